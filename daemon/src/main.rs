@@ -1,0 +1,2 @@
+//! The scenecast command.
+fn main() {}

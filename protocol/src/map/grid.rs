@@ -1,0 +1,184 @@
+//! Unbounded sparse grid of labels.
+
+use std::collections::BTreeMap;
+
+/// Edge of a storage tile in cells.
+pub const TILE: i32 = 16;
+
+/// A cell's place on the grid: east and north counts of cells from the session's origin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Cell {
+    /// Cells east of the origin.
+    pub x: i32,
+    /// Cells north of the origin.
+    pub y: i32,
+}
+
+impl Cell {
+    /// The cell `x` cells east and `y` cells north of the origin.
+    pub const fn new(x: i32, y: i32) -> Self {
+        Self { x, y }
+    }
+
+    fn tile(self) -> (i32, i32) {
+        (self.y.div_euclid(TILE), self.x.div_euclid(TILE))
+    }
+
+    fn index(self) -> usize {
+        (self.y.rem_euclid(TILE) * TILE + self.x.rem_euclid(TILE)) as usize
+    }
+}
+
+/// A rectangle of cells; `width` and `height` are at least 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rect {
+    /// Westernmost column.
+    pub x: i32,
+    /// Southernmost row.
+    pub y: i32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Rect {
+    /// Smallest rectangle that holds every cell; `None` if there is none.
+    pub fn around(cells: impl IntoIterator<Item = Cell>) -> Option<Self> {
+        let mut bounds: Option<(i32, i32, i32, i32)> = None;
+        for c in cells {
+            let (x0, y0, x1, y1) = bounds.unwrap_or((c.x, c.y, c.x, c.y));
+            bounds = Some((x0.min(c.x), y0.min(c.y), x1.max(c.x), y1.max(c.y)));
+        }
+        bounds.map(|(x0, y0, x1, y1)| Self { x: x0, y: y0, width: x1.abs_diff(x0) + 1, height: y1.abs_diff(y0) + 1 })
+    }
+
+    /// Whether `cell` lies inside.
+    pub fn contains(&self, cell: Cell) -> bool {
+        cell.x >= self.x
+            && cell.y >= self.y
+            && cell.x.abs_diff(self.x) < self.width
+            && cell.y.abs_diff(self.y) < self.height
+    }
+
+    /// Every cell, row by row from the south-west corner.
+    pub fn cells(&self) -> impl Iterator<Item = Cell> + use<> {
+        let r = *self;
+        (0..r.height).flat_map(move |dy| {
+            (0..r.width).map(move |dx| Cell::new(r.x.wrapping_add_unsigned(dx), r.y.wrapping_add_unsigned(dy)))
+        })
+    }
+
+    /// Number of cells.
+    pub fn area(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+/// Labels by cell; a cell never set reads as [`UNEXPLORED`](super::UNEXPLORED).
+///
+/// Memory is one byte a cell in tiles of [`TILE`] x [`TILE`] that hold at least one set cell.
+#[derive(Debug, Clone, Default)]
+pub struct LabelGrid {
+    tiles: BTreeMap<(i32, i32), Box<[u8; (TILE * TILE) as usize]>>,
+}
+
+impl LabelGrid {
+    /// The label of `cell`.
+    pub fn get(&self, cell: Cell) -> u8 {
+        self.tiles.get(&cell.tile()).map_or(0, |t| t[cell.index()])
+    }
+
+    /// Sets the label of `cell` and returns the one it had.
+    pub fn set(&mut self, cell: Cell, label: u8) -> u8 {
+        if label == 0 && !self.tiles.contains_key(&cell.tile()) {
+            return 0;
+        }
+        let tile = self.tiles.entry(cell.tile()).or_insert_with(|| Box::new([0; (TILE * TILE) as usize]));
+        std::mem::replace(&mut tile[cell.index()], label)
+    }
+
+    /// Explored cells with their labels, tile by tile in a fixed order.
+    pub fn iter(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
+        self.tiles.iter().flat_map(|(&(ty, tx), tile)| {
+            tile.iter().enumerate().filter(|&(_, &l)| l != 0).map(move |(i, &l)| {
+                let i = i as i32;
+                (Cell::new(tx * TILE + i % TILE, ty * TILE + i / TILE), l)
+            })
+        })
+    }
+
+    /// Number of explored cells.
+    pub fn explored(&self) -> usize {
+        self.iter().count()
+    }
+
+    /// Smallest rectangle around the explored cells.
+    pub fn bounds(&self) -> Option<Rect> {
+        Rect::around(self.iter().map(|(c, _)| c))
+    }
+
+    /// Whether no cell is explored.
+    pub fn is_empty(&self) -> bool {
+        self.iter().next().is_none()
+    }
+
+    /// Forgets every cell.
+    pub fn clear(&mut self) {
+        self.tiles.clear();
+    }
+}
+
+impl PartialEq for LabelGrid {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl Eq for LabelGrid {}
+
+impl FromIterator<(Cell, u8)> for LabelGrid {
+    fn from_iter<I: IntoIterator<Item = (Cell, u8)>>(cells: I) -> Self {
+        let mut grid = Self::default();
+        for (cell, label) in cells {
+            grid.set(cell, label);
+        }
+        grid
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn negative_and_far_cells_keep_their_own_labels() {
+        let cells = [(-1, -1), (0, 0), (-16, 15), (-17, 16), (i32::MAX, i32::MIN)];
+        let mut grid = LabelGrid::default();
+        for (i, (x, y)) in cells.into_iter().enumerate() {
+            assert_eq!(grid.set(Cell::new(x, y), i as u8 + 1), 0);
+        }
+        for (i, (x, y)) in cells.into_iter().enumerate() {
+            assert_eq!(grid.get(Cell::new(x, y)), i as u8 + 1);
+        }
+        assert_eq!(grid.explored(), cells.len());
+    }
+
+    #[test]
+    fn grids_with_equal_cells_are_equal_whatever_tiles_they_touched() {
+        let mut a = LabelGrid::default();
+        a.set(Cell::new(100, 100), 3);
+        a.set(Cell::new(100, 100), 0);
+        assert_eq!(a, LabelGrid::default());
+        assert!(a.is_empty());
+    }
+
+    #[test]
+    fn rect_iterates_every_cell_inside_it() {
+        let r = Rect { x: -2, y: 5, width: 3, height: 2 };
+        let cells: Vec<_> = r.cells().collect();
+        assert_eq!(cells.len() as u64, r.area());
+        assert!(cells.iter().all(|&c| r.contains(c)));
+        assert_eq!(Rect::around(cells), Some(r));
+    }
+}
