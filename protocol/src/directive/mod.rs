@@ -1,0 +1,238 @@
+//! What the surface tells a vehicle: independent versioned slots.
+
+mod fix;
+mod outbox;
+mod settings;
+mod utility;
+
+pub use fix::Fix;
+pub use outbox::{LifeLine, SlotOutbox, SlotProgress};
+pub use settings::{Budget, Constraints, Requests, Settings};
+pub use utility::Utility;
+
+use crate::wire::{Reader, Truncated};
+
+/// Number of slots.
+pub const SLOTS: usize = 6;
+
+/// A slot of the directive; a newer version supersedes the older one of the same slot only.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SlotId {
+    /// What each label is worth.
+    Utility,
+    /// Where and how the vehicle may move.
+    Constraints,
+    /// How the vehicle builds its map.
+    Settings,
+    /// Bits the vehicle may put on air.
+    Budget,
+    /// Representative images asked for.
+    Requests,
+    /// Where the vehicle is, seen from the surface.
+    Fix,
+}
+
+impl SlotId {
+    /// Every slot, in wire order.
+    pub const ALL: [Self; SLOTS] =
+        [Self::Utility, Self::Constraints, Self::Settings, Self::Budget, Self::Requests, Self::Fix];
+
+    /// Place in [`Self::ALL`] and number on the wire.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Utility => "utility",
+            Self::Constraints => "constraints",
+            Self::Settings => "settings",
+            Self::Budget => "budget",
+            Self::Requests => "requests",
+            Self::Fix => "fix",
+        }
+    }
+}
+
+/// Why a vehicle refuses a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum RefusalReason {
+    /// The bytes make no sense.
+    Malformed,
+    /// It speaks of labels of another epoch.
+    OtherEpoch,
+    /// It names a label that the map does not have.
+    UnknownLabel,
+    /// A value lies outside what the vehicle accepts.
+    OutOfRange,
+    /// It contradicts itself or a constraint in force.
+    Contradiction,
+    /// It came too late to be of use.
+    TooOld,
+}
+
+impl RefusalReason {
+    const ALL: [Self; 6] = [
+        Self::Malformed,
+        Self::OtherEpoch,
+        Self::UnknownLabel,
+        Self::OutOfRange,
+        Self::Contradiction,
+        Self::TooOld,
+    ];
+
+    pub(crate) fn code(self) -> u8 {
+        self as u8 + 2
+    }
+
+    pub(crate) fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|r| r.code() == code)
+    }
+
+    /// One sentence for the operator.
+    pub fn explain(self) -> &'static str {
+        match self {
+            Self::Malformed => "the vehicle could not read it",
+            Self::OtherEpoch => "the vehicle has renumbered its labels since: set the weights again",
+            Self::UnknownLabel => "it names a label that is not on the vehicle's map",
+            Self::OutOfRange => "a value is outside what the vehicle accepts",
+            Self::Contradiction => "it contradicts a constraint in force",
+            Self::TooOld => "it came too late to be of use",
+        }
+    }
+}
+
+/// The payload of a slot.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Slot {
+    /// See [`Utility`].
+    Utility(Utility),
+    /// See [`Constraints`].
+    Constraints(Constraints),
+    /// See [`Settings`].
+    Settings(Settings),
+    /// See [`Budget`].
+    Budget(Budget),
+    /// See [`Requests`].
+    Requests(Requests),
+    /// See [`Fix`].
+    Fix(Fix),
+}
+
+impl Slot {
+    /// Which slot this is the content of.
+    pub fn id(&self) -> SlotId {
+        match self {
+            Self::Utility(_) => SlotId::Utility,
+            Self::Constraints(_) => SlotId::Constraints,
+            Self::Settings(_) => SlotId::Settings,
+            Self::Budget(_) => SlotId::Budget,
+            Self::Requests(_) => SlotId::Requests,
+            Self::Fix(_) => SlotId::Fix,
+        }
+    }
+
+    fn encode_payload(&self, out: &mut Vec<u8>) {
+        match self {
+            Self::Utility(v) => v.encode(out),
+            Self::Constraints(v) => v.encode(out),
+            Self::Settings(v) => v.encode(out),
+            Self::Budget(v) => v.encode(out),
+            Self::Requests(v) => v.encode(out),
+            Self::Fix(v) => v.encode(out),
+        }
+    }
+
+    fn decode_payload(id: SlotId, r: &mut Reader<'_>) -> Result<Self, Truncated> {
+        Ok(match id {
+            SlotId::Utility => Self::Utility(Utility::decode(r)?),
+            SlotId::Constraints => Self::Constraints(Constraints::decode(r)?),
+            SlotId::Settings => Self::Settings(Settings::decode(r)?),
+            SlotId::Budget => Self::Budget(Budget::decode(r)?),
+            SlotId::Requests => Self::Requests(Requests::decode(r)?),
+            SlotId::Fix => Self::Fix(Fix::decode(r)?),
+        })
+    }
+}
+
+/// A slot as it travels.
+///
+/// ```text
+///  0                   1                   2                   3
+///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
+/// +-----+---------+-------------------------------+---------------
+/// |slot |0 0 0 0 0| series                        | version
+/// +-----+---------+-------------------------------+---------------
+///   version       | payload ...
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct VersionedSlot {
+    /// Which slot.
+    pub id: SlotId,
+    /// Random number of the run of the surface that counts the versions.
+    pub series: u16,
+    /// Version in the series; wraps.
+    pub version: u16,
+    /// What it says; `None` if the payload could not be read.
+    pub content: Option<Slot>,
+}
+
+impl VersionedSlot {
+    /// The bytes of `slot` at `version` of `series`.
+    pub fn encode(series: u16, version: u16, slot: &Slot) -> Vec<u8> {
+        let mut out = vec![(slot.id() as u8) << 5];
+        out.extend_from_slice(&series.to_be_bytes());
+        out.extend_from_slice(&version.to_be_bytes());
+        slot.encode_payload(&mut out);
+        out
+    }
+
+    /// Reads a slot; an unreadable payload still yields its id and version, so that it can be refused by name.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
+        let mut r = Reader::new(bytes);
+        let head = r.u8()?;
+        let id = SlotId::ALL.get(usize::from(head >> 5)).copied().ok_or(Truncated)?;
+        let (series, version) = (r.u16()?, r.u16()?);
+        let content = Slot::decode_payload(id, &mut r).ok().filter(|_| r.rest().is_empty());
+        Ok(Self { id, series, version, content })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..80)) {
+            let _ = VersionedSlot::decode(&bytes);
+        }
+
+        #[test]
+        fn utilities_round_trip(
+            weights in proptest::collection::btree_map(1u8..=254, -100i8..=100, 0..60),
+            exploration in -100i8..=100, epoch: u8, series: u16, version: u16,
+        ) {
+            let slot = Slot::Utility(Utility { epoch, exploration, curiosity: 5, weights });
+            let bytes = VersionedSlot::encode(series, version, &slot);
+            let back = VersionedSlot { id: SlotId::Utility, series, version, content: Some(slot) };
+            prop_assert_eq!(VersionedSlot::decode(&bytes), Ok(back));
+        }
+    }
+
+    #[test]
+    fn twelve_weights_fit_a_frame_of_64_bytes() {
+        let weights = (1..=12).map(|l| (l, 50)).collect();
+        let bytes = VersionedSlot::encode(1, 1, &Slot::Utility(Utility { weights, ..Utility::default() }));
+        assert!(bytes.len() <= 49, "{} bytes", bytes.len());
+    }
+
+    #[test]
+    fn golden_bytes_of_a_utility() {
+        let weights = [(3, 80), (5, -20)].into_iter().collect();
+        let utility = Utility { epoch: 1, exploration: 20, curiosity: 0, weights };
+        assert_eq!(VersionedSlot::encode(0xABCD, 4, &Slot::Utility(utility)), [0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]);
+    }
+}

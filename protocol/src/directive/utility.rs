@@ -1,0 +1,51 @@
+//! The operator's utility function.
+
+use crate::wire::{Reader, Truncated};
+use std::collections::BTreeMap;
+
+/// What seeing one more cell of each label is worth to the operator.
+///
+/// ```text
+/// byte  field
+///  0    label epoch
+///  1    weight of unseen cells, hundredths, signed, -100..=100
+///  2    weight of perplexity, hundredths, signed, -100..=100
+///  3..  pairs: label 1..=254, weight in hundredths, signed, -100..=100; a label not named weighs 0
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Utility {
+    /// Epoch of the label ids.
+    pub epoch: u8,
+    /// Weight of unseen cells, hundredths.
+    pub exploration: i8,
+    /// Weight of perplexity, hundredths.
+    pub curiosity: i8,
+    /// Weight by label, hundredths.
+    pub weights: BTreeMap<u8, i8>,
+}
+
+impl Utility {
+    /// Weight of a label in -1..=1.
+    pub fn weight(&self, label: u8) -> f64 {
+        self.weights.get(&label).map_or(0.0, |&w| f64::from(w) / 100.0)
+    }
+
+    /// Whether every weight lies in -100..=100 and every label in 1..=254.
+    pub fn is_in_range(&self) -> bool {
+        let ok = |w: i8| (-100..=100).contains(&w);
+        ok(self.exploration) && ok(self.curiosity) && self.weights.iter().all(|(&l, &w)| (1..=254).contains(&l) && ok(w))
+    }
+
+    pub(super) fn encode(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(&[self.epoch, self.exploration as u8, self.curiosity as u8]);
+        out.extend(self.weights.iter().flat_map(|(&l, &w)| [l, w as u8]));
+    }
+
+    pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
+        let mut utility = Self { epoch: r.u8()?, exploration: r.i8()?, curiosity: r.i8()?, weights: BTreeMap::new() };
+        while !r.rest().is_empty() {
+            utility.weights.insert(r.u8()?, r.i8()?);
+        }
+        Ok(utility)
+    }
+}

@@ -1,0 +1,47 @@
+//! Two ends that agree, whatever the water does to the frames between them.
+//!
+//! [`VehicleLink`] and [`SurfaceLink`] are the ends. What they share, the state of a pair of ends, is in [`Pair`], split by
+//! concern: [`Sessions`] (who restarted), [`Flight`] (frames of unknown fate), [`Window`] (frames heard).
+
+mod flight;
+mod pair;
+mod sessions;
+mod slots;
+mod stats;
+mod surface;
+mod surface_peer;
+mod vehicle;
+mod window;
+
+pub use flight::Flight;
+pub use pair::{Inbound, Pair};
+pub use sessions::{Sessions, Sighting};
+pub use slots::{SlotInbox, SlotInboxState};
+pub use stats::{DropReason, LinkStats};
+pub use surface::{SurfaceConfig, SurfaceEvent, SurfaceLink};
+pub use surface_peer::PeerView;
+pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
+pub use window::{Refusal, Window};
+
+/// A frame to put on air.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Transmit {
+    /// Receiver.
+    pub to: crate::wire::Address,
+    /// The frame.
+    pub bytes: Vec<u8>,
+    /// What the frame mostly carries.
+    pub kind: &'static str,
+}
+
+/// Why the link asks to be woken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wakeup {
+    /// Its granted turn begins, or its budget allows the next frame.
+    Turn,
+    /// The surface may grant the next turn.
+    Grant,
+}
+
+/// The frame number after which a peer that lost its state starts counting what it hears.
+type FrameNumber = u64;

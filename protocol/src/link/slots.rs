@@ -1,0 +1,121 @@
+//! The vehicle's side of the directive: each version of each slot is decided about once.
+
+use crate::directive::{SLOTS, SlotId, VersionedSlot};
+use crate::wire::{SlotReport, SlotState};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// What must survive a restart of the vehicle so that nothing is applied twice.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct SlotInboxState {
+    /// The series of versions that is being followed.
+    pub series: Option<u16>,
+    /// Series that have ended.
+    pub retired: VecDeque<u16>,
+    /// Latest version seen, by slot.
+    pub versions: [Option<u16>; SLOTS],
+}
+
+/// Filters the slots that arrive, and reports what was decided.
+#[derive(Debug, Default)]
+pub struct SlotInbox {
+    state: SlotInboxState,
+    reports: [SlotReport; SLOTS],
+}
+
+impl SlotInbox {
+    /// Ended series to remember.
+    const MEMORY: usize = 16;
+
+    /// An inbox that continues from what survived; the slots seen then count as applied.
+    pub fn restore(state: SlotInboxState) -> Self {
+        let mut reports = [SlotReport::default(); SLOTS];
+        for (report, version) in reports.iter_mut().zip(state.versions) {
+            if let Some(version) = version {
+                *report = SlotReport { version_low: version as u8, state: SlotState::Applied };
+            }
+        }
+        Self { state, reports }
+    }
+
+    /// What must survive.
+    pub fn state(&self) -> &SlotInboxState {
+        &self.state
+    }
+
+    /// Decisions, for the status.
+    pub fn reports(&self) -> [SlotReport; SLOTS] {
+        self.reports
+    }
+
+    /// Whether a version that arrived is news; if so it is from now on counted as seen.
+    pub fn admit(&mut self, slot: &VersionedSlot) -> bool {
+        if self.state.retired.contains(&slot.series) {
+            return false;
+        }
+        if self.state.series != Some(slot.series) {
+            self.begin_series(slot.series);
+        }
+        let seen = &mut self.state.versions[slot.id.index()];
+        let newer = seen.is_none_or(|v| (slot.version.wrapping_sub(v) as i16) > 0);
+        if newer {
+            *seen = Some(slot.version);
+        }
+        newer
+    }
+
+    /// The host has decided about the latest version of a slot.
+    pub fn decide(&mut self, id: SlotId, state: SlotState) {
+        if let Some(version) = self.state.versions[id.index()] {
+            self.reports[id.index()] = SlotReport { version_low: version as u8, state };
+        }
+    }
+
+    fn begin_series(&mut self, series: u16) {
+        if let Some(old) = self.state.series.replace(series) {
+            self.state.retired.push_back(old);
+            if self.state.retired.len() > Self::MEMORY {
+                self.state.retired.pop_front();
+            }
+        }
+        self.state.versions = [None; SLOTS];
+        self.reports = [SlotReport::default(); SLOTS];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    fn slot(series: u16, version: u16) -> VersionedSlot {
+        VersionedSlot { id: SlotId::Utility, series, version, content: None }
+    }
+
+    proptest! {
+        #[test]
+        fn no_version_is_admitted_twice_even_across_restarts(
+            arrivals in proptest::collection::vec((0u16..4, 1u16..30, any::<bool>()), 1..200),
+        ) {
+            let mut inbox = SlotInbox::default();
+            let mut admitted = BTreeSet::new();
+            for (series, version, restart) in arrivals {
+                if inbox.admit(&slot(series, version)) {
+                    prop_assert!(admitted.insert((series, version)));
+                }
+                if restart {
+                    inbox = SlotInbox::restore(inbox.state().clone());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn versions_wrap_without_going_back() {
+        let mut inbox = SlotInbox::default();
+        assert!(inbox.admit(&slot(1, 65_535)));
+        assert!(inbox.admit(&slot(1, 0)));
+        assert!(!inbox.admit(&slot(1, 65_535)));
+    }
+}

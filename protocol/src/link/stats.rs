@@ -1,0 +1,83 @@
+//! What a link counts.
+
+use crate::schedule::Class;
+use crate::wire::FrameError;
+use std::collections::BTreeMap;
+
+/// Why received bytes were dropped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DropReason {
+    /// Too short to be a frame.
+    Truncated,
+    /// Of another wire version.
+    Version,
+    /// For somebody else.
+    NotForUs,
+    /// Corrupted, of another mission, or for an earlier run of ours.
+    Checksum,
+    /// A field or chunk that makes no sense.
+    Malformed,
+    /// From a run of the peer that has ended.
+    OldSession,
+    /// Taken before.
+    Duplicate,
+    /// Came after it was declared lost.
+    Late,
+    /// Refers to a base that we lack.
+    NoBase,
+    /// From nobody we know.
+    Stranger,
+}
+
+impl From<FrameError> for DropReason {
+    fn from(e: FrameError) -> Self {
+        match e {
+            FrameError::Truncated => Self::Truncated,
+            FrameError::Version(_) => Self::Version,
+            FrameError::NotForUs => Self::NotForUs,
+            FrameError::Checksum => Self::Checksum,
+            FrameError::BadField => Self::Malformed,
+        }
+    }
+}
+
+/// Counters of one end toward one peer.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LinkStats {
+    /// Frames put on air.
+    pub frames_sent: u64,
+    /// Frames taken.
+    pub frames_heard: u64,
+    /// Own frames that the peer declared lost.
+    pub frames_lost: u64,
+    /// Own frames that the peer declared held.
+    pub frames_delivered: u64,
+    /// Received bytes that were dropped, by reason.
+    pub dropped: BTreeMap<DropReason, u64>,
+    /// Bytes put on air, by class.
+    pub bytes_by_class: BTreeMap<Class, u64>,
+    /// Bytes of chunks that the peer declared held, by class.
+    pub delivered_by_class: BTreeMap<Class, u64>,
+    /// Restarts of the peer that were noticed.
+    pub peer_restarts: u64,
+    /// Times that the two maps were found to differ and were sent afresh.
+    pub resyncs: u64,
+}
+
+impl LinkStats {
+    /// Counts a drop.
+    pub fn drop(&mut self, reason: DropReason) {
+        *self.dropped.entry(reason).or_default() += 1;
+    }
+
+    /// Counts bytes put on air.
+    pub fn count(&mut self, class: Class, bytes: usize) {
+        *self.bytes_by_class.entry(class).or_default() += bytes as u64;
+    }
+
+    /// Share of judged frames that were lost.
+    pub fn loss(&self) -> f64 {
+        let judged = self.frames_lost + self.frames_delivered;
+        if judged == 0 { 0.0 } else { self.frames_lost as f64 / judged as f64 }
+    }
+}

@@ -1,0 +1,155 @@
+//! Frames heard.
+
+use super::FrameNumber;
+use crate::wire::{AckStatement, MAX_WINDOW, unwrap_number};
+use std::collections::BTreeSet;
+
+/// Why a verified frame is not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// It was taken before.
+    Duplicate,
+    /// It comes after it was declared lost, or refers to a base that is gone.
+    Late,
+    /// It claims a base that we never acknowledged.
+    NoBase,
+}
+
+/// What was heard of one session of a peer.
+///
+/// Invariants: `base <= closed <= highest`; a frame up to `closed` that is not in `held` never will be.
+#[derive(Debug)]
+pub struct Window {
+    base: FrameNumber,
+    closed: FrameNumber,
+    highest: FrameNumber,
+    held: BTreeSet<FrameNumber>,
+    unpersisted: BTreeSet<FrameNumber>,
+}
+
+impl Window {
+    /// A window that opens with the first frame heard: what the sender calls known is none of our business.
+    pub fn opened_by(number_low: u16, base_distance: u16) -> Self {
+        let number = u64::from(number_low) + 0x1_0000;
+        let base = number - u64::from(base_distance);
+        Self { base, closed: base, highest: base, held: BTreeSet::new(), unpersisted: BTreeSet::new() }
+    }
+
+    /// The last frame whose fate the sender is known to know.
+    pub fn base(&self) -> FrameNumber {
+        self.base
+    }
+
+    /// Frames missing so far above the base.
+    pub fn missing(&self) -> u64 {
+        self.highest - self.base - self.held.len() as u64
+    }
+
+    /// Takes a frame, or says why not.
+    pub fn accept(&mut self, number_low: u16, base_distance: u16) -> Result<FrameNumber, Refusal> {
+        let number = unwrap_number(number_low, self.highest);
+        let base = number.checked_sub(u64::from(base_distance)).ok_or(Refusal::Late)?;
+        if self.held.contains(&number) {
+            return Err(Refusal::Duplicate);
+        }
+        if number <= self.closed || base < self.base {
+            return Err(Refusal::Late);
+        }
+        if base > self.closed || number - self.base > 2 * MAX_WINDOW {
+            return Err(Refusal::NoBase);
+        }
+        self.base = base;
+        self.held = self.held.split_off(&(base + 1));
+        self.held.insert(number);
+        self.highest = self.highest.max(number);
+        Ok(number)
+    }
+
+    /// Frame `number` may not be acknowledged before the host has made its content durable.
+    pub fn hold_back(&mut self, number: FrameNumber) {
+        self.unpersisted.insert(number);
+    }
+
+    /// Everything taken so far is durable.
+    pub fn handle_persisted(&mut self) {
+        self.unpersisted.clear();
+    }
+
+    /// The verdict on what was heard, in at most `room` bytes; `None` if the sender knows everything already.
+    ///
+    /// What the verdict calls lost is closed: it will not be taken later.
+    pub fn statement(&mut self, room: usize) -> Option<AckStatement> {
+        let mut horizon = self.unpersisted.first().map_or(self.highest, |&n| n - 1);
+        loop {
+            if horizon <= self.base {
+                return None;
+            }
+            let lost = (self.base + 1..=horizon).rev().filter(|n| !self.held.contains(n));
+            let lost: Vec<u16> = lost.map(|n| (horizon - n) as u16).collect();
+            let statement = AckStatement { horizon_low: (horizon & 0xFFF) as u16, lost };
+            if statement.encode(room, &mut Vec::new()) {
+                self.closed = self.closed.max(horizon);
+                return Some(statement);
+            }
+            horizon = self.base + (horizon - self.base) * 3 / 4;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Flight;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Both ends agree for ever on what was delivered up to the sender's horizon.
+        #[test]
+        fn sender_and_receiver_agree_on_every_fate(
+            events in proptest::collection::vec((0u8..10, 0usize..40, 3usize..20), 1..400), start in 0u64..70_000,
+        ) {
+            let mut flight = Flight::<u64>::default();
+            for _ in 0..start % 7 { flight.push(0); }
+            flight.handle_peer_restart();
+            let mut window: Option<Window> = None;
+            let mut water: Vec<(u64, u16)> = Vec::new();
+            let mut taken = BTreeSet::new();
+            let mut fates = Vec::new();
+            for (what, pick, room) in events {
+                match what {
+                    0..5 if !flight.is_full() => {
+                        water.push((flight.next_number(), flight.base_distance()));
+                        flight.push(flight.next_number());
+                    }
+                    5..8 if !water.is_empty() => {
+                        let (number, distance) = water.remove(pick % water.len());
+                        let w = window.get_or_insert_with(|| Window::opened_by(number as u16, distance));
+                        if w.accept(number as u16, distance).is_ok() {
+                            prop_assert!(taken.insert(number), "frame {} taken twice", number);
+                        }
+                    }
+                    _ => {
+                        if let Some(s) = window.as_mut().and_then(|w| w.statement(room)) {
+                            if pick % 3 > 0 {
+                                fates.extend(flight.handle_statement(&s));
+                            }
+                        }
+                    }
+                }
+            }
+            for (number, delivered) in fates {
+                prop_assert_eq!(taken.contains(&number), delivered, "frame {}", number);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_durable_is_not_acknowledged() {
+        let mut w = Window::opened_by(1, 1);
+        let first = w.accept(1, 1).unwrap();
+        w.hold_back(first);
+        assert_eq!(w.statement(10), None);
+        w.handle_persisted();
+        assert!(w.statement(10).is_some());
+    }
+}

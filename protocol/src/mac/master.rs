@@ -1,0 +1,155 @@
+//! The surface's side of the turns.
+
+use super::{ModemProfile, quarter_seconds};
+use crate::time::Instant;
+use std::time::Duration;
+
+/// How the surface grants turns to one vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MasterConfig {
+    /// Longest one-way propagation delay to expect before a round trip was measured.
+    pub max_propagation: Duration,
+    /// Longest turn to grant.
+    pub max_turn: Duration,
+    /// Longest pause between turns while nothing is to be said.
+    pub max_idle: Duration,
+}
+
+impl Default for MasterConfig {
+    fn default() -> Self {
+        Self {
+            max_propagation: Duration::from_millis(2200),
+            max_turn: Duration::from_secs(12),
+            max_idle: Duration::from_secs(10),
+        }
+    }
+}
+
+/// What the medium is doing, as far as the surface knows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum State {
+    /// Nobody speaks; the next grant goes out at the given time.
+    Idle { next: Instant },
+    /// The surface is on air.
+    Speaking,
+    /// The vehicle has the turn: nothing heard yet since the grant ended at `granted`.
+    Granted { granted: Instant, until: Instant },
+    /// The vehicle is speaking.
+    Listening { until: Instant },
+}
+
+/// Grants turns to one vehicle and recovers lost grants.
+#[derive(Debug)]
+pub struct Master {
+    config: MasterConfig,
+    state: State,
+    round_trip: Option<Duration>,
+    unanswered: u32,
+    granted_airtime: Duration,
+    begun: Option<Instant>,
+}
+
+impl Master {
+    /// A master that may grant its first turn at `now`.
+    pub fn new(config: MasterConfig, now: Instant) -> Self {
+        Self { config, state: State::Idle { next: now }, round_trip: None, unanswered: 0, granted_airtime: Duration::ZERO, begun: None }
+    }
+
+    /// Two-way propagation, smoothed; `None` before the first answer.
+    pub fn round_trip(&self) -> Option<Duration> {
+        self.round_trip
+    }
+
+    /// Grants in a row that were not answered.
+    pub fn unanswered(&self) -> u32 {
+        self.unanswered
+    }
+
+    /// When the last turn began.
+    pub fn begun(&self) -> Option<Instant> {
+        self.begun
+    }
+
+    /// Whether the surface's own turn is under way.
+    pub fn is_speaking(&self) -> bool {
+        self.state == State::Speaking
+    }
+
+    /// Whether the medium is taken by a turn of this vehicle or a grant to it.
+    pub fn is_engaged(&self) -> bool {
+        !matches!(self.state, State::Idle { .. })
+    }
+
+    /// Whether the surface may begin its turn at `now`; `news` ends an idle pause.
+    pub fn may_speak(&self, news: bool, now: Instant) -> bool {
+        match self.state {
+            State::Idle { next } => news || now >= next,
+            State::Speaking => false,
+            State::Granted { until, .. } | State::Listening { until } => now >= until,
+        }
+    }
+
+    /// When [`Self::may_speak`] next turns true by itself.
+    pub fn next_wakeup(&self) -> Option<Instant> {
+        match self.state {
+            State::Idle { next } => Some(next),
+            State::Speaking => None,
+            State::Granted { until, .. } | State::Listening { until } => Some(until),
+        }
+    }
+
+    /// The turn to grant: long against what changing hands costs, in quarter seconds.
+    pub fn grant(&self, profile: &ModemProfile) -> u8 {
+        let cost = self.round_trip.unwrap_or(self.config.max_propagation * 2) + profile.turn_around * 2;
+        let least = profile.frame_airtime() + Duration::from_secs(1);
+        quarter_seconds((cost * 8).max(least).min(self.config.max_turn.max(least)), 255)
+    }
+
+    /// The surface begins its turn. A turn that begins while an answer was due counts as unanswered.
+    pub fn begin(&mut self, grant_quarters: u8, now: Instant) {
+        self.begun = Some(now);
+        if matches!(self.state, State::Granted { .. }) {
+            self.unanswered += 1;
+        }
+        self.granted_airtime = Duration::from_millis(250) * u32::from(grant_quarters);
+        self.state = State::Speaking;
+    }
+
+    /// The last frame of the surface's turn has left the modem.
+    pub fn handle_turn_sent(&mut self, profile: &ModemProfile, now: Instant) {
+        let flight = self.round_trip.map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 2 + Duration::from_millis(200));
+        let until = now + flight + profile.turn_around * 2 + profile.frame_airtime();
+        self.state = State::Granted { granted: now, until };
+    }
+
+    /// A frame of the vehicle was heard, which it says `remaining` more will follow; `wish` is its turn byte.
+    pub fn handle_frame(&mut self, bytes: usize, remaining: u8, wish: Option<u8>, profile: &ModemProfile, now: Instant) {
+        if let State::Granted { granted, .. } = self.state {
+            let both_ways = now.since(granted).saturating_sub(profile.airtime(bytes) + profile.turn_around);
+            self.round_trip = Some(self.round_trip.map_or(both_ways, |old| follow(old, both_ways)));
+        }
+        self.unanswered = 0;
+        if remaining > 0 {
+            let rest = profile.frame_airtime() * u32::from(remaining);
+            let margin = profile.turn_around + profile.frame_airtime() / 2;
+            let until = now + rest.min(self.granted_airtime) + margin;
+            self.state = State::Listening { until };
+            return;
+        }
+        let pause = wish.map_or(Duration::ZERO, |quarters| Duration::from_millis(250) * u32::from(quarters));
+        self.state = State::Idle { next: now + profile.turn_around + pause.min(self.config.max_idle) };
+    }
+
+    /// Nothing may be sent before `at` (the budget does not allow it): wait until then.
+    pub fn postpone(&mut self, at: Instant) {
+        if let State::Granted { .. } = self.state {
+            self.unanswered += 1;
+        }
+        self.state = State::Idle { next: at };
+    }
+}
+
+/// Follows a shorter round trip fast and a longer one slowly: a lost first frame of an answer makes it look longer.
+fn follow(old: Duration, measured: Duration) -> Duration {
+    if measured < old { (old + measured) / 2 } else { (old * 15 + measured.min(old * 2)) / 16 }
+}

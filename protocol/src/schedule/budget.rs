@@ -1,0 +1,147 @@
+//! The bit budget of one transmitter.
+
+use crate::time::Instant;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Lets whole modem transmissions out so that neither any window nor the long run exceeds the budget.
+///
+/// Two conditions, both in bits on air:
+/// * the transmissions begun within the last window add up to less than `rate x window`, so that one more exceeds it by at
+///   most itself;
+/// * a token bucket as deep as `rate x window`, filled at `rate`, has the bits (or is full, for a transmission larger than
+///   the bucket, which then leaves a debt). This bounds the long-run mean where a transmission is large against a window.
+#[derive(Debug, Clone)]
+pub struct BitBudget {
+    bits_per_s: f64,
+    window: Duration,
+    tokens: f64,
+    filled: Instant,
+    recent: VecDeque<(Instant, u64)>,
+    recent_bits: u64,
+}
+
+impl BitBudget {
+    /// A budget of `bits_per_s` over `window`, unused at `now`.
+    pub fn new(bits_per_s: u32, window: Duration, now: Instant) -> Self {
+        let rate = f64::from(bits_per_s.max(1));
+        let tokens = rate * window.as_secs_f64();
+        Self { bits_per_s: rate, window, tokens, filled: now, recent: VecDeque::new(), recent_bits: 0 }
+    }
+
+    /// Bits a second.
+    pub fn bits_per_s(&self) -> u32 {
+        self.bits_per_s as u32
+    }
+
+    /// The window.
+    pub fn window(&self) -> Duration {
+        self.window
+    }
+
+    /// Changes the rate from `now` on; what was sent stays counted.
+    pub fn set_rate(&mut self, bits_per_s: u32, now: Instant) {
+        self.advance(now);
+        self.bits_per_s = f64::from(bits_per_s.max(1));
+        self.tokens = self.tokens.min(self.capacity());
+    }
+
+    /// When a transmission of `bits` may begin; `now` if it may at once.
+    pub fn earliest(&self, bits: u64, now: Instant) -> Instant {
+        let mut at = now;
+        let tokens = self.tokens + self.bits_per_s * now.since(self.filled).as_secs_f64();
+        let short = (bits as f64).min(self.capacity()) - tokens;
+        if short > 0.0 {
+            at = now + Duration::from_micros((short / self.bits_per_s * 1e6).ceil() as u64);
+        }
+        let limit = self.capacity();
+        let mut sum = self.recent_bits as f64;
+        for &(sent, sent_bits) in &self.recent {
+            if sum < limit {
+                break;
+            }
+            at = at.max(sent + self.window);
+            sum -= sent_bits as f64;
+        }
+        at
+    }
+
+    /// How many transmissions of `bits` each may begin back to back at `now`, at most `most`.
+    pub fn affordable(&self, bits: u64, most: u32, now: Instant) -> u32 {
+        let mut trial = self.clone();
+        (0..most)
+            .take_while(|_| {
+                let ok = trial.earliest(bits, now) <= now;
+                trial.spend(bits, now);
+                ok
+            })
+            .count() as u32
+    }
+
+    /// Counts a transmission that begins at `now`.
+    pub fn spend(&mut self, bits: u64, now: Instant) {
+        self.advance(now);
+        self.tokens -= bits as f64;
+        self.recent.push_back((now, bits));
+        self.recent_bits += bits;
+    }
+
+    fn capacity(&self) -> f64 {
+        self.bits_per_s * self.window.as_secs_f64()
+    }
+
+    fn advance(&mut self, now: Instant) {
+        let gained = self.bits_per_s * now.since(self.filled).as_secs_f64();
+        self.tokens = (self.tokens + gained).min(self.capacity());
+        self.filled = self.filled.max(now);
+        while let Some(&(sent, bits)) = self.recent.front()
+            && now.since(sent) >= self.window
+        {
+            self.recent.pop_front();
+            self.recent_bits -= bits;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Audit;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn no_window_exceeds_the_budget_by_more_than_one_transmission(
+            rate in 50u32..20_000,
+            sizes in proptest::collection::vec((100u64..9000, 0u64..4_000_000), 1..200),
+        ) {
+            let window = Duration::from_secs(10);
+            let mut budget = BitBudget::new(rate, window, Instant::ZERO);
+            let mut audit = Audit::new(window);
+            let (mut now, mut largest, mut total) = (Instant::ZERO, 0, 0);
+            for (bits, pause) in sizes {
+                now = budget.earliest(bits, now + Duration::from_micros(pause));
+                prop_assert!(budget.earliest(bits, now) <= now);
+                budget.spend(bits, now);
+                audit.record(bits, now);
+                largest = largest.max(bits);
+                total += bits;
+            }
+            let limit = f64::from(rate) * 10.0;
+            prop_assert!(audit.worst_window_bits() as f64 <= limit + largest as f64);
+            prop_assert!(total as f64 <= f64::from(rate) * (now.as_secs_f64() + 10.0) + largest as f64 + limit);
+        }
+    }
+
+    #[test]
+    fn a_full_budget_is_used_to_the_last_bit_over_a_long_run() {
+        let mut budget = BitBudget::new(100, Duration::from_secs(10), Instant::ZERO);
+        let (mut now, mut sent) = (Instant::ZERO, 0);
+        while now < Instant::from_secs_f64(3600.0) {
+            now = budget.earliest(512, now);
+            budget.spend(512, now);
+            sent += 512;
+        }
+        assert!((355_000..=362_000).contains(&sent), "{sent} bits in an hour at 100 bit/s");
+    }
+}

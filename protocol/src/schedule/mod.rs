@@ -1,0 +1,9 @@
+//! What is worth the next bits, and how many there may be.
+
+mod audit;
+mod budget;
+mod shares;
+
+pub use audit::Audit;
+pub use budget::BitBudget;
+pub use shares::{Class, ClassShares};

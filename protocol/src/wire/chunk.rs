@@ -1,0 +1,171 @@
+//! Chunks: what a frame carries.
+
+/// Most bytes that a chunk header takes.
+pub const MAX_CHUNK_HEADER: usize = 3;
+
+/// What a chunk is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ChunkKind {
+    /// A patch of the label map.
+    Map,
+    /// The vehicle's status.
+    Status,
+    /// One slot of the directive.
+    Slot,
+    /// A part of an object that is larger than a frame.
+    Object,
+}
+
+impl ChunkKind {
+    fn code(self) -> u8 {
+        match self {
+            Self::Map => 1,
+            Self::Status => 2,
+            Self::Slot => 3,
+            Self::Object => 4,
+        }
+    }
+
+    fn from_code(code: u8) -> Option<Self> {
+        [Self::Map, Self::Status, Self::Slot, Self::Object].into_iter().find(|k| k.code() == code)
+    }
+}
+
+/// One chunk of a frame.
+///
+/// ```text
+///  0 1 2 3 4 5 6 7
+/// +-----+---------+----------------+-----------+
+/// |kind | length  | [more length]  | payload   |
+/// +-----+---------+----------------+-----------+
+/// kind     0 nothing more in this frame, 1 map, 2 status, 3 slot, 4 object; 5..7 reserved: the frame is refused
+/// length   0..28 bytes of payload; 29: 29 + next byte; 30: next two bytes; 31: to the end of the frame
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chunk<'a> {
+    /// What it is about.
+    pub kind: ChunkKind,
+    /// Its own bytes.
+    pub payload: &'a [u8],
+}
+
+/// Bytes that the header of a chunk takes when `payload` bytes go into `room`.
+pub fn chunk_header_len(payload: usize, room: usize) -> usize {
+    match payload {
+        0..=28 => 1,
+        n if n + 1 == room => 1,
+        29..=284 => 2,
+        _ => 3,
+    }
+}
+
+/// Most bytes of payload that one chunk can have in `room` bytes.
+pub fn room_for_payload(room: usize) -> usize {
+    room.saturating_sub(1)
+}
+
+/// Appends a chunk to a frame body that can still take `room` bytes; says whether it fitted.
+pub(super) fn push_chunk(kind: ChunkKind, payload: &[u8], room: usize, out: &mut Vec<u8>) -> bool {
+    let n = payload.len();
+    if n + chunk_header_len(n, room) > room {
+        return false;
+    }
+    let head = kind.code() << 5;
+    match n {
+        0..=28 => out.push(head | n as u8),
+        n if n + 1 == room => out.push(head | 31),
+        29..=284 => out.extend_from_slice(&[head | 29, (n - 29) as u8]),
+        _ => {
+            out.push(head | 30);
+            out.extend_from_slice(&(n as u16).to_be_bytes());
+        }
+    }
+    out.extend_from_slice(payload);
+    true
+}
+
+/// The chunks of a received frame, in order; ends at the first that makes no sense.
+#[derive(Debug, Clone, Default)]
+pub struct Chunks<'a> {
+    body: &'a [u8],
+}
+
+impl<'a> Chunks<'a> {
+    pub(super) fn new(body: &'a [u8]) -> Self {
+        Self { body }
+    }
+
+    /// Whether every chunk of the frame is well formed.
+    pub fn are_sound(&self) -> bool {
+        let mut all = self.clone();
+        while all.next().is_some() {}
+        all.body.is_empty()
+    }
+
+    fn split(&self) -> Option<(Option<Chunk<'a>>, &'a [u8])> {
+        let (&head, rest) = self.body.split_first()?;
+        if head >> 5 == 0 {
+            return Some((None, &[]));
+        }
+        let kind = ChunkKind::from_code(head >> 5)?;
+        let (len, rest) = match head & 31 {
+            31 => (rest.len(), rest),
+            30 => {
+                let (len, rest) = rest.split_first_chunk::<2>()?;
+                (usize::from(u16::from_be_bytes(*len)), rest)
+            }
+            29 => {
+                let (len, rest) = rest.split_first()?;
+                (29 + usize::from(*len), rest)
+            }
+            n => (usize::from(n), rest),
+        };
+        let (payload, rest) = rest.split_at_checked(len)?;
+        Some((Some(Chunk { kind, payload }), rest))
+    }
+}
+
+impl<'a> Iterator for Chunks<'a> {
+    type Item = Chunk<'a>;
+
+    fn next(&mut self) -> Option<Chunk<'a>> {
+        let (chunk, rest) = self.split()?;
+        self.body = rest;
+        chunk
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_last_chunk_that_fills_the_frame_has_a_one_byte_header() {
+        let mut out = Vec::new();
+        assert!(push_chunk(ChunkKind::Map, &[7; 200], 201, &mut out));
+        assert_eq!((out.len(), out[0]), (201, 0b001_11111));
+    }
+
+    proptest! {
+        #[test]
+        fn chunks_come_back_in_order(sizes in proptest::collection::vec(0usize..400, 0..6), slack in 0usize..40) {
+            let room = sizes.iter().sum::<usize>() + 3 * sizes.len() + slack;
+            let mut body = Vec::new();
+            for (i, &n) in sizes.iter().enumerate() {
+                let left = room - body.len();
+                prop_assert!(push_chunk(ChunkKind::Map, &vec![i as u8; n], left, &mut body));
+            }
+            body.resize(room, 0);
+            let chunks = Chunks::new(&body);
+            prop_assert!(chunks.are_sound());
+            let back: Vec<usize> = chunks.map(|c| c.payload.len()).collect();
+            prop_assert_eq!(back, sizes);
+        }
+
+        #[test]
+        fn any_body_ends(body in proptest::collection::vec(any::<u8>(), 0..400)) {
+            prop_assert!(Chunks::new(&body).count() <= body.len());
+        }
+    }
+}

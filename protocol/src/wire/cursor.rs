@@ -1,0 +1,70 @@
+//! Reading of untrusted bytes.
+
+/// The bytes ended before the value did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the bytes end too early")]
+pub struct Truncated;
+
+/// A reader over received bytes that can only fail, never panic.
+#[derive(Debug, Clone)]
+pub struct Reader<'a>(&'a [u8]);
+
+impl<'a> Reader<'a> {
+    /// Reads `bytes` from their beginning.
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self(bytes)
+    }
+
+    /// Bytes not yet read.
+    pub fn rest(&self) -> &'a [u8] {
+        self.0
+    }
+
+    /// The next `n` bytes.
+    pub fn take(&mut self, n: usize) -> Result<&'a [u8], Truncated> {
+        let (head, tail) = self.0.split_at_checked(n).ok_or(Truncated)?;
+        self.0 = tail;
+        Ok(head)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], Truncated> {
+        let (head, tail) = self.0.split_first_chunk::<N>().ok_or(Truncated)?;
+        self.0 = tail;
+        Ok(*head)
+    }
+
+    /// One byte.
+    pub fn u8(&mut self) -> Result<u8, Truncated> {
+        self.array::<1>().map(|[b]| b)
+    }
+
+    /// One signed byte.
+    pub fn i8(&mut self) -> Result<i8, Truncated> {
+        self.u8().map(|b| b as i8)
+    }
+
+    /// Two bytes.
+    pub fn u16(&mut self) -> Result<u16, Truncated> {
+        self.array().map(u16::from_be_bytes)
+    }
+
+    /// Two bytes, signed.
+    pub fn i16(&mut self) -> Result<i16, Truncated> {
+        self.array().map(i16::from_be_bytes)
+    }
+
+    /// Three bytes.
+    pub fn u24(&mut self) -> Result<u32, Truncated> {
+        self.array().map(|[a, b, c]| u32::from_be_bytes([0, a, b, c]))
+    }
+
+    /// Three bytes, signed.
+    pub fn i24(&mut self) -> Result<i32, Truncated> {
+        self.u24().map(|v| ((v << 8) as i32) >> 8)
+    }
+
+    /// Four bytes.
+    pub fn u32(&mut self) -> Result<u32, Truncated> {
+        self.array().map(u32::from_be_bytes)
+    }
+}

@@ -1,0 +1,20 @@
+//! Bits on the water: frames, their acknowledgements, their chunks.
+//!
+//! Multi-byte integers are big-endian. Diagrams count bits from the most significant one of the first byte.
+
+mod ack;
+mod chunk;
+mod cursor;
+mod frame;
+mod number;
+mod status;
+
+pub use ack::{AckStatement, MAX_WINDOW};
+pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};
+pub use cursor::{Reader, Truncated};
+pub use frame::{Address, Frame, FrameBuilder, FrameError, Header, MissionId, OVERHEAD_MAX, SessionId, crc_len};
+pub use number::unwrap_number;
+pub use status::{SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
+
+/// Version of the wire; a frame of another version is counted and dropped.
+pub const WIRE_VERSION: u8 = 1;
