@@ -98,6 +98,28 @@ impl LabelGrid {
         std::mem::replace(&mut tile[cell.index()], label)
     }
 
+    /// Labels of the `width` x `height` cells whose south-west corner is (`x`, `y`), row by row from the south;
+    /// places outside the 32-bit grid read as unexplored.
+    pub fn copy_area(&self, x: i64, y: i64, width: usize, height: usize) -> Vec<u8> {
+        let mut out = vec![0; width * height];
+        let edge = i64::from(TILE);
+        let (x_end, y_end) = (x + width as i64, y + height as i64);
+        for ty in y.div_euclid(edge)..=(y_end - 1).div_euclid(edge) {
+            for tx in x.div_euclid(edge)..=(x_end - 1).div_euclid(edge) {
+                let (Ok(kx), Ok(ky)) = (i32::try_from(tx), i32::try_from(ty)) else { continue };
+                let Some(tile) = self.tiles.get(&(ky, kx)) else { continue };
+                let (from, to) = (x.max(tx * edge), x_end.min((tx + 1) * edge));
+                for row in y.max(ty * edge)..y_end.min((ty + 1) * edge) {
+                    let at = ((row - y) * width as i64 + from - x) as usize;
+                    let source = ((row - ty * edge) * edge + from - tx * edge) as usize;
+                    let length = (to - from) as usize;
+                    out[at..at + length].copy_from_slice(&tile[source..source + length]);
+                }
+            }
+        }
+        out
+    }
+
     /// Explored cells with their labels, tile by tile in a fixed order.
     pub fn iter(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
         self.tiles.iter().flat_map(|(&(ty, tx), tile)| {
@@ -171,6 +193,20 @@ mod tests {
         a.set(Cell::new(100, 100), 0);
         assert_eq!(a, LabelGrid::default());
         assert!(a.is_empty());
+    }
+
+    #[test]
+    fn a_copied_area_reads_like_its_cells_one_by_one() {
+        let mut grid = LabelGrid::default();
+        for i in 0..4000i32 {
+            grid.set(Cell::new(i * 37 % 101 - 50, i * 53 % 89 - 40), (i % 254) as u8 + 1);
+        }
+        grid.set(Cell::new(i32::MIN, i32::MAX), 9);
+        let area = grid.copy_area(-33, -19, 70, 41);
+        let rect = Rect { x: -33, y: -19, width: 70, height: 41 };
+        assert!(rect.cells().zip(&area).all(|(cell, &label)| grid.get(cell) == label));
+        let corner = grid.copy_area(i64::from(i32::MIN) - 1, i64::from(i32::MAX), 2, 2);
+        assert_eq!(corner, [0, 9, 0, 0]);
     }
 
     #[test]

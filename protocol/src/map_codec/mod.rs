@@ -1,1 +1,23 @@
 //! Label-map coding: a change of the map against a base both ends hold, small enough for the room in a frame.
+//!
+//! A chunk covers one compact patch. It says the new label of the cells it changes and leaves every other cell of
+//! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
+
+mod bits;
+mod chunk;
+mod codec;
+mod grow;
+mod header;
+mod png;
+#[cfg(test)]
+mod tests;
+mod window;
+
+pub use chunk::{DecodeError, MapChunk, decode, encode};
+pub use codec::Codec;
+pub use png::restored_png;
+
+/// Most cells a patch may have; bounds what decoding a chunk allocates.
+pub const MAX_PATCH_CELLS: usize = 1 << 16;
+/// Most cells along one side of a patch.
+pub const MAX_PATCH_SIDE: usize = 1 << 10;

@@ -1,0 +1,86 @@
+//! Writing the best chunk for the room that is left, and reading any chunk.
+
+use super::bits::BitReader;
+use super::grow::Growth;
+use super::header::{Body, Header, base_check};
+use super::window::Patch;
+use super::{Codec, png};
+use crate::map::{Cell, LabelGrid, Rect};
+
+/// One encoded change of the map.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MapChunk {
+    /// Everything that [`decode`] needs besides the base.
+    pub bytes: Vec<u8>,
+    /// Changed cells with their new labels (0 = becomes unexplored), exactly as [`decode`] returns them.
+    pub changes: Vec<(Cell, u8)>,
+}
+
+/// Why a chunk was refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DecodeError {
+    /// The bytes end inside the head.
+    #[error("map chunk ends early")]
+    Truncated,
+    /// The patch is larger than allowed or leaves the 32-bit grid.
+    #[error("map chunk has an impossible patch")]
+    BadGeometry,
+    /// The chunk was coded against another base.
+    #[error("map chunk was coded against another base")]
+    BaseMismatch,
+    /// The body is not one that the encoder writes.
+    #[error("map chunk is corrupt")]
+    Corrupt,
+    /// The body needs a coder that is not known here.
+    #[error("map chunk uses an unknown codec")]
+    UnknownCodec,
+}
+
+/// Best chunk of at most `room` bytes around `seed`.
+///
+/// Grows a compact patch around `seed` for as long as it fits and fills the room. `wanted` says which cells that
+/// differ between `base` and `target` may be sent now; the others stay untouched. `None` if `seed` does not differ or
+/// is not wanted, or if not even one cell fits.
+pub fn encode(
+    codec: Codec,
+    base: &LabelGrid,
+    target: &LabelGrid,
+    seed: Cell,
+    room: usize,
+    wanted: &dyn Fn(Cell) -> bool,
+) -> Option<MapChunk> {
+    let growth = Growth::around(base, target, seed, room, wanted)?;
+    let _ = codec;
+    png::best_chunk(base, &growth, room)
+}
+
+/// The changes in a chunk: cells with their new labels (0 = becomes unexplored), row by row.
+///
+/// Never panics, whatever the bytes; allocates for at most [`MAX_PATCH_CELLS`](super::MAX_PATCH_CELLS) cells.
+pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeError> {
+    let mut bits = BitReader::new(bytes);
+    let header = Header::read(&mut bits).ok_or(DecodeError::Truncated)?;
+    if !header.geometry_is_sound() {
+        return Err(DecodeError::BadGeometry);
+    }
+    if header.check != base_check(base, header.patch) {
+        return Err(DecodeError::BaseMismatch);
+    }
+    let patch = header.patch;
+    let held = base.copy_area(i64::from(patch.x), i64::from(patch.y), patch.width as usize, patch.height as usize);
+    match header.body {
+        Body::Png => png::read(bits, patch, held),
+        Body::Context => Err(DecodeError::UnknownCodec),
+    }
+    .map(|patch| patch.changes())
+}
+
+/// Head of a chunk for `rect`.
+pub(super) fn header_for(base: &LabelGrid, body: Body, rect: Rect) -> Header {
+    Header { body, patch: rect, check: base_check(base, rect) }
+}
+
+/// The chunk that says `patch` in `bytes`.
+pub(super) fn chunk(patch: &Patch, bytes: Vec<u8>) -> MapChunk {
+    MapChunk { bytes, changes: patch.changes() }
+}

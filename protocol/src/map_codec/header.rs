@@ -1,0 +1,129 @@
+//! The head of a chunk: coder, place and size of the patch, check of the base.
+
+use super::bits::{BitReader, BitWriter};
+use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
+use crate::map::{LabelGrid, Rect};
+use crc::{CRC_8_AUTOSAR, Crc};
+
+/// Which coder wrote the body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Body {
+    Png,
+    Context,
+}
+
+/// Head of every chunk; most significant bit first, followed directly by the body.
+///
+/// ```text
+///  bits  1      2            n + n         2           m + m             8
+///      +------+------------+-------------+-----------+-----------------+-------+
+///      | body | place size | x, y        | side size | width-1 height-1 | check |
+///      +------+------------+-------------+-----------+-----------------+-------+
+/// ```
+/// * body: 0 = png, 1 = context.
+/// * place size: n = 8, 11, 16, 32 bits; x, y = south-west cell of the patch, two's complement.
+/// * side size: m = 4, 6, 8, 10 bits; width x height at most [`MAX_PATCH_CELLS`].
+/// * check: CRC-8 over the base in the patch and [`CHECK_MARGIN`] cells around it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Header {
+    pub(super) body: Body,
+    pub(super) patch: Rect,
+    pub(super) check: u8,
+}
+
+const PLACE_BITS: [u32; 4] = [8, 11, 16, 32];
+const SIDE_BITS: [u32; 4] = [4, 6, 8, 10];
+/// Cells around the patch that the check covers too.
+pub(super) const CHECK_MARGIN: usize = 2;
+
+impl Header {
+    /// The longest head in bytes.
+    #[cfg(test)]
+    pub(super) const MAX_BYTES: usize = 13;
+
+    pub(super) fn write(&self, out: &mut BitWriter) {
+        out.bit(self.body == Body::Context);
+        let place = smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n));
+        out.put(place as u64, 2);
+        let n = PLACE_BITS[place];
+        out.put(self.patch.x as u64, n);
+        out.put(self.patch.y as u64, n);
+        let (w, h) = (u64::from(self.patch.width - 1), u64::from(self.patch.height - 1));
+        let side = smallest(&SIDE_BITS, |m| (w | h) >> m == 0);
+        out.put(side as u64, 2);
+        out.put(w, SIDE_BITS[side]);
+        out.put(h, SIDE_BITS[side]);
+        out.put(u64::from(self.check), 8);
+    }
+
+    /// Reads the head; `None` if the bits end early.
+    pub(super) fn read(bits: &mut BitReader<'_>) -> Option<Self> {
+        let body = if bits.bit()? { Body::Context } else { Body::Png };
+        let n = *PLACE_BITS.get(bits.take(2)? as usize)?;
+        let (x, y) = (signed(bits.take(n)?, n), signed(bits.take(n)?, n));
+        let m = *SIDE_BITS.get(bits.take(2)? as usize)?;
+        let (width, height) = (bits.take(m)? as u32 + 1, bits.take(m)? as u32 + 1);
+        let check = bits.take(8)? as u8;
+        Some(Self { body, patch: Rect { x, y, width, height }, check })
+    }
+
+    /// Whether the patch keeps to the limits and lies on the 32-bit grid.
+    pub(super) fn geometry_is_sound(&self) -> bool {
+        let Rect { x, y, width, height } = self.patch;
+        self.patch.area() <= MAX_PATCH_CELLS as u64
+            && width.max(height) as usize <= MAX_PATCH_SIDE
+            && x.checked_add_unsigned(width - 1).is_some()
+            && y.checked_add_unsigned(height - 1).is_some()
+    }
+}
+
+/// Check over the base that a chunk for `patch` is coded against.
+pub(super) fn base_check(base: &LabelGrid, patch: Rect) -> u8 {
+    const CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
+    let margin = CHECK_MARGIN as i64;
+    let (width, height) = (patch.width as usize + 2 * CHECK_MARGIN, patch.height as usize + 2 * CHECK_MARGIN);
+    CRC.checksum(&base.copy_area(i64::from(patch.x) - margin, i64::from(patch.y) - margin, width, height))
+}
+
+fn smallest(sizes: &[u32; 4], holds: impl Fn(u32) -> bool) -> usize {
+    sizes.iter().position(|&n| holds(n)).unwrap_or(sizes.len() - 1)
+}
+
+fn fits(value: i32, bits: u32) -> bool {
+    bits >= 32 || (-(1i32 << (bits - 1))..1i32 << (bits - 1)).contains(&value)
+}
+
+fn signed(value: u64, bits: u32) -> i32 {
+    ((value << (64 - bits)) as i64 >> (64 - bits)) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes_of(header: Header) -> Vec<u8> {
+        let mut out = BitWriter::default();
+        header.write(&mut out);
+        out.into_bytes()
+    }
+
+    #[test]
+    fn a_typical_head_keeps_its_golden_bytes() {
+        let patch = Rect { x: 200, y: -3, width: 40, height: 24 };
+        let header = Header { body: Body::Context, patch, check: 0xA5 };
+        // 1 | 01 | 00011001000 | 11111111101 | 01 | 100111 | 010111 | 10100101 | 0
+        assert_eq!(bytes_of(header), [0xA3, 0x23, 0xFE, 0xB3, 0xAF, 0x4A]);
+    }
+
+    #[test]
+    fn heads_of_any_size_read_back() {
+        for (x, y) in [(0, 0), (127, -128), (128, 0), (-1024, 1023), (-1025, 9), (40_000, -1), (i32::MAX, i32::MIN)] {
+            for (width, height) in [(1, 1), (16, 16), (17, 3), (64, 65), (1024, 64)] {
+                let header = Header { body: Body::Png, patch: Rect { x, y, width, height }, check: 7 };
+                let bytes = bytes_of(header);
+                assert!(bytes.len() <= Header::MAX_BYTES);
+                assert_eq!(Header::read(&mut BitReader::new(&bytes)), Some(header));
+            }
+        }
+    }
+}
