@@ -10,4 +10,3 @@ pub mod object;
 pub mod schedule;
 pub mod time;
 pub mod wire;
-

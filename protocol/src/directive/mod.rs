@@ -73,14 +73,8 @@ pub enum RefusalReason {
 }
 
 impl RefusalReason {
-    const ALL: [Self; 6] = [
-        Self::Malformed,
-        Self::OtherEpoch,
-        Self::UnknownLabel,
-        Self::OutOfRange,
-        Self::Contradiction,
-        Self::TooOld,
-    ];
+    const ALL: [Self; 6] =
+        [Self::Malformed, Self::OtherEpoch, Self::UnknownLabel, Self::OutOfRange, Self::Contradiction, Self::TooOld];
 
     pub(crate) fn code(self) -> u8 {
         self as u8 + 2
@@ -233,6 +227,9 @@ mod tests {
     fn golden_bytes_of_a_utility() {
         let weights = [(3, 80), (5, -20)].into_iter().collect();
         let utility = Utility { epoch: 1, exploration: 20, curiosity: 0, weights };
-        assert_eq!(VersionedSlot::encode(0xABCD, 4, &Slot::Utility(utility)), [0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]);
+        assert_eq!(
+            VersionedSlot::encode(0xABCD, 4, &Slot::Utility(utility)),
+            [0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]
+        );
     }
 }

@@ -128,7 +128,14 @@ impl SlotOutbox {
         self.begin_turn();
     }
 
-    fn advance(&mut self, id: SlotId, version: u16, to: LifeLine, now: Instant, from: impl Fn(LifeLine) -> bool) -> bool {
+    fn advance(
+        &mut self,
+        id: SlotId,
+        version: u16,
+        to: LifeLine,
+        now: Instant,
+        from: impl Fn(LifeLine) -> bool,
+    ) -> bool {
         match &mut self.slots[id.index()] {
             Some(s) if s.version == version && from(s.life) => {
                 (s.life, s.changed) = (to, now);
@@ -142,9 +149,7 @@ impl SlotOutbox {
 /// A fix is as old as it is when it leaves.
 fn dated(progress: &SlotProgress, now: Instant) -> Slot {
     match progress.slot {
-        Slot::Fix(fix) => {
-            Slot::Fix(super::Fix { age_s: fix.age_s + now.since(progress.issued).as_secs_f64(), ..fix })
-        }
+        Slot::Fix(fix) => Slot::Fix(super::Fix { age_s: fix.age_s + now.since(progress.issued).as_secs_f64(), ..fix }),
         ref other => other.clone(),
     }
 }

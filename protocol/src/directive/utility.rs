@@ -33,7 +33,9 @@ impl Utility {
     /// Whether every weight lies in -100..=100 and every label in 1..=254.
     pub fn is_in_range(&self) -> bool {
         let ok = |w: i8| (-100..=100).contains(&w);
-        ok(self.exploration) && ok(self.curiosity) && self.weights.iter().all(|(&l, &w)| (1..=254).contains(&l) && ok(w))
+        ok(self.exploration)
+            && ok(self.curiosity)
+            && self.weights.iter().all(|(&l, &w)| (1..=254).contains(&l) && ok(w))
     }
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {

@@ -119,7 +119,14 @@ impl<T> Pair<T> {
         }
         let header = frame.header.clone();
         if header.hello {
-            return Ok(Inbound { header, restarted, fates: Vec::new(), number: None, base: 0, chunks: Chunks::default() });
+            return Ok(Inbound {
+                header,
+                restarted,
+                fates: Vec::new(),
+                number: None,
+                base: 0,
+                chunks: Chunks::default(),
+            });
         }
         let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| self.flight.handle_statement(ack));
         for (_, delivered) in &fates {

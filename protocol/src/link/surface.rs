@@ -124,7 +124,8 @@ impl SurfaceLink {
 
     /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
-        let Some(peer) = bytes.get(1).and_then(|b| Address::vehicle(b >> 4)).and_then(|a| self.peers.get_mut(&a)) else {
+        let Some(peer) = bytes.get(1).and_then(|b| Address::vehicle(b >> 4)).and_then(|a| self.peers.get_mut(&a))
+        else {
             if let Some(first) = self.peers.values_mut().next() {
                 first.pair.stats.drop(super::DropReason::Stranger);
             }

