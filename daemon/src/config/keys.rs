@@ -1,0 +1,94 @@
+//! Every key that there is: what it means, its unit, what it allows.
+
+/// What a key allows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Allowed {
+    /// A number from the first to the second.
+    Range(f64, f64),
+    /// One of these words.
+    Choice(&'static [&'static str]),
+    /// Any text.
+    Text,
+    /// `true` or `false`.
+    Flag,
+}
+
+/// A key of the configuration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Key {
+    /// Section and name.
+    pub name: &'static str,
+    /// Unit, empty if it has none.
+    pub unit: &'static str,
+    /// What it allows.
+    pub allowed: Allowed,
+    /// Who reads it: `a` the vehicle, `s` the surface, `r` the rehearsal.
+    pub roles: &'static str,
+    /// What it is.
+    pub doc: &'static str,
+}
+
+const fn key(name: &'static str, unit: &'static str, allowed: Allowed, roles: &'static str, doc: &'static str) -> Key {
+    Key { name, unit, allowed, roles, doc }
+}
+
+use Allowed::{Choice, Flag, Range, Text};
+
+/// Every key, in the order of the files.
+pub const KEYS: &[Key] = &[
+    key("mission.name", "", Text, "asr", "name of the mission for people"),
+    key("mission.id", "", Range(0.0, 4_294_967_295.0), "asr", "number that both ends share: frames of another mission are dropped"),
+    key("vehicle.address", "", Range(1.0, 14.0), "asr", "acoustic address of the vehicle (0 is the surface)"),
+    key("vehicle.name", "", Text, "asr", "name of the vehicle for people"),
+    key("link.budget_bps", "bit/s", Range(10.0, 1e7), "asr", "bits on air that this end may send, mean over the window"),
+    key("link.budget_window_s", "s", Range(1.0, 3600.0), "asr", "window over which the budget is kept"),
+    key("link.frame_bytes", "bytes", Range(32.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
+    key("link.exemplar_share", "", Range(0.0, 0.9), "ar", "share of representative images while map and images both wait"),
+    key("link.status_period_s", "s", Range(1.0, 3600.0), "ar", "time between two statuses of the vehicle"),
+    key("link.max_turn_s", "s", Range(1.0, 60.0), "sr", "longest turn that the surface grants"),
+    key("link.max_idle_s", "s", Range(0.5, 600.0), "sr", "longest pause between turns when nothing is to be said"),
+    key("link.max_range_m", "m", Range(10.0, 20_000.0), "sr", "range for which an answer is waited before a round trip was measured"),
+    key("link.turn_around_s", "s", Range(0.0, 10.0), "asr", "time that a modem needs between receiving and sending"),
+    key("modem.kind", "", Choice(&["tcp", "transparent"]), "as", "tcp: frames over a TCP link; transparent: a byte pipe on a serial device"),
+    key("modem.device", "", Text, "as", "serial device of a transparent modem, best from /dev/serial/by-id"),
+    key("modem.baud", "bit/s", Range(300.0, 4_000_000.0), "as", "speed of the serial device"),
+    key("modem.listen", "", Text, "as", "ADDRESS:PORT to listen on, modem kind tcp"),
+    key("modem.connect", "", Text, "as", "ADDRESS:PORT to connect to, modem kind tcp"),
+    key("modem.bit_rate", "bit/s", Range(10.0, 1e7), "as", "bit rate of the modem on air"),
+    key("modem.overhead_bits", "bit", Range(0.0, 100_000.0), "asr", "bits on air that a transmission costs besides its bytes"),
+    key("channel.bit_rate", "bit/s", Range(10.0, 1e7), "r", "bit rate of the simulated modems on air"),
+    key("channel.range_m", "m", Range(1.0, 20_000.0), "r", "distance from the surface vehicle to the middle of the survey"),
+    key("channel.loss", "", Range(0.0, 0.99), "r", "probability that a frame is lost"),
+    key("channel.duplication", "", Range(0.0, 1.0), "r", "probability that a frame arrives twice"),
+    key("channel.reordering", "", Range(0.0, 1.0), "r", "probability that a frame arrives late"),
+    key("channel.corruption", "", Range(0.0, 1.0), "r", "probability that a frame arrives with flipped bits"),
+    key("channel.half_duplex", "", Flag, "r", "whether a modem is deaf while it speaks"),
+    key("channel.sound_speed_m_s", "m/s", Range(1300.0, 1700.0), "r", "speed of sound"),
+    key("map.codec", "", Choice(&["auto", "png", "context"]), "ar", "codec of map chunks; auto takes the smaller for each"),
+    key("map.stream", "", Choice(&["delta", "whole-png"]), "ar", "whole-png sends the whole map again whenever it changed: for comparison only"),
+    key("camera.source", "", Text, "ar", "empty: the rehearsal's image; frames:DIR: images with DIR/poses.csv"),
+    key("camera.rate_hz", "1/s", Range(0.01, 30.0), "r", "frames a second"),
+    key("camera.width_px", "pixel", Range(64.0, 4096.0), "r", "columns of a frame"),
+    key("camera.height_px", "pixel", Range(64.0, 4096.0), "r", "rows of a frame"),
+    key("camera.metres_per_pixel", "m", Range(0.0001, 10.0), "ar", "size of a pixel on the sea floor"),
+    key("scene.cell_m", "m", Range(0.0, 1000.0), "asr", "edge of a map cell; 0: 25 pixels of the camera"),
+    key("scene.alpha", "", Range(1e-9, 1e3), "ar", "preference for labels that are used elsewhere"),
+    key("scene.beta", "", Range(1e-9, 1e3), "ar", "prior weight of each word in a label"),
+    key("scene.gamma", "", Range(1e-12, 1e3), "ar", "weight of a new label"),
+    key("scene.birth", "", Choice(&["literal", "collapsed", "rost"]), "ar", "reading of the new-label weight"),
+    key("scene.max_labels", "", Range(2.0, 254.0), "ar", "most labels at a time"),
+    key("scene.refine_words_per_s", "1/s", Range(0.0, 1e8), "ar", "words resampled a second of mission time"),
+    key("scene.max_words_per_cell", "", Range(8.0, 60_000.0), "ar", "words kept a cell"),
+    key("survey.duration_s", "s", Range(0.0, 1e7), "ar", "when the survey ends; 0: never"),
+    key("survey.speed_m_s", "m/s", Range(0.01, 10.0), "ar", "speed over ground"),
+    key("survey.altitude_m", "m", Range(0.1, 100.0), "ar", "height of the camera above the sea floor"),
+    key("survey.depth_m", "m", Range(0.0, 11_000.0), "ar", "depth of the sea floor"),
+    key("survey.area_m", "m", Range(-1e6, 1e6), "ar", "west, south, east and north limits; all 0: the rehearsal's image"),
+    key("navigation.drift_percent", "%", Range(0.0, 50.0), "ar", "drift of dead reckoning in percent of the distance"),
+    key("navigation.fix_period_s", "s", Range(0.0, 3600.0), "r", "time between two position fixes; 0: none"),
+    key("navigation.fix_sigma_m", "m", Range(0.0, 100.0), "r", "standard deviation of a fix"),
+    key("operator.script", "", Choice(&["scripted", "none"]), "r", "scripted: two utilities and image requests at fixed times"),
+    key("console.listen", "", Text, "s", "ADDRESS:PORT of the operator's page; empty: none"),
+    key("runtime.state_dir", "", Text, "as", "folder of what must survive a restart, and of the operator's map"),
+    key("runtime.time_scale", "", Range(0.01, 1000.0), "as", "seconds of mission time a second, for rehearsals with processes"),
+];

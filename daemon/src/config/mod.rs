@@ -1,0 +1,231 @@
+//! One configuration for the sea and for rehearsal.
+
+mod keys;
+mod load;
+mod print;
+
+pub use keys::{Allowed, KEYS, Key};
+pub use load::load;
+pub use print::print;
+
+use serde::{Deserialize, Serialize};
+
+/// Every setting; see [`KEYS`] for meaning, unit and range of each.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Config {
+    /// The mission.
+    pub mission: Mission,
+    /// This vehicle, and the ones the surface speaks with.
+    pub vehicle: VehicleSection,
+    /// The acoustic link.
+    pub link: Link,
+    /// The modem of a vehicle or of the surface.
+    pub modem: Modem,
+    /// The simulated water.
+    pub channel: Channel,
+    /// The stream of the map.
+    pub map: Map,
+    /// The camera.
+    pub camera: Camera,
+    /// The scene model.
+    pub scene: Scene,
+    /// The survey.
+    pub survey: Survey,
+    /// The vehicle's navigation.
+    pub navigation: Navigation,
+    /// The operator of a rehearsal.
+    pub operator: Operator,
+    /// The operator's page.
+    pub console: Console,
+    /// The processes.
+    pub runtime: Runtime,
+}
+
+macro_rules! section {
+    ($(#[$doc:meta])* $name:ident { $($(#[$fdoc:meta])* $field:ident: $type:ty = $default:expr,)* }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(default)]
+        pub struct $name { $($(#[$fdoc])* pub $field: $type,)* }
+        impl Default for $name {
+            fn default() -> Self { Self { $($field: $default,)* } }
+        }
+    };
+}
+
+section! {
+    /// The mission.
+    Mission {
+        /// Name for people.
+        name: String = "rehearsal".into(),
+        /// Number that both ends share; frames of another mission are dropped.
+        id: u32 = 1,
+    }
+}
+section! {
+    /// Vehicles by their addresses.
+    VehicleSection {
+        /// Own address of a vehicle; the one the surface speaks with.
+        address: u8 = 1,
+        /// Name for people.
+        name: String = "auv-1".into(),
+    }
+}
+section! {
+    /// The acoustic link.
+    Link {
+        /// Bits on air a second, per transmitter.
+        budget_bps: u32 = 10_000,
+        /// Window of the budget in seconds.
+        budget_window_s: f64 = 10.0,
+        /// Bytes of a full frame.
+        frame_bytes: u32 = 256,
+        /// Share of representative images while map and images both wait.
+        exemplar_share: f64 = 0.2,
+        /// Seconds between two statuses.
+        status_period_s: f64 = 10.0,
+        /// Longest turn in seconds.
+        max_turn_s: f64 = 12.0,
+        /// Longest pause between turns in seconds.
+        max_idle_s: f64 = 10.0,
+        /// Greatest range in metres to wait an answer for.
+        max_range_m: f64 = 3000.0,
+        /// Seconds that a modem needs between receiving and sending.
+        turn_around_s: f64 = 0.2,
+    }
+}
+section! {
+    /// The modem.
+    Modem {
+        /// `tcp` or `transparent`.
+        kind: String = "tcp".into(),
+        /// Serial device of a transparent modem.
+        device: String = String::new(),
+        /// Its speed in bits a second.
+        baud: u32 = 9600,
+        /// Address to listen on (surface, `tcp`).
+        listen: String = String::new(),
+        /// Address to connect to (vehicle, `tcp`).
+        connect: String = String::new(),
+        /// Bits a second on air.
+        bit_rate: f64 = 10_000.0,
+        /// Bits on air that a transmission costs besides its bytes.
+        overhead_bits: u32 = 0,
+    }
+}
+section! {
+    /// The simulated water.
+    Channel {
+        /// Bits a second on air.
+        bit_rate: f64 = 10_000.0,
+        /// Horizontal distance between the surface vehicle and the middle of the survey, metres.
+        range_m: f64 = 500.0,
+        /// Probability that a frame is lost.
+        loss: f64 = 0.1,
+        /// Probability that a frame arrives twice.
+        duplication: f64 = 0.0,
+        /// Probability that a frame arrives late.
+        reordering: f64 = 0.0,
+        /// Probability that a frame arrives with flipped bits.
+        corruption: f64 = 0.0,
+        /// Whether a modem is deaf while it speaks.
+        half_duplex: bool = true,
+        /// Speed of sound, metres a second.
+        sound_speed_m_s: f64 = 1500.0,
+    }
+}
+section! {
+    /// The stream of the map.
+    Map {
+        /// `auto`, `png` or `context`.
+        codec: String = "auto".into(),
+        /// `delta` or `whole-png`.
+        stream: String = "delta".into(),
+    }
+}
+section! {
+    /// The camera.
+    Camera {
+        /// Empty, or `frames:DIR`.
+        source: String = String::new(),
+        /// Frames a second.
+        rate_hz: f64 = 0.5,
+        /// Columns of a frame.
+        width_px: u32 = 640,
+        /// Rows of a frame.
+        height_px: u32 = 480,
+        /// Size of a pixel on the sea floor.
+        metres_per_pixel: f64 = 0.01,
+    }
+}
+section! {
+    /// The scene model.
+    Scene {
+        /// Edge of a cell in metres; 0 = 25 pixels of the camera.
+        cell_m: f64 = 0.0,
+        /// Preference for labels used elsewhere.
+        alpha: f64 = 0.01,
+        /// Prior of words in a label.
+        beta: f64 = 0.1,
+        /// Weight of a new label.
+        gamma: f64 = 1e-4,
+        /// `literal`, `collapsed` or `rost`.
+        birth: String = "literal".into(),
+        /// Most labels at a time.
+        max_labels: u32 = 16,
+        /// Words resampled a second of mission time.
+        refine_words_per_s: u32 = 50_000,
+        /// Words kept a cell.
+        max_words_per_cell: u32 = 200,
+    }
+}
+section! {
+    /// The survey.
+    Survey {
+        /// Seconds until the survey ends; 0 = at sea: never.
+        duration_s: f64 = 1200.0,
+        /// Speed over ground.
+        speed_m_s: f64 = 0.5,
+        /// Height above the sea floor.
+        altitude_m: f64 = 4.0,
+        /// Depth of the sea floor.
+        depth_m: f64 = 20.0,
+        /// West, south, east, north limits in metres from the origin; all 0 = the rehearsal's image.
+        area_m: [f64; 4] = [0.0; 4],
+    }
+}
+section! {
+    /// The vehicle's navigation.
+    Navigation {
+        /// Drift of dead reckoning in percent of the distance.
+        drift_percent: f64 = 1.0,
+        /// Seconds between two position fixes; 0 = none.
+        fix_period_s: f64 = 10.0,
+        /// Standard deviation of a fix.
+        fix_sigma_m: f64 = 0.5,
+    }
+}
+section! {
+    /// The operator of a rehearsal.
+    Operator {
+        /// `scripted` or `none`.
+        script: String = "scripted".into(),
+    }
+}
+section! {
+    /// The operator's page.
+    Console {
+        /// Address to listen on; empty = no page.
+        listen: String = "127.0.0.1:8460".into(),
+    }
+}
+section! {
+    /// The processes.
+    Runtime {
+        /// Folder of what must survive a restart, and of the operator's map.
+        state_dir: String = "state".into(),
+        /// Seconds of mission time a second.
+        time_scale: f64 = 1.0,
+    }
+}

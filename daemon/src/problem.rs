@@ -1,0 +1,38 @@
+//! What went wrong, for people.
+
+use std::fmt;
+use std::path::Path;
+
+/// A problem that ends a command, with the exit code that tells which kind it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Problem {
+    /// Wrong usage or input: one line that says what, where and what is allowed. Exit code 2.
+    Input(String),
+    /// Right usage, but it could not be done. Exit code 1.
+    Failed(String),
+}
+
+impl Problem {
+    /// A problem with a file, as `FILE: what`.
+    pub fn file(path: &Path, what: impl fmt::Display) -> Self {
+        Self::Input(format!("{}: {what}", path.display()))
+    }
+
+    /// The process's exit code.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Failed(_) => 1,
+        }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(what) | Self::Failed(what) => f.write_str(what),
+        }
+    }
+}
+
+impl std::error::Error for Problem {}
