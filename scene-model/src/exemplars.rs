@@ -1,0 +1,116 @@
+//! The image patches that show best what a label means, in a bounded store.
+
+use std::collections::BTreeMap;
+
+use image::{RgbImage, imageops};
+
+use crate::topics::TopicId;
+
+/// A patch of a camera frame that represents a topic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exemplar {
+    /// Square patch of the store's edge length.
+    pub patch: RgbImage,
+    /// How well it represents the topic, higher is better (the daemon offers the cell's confidence).
+    pub score: f32,
+    /// When it was seen, seconds.
+    pub t_s: f64,
+    /// Where it was seen: east and north, metres.
+    pub place: (f64, f64),
+}
+
+/// Keeps the best few patches of each topic.
+#[derive(Clone, Debug)]
+pub struct ExemplarStore {
+    per_label: usize,
+    edge_px: u32,
+    topics: BTreeMap<TopicId, Vec<Exemplar>>,
+}
+
+/// Topics whose patches are kept; when there are more, the topic with the lowest best score goes.
+const MAX_TOPICS: usize = 256;
+
+impl ExemplarStore {
+    /// A store of at most `per_label` patches of `edge_px` x `edge_px` pixels for each of at most 256 topics.
+    pub fn new(per_label: usize, edge_px: u32) -> Self {
+        Self { per_label: per_label.max(1), edge_px: edge_px.max(1), topics: BTreeMap::new() }
+    }
+
+    /// Offers a patch; it is scaled to the store's size and kept if its score is high enough.
+    ///
+    /// A score that is no number and a patch without pixels are ignored.
+    pub fn offer(&mut self, topic: TopicId, patch: RgbImage, score: f32, t_s: f64, place: (f64, f64)) {
+        if score.is_nan() || patch.width() == 0 || patch.height() == 0 || !self.would_keep(topic, score) {
+            return;
+        }
+        let edge = self.edge_px;
+        let patch = if patch.dimensions() == (edge, edge) {
+            patch
+        } else {
+            imageops::resize(&patch, edge, edge, imageops::FilterType::Triangle)
+        };
+        let kept = self.topics.entry(topic).or_default();
+        let rank = kept.partition_point(|other| other.score >= score);
+        kept.insert(rank, Exemplar { patch, score, t_s, place });
+        kept.truncate(self.per_label);
+        self.drop_the_weakest_topic();
+    }
+
+    /// Whether a patch of this score would be kept now; lets the caller skip the cropping.
+    pub fn would_keep(&self, topic: TopicId, score: f32) -> bool {
+        let kept = self.topics.get(&topic).map_or(&[][..], Vec::as_slice);
+        kept.len() < self.per_label || kept.last().is_some_and(|worst| score > worst.score)
+    }
+
+    /// The best patch of a topic.
+    pub fn best(&self, topic: TopicId) -> Option<&Exemplar> {
+        self.topics.get(&topic)?.first()
+    }
+
+    /// All kept patches of a topic, best first.
+    pub fn all(&self, topic: TopicId) -> &[Exemplar] {
+        self.topics.get(&topic).map_or(&[], Vec::as_slice)
+    }
+
+    fn drop_the_weakest_topic(&mut self) {
+        if self.topics.len() <= MAX_TOPICS {
+            return;
+        }
+        let best = |kept: &[Exemplar]| kept.first().map_or(f32::NEG_INFINITY, |exemplar| exemplar.score);
+        let weakest = self.topics.iter().min_by(|a, b| best(a.1).total_cmp(&best(b.1)));
+        if let Some(topic) = weakest.map(|entry| *entry.0) {
+            self.topics.remove(&topic);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn offer(store: &mut ExemplarStore, topic: u32, score: f32) {
+        store.offer(TopicId(topic), RgbImage::new(20, 10), score, 1.0, (0.0, 0.0));
+    }
+
+    #[test]
+    fn the_best_patches_are_kept_in_the_stores_size() {
+        let mut store = ExemplarStore::new(2, 16);
+        for score in [0.3, 0.9, 0.1, 0.5, f32::NAN] {
+            offer(&mut store, 4, score);
+        }
+        let scores: Vec<f32> = store.all(TopicId(4)).iter().map(|exemplar| exemplar.score).collect();
+        assert_eq!(scores, [0.9, 0.5]);
+        assert_eq!(store.best(TopicId(4)).unwrap().patch.dimensions(), (16, 16));
+        assert!(store.best(TopicId(5)).is_none());
+    }
+
+    #[test]
+    fn the_number_of_topics_is_bounded() {
+        let mut store = ExemplarStore::new(1, 2);
+        for topic in 0..400 {
+            offer(&mut store, topic, if topic == 3 { 0.01 } else { 0.5 });
+        }
+        assert_eq!(store.topics.len(), MAX_TOPICS);
+        assert!(store.best(TopicId(3)).is_none());
+    }
+}

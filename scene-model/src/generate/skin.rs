@@ -1,0 +1,81 @@
+//! How a class looks: two tones joined by layered noise of its own grain and direction.
+
+use super::noise::Noise;
+use crate::random::Stream;
+
+pub(crate) const MAX_CLASSES: u8 = 24;
+
+/// Colours of a reef as an underwater camera gives them: sand, rubble, rock, algae, corals, sponges.
+const TONES: [[f32; 3]; 12] = [
+    [196.0, 190.0, 158.0],
+    [128.0, 132.0, 122.0],
+    [84.0, 98.0, 104.0],
+    [74.0, 112.0, 66.0],
+    [168.0, 128.0, 82.0],
+    [150.0, 92.0, 118.0],
+    [112.0, 78.0, 60.0],
+    [104.0, 138.0, 142.0],
+    [186.0, 164.0, 96.0],
+    [60.0, 74.0, 58.0],
+    [172.0, 112.0, 92.0],
+    [96.0, 92.0, 132.0],
+];
+
+/// The looks of one class.
+#[derive(Clone, Debug)]
+pub(crate) struct Skin {
+    dark: [f32; 3],
+    bright: [f32; 3],
+    /// Lattice steps per pixel along and across the grain.
+    pitch: [f32; 2],
+    turn: [f32; 2],
+    /// Shares of the coarse, middle and fine layer.
+    layers: [f32; 3],
+    offset: f32,
+}
+
+impl Skin {
+    #[inline]
+    pub(crate) fn colour(&self, noise: &Noise, x: f32, y: f32) -> [u8; 3] {
+        let along = (x * self.turn[0] + y * self.turn[1]) * self.pitch[0] + self.offset;
+        let across = (y * self.turn[0] - x * self.turn[1]) * self.pitch[1] - self.offset;
+        let coarse = noise.value(along * 0.17, across * 0.17);
+        let middle = noise.value(along, across);
+        let fine = noise.value(along * 3.7 + 40.0, across * 3.7);
+        let tone = self.layers[0] * coarse + self.layers[1] * middle + self.layers[2] * fine;
+        let light = 0.9 + 0.2 * noise.value(x * 0.004, y * 0.004);
+        std::array::from_fn(|channel| {
+            let value = self.dark[channel] + (self.bright[channel] - self.dark[channel]) * tone;
+            (value * light) as u8
+        })
+    }
+}
+
+/// One skin for each class; tones differ as long as there are some left.
+pub(crate) fn palette(key: u64, classes: u8) -> Vec<Skin> {
+    let mut chance = Stream::new(key);
+    let mut order: Vec<usize> = (0..TONES.len()).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, chance.below(i + 1));
+    }
+    (0..classes as usize).map(|class| skin(TONES[order[class % order.len()]], &mut chance)).collect()
+}
+
+fn skin(tone: [f32; 3], chance: &mut Stream) -> Skin {
+    let mut between = |low: f64, high: f64| (low + (high - low) * chance.unit()) as f32;
+    let contrast = between(0.25, 0.6);
+    let brightness = between(0.85, 1.15);
+    let grain = 1.0 / between(3.0, 14.0);
+    let stretch = between(1.0, 3.0);
+    let (sin, cos) = between(0.0, std::f64::consts::PI).sin_cos();
+    let layers = [between(0.2, 0.6), between(0.2, 0.8), between(0.1, 0.6)];
+    let sum: f32 = layers.iter().sum();
+    Skin {
+        dark: tone.map(|value| value * brightness * (1.0 - contrast)),
+        bright: tone.map(|value| value * brightness * (1.0 + contrast)),
+        pitch: [grain / stretch, grain],
+        turn: [cos, sin],
+        layers: layers.map(|layer| layer / sum),
+        offset: between(0.0, 200.0),
+    }
+}

@@ -1,0 +1,155 @@
+//! The cells of the world, by dense id: words with their labels, label counts, neighbours.
+
+use super::grid::{Coord, NONE, SpatialHash, colour_of, neighbours_of};
+use super::labels::{LANES, Lanes, UNLABELLED, label_of, pack};
+
+/// All cells seen so far, in the order of their first observation.
+#[derive(Clone, Debug)]
+pub(crate) struct Cells {
+    blocks: usize,
+    hash: SpatialHash,
+    coords: Vec<Coord>,
+    words: Vec<Vec<u32>>,
+    counts: Vec<u16>,
+    neighbours: Vec<[u32; 6]>,
+    total: u64,
+}
+
+impl Cells {
+    /// Room for `blocks` x 16 label slots in each cell.
+    pub(crate) fn new(blocks: usize) -> Self {
+        Self {
+            blocks,
+            hash: SpatialHash::default(),
+            coords: Vec::new(),
+            words: Vec::new(),
+            counts: Vec::new(),
+            neighbours: Vec::new(),
+            total: 0,
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.coords.len()
+    }
+
+    /// Words in all cells.
+    pub(crate) fn total(&self) -> u64 {
+        self.total
+    }
+
+    pub(crate) fn coord(&self, cell: u32) -> Coord {
+        self.coords[cell as usize]
+    }
+
+    pub(crate) fn colour(&self, cell: u32) -> usize {
+        colour_of(self.coords[cell as usize])
+    }
+
+    /// Words of a cell, packed with their labels.
+    pub(crate) fn words(&self, cell: u32) -> &[u32] {
+        &self.words[cell as usize]
+    }
+
+    pub(crate) fn words_mut(&mut self, cell: u32) -> &mut [u32] {
+        &mut self.words[cell as usize]
+    }
+
+    pub(crate) fn width(&self) -> usize {
+        self.blocks * LANES
+    }
+
+    /// Label counts of a cell, one per slot.
+    pub(crate) fn counts(&self, cell: u32) -> &[u16] {
+        let width = self.width();
+        &self.counts[cell as usize * width..][..width]
+    }
+
+    pub(crate) fn neighbours(&self, cell: u32) -> &[u32; 6] {
+        &self.neighbours[cell as usize]
+    }
+
+    /// The cell at `coord`, made and linked to its neighbours if it is new.
+    pub(crate) fn find_or_add(&mut self, coord: Coord) -> u32 {
+        if let Some(cell) = self.hash.get(coord) {
+            return cell;
+        }
+        let cell = self.coords.len() as u32;
+        let mut neighbours = [NONE; 6];
+        for (direction, there) in neighbours_of(coord).into_iter().enumerate() {
+            if let Some(other) = self.hash.get(there) {
+                neighbours[direction] = other;
+                self.neighbours[other as usize][direction ^ 1] = cell;
+            }
+        }
+        self.hash.insert(coord, cell);
+        self.coords.push(coord);
+        self.words.push(Vec::new());
+        self.counts.resize(self.counts.len() + self.width(), 0);
+        self.neighbours.push(neighbours);
+        cell
+    }
+
+    /// Adds a word without a label.
+    pub(crate) fn push(&mut self, cell: u32, word: u32) {
+        self.words[cell as usize].push(pack(word, UNLABELLED));
+        self.total += 1;
+    }
+
+    /// Label counts of a cell and its neighbours together, into `sum` (one number per slot).
+    pub(crate) fn gather(&self, cell: u32, sum: &mut [Lanes]) {
+        set_counts(sum, self.counts(cell));
+        for &other in self.neighbours(cell) {
+            if other != NONE {
+                add_counts(sum, self.counts(other));
+            }
+        }
+    }
+
+    /// Makes the label counts of a cell those of its words.
+    pub(crate) fn recount(&mut self, cell: u32) {
+        let width = self.width();
+        let counts = &mut self.counts[cell as usize * width..][..width];
+        counts.fill(0);
+        for &packed in &self.words[cell as usize] {
+            if let Some(count) = counts.get_mut(label_of(packed) as usize) {
+                *count += 1;
+            }
+        }
+    }
+}
+
+fn set_counts(sum: &mut [Lanes], counts: &[u16]) {
+    for (lanes, counts) in sum.iter_mut().zip(counts.as_chunks::<LANES>().0) {
+        for (lane, &count) in lanes.0.iter_mut().zip(counts) {
+            *lane = f32::from(count);
+        }
+    }
+}
+
+fn add_counts(sum: &mut [Lanes], counts: &[u16]) {
+    for (lanes, counts) in sum.iter_mut().zip(counts.as_chunks::<LANES>().0) {
+        for (lane, &count) in lanes.0.iter_mut().zip(counts) {
+            *lane += f32::from(count);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_are_linked_both_ways_in_any_order() {
+        let mut cells = Cells::new(1);
+        let middle = cells.find_or_add([0, 0, 0]);
+        let north = cells.find_or_add([0, 1, 0]);
+        let below = cells.find_or_add([0, 0, -1]);
+        assert_eq!(cells.neighbours(middle)[3], north);
+        assert_eq!(cells.neighbours(north)[2], middle);
+        assert_eq!(cells.neighbours(middle)[4], below);
+        assert_eq!(cells.neighbours(below)[5], middle);
+        assert_eq!(cells.find_or_add([0, 1, 0]), north);
+        assert_eq!(cells.len(), 3);
+    }
+}

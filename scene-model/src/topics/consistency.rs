@@ -1,0 +1,118 @@
+//! Property test: whatever is done to a model, its counts are those of its words.
+
+use proptest::prelude::*;
+
+use super::labels::{LANES, label_of, word_of};
+use super::{Birth, SceneConfig, SceneModel};
+use crate::project::Observation;
+
+#[derive(Clone, Debug)]
+enum Step {
+    Insert(Vec<(i8, i8, i8, u32)>),
+    Refine(u64),
+    Sweep(u32),
+    Map,
+}
+
+fn step() -> impl Strategy<Value = Step> {
+    let place = (-4i8..4, -4i8..4, -1i8..2, 0u32..24);
+    prop_oneof![
+        4 => prop::collection::vec(place, 0..120).prop_map(Step::Insert),
+        3 => (0u64..400).prop_map(Step::Refine),
+        2 => (1u32..4).prop_map(Step::Sweep),
+        1 => Just(Step::Map),
+    ]
+}
+
+fn take(model: &mut SceneModel, step: &Step) {
+    match step {
+        Step::Insert(words) => {
+            let seen = |&(x, y, z, word): &(i8, i8, i8, u32)| Observation {
+                word,
+                x: f64::from(x) + 0.5,
+                y: f64::from(y) + 0.5,
+                z: f64::from(z),
+            };
+            let observations: Vec<Observation> = words.iter().map(seen).collect();
+            let outcome = model.insert(0.0, &observations);
+            let all = outcome.accepted + outcome.skipped_bad + outcome.skipped_full;
+            assert_eq!(all, observations.len() as u64);
+        }
+        Step::Refine(words) => assert!(model.refine(*words) >= *words || model.words() == 0),
+        Step::Sweep(sweeps) => assert_eq!(model.sweep(*sweeps), u64::from(*sweeps) * model.words()),
+        Step::Map => drop(model.label_map()),
+    }
+}
+
+impl SceneModel {
+    /// Panics if a count is not the number of words that it stands for.
+    pub(crate) fn assert_consistent(&self) {
+        let (cells, labels) = self.parts();
+        let mut rows = vec![0i32; labels.rows.len() * LANES];
+        let mut total = 0;
+        for cell in 0..cells.len() as u32 {
+            let mut counts = vec![0u16; cells.width()];
+            for &packed in cells.words(cell) {
+                let label = label_of(packed);
+                assert!(labels.topic(label).is_some(), "a word has a label that is not in use");
+                counts[label as usize] += 1;
+                rows[word_of(packed) as usize * labels.blocks * LANES + label as usize] += 1;
+            }
+            assert_eq!(counts, cells.counts(cell));
+            assert!(cells.words(cell).len() <= self.config().max_words_per_cell as usize);
+            total += cells.words(cell).len() as u64;
+        }
+        assert_eq!(total, cells.total());
+        assert!(rows.iter().eq(labels.rows.iter().flat_map(|row| &row.0)));
+        assert!(labels.active() <= self.config().max_labels as usize);
+        for slot in 0..self.config().max_labels {
+            let used = cells.total() > 0 && (0..cells.len() as u32).any(|cell| cells.counts(cell)[slot as usize] > 0);
+            assert_eq!(labels.topic(slot).is_some(), used, "topics in use are those that words have");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn counts_stay_consistent_after_any_sequence_of_steps(
+        steps in prop::collection::vec(step(), 1..12),
+        max_labels in prop::sample::select(vec![1u32, 2, 15, 16, 17, 40]),
+        birth in prop::sample::select(vec![Birth::Literal, Birth::Collapsed, Birth::Rost]),
+        gamma in prop::sample::select(vec![0.0, 1e-4, 0.1, 10.0]),
+        seed in any::<u64>(),
+    ) {
+        let config = SceneConfig {
+            cell_m: [1.0; 3], gamma, birth, max_labels, vocabulary: 20, max_words_per_cell: 30, seed,
+            ..SceneConfig::default()
+        };
+        let mut model = SceneModel::new(config).unwrap();
+        for step in &steps {
+            take(&mut model, step);
+            model.assert_consistent();
+        }
+        let map = model.label_map();
+        prop_assert!(map.is_sorted_by_key(|cell| (cell.y, cell.x)));
+        prop_assert!(map.iter().all(|cell| (0.0..=1.0).contains(&cell.confidence) && cell.perplexity >= 0.99));
+    }
+
+    #[test]
+    fn an_incremental_map_equals_one_made_afresh(
+        steps in prop::collection::vec(step(), 1..8),
+        seed in any::<u64>(),
+    ) {
+        let config =
+            SceneConfig { cell_m: [1.0; 3], gamma: 0.01, vocabulary: 24, seed, ..SceneConfig::default() };
+        let (mut watched, mut unwatched) =
+            (SceneModel::new(config.clone()).unwrap(), SceneModel::new(config).unwrap());
+        for step in &steps {
+            take(&mut watched, step);
+            take(&mut unwatched, step);
+            watched.label_map();
+        }
+        watched.sweep(1);
+        unwatched.sweep(1);
+        prop_assert_eq!(watched.label_map(), unwatched.label_map());
+    }
+}

@@ -1,0 +1,106 @@
+//! The flattened map, kept up to date cell by cell.
+
+use super::cells::Cells;
+use super::evaluate::{CellView, Evaluator};
+use super::labels::{Labels, TopicId};
+
+/// One cell of the map flattened to two dimensions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlatCell {
+    /// Cell index east: the cell spans x * edge to (x + 1) * edge metres.
+    pub x: i32,
+    /// Cell index north.
+    pub y: i32,
+    /// Cell index of the height that the label comes from: the topmost cell with that label.
+    pub z: i32,
+    /// Label of the cell.
+    pub topic: TopicId,
+    /// Words in the column.
+    pub words: u32,
+    /// Share of the column's words whose own MAP label is this one, 0 to 1.
+    pub confidence: f32,
+    /// exp(-mean ln p(w)) over the words of the column; in-sample.
+    pub perplexity: f32,
+}
+
+/// Views of all cells, and which of them are out of date.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MapCache {
+    views: Vec<Option<CellView>>,
+    stale: Vec<u32>,
+    is_stale: Vec<bool>,
+    /// Cells by y, x, then from top to bottom.
+    order: Vec<u32>,
+}
+
+impl MapCache {
+    pub(crate) fn touch(&mut self, cell: u32) {
+        let index = cell as usize;
+        if index >= self.is_stale.len() {
+            self.is_stale.resize(index + 1, false);
+        }
+        if !std::mem::replace(&mut self.is_stale[index], true) {
+            self.stale.push(cell);
+        }
+    }
+
+    /// Evaluates what is out of date.
+    pub(crate) fn refresh(&mut self, cells: &Cells, labels: &Labels) {
+        self.views.resize(cells.len(), None);
+        let mut evaluator = Evaluator::new(labels);
+        for cell in self.stale.drain(..) {
+            self.is_stale[cell as usize] = false;
+            self.views[cell as usize] = Some(evaluator.view(cells, cell));
+        }
+        if self.order.len() < cells.len() {
+            self.order.extend(self.order.len() as u32..cells.len() as u32);
+            self.order.sort_by_key(|&cell| {
+                let [x, y, z] = cells.coord(cell);
+                (y, x, std::cmp::Reverse(z))
+            });
+        }
+    }
+
+    /// exp of the mean surprise over all words.
+    pub(crate) fn perplexity(&self) -> f64 {
+        let (mut surprise, mut words) = (0.0, 0u64);
+        for view in self.views.iter().flatten() {
+            surprise += view.surprise;
+            words += u64::from(view.words);
+        }
+        if words == 0 { 1.0 } else { (surprise / words as f64).exp() }
+    }
+
+    pub(crate) fn flatten(&self, cells: &Cells) -> Vec<FlatCell> {
+        let column = |cell: u32| {
+            let [x, y, _] = cells.coord(cell);
+            (x, y)
+        };
+        let mut map = Vec::with_capacity(self.order.len());
+        for stack in self.order.chunk_by(|&a, &b| column(a) == column(b)) {
+            map.extend(self.flatten_column(cells, stack));
+        }
+        map
+    }
+
+    /// The label with most words in a column from top to bottom; ties to the upper cell.
+    fn flatten_column(&self, cells: &Cells, stack: &[u32]) -> Option<FlatCell> {
+        let views = || stack.iter().filter_map(|&cell| self.views[cell as usize].map(|view| (cell, view)));
+        let words_of = |topic| views().filter(|(_, v)| v.topic == topic).map(|(_, v)| v.words).sum::<u32>();
+        let mut winner: Option<(u32, TopicId, u32)> = None;
+        for (cell, view) in views() {
+            let words = words_of(view.topic);
+            if winner.is_none_or(|(_, _, most)| words > most) {
+                winner = Some((cell, view.topic, words));
+            }
+        }
+        let (cell, topic, _) = winner?;
+        let [x, y, z] = cells.coord(cell);
+        let words: u32 = views().map(|(_, view)| view.words).sum();
+        let votes: u32 = views().filter(|(_, view)| view.topic == topic).map(|(_, view)| view.votes).sum();
+        let surprise: f64 = views().map(|(_, view)| view.surprise).sum();
+        let each = 1.0 / f64::from(words.max(1));
+        let confidence = (f64::from(votes) * each) as f32;
+        Some(FlatCell { x, y, z, topic, words, confidence, perplexity: (surprise * each).exp() as f32 })
+    }
+}

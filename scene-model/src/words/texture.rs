@@ -1,0 +1,129 @@
+//! Texture words: Gabor energy at three scales, each cut into six levels of equal share.
+
+use super::grid::centres;
+use super::plane::Plane;
+use super::{Moments, Word};
+
+const SCALES: usize = 3;
+const ORIENTATIONS: usize = 6;
+/// Even and odd filters of all orientations.
+const FILTERS: usize = 2 * ORIENTATIONS;
+const SIDE: usize = 9;
+/// Wavelength and width of the filters, pixels of their scale.
+const WAVELENGTH: f32 = 5.0;
+const SIGMA: f32 = 2.0;
+/// Sextiles of the standard normal.
+const CUTS: [f32; 5] = [-0.967, -0.431, 0.0, 0.431, 0.967];
+
+/// Number of texture words.
+pub(crate) const SIZE: u32 = 216;
+
+/// Filter bank, and mean and spread of the log energy at each scale in the frames learnt from.
+#[derive(Clone, Debug)]
+pub(crate) struct Texture {
+    bank: Vec<[[f32; FILTERS]; SIDE]>,
+    energy: [Moments; SCALES],
+}
+
+impl Default for Texture {
+    fn default() -> Self {
+        Self { bank: bank(), energy: [Moments::default(); SCALES] }
+    }
+}
+
+impl Texture {
+    /// One word for each position of a grid of `spacing` pixels.
+    pub(crate) fn extract(
+        &mut self,
+        levels: &[Plane; SCALES],
+        spacing: f32,
+        learn: bool,
+        first_id: u32,
+        words: &mut Vec<Word>,
+    ) {
+        let across = centres(levels[0].width as u32, spacing);
+        let down = centres(levels[0].height as u32, spacing);
+        let places = || down.iter().flat_map(|&v| across.iter().map(move |&u| (u, v)));
+        let energies: Vec<[f32; SCALES]> = places().map(|(u, v)| self.energies(levels, u, v)).collect();
+        if learn {
+            for energy in &energies {
+                self.energy.iter_mut().zip(energy).for_each(|(moments, &value)| moments.add(value));
+            }
+        }
+        let scales = self.energy.map(|moments| moments.scale());
+        words.extend(energies.iter().zip(places()).map(|(energy, (u, v))| {
+            let mut id = 0;
+            for (value, (mean, gain)) in energy.iter().zip(scales) {
+                let z = (value - mean) * gain;
+                id = id * 6 + CUTS.iter().map(|&cut| u32::from(z > cut)).sum::<u32>();
+            }
+            Word { id: first_id + id, u, v }
+        }));
+    }
+
+    /// Log energy over all orientations at each scale.
+    fn energies(&self, levels: &[Plane; SCALES], u: f32, v: f32) -> [f32; SCALES] {
+        let mut energies = [0.0; SCALES];
+        let mut zoom = 1.0;
+        for (energy, level) in energies.iter_mut().zip(levels) {
+            *energy = self.energy(&level.patch::<SIDE>(u * zoom, v * zoom));
+            zoom *= 0.5;
+        }
+        energies
+    }
+
+    fn energy(&self, patch: &[[f32; SIDE]; SIDE]) -> f32 {
+        let mut response = [0.0f32; FILTERS];
+        for (line, filters) in patch.iter().zip(&self.bank) {
+            for (&pixel, taps) in line.iter().zip(filters) {
+                for (sum, tap) in response.iter_mut().zip(taps) {
+                    *sum += pixel * tap;
+                }
+            }
+        }
+        let power: f32 = response.iter().map(|value| value * value).sum();
+        (power + 1e-5).ln()
+    }
+}
+
+/// Even and odd Gabor filters, without answer to a constant.
+fn bank() -> Vec<[[f32; FILTERS]; SIDE]> {
+    let offsets = || (0..SIDE * SIDE).map(|i| ((i % SIDE) as f32 - 4.0, (i / SIDE) as f32 - 4.0));
+    let window = |(dx, dy): (f32, f32)| (-(dx * dx + dy * dy) / (2.0 * SIGMA * SIGMA)).exp();
+    let mass: f32 = offsets().map(window).sum();
+    let filter = |index: usize| -> Vec<f32> {
+        let (sin, cos) = (std::f32::consts::PI * (index / 2) as f32 / ORIENTATIONS as f32).sin_cos();
+        let wave = |(dx, dy): (f32, f32)| {
+            let phase = std::f32::consts::TAU * (dx * cos + dy * sin) / WAVELENGTH;
+            if index.is_multiple_of(2) { phase.cos() } else { phase.sin() }
+        };
+        let mean = offsets().map(|place| window(place) * wave(place)).sum::<f32>() / mass;
+        offsets().map(|place| window(place) * (wave(place) - mean) / mass).collect()
+    };
+    let filters: Vec<Vec<f32>> = (0..FILTERS).map(filter).collect();
+    let taps = |y: usize, x: usize| std::array::from_fn(|index| filters[index][y * SIDE + x]);
+    (0..SIDE).map(|y| std::array::from_fn(|x| taps(y, x))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn energy_of(pixel: impl Fn(usize, usize) -> f32) -> f32 {
+        let mut patch = [[0.0; SIDE]; SIDE];
+        for (y, line) in patch.iter_mut().enumerate() {
+            for (x, value) in line.iter_mut().enumerate() {
+                *value = pixel(x, y);
+            }
+        }
+        Texture::default().energy(&patch)
+    }
+
+    #[test]
+    fn stripes_have_energy_and_an_even_patch_has_none() {
+        let even = energy_of(|_, _| 0.7);
+        let stripes = energy_of(|x, _| if x % 5 < 2 { 1.0 } else { 0.0 });
+        assert!(even < -11.0, "{even}");
+        assert!(stripes > -4.0, "{stripes}");
+    }
+}

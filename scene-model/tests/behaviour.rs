@@ -1,0 +1,132 @@
+//! What the scene model promises, from outside.
+
+use scene_model::generate::{Reef, reef};
+use scene_model::project::{DownCamera, Observation, Pose};
+use scene_model::publish::LabelBook;
+use scene_model::topics::{FlatCell, SceneConfig, SceneModel};
+use scene_model::tuning::mutual_information_nats;
+use scene_model::words::{WordConfig, WordExtractor};
+
+const CELL_PX: f32 = 25.0;
+
+fn config(seed: u64) -> SceneConfig {
+    SceneConfig { cell_m: [0.25, 0.25, 1e4], seed, ..SceneConfig::default() }
+}
+
+fn learn_reef(reef: &Reef, config: SceneConfig) -> SceneModel {
+    let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
+    let words = WordExtractor::new(&WordConfig::default()).extract(&reef.image, CELL_PX);
+    let seen = camera.project(reef.width, reef.height, &Pose::default(), &words);
+    let mut model = SceneModel::new(config).unwrap();
+    assert_eq!(model.insert(0.0, &seen).accepted, words.len() as u64);
+    model.sweep(30);
+    model
+}
+
+/// Mutual information of the map with the truth at the cell centres, the map displaced by whole cells around a torus.
+fn score(reef: &Reef, map: &[FlatCell], shift: (i32, i32)) -> f64 {
+    let left = map.iter().map(|cell| cell.x).min().unwrap();
+    let bottom = map.iter().map(|cell| cell.y).min().unwrap();
+    let (columns, rows) = (reef.width as i32 / 25, reef.height as i32 / 25);
+    let pairs = map.iter().filter_map(|cell| {
+        let (x, y) = ((cell.x - left + shift.0).rem_euclid(columns), (cell.y - bottom + shift.1).rem_euclid(rows));
+        let (u, v) = (x * 25 + 12, reef.height as i32 - 1 - (y * 25 + 12));
+        let index = usize::try_from(v).ok()? * reef.width as usize + usize::try_from(u).ok()?;
+        Some((cell.topic.0, u32::from(*reef.truth.get(index)?)))
+    });
+    mutual_information_nats(pairs).nats
+}
+
+#[test]
+fn a_reef_with_known_truth_is_recovered_well_above_the_spatial_null() {
+    let reef = reef(4, 1000, 800, 100, 6);
+    let map = learn_reef(&reef, config(1)).label_map();
+    let found = score(&reef, &map, (0, 0));
+    let shifts = [(20, 0), (0, 16), (20, 16), (10, 8), (30, 24), (13, 20)];
+    let null = shifts.iter().map(|&shift| score(&reef, &map, shift)).sum::<f64>() / shifts.len() as f64;
+    assert!(found > 0.8 && found > null + 0.5, "MI {found:.3}, null {null:.3}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_labels_and_another_seed_others() {
+    let reef = reef(9, 500, 400, 60, 5);
+    let map = |seed| learn_reef(&reef, config(seed)).label_map();
+    assert_eq!(map(1), map(1));
+    assert_ne!(map(1), map(2));
+}
+
+#[test]
+fn bad_words_are_counted_and_skipped() {
+    let mut model = SceneModel::new(SceneConfig { vocabulary: 10, max_words_per_cell: 3, ..config(1) }).unwrap();
+    let good = Observation { word: 3, x: 1.0, y: 1.0, z: 0.0 };
+    let seen = [
+        good,
+        Observation { x: f64::NAN, ..good },
+        Observation { z: f64::INFINITY, ..good },
+        Observation { y: 1e30, ..good },
+        Observation { word: 10, ..good },
+        good,
+        good,
+        good,
+    ];
+    let outcome = model.insert(0.0, &seen);
+    assert_eq!((outcome.accepted, outcome.skipped_bad, outcome.skipped_full), (3, 4, 1));
+    assert_eq!((model.cells(), model.words(), model.labels()), (1, 3, 1));
+    assert_eq!(model.refine(10), 12);
+}
+
+#[test]
+fn an_empty_model_has_an_empty_map() {
+    let mut model = SceneModel::new(config(1)).unwrap();
+    assert_eq!((model.refine(1000), model.sweep(3), model.cells(), model.labels()), (0, 0, 0, 0));
+    assert!(model.label_map().is_empty());
+    assert_eq!(model.perplexity(), 1.0);
+}
+
+#[test]
+fn a_world_may_lie_on_both_sides_of_the_origin() {
+    let mut model = SceneModel::new(config(1)).unwrap();
+    let at = |x, y| Observation { word: 1, x, y, z: -30.0 };
+    model.insert(0.0, &[at(-0.1, -0.1), at(0.1, -0.1), at(-1e6, 1e6)]);
+    let places: Vec<(i32, i32)> = model.label_map().iter().map(|cell| (cell.x, cell.y)).collect();
+    assert_eq!(places, [(-1, -1), (0, -1), (-4_000_000, 4_000_000)]);
+}
+
+#[test]
+fn where_cells_stack_the_label_with_most_words_wins() {
+    let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 1.0, ..config(1) };
+    let mut model = SceneModel::new(config).unwrap();
+    let at = |word, z| Observation { word, x: 0.5, y: 0.5, z };
+    let mut seen = vec![at(0, 9.0); 40];
+    seen.extend(vec![at(3, 2.0); 90]);
+    model.insert(0.0, &seen);
+    model.sweep(50);
+    let map = model.label_map();
+    assert_eq!(map.len(), 1);
+    assert_eq!((map[0].z, map[0].words), (2, 130));
+}
+
+#[test]
+fn labels_are_never_renamed_while_a_mission_streams_in() {
+    let reef = reef(2, 900, 700, 80, 6);
+    let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
+    let mut extractor = WordExtractor::new(&WordConfig::default());
+    let mut model = SceneModel::new(config(3)).unwrap();
+    let mut book = LabelBook::new(7);
+    let mut meanings = std::collections::BTreeMap::new();
+    for frame in 0..24u32 {
+        let (left, top) = (frame % 6 * 100, frame / 6 * 100);
+        let view = image::imageops::crop_imm(&reef.image, left, top, 320, 240).to_image();
+        let pose = Pose { x: f64::from(left) * 0.01, y: -f64::from(top) * 0.01, z: 3.0, yaw_rad: 0.0 };
+        let words = extractor.extract(&view, CELL_PX);
+        model.insert(f64::from(frame), &camera.project(320, 240, &pose, &words));
+        model.refine(20_000);
+        let published = book.publish(&model.label_map());
+        for label in published.iter().map(|cell| cell.label) {
+            let topic = book.topic_of(label).unwrap();
+            assert_eq!(*meanings.entry(label).or_insert(topic), topic, "label {label} changed its meaning");
+        }
+    }
+    assert_eq!(book.epoch(), 7);
+    assert!(meanings.len() > 1 && meanings.len() <= 40, "{} labels", meanings.len());
+}
