@@ -8,7 +8,11 @@ pub mod acoustics;
 mod channel;
 pub mod loss;
 mod node;
+pub mod presets;
 mod random;
+mod talker;
+mod track;
+pub mod usbl;
 
 pub use std::time::Duration;
 
@@ -16,3 +20,5 @@ pub use channel::{Arrival, Channel, ChannelConfig, LossReason, Outage, OutageSco
 pub use loss::LossModel;
 pub use node::{NodeId, Position};
 pub use random::Stream;
+pub use talker::Talker;
+pub use track::Track;

@@ -3,6 +3,7 @@
 pub mod absorption;
 pub mod frame_error;
 pub mod noise;
+pub mod sound_speed;
 pub mod spreading;
 
 /// The sum of levels in decibels, as of uncorrelated powers.

@@ -11,7 +11,7 @@ pub use config::ChannelConfig;
 pub use outage::{Outage, OutageScope};
 
 use crate::loss::{Frame, Verdict};
-use crate::{Duration, LossModel, NodeId, Position};
+use crate::{Duration, LossModel, NodeId, Position, Track};
 use link::Link;
 use reception::{Reception, Span};
 use std::collections::BTreeMap;
@@ -26,6 +26,7 @@ pub struct Channel {
     config: ChannelConfig,
     seed: u64,
     positions: BTreeMap<NodeId, Position>,
+    tracks: BTreeMap<NodeId, Track>,
     links: BTreeMap<(NodeId, NodeId), Link>,
     own_loss: BTreeMap<(NodeId, NodeId), LossModel>,
     on_air: BTreeMap<NodeId, Vec<Span>>,
@@ -42,6 +43,7 @@ impl Channel {
             config,
             seed,
             positions: BTreeMap::new(),
+            tracks: BTreeMap::new(),
             links: BTreeMap::new(),
             own_loss: BTreeMap::new(),
             on_air: BTreeMap::new(),
@@ -78,12 +80,31 @@ impl Channel {
     }
 
     /// Adds a node, or moves it; signals under way keep the delay they started with.
+    ///
+    /// A node that followed a track leaves it.
     pub fn place(&mut self, node: NodeId, position: Position) {
+        self.tracks.remove(&node);
         self.positions.insert(node, position);
+    }
+
+    /// Adds a node that moves along a track; its place is brought up to date by `advance` and by every `transmit`.
+    pub fn follow(&mut self, node: NodeId, track: Track, now: Duration) {
+        self.tracks.insert(node, track);
+        self.advance(now);
+    }
+
+    /// Moves the nodes that follow tracks to where they are at `now`.
+    pub fn advance(&mut self, now: Duration) {
+        for (node, track) in &self.tracks {
+            if let Some(position) = track.at(now) {
+                self.positions.insert(*node, position);
+            }
+        }
     }
 
     /// Takes a node out of the water; signals under way to it still arrive.
     pub fn remove(&mut self, node: NodeId) {
+        self.tracks.remove(&node);
         self.positions.remove(&node);
     }
 
@@ -112,6 +133,7 @@ impl Channel {
     /// not. Returns the number of the transmission, counted from 1.
     pub fn transmit(&mut self, from: NodeId, bytes: Vec<u8>, airtime: Duration, now: Duration) -> u64 {
         self.transmissions += 1;
+        self.advance(now);
         self.deafen(from, Span::new(now, airtime), now);
         let bytes = Arc::new(bytes);
         let Some(origin) = self.position(from) else { return self.transmissions };

@@ -264,3 +264,34 @@ fn loss_can_be_changed_while_running_and_per_link() {
     assert_eq!(fate(&arrivals, second, B), Some(LossReason::Noise));
     assert_eq!(fate(&arrivals, second, C), None);
 }
+
+#[test]
+fn a_node_on_a_track_is_heard_from_where_it_is() {
+    let mut channel = pair(ChannelConfig::default(), 1);
+    let track = Track::new(vec![
+        (Duration::ZERO, Position::new(1500.0, 0.0, 0.0)),
+        (Duration::from_secs(1000), Position::new(3000.0, 0.0, 0.0)),
+    ]);
+    channel.follow(B, track, Duration::ZERO);
+    channel.transmit(A, vec![1], ms(100), Duration::from_secs(500));
+    assert_eq!(drain(&mut channel)[0].range_m, 2250.0);
+    assert_eq!(channel.range_m(A, B), Some(2250.0));
+}
+
+#[test]
+fn an_hour_of_fifteen_talkative_nodes_passes_quickly() {
+    let mut channel = Channel::new(ChannelConfig { duplication: 0.05, reordering: 0.05, ..crate::presets::storm() }, 1);
+    for n in 0..15u8 {
+        channel.place(NodeId(n), Position::new(200.0 * f64::from(n), 0.0, 0.0));
+    }
+    let mut arrivals = 0;
+    for second in 0..3600u64 {
+        for n in 0..15u8 {
+            channel.transmit(NodeId(n), vec![n; 64], ms(50), ms(1000 * second + 60 * u64::from(n)));
+        }
+        while channel.poll_arrival(ms(1000 * second + 999)).is_some() {
+            arrivals += 1;
+        }
+    }
+    assert!(arrivals > 3500 * 15 * 14);
+}
