@@ -1,0 +1,226 @@
+//! The shared water: who hears what, when, and what is lost on the way.
+
+mod arrival;
+mod config;
+mod link;
+mod outage;
+mod reception;
+
+pub use arrival::{Arrival, LossReason, Outcome};
+pub use config::ChannelConfig;
+pub use outage::{Outage, OutageScope};
+
+use crate::loss::{Frame, Verdict};
+use crate::{Duration, LossModel, NodeId, Position, Track};
+use link::Link;
+use reception::{Reception, Span};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// An acoustic channel between placed nodes, in virtual time.
+///
+/// Calls must come with a `now` that never goes back, and every transmission that begins before a time must be put on
+/// air before arrivals are polled at that time; collisions could not be judged otherwise.
+#[derive(Debug)]
+pub struct Channel {
+    config: ChannelConfig,
+    seed: u64,
+    positions: BTreeMap<NodeId, Position>,
+    tracks: BTreeMap<NodeId, Track>,
+    links: BTreeMap<(NodeId, NodeId), Link>,
+    own_loss: BTreeMap<(NodeId, NodeId), LossModel>,
+    on_air: BTreeMap<NodeId, Vec<Span>>,
+    underway: BTreeMap<(Duration, u64), Reception>,
+    ready: BTreeMap<(Duration, u64, u8), Arrival>,
+    transmissions: u64,
+    receptions: u64,
+}
+
+impl Channel {
+    /// An empty channel; all chance in it comes from `seed`.
+    pub fn new(config: ChannelConfig, seed: u64) -> Self {
+        Self {
+            config,
+            seed,
+            positions: BTreeMap::new(),
+            tracks: BTreeMap::new(),
+            links: BTreeMap::new(),
+            own_loss: BTreeMap::new(),
+            on_air: BTreeMap::new(),
+            underway: BTreeMap::new(),
+            ready: BTreeMap::new(),
+            transmissions: 0,
+            receptions: 0,
+        }
+    }
+
+    /// The conditions in force.
+    pub fn config(&self) -> &ChannelConfig {
+        &self.config
+    }
+
+    /// Changes the conditions for transmissions from now on.
+    ///
+    /// A changed loss model starts afresh on every link that has none of its own; other changes leave it running.
+    pub fn set_config(&mut self, config: ChannelConfig) {
+        if config.loss != self.config.loss {
+            for (_, link) in self.links.iter_mut().filter(|(ends, _)| !self.own_loss.contains_key(*ends)) {
+                link.set_model(&config.loss);
+            }
+        }
+        self.config = config;
+    }
+
+    /// Gives one direction of a link a loss model of its own.
+    pub fn set_link_loss(&mut self, from: NodeId, to: NodeId, model: LossModel) {
+        if let Some(link) = self.links.get_mut(&(from, to)) {
+            link.set_model(&model);
+        }
+        self.own_loss.insert((from, to), model);
+    }
+
+    /// Adds a node, or moves it; signals under way keep the delay they started with.
+    ///
+    /// A node that followed a track leaves it.
+    pub fn place(&mut self, node: NodeId, position: Position) {
+        self.tracks.remove(&node);
+        self.positions.insert(node, position);
+    }
+
+    /// Adds a node that moves along a track; its place is brought up to date by `advance` and by every `transmit`.
+    pub fn follow(&mut self, node: NodeId, track: Track, now: Duration) {
+        self.tracks.insert(node, track);
+        self.advance(now);
+    }
+
+    /// Moves the nodes that follow tracks to where they are at `now`.
+    pub fn advance(&mut self, now: Duration) {
+        for (node, track) in &self.tracks {
+            if let Some(position) = track.at(now) {
+                self.positions.insert(*node, position);
+            }
+        }
+    }
+
+    /// Takes a node out of the water; signals under way to it still arrive.
+    pub fn remove(&mut self, node: NodeId) {
+        self.tracks.remove(&node);
+        self.positions.remove(&node);
+    }
+
+    /// Where a node is.
+    pub fn position(&self, node: NodeId) -> Option<Position> {
+        self.positions.get(&node).copied()
+    }
+
+    /// Slant range in metres; `None` if either node is not placed.
+    pub fn range_m(&self, a: NodeId, b: NodeId) -> Option<f64> {
+        Some(self.positions.get(&a)?.range_m(self.positions.get(&b)?))
+    }
+
+    /// Time that sound takes over `range_m` metres, at most a day.
+    pub fn propagation(&self, range_m: f64) -> Duration {
+        const DAY: Duration = Duration::from_secs(86_400);
+        Duration::try_from_secs_f64(range_m / self.config.sound_speed_m_s).unwrap_or(DAY).min(DAY)
+    }
+
+    /// Whether a node is transmitting itself at `now`.
+    pub fn is_busy(&self, node: NodeId, now: Duration) -> bool {
+        self.on_air.get(&node).is_some_and(|spans| spans.iter().any(|span| span.start <= now && now < span.end))
+    }
+
+    /// Puts bytes on air at `now` for `airtime`; every other placed node gets its own copy, or an `Arrival` that says why
+    /// not. Returns the number of the transmission, counted from 1.
+    pub fn transmit(&mut self, from: NodeId, bytes: Vec<u8>, airtime: Duration, now: Duration) -> u64 {
+        self.transmissions += 1;
+        self.advance(now);
+        self.deafen(from, Span::new(now, airtime), now);
+        let bytes = Arc::new(bytes);
+        let Some(origin) = self.position(from) else { return self.transmissions };
+        let others: Vec<_> = self.positions.iter().map(|(n, p)| (*n, *p)).filter(|(n, _)| *n != from).collect();
+        for (to, position) in others {
+            let reception = self.receive(from, to, origin.range_m(&position), &bytes, airtime, now);
+            self.enter(reception);
+        }
+        self.transmissions
+    }
+
+    /// When the next arrival is complete; `None` if nothing is under way.
+    pub fn poll_timeout(&self) -> Option<Duration> {
+        let underway = self.underway.keys().next().map(|(at, _)| *at);
+        let ready = self.ready.keys().next().map(|(at, ..)| *at);
+        underway.into_iter().chain(ready).min()
+    }
+
+    /// The next arrival complete by `now`, in order of time; ties in order of transmission, receiver and copy.
+    pub fn poll_arrival(&mut self, now: Duration) -> Option<Arrival> {
+        while let Some(entry) = self.underway.first_entry().filter(|entry| entry.key().0 <= now) {
+            let ((_, number), reception) = entry.remove_entry();
+            for (copy, arrival) in (0u8..).zip(reception.arrivals(self.config.reorder_delay)) {
+                self.ready.insert((arrival.at, number, copy), arrival);
+            }
+        }
+        let entry = self.ready.first_entry().filter(|entry| entry.key().0 <= now)?;
+        Some(entry.remove())
+    }
+
+    /// Notes a node's own transmission and spoils what it would have received meanwhile.
+    fn deafen(&mut self, node: NodeId, span: Span, now: Duration) {
+        let spans = self.on_air.entry(node).or_default();
+        spans.retain(|span| span.end > now);
+        spans.push(span);
+        if self.config.half_duplex {
+            let heard = self.underway.values_mut().filter(|other| other.to == node && other.span.overlaps(&span));
+            heard.for_each(|other| other.self_deaf = true);
+        }
+    }
+
+    /// The signal as it will come to one receiver, its fate drawn but not yet its collisions.
+    fn receive(
+        &mut self,
+        from: NodeId,
+        to: NodeId,
+        range_m: f64,
+        bytes: &Arc<Vec<u8>>,
+        airtime: Duration,
+        now: Duration,
+    ) -> Reception {
+        let span = Span::new(now.saturating_add(self.propagation(range_m)), airtime);
+        let model = self.own_loss.get(&(from, to)).unwrap_or(&self.config.loss);
+        let link = self.links.entry((from, to)).or_insert_with(|| Link::new(self.seed, from, to, model));
+        let frame = Frame { at: span.start, airtime, bytes: bytes.len(), range_m };
+        let mut draws = link.draw(&frame, &self.config);
+        if range_m > self.config.max_range_m {
+            draws.verdict = Verdict::OutOfRange;
+        }
+        Reception {
+            transmission: self.transmissions,
+            from,
+            to,
+            span,
+            sent_at: now,
+            range_m,
+            bytes: Arc::clone(bytes),
+            draws,
+            in_outage: self.config.outages.iter().any(|outage| outage.covers(from, to, span.start, span.end)),
+            collided: false,
+            self_deaf: false,
+        }
+    }
+
+    /// Adds a reception to those under way, marking collisions in both directions.
+    fn enter(&mut self, mut new: Reception) {
+        let own = self.on_air.get(&new.to).map(Vec::as_slice).unwrap_or_default();
+        new.self_deaf = self.config.half_duplex && own.iter().any(|span| span.overlaps(&new.span));
+        let overlapping = self.underway.values_mut().filter(|old| old.to == new.to && old.span.overlaps(&new.span));
+        for old in overlapping {
+            new.collided |= old.audible();
+            old.collided |= new.audible();
+        }
+        self.receptions += 1;
+        self.underway.insert((new.span.end, self.receptions), new);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,87 @@
+//! Signals at one receiver: who overlaps whom, and with its own voice.
+
+use super::link::Draws;
+use super::{Arrival, LossReason, Outcome};
+use crate::channel::link::flip_bits;
+use crate::loss::Verdict;
+use crate::{Duration, NodeId};
+use std::sync::Arc;
+
+/// A span of time at one place; touching spans do not overlap.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Span {
+    pub start: Duration,
+    pub end: Duration,
+}
+
+impl Span {
+    pub(super) fn new(start: Duration, airtime: Duration) -> Self {
+        Self { start, end: start.saturating_add(airtime) }
+    }
+
+    pub(super) fn overlaps(&self, other: &Span) -> bool {
+        self.start < other.end && other.start < self.end
+    }
+}
+
+/// One signal on its way to one receiver.
+#[derive(Debug)]
+pub(super) struct Reception {
+    pub transmission: u64,
+    pub from: NodeId,
+    pub to: NodeId,
+    pub span: Span,
+    pub sent_at: Duration,
+    pub range_m: f64,
+    pub bytes: Arc<Vec<u8>>,
+    pub draws: Draws,
+    pub in_outage: bool,
+    pub collided: bool,
+    pub self_deaf: bool,
+}
+
+impl Reception {
+    /// Whether there is energy at the receiver that disturbs other signals.
+    pub(super) fn audible(&self) -> bool {
+        !self.in_outage && self.draws.verdict != Verdict::OutOfRange
+    }
+
+    fn loss_reason(&self) -> Option<LossReason> {
+        [
+            (self.in_outage, LossReason::Outage),
+            (self.draws.verdict == Verdict::OutOfRange, LossReason::OutOfRange),
+            (self.self_deaf, LossReason::SelfDeaf),
+            (self.collided, LossReason::Collision),
+            (self.draws.verdict == Verdict::Lost, LossReason::Noise),
+        ]
+        .into_iter()
+        .find_map(|(holds, reason)| holds.then_some(reason))
+    }
+
+    fn delivery(&self, copy: u8) -> Outcome {
+        let mut bytes = self.bytes.to_vec();
+        let corrupted = self.draws.corrupted && flip_bits(&mut bytes, &mut self.draws.flips.clone());
+        Outcome::Delivered { bytes, copy, corrupted }
+    }
+
+    /// The arrivals that this reception ends in: one, or two if it is delivered and duplicated.
+    pub(super) fn arrivals(&self, reorder_delay: Duration) -> impl Iterator<Item = Arrival> {
+        let reason = self.loss_reason();
+        let copies = if reason.is_none() && self.draws.duplicated { 2 } else { 1 };
+        self.draws.late.into_iter().zip(0u8..copies).map(move |(late, copy)| {
+            let delay = if late && reason.is_none() { reorder_delay } else { Duration::ZERO };
+            Arrival {
+                transmission: self.transmission,
+                from: self.from,
+                to: self.to,
+                at: self.span.end.saturating_add(delay),
+                sent_at: self.sent_at,
+                range_m: self.range_m,
+                outcome: match reason {
+                    Some(reason) => Outcome::Lost { bytes_len: self.bytes.len(), reason },
+                    None => self.delivery(copy),
+                },
+            }
+        })
+    }
+}

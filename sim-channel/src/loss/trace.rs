@@ -1,0 +1,170 @@
+//! Loss replayed from a record.
+
+use super::{Frame, LinkLoss, Verdict};
+use crate::{Duration, Stream};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// A record of when frames got through.
+///
+/// A frame shares the fate of the last record at or before the time it begins to arrive. After the end the record begins
+/// again, one mean spacing later.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Trace {
+    records: Arc<[Record]>,
+    period: Duration,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Record {
+    /// Since the first record.
+    at: Duration,
+    delivered: bool,
+}
+
+/// What is wrong with a record.
+#[derive(Clone, PartialEq, Eq, Debug, Error)]
+pub enum TraceError {
+    /// A line is not `time,delivered`; lines count from 1.
+    #[error("line {line}: expected time_s,delivered (0 or 1)")]
+    Line {
+        /// Where.
+        line: usize,
+    },
+    /// There is no record in it.
+    #[error("no record found")]
+    Empty,
+}
+
+impl Trace {
+    /// Reads lines `time,delivered`: seconds, then 0 or 1 (or false, true); a header and `#` lines are skipped.
+    pub fn from_csv(text: &str) -> Result<Self, TraceError> {
+        let mut records = Vec::new();
+        for (line, content) in (1..).zip(text.lines().map(str::trim)) {
+            if content.is_empty() || content.starts_with('#') {
+                continue;
+            }
+            match csv_record(content) {
+                Some(record) => records.push(record),
+                None if line == 1 => {}
+                None => return Err(TraceError::Line { line }),
+            }
+        }
+        Self::from_records(records)
+    }
+
+    /// Reads our own `frames.log`, one line a frame: `time_s direction bytes kind lost`, by blanks, commas or tabs.
+    ///
+    /// Keeps the lines of one `direction` if one is named. Lines that are no such record are skipped, so that a log cut
+    /// off in mid-line still serves. `lost` counts as lost unless it is empty, 0, `false`, `no`, `ok`, `-` or `delivered`.
+    pub fn from_frames_log(text: &str, direction: Option<&str>) -> Result<Self, TraceError> {
+        Self::from_records(text.lines().filter_map(|line| log_record(line, direction)).collect())
+    }
+
+    /// Share of the records that were lost.
+    pub fn loss_rate(&self) -> f64 {
+        self.records.iter().filter(|record| !record.delivered).count() as f64 / self.records.len() as f64
+    }
+
+    /// How long the record lasts before it begins again.
+    pub fn period(&self) -> Duration {
+        self.period
+    }
+
+    fn from_records(mut timed: Vec<(f64, bool)>) -> Result<Self, TraceError> {
+        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (Some(first), Some(last)) = (timed.first().copied(), timed.last().copied()) else {
+            return Err(TraceError::Empty);
+        };
+        let length = last.0 - first.0;
+        let spacing = if timed.len() > 1 { length / (timed.len() - 1) as f64 } else { 1.0 };
+        let record = |(at, delivered): (f64, bool)| Record { at: Duration::from_secs_f64(at - first.0), delivered };
+        let period = Duration::from_secs_f64(length + spacing).max(Duration::from_nanos(1));
+        Ok(Self { records: timed.into_iter().map(record).collect(), period })
+    }
+
+    fn delivered_at(&self, at: Duration) -> bool {
+        let within = Duration::from_nanos((at.as_nanos() % self.period.as_nanos()) as u64);
+        let after = self.records.partition_point(|record| record.at <= within);
+        after.checked_sub(1).and_then(|index| self.records.get(index)).is_none_or(|record| record.delivered)
+    }
+
+    pub(super) fn instance(&self) -> Box<dyn LinkLoss> {
+        Box::new(self.clone())
+    }
+}
+
+impl LinkLoss for Trace {
+    fn judge(&mut self, frame: &Frame, _chance: &mut Stream) -> Verdict {
+        Verdict::lost_if(!self.delivered_at(frame.at))
+    }
+}
+
+/// A time in seconds that a `Duration` can hold: 0..=10^9.
+fn seconds(text: &str) -> Option<f64> {
+    text.trim().parse().ok().filter(|at| (0.0..=1e9).contains(at))
+}
+
+fn csv_record(line: &str) -> Option<(f64, bool)> {
+    let (at, delivered) = line.split_once([',', ';', '\t'])?;
+    let delivered = match delivered.trim().to_ascii_lowercase().as_str() {
+        "1" | "true" => true,
+        "0" | "false" => false,
+        _ => return None,
+    };
+    Some((seconds(at)?, delivered))
+}
+
+fn log_record(line: &str, wanted: Option<&str>) -> Option<(f64, bool)> {
+    let mut fields = line.split([' ', '\t', ',']).filter(|field| !field.is_empty());
+    let at = seconds(fields.next()?)?;
+    let direction = fields.next()?;
+    let _bytes: u64 = fields.next()?.parse().ok()?;
+    let _kind = fields.next()?;
+    let lost = fields.next().unwrap_or_default().to_ascii_lowercase();
+    let delivered = matches!(lost.as_str(), "" | "0" | "false" | "no" | "ok" | "-" | "delivered");
+    wanted.is_none_or(|wanted| wanted == direction).then_some((at, delivered))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_shares_the_fate_of_the_last_record() {
+        let trace = Trace::from_csv("time,delivered\n10,1\n12,0\n14,1\n").expect("record");
+        let fate = |s| trace.delivered_at(Duration::from_secs_f64(s));
+        assert_eq!([0.0, 1.9, 2.0, 3.9, 4.0, 5.9].map(fate), [true, true, false, false, true, true]);
+    }
+
+    #[test]
+    fn the_record_begins_again_after_its_end() {
+        let trace = Trace::from_csv("0,0\n1,1\n2,1\n").expect("record");
+        assert_eq!(trace.period(), Duration::from_secs(3));
+        let fates: Vec<_> = (0..7).map(|s| trace.delivered_at(Duration::from_secs(s))).collect();
+        assert_eq!(fates, [false, true, true, false, true, true, false]);
+    }
+
+    #[test]
+    fn loss_rate_is_that_of_the_record() {
+        let trace = Trace::from_csv("0,0\n1,1\n2,1\n3,0\n").expect("record");
+        assert_eq!(trace.loss_rate(), 0.5);
+    }
+
+    #[test]
+    fn our_own_log_is_read_by_direction_and_tolerantly() {
+        let log = "# time_s direction bytes kind lost\n0.5 up 256 map 0\n1.5 down 32 directive noise\n2.5 up 256 map 1\n3.5 up 25";
+        let up = Trace::from_frames_log(log, Some("up")).expect("records");
+        assert_eq!((up.records.len(), up.loss_rate()), (2, 0.5));
+        assert_eq!(Trace::from_frames_log(log, Some("down")).expect("record").loss_rate(), 1.0);
+        assert_eq!(Trace::from_frames_log(log, None).expect("records").records.len(), 3);
+        assert_eq!(Trace::from_frames_log("", None), Err(TraceError::Empty));
+    }
+
+    #[test]
+    fn a_wrong_line_is_named() {
+        assert_eq!(Trace::from_csv("0,1\n1,perhaps\n"), Err(TraceError::Line { line: 2 }));
+        assert_eq!(Trace::from_csv("0,1\n-4,1\n"), Err(TraceError::Line { line: 2 }));
+        assert_eq!(Trace::from_csv("a,b\n"), Err(TraceError::Empty));
+    }
+}

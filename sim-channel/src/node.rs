@@ -1,0 +1,41 @@
+//! Who takes part, and where.
+
+/// A participant of the channel; also its modem address where a modem is emulated (1..=254).
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
+pub struct NodeId(pub u8);
+
+/// A place in the water, in metres: x east, y north, z down from the surface.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Position {
+    /// Metres east of the origin.
+    pub x_m: f64,
+    /// Metres north of the origin.
+    pub y_m: f64,
+    /// Metres below the surface.
+    pub z_m: f64,
+}
+
+impl Position {
+    /// A place at `x_m`, `y_m`, `z_m` metres.
+    pub const fn new(x_m: f64, y_m: f64, z_m: f64) -> Self {
+        Self { x_m, y_m, z_m }
+    }
+
+    /// Slant distance in metres along a straight ray.
+    pub fn range_m(&self, other: &Position) -> f64 {
+        let (dx, dy, dz) = (self.x_m - other.x_m, self.y_m - other.y_m, self.z_m - other.z_m);
+        (dx * dx + dy * dy + dz * dz).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn range_is_the_straight_line() {
+        let a = Position::new(0.0, 0.0, 2.0);
+        let b = Position::new(3.0, 4.0, 14.0);
+        assert_eq!(a.range_m(&b), 13.0);
+    }
+}
