@@ -1,0 +1,63 @@
+// The buttons along the map.
+
+import { $, h, show } from "../dom.js";
+import { store } from "../store.js";
+import { fit, follow, options, redraw, toggle, view } from "./chart.js";
+import { layer, layerNames, setLayer } from "./layers.js";
+import { measure, toggleMeasure } from "./measure.js";
+
+const buttons = {};
+const zoom = (factor) => () => {
+  view.zoomAt(view.width / 2, view.height / 2, factor);
+  store.tell("view");
+  redraw();
+};
+
+function button(name, label, title, onclick) {
+  buttons[name] = h("button.tool", { type: "button", title, onclick }, label);
+  if (title !== label && label.length < 2) buttons[name].setAttribute("aria-label", title);
+  return buttons[name];
+}
+
+export function startTools() {
+  const pick = h("select", { id: "layer", onchange: () => (setLayer(pick.value), redraw()) });
+  const layers = h("label.tool-field", {}, "Layer", pick);
+  const after = (fn) => () => {
+    fn();
+    mark();
+    redraw();
+  };
+  $("tools").append(
+    button("in", "+", "Zoom in", zoom(1.4)),
+    button("out", "\u2212", "Zoom out", zoom(1 / 1.4)),
+    button("fit", "Fit", "Show everything (0)", after(fit)),
+    button("follow", "Follow", "Keep the vehicle in the middle (F)", after(follow)),
+    layers,
+    button("grid", "Grid", "Grid in metres", after(() => toggle("grid"))),
+    button("rings", "Rings", "Range rings about the vehicle", after(() => toggle("rings"))),
+    button("measure", "Measure", "Measure distance and bearing (M)", after(toggleMeasure)),
+  );
+  store.on("view", mark);
+  store.on("map select", () => offer(pick));
+  offer(pick);
+  mark();
+}
+
+function offer(pick) {
+  const names = layerNames();
+  if (names.join() !== [...pick.options].map((o) => o.value).join()) {
+    pick.replaceChildren(...names.map((n) => h("option", { value: n }, n)));
+  }
+  if (!names.includes(layer.name)) setLayer("label");
+  pick.value = layer.name;
+  show(pick.parentElement, names.length > 1);
+}
+
+function mark() {
+  const pressed = {
+    fit: view.mode === "fit", follow: view.mode === "follow",
+    grid: options.grid, rings: options.rings, measure: measure.on,
+  };
+  for (const [name, on] of Object.entries(pressed)) buttons[name].setAttribute("aria-pressed", String(on));
+  $("chart").classList.toggle("measuring", measure.on);
+}
