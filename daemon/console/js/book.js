@@ -3,7 +3,8 @@
 
 import { recall, remember } from "./prefs.js";
 import { store } from "./store.js";
-import { tableColour } from "./palette.js";
+import { current as theme } from "./theme.js";
+import { redShade, rgb, tableColour } from "./palette.js";
 
 const EMPTY = { names: {}, colours: {}, merged: {} };
 let loadedKey = null;
@@ -39,6 +40,10 @@ export function shownAs(id) {
 export const nameOf = (id) => current().names[id] ?? `Label ${id}`;
 export const hasName = (id) => current().names[id] !== undefined;
 export const colourOf = (id) => current().colours[id] ?? tableColour(id);
+
+/** [r, g, b] in which `id` is painted now: its colour, or a shade of red in the red theme. */
+export const tintOf = (id) => (theme() === "red" ? redShade(id) : rgb(colourOf(id)));
+
 export const membersOf = (id, ids) => ids.filter((other) => shownAs(other) === id);
 
 export function rename(id, name) {

@@ -30,6 +30,7 @@ export function metres(m, digits = 1) {
 }
 
 export function area(m2) {
+  if (m2 >= 1000 && m2 < 10000) return `${count(m2)}${THIN}m²`;
   return m2 >= 10000 ? `${(m2 / 10000).toFixed(2)}${THIN}ha` : `${m2.toFixed(m2 < 10 ? 2 : 1)}${THIN}m²`;
 }
 

@@ -1,5 +1,6 @@
 // Starts the page: every part listens to the store, the feed fills it.
 
+import { startCloud } from "./cloud/cloud.js";
 import { startFeed } from "./feed.js";
 import { startChart } from "./map/chart.js";
 import { startTools } from "./map/tools.js";
@@ -21,6 +22,7 @@ startLabels();
 startVehicle();
 startLink();
 startChart();
+startCloud();
 startTools();
 startKeys();
 onTheme(() => store.tell("theme"));

@@ -111,7 +111,8 @@ export class Vehicle {
     const e = { label, state: "queued", progress: 0, bytes: 380 + 24 * label, url: null, at_s: null };
     this.exemplars.set(label, e);
     return this.directive.issue("requests", nowS, (state) => {
-      e.state = state === "refused" ? "refused" : "coming";
+      const asked = [...this.exemplars.values()].filter((x) => x.state === "queued");
+      for (const x of asked) x.state = state === "refused" ? "refused" : "coming";
     });
   }
 

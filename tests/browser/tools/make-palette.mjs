@@ -50,7 +50,7 @@ for (let r = 0; r <= 255; r += step)
     for (let b = 0; b <= 255; b += step) {
       const hex = [r, g, b].map((v) => v.toString(16).padStart(2, "0")).join("");
       const views = seen(parse(hex));
-      if (views[0][0] > 0.36 && views[0][0] < 0.92) candidates.push({ hex, views, least: Infinity });
+      if (views[0][0] > 0.45 && views[0][0] < 0.92) candidates.push({ hex, views, least: Infinity });
     }
 
 const chosen = [];

@@ -3,7 +3,7 @@
 import { $, show, text } from "../dom.js";
 import { ago, count, span } from "../format.js";
 import { recall, remember } from "../prefs.js";
-import { ageOf, isSilent, isStale, store } from "../store.js";
+import { ageOf, isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
 import { drawCraft } from "./craft.js";
 import { listen } from "./input.js";
@@ -29,7 +29,7 @@ export function startChart() {
     changed: () => (redraw(), store.tell("view")),
     point: hover,
     click,
-    keys: { 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, Escape: () => measure.on && toggleMeasure() },
+    keys: { 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, Escape: () => measure.on && measureKey(), Enter: () => click(view.width / 2, view.height / 2) },
   });
   canvas.addEventListener("focus", redraw);
   canvas.addEventListener("blur", redraw);
@@ -193,8 +193,7 @@ function plates() {
   const age = ageOf(v.map.updated_s);
   const late = isStale(v);
   $("map-age").classList.toggle("stale", late);
-  const state = late ? `stale, last change ${ago(age)}` : age === null ? "nothing yet" : `changed ${span(age)} ago`;
-  const wait = isSilent(v) ? ", vehicle silent" : "";
-  text($("map-age"), `Map v${v.map.version} · ${state}${wait} · ${count(v.map.explored_cells)} cells`);
+  const state = late ? `stale, changed ${ago(age)}` : age === null ? "nothing yet" : `changed ${span(age)} ago`;
+  text($("map-age"), `Map v${v.map.version} · ${state} · ${count(v.map.explored_cells)} cells`);
   canvas.dataset.layer = layer.name;
 }

@@ -1,10 +1,11 @@
 // Which plane of the map is painted, its legend, and the canvas that holds it until something changes.
 
 import { $, h, show } from "../dom.js";
-import { colourOf, shownAs } from "../book.js";
+import { shownAs, tintOf } from "../book.js";
 import { isStale, store } from "../store.js";
 import { minus, nice, span } from "../format.js";
 import { ramp } from "../palette.js";
+import { current as theme, onTheme } from "../theme.js";
 import { paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
 
 const AGE_REPAINT_S = 5;
@@ -13,6 +14,10 @@ const painted = new Map();
 let legendKey = "";
 let bookEdits = 0;
 store.on("book select", () => (bookEdits += 1));
+onTheme(() => {
+  bookEdits += 1;
+  legendKey = "";
+});
 
 /** The layers that the chosen vehicle's map can show. */
 export function layerNames() {
@@ -40,7 +45,7 @@ export function canvasOf(vehicle, map) {
       ? paintPlane(map, plane)
       : layer.name === "age"
         ? paintAge(map, age, ageTop(map))
-        : paintLabels(map, { colourOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
+        : paintLabels(map, { tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
   painted.set(vehicle.id, { key, canvas });
   return canvas;
 }
@@ -69,7 +74,7 @@ export function drawLegend() {
   const bar = h("canvas", { width: 120, height: 8, "aria-hidden": "true" });
   const c = bar.getContext("2d");
   for (let x = 0; x < 120; x += 1) {
-    c.fillStyle = `rgb(${ramp(flip ? 1 - x / 119 : x / 119).join(" ")})`;
+    c.fillStyle = `rgb(${ramp(flip ? 1 - x / 119 : x / 119, theme() === "red").join(" ")})`;
     c.fillRect(x, 0, 1, 8);
   }
   box.replaceChildren(h("b", {}, title), h("span", {}, low.trim()), bar, h("span", {}, high.trim()));

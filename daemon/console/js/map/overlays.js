@@ -88,16 +88,16 @@ export function drawRings(c, view, ink, x, y) {
   const step = nice(160 / view.scale);
   const [px, py] = view.toScreen(x, y);
   const reach = Math.hypot(view.width, view.height) / view.scale;
-  c.setLineDash([2, 4]);
-  c.lineWidth = 1;
   c.font = FONT;
   c.textAlign = "center";
   for (let i = 1; i * step < reach && i < 12; i += 1) {
+    c.setLineDash([2, 4]);
+    c.lineWidth = 1;
     c.strokeStyle = ink.text;
     c.beginPath();
     c.arc(px, py, i * step * view.scale, 0, 2 * Math.PI);
     c.stroke();
+    c.setLineDash([]);
     haloText(c, metres(i * step, step < 1 ? 1 : 0), px, py - i * step * view.scale - 3, ink);
   }
-  c.setLineDash([]);
 }

@@ -1,6 +1,9 @@
 // One map version painted once into an offscreen canvas, one pixel a cell, north up.
 
-import { ramp, rgb } from "../palette.js";
+import { ramp } from "../palette.js";
+import { current as theme } from "../theme.js";
+
+const shade = (t) => ramp(t, theme() === "red");
 
 /** The extent of explored cells in metres [west, south, east, north], or null. */
 export function extent(map) {
@@ -50,13 +53,14 @@ function paint(map, rgbaOf) {
 const mix = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
 
 /** Labels in their colours; greyed when stale, the rest faint when one is highlighted. */
-export function paintLabels(map, { colourOf, shownAs, stale, highlight }) {
+export function paintLabels(map, { tintOf, shownAs, stale, highlight }) {
   const table = new Array(256);
   const lookup = (label) => {
     const shown = shownAs(label);
-    const full = rgb(colourOf(shown));
+    const full = tintOf(shown);
     const grey = 0.3 * full[0] + 0.59 * full[1] + 0.11 * full[2];
-    const tone = stale ? mix(full, [grey, grey, grey], 0.7) : full;
+    const pale = theme() === "red" ? [grey, 0, 0] : [grey, grey, grey];
+    const tone = stale ? mix(full, pale, 0.7) : full;
     return [...tone, highlight === null || highlight === shown ? 255 : 36];
   };
   return paint(map, (_, label) => (table[label] ??= lookup(label)));
@@ -66,7 +70,7 @@ export function paintLabels(map, { colourOf, shownAs, stale, highlight }) {
 export function paintAge(map, sinceFetchS, top) {
   return paint(map, (at) => {
     const age = map.age[at];
-    return age === 65535 ? [128, 128, 128, 90] : [...ramp(1 - (age + sinceFetchS) / top), 255];
+    return age === 65535 ? [128, 128, 128, 90] : [...shade(1 - (age + sinceFetchS) / top), 255];
   });
 }
 
@@ -74,7 +78,7 @@ export function paintAge(map, sinceFetchS, top) {
 export function paintPlane(map, plane) {
   return paint(map, (at) => {
     const v = plane.data[at];
-    return v === 255 ? [128, 128, 128, 90] : [...ramp(v / 254), 255];
+    return v === 255 ? [128, 128, 128, 90] : [...shade(v / 254), 255];
   });
 }
 

@@ -2,7 +2,7 @@
 
 import { h, show, text } from "../dom.js";
 import { area, signed } from "../format.js";
-import { colourOf, nameOf } from "../book.js";
+import { nameOf, tintOf } from "../book.js";
 import { layer } from "../map/layers.js";
 import { store } from "../store.js";
 import { changedElsewhere, draft, setWeight, weight } from "./draft.js";
@@ -41,7 +41,7 @@ export function refreshRow(node, label) {
   const w = weight(label);
   const mine = draft().weights.get(label.id);
   const extra = label.members.length > 1 ? ` +${label.members.length - 1}` : "";
-  parts.chip.style.backgroundColor = colourOf(label.id);
+  parts.chip.style.backgroundColor = `rgb(${tintOf(label.id).join(" ")})`;
   parts.chip.setAttribute("aria-label", `Show only ${name} on the map`);
   parts.chip.setAttribute("aria-pressed", String(layer.highlight === label.id));
   text(parts.name, name + extra);

@@ -3,7 +3,7 @@
 import { $, h, keyed, show, text } from "../dom.js";
 import { shownLabels } from "../book.js";
 import { recall, remember } from "../prefs.js";
-import { store } from "../store.js";
+import { isStale, store } from "../store.js";
 import { discard, draft, exploration, send, serverExploration, setExploration, settle, unsent, weight } from "./draft.js";
 import { makeRow, refreshRow } from "./label-row.js";
 import { lifeline, slotOf } from "./lifeline.js";
@@ -17,6 +17,8 @@ const line = lifeline("the weights");
 const empty = h("p.empty", {}, "No labels yet. They appear with the first cells of the map.");
 const slider = h("input", { type: "range", min: 0, max: 1, step: 0.05, id: "exploration", oninput: () => setExploration(store.vehicle, Number(slider.value)) });
 const value = h("output.value", { for: "exploration" });
+const explore = h("div.exploration", {},
+  h("label", { for: "exploration", title: "Weight of unexplored ground against known labels" }, "Unexplored"), slider, value);
 const go = h("button.primary", { type: "button", id: "send-weights", onclick: () => send(store.vehicle, labels()) }, "Send weights");
 const drop = h("button", { type: "button", onclick: discard }, "Discard");
 const error = h("p.error", { role: "alert" });
@@ -30,11 +32,9 @@ export function startLabels() {
     remember("label-order", order.value);
     update();
   });
-  $("label-list").before(empty);
-  $("send").append(
-    h("div.exploration", {}, h("label", { for: "exploration", title: "Weight of unexplored ground against known labels" }, "Explore"), slider, value),
-    h("div.buttons", {}, go, drop), error, line.node);
-  store.on("state select draft book highlight feed", update);
+  $("label-list").before(explore, empty);
+  $("send").append(h("div.buttons", {}, go, drop), error, line.node);
+  store.on("state select draft book highlight feed theme", update);
   store.on("tick", refreshLine);
 }
 
@@ -49,6 +49,7 @@ function update() {
   show(empty, rows.length === 0);
   const e = exploration(vehicle);
   if (Number(slider.value) !== e) slider.value = e;
+  $("labels").classList.toggle("stale", isStale(vehicle));
   const known = serverExploration(vehicle) !== null || draft().exploration !== null;
   text(value, e.toFixed(2));
   value.title = known ? "" : "The daemon does not report this value; this is the default.";

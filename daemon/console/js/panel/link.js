@@ -31,7 +31,7 @@ export function startLink() {
     values[key] = set;
     list.append(node);
   }
-  classes.append(h("caption", {}, "Bits by class"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
+  classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
     h("tbody", {}, ...CLASSES.map((c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td")))));
   const form = h("form.budget", { onsubmit: submit },
     h("label", { for: "budget" }, "Budget, bit/s"), budget, h("button", { type: "submit" }, "Set"));

@@ -15,6 +15,7 @@ const age = h("p.age");
 const values = {};
 const list = h("dl.values");
 const slots = h("ul.slots");
+const nothing = h("p.note", {}, "Nothing sent yet.");
 const hold = h("button", { type: "button", id: "hold", onclick: confirmHold });
 const line = lifeline("the constraints");
 const error = h("p.error", { role: "alert" });
@@ -30,7 +31,7 @@ export function startVehicle() {
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
-    h("h3", {}, "Directive"), slots, h("div.buttons", {}, hold), error, line.node);
+    h("h3", {}, "Directive"), slots, nothing, h("div.buttons", {}, hold), error, line.node);
   store.on("state select tick feed", update);
 }
 
@@ -42,7 +43,7 @@ function update() {
   text(mode, s?.mode ?? "unknown");
   mode.dataset.mode = s?.mode ?? "none";
   $("vehicle").classList.toggle("stale", isStale(v));
-  text(age, s ? `Status ${span(ageOf(s.at_s))} old; heard ${ago(ageOf(v.heard_s))}, expected every ${span(v.expected_interval_s)}` : "No status heard yet.");
+  text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 heard ${ago(ageOf(v.heard_s))}, due every ${span(v.expected_interval_s)}` : "No status heard yet.");
   values.position(s ? `${metres(s.x_m)}, ${metres(s.y_m)}` : none);
   values.depth(s ? metres(-s.z_m) : none);
   values.heading(s ? degrees(s.heading_deg) : none);
@@ -52,6 +53,7 @@ function update() {
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
+  show(nothing, v.directive.slots.length === 0);
   text(hold, s?.mode === "hold" ? "Resume survey" : "Hold position");
   hold.disabled = !store.connected;
   const slot = slotOf(v, "constraints");
