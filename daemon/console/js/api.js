@@ -1,0 +1,55 @@
+// The HTTP API of the daemon: reads, and writes that carry the header the server asks for.
+
+const BASE = "/api/v1";
+
+export class Refused extends Error {}
+
+async function read(path) {
+  const answer = await fetch(BASE + path, { cache: "no-store", signal: AbortSignal.timeout(10000) });
+  if (!answer.ok) throw new Refused(`${answer.status} ${answer.statusText}`);
+  return answer.json();
+}
+
+async function write(path, body) {
+  let answer;
+  try {
+    answer = await fetch(BASE + path, {
+      method: "POST",
+      headers: { "content-type": "application/json", "x-scenecast": "1" },
+      body: JSON.stringify(body),
+      signal: AbortSignal.timeout(10000),
+    });
+  } catch {
+    throw new Refused("scenecast did not answer; nothing was sent");
+  }
+  const said = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Refused(said.error ?? `refused with status ${answer.status}`);
+  return said;
+}
+
+export const sendUtility = (id, weights, exploration) =>
+  write(`/vehicles/${id}/utility`, { weights, exploration });
+export const askExemplar = (id, label) => write(`/vehicles/${id}/exemplars`, { label });
+export const sendHold = (id, hold) => write(`/vehicles/${id}/constraints`, { hold });
+export const sendBudget = (bps) => write("/budget", { budget_bps: bps });
+
+/** The map of a vehicle with its planes as typed arrays, rows from the south. */
+export async function readMap(id) {
+  const m = await read(`/vehicles/${id}/map`);
+  const labels = decode(m.labels);
+  const raw = decode(m.age_s);
+  const age = new Uint16Array(raw.length / 2);
+  for (let i = 0; i < age.length; i += 1) age[i] = raw[2 * i] | (raw[2 * i + 1] << 8);
+  if (labels.length !== m.width * m.height || age.length !== labels.length) {
+    throw new Refused("the map's planes do not fit its size");
+  }
+  const planes = (m.planes ?? []).map((p) => ({ ...p, data: decode(p.data) }));
+  return { ...m, labels, age, planes };
+}
+
+function decode(base64) {
+  const text = atob(base64);
+  const out = new Uint8Array(text.length);
+  for (let i = 0; i < out.length; i += 1) out[i] = text.charCodeAt(i);
+  return out;
+}

@@ -1,0 +1,90 @@
+// The operator's own names, colours and merges of labels. Kept in this browser only, per mission,
+// vehicle and epoch: the vehicle knows ids, nothing here is sent. See daemon/console/README.md.
+
+import { recall, remember } from "./prefs.js";
+import { store } from "./store.js";
+import { current as theme } from "./theme.js";
+import { redShade, rgb, tableColour } from "./palette.js";
+
+const EMPTY = { names: {}, colours: {}, merged: {} };
+let loadedKey = null;
+let page = EMPTY;
+
+function key() {
+  const v = store.vehicle;
+  return `book.${store.snapshot?.mission.name ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
+}
+
+function current() {
+  if (key() !== loadedKey) {
+    loadedKey = key();
+    page = { ...structuredClone(EMPTY), ...recall(loadedKey, {}) };
+  }
+  return page;
+}
+
+function change(edit) {
+  edit(current());
+  remember(loadedKey, page);
+  store.tell("book");
+}
+
+/** The label under which `id` is shown: itself, or the one it was merged into. */
+export function shownAs(id) {
+  const { merged } = current();
+  let at = id;
+  for (let i = 0; merged[at] && i < 254; i += 1) at = merged[at];
+  return at;
+}
+
+export const nameOf = (id) => current().names[id] ?? `Label ${id}`;
+export const hasName = (id) => current().names[id] !== undefined;
+export const colourOf = (id) => current().colours[id] ?? tableColour(id);
+
+/** [r, g, b] in which `id` is painted now: its colour, or a shade of red in the red theme. */
+export const tintOf = (id) => (theme() === "red" ? redShade(id) : rgb(colourOf(id)));
+
+export const membersOf = (id, ids) => ids.filter((other) => shownAs(other) === id);
+
+export function rename(id, name) {
+  change((b) => {
+    if (name.trim() === "" || name.trim() === `Label ${id}`) delete b.names[id];
+    else b.names[id] = name.trim().slice(0, 40);
+  });
+}
+
+export function recolour(id, colour) {
+  change((b) => {
+    if (colour === tableColour(id)) delete b.colours[id];
+    else b.colours[id] = colour;
+  });
+}
+
+export function merge(id, into) {
+  if (shownAs(into) === id) return;
+  change((b) => {
+    b.merged[id] = into;
+  });
+}
+
+export function split(id) {
+  change((b) => {
+    for (const [from, into] of Object.entries(b.merged)) if (into === id) delete b.merged[from];
+  });
+}
+
+/** The vehicle's labels as the operator sees them: merged ones summed up, each with its `members`. */
+export function shownLabels(vehicle) {
+  const ids = vehicle.labels.map((l) => l.id);
+  return vehicle.labels
+    .filter((l) => shownAs(l.id) === l.id)
+    .map((l) => {
+      const members = vehicle.labels.filter((m) => shownAs(m.id) === l.id);
+      return {
+        ...l,
+        members: membersOf(l.id, ids),
+        cells: members.reduce((sum, m) => sum + m.cells, 0),
+        area_m2: members.reduce((sum, m) => sum + m.area_m2, 0),
+      };
+    });
+}

@@ -1,0 +1,68 @@
+// The map as vertices: cells at their depth, the vehicle, its track, a grid to judge sizes by.
+
+import { shownAs, tintOf } from "../book.js";
+import { rgb } from "../palette.js";
+import { nice } from "../format.js";
+
+export const depthPlane = (map) => map.planes.find((p) => p.name === "depth") ?? null;
+
+/** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. */
+export function cellPoints(map) {
+  const depth = depthPlane(map);
+  const places = [];
+  const tints = [];
+  for (let at = 0; at < map.labels.length; at += 1) {
+    const label = map.labels[at];
+    if (label === 0 || depth?.data[at] === 255) continue;
+    const x = (map.x0 + (at % map.width) + 0.5) * map.cell_m;
+    const y = (map.y0 + Math.floor(at / map.width) + 0.5) * map.cell_m;
+    places.push(x, y, depth ? -(depth.min + ((depth.max - depth.min) * depth.data[at]) / 254) : 0);
+    tints.push(...tintOf(shownAs(label)), 255);
+  }
+  return { places: new Float32Array(places), tints: new Uint8Array(tints) };
+}
+
+export function meanHeight(places) {
+  let sum = 0;
+  for (let i = 2; i < places.length; i += 3) sum += places[i];
+  return places.length ? sum / (places.length / 3) : 0;
+}
+
+/** Line segments: a grid of round metres at height `z` about the map. */
+export function gridLines([west, south, east, north], z, hex) {
+  const step = nice(Math.max(east - west, north - south) / 4);
+  const [w, s, e, n] = [west, south, east, north].map((v, i) => (i < 2 ? Math.floor : Math.ceil)(v / step) * step);
+  const places = [];
+  for (let x = w; x <= e + step / 2; x += step) places.push(x, s, z, x, n, z);
+  for (let y = s; y <= n + step / 2; y += step) places.push(w, y, z, e, y, z);
+  return { step, ...coloured(places, hex) };
+}
+
+/** The vehicle at its depth (or just over a flat map), a plumb line to the floor, its track, its bow. */
+export function craftShape(vehicle, floor, flat, hex) {
+  const places = [];
+  const hull = [];
+  const s = vehicle.status;
+  const z = flat || !s ? floor + 1 : s.z_m;
+  for (let i = 1; i < vehicle.track.length; i += 1) {
+    const [[, ax, ay], [, bx, by]] = [vehicle.track[i - 1], vehicle.track[i]];
+    places.push(ax, ay, z, bx, by, z);
+  }
+  if (s) {
+    const a = (s.heading_deg * Math.PI) / 180;
+    const at = (forward, right) => [
+      s.x_m + forward * Math.sin(a) + right * Math.cos(a), s.y_m + forward * Math.cos(a) - right * Math.sin(a), z,
+    ];
+    const [bow, left, stern, right] = [at(1.3, 0), at(-0.9, -0.7), at(-0.4, 0), at(-0.9, 0.7)];
+    hull.push(...bow, ...left, ...stern, ...bow, ...stern, ...right);
+    places.push(s.x_m, s.y_m, z, s.x_m, s.y_m, floor);
+  }
+  return { lines: coloured(places, hex), hull: coloured(hull, hex) };
+}
+
+function coloured(places, hex) {
+  const tints = new Uint8Array((places.length / 3) * 4);
+  const tone = [...rgb(hex), 255];
+  for (let i = 0; i < tints.length; i += 1) tints[i] = tone[i % 4];
+  return { places: new Float32Array(places), tints };
+}

@@ -1,0 +1,63 @@
+// Making and updating elements without markup strings.
+
+/** h("button.primary", {type: "button", onclick}, "Send") */
+export function h(spec, props = {}, ...children) {
+  const [tag, ...classes] = spec.split(".");
+  const node = document.createElement(tag);
+  if (classes.length > 0) node.className = classes.join(" ");
+  for (const [key, value] of Object.entries(props)) {
+    if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+    else if (key === "data") Object.assign(node.dataset, value);
+    else if (key.includes("-") || key === "role" || key === "for") node.setAttribute(key, value);
+    else node[key] = value;
+  }
+  node.append(...children.filter((c) => c !== null && c !== undefined));
+  return node;
+}
+
+export const $ = (id) => document.getElementById(id);
+
+/** Sets text only when it differs, so that selections and screen readers are left in peace. */
+export function text(node, value) {
+  if (node.textContent !== value) node.textContent = value;
+}
+
+export function data(node, key, value) {
+  if (node.dataset[key] !== value) node.dataset[key] = value;
+}
+
+export function show(node, visible) {
+  if (node.hidden === visible) node.hidden = !visible;
+}
+
+/** Keeps one child per key in `list`, in the order of `items`; `make` builds, `update` refreshes. */
+export function keyed(list, items, key, make, update) {
+  const old = new Map([...list.children].map((c) => [c.dataset.key, c]));
+  let at = list.firstElementChild;
+  for (const item of items) {
+    const k = String(key(item));
+    let node = old.get(k);
+    if (!node) {
+      node = make(item);
+      node.dataset.key = k;
+    }
+    old.delete(k);
+    if (node === at) at = at.nextElementSibling;
+    else list.insertBefore(node, at);
+    update(node, item);
+  }
+  for (const gone of old.values()) gone.remove();
+}
+
+/** A definition row whose value can be refreshed: [row, setter(value, age?)]. */
+export function row(name, title = "") {
+  const value = h("dd");
+  const line = h("div", { title }, h("dt", {}, name), value);
+  return [line, (v) => text(value, v)];
+}
+
+export function download(name, type, parts) {
+  const url = URL.createObjectURL(new Blob(parts, { type }));
+  h("a", { href: url, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(url), 10000);
+}

@@ -1,0 +1,74 @@
+// The map as files: CSV of cells, GeoJSON of regions, PLY of points, PNG with a world file.
+
+import { colourOf, nameOf, shownAs } from "../book.js";
+import { depthPlane } from "../cloud/points.js";
+import { toLatLon } from "../map/readout.js";
+import { rgb } from "../palette.js";
+import { regions } from "./regions.js";
+
+const quoted = (s) => `"${s.replaceAll('"', '""')}"`;
+
+function* cells(map) {
+  for (let at = 0; at < map.labels.length; at += 1) {
+    if (map.labels[at] === 0) continue;
+    const x = (map.x0 + (at % map.width) + 0.5) * map.cell_m;
+    const y = (map.y0 + Math.floor(at / map.width) + 0.5) * map.cell_m;
+    yield { at, x, y, label: map.labels[at] };
+  }
+}
+
+const valueOf = (plane, at) =>
+  plane.data[at] === 255 ? "" : (plane.min + ((plane.max - plane.min) * plane.data[at]) / 254).toFixed(3);
+
+/** One line a cell: centre in metres, label as the vehicle knows it, as shown, age, planes. */
+export function toCsv(map, sinceFetchS) {
+  const lines = [["east_m", "north_m", "label", "shown_as", "name", "age_s", ...map.planes.map((p) => p.name)].join(",")];
+  for (const { at, x, y, label } of cells(map)) {
+    const shown = shownAs(label);
+    const age = map.age[at] === 65535 ? "" : Math.round(map.age[at] + sinceFetchS);
+    lines.push([x.toFixed(3), y.toFixed(3), label, shown, quoted(nameOf(shown)), age, ...map.planes.map((p) => valueOf(p, at))].join(","));
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+/** Regions of equal label. WGS 84 when the mission has an origin, else metres east and north of it. */
+export function toGeoJson(map, vehicle, origin, nowS) {
+  const shown = map.labels.map((label) => (label === 0 ? 0 : shownAs(label)));
+  const place = ([cx, cy]) => {
+    const [x, y] = [(map.x0 + cx) * map.cell_m, (map.y0 + cy) * map.cell_m];
+    return origin ? toLatLon(origin, x, y).reverse().map((v) => Number(v.toFixed(8))) : [x, y];
+  };
+  const features = [...regions(shown, map.width, map.height)].sort((a, b) => a[0] - b[0]).map(([label, polygons]) => ({
+    type: "Feature",
+    id: label,
+    properties: {
+      label, name: nameOf(label), colour: colourOf(label), vehicle: vehicle.name,
+      area_m2: shown.reduce((n, v) => n + (v === label ? 1 : 0), 0) * map.cell_m ** 2,
+    },
+    geometry: { type: "MultiPolygon", coordinates: polygons.map((rings) => rings.map((ring) => ring.map(place))) },
+  }));
+  const about = { map_version: map.version, epoch: map.epoch, mission_time_s: Math.round(nowS) };
+  if (!origin) about.coordinates = "metres east and north of the mission's origin";
+  return JSON.stringify({ type: "FeatureCollection", scenecast: about, features });
+}
+
+/** ASCII PLY: x east, y north, z up (0 where no depth is known), colour, label. */
+export function toPly(map) {
+  const depth = depthPlane(map);
+  const lines = [];
+  for (const { at, x, y, label } of cells(map)) {
+    const z = depth && depth.data[at] !== 255 ? (-Number(valueOf(depth, at))).toFixed(3) : "0";
+    lines.push(`${x.toFixed(3)} ${y.toFixed(3)} ${z} ${rgb(colourOf(shownAs(label))).join(" ")} ${label}`);
+  }
+  const head = ["ply", "format ascii 1.0", "comment scenecast map, metres east, north, up", `element vertex ${lines.length}`,
+    "property float x", "property float y", "property float z",
+    "property uchar red", "property uchar green", "property uchar blue", "property uchar label", "end_header"];
+  return `${[...head, ...lines].join("\n")}\n`;
+}
+
+/** The six lines of a world file: pixel size and the centre of the north-west pixel. */
+export function toWorldFile(map) {
+  const west = (map.x0 + 0.5) * map.cell_m;
+  const north = (map.y0 + map.height - 0.5) * map.cell_m;
+  return [map.cell_m, 0, 0, -map.cell_m, west, north].map((v) => `${v}\n`).join("");
+}

@@ -1,0 +1,65 @@
+// Numbers as an operator reads them.
+
+const DASH = "\u2013";
+const THIN = "\u202f";
+
+export const none = DASH;
+
+/** Seconds as "8 s", "2 min 05 s", "1 h 12 min". */
+export function span(s) {
+  if (s === null || s === undefined || !Number.isFinite(s)) return DASH;
+  const t = Math.max(0, Math.round(s));
+  if (t < 100) return `${t}${THIN}s`;
+  if (t < 3600) return `${Math.floor(t / 60)}${THIN}min ${String(t % 60).padStart(2, "0")}${THIN}s`;
+  return `${Math.floor(t / 3600)}${THIN}h ${String(Math.floor((t % 3600) / 60)).padStart(2, "0")}${THIN}min`;
+}
+
+export const ago = (s) => (s === null ? "never" : `${span(s)} ago`);
+
+/** Mission time as T+ h:mm:ss. */
+export function missionTime(s) {
+  const t = Math.max(0, Math.floor(s));
+  const two = (n) => String(n).padStart(2, "0");
+  return `T+${Math.floor(t / 3600)}:${two(Math.floor(t / 60) % 60)}:${two(t % 60)}`;
+}
+
+export function metres(m, digits = 1) {
+  if (m === null || m === undefined) return DASH;
+  if (Math.abs(m) >= 1000) return `${(m / 1000).toFixed(2)}${THIN}km`;
+  return `${minus(m.toFixed(digits))}${THIN}m`;
+}
+
+export function area(m2) {
+  if (m2 >= 1000 && m2 < 10000) return `${count(m2)}${THIN}m²`;
+  return m2 >= 10000 ? `${(m2 / 10000).toFixed(2)}${THIN}ha` : `${m2.toFixed(m2 < 10 ? 2 : 1)}${THIN}m²`;
+}
+
+export const minus = (t) => (/^-0(\.0*)?$/.test(t) ? t.slice(1) : t.replace("-", "\u2212"));
+
+export const signed = (w) => (w > 0 ? `+${w.toFixed(2)}` : minus(w.toFixed(2)));
+
+export const percent = (x, digits = 0) => (x === null ? DASH : `${(100 * x).toFixed(digits)}${THIN}%`);
+
+export const degrees = (d) => `${String(Math.round(((d % 360) + 360) % 360) % 360).padStart(3, "0")}°`;
+
+export function bits(n) {
+  if (n === null || n === undefined) return DASH;
+  if (n < 1000) return `${Math.round(n)}${THIN}bit`;
+  if (n < 1e6) return `${(n / 1000).toFixed(n < 10000 ? 2 : 1)}${THIN}kbit`;
+  return `${(n / 1e6).toFixed(2)}${THIN}Mbit`;
+}
+
+export const rate = (n) => (n === null || n === undefined ? DASH : `${bits(n)}/s`);
+
+export function bytes(n) {
+  return n < 1000 ? `${n}${THIN}B` : `${(n / 1000).toFixed(1)}${THIN}kB`;
+}
+
+export const count = (n) => String(Math.round(n)).replace(/\B(?=(\d{3})+$)/g, THIN);
+
+/** The largest 1, 2 or 5 times a power of ten that is not above x. */
+export function nice(x) {
+  const power = 10 ** Math.floor(Math.log10(x));
+  const digit = x / power;
+  return power * (digit >= 5 ? 5 : digit >= 2 ? 2 : 1);
+}

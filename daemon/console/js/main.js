@@ -1,0 +1,30 @@
+// Starts the page: every part listens to the store, the feed fills it.
+
+import { startCloud } from "./cloud/cloud.js";
+import { startFeed } from "./feed.js";
+import { startChart } from "./map/chart.js";
+import { startTools } from "./map/tools.js";
+import { startBanners } from "./panel/banners.js";
+import { startBar } from "./panel/bar.js";
+import { startKeys } from "./panel/keys.js";
+import { startLabels } from "./panel/labels.js";
+import { startLink } from "./panel/link.js";
+import { startTabs } from "./panel/tabs.js";
+import { startVehicle } from "./panel/vehicle.js";
+import { store } from "./store.js";
+import { onTheme, startTheme } from "./theme.js";
+
+startTheme();
+startBar();
+startBanners();
+startTabs();
+startLabels();
+startVehicle();
+startLink();
+startChart();
+startCloud();
+startTools();
+startKeys();
+onTheme(() => store.tell("theme"));
+startFeed();
+setInterval(() => store.tell("tick"), 1000);

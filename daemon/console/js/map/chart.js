@@ -1,0 +1,199 @@
+// The operator's map: puts layers, overlays and vehicles on the canvas whenever something changed.
+
+import { $, show, text } from "../dom.js";
+import { ago, count, span } from "../format.js";
+import { recall, remember } from "../prefs.js";
+import { ageOf, isStale, store } from "../store.js";
+import { colour, onTheme } from "../theme.js";
+import { drawCraft } from "./craft.js";
+import { listen } from "./input.js";
+import { canvasOf, drawLegend, layer } from "./layers.js";
+import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
+import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
+import { extent, rectangle } from "./raster.js";
+import { showReadout } from "./readout.js";
+import { View } from "./view.js";
+
+export const view = new View();
+export const options = { grid: recall("grid", true), rings: recall("rings", false) };
+const canvas = $("chart");
+let ink = {};
+let dirty = false;
+let pointer = null;
+
+export function startChart() {
+  new ResizeObserver(resize).observe(canvas.parentElement);
+  onTheme(readInk);
+  readInk();
+  listen(canvas, view, {
+    changed: () => (redraw(), store.tell("view")),
+    point: hover,
+    click,
+    keys: { 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, Escape: () => measure.on && measureKey(), Enter: () => click(view.width / 2, view.height / 2) },
+  });
+  canvas.addEventListener("focus", redraw);
+  canvas.addEventListener("blur", redraw);
+  store.on("state map select feed book highlight tick", () => {
+    keepInView();
+    redraw();
+  });
+}
+
+export function redraw() {
+  if (dirty) return;
+  dirty = true;
+  requestAnimationFrame(() => {
+    dirty = false;
+    draw();
+  });
+}
+
+export function fit() {
+  view.mode = "fit";
+  const all = bounds();
+  if (all) view.fit(all);
+  store.tell("view");
+  redraw();
+}
+
+export function follow() {
+  view.mode = view.mode === "follow" ? "free" : "follow";
+  keepInView();
+  store.tell("view");
+  redraw();
+}
+
+export function toggle(option) {
+  options[option] = !options[option];
+  remember(option, options[option]);
+  redraw();
+}
+
+function measureKey() {
+  toggleMeasure();
+  store.tell("view");
+}
+
+function keepInView() {
+  const s = store.vehicle?.status;
+  if (view.mode === "follow" && s) view.centre(s.x_m, s.y_m);
+  const all = view.mode === "fit" ? bounds() : null;
+  if (all && (!view.holds(all) || !fitted)) {
+    view.fit(all);
+    fitted = true;
+  }
+}
+let fitted = false;
+
+const extents = new WeakMap();
+function extentOf(map) {
+  if (!extents.has(map)) extents.set(map, extent(map));
+  return extents.get(map);
+}
+
+/** What "fit" shows: every map, every vehicle and its waypoint. */
+function bounds() {
+  const boxes = [];
+  for (const map of store.maps.values()) boxes.push(extentOf(map));
+  for (const v of store.snapshot?.vehicles ?? []) {
+    const s = v.status;
+    if (s) boxes.push([s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4]);
+    if (s?.waypoint) boxes.push([...s.waypoint, ...s.waypoint]);
+  }
+  const known = boxes.filter(Boolean);
+  if (known.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
+  return known.reduce((a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])]);
+}
+
+function readInk() {
+  for (const name of ["sea", "text", "grid", "craft", "track", "stale", "accent"]) ink[name] = colour(`map-${name}`);
+  redraw();
+}
+
+function resize() {
+  const box = canvas.parentElement.getBoundingClientRect();
+  const ratio = devicePixelRatio || 1;
+  canvas.width = Math.round(box.width * ratio);
+  canvas.height = Math.round(box.height * ratio);
+  view.resize(box.width, box.height);
+  if (view.mode === "fit") fit();
+  draw();
+}
+
+function hover(px, py) {
+  pointer = px === null ? null : [px, py];
+  measure.pointer = pointer && view.toWorld(...pointer);
+  if (measure.on) redraw();
+  else readout();
+}
+
+function click(px, py) {
+  if (!measure.on) return;
+  addPoint(...view.toWorld(px, py));
+  redraw();
+}
+
+const byKeys = () => canvas.matches(":focus-visible") && pointer === null;
+
+function readout() {
+  if (pointer) showReadout(view.toWorld(...pointer));
+  else showReadout(byKeys() ? [view.east, view.north] : null);
+}
+
+function draw() {
+  const c = canvas.getContext("2d");
+  const ratio = devicePixelRatio || 1;
+  c.setTransform(ratio, 0, 0, ratio, 0, 0);
+  c.fillStyle = ink.sea;
+  c.fillRect(0, 0, view.width, view.height);
+  const vehicles = store.snapshot?.vehicles ?? [];
+  const byChoice = [...vehicles].sort((a, b) => (a.id === store.selectedId) - (b.id === store.selectedId));
+  for (const v of byChoice) drawMap(c, v);
+  if (options.grid) drawGrid(c, view, ink);
+  const s = store.vehicle?.status;
+  if (options.rings && s) drawRings(c, view, ink, s.x_m, s.y_m);
+  for (const v of byChoice) drawCraft(c, view, ink, v, v.id === store.selectedId);
+  drawMeasure(c, view, ink);
+  if (byKeys()) drawCross(c);
+  drawScaleBar(c, view, ink);
+  drawNorth(c, view, ink);
+  drawLegend();
+  plates();
+  readout();
+}
+
+function drawMap(c, vehicle) {
+  const map = store.maps.get(vehicle.id);
+  if (!map || map.width === 0) return;
+  const [west, south, east, north] = rectangle(map);
+  const [left, top] = view.toScreen(west, north);
+  const [right, bottom] = view.toScreen(east, south);
+  c.imageSmoothingEnabled = (right - left) / map.width < 1;
+  c.drawImage(canvasOf(vehicle, map), left, top, right - left, bottom - top);
+}
+
+function drawCross(c) {
+  const [x, y] = [view.width / 2, view.height / 2];
+  c.strokeStyle = ink.text;
+  c.lineWidth = 1;
+  c.beginPath();
+  for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    c.moveTo(x + 4 * dx, y + 4 * dy);
+    c.lineTo(x + 14 * dx, y + 14 * dy);
+  }
+  c.stroke();
+}
+
+function plates() {
+  const v = store.vehicle;
+  show($("map-empty"), Boolean(v) && v.map.explored_cells === 0);
+  text($("map-empty"), v?.heard_s === null ? `Nothing heard from ${v.name} yet.` : "No cell of the map has arrived yet.");
+  show($("map-age"), Boolean(v));
+  if (!v) return;
+  const age = ageOf(v.map.updated_s);
+  const late = isStale(v);
+  $("map-age").classList.toggle("stale", late);
+  const state = late ? `stale, changed ${ago(age)}` : age === null ? "nothing yet" : `changed ${span(age)} ago`;
+  text($("map-age"), `Map v${v.map.version} · ${state} · ${count(v.map.explored_cells)} cells`);
+  canvas.dataset.layer = layer.name;
+}

@@ -1,0 +1,99 @@
+// A vehicle on the map: track, uncertainty, waypoint, itself with heading.
+
+import { FONT, haloText } from "./overlays.js";
+import { ageOf, isStale } from "../store.js";
+import { span } from "../format.js";
+
+export function drawCraft(c, view, ink, vehicle, chosen) {
+  const stale = isStale(vehicle);
+  c.globalAlpha = chosen ? 1 : 0.6;
+  drawTrack(c, view, ink, vehicle.track);
+  if (vehicle.status) {
+    const s = vehicle.status;
+    const tone = stale ? ink.stale : ink.craft;
+    if (s.waypoint) drawWaypoint(c, view, ink, s);
+    drawSigma(c, view, s, tone);
+    drawHull(c, view, ink, s, tone);
+    drawName(c, view, ink, vehicle, stale);
+  }
+  c.globalAlpha = 1;
+}
+
+function drawTrack(c, view, ink, track) {
+  if (track.length < 2) return;
+  c.lineJoin = "round";
+  for (const [style, width] of [[ink.sea, 3.5], [ink.track, 1.5]]) {
+    c.strokeStyle = style;
+    c.lineWidth = width;
+    c.beginPath();
+    for (const [, x, y] of track) c.lineTo(...view.toScreen(x, y));
+    c.stroke();
+  }
+}
+
+/** Two standard deviations of the position estimate. */
+function drawSigma(c, view, s, tone) {
+  const radius = 2 * s.sigma_m * view.scale;
+  if (radius < 9) return;
+  c.beginPath();
+  c.arc(...view.toScreen(s.x_m, s.y_m), radius, 0, 2 * Math.PI);
+  c.strokeStyle = tone;
+  c.lineWidth = 1.5;
+  c.setLineDash([5, 3]);
+  c.stroke();
+  c.setLineDash([]);
+}
+
+function drawWaypoint(c, view, ink, s) {
+  const [px, py] = view.toScreen(s.x_m, s.y_m);
+  const [wx, wy] = view.toScreen(...s.waypoint);
+  for (const [style, width] of [[ink.sea, 3.5], [ink.text, 1.5]]) {
+    c.strokeStyle = style;
+    c.lineWidth = width;
+    c.beginPath();
+    c.setLineDash([3, 4]);
+    c.moveTo(px, py);
+    c.lineTo(wx, wy);
+    c.stroke();
+    c.setLineDash([]);
+    c.beginPath();
+    c.moveTo(wx - 6, wy - 6);
+    c.lineTo(wx + 6, wy + 6);
+    c.moveTo(wx + 6, wy - 6);
+    c.lineTo(wx - 6, wy + 6);
+    c.stroke();
+  }
+}
+
+function drawHull(c, view, ink, s, tone) {
+  const [px, py] = view.toScreen(s.x_m, s.y_m);
+  c.save();
+  c.translate(px, py);
+  c.rotate((s.heading_deg * Math.PI) / 180);
+  c.beginPath();
+  c.moveTo(0, -12);
+  c.lineTo(7.5, 9);
+  c.lineTo(0, 5);
+  c.lineTo(-7.5, 9);
+  c.closePath();
+  c.lineJoin = "round";
+  c.lineWidth = 4;
+  c.strokeStyle = ink.sea;
+  c.stroke();
+  c.fillStyle = tone;
+  c.fill();
+  c.lineWidth = 1.25;
+  c.strokeStyle = ink.text;
+  c.stroke();
+  c.restore();
+}
+
+function drawName(c, view, ink, vehicle, stale) {
+  const { status } = vehicle;
+  const [px, py] = view.toScreen(status.x_m, status.y_m);
+  const late = stale ? `, ${span(ageOf(status.at_s))} old` : "";
+  c.font = FONT;
+  const left = px > view.width - 130;
+  c.textAlign = left ? "right" : "left";
+  haloText(c, vehicle.name + late, px + (left ? -15 : 15), py - 8, ink);
+}

@@ -1,0 +1,79 @@
+// Pan and zoom by mouse, finger and keys.
+
+const KEY_PAN_PX = 60;
+
+/** Wires `canvas`; calls `changed()` after the view moved, `point(px, py | null)` as the pointer moves,
+ *  `click(px, py)` for a press that did not pan. */
+export function listen(canvas, view, { changed, point, click, keys }) {
+  const fingers = new Map();
+  let moved = 0;
+
+  const place = (event) => {
+    const box = canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  };
+
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    fingers.set(event.pointerId, place(event));
+    moved = fingers.size > 1 ? Infinity : 0;
+  });
+
+  canvas.addEventListener("pointermove", (event) => {
+    const now = place(event);
+    const before = fingers.get(event.pointerId);
+    point(...now);
+    if (!before) return;
+    const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+    moved += Math.hypot(now[0] - before[0], now[1] - before[1]);
+    if (moved < 4) return;
+    if (other) pinch(view, before, now, other);
+    else view.panBy(now[0] - before[0], now[1] - before[1]);
+    fingers.set(event.pointerId, now);
+    changed();
+  });
+
+  const lift = (event) => {
+    const here = fingers.delete(event.pointerId);
+    if (here && event.type === "pointerup" && moved < 4) click(...place(event));
+  };
+  canvas.addEventListener("pointerup", lift);
+  canvas.addEventListener("pointercancel", lift);
+  canvas.addEventListener("pointerleave", () => point(null, null));
+
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 30 : 1;
+      view.zoomAt(...place(event), Math.exp(-event.deltaY * lines * (event.ctrlKey ? 0.01 : 0.0016)));
+      changed();
+    },
+    { passive: false },
+  );
+
+  canvas.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const act = {
+      ArrowLeft: () => view.panBy(KEY_PAN_PX, 0),
+      ArrowRight: () => view.panBy(-KEY_PAN_PX, 0),
+      ArrowUp: () => view.panBy(0, KEY_PAN_PX),
+      ArrowDown: () => view.panBy(0, -KEY_PAN_PX),
+      "+": () => view.zoomAt(view.width / 2, view.height / 2, 1.3),
+      "=": () => view.zoomAt(view.width / 2, view.height / 2, 1.3),
+      "-": () => view.zoomAt(view.width / 2, view.height / 2, 1 / 1.3),
+      ...keys,
+    }[event.key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+    changed();
+  });
+}
+
+function pinch(view, before, now, other) {
+  const was = Math.hypot(before[0] - other[0], before[1] - other[1]);
+  const is = Math.hypot(now[0] - other[0], now[1] - other[1]);
+  view.panBy((now[0] - before[0]) / 2, (now[1] - before[1]) / 2);
+  if (was > 0) view.zoomAt((now[0] + other[0]) / 2, (now[1] + other[1]) / 2, is / was);
+}

@@ -1,0 +1,81 @@
+// Which plane of the map is painted, its legend, and the canvas that holds it until something changes.
+
+import { $, h, show } from "../dom.js";
+import { shownAs, tintOf } from "../book.js";
+import { isStale, store } from "../store.js";
+import { minus, nice, span } from "../format.js";
+import { ramp } from "../palette.js";
+import { current as theme, onTheme } from "../theme.js";
+import { paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
+
+const AGE_REPAINT_S = 5;
+export const layer = { name: "label", highlight: null };
+const painted = new Map();
+let legendKey = "";
+let bookEdits = 0;
+store.on("book select", () => (bookEdits += 1));
+onTheme(() => {
+  bookEdits += 1;
+  legendKey = "";
+});
+
+/** The layers that the chosen vehicle's map can show. */
+export function layerNames() {
+  return ["label", "age", ...(store.map?.planes.map((p) => p.name) ?? [])];
+}
+
+export function setLayer(name) {
+  layer.name = layerNames().includes(name) ? name : "label";
+  drawLegend();
+}
+
+/** The painted canvas of a vehicle's map; painted again only when its key changes. */
+export function canvasOf(vehicle, map) {
+  const chosen = vehicle.id === store.selectedId;
+  const plane = map.planes.find((p) => p.name === layer.name);
+  const age = layer.name === "age" ? Math.floor((store.nowS - map.fetchedS) / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
+  const key = chosen
+    ? `${map.epoch}.${map.version}.${layer.name}.${age}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`
+    : `${map.epoch}.${map.version}.footprint`;
+  const have = painted.get(vehicle.id);
+  if (have?.key === key) return have.canvas;
+  const canvas = !chosen
+    ? paintFootprint(map)
+    : plane
+      ? paintPlane(map, plane)
+      : layer.name === "age"
+        ? paintAge(map, age, ageTop(map))
+        : paintLabels(map, { tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
+  painted.set(vehicle.id, { key, canvas });
+  return canvas;
+}
+
+/** The upper end of the age scale: a round number above the oldest cell. */
+export function ageTop(map) {
+  let oldest = 60;
+  for (const a of map.age) if (a !== 65535 && a > oldest) oldest = a;
+  const step = nice(oldest);
+  return Math.ceil(oldest / step) * step;
+}
+
+export function drawLegend() {
+  const map = store.map;
+  const plane = map?.planes.find((p) => p.name === layer.name);
+  const top = layer.name === "age" && map ? ageTop(map) : 0;
+  const key = `${layer.name}.${top}.${plane?.min}.${plane?.max}`;
+  if (key === legendKey) return;
+  legendKey = key;
+  const box = $("legend");
+  show(box, Boolean(map) && layer.name !== "label");
+  if (box.hidden) return;
+  const [title, low, high, flip] = plane
+    ? [plane.name, `${minus(String(plane.min))} ${plane.unit}`, `${minus(String(plane.max))} ${plane.unit}`, false]
+    : ["age of cells", "now", span(top), true];
+  const bar = h("canvas", { width: 120, height: 8, "aria-hidden": "true" });
+  const c = bar.getContext("2d");
+  for (let x = 0; x < 120; x += 1) {
+    c.fillStyle = `rgb(${ramp(flip ? 1 - x / 119 : x / 119, theme() === "red").join(" ")})`;
+    c.fillRect(x, 0, 1, 8);
+  }
+  box.replaceChildren(h("b", {}, title), h("span", {}, low.trim()), bar, h("span", {}, high.trim()));
+}

@@ -1,0 +1,54 @@
+// What lies under the pointer, or under the cross at the centre when the map is used by keys.
+
+import { $, show, text } from "../dom.js";
+import { metres, minus, none, percent, span } from "../format.js";
+import { nameOf, shownAs } from "../book.js";
+import { ageOf, store } from "../store.js";
+
+/** The cell under (x, y) metres: {label, ageS, planes} or null when outside the map. */
+export function cellAt(map, x, y) {
+  const cx = Math.floor(x / map.cell_m) - map.x0;
+  const cy = Math.floor(y / map.cell_m) - map.y0;
+  if (cx < 0 || cy < 0 || cx >= map.width || cy >= map.height) return null;
+  const at = cy * map.width + cx;
+  if (map.labels[at] === 0) return null;
+  const age = map.age[at] === 65535 ? null : map.age[at] + (ageOf(map.fetchedS) ?? 0);
+  const planes = map.planes
+    .filter((p) => p.data[at] !== 255)
+    .map((p) => ({ ...p, value: p.min + ((p.max - p.min) * p.data[at]) / 254 }));
+  return { label: map.labels[at], ageS: age, planes };
+}
+
+export function showReadout(world) {
+  const plate = $("readout");
+  show(plate, world !== null);
+  if (world === null) return null;
+  const cell = store.map ? cellAt(store.map, ...world) : null;
+  const parts = [`E ${metres(world[0])}  N ${metres(world[1])}`];
+  const origin = store.snapshot?.mission.origin;
+  if (origin) parts.push(latLon(origin, ...world));
+  if (cell) {
+    parts.push(nameOf(shownAs(cell.label)));
+    parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
+    for (const p of cell.planes) parts.push(`${p.name} ${planeValue(p)}`);
+  } else {
+    parts.push("unexplored");
+  }
+  text(plate, parts.join("  ·  "));
+  return cell;
+}
+
+const planeValue = (p) =>
+  p.unit === "" && p.max === 1 ? percent(p.value) : `${minus(p.value.toFixed(1))} ${p.unit}`;
+
+/** Latitude and longitude of a place near `origin`, on a tangent plane. */
+export function toLatLon(origin, x, y) {
+  const lat = origin.lat_deg + y / 111132.95;
+  const lon = origin.lon_deg + x / (111412.84 * Math.cos((origin.lat_deg * Math.PI) / 180));
+  return [lat, lon];
+}
+
+function latLon(origin, x, y) {
+  const [lat, lon] = toLatLon(origin, x, y);
+  return `${Math.abs(lat).toFixed(6)}° ${lat < 0 ? "S" : "N"} ${Math.abs(lon).toFixed(6)}° ${lon < 0 ? "W" : "E"}`;
+}

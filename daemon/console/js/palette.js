@@ -1,0 +1,38 @@
+// One fixed colour per label id, 1..254, told apart under the common kinds of colour blindness.
+
+import { TABLE } from "./palette-table.js";
+
+/** "#rrggbb" of a label id. */
+export function tableColour(id) {
+  const at = ((id - 1) % 254) * 6;
+  return `#${TABLE.slice(at, at + 6)}`;
+}
+
+/** [r, g, b], 0..255. */
+export function rgb(hex) {
+  const n = parseInt(hex.slice(1), 16);
+  return [n >> 16, (n >> 8) & 255, n & 255];
+}
+
+// Cividis (Nuñez, Anderton and Renslow 2018), nine knots: one reading order for every kind of sight.
+const CIVIDIS = [
+  [0, 34, 78], [33, 58, 112], [76, 83, 109], [108, 110, 114], [125, 124, 120],
+  [150, 144, 118], [181, 170, 104], [217, 199, 77], [254, 232, 56],
+];
+
+/** Shades of red for the red theme: neighbouring ids get shades far apart (van der Corput). */
+export function redShade(id) {
+  let [level, part] = [0, 0.5];
+  for (let n = id; n > 0; n >>= 1, part /= 2) level += (n & 1) * part;
+  return redLevel(0.24 + 0.76 * level);
+}
+
+const redLevel = (t) => [Math.round(255 * t), Math.round(50 * t * t), Math.round(36 * t * t)];
+
+/** Colour of t in 0..1 on the sequential scale, in shades of red if `red`. */
+export function ramp(t, red = false) {
+  if (red) return redLevel(0.14 + 0.86 * Math.min(1, Math.max(0, t)));
+  const at = Math.min(1, Math.max(0, t)) * (CIVIDIS.length - 1);
+  const i = Math.min(CIVIDIS.length - 2, Math.floor(at));
+  return CIVIDIS[i].map((v, c) => Math.round(v + (CIVIDIS[i + 1][c] - v) * (at - i)));
+}

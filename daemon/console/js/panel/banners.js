@@ -1,0 +1,62 @@
+// What the operator must not miss: no connection, a silent vehicle, a mission that ended.
+
+import { $, h, keyed, show, text } from "../dom.js";
+import { missionTime, span } from "../format.js";
+import { ageOf, isSilent, store } from "../store.js";
+import { retryNow } from "../feed.js";
+
+export function startBanners() {
+  store.on("state feed tick", update);
+}
+
+function update() {
+  keyed($("banners"), current(), (b) => b.key, make, refresh);
+  show($("banners"), $("banners").childElementCount > 0);
+}
+
+function current() {
+  const found = [];
+  if (store.feed.state === "lost") found.push(lost());
+  for (const v of store.snapshot?.vehicles ?? []) if (isSilent(v)) found.push(silent(v));
+  if (store.snapshot?.mission.ended) found.push(ended());
+  return found;
+}
+
+function lost() {
+  const since = span((performance.now() - store.feed.sinceMs) / 1000);
+  const wait = Math.max(0, (store.feed.retryMs - performance.now()) / 1000);
+  const next = wait > 0 ? `trying again in ${span(Math.ceil(wait))}` : "trying now";
+  return {
+    key: "lost", kind: "bad", head: "No connection to scenecast",
+    body: `for ${since}; ${next}. Everything shown is old and grows older.`, retry: true,
+  };
+}
+
+function silent(v) {
+  const every = `a frame is expected every ${span(v.expected_interval_s)}`;
+  const heard = v.heard_s === null
+    ? `nothing heard since the start; ${every}.`
+    : `last heard ${span(ageOf(v.heard_s))} ago at ${missionTime(v.heard_s)}; ${every}.`;
+  return { key: `silent-${v.id}`, kind: "warn", head: `${v.name} is silent`, body: `${heard} ${contact(v)}` };
+}
+
+export function contact(v) {
+  if (v.next_contact_s === null) return "No next contact is known.";
+  const wait = v.next_contact_s - store.nowS;
+  const when = missionTime(v.next_contact_s);
+  return wait >= 0 ? `Next contact in ${span(wait)}, at ${when}.` : `Contact was due ${span(-wait)} ago, at ${when}.`;
+}
+
+function ended() {
+  return { key: "ended", kind: "info", head: "The mission has ended", body: `at ${missionTime(store.nowS)}. The map is final.` };
+}
+
+function make(banner) {
+  const retry = h("button", { type: "button", onclick: retryNow }, "Try now");
+  return h("p.banner", { data: { kind: banner.kind } }, h("b"), " ", h("span"), " ", banner.retry ? retry : null);
+}
+
+function refresh(node, banner) {
+  text(node.children[0], banner.head);
+  text(node.children[1], banner.body);
+}

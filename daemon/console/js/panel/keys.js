@@ -1,0 +1,22 @@
+// What the keys do, in a dialog.
+
+import { $, h } from "../dom.js";
+
+const KEYS = [
+  ["Arrows", "pan the map"], ["+ and \u2212", "zoom"], ["0", "show everything"], ["F", "follow the vehicle"],
+  ["M", "measure; Enter sets a point at the cross, Escape ends"], ["Tab", "go on to the next control"],
+  ["Wheel, drag, pinch", "zoom and pan with mouse or fingers"],
+];
+
+export function startKeys() {
+  $("keys-open").addEventListener("click", () => {
+    const dialog = $("dialog");
+    dialog.replaceChildren(
+      h("h2", { id: "dialog-title" }, "Keys"),
+      h("p", {}, "On the map, once it has the focus:"),
+      h("dl.keys", {}, ...KEYS.map(([k, does]) => h("div", {}, h("dt", {}, k), h("dd", {}, does)))),
+      h("div.buttons", {}, h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close")),
+    );
+    dialog.showModal();
+  });
+}

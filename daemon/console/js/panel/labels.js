@@ -1,0 +1,74 @@
+// The list of labels with weights, and the button that sends them.
+
+import { $, h, keyed, show, text } from "../dom.js";
+import { shownLabels } from "../book.js";
+import { recall, remember } from "../prefs.js";
+import { isStale, store } from "../store.js";
+import { discard, draft, exploration, send, serverExploration, setExploration, settle, unsent, weight } from "./draft.js";
+import { makeRow, refreshRow } from "./label-row.js";
+import { lifeline, slotOf } from "./lifeline.js";
+
+const ORDERS = {
+  id: (a, b) => a.id - b.id,
+  area: (a, b) => b.area_m2 - a.area_m2 || a.id - b.id,
+  weight: (a, b) => weight(b) - weight(a) || a.id - b.id,
+};
+const line = lifeline("the weights");
+const empty = h("p.empty", {}, "No labels yet. They appear with the first cells of the map.");
+const slider = h("input", { type: "range", min: 0, max: 1, step: 0.05, id: "exploration", oninput: () => setExploration(store.vehicle, Number(slider.value)) });
+const value = h("output.value", { for: "exploration" });
+const explore = h("div.exploration", {},
+  h("label", { for: "exploration", title: "Weight of unexplored ground against known labels" }, "Unexplored"), slider, value);
+const go = h("button.primary", { type: "button", id: "send-weights", onclick: () => send(store.vehicle, labels()) }, "Send weights");
+const drop = h("button", { type: "button", onclick: discard }, "Discard");
+const error = h("p.error", { role: "alert" });
+const labels = () => (store.vehicle ? shownLabels(store.vehicle) : []);
+let shownVehicle = null;
+
+export function startLabels() {
+  const order = $("label-order");
+  order.value = recall("label-order", "id");
+  order.addEventListener("change", () => {
+    remember("label-order", order.value);
+    update();
+  });
+  $("label-list").before(explore, empty);
+  $("send").append(h("div.buttons", {}, go, drop), error, line.node);
+  store.on("state select draft book highlight feed theme", update);
+  store.on("tick", refreshLine);
+}
+
+function update() {
+  const vehicle = store.vehicle;
+  if (!vehicle) return;
+  if (shownVehicle !== vehicle.id) $("label-list").replaceChildren();
+  shownVehicle = vehicle.id;
+  settle(vehicle);
+  const rows = labels().sort(ORDERS[$("label-order").value] ?? ORDERS.id);
+  keyed($("label-list"), rows, (l) => l.id, makeRow, refreshRow);
+  show(empty, rows.length === 0);
+  const e = exploration(vehicle);
+  if (Number(slider.value) !== e) slider.value = e;
+  $("labels").classList.toggle("stale", isStale(vehicle));
+  const known = serverExploration(vehicle) !== null || draft().exploration !== null;
+  text(value, e.toFixed(2));
+  value.title = known ? "" : "The daemon does not report this value; this is the default.";
+  refreshLine();
+}
+
+function refreshLine() {
+  const vehicle = store.vehicle;
+  if (!vehicle) return;
+  const d = draft();
+  const slot = slotOf(vehicle, "utility");
+  const n = unsent();
+  const again = slot?.state === "refused";
+  go.disabled = d.busy || !store.connected || labels().length === 0 || (n === 0 && !again);
+  text(go, n > 0 ? `Send ${n} change${n === 1 ? "" : "s"}` : again ? "Send again" : "Send weights");
+  show(drop, n > 0);
+  show(error, d.error !== null);
+  text(error, d.error ?? "");
+  const handing = d.busy ? "Handing over to scenecast." : null;
+  const taken = d.sentVersion !== null && (slot?.version ?? 0) < d.sentVersion ? `Version ${d.sentVersion} handed over; no report yet.` : null;
+  line.update(slot, handing ?? taken);
+}

@@ -1,0 +1,110 @@
+// The acoustic link: rates against the budget, bits by class, loss, delay, backlog.
+
+import { sendBudget } from "../api.js";
+import { $, h, row, show, text } from "../dom.js";
+import { bits, count, none, percent, rate, span } from "../format.js";
+import { ageOf, store } from "../store.js";
+import { drawHistory } from "./history.js";
+import { lifeline, slotOf } from "./lifeline.js";
+
+const CLASSES = ["map", "status", "directive", "exemplar", "overhead"];
+const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
+const history = h("canvas", { role: "img" });
+const values = {};
+const list = h("dl.values");
+const classes = h("table.classes");
+const budget = h("input", { type: "number", id: "budget", min: 1, step: 100, required: true });
+const line = lifeline("the budget");
+const error = h("p.error", { role: "alert" });
+const age = h("p.age");
+
+function direction(name, title) {
+  const bar = h("span.bar", {}, h("span.now"), h("span.worst", { title: "Highest rate over one window" }));
+  const now = h("b.rate");
+  const worst = h("span.worst-text");
+  return { node: h("div.direction", { title }, h("span.way", {}, name), bar, now, worst), bar, now, worst };
+}
+
+export function startLink() {
+  for (const [key, name] of [["loss", "Frames lost, up / down"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"], ["backlog", "Backlog"]]) {
+    const [node, set] = row(name);
+    values[key] = set;
+    list.append(node);
+  }
+  classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
+    h("tbody", {}, ...CLASSES.map((c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td")))));
+  const form = h("form.budget", { onsubmit: submit },
+    h("label", { for: "budget" }, "Budget, bit/s"), budget, h("button", { type: "submit" }, "Set"));
+  $("link").append(h("header", {}, h("h2", { id: "link-title" }, "Link"), age),
+    directions.up.node, directions.down.node, history, list, classes, form, error, line.node);
+  store.on("state feed theme", update);
+  store.on("tick", refreshAge);
+  new ResizeObserver(update).observe(history);
+}
+
+async function submit(event) {
+  event.preventDefault();
+  text(error, "");
+  try {
+    await sendBudget(Math.round(Number(budget.value)));
+    budget.dataset.edited = "";
+  } catch (problem) {
+    text(error, problem.message);
+  }
+}
+
+function refreshAge() {
+  if (!store.snapshot) return;
+  const old = ageOf(store.snapshot.now_s);
+  text(age, store.connected ? "now" : `${span(old)} old`);
+  const slot = slotOf(store.vehicle, "budget");
+  show(line.node, slot !== null);
+  line.update(slot);
+}
+
+function update() {
+  const link = store.snapshot?.link;
+  if (!link) return;
+  $("link").classList.toggle("stale", !store.connected);
+  refreshDirection(directions.up, link.up, link);
+  refreshDirection(directions.down, link.down, link);
+  values.loss(`${percent(link.up.loss, 1)} / ${percent(link.down.loss, 1)}`);
+  values.goodput(`${rate(link.up.goodput_bps)} / ${rate(link.down.goodput_bps)}`);
+  values.trip(link.round_trip_s === null ? none : `${link.round_trip_s.toFixed(2)} s`);
+  values.backlog(backlog(link));
+  refreshClasses(link);
+  if (document.activeElement !== budget) budget.value = link.budget_bps;
+  history.setAttribute("aria-label", `Rate over time. Up now ${rate(link.up.bps_1min)}, down ${rate(link.down.bps_1min)}, budget ${rate(link.budget_bps)}.`);
+  drawHistory(history, link, store.snapshot.now_s);
+  refreshAge();
+}
+
+function backlog(link) {
+  if (link.backlog_bits === null) return none;
+  if (link.backlog_bits === 0) return "empty";
+  const left = link.up.goodput_bps > 0 ? `, empty in ${span(link.backlog_bits / link.up.goodput_bps)}` : "";
+  return `${bits(link.backlog_bits)}${left}`;
+}
+
+/** The bar runs to the budget line at 80 % of its length, so that a breach would show. */
+function refreshDirection(d, side, link) {
+  const place = (bps) => `${Math.min(100, (80 * bps) / link.budget_bps)}%`;
+  d.bar.children[0].style.width = place(side.bps_1min);
+  d.bar.children[1].style.left = place(side.worst_window_bps);
+  d.bar.classList.toggle("over", side.worst_window_bps > link.budget_bps);
+  text(d.now, rate(side.bps_1min));
+  text(d.worst, `worst ${link.budget_window_s} s: ${percent(side.worst_window_bps / link.budget_bps)} of budget`);
+  d.node.title = `${count(side.frames)} frames, ${count(side.lost)} lost`;
+}
+
+function refreshClasses(link) {
+  const total = Object.values(link.up.bytes_by_class).reduce((a, b) => a + b, 0) || 1;
+  for (const line of classes.tBodies[0].rows) {
+    const up = link.up.bytes_by_class[line.dataset.class] ?? 0;
+    const down = link.down.bytes_by_class[line.dataset.class] ?? 0;
+    text(line.cells[1], bits(8 * up));
+    line.cells[2].firstElementChild.firstElementChild.style.width = `${(100 * up) / total}%`;
+    line.cells[2].title = percent(up / total);
+    text(line.cells[3], bits(8 * down));
+  }
+}

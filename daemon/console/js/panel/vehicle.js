@@ -1,0 +1,104 @@
+// The chosen vehicle: where it says it is, what it does, the slots of its directive, hold.
+
+import { sendHold } from "../api.js";
+import { $, h, keyed, row, show, text } from "../dom.js";
+import { ago, count, degrees, metres, missionTime, none, span } from "../format.js";
+import { bearing } from "../map/measure.js";
+import { ageOf, isStale, store } from "../store.js";
+import { contact } from "./banners.js";
+import { describe, lifeline, slotOf, word } from "./lifeline.js";
+
+const NAMES = { utility: "Weights", constraints: "Constraints", budget: "Budget", requests: "Pictures", fix: "Position fix" };
+const title = h("h2", { id: "vehicle-title" });
+const mode = h("span.mode");
+const age = h("p.age");
+const values = {};
+const list = h("dl.values");
+const slots = h("ul.slots");
+const nothing = h("p.note", {}, "Nothing sent yet.");
+const hold = h("button", { type: "button", id: "hold", onclick: confirmHold });
+const line = lifeline("the constraints");
+const error = h("p.error", { role: "alert" });
+
+export function startVehicle() {
+  for (const [key, name, hint] of [
+    ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
+    ["sigma", "Position \u03c3", "Standard deviation of its position; the ring on the map is twice this"],
+    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["cells", "Its own map"], ["contact", "Next contact"],
+  ]) {
+    const [node, set] = row(name, hint);
+    values[key] = set;
+    list.append(node);
+  }
+  $("vehicle").append(h("header", {}, title, mode), age, list,
+    h("h3", {}, "Directive"), slots, nothing, h("div.buttons", {}, hold), error, line.node);
+  store.on("state select tick feed", update);
+}
+
+function update() {
+  const v = store.vehicle;
+  if (!v) return;
+  const s = v.status;
+  text(title, v.name);
+  text(mode, s?.mode ?? "unknown");
+  mode.dataset.mode = s?.mode ?? "none";
+  $("vehicle").classList.toggle("stale", isStale(v));
+  text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 heard ${ago(ageOf(v.heard_s))}, due every ${span(v.expected_interval_s)}` : "No status heard yet.");
+  values.position(s ? `${metres(s.x_m)}, ${metres(s.y_m)}` : none);
+  values.depth(s ? metres(-s.z_m) : none);
+  values.heading(s ? degrees(s.heading_deg) : none);
+  values.sigma(s ? metres(s.sigma_m) : none);
+  values.fix(s?.fix_age_s === null || !s ? "none" : `${span(s.fix_age_s + ageOf(s.at_s))} ago`);
+  values.waypoint(s?.waypoint ? leg(s) : none);
+  values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
+  values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
+  keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
+  show(nothing, v.directive.slots.length === 0);
+  text(hold, s?.mode === "hold" ? "Resume survey" : "Hold position");
+  hold.disabled = !store.connected;
+  const slot = slotOf(v, "constraints");
+  show(line.node, slot !== null);
+  line.update(slot);
+}
+
+const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s - store.nowS)}` : "overdue");
+
+function leg(s) {
+  const to = s.waypoint;
+  return `${metres(Math.hypot(to[0] - s.x_m, to[1] - s.y_m))} at ${degrees(bearing([s.x_m, s.y_m], to))}`;
+}
+
+const makeSlot = () => h("li.slot", {}, h("span.what"), h("span.version"), h("span.state"), h("span.since"));
+
+function refreshSlot(node, slot) {
+  const [what, version, state, since] = node.children;
+  text(what, NAMES[slot.slot] ?? slot.slot);
+  text(version, `v${slot.version}`);
+  text(state, word(slot.state));
+  text(since, span(ageOf(slot.changed_s)));
+  node.dataset.state = slot.state;
+  node.title = describe(slot);
+}
+
+function confirmHold() {
+  const v = store.vehicle;
+  const holding = v.status?.mode === "hold";
+  const dialog = $("dialog");
+  dialog.replaceChildren(
+    h("h2", { id: "dialog-title" }, holding ? `Let ${v.name} resume its survey?` : `Hold ${v.name} where it is?`),
+    h("p", {}, `The order goes out with the surface's next turn. ${contact(v)}`),
+    h("div.buttons", {},
+      h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),
+      h("button.primary", { type: "button", onclick: () => (order(v, !holding), dialog.close()) }, holding ? "Resume" : "Hold")),
+  );
+  dialog.showModal();
+}
+
+async function order(v, on) {
+  text(error, "");
+  try {
+    await sendHold(v.id, on);
+  } catch (problem) {
+    text(error, problem.message);
+  }
+}

@@ -1,0 +1,64 @@
+// The life line of the directive slots: queued -> on_air -> heard -> applied | refused.
+
+const SLOTS = ["utility", "constraints", "budget", "requests", "fix"];
+const REASONS = {
+  utility: "label 3 was retired under epoch 1",
+  constraints: "holding here would break the return margin",
+  budget: "below the 500 bit/s that status needs",
+  requests: "no image kept for this label",
+};
+
+export class Directive {
+  constructor() {
+    this.slots = new Map();
+    this.refuseNext = new Set();
+  }
+
+  issue(slot, nowS, onApplied) {
+    const version = (this.slots.get(slot)?.version ?? 0) + 1;
+    const made = { slot, version, state: "queued", reason: null, issued_s: nowS, changed_s: nowS, onApplied };
+    this.slots.set(slot, made);
+    return { slot, version };
+  }
+
+  /** The surface's turn: whatever is queued goes on air. */
+  transmit(nowS) {
+    for (const s of this.slots.values()) if (s.state === "queued") this.move(s, "on_air", nowS);
+  }
+
+  /** The downlink turn arrived (or not) at the vehicle. */
+  deliver(nowS, arrived) {
+    for (const s of this.slots.values()) {
+      if (s.state === "on_air") s.arrived = arrived;
+      if (s.state === "on_air" && !arrived) this.move(s, "queued", nowS);
+    }
+  }
+
+  /** A frame from the vehicle came back with its acks. */
+  acknowledge(nowS) {
+    for (const s of this.slots.values()) {
+      if (s.state === "heard") this.finish(s, nowS);
+      else if (s.state === "on_air" && s.arrived) this.move(s, "heard", nowS);
+    }
+  }
+
+  finish(s, nowS) {
+    if (this.refuseNext.delete(s.slot)) {
+      s.reason = REASONS[s.slot] ?? "not possible now";
+      this.move(s, "refused", nowS);
+    } else {
+      this.move(s, "applied", nowS);
+    }
+    s.onApplied?.(s.state);
+  }
+
+  move(s, state, nowS) {
+    s.state = state;
+    s.changed_s = nowS;
+  }
+
+  json() {
+    const known = SLOTS.map((name) => this.slots.get(name)).filter(Boolean);
+    return { slots: known.map(({ onApplied, arrived, ...shown }) => shown) };
+  }
+}

@@ -1,0 +1,179 @@
+// A stand-in for the daemon: serves daemon/console/ and /api/v1 over a synthetic mission.
+//
+//   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big]
+//
+// POST /mock steers it in tests:
+//   {"scenario": "rich", "advance": 60, "speed": 20, "silent": true, "refuse": "utility",
+//    "loss": 0.3, "planes": true, "ended": true, "stream": false, "down": true}
+
+import http from "node:http";
+import { deflateSync } from "node:zlib";
+import { readFile } from "node:fs/promises";
+import { dirname, extname, join, normalize } from "node:path";
+import { fileURLToPath } from "node:url";
+import { Mission } from "./mission.mjs";
+import { encodePng } from "./png.mjs";
+
+const HERE = dirname(fileURLToPath(import.meta.url));
+const ASSETS = join(HERE, "../../../daemon/console");
+const TYPES = {
+  ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
+  ".js": "text/javascript; charset=utf-8",
+};
+const POLICY =
+  "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; " +
+  "form-action 'none'; frame-ancestors 'none'";
+
+/** Starts a mock; resolves to {url, close()}. */
+export async function startMock({ port = 0, scenario = "rich" } = {}) {
+  const mock = { mission: new Mission(scenario), streams: new Set(), stream: true, down: false };
+  const server = http.createServer((req, res) => {
+    route(mock, req, res).catch((error) => reply(res, error.status ?? 500, { error: error.message }));
+  });
+  await new Promise((resolve, reject) => {
+    server.once("error", reject);
+    server.listen(port, "127.0.0.1", resolve);
+  });
+  let ticks = 0;
+  const timer = setInterval(() => {
+    for (const vehicle of mock.mission.advance(0.25 * mock.mission.speed)) {
+      const { version } = mock.mission.vehicles.find((v) => v.id === vehicle).heard;
+      emit(mock, "map", { vehicle, version });
+    }
+    ticks += 1;
+    if (ticks % 4 === 0) emit(mock, "state", mock.mission.json());
+  }, 250);
+  const close = () => {
+    clearInterval(timer);
+    for (const s of mock.streams) s.destroy();
+    server.closeAllConnections();
+    return new Promise((resolve) => server.close(resolve));
+  };
+  return { url: `http://127.0.0.1:${server.address().port}`, close };
+}
+
+function emit(mock, event, data) {
+  for (const s of mock.streams) s.write(`event: ${event}\ndata: ${JSON.stringify(data)}\n\n`);
+}
+
+async function route(mock, req, res) {
+  const { pathname } = new URL(req.url, "http://mock");
+  if (pathname === "/mock") return steer(mock, await body(req), res);
+  if (mock.down) return req.socket.destroy();
+  if (pathname === "/api/v1/events") return subscribe(mock, res);
+  if (pathname.startsWith("/api/v1/")) return api(mock, req, res, pathname.slice(8));
+  return asset(pathname, res);
+}
+
+function subscribe(mock, res) {
+  if (!mock.stream) return reply(res, 503, { error: "no streams now" });
+  res.writeHead(200, { "content-type": "text/event-stream", "cache-control": "no-store" });
+  res.write(`event: state\ndata: ${JSON.stringify(mock.mission.json())}\n\n`);
+  mock.streams.add(res);
+  res.on("close", () => mock.streams.delete(res));
+}
+
+async function api(mock, req, res, path) {
+  const { mission } = mock;
+  if (req.method === "POST") return post(mock, req, res, path);
+  if (path === "state") return reply(res, 200, mission.json());
+  const [, id, what] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
+  const vehicle = mission.vehicles.find((v) => v.id === Number(id));
+  if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
+  if (what === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.planes));
+  if (what === "map.png") return send(res, 200, "image/png", encodePng(vehicle.mapJson(mission.nowS, false), deflateSync));
+  const [, label] = what.match(/^exemplars\/(\d+)\.webp$/) ?? [];
+  if (vehicle.exemplars.get(Number(label))?.state !== "here") return reply(res, 404, { error: "not here" });
+  return send(res, 200, "image/webp", await readFile(join(HERE, `exemplars/${(Number(label) - 1) % 6}.webp`)));
+}
+
+async function post(mock, req, res, path) {
+  if (req.headers["x-scenecast"] !== "1") return reply(res, 403, { error: "header X-Scenecast is missing" });
+  const { mission } = mock;
+  const given = await body(req);
+  if (path === "budget") {
+    const bps = given.budget_bps;
+    if (!Number.isInteger(bps) || bps < 100 || bps > 100000) {
+      return reply(res, 422, { error: "budget_bps must be 100 to 100000" });
+    }
+    const [first] = mission.vehicles;
+    return accepted(mock, res, first.directive.issue("budget", mission.nowS, (s) => {
+      if (s === "applied") mission.budgetBps = bps;
+    }));
+  }
+  const [, id, what] = path.match(/^vehicles\/(\d+)\/(\w+)$/) ?? [];
+  const v = mission.vehicles.find((x) => x.id === Number(id));
+  if (!v) return reply(res, 404, { error: "no such vehicle" });
+  if (what === "utility") {
+    const bad = Object.entries(given.weights ?? {}).find(([, w]) => !(w >= -1 && w <= 1));
+    if (bad) return reply(res, 422, { error: `weight of label ${bad[0]} must be -1 to 1` });
+    return accepted(mock, res, mission.utility(v, given));
+  }
+  if (what === "exemplars") return accepted(mock, res, v.request(given.label, mission.nowS));
+  if (what === "constraints") {
+    return accepted(mock, res, v.directive.issue("constraints", mission.nowS, (s) => {
+      if (s === "applied") v.hold = given.hold;
+    }));
+  }
+  return reply(res, 404, { error: "no such thing" });
+}
+
+function accepted(mock, res, answer) {
+  reply(res, 202, answer);
+  emit(mock, "state", mock.mission.json());
+}
+
+function steer(mock, order, res) {
+  if (order.scenario) mock.mission = new Mission(order.scenario);
+  const { mission } = mock;
+  for (const key of ["loss", "planes", "ended", "speed"]) if (key in order) mission[key] = order[key];
+  if ("silent" in order) mission.vehicles[0].silent = order.silent;
+  if (order.refuse) mission.vehicles[0].directive.refuseNext.add(order.refuse);
+  if ("down" in order) mock.down = order.down;
+  if ("stream" in order) mock.stream = order.stream;
+  if (order.stream === false || order.down) for (const s of mock.streams) s.destroy();
+  const changed = order.advance ? mission.advance(order.advance) : [];
+  for (const v of changed) emit(mock, "map", { vehicle: v, version: mission.vehicles.find((x) => x.id === v).heard.version });
+  emit(mock, "state", mission.json());
+  reply(res, 200, { now_s: mission.nowS });
+}
+
+async function asset(pathname, res) {
+  const name = normalize(pathname === "/" ? "/index.html" : pathname);
+  const type = TYPES[extname(name)];
+  if (!type || name.includes("..")) return reply(res, 404, { error: "no such page" });
+  try {
+    return send(res, 200, type, await readFile(join(ASSETS, name)));
+  } catch {
+    return reply(res, 404, { error: "no such page" });
+  }
+}
+
+async function body(req) {
+  let text = "";
+  for await (const chunk of req) text += chunk;
+  try {
+    return JSON.parse(text || "{}");
+  } catch {
+    throw Object.assign(new Error("not JSON"), { status: 400 });
+  }
+}
+
+function send(res, status, type, bytes) {
+  res.writeHead(status, {
+    "content-type": type, "content-length": bytes.length, "cache-control": "no-cache",
+    "content-security-policy": POLICY, "x-content-type-options": "nosniff",
+  });
+  res.end(bytes);
+}
+
+const reply = (res, status, value) => send(res, status, "application/json", Buffer.from(JSON.stringify(value)));
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  const option = (name, otherwise) => {
+    const at = process.argv.indexOf(`--${name}`);
+    return at > 0 ? process.argv[at + 1] : otherwise;
+  };
+  const { url } = await startMock({ port: Number(option("port", 8470)), scenario: option("scenario", "rich") });
+  console.log(url);
+}

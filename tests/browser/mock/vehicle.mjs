@@ -1,0 +1,148 @@
+// One synthetic vehicle: flies legs over the scene, tells its map in turns, hears directives.
+
+import { habitat, confidence, floorDepth } from "./scene.mjs";
+import { Grid } from "./grid.mjs";
+import { Direction } from "./link.mjs";
+import { Directive } from "./directive.mjs";
+
+const PLANES = [
+  { name: "confidence", unit: "", min: 0, max: 1, at: confidence },
+  { name: "curiosity", unit: "nats", min: 0, max: 3, at: (x, y) => 3 * (1.2 - confidence(x, y)) },
+  { name: "depth", unit: "m", min: 10, max: 25, at: floorDepth },
+];
+
+export class Vehicle {
+  constructor(id, { turnS = 12, speed = 0.9, legs = { width: 24, height: 15, x: -9, y: -5 }, cellM = 0.25, footprint = 1.4 } = {}) {
+    Object.assign(this, { id, turnS, speed, legs, footprint });
+    this.name = `auv-${id}`;
+    this.own = new Grid(cellM);
+    this.heard = new Grid(cellM);
+    this.up = new Direction(97 + id);
+    this.directive = new Directive();
+    this.published = new Map();
+    this.weights = new Map();
+    this.exploration = 0.2;
+    this.exemplars = new Map();
+    this.track = [];
+    this.hold = false;
+    this.silent = false;
+    this.heardS = null;
+    this.status = null;
+    this.alongM = 0;
+    this.pending = new Map();
+    this.nextTurnS = 4 + 3 * id;
+    this.fixS = 0;
+  }
+
+  /** Position on the lawn-mower pattern, in metres east and north, with heading. */
+  pose() {
+    const { x, y, width, height } = this.legs;
+    const lane = 1.9;
+    const period = width + lane;
+    const lanes = Math.floor(height / lane) + 1;
+    const n = Math.floor(this.alongM / period) % lanes;
+    const on = this.alongM % period;
+    const east = n % 2 === 0;
+    const wander = 0.25 * Math.sin(this.alongM / 3.1);
+    if (on > width) return { x: x + (east ? width : 0), y: y + n * lane + (on - width), heading: 0 };
+    const heading = (east ? 90 : 270) + (east ? -1 : 1) * 5 * Math.cos(this.alongM / 3.1);
+    return { x: x + (east ? on : width - on), y: y + n * lane + wander, heading };
+  }
+
+  step(nowS, dt, loss, budgetBps, planes) {
+    if (!this.hold) this.alongM += this.speed * dt;
+    const p = this.pose();
+    this.observe(p, nowS);
+    if (nowS - this.fixS > 40) this.fixS = nowS;
+    if (nowS < this.nextTurnS) return false;
+    this.nextTurnS = nowS + this.turnS;
+    return !this.silent && this.report(p, nowS, loss, budgetBps);
+  }
+
+  observe(p, nowS) {
+    const cell = this.own.cellM;
+    const reach = Math.ceil(this.footprint / cell);
+    const [cx, cy] = [Math.floor(p.x / cell), Math.floor(p.y / cell)];
+    for (let dy = -reach; dy <= reach; dy += 1)
+      for (let dx = -reach; dx <= reach; dx += 1) {
+        if (dx * dx + dy * dy > reach * reach) continue;
+        const [x, y] = [cx + dx, cy + dy];
+        const kind = habitat((x + 0.5) * cell, (y + 0.5) * cell);
+        if (!this.published.has(kind)) this.published.set(kind, this.published.size + 1);
+        this.pending.set(`${x},${y}`, { x, y, label: this.published.get(kind) });
+        this.own.set(x, y, this.published.get(kind), nowS);
+      }
+  }
+
+  report(p, nowS, loss, budgetBps) {
+    const exemplar = [...this.exemplars.values()].find((e) => e.state === "coming");
+    const room = 0.7 * budgetBps * 1.25;
+    const parts = { map: Math.min(room, 900 + this.pending.size * 6), status: 22, directive: 3, exemplar: exemplar ? 96 : 0 };
+    if (!this.up.send(nowS, parts, loss)) return false;
+    this.heardS = nowS;
+    for (const c of this.pending.values()) this.heard.set(c.x, c.y, c.label, nowS);
+    this.pending.clear();
+    this.heard.version += 1;
+    this.updatedS = nowS;
+    const ahead = this.pose();
+    this.status = {
+      at_s: nowS - 0.8, x_m: p.x, y_m: p.y, z_m: -16.4 - 0.6 * Math.sin(nowS / 30),
+      heading_deg: (p.heading + 360) % 360, sigma_m: 0.6 + 0.03 * (nowS - this.fixS),
+      mode: this.hold ? "hold" : "survey",
+      waypoint: this.hold ? null : [p.heading > 180 ? this.legs.x : this.legs.x + this.legs.width, ahead.y],
+      cells: this.own.cells.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
+    };
+    this.track.push([nowS, p.x, p.y]);
+    this.track = this.track.slice(-500);
+    this.directive.acknowledge(nowS);
+    if (exemplar) this.progress(exemplar, nowS);
+    return true;
+  }
+
+  progress(e, nowS) {
+    e.progress = Math.min(1, e.progress + 0.25);
+    if (e.progress < 1) return;
+    e.state = "here";
+    e.at_s = nowS;
+    e.url = `/api/v1/vehicles/${this.id}/exemplars/${e.label}.webp`;
+  }
+
+  request(label, nowS) {
+    const e = { label, state: "queued", progress: 0, bytes: 380 + 24 * label, url: null, at_s: null };
+    this.exemplars.set(label, e);
+    return this.directive.issue("requests", nowS, (state) => {
+      const asked = [...this.exemplars.values()].filter((x) => x.state === "queued");
+      for (const x of asked) x.state = state === "refused" ? "refused" : "coming";
+    });
+  }
+
+  exemplarJson(label) {
+    const e = this.exemplars.get(label);
+    if (!e) return { state: "none", progress: 0, bytes: 0, url: null, at_s: null };
+    const slot = this.directive.slots.get("requests");
+    const state = e.state === "queued" && slot.state !== "queued" ? "on_air" : e.state;
+    return { state, progress: e.progress, bytes: e.bytes, url: e.url, at_s: e.at_s };
+  }
+
+  json(nowS) {
+    const bounds = this.heard.bounds();
+    const area = this.heard.cellM ** 2;
+    const counts = [...this.heard.counts()].sort((a, b) => a[0] - b[0]);
+    return {
+      id: this.id, name: this.name, heard_s: this.heardS, expected_interval_s: this.turnS,
+      next_contact_s: this.heardS === null ? null : this.nextTurnS, status: this.status, track: this.track,
+      map: {
+        version: this.heard.version, cell_m: this.heard.cellM, ...bounds,
+        explored_cells: this.heard.cells.size, updated_s: this.updatedS ?? null, epoch: 0,
+      },
+      labels: counts.map(([id, cells]) => ({
+        id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
+      })),
+      directive: this.directive.json(),
+    };
+  }
+
+  mapJson(nowS, withPlanes) {
+    return this.heard.json(nowS, withPlanes ? PLANES : []);
+  }
+}
