@@ -1,1 +1,15 @@
-//! The scenecast daemon.
+//! The scenecast daemon: the roles at sea, their drivers and runtime, the operator's console, the rehearsal and the tools.
+
+pub mod asv;
+pub mod auv;
+pub mod cli;
+pub mod config;
+pub mod console;
+mod ends;
+pub mod modem;
+pub mod picture;
+mod problem;
+pub mod rehearsal;
+pub mod runtime;
+
+pub use problem::Problem;

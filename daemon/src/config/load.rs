@@ -70,8 +70,9 @@ fn plain(value: &Spanned<DeValue<'_>>) -> Option<Value> {
 }
 
 fn read_set(set: &str) -> Result<Given, Problem> {
-    let (key, text) =
-        set.split_once('=').ok_or_else(|| Problem::Input(format!("--set {set}: expected KEY=VALUE, as in link.budget_bps=2000")))?;
+    let (key, text) = set
+        .split_once('=')
+        .ok_or_else(|| Problem::Input(format!("--set {set}: expected KEY=VALUE, as in link.budget_bps=2000")))?;
     let parsed = format!("v = {text}").parse::<Table>().ok().and_then(|mut t| t.remove("v"));
     let value = parsed.unwrap_or_else(|| Value::String(text.to_owned()));
     Ok(Given { key: key.trim().to_owned(), value, place: format!("--set {set}") })
@@ -80,8 +81,15 @@ fn read_set(set: &str) -> Result<Given, Problem> {
 fn check(given: &Given) -> Result<Value, Problem> {
     let Some(key) = KEYS.iter().find(|k| k.name == given.key) else { return Err(unknown(&given.key, &given.place)) };
     let default = default_of(key);
-    fit(&given.value, &default, key)
-        .ok_or_else(|| Problem::Input(format!("{}: {} = {} is not allowed: it takes {}", given.place, key.name, given.value, key.takes(&default))))
+    fit(&given.value, &default, key).ok_or_else(|| {
+        Problem::Input(format!(
+            "{}: {} = {} is not allowed: it takes {}",
+            given.place,
+            key.name,
+            given.value,
+            key.takes(&default)
+        ))
+    })
 }
 
 /// `value` in the type of `default`, if it lies within what the key allows.
@@ -126,7 +134,9 @@ impl Key {
 
 fn unknown(key: &str, place: &str) -> Problem {
     let nearest = KEYS.iter().map(|k| k.name).min_by_key(|name| distance(name, key)).unwrap_or_default();
-    Problem::Input(format!("{place}: there is no key {key}; the nearest is {nearest} (scenecast config lists them all)"))
+    Problem::Input(format!(
+        "{place}: there is no key {key}; the nearest is {nearest} (scenecast config lists them all)"
+    ))
 }
 
 /// Edit distance.
@@ -172,7 +182,10 @@ mod tests {
     #[test]
     fn a_value_out_of_range_is_answered_with_the_range() {
         let said = message(&["link.frame_bytes=9"]);
-        assert_eq!(said, "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 32 to 1024 bytes");
+        assert_eq!(
+            said,
+            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 32 to 1024 bytes"
+        );
     }
 
     #[test]

@@ -54,6 +54,8 @@ pub struct LinkStats {
     pub frames_delivered: u64,
     /// Received bytes that were dropped, by reason.
     pub dropped: BTreeMap<DropReason, u64>,
+    /// Map chunks put on air.
+    pub chunks_sent: u64,
     /// Bytes put on air, by class.
     pub bytes_by_class: BTreeMap<Class, u64>,
     /// Bytes of chunks that the peer declared held, by class.

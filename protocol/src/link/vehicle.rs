@@ -3,7 +3,7 @@
 use super::{DropReason, Inbound, LinkStats, Pair, SlotInbox, SlotInboxState, Transmit, Wakeup};
 use crate::directive::{Slot, SlotId, VersionedSlot};
 use crate::mac::{Grant, ModemProfile, quarter_seconds};
-use crate::map::{Cell, LabelGrid, MapSource};
+use crate::map::{Cell, LabelGrid, MapSource, UNEXPLORED};
 use crate::map_codec::Codec;
 use crate::object::{ObjectId, ObjectSender};
 use crate::schedule::{BitBudget, Class, ClassShares};
@@ -28,6 +28,8 @@ pub struct VehicleConfig {
     pub budget_window: Duration,
     /// Map codec.
     pub codec: Codec,
+    /// Whether the map is replicated cell by cell; if not, the host sends it otherwise.
+    pub replicate_map: bool,
     /// Share of exemplars against the map while both have something to send.
     pub exemplar_share: f64,
     /// Time between two statuses; longer where the budget is small, so that they take at most a tenth of it.
@@ -42,6 +44,8 @@ pub enum VehicleEvent {
     Slot {
         /// Which slot.
         id: SlotId,
+        /// Its version in the surface's series.
+        version: u16,
         /// What it says; `None` if it is unreadable and can only be refused.
         content: Option<Slot>,
     },
@@ -117,6 +121,15 @@ impl VehicleLink {
         self.map.set(cells, now)
     }
 
+    /// Begins a new run toward the surface, which then forgets the map it has: label ids start afresh.
+    pub fn renew(&mut self, session: SessionId, now: Instant) {
+        self.pair.renew(session);
+        let labelled: Vec<Cell> = self.map.target().iter().map(|(cell, _)| cell).collect();
+        self.map.set(labelled.into_iter().map(|cell| (cell, UNEXPLORED)), now);
+        self.map.handle_peer_restart(now);
+        self.objects = ObjectSender::default();
+    }
+
     /// The map as the vehicle sees it.
     pub fn map(&self) -> &LabelGrid {
         self.map.target()
@@ -129,7 +142,9 @@ impl VehicleLink {
 
     /// Whether the surface is known to hold the map, and every object.
     pub fn is_settled(&self) -> bool {
-        self.map.is_settled() && self.objects.backlog_bytes() == 0 && !self.pair.awaits_ack()
+        (self.map.is_settled() || !self.config.replicate_map)
+            && self.objects.backlog_bytes() == 0
+            && !self.pair.awaits_ack()
     }
 
     /// What each label is worth to the operator, 0..=1; what differs from his picture goes out in that order.
@@ -246,7 +261,7 @@ impl VehicleLink {
                 if let Some(window) = self.pair.window_mut() {
                     window.hold_back(number);
                 }
-                self.events.push_back(VehicleEvent::Slot { id: slot.id, content: slot.content });
+                self.events.push_back(VehicleEvent::Slot { id: slot.id, version: slot.version, content: slot.content });
             }
             Ok(_) => {}
             Err(_) => self.pair.stats.drop(DropReason::Malformed),
@@ -287,8 +302,12 @@ impl VehicleLink {
 
     fn frames_wanted(&self) -> u32 {
         let room = self.config.modem.frame_bytes.saturating_sub(14).max(1) as f64;
-        let bytes = self.map.backlog_cells() as f64 * self.bytes_per_cell + self.objects.backlog_bytes() as f64;
+        let bytes = self.map_backlog() as f64 * self.bytes_per_cell + self.objects.backlog_bytes() as f64;
         (bytes / room).ceil() as u32
+    }
+
+    fn map_backlog(&self) -> usize {
+        if self.config.replicate_map { self.map.backlog_cells() } else { 0 }
     }
 
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
@@ -322,7 +341,7 @@ impl VehicleLink {
     fn wish(&self, now: Instant) -> u8 {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
-        let idle = self.map.is_settled() && self.objects.backlog_bytes() == 0;
+        let idle = self.is_settled();
         let wait = if idle { affordable.max(self.status_due.since(now)) } else { affordable };
         quarter_seconds(wait, 254)
     }
@@ -332,7 +351,7 @@ impl VehicleLink {
         loop {
             let room = room_for_payload(builder.room());
             let object = self.objects.next_part(room);
-            let both = object.is_some() && self.map.backlog_cells() > 0;
+            let both = object.is_some() && self.map_backlog() > 0;
             let exemplar_first = !both || self.shares.turn() == Class::Exemplar;
             let spent = match object {
                 Some((id, range, bytes)) if exemplar_first && builder.push(ChunkKind::Object, &bytes) => {
@@ -376,10 +395,14 @@ impl VehicleLink {
             let surprise = if old == 0 { 1.0 } else { 0.5 };
             surprise * (0.2 + interest)
         };
+        if !self.config.replicate_map {
+            return None;
+        }
         let chunk = self.map.next_chunk(self.config.codec, room, now, &worth)?;
         if !builder.push(ChunkKind::Map, &chunk.bytes) {
             return None;
         }
+        self.pair.stats.chunks_sent += 1;
         let n = chunk.bytes.len();
         let per_cell = n as f64 / chunk.changes.len().max(1) as f64;
         self.bytes_per_cell += (per_cell - self.bytes_per_cell) * 0.1;

@@ -136,7 +136,7 @@ impl Pair {
 
     fn pump(&mut self) {
         while let Some(event) = self.vehicle.poll_event() {
-            if let VehicleEvent::Slot { id, content: Some(slot) } = event {
+            if let VehicleEvent::Slot { id, content: Some(slot), .. } = event {
                 self.applied.push(slot);
                 self.vehicle.decide(id, SlotState::Applied, self.now);
                 self.durable = self.vehicle.persistent_state().clone();
@@ -195,6 +195,7 @@ fn vehicle(
         budget_bps,
         budget_window: Duration::from_secs(10),
         codec,
+        replicate_map: true,
         exemplar_share: 0.2,
         status_period: Duration::from_secs(10),
     };

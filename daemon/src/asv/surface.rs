@@ -1,0 +1,198 @@
+//! The surface's role: link and operator in one sans-IO whole.
+
+use super::desk::Desk;
+use crate::auv::Exemplar;
+use crate::picture;
+use scenecast_protocol::directive::{Budget, Constraints, Fix, Slot, SlotId, Utility};
+use scenecast_protocol::link::{PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
+use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::collections::{BTreeMap, VecDeque};
+
+/// What the surface tells its host.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SurfaceOutput {
+    /// The operator's map of a vehicle has changed.
+    MapChanged(Address),
+    /// An image of a label is here.
+    ExemplarHere(Address, u8),
+    /// A slot is in force or was refused.
+    SlotSettled(Address, SlotId),
+    /// Anything else that the operator's page shows.
+    Changed(Address),
+}
+
+/// The surface.
+pub struct Surface {
+    link: SurfaceLink,
+    desks: BTreeMap<Address, Desk>,
+    outputs: VecDeque<SurfaceOutput>,
+}
+
+impl Surface {
+    /// A surface that speaks with these vehicles, by address and name.
+    pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
+        let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
+        Self { link, desks, outputs: VecDeque::new() }
+    }
+
+    /// The vehicles.
+    pub fn vehicles(&self) -> impl Iterator<Item = (Address, &Desk)> {
+        self.desks.iter().map(|(&a, d)| (a, d))
+    }
+
+    /// The operator's papers about a vehicle.
+    pub fn desk(&self, vehicle: Address) -> Option<&Desk> {
+        self.desks.get(&vehicle)
+    }
+
+    /// The link's view of a vehicle.
+    pub fn view(&self, vehicle: Address) -> Option<PeerView<'_>> {
+        self.link.vehicle(vehicle)
+    }
+
+    /// The operator's map of a vehicle.
+    pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
+        let whole = self.desks.get(&vehicle).and_then(|d| d.whole.as_ref());
+        whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+    }
+
+    /// Bits a second that the surface may use.
+    pub fn budget_bps(&self) -> u32 {
+        self.link.budget_bps()
+    }
+
+    /// The next thing to tell the host.
+    pub fn poll_output(&mut self) -> Option<SurfaceOutput> {
+        self.outputs.pop_front()
+    }
+
+    /// Sends weights (-1..=1) of labels and of unseen cells. The error is one line for the operator.
+    pub fn set_utility(
+        &mut self,
+        vehicle: Address,
+        weights: &BTreeMap<u8, f64>,
+        exploration: f64,
+        now: Instant,
+    ) -> Result<u16, String> {
+        let known = self.labels(vehicle).ok_or("no such vehicle")?;
+        let hundredths = |what: &str, w: f64| {
+            let ok = w.is_finite() && (-1.0..=1.0).contains(&w);
+            ok.then_some((w * 100.0).round() as i8).ok_or(format!("{what} {w} is not within -1 to 1"))
+        };
+        let mut utility = Utility { exploration: hundredths("exploration", exploration)?, ..Utility::default() };
+        for (&label, &weight) in weights {
+            if !known.contains_key(&label) {
+                return Err(format!("label {label} is not on the map"));
+            }
+            let weight = hundredths(&format!("weight of label {label}:"), weight)?;
+            if weight != 0 {
+                utility.weights.insert(label, weight);
+            }
+        }
+        let desk = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?;
+        utility.epoch = desk.epoch;
+        desk.utility = utility.clone();
+        self.issue(vehicle, Slot::Utility(utility), now)
+    }
+
+    /// Asks for a representative image of a label.
+    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
+        if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
+            return Err(format!("label {label} is not on the map"));
+        }
+        let requests = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.request(label, now);
+        self.issue(vehicle, Slot::Requests(requests), now)
+    }
+
+    /// Tells a vehicle to stay, or to go on.
+    pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
+        self.issue(vehicle, Slot::Constraints(Constraints { hold }), now)
+    }
+
+    /// Changes the bit budget of the surface and of every vehicle.
+    pub fn set_budget(&mut self, bits_per_s: u32, now: Instant) -> Result<(), String> {
+        if !(10..=10_000_000).contains(&bits_per_s) {
+            return Err(format!("budget_bps {bits_per_s} is not within 10 to 10000000"));
+        }
+        self.link.set_budget(bits_per_s, now);
+        let vehicles: Vec<Address> = self.desks.keys().copied().collect();
+        vehicles.into_iter().try_for_each(|v| self.issue(v, Slot::Budget(Budget { bits_per_s }), now).map(drop))
+    }
+
+    /// Sends a position fix.
+    pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, String> {
+        self.issue(vehicle, Slot::Fix(fix), now)
+    }
+
+    fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
+        let version = self.link.issue(vehicle, slot, now).ok_or_else(|| "no such vehicle".to_owned())?;
+        self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        Ok(version)
+    }
+
+    /// Cells of each label on the operator's map.
+    pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
+        let mut cells = BTreeMap::new();
+        for (_, label) in self.map(vehicle)?.iter() {
+            *cells.entry(label).or_default() += 1;
+        }
+        Some(cells)
+    }
+
+    /// Takes received bytes.
+    pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
+        self.link.handle_frame(bytes, now);
+        while let Some(event) = self.link.poll_event() {
+            if let Some(output) = self.handle_event(event, now) {
+                self.outputs.push_back(output);
+            }
+        }
+    }
+
+    fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
+        match event {
+            SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
+            SurfaceEvent::VehicleRestarted(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
+            SurfaceEvent::SlotSettled(vehicle, slot) => Some(SurfaceOutput::SlotSettled(vehicle, slot)),
+            SurfaceEvent::Status(vehicle) => {
+                let (status, _) = self.link.vehicle(vehicle)?.status()?;
+                self.desks.get_mut(&vehicle)?.handle_status(status, now);
+                Some(SurfaceOutput::Changed(vehicle))
+            }
+            SurfaceEvent::ObjectProgress { vehicle, head, held, total } => {
+                self.desks.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
+                Some(SurfaceOutput::Changed(vehicle))
+            }
+            SurfaceEvent::Object(vehicle, bytes) => {
+                let desk = self.desks.get_mut(&vehicle)?;
+                match Exemplar::decode(&bytes) {
+                    Some(exemplar) => {
+                        let label = exemplar.label;
+                        desk.handle_exemplar(exemplar, now).then_some(SurfaceOutput::ExemplarHere(vehicle, label))
+                    }
+                    None => {
+                        desk.whole = Some(picture::read_whole(&bytes)?);
+                        Some(SurfaceOutput::MapChanged(vehicle))
+                    }
+                }
+            }
+        }
+    }
+
+    /// The transmission that was handed out has left the modem.
+    pub fn handle_transmit_outcome(&mut self, now: Instant) {
+        self.link.handle_transmit_outcome(now);
+    }
+
+    /// The next frame to put on air.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        self.link.poll_transmit(now)
+    }
+
+    /// When to ask for the next frame.
+    pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
+        self.link.poll_timeout()
+    }
+}

@@ -1,0 +1,147 @@
+//! Camera frames to label map.
+
+use crate::config::Config;
+use crate::problem::Problem;
+use image::RgbImage;
+use scene_model::exemplars::ExemplarStore;
+use scene_model::project::{DownCamera, Pose};
+use scene_model::publish::{LabelBook, PublishedCell};
+use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
+use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_protocol::map::Cell;
+
+/// Edge of a representative image in pixels.
+const EXEMPLAR_PX: u32 = 64;
+/// Representative images kept a label.
+const EXEMPLARS_KEPT: usize = 4;
+
+/// The label map after a camera frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapUpdate {
+    /// Mission time of the frame, seconds.
+    pub t_s: f64,
+    /// Epoch of the label ids.
+    pub epoch: u8,
+    /// Labels of every explored cell.
+    pub cells: Vec<(Cell, u8)>,
+    /// Labels given so far.
+    pub labels: u8,
+}
+
+/// The scene model of one vehicle.
+pub struct Mapper {
+    extractor: WordExtractor,
+    camera: DownCamera,
+    cell_m: f64,
+    model: SceneModel,
+    book: LabelBook,
+    exemplars: ExemplarStore,
+    refine_words_per_s: f64,
+    last_s: Option<f64>,
+    flat: Vec<FlatCell>,
+}
+
+/// Edge of a cell in metres.
+pub fn cell_m(config: &Config) -> f64 {
+    if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }
+}
+
+impl Mapper {
+    /// A mapper that has seen nothing; its label ids begin at `epoch`.
+    pub fn new(config: &Config, epoch: u8, seed: u64) -> Result<Self, Problem> {
+        let words = WordConfig::default();
+        let cell_m = cell_m(config);
+        let birth = match config.scene.birth.as_str() {
+            "collapsed" => Birth::Collapsed,
+            "rost" => Birth::Rost,
+            _ => Birth::Literal,
+        };
+        let scene = SceneConfig {
+            cell_m: [cell_m, cell_m, 1e4],
+            alpha: config.scene.alpha,
+            beta: config.scene.beta,
+            gamma: config.scene.gamma,
+            birth,
+            max_labels: config.scene.max_labels,
+            vocabulary: words.vocabulary_size(),
+            max_words_per_cell: config.scene.max_words_per_cell,
+            seed,
+        };
+        Ok(Self {
+            extractor: WordExtractor::new(&words),
+            camera: DownCamera {
+                metres_per_pixel: config.camera.metres_per_pixel,
+                altitude_m: config.survey.altitude_m,
+            },
+            cell_m,
+            model: SceneModel::new(scene).map_err(|e| Problem::Input(format!("scene.{e}")))?,
+            book: LabelBook::new(epoch),
+            exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
+            refine_words_per_s: f64::from(config.scene.refine_words_per_s),
+            last_s: None,
+            flat: Vec::new(),
+        })
+    }
+
+    /// Sets the words resampled a second of mission time.
+    pub fn set_refine_rate(&mut self, words_per_s: u32) {
+        self.refine_words_per_s = f64::from(words_per_s);
+    }
+
+    /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.
+    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, t_s: f64) -> MapUpdate {
+        let words = self.extractor.extract(image, (self.cell_m / self.camera.metres_per_pixel) as f32);
+        let observations = self.camera.project(image.width(), image.height(), pose, &words);
+        self.model.insert(t_s, &observations);
+        let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
+        self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
+        self.flat = self.model.label_map();
+        let published = self.book.publish(&self.flat);
+        self.offer_exemplar(image, pose, t_s);
+        let cells = published.iter().map(|c: &PublishedCell| (Cell::new(c.x, c.y), c.label)).collect();
+        let labels = self.book.labels().count() as u8;
+        MapUpdate { t_s, epoch: self.book.epoch(), cells, labels }
+    }
+
+    /// The middle of the frame, where the camera distorts least, may represent the label below it.
+    fn offer_exemplar(&mut self, image: &RgbImage, pose: &Pose, t_s: f64) {
+        let middle = (self.cell(pose.y), self.cell(pose.x));
+        let Ok(at) = self.flat.binary_search_by_key(&middle, |c| (c.y, c.x)) else { return };
+        let (topic, score) = (self.flat[at].topic, self.flat[at].confidence);
+        if image.width() < EXEMPLAR_PX || image.height() < EXEMPLAR_PX || !self.exemplars.would_keep(topic, score) {
+            return;
+        }
+        let (x, y) = ((image.width() - EXEMPLAR_PX) / 2, (image.height() - EXEMPLAR_PX) / 2);
+        let patch = image::imageops::crop_imm(image, x, y, EXEMPLAR_PX, EXEMPLAR_PX).to_image();
+        self.exemplars.offer(topic, patch, score, t_s, (pose.x, pose.y));
+    }
+
+    fn cell(&self, metres: f64) -> i32 {
+        (metres / self.cell_m).floor() as i32
+    }
+
+    /// The image that represents a label best so far.
+    pub fn exemplar(&self, label: u8) -> Option<&RgbImage> {
+        self.exemplars.best(self.book.topic_of(label)?).map(|e| &e.patch)
+    }
+
+    /// Epoch of the label ids.
+    pub fn epoch(&self) -> u8 {
+        self.book.epoch()
+    }
+
+    /// Cells with words.
+    pub fn cells(&self) -> usize {
+        self.model.cells()
+    }
+
+    /// Words held.
+    pub fn words(&self) -> u64 {
+        self.model.words()
+    }
+
+    /// Perplexity of the words under the model.
+    pub fn perplexity(&self) -> f64 {
+        self.model.perplexity()
+    }
+}

@@ -1,0 +1,16 @@
+//! The vehicle: sees, maps, tells, obeys.
+//!
+//! [`Mapper`] turns camera frames into labels and may live on a thread of its own; [`Vehicle`] speaks with the surface,
+//! keeps the position estimate and chooses waypoints. Neither does IO.
+
+mod exemplar;
+mod mapper;
+mod navigator;
+mod steering;
+mod vehicle;
+
+pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
+pub use mapper::{MapUpdate, Mapper, cell_m};
+pub use navigator::Navigator;
+pub use steering::{Area, Footprint, Steering};
+pub use vehicle::{AppliedSlot, Durable, Vehicle, VehicleOutput};

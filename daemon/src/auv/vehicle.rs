@@ -1,0 +1,385 @@
+//! The vehicle's role: link, position estimate and steering in one sans-IO whole.
+
+use super::exemplar::{Exemplar, encode_webp};
+use super::mapper::{MapUpdate, Mapper};
+use super::navigator::Navigator;
+use super::steering::Steering;
+use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
+use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
+use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{SessionId, SlotState, VehicleMode, VehicleStatus};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+/// Most bytes of a representative image.
+const EXEMPLAR_BYTES: usize = 700;
+
+/// What must survive a restart of the vehicle, so that nothing is applied twice and no label changes its meaning.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Durable {
+    /// Slots seen.
+    pub inbox: SlotInboxState,
+    /// Epoch of the label ids in use.
+    pub epoch: u8,
+    /// Utility in force: epoch, exploration, curiosity, weights.
+    pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
+    /// Whether the vehicle is told to hold.
+    pub hold: bool,
+    /// Budget in force, bits a second.
+    pub budget_bps: Option<u32>,
+}
+
+/// What the vehicle asks of its host.
+#[derive(Debug, Clone, PartialEq)]
+pub enum VehicleOutput {
+    /// Make [`Vehicle::durable`] durable, then call [`Vehicle::handle_persisted`].
+    Persist,
+    /// Go there, metres east and north.
+    Waypoint(f64, f64),
+    /// Stay where you are.
+    Hold,
+    /// Resample so many words a second.
+    RefineRate(u32),
+    /// A slot was decided about.
+    Applied(AppliedSlot),
+}
+
+/// A decision about a slot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AppliedSlot {
+    /// Which slot.
+    pub id: SlotId,
+    /// Which version of it.
+    pub version: u16,
+    /// The decision.
+    pub state: SlotState,
+    /// When.
+    pub at: Instant,
+}
+
+/// The vehicle.
+pub struct Vehicle {
+    link: VehicleLink,
+    navigator: Navigator,
+    steering: Steering,
+    durable: Durable,
+    utility: Option<Utility>,
+    requests: Requests,
+    answered: Vec<(u8, u8)>,
+    labels: u8,
+    explored: u32,
+    waypoint: Option<(f64, f64)>,
+    done: bool,
+    outputs: VecDeque<VehicleOutput>,
+    fixes_applied: u64,
+    whole_png: Option<u64>,
+    outstanding: Option<scenecast_protocol::object::ObjectId>,
+}
+
+impl Vehicle {
+    /// A vehicle at its start; `durable` is what survived the last run, with the epoch this run begins.
+    pub fn new(link: VehicleLink, navigator: Navigator, steering: Steering, durable: Durable) -> Self {
+        let utility = durable.utility.clone().map(|(epoch, exploration, curiosity, weights)| Utility {
+            epoch,
+            exploration,
+            curiosity,
+            weights,
+        });
+        let mut vehicle = Self {
+            link,
+            navigator,
+            steering,
+            // Weights speak of labels of their epoch; a new epoch has none yet.
+            utility: utility.filter(|u| u.epoch == durable.epoch),
+            durable,
+            requests: Requests::default(),
+            answered: Vec::new(),
+            labels: 0,
+            explored: 0,
+            waypoint: None,
+            done: false,
+            outputs: VecDeque::new(),
+            fixes_applied: 0,
+            whole_png: None,
+            outstanding: None,
+        };
+        vehicle.follow_utility();
+        vehicle
+    }
+
+    /// Sends the whole map as a PNG whenever it has changed instead of what changed, for comparison.
+    pub fn send_whole_png(&mut self) {
+        self.whole_png = Some(0);
+    }
+
+    /// What must survive a restart.
+    pub fn durable(&self) -> &Durable {
+        &self.durable
+    }
+
+    /// The position estimate.
+    pub fn navigator(&self) -> &Navigator {
+        &self.navigator
+    }
+
+    /// The map as the vehicle sees it.
+    pub fn map(&self) -> &LabelGrid {
+        self.link.map()
+    }
+
+    /// Versions of the map so far.
+    pub fn map_version(&self) -> u64 {
+        self.link.map_version()
+    }
+
+    /// Whether the surface is known to have everything.
+    pub fn is_settled(&self) -> bool {
+        self.link.is_settled()
+    }
+
+    /// Counters of the link.
+    pub fn stats(&self) -> &LinkStats {
+        self.link.stats()
+    }
+
+    /// Bits a second that the link may use.
+    pub fn budget_bps(&self) -> u32 {
+        self.link.budget_bps()
+    }
+
+    /// Fixes that corrected the estimate.
+    pub fn fixes_applied(&self) -> u64 {
+        self.fixes_applied
+    }
+
+    /// The utility in force.
+    pub fn utility(&self) -> Option<&Utility> {
+        self.utility.as_ref()
+    }
+
+    /// The next thing asked of the host.
+    pub fn poll_output(&mut self) -> Option<VehicleOutput> {
+        self.outputs.pop_front()
+    }
+
+    /// The vehicle's own sensors say that it moved.
+    pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
+    }
+
+    /// The position is known from elsewhere, as in a recorded mission.
+    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
+    }
+
+    /// The scene model has a new map.
+    pub fn handle_map(&mut self, update: &MapUpdate, session: SessionId, now: Instant) {
+        if update.epoch != self.durable.epoch {
+            self.begin_epoch(update.epoch, session, now);
+        }
+        self.labels = update.labels;
+        self.explored = update.cells.len() as u32;
+        self.link.set_map(update.cells.iter().copied(), now);
+        let at = self.navigator.position();
+        self.steering.handle_view(at);
+    }
+
+    /// Label ids start afresh: the surface learns it by a new session, before any of the new ids.
+    fn begin_epoch(&mut self, epoch: u8, session: SessionId, now: Instant) {
+        self.link.renew(session, now);
+        self.durable.epoch = epoch;
+        self.utility = None;
+        self.requests = Requests::default();
+        self.answered.clear();
+        self.follow_utility();
+        self.outputs.push_back(VehicleOutput::Persist);
+    }
+
+    /// Answers requests for representative images that the scene model can meet by now.
+    pub fn answer_requests(&mut self, mapper: &Mapper) {
+        for &(label, serial) in &self.requests.wanted {
+            if self.answered.contains(&(label, serial)) {
+                continue;
+            }
+            let Some(patch) = mapper.exemplar(label) else { continue };
+            let webp = encode_webp(patch, EXEMPLAR_BYTES);
+            let object = Exemplar { epoch: self.durable.epoch, label, serial, webp };
+            if self.link.push_object(object.encode()).is_some() {
+                self.answered.push((label, serial));
+            }
+        }
+    }
+
+    /// For comparison: the whole map as a PNG, once the last one is through and the map has changed.
+    fn push_whole_png(&mut self) {
+        let version = self.link.map_version();
+        if self.outstanding.is_some() || self.whole_png.is_none_or(|sent| sent == version) {
+            return;
+        }
+        if let Ok(png) = crate::picture::encode(self.link.map()) {
+            self.outstanding = self.link.push_object(crate::picture::with_place(self.link.map(), &png));
+            self.whole_png = Some(version);
+        }
+    }
+
+    /// Chooses a waypoint if there is none or the last one is reached.
+    pub fn steer(&mut self) {
+        if self.durable.hold || self.done {
+            return;
+        }
+        let at = self.navigator.position();
+        let reached = self.waypoint.is_none_or(|w| (w.0 - at.0).hypot(w.1 - at.1) < 0.5);
+        if reached {
+            let next = self.steering.next_waypoint(at, self.link.map(), self.utility.as_ref());
+            self.waypoint = Some(next);
+            self.outputs.push_back(VehicleOutput::Waypoint(next.0, next.1));
+        }
+    }
+
+    /// The survey is over: stay, and keep telling.
+    pub fn finish_survey(&mut self) {
+        self.done = true;
+        self.waypoint = None;
+        self.outputs.push_back(VehicleOutput::Hold);
+    }
+
+    /// Takes received bytes.
+    pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
+        self.link.handle_frame(bytes, now);
+        while let Some(event) = self.link.poll_event() {
+            match event {
+                VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
+                VehicleEvent::ObjectDelivered(id) if self.outstanding == Some(id) => self.outstanding = None,
+                VehicleEvent::ObjectDelivered(_) => {}
+                VehicleEvent::SurfaceRestarted => self.answered.clear(),
+            }
+        }
+    }
+
+    fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
+        let state = match content.ok_or(RefusalReason::Malformed).and_then(|slot| self.apply(slot, now)) {
+            Ok(()) => SlotState::Applied,
+            Err(reason) => SlotState::Refused(reason),
+        };
+        self.link.decide(id, state, now);
+        self.durable.inbox = self.link.persistent_state().clone();
+        self.outputs.push_back(VehicleOutput::Persist);
+        self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));
+    }
+
+    fn apply(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
+        match slot {
+            Slot::Utility(utility) => self.apply_utility(utility),
+            Slot::Constraints(constraints) => {
+                self.durable.hold = constraints.hold;
+                self.waypoint = None;
+                if constraints.hold {
+                    self.outputs.push_back(VehicleOutput::Hold);
+                }
+                Ok(())
+            }
+            Slot::Settings(settings) => {
+                self.outputs.push_back(VehicleOutput::RefineRate(settings.refine_words_per_s));
+                Ok(())
+            }
+            Slot::Budget(budget) if (10..=10_000_000).contains(&budget.bits_per_s) => {
+                self.link.set_budget(budget.bits_per_s, now);
+                self.durable.budget_bps = Some(budget.bits_per_s);
+                Ok(())
+            }
+            Slot::Budget(_) => Err(RefusalReason::OutOfRange),
+            Slot::Requests(requests) if requests.epoch != self.durable.epoch => Err(RefusalReason::OtherEpoch),
+            Slot::Requests(requests) if requests.wanted.iter().any(|&(l, _)| l == 0 || l > self.labels) => {
+                Err(RefusalReason::UnknownLabel)
+            }
+            Slot::Requests(requests) => {
+                self.requests = requests;
+                Ok(())
+            }
+            Slot::Fix(fix) => {
+                let taken = now - Duration::from_secs_f64(fix.age_s);
+                let used = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
+                self.fixes_applied += u64::from(used);
+                if used { Ok(()) } else { Err(RefusalReason::TooOld) }
+            }
+        }
+    }
+
+    fn apply_utility(&mut self, utility: Utility) -> Result<(), RefusalReason> {
+        if !utility.is_in_range() {
+            return Err(RefusalReason::OutOfRange);
+        }
+        if utility.epoch != self.durable.epoch {
+            return Err(RefusalReason::OtherEpoch);
+        }
+        if utility.weights.keys().any(|&label| label > self.labels) {
+            return Err(RefusalReason::UnknownLabel);
+        }
+        let u = &utility;
+        self.durable.utility = Some((u.epoch, u.exploration, u.curiosity, u.weights.clone()));
+        self.utility = Some(utility);
+        self.waypoint = None;
+        self.follow_utility();
+        Ok(())
+    }
+
+    fn follow_utility(&mut self) {
+        let utility = self.utility.clone().unwrap_or_default();
+        self.link.set_interest(|label| utility.weight(label));
+    }
+
+    /// The host has made [`Self::durable`] durable.
+    pub fn handle_persisted(&mut self) {
+        self.link.handle_persisted();
+    }
+
+    /// The transmission that was handed out has left the modem.
+    pub fn handle_transmit_outcome(&mut self) {
+        self.link.handle_transmit_outcome();
+    }
+
+    /// The next frame to put on air.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        if self.link.wants_status(now) {
+            let status = self.status(now);
+            self.link.set_status(status);
+        }
+        self.push_whole_png();
+        self.link.poll_transmit(now)
+    }
+
+    /// When to ask for the next frame.
+    pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
+        self.link.poll_timeout()
+    }
+
+    fn status(&self, now: Instant) -> VehicleStatus {
+        let (x_m, y_m) = self.navigator.position();
+        let mode = match (self.durable.hold, self.done) {
+            (true, _) => VehicleMode::Hold,
+            (_, true) => VehicleMode::Done,
+            _ => VehicleMode::Survey,
+        };
+        VehicleStatus {
+            mode,
+            x_m,
+            y_m,
+            depth_m: self.navigator.depth_m(),
+            heading_deg: self.navigator.heading_rad().to_degrees().rem_euclid(360.0),
+            sigma_m: self.navigator.sigma_m(),
+            fix_age_s: self.navigator.last_fix().map(|at| now.since(at).as_secs_f64()),
+            waypoint: self.waypoint,
+            epoch: self.durable.epoch,
+            labels: self.labels,
+            explored_cells: self.explored,
+            ..VehicleStatus::default()
+        }
+    }
+
+    /// Labels of cells as the vehicle sees them.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
+        self.link.map().iter()
+    }
+}

@@ -1,0 +1,64 @@
+//! `scenecast bench`
+
+use super::sim::WorldArguments;
+use crate::problem::Problem;
+use crate::rehearsal::{FidelityRow, fidelity};
+use clap::{Args, Subcommand};
+
+/// Measurements.
+#[derive(Debug, Subcommand)]
+pub(super) enum Bench {
+    /// The operator's map at 100, 250, 1000 and 10 000 bit/s: our stream against whole PNGs.
+    Fidelity(Fidelity),
+}
+
+/// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
+/// changed", with the same frames, acknowledgements, repair and turns.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast bench fidelity --seed 3")]
+pub(super) struct Fidelity {
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    world: WorldArguments,
+}
+
+impl Bench {
+    pub(super) fn run(self) -> Result<(), Problem> {
+        match self {
+            Self::Fidelity(f) => f.run(),
+        }
+    }
+}
+
+impl Fidelity {
+    fn run(mut self) -> Result<(), Problem> {
+        // What the rows have in common unless it is set otherwise: small frames suit small budgets.
+        let defaults = ["channel.loss=0.1", "link.frame_bytes=64"].map(str::to_owned);
+        self.world.sets.splice(0..0, defaults);
+        let config = self.world.config()?;
+        let world = self.world.world(&config)?;
+        if !self.json {
+            println!("budget_bps stream     agreement_mean  age_s median     p95     max  MI nats  map bytes");
+        }
+        let rows = fidelity(&config, &world, self.world.seed, &mut |row| {
+            if !self.json {
+                print_row(row);
+            }
+        })?;
+        if self.json {
+            let text = serde_json::to_string_pretty(&rows).map_err(|e| Problem::Failed(e.to_string()))?;
+            println!("{text}");
+        }
+        Ok(())
+    }
+}
+
+fn print_row(r: &FidelityRow) {
+    let mi = r.mutual_information_nats.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    println!(
+        "{:>10} {:<10} {:>14.4} {:>13.1} {:>7.1} {:>7.1} {:>8} {:>10}",
+        r.budget_bps, r.stream, r.agreement_mean, r.age_s_median, r.age_s_p95, r.age_s_max, mi, r.map_bytes
+    );
+}

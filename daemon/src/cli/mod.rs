@@ -1,0 +1,49 @@
+//! The command line.
+//!
+//! Exit codes: 0 done, 1 failed, 2 wrong usage or input.
+
+mod bench;
+mod demo;
+mod node;
+mod progress;
+mod sim;
+
+use crate::problem::Problem;
+use clap::{Parser, Subcommand};
+
+/// Streams an underwater robot's scene map over an acoustic link to a scientist at the surface.
+#[derive(Debug, Parser)]
+#[command(name = "scenecast", version, after_help = "Example: scenecast demo, then open http://127.0.0.1:8460")]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fly a simulated mission in real time and serve the operator's page.
+    Demo(demo::Demo),
+    /// Fly a simulated mission in virtual time and write a report.
+    Sim(sim::Sim),
+    /// Run the vehicle.
+    Auv(node::Node),
+    /// Run the surface: hold the operator's map, serve his page.
+    Asv(node::Node),
+    /// Measure.
+    #[command(subcommand)]
+    Bench(bench::Bench),
+    /// Print a configuration file with every key explained.
+    Config(node::PrintConfig),
+}
+
+/// Carries out a command.
+pub fn run(arguments: Arguments) -> Result<(), Problem> {
+    match arguments.command {
+        Command::Demo(demo) => demo.run(),
+        Command::Sim(sim) => sim.run(),
+        Command::Auv(node) => node.run_vehicle(),
+        Command::Asv(node) => node.run_surface(),
+        Command::Bench(bench) => bench.run(),
+        Command::Config(print) => print.run(),
+    }
+}

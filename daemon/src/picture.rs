@@ -1,0 +1,138 @@
+//! Label maps as indexed PNG files.
+
+use crate::problem::Problem;
+use scenecast_protocol::map::{Cell, LabelGrid, Rect};
+use std::io::Write;
+use std::path::Path;
+
+/// Colour of a label: 0 black, others spread over hue and lightness so that neighbours in number differ.
+pub fn colour(label: u8) -> [u8; 3] {
+    if label == 0 {
+        return [0, 0, 0];
+    }
+    // The golden angle visits the hues evenly whatever the number of labels.
+    let hue = f64::from(label) * 137.507_764;
+    let light = [0.60, 0.72, 0.48][usize::from(label) % 3];
+    let channel = |shift: f64| {
+        let h = (hue + shift).to_radians().cos();
+        ((light + 0.28 * h).clamp(0.0, 1.0) * 255.0) as u8
+    };
+    [channel(0.0), channel(-120.0), channel(120.0)]
+}
+
+/// The map within `bounds` as an indexed PNG, north up; pixel value = label.
+pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, png::EncodingError> {
+    let highest = grid.iter().map(|(_, l)| l).max().unwrap_or(0);
+    let depth = match highest {
+        0..=1 => png::BitDepth::One,
+        2..=3 => png::BitDepth::Two,
+        4..=15 => png::BitDepth::Four,
+        _ => png::BitDepth::Eight,
+    };
+    let per_byte = 8 / depth as usize;
+    let mut pixels = Vec::new();
+    for row in (0..bounds.height).rev() {
+        let labels: Vec<u8> = (0..bounds.width)
+            .map(|column| {
+                grid.get(Cell::new(bounds.x.wrapping_add_unsigned(column), bounds.y.wrapping_add_unsigned(row)))
+            })
+            .collect();
+        for group in labels.chunks(per_byte) {
+            let packed = group.iter().enumerate().fold(0u8, |acc, (i, &l)| acc | l << (8 - (i + 1) * depth as usize));
+            pixels.push(packed);
+        }
+    }
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, bounds.width, bounds.height);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(depth);
+    encoder.set_palette((0..=highest).flat_map(colour).collect::<Vec<u8>>());
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::NoFilter);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&pixels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The whole map as an indexed PNG; one black pixel if nothing is explored.
+pub fn encode(grid: &LabelGrid) -> Result<Vec<u8>, png::EncodingError> {
+    encode_within(grid, grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 }))
+}
+
+/// A whole-map object: the cell of the south-west corner (two 32-bit numbers), then the PNG.
+pub fn with_place(grid: &LabelGrid, png: &[u8]) -> Vec<u8> {
+    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    [&bounds.x.to_be_bytes()[..], &bounds.y.to_be_bytes()[..], png].concat()
+}
+
+/// Reads a whole-map object; `None` if it is none.
+pub fn read_whole(object: &[u8]) -> Option<LabelGrid> {
+    let (x, rest) = object.split_first_chunk::<4>()?;
+    let (y, png) = rest.split_first_chunk::<4>()?;
+    decode(png, i32::from_be_bytes(*x), i32::from_be_bytes(*y)).ok()
+}
+
+/// Reads an indexed PNG as a map whose south-west cell is `(x0, y0)`.
+pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
+    let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
+    if reader.info().color_type != png::ColorType::Indexed {
+        return Err("not an indexed PNG".to_owned());
+    }
+    let depth = reader.info().bit_depth as usize;
+    let mut pixels = vec![0; reader.output_buffer_size().ok_or("too large")?];
+    let info = reader.next_frame(&mut pixels).map_err(|e| e.to_string())?;
+    let mut grid = LabelGrid::default();
+    for (row, line) in pixels.chunks(info.line_size).take(info.height as usize).enumerate() {
+        for column in 0..info.width as usize {
+            let bit = column * depth;
+            let byte = line.get(bit / 8).copied().unwrap_or(0);
+            let label = byte >> (8 - depth - bit % 8) & (0xFFu16 >> (8 - depth)) as u8;
+            grid.set(Cell::new(x0 + column as i32, y0 + (info.height as usize - 1 - row) as i32), label);
+        }
+    }
+    Ok(grid)
+}
+
+/// Writes a file so that a reader sees the old or the new one, never half of one.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
+    let failed = |e: std::io::Error| Problem::Failed(format!("{}: {e}", path.display()));
+    let part = path.with_extension("part");
+    let mut file = std::fs::File::create(&part).map_err(failed)?;
+    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed)?;
+    std::fs::rename(&part, path).map_err(failed)?;
+    if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
+        std::fs::File::open(dir).and_then(|d| d.sync_all()).map_err(failed)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_comes_back_from_its_png_at_every_bit_depth() {
+        for labels in [1u8, 3, 9, 200] {
+            let grid: LabelGrid = (0..15 * 9)
+                .map(|i| (Cell::new(i % 15 - 4, i / 15 - 2), (i * 7 % i32::from(labels)) as u8 + 1))
+                .collect();
+            let bounds = grid.bounds().unwrap();
+            let png = encode(&grid).unwrap();
+            assert_eq!(decode(&png, bounds.x, bounds.y).unwrap(), grid, "{labels} labels");
+            assert_eq!(read_whole(&with_place(&grid, &png)).unwrap(), grid);
+        }
+    }
+
+    #[test]
+    fn the_first_labels_have_colours_far_apart() {
+        for a in 0..16u8 {
+            for b in 0..a {
+                let d: i32 = colour(a).iter().zip(colour(b)).map(|(&x, y)| (i32::from(x) - i32::from(y)).pow(2)).sum();
+                assert!(d > 800, "labels {a} and {b} look alike");
+            }
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! One line a frame.
+
+use sim_channel::Arrival;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// What is kept of a frame until its fate is known.
+#[derive(Debug, Clone)]
+struct Sent {
+    direction: &'static str,
+    bytes: usize,
+    kind: &'static str,
+}
+
+/// The log of a mission's frames.
+///
+/// One line a frame, in the order in which their fates became known: time of transmission in seconds, `up` or `down`,
+/// bytes, kind, `lost` or `ok`.
+#[derive(Debug)]
+pub struct FramesLog {
+    open: BTreeMap<u64, Sent>,
+    text: String,
+    /// Frames sent, and lost, up and down.
+    pub sent: [u64; 2],
+    /// Frames lost on the way, up and down.
+    pub lost: [u64; 2],
+}
+
+impl Default for FramesLog {
+    fn default() -> Self {
+        let text = "# time_s direction bytes kind fate\n".to_owned();
+        Self { open: BTreeMap::new(), text, sent: [0; 2], lost: [0; 2] }
+    }
+}
+
+impl FramesLog {
+    /// A frame went on air.
+    pub fn handle_sent(&mut self, transmission: u64, up: bool, bytes: usize, kind: &'static str) {
+        let direction = if up { "up" } else { "down" };
+        self.sent[usize::from(!up)] += 1;
+        self.open.insert(transmission, Sent { direction, bytes, kind });
+    }
+
+    /// The fate of a frame is known; later copies are not logged again.
+    pub fn handle_fate(&mut self, arrival: &Arrival) {
+        let Some(sent) = self.open.remove(&arrival.transmission) else { return };
+        let lost = matches!(arrival.outcome, sim_channel::Outcome::Lost { .. });
+        self.lost[usize::from(sent.direction == "down")] += u64::from(lost);
+        let fate = if lost { "lost" } else { "ok" };
+        let time = arrival.sent_at.as_secs_f64();
+        let _ = writeln!(self.text, "{time:.3} {} {} {} {fate}", sent.direction, sent.bytes, sent.kind);
+    }
+
+    /// The log so far.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}

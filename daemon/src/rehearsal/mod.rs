@@ -1,0 +1,22 @@
+//! A whole mission in virtual time: the role code of the sea, a made-up sea floor and water around it.
+
+mod baseline;
+mod fidelity;
+mod frames_log;
+mod meter;
+mod mission;
+mod motion;
+mod outputs;
+mod recording;
+mod report;
+mod script;
+mod world;
+
+pub use fidelity::{FidelityRow, fidelity};
+pub use frames_log::FramesLog;
+pub use meter::Delays;
+pub use mission::{Mission, MissionOptions};
+pub use outputs::write_outputs;
+pub use recording::{RecordedFrame, Recording};
+pub use report::{Report, report};
+pub use world::World;

@@ -1,0 +1,42 @@
+//! The files of a rehearsal.
+
+use super::mission::Mission;
+use super::report::Report;
+use crate::picture;
+use crate::problem::Problem;
+use scenecast_protocol::map::{LabelGrid, Rect};
+use serde_json::Value;
+use std::path::Path;
+
+/// Writes report, maps, images and frame log into a folder, which is made.
+pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path) -> Result<(), Problem> {
+    let failed = |path: &Path, e: std::io::Error| Problem::Failed(format!("{}: {e}", path.display()));
+    std::fs::create_dir_all(dir).map_err(|e| failed(dir, e))?;
+    let bounds = mission.vehicle.map().bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    write_map(&dir.join("vehicle-map.png"), mission.vehicle.map(), bounds)?;
+    write_map(&dir.join("operator-map.png"), &mission.operator_map(), bounds)?;
+    if mission.world.is_annotated() {
+        write_map(&dir.join("truth.png"), &truth(mission, bounds), bounds)?;
+    }
+    let exemplars = dir.join("exemplars");
+    std::fs::create_dir_all(&exemplars).map_err(|e| failed(&exemplars, e))?;
+    for (label, webp) in mission.exemplars() {
+        picture::write_whole(&exemplars.join(format!("label-{label}.webp")), webp)?;
+    }
+    picture::write_whole(&dir.join("frames.log"), mission.log.text().as_bytes())?;
+    let mut figures = report.figures.clone();
+    figures["wall"] = wall;
+    let text = serde_json::to_string_pretty(&figures).map_err(|e| Problem::Failed(e.to_string()))? + "\n";
+    picture::write_whole(&dir.join("report.json"), text.as_bytes())
+}
+
+fn write_map(path: &Path, map: &LabelGrid, bounds: Rect) -> Result<(), Problem> {
+    let png = picture::encode_within(map, bounds).map_err(|e| Problem::Failed(format!("{}: {e}", path.display())))?;
+    picture::write_whole(path, &png)
+}
+
+/// Classes of the annotation on the cells of the map, shifted by one: 0 = not annotated.
+fn truth(mission: &Mission, bounds: Rect) -> LabelGrid {
+    let class = |cell| mission.world.class_of(cell, mission.cell_m());
+    bounds.cells().filter_map(|cell| Some((cell, class(cell)?.saturating_add(1).min(254)))).collect()
+}

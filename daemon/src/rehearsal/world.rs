@@ -1,0 +1,169 @@
+//! The sea floor of a rehearsal.
+
+use crate::auv::Area;
+use crate::problem::Problem;
+use image::RgbImage;
+use scenecast_protocol::map::Cell;
+use std::path::Path;
+
+/// An image of the sea floor, its south-west corner at the origin, with the class of each pixel where that is known.
+#[derive(Debug, Clone)]
+pub struct World {
+    image: RgbImage,
+    metres_per_pixel: f64,
+    classes: Option<Vec<u8>>,
+}
+
+/// Class value that stands for "not annotated".
+const IGNORE: u8 = 255;
+
+impl World {
+    /// A procedural reef of about 26 x 18 m drawn from the scene model's own generative process.
+    pub fn procedural(seed: u64, metres_per_pixel: f64) -> Self {
+        let reef = scene_model::generate::reef(seed, 2600, 1800, 25, 8);
+        Self { image: reef.image, metres_per_pixel, classes: Some(reef.truth) }
+    }
+
+    /// A mosaic from a file, and its annotation from another of the same size.
+    pub fn from_files(mosaic: &Path, annotations: Option<&Path>, metres_per_pixel: f64) -> Result<Self, Problem> {
+        let image = read_image(mosaic)?.to_rgb8();
+        if image.width() < 64 || image.height() < 64 {
+            let (w, h) = image.dimensions();
+            return Err(Problem::file(
+                mosaic,
+                format!("the image has {w} x {h} pixels; a mosaic needs at least 64 x 64"),
+            ));
+        }
+        let classes = annotations.map(|path| read_classes(path, image.dimensions())).transpose()?;
+        Ok(Self { image, metres_per_pixel, classes })
+    }
+
+    /// The limits of the image.
+    pub fn area(&self) -> Area {
+        let (w, h) = self.image.dimensions();
+        let mpp = self.metres_per_pixel;
+        Area { west: 0.0, south: 0.0, east: f64::from(w) * mpp, north: f64::from(h) * mpp }
+    }
+
+    /// Whether the classes are known.
+    pub fn is_annotated(&self) -> bool {
+        self.classes.is_some()
+    }
+
+    /// What a down-looking camera sees at a place (metres) and heading (radians clockwise from north). Beyond its limits
+    /// the image is mirrored.
+    pub fn view(&self, x_m: f64, y_m: f64, heading_rad: f64, width: u32, height: u32) -> RgbImage {
+        let (w, h) = self.image.dimensions();
+        let (sin, cos) = heading_rad.sin_cos();
+        let (cx, cy) = (x_m / self.metres_per_pixel, f64::from(h) - y_m / self.metres_per_pixel);
+        let mut view = RgbImage::new(width, height);
+        for (v, row) in view.rows_mut().enumerate() {
+            let back = v as f64 + 0.5 - f64::from(height) / 2.0;
+            for (u, pixel) in row.enumerate() {
+                let right = u as f64 + 0.5 - f64::from(width) / 2.0;
+                let column = cx + cos * right - sin * back;
+                let line = cy + sin * right + cos * back;
+                *pixel = *self.image.get_pixel(mirror(column, w), mirror(line, h));
+            }
+        }
+        view
+    }
+
+    /// The class of most annotated pixels of a cell; `None` outside the image or where nothing is annotated.
+    pub fn class_of(&self, cell: Cell, cell_m: f64) -> Option<u8> {
+        let classes = self.classes.as_ref()?;
+        let (w, h) = (self.image.width() as i64, self.image.height() as i64);
+        let px = cell_m / self.metres_per_pixel;
+        let column = |c: i32| (f64::from(c) * px).round() as i64;
+        let mut counts = [0u32; 256];
+        for x in column(cell.x).max(0)..column(cell.x.saturating_add(1)).min(w) {
+            for y in column(cell.y).max(0)..column(cell.y.saturating_add(1)).min(h) {
+                counts[usize::from(classes[((h - 1 - y) * w + x) as usize])] += 1;
+            }
+        }
+        counts[usize::from(IGNORE)] = 0;
+        let (class, &n) = counts.iter().enumerate().rev().max_by_key(|(_, n)| **n)?;
+        (n > 0).then_some(class as u8)
+    }
+}
+
+fn mirror(at: f64, size: u32) -> u32 {
+    let period = 2 * i64::from(size);
+    let p = (at.floor() as i64).rem_euclid(period);
+    (if p < i64::from(size) { p } else { period - 1 - p }) as u32
+}
+
+fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
+    let reader = image::ImageReader::open(path).map_err(|e| Problem::file(path, e))?;
+    let reader = reader.with_guessed_format().map_err(|e| Problem::file(path, e))?;
+    reader.decode().map_err(|e| Problem::file(path, format!("not an image that can be read: {e}")))
+}
+
+/// Classes from a grey or indexed image: the pixel value is the class.
+fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, Problem> {
+    let (classes, width, height) = match read_indexed(path)? {
+        Some(indexed) => indexed,
+        None => {
+            let grey = match read_image(path)? {
+                image::DynamicImage::ImageLuma8(grey) => grey,
+                _ => return Err(Problem::file(path, "annotations need a grey or indexed image: pixel value = class")),
+            };
+            let (w, h) = grey.dimensions();
+            (grey.into_raw(), w, h)
+        }
+    };
+    if (width, height) != size {
+        let what = format!("the annotations have {width} x {height} pixels, the mosaic has {} x {}", size.0, size.1);
+        return Err(Problem::file(path, what));
+    }
+    Ok(classes)
+}
+
+/// The raw indices of an indexed PNG, `None` if the file is not one.
+fn read_indexed(path: &Path) -> Result<Option<(Vec<u8>, u32, u32)>, Problem> {
+    let file = std::fs::File::open(path).map_err(|e| Problem::file(path, e))?;
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let Ok(mut reader) = decoder.read_info() else { return Ok(None) };
+    let (width, height) = (reader.info().width, reader.info().height);
+    if reader.info().color_type != png::ColorType::Indexed {
+        return Ok(None);
+    }
+    let depth = reader.info().bit_depth as usize;
+    let mut raw = vec![0; reader.output_buffer_size().unwrap_or(0)];
+    let info =
+        reader.next_frame(&mut raw).map_err(|e| Problem::file(path, format!("not an image that can be read: {e}")))?;
+    let index = |line: &[u8], x: usize| {
+        let bit = x * depth;
+        line[bit / 8] >> (8 - depth - bit % 8) & (0xFFu16 >> (8 - depth)) as u8
+    };
+    let lines = raw.chunks(info.line_size).take(height as usize);
+    let classes = lines.flat_map(|line| (0..width as usize).map(move |x| index(line, x))).collect();
+    Ok(Some((classes, width, height)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    #[test]
+    fn the_camera_sees_what_lies_north_at_the_top_and_turns_with_the_heading() {
+        let image = RgbImage::from_fn(200, 200, |x, y| Rgb([x as u8, y as u8, 0]));
+        let world = World { image, metres_per_pixel: 0.1, classes: None };
+        let north = world.view(10.0, 10.0, 0.0, 64, 64);
+        assert!(north.get_pixel(32, 0)[1] < north.get_pixel(32, 63)[1], "top is north: small row of the image");
+        let east = world.view(10.0, 10.0, 90f64.to_radians(), 64, 64);
+        assert!(east.get_pixel(32, 0)[0] > east.get_pixel(32, 63)[0], "heading east, top is east: large column");
+    }
+
+    #[test]
+    fn a_cell_has_the_class_of_most_of_its_pixels_and_none_outside() {
+        let classes = (0..100 * 50).map(|i| if i % 100 < 50 { 3 } else { IGNORE }).collect();
+        let image = RgbImage::from_pixel(100, 50, Rgb([120, 120, 120]));
+        let world = World { image, metres_per_pixel: 0.1, classes: Some(classes) };
+        assert_eq!(world.class_of(Cell::new(0, 0), 1.0), Some(3));
+        assert_eq!(world.class_of(Cell::new(8, 2), 1.0), None, "not annotated");
+        assert_eq!(world.class_of(Cell::new(-1, 0), 1.0), None, "outside");
+    }
+}
