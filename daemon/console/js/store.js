@@ -20,10 +20,12 @@ export const store = new (class extends EventTarget {
   }
 
   take(snapshot) {
+    const first = this.snapshot === null;
     this.snapshot = snapshot;
     this.receivedMs = performance.now();
     if (!this.vehicle) this.selectedId = snapshot.vehicles[0]?.id ?? null;
     this.tell("state");
+    if (first) performance.mark("scenecast-ready");
     for (const v of snapshot.vehicles) this.wantMap(v.id, v.map);
   }
 
