@@ -12,7 +12,8 @@ let page = EMPTY;
 
 function key() {
   const v = store.vehicle;
-  return `book.${store.snapshot?.mission.name ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
+  const mission = store.snapshot?.mission;
+  return `book.${mission?.id ?? mission?.name ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
 }
 
 function current() {
@@ -77,7 +78,7 @@ export function split(id) {
 export function shownLabels(vehicle) {
   const ids = vehicle.labels.map((l) => l.id);
   return vehicle.labels
-    .filter((l) => shownAs(l.id) === l.id)
+    .filter((l) => shownAs(l.id) === l.id || !ids.includes(shownAs(l.id)))
     .map((l) => {
       const members = vehicle.labels.filter((m) => shownAs(m.id) === l.id);
       return {

@@ -59,6 +59,11 @@ export const store = new (class extends EventTarget {
     const have = this.maps.get(id);
     if (have && have.version === seen.version && have.epoch === seen.epoch) return;
     if (this.#fetching.has(id)) return;
+    if (seen.width === 0 || seen.height === 0) {
+      this.maps.set(id, { ...seen, labels: new Uint8Array(0), age: new Uint16Array(0), planes: [], fetchedS: this.nowS });
+      this.tell("map", { id });
+      return;
+    }
     this.#fetching.add(id);
     try {
       const map = await readMap(id);

@@ -14,7 +14,7 @@ const values = {};
 const list = h("dl.values");
 const classes = h("table.classes");
 const budget = h("input", { type: "number", id: "budget", min: 1, step: 1, required: true, oninput: () => (edited = true) });
-const line = lifeline("the budget");
+const line = lifeline("Budget");
 let edited = false;
 const error = h("p.error", { role: "alert" });
 const age = h("p.age");
