@@ -21,6 +21,7 @@ export const store = new (class extends EventTarget {
 
   take(snapshot) {
     const first = this.snapshot === null;
+    if (!first && snapshot.now_s < this.snapshot.now_s - 5) this.maps.clear();
     this.snapshot = snapshot;
     this.receivedMs = performance.now();
     if (!this.vehicle) this.selectedId = snapshot.vehicles[0]?.id ?? null;

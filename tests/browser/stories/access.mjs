@@ -85,6 +85,9 @@ export default [
       await s.ready();
       assert.deepEqual([...hosts], [new URL(s.url).origin]);
       const html = await (await fetch(s.url)).text();
+      const loaded = await s.page.evaluate(() => performance.getEntriesByType("resource").map((r) => new URL(r.name).pathname).filter((p) => p.endsWith(".js")));
+      const named = [...html.matchAll(/(?:href|src)="(js[^"]+)"/g)].map((m) => `/${m[1]}`);
+      assert.deepEqual([...new Set(loaded)].sort(), named.sort(), "each module is named in the page, so that none waits for another");
       assert.doesNotMatch(html, /\sstyle=|<style|\son\w+=|<script(?![^>]*\ssrc=)/);
     },
   },

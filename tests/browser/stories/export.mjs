@@ -1,4 +1,5 @@
 import assert from "node:assert/strict";
+import { regions } from "../../../daemon/console/js/export/regions.js";
 import { readFile } from "node:fs/promises";
 
 /** Clicks a file's button; resolves to its downloads by extension, as text or bytes. */
@@ -27,7 +28,30 @@ async function frozen(s) {
 
 const area = (ring) => ring.slice(1).reduce((sum, [x, y], i) => sum + ring[i][0] * y - x * ring[i][1], 0) / 2;
 
+/** A grid of noise: small patches, holes in holes, corners that touch. */
+function noise(seed, width, height) {
+  let state = seed;
+  return Uint8Array.from({ length: width * height }, () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return (state >>> 24) % 4;
+  });
+}
+
 export default [
+  {
+    name: "outlines of noise have the area of its cells",
+    bare: true,
+    run() {
+      for (let seed = 1; seed <= 40; seed += 1) {
+        const values = noise(seed, 13 + (seed % 5), 11);
+        for (const [value, polygons] of regions(values, 13 + (seed % 5), 11)) {
+          const cells = values.filter((v) => v === value).length;
+          assert.equal(polygons.flat().reduce((n, ring) => n + area(ring), 0), cells, `seed ${seed}, value ${value}`);
+          assert.ok(polygons.every(([outer, ...holes]) => area(outer) > 0 && holes.every((h) => area(h) < 0)));
+        }
+      }
+    },
+  },
   {
     name: "CSV has a line for each explored cell",
     scenario: "rich",

@@ -100,6 +100,15 @@ export default [
     },
   },
   {
+    name: "a tapped cell is read out on a phone",
+    size: PHONE,
+    async run(s) {
+      const box = await s.page.locator("#chart").boundingBox();
+      await s.page.touchscreen.tap(box.x + box.width / 2, box.y + box.height / 2);
+      await s.shows("#readout", /E .* N /s);
+    },
+  },
+  {
     name: "with the keyboard the cross at the centre is read out",
     async run(s) {
       await s.page.keyboard.press("Tab");

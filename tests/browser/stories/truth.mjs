@@ -77,6 +77,17 @@ export default [
     },
   },
   {
+    name: "a daemon that started afresh replaces the old map even under the same version",
+    scenario: "rich",
+    async run(s) {
+      await s.steer({ scenario: "start" });
+      await s.until("the new map", async () => {
+        const { map } = await s.vehicle();
+        return (await s.inPage(({ store }) => store.map.width)) === map.width;
+      });
+    },
+  },
+  {
     name: "a mission that ended is no alarm",
     scenario: "rich",
     async run(s) {
