@@ -112,6 +112,7 @@ export default [
           };
           look();
         });
+        return new Promise((resolve) => source.addEventListener("open", () => resolve()));
       });
       await s.steer({ loss: 0, advance: 13 });
       const lag = await s.until("the new map", () => s.page.evaluate(() => window.lagMs));
