@@ -97,7 +97,7 @@ export default [
     },
   },
   {
-    name: "a map update is on the canvas within 200 ms",
+    name: "a map is in the page within 200 ms of its event",
     scenario: "rich",
     async run(s) {
       await s.page.evaluate(() => {
