@@ -1,4 +1,4 @@
-// How every script here starts the browser: Debian's chromium, quiet on the network.
+// How every script here starts the browser: Debian's chromium, quiet on the network, WebGL in software.
 
 export const LAUNCH = {
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -6,5 +6,6 @@ export const LAUNCH = {
   args: [
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
   ],
 };

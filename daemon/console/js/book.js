@@ -12,7 +12,8 @@ let page = EMPTY;
 
 function key() {
   const v = store.vehicle;
-  return `book.${store.snapshot?.mission.name ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
+  const mission = store.snapshot?.mission;
+  return `book.${mission?.id ?? mission?.name ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
 }
 
 function current() {
@@ -44,7 +45,6 @@ export const colourOf = (id) => current().colours[id] ?? tableColour(id);
 /** [r, g, b] in which `id` is painted now: its colour, or a shade of red in the red theme. */
 export const tintOf = (id) => (theme() === "red" ? redShade(id) : rgb(colourOf(id)));
 
-export const membersOf = (id, ids) => ids.filter((other) => shownAs(other) === id);
 
 export function rename(id, name) {
   change((b) => {
@@ -75,16 +75,16 @@ export function split(id) {
 
 /** The vehicle's labels as the operator sees them: merged ones summed up, each with its `members`. */
 export function shownLabels(vehicle) {
-  const ids = vehicle.labels.map((l) => l.id);
-  return vehicle.labels
-    .filter((l) => shownAs(l.id) === l.id)
-    .map((l) => {
-      const members = vehicle.labels.filter((m) => shownAs(m.id) === l.id);
-      return {
-        ...l,
-        members: membersOf(l.id, ids),
-        cells: members.reduce((sum, m) => sum + m.cells, 0),
-        area_m2: members.reduce((sum, m) => sum + m.area_m2, 0),
-      };
-    });
+  const ids = new Set(vehicle.labels.map((l) => l.id));
+  const shown = new Map();
+  for (const label of vehicle.labels) {
+    const into = shownAs(label.id);
+    const id = ids.has(into) ? into : label.id;
+    if (!shown.has(id)) shown.set(id, { members: [], cells: 0, area_m2: 0 });
+    const sum = shown.get(id);
+    sum.members.push(label.id);
+    sum.cells += label.cells;
+    sum.area_m2 += label.area_m2;
+  }
+  return vehicle.labels.filter((l) => shown.has(l.id)).map((l) => ({ ...l, ...shown.get(l.id) }));
 }

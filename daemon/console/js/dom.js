@@ -30,6 +30,11 @@ export function show(node, visible) {
   if (node.hidden === visible) node.hidden = !visible;
 }
 
+/** Says something once to screen readers; values that tick by the second are not announced. */
+export function announce(words) {
+  $("announce").textContent = words;
+}
+
 /** Keeps one child per key in `list`, in the order of `items`; `make` builds, `update` refreshes. */
 export function keyed(list, items, key, make, update) {
   const old = new Map([...list.children].map((c) => [c.dataset.key, c]));

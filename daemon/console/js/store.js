@@ -20,10 +20,13 @@ export const store = new (class extends EventTarget {
   }
 
   take(snapshot) {
+    const first = this.snapshot === null;
+    if (!first && snapshot.now_s < this.snapshot.now_s - 5) this.maps.clear();
     this.snapshot = snapshot;
     this.receivedMs = performance.now();
     if (!this.vehicle) this.selectedId = snapshot.vehicles[0]?.id ?? null;
     this.tell("state");
+    if (first) performance.mark("scenecast-ready");
     for (const v of snapshot.vehicles) this.wantMap(v.id, v.map);
   }
 
@@ -57,6 +60,11 @@ export const store = new (class extends EventTarget {
     const have = this.maps.get(id);
     if (have && have.version === seen.version && have.epoch === seen.epoch) return;
     if (this.#fetching.has(id)) return;
+    if (seen.width === 0 || seen.height === 0) {
+      this.maps.set(id, { ...seen, labels: new Uint8Array(0), age: new Uint16Array(0), planes: [], fetchedS: this.nowS });
+      this.tell("map", { id });
+      return;
+    }
     this.#fetching.add(id);
     try {
       const map = await readMap(id);

@@ -4,7 +4,7 @@
 //
 // POST /mock steers it in tests:
 //   {"scenario": "rich", "advance": 60, "speed": 20, "silent": true, "refuse": "utility",
-//    "loss": 0.3, "planes": true, "ended": true, "stream": false, "down": true}
+//    "loss": 0.3, "planes": true, "ended": true, "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
 import { deflateSync } from "node:zlib";
@@ -26,7 +26,7 @@ const POLICY =
 
 /** Starts a mock; resolves to {url, close()}. */
 export async function startMock({ port = 0, scenario = "rich" } = {}) {
-  const mock = { mission: new Mission(scenario), streams: new Set(), stream: true, down: false };
+  const mock = { mission: new Mission(scenario), streams: new Set(), stream: true, down: false, mute: false };
   const server = http.createServer((req, res) => {
     route(mock, req, res).catch((error) => reply(res, error.status ?? 500, { error: error.message }));
   });
@@ -53,6 +53,7 @@ export async function startMock({ port = 0, scenario = "rich" } = {}) {
 }
 
 function emit(mock, event, data) {
+  if (mock.mute) return;
   for (const s of mock.streams) s.write(`event: ${event}\ndata: ${JSON.stringify(data)}\n\n`);
 }
 
@@ -130,6 +131,7 @@ function steer(mock, order, res) {
   if ("silent" in order) mission.vehicles[0].silent = order.silent;
   if (order.refuse) mission.vehicles[0].directive.refuseNext.add(order.refuse);
   if ("down" in order) mock.down = order.down;
+  if ("mute" in order) mock.mute = order.mute;
   if ("stream" in order) mock.stream = order.stream;
   if (order.stream === false || order.down) for (const s of mock.streams) s.destroy();
   const changed = order.advance ? mission.advance(order.advance) : [];

@@ -19,6 +19,22 @@ export function drawCraft(c, view, ink, vehicle, chosen) {
   c.globalAlpha = 1;
 }
 
+/** The surface end of the link, where the server says where it is. */
+export function drawSurface(c, view, ink, surface) {
+  const [px, py] = view.toScreen(surface.x_m, surface.y_m);
+  c.lineWidth = 3;
+  c.strokeStyle = ink.sea;
+  c.strokeRect(px - 7, py - 7, 14, 14);
+  c.fillStyle = ink.craft;
+  c.fillRect(px - 6, py - 6, 12, 12);
+  c.lineWidth = 1.25;
+  c.strokeStyle = ink.text;
+  c.strokeRect(px - 6, py - 6, 12, 12);
+  c.font = FONT;
+  c.textAlign = "left";
+  haloText(c, "surface", px + 12, py + 4, ink);
+}
+
 function drawTrack(c, view, ink, track) {
   if (track.length < 2) return;
   c.lineJoin = "round";

@@ -17,6 +17,7 @@ export function listen(canvas, view, { changed, point, click, keys }) {
     canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, place(event));
     moved = fingers.size > 1 ? Infinity : 0;
+    point(...place(event));
   });
 
   canvas.addEventListener("pointermove", (event) => {
@@ -39,7 +40,8 @@ export function listen(canvas, view, { changed, point, click, keys }) {
   };
   canvas.addEventListener("pointerup", lift);
   canvas.addEventListener("pointercancel", lift);
-  canvas.addEventListener("pointerleave", () => point(null, null));
+  // A tapped cell stays read out; a mouse that left does not.
+  canvas.addEventListener("pointerleave", (event) => event.pointerType !== "touch" && point(null, null));
 
   canvas.addEventListener(
     "wheel",

@@ -37,7 +37,7 @@ export function startTools() {
     button("follow", "Follow", "Keep the vehicle in the middle (F)", after(follow)),
     layers,
     button("grid", "Grid", "Grid in metres", after(() => toggle("grid"))),
-    button("rings", "Rings", "Range rings about the vehicle", after(() => toggle("rings"))),
+    button("rings", "Rings", "Range rings about the surface, or about the vehicle where the surface is not known", after(() => toggle("rings"))),
     button("cloud", "3-D", "Point cloud of the cells", after(toggleCloud)),
     button("measure", "Measure", "Measure distance and bearing (M)", after(toggleMeasure)),
     button("export", "Export", "PNG, CSV, GeoJSON, PLY", openExport),

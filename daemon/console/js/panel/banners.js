@@ -1,16 +1,22 @@
 // What the operator must not miss: no connection, a silent vehicle, a mission that ended.
 
-import { $, h, keyed, show, text } from "../dom.js";
+import { $, announce, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
 import { retryNow } from "../feed.js";
+
+let announced = "";
 
 export function startBanners() {
   store.on("state feed tick", update);
 }
 
 function update() {
-  keyed($("banners"), current(), (b) => b.key, make, refresh);
+  const banners = current();
+  const heads = banners.map((b) => b.head).join(". ");
+  if (heads !== announced) announce(heads || "All in order again.");
+  announced = heads;
+  keyed($("banners"), banners, (b) => b.key, make, refresh);
   show($("banners"), $("banners").childElementCount > 0);
 }
 

@@ -29,7 +29,7 @@ function refresh(node, vehicle) {
   const silent = isSilent(vehicle);
   const heard = vehicle.heard_s === null ? "not heard yet" : `heard ${span(ageOf(vehicle.heard_s))} ago`;
   node.setAttribute("aria-pressed", String(vehicle.id === store.selectedId));
-  node.dataset.state = silent ? "silent" : vehicle.heard_s === null ? "none" : "heard";
+  node.dataset.state = !store.connected ? "none" : silent ? "silent" : vehicle.heard_s === null ? "none" : "heard";
   text(node.children[1], vehicle.name);
   text(node.children[2], silent && vehicle.heard_s !== null ? `silent ${span(ageOf(vehicle.heard_s))}` : heard);
 }

@@ -14,6 +14,8 @@ export function draft() {
   return drafts.get(id);
 }
 
+const same = (a, b) => Math.abs(a - b) < 1e-6;
+
 export const serverExploration = (vehicle) => vehicle.utility?.exploration ?? null;
 
 export function exploration(vehicle) {
@@ -25,7 +27,7 @@ export const weight = (label) => draft().weights.get(label.id)?.value ?? label.w
 export function setWeight(label, value) {
   const { weights } = draft();
   const base = weights.get(label.id)?.base ?? label.weight;
-  if (value === base) weights.delete(label.id);
+  if (same(value, base)) weights.delete(label.id);
   else weights.set(label.id, { value, base, sent: false });
   store.tell("draft");
 }
@@ -52,7 +54,7 @@ export function unsent() {
 /** The server's weight when somebody else changed it under our draft, else null. */
 export function changedElsewhere(label) {
   const d = draft().weights.get(label.id);
-  return d && !d.sent && label.weight !== d.base ? label.weight : null;
+  return d && !d.sent && !same(label.weight, d.base) ? label.weight : null;
 }
 
 /** Drops sent values once the server's own state carries them. */

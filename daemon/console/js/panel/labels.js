@@ -13,7 +13,7 @@ const ORDERS = {
   area: (a, b) => b.area_m2 - a.area_m2 || a.id - b.id,
   weight: (a, b) => weight(b) - weight(a) || a.id - b.id,
 };
-const line = lifeline("the weights");
+const line = lifeline("Weights");
 const empty = h("p.empty", {}, "No labels yet. They appear with the first cells of the map.");
 const slider = h("input", { type: "range", min: 0, max: 1, step: 0.05, id: "exploration", oninput: () => setExploration(store.vehicle, Number(slider.value)) });
 const value = h("output.value", { for: "exploration" });

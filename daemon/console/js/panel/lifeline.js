@@ -1,6 +1,6 @@
 // The life line of something sent to the vehicle: queued, on air, heard, applied or refused.
 
-import { h, show, text } from "../dom.js";
+import { announce, h, show, text } from "../dom.js";
 import { span } from "../format.js";
 import { ageOf } from "../store.js";
 
@@ -12,12 +12,16 @@ export const word = (state) => WORDS[state] ?? state;
 /** A stepper; call its `update(slot | null, waiting)` with a slot of the server's directive. */
 export function lifeline(name) {
   const steps = STEPS.map((s) => h("li", { data: { step: s } }, WORDS[s]));
-  const list = h("ol.steps", { "aria-label": `Life line of ${name}` }, ...steps);
-  const note = h("p.note", { role: "status" });
+  const list = h("ol.steps", { "aria-label": `Life line: ${name}` }, ...steps);
+  const note = h("p.note");
+  let announced = null;
   const node = h("div.lifeline", {}, list, note);
 
   function update(slot, waiting = null) {
     show(list, slot !== null);
+    const said = slot && `${name}: ${word(slot.state)}`;
+    if (announced !== null && said !== announced) announce(said);
+    announced = said;
     node.dataset.state = slot?.state ?? "none";
     if (slot) mark(steps, slot);
     text(note, waiting ?? describe(slot));

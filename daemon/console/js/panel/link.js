@@ -13,8 +13,9 @@ const history = h("canvas", { role: "img" });
 const values = {};
 const list = h("dl.values");
 const classes = h("table.classes");
-const budget = h("input", { type: "number", id: "budget", min: 1, step: 100, required: true });
-const line = lifeline("the budget");
+const budget = h("input", { type: "number", id: "budget", min: 1, step: 1, required: true, oninput: () => (edited = true) });
+const line = lifeline("Budget");
+let edited = false;
 const error = h("p.error", { role: "alert" });
 const age = h("p.age");
 
@@ -33,7 +34,7 @@ export function startLink() {
   }
   classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
     h("tbody", {}, ...CLASSES.map((c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td")))));
-  const form = h("form.budget", { onsubmit: submit },
+  const form = h("form.budget", { onsubmit: submit, onkeydown: (event) => event.key === "Escape" && forget() },
     h("label", { for: "budget" }, "Budget, bit/s"), budget, h("button", { type: "submit" }, "Set"));
   $("link").append(h("header", {}, h("h2", { id: "link-title" }, "Link"), age),
     directions.up.node, directions.down.node, history, list, classes, form, error, line.node);
@@ -47,10 +48,15 @@ async function submit(event) {
   text(error, "");
   try {
     await sendBudget(Math.round(Number(budget.value)));
-    budget.dataset.edited = "";
+    edited = false;
   } catch (problem) {
     text(error, problem.message);
   }
+}
+
+function forget() {
+  edited = false;
+  update();
 }
 
 function refreshAge() {
@@ -73,7 +79,7 @@ function update() {
   values.trip(link.round_trip_s === null ? none : `${link.round_trip_s.toFixed(2)} s`);
   values.backlog(backlog(link));
   refreshClasses(link);
-  if (document.activeElement !== budget) budget.value = link.budget_bps;
+  if (!edited) budget.value = link.budget_bps;
   history.setAttribute("aria-label", `Rate over time. Up now ${rate(link.up.bps_1min)}, down ${rate(link.down.bps_1min)}, budget ${rate(link.budget_bps)}.`);
   drawHistory(history, link, store.snapshot.now_s);
   refreshAge();

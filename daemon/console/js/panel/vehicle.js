@@ -17,7 +17,7 @@ const list = h("dl.values");
 const slots = h("ul.slots");
 const nothing = h("p.note", {}, "Nothing sent yet.");
 const hold = h("button", { type: "button", id: "hold", onclick: confirmHold });
-const line = lifeline("the constraints");
+const line = lifeline("Constraints");
 const error = h("p.error", { role: "alert" });
 
 export function startVehicle() {

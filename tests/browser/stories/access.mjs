@@ -1,0 +1,94 @@
+import assert from "node:assert/strict";
+import { createRequire } from "node:module";
+import { PHONE, WIDE } from "../stage.mjs";
+
+const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
+
+/** No serious or critical violation of WCAG 2.2 A and AA. The page's policy forbids inline scripts, so axe comes through the devtools. */
+async function clean(s) {
+  await s.page.evaluate(await (await import("node:fs/promises")).readFile(AXE, "utf8"));
+  const { violations, passes } = await s.page.evaluate(() =>
+    window.axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"] }));
+  assert.ok(passes.length > 20, "axe looked at the page");
+  const bad = violations.filter((v) => ["serious", "critical"].includes(v.impact));
+  assert.deepEqual(bad.map((v) => `${v.id}: ${v.nodes.map((n) => `${n.target} ${n.failureSummary}`).join("; ")}`), []);
+}
+
+const states = [["rich", null], ["empty", "empty"], ["silent", "silent"], ["refused", "refused"]];
+const audits = ["light", "dark", "red"].flatMap((theme) =>
+  states.map(([name, scenario]) => ({
+    name: `axe finds nothing serious: ${name}, ${theme}`,
+    theme, scenario, size: WIDE,
+    async run(s) {
+      await s.page.locator("#vehicle .values").waitFor();
+      await clean(s);
+      if (name !== "rich") return;
+      await s.page.locator(".label .name").first().click();
+      await clean(s);
+      await s.page.keyboard.press("Escape");
+      await s.page.setViewportSize(PHONE);
+      for (const tab of ["Labels", "Vehicle", "Link"]) {
+        await s.page.getByRole("tab", { name: tab }).click();
+        await clean(s);
+      }
+    },
+  })));
+
+export default [
+  ...audits,
+  {
+    name: "weights can be set and sent with the keyboard alone",
+    async run(s) {
+      await s.page.locator(".label").first().waitFor();
+      const onto = async (match) => {
+        for (let i = 0; i < 80; i += 1) {
+          await s.page.keyboard.press("Tab");
+          if (await s.page.evaluate((m) => document.activeElement.matches(m), match)) return;
+        }
+        throw new Error(`Tab never reached ${match}`);
+      };
+      await onto(".label input[type=range]");
+      await s.page.keyboard.press("ArrowRight");
+      await onto("#send-weights");
+      await s.page.keyboard.press("Enter");
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/utility")));
+    },
+  },
+  {
+    name: "on a phone nothing is wider than the screen and the tabs change panels",
+    size: PHONE,
+    async run(s) {
+      const over = await s.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      assert.ok(over <= 0, `${over} px too wide`);
+      await s.page.getByRole("tab", { name: "Link" }).click();
+      assert.ok(await s.page.locator("#link").isVisible());
+      assert.equal(await s.page.locator("#labels").isVisible(), false);
+    },
+  },
+  {
+    name: "the theme is remembered",
+    async run(s) {
+      const theme = () => s.page.evaluate(() => document.documentElement.dataset.theme);
+      await s.page.locator("#theme").click();
+      assert.equal(await theme(), "dark");
+      await s.page.reload();
+      assert.equal(await theme(), "dark");
+    },
+  },
+  {
+    name: "the page asks nothing of any other host and holds no inline script or style",
+    bare: true,
+    async run(s) {
+      const hosts = new Set();
+      s.page.on("request", (r) => hosts.add(new URL(r.url()).origin));
+      await s.page.reload();
+      await s.ready();
+      assert.deepEqual([...hosts], [new URL(s.url).origin]);
+      const html = await (await fetch(s.url)).text();
+      const loaded = await s.page.evaluate(() => performance.getEntriesByType("resource").map((r) => new URL(r.name).pathname).filter((p) => p.endsWith(".js")));
+      const named = [...html.matchAll(/(?:href|src)="(js[^"]+)"/g)].map((m) => `/${m[1]}`);
+      assert.deepEqual([...new Set(loaded)].sort(), named.sort(), "each module is named in the page, so that none waits for another");
+      assert.doesNotMatch(html, /\sstyle=|<style|\son\w+=|<script(?![^>]*\ssrc=)/);
+    },
+  },
+];

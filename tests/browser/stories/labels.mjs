@@ -1,0 +1,168 @@
+import assert from "node:assert/strict";
+
+const slider = (s, name) => s.page.getByRole("slider", { name: `Weight of ${name}` });
+const send = (s) => s.page.locator("#send-weights");
+const step = (s) => s.page.locator("#send [aria-current=step]").innerText({ timeout: 300 }).catch(() => null);
+const labelButton = (s, name) => s.page.locator(".label .name", { hasText: name }).first();
+
+async function firstLabels(s) {
+  await s.until("labels", async () => (await s.page.locator(".label").count()) > 1, { ms: 60000, advance: 10 });
+  const { labels } = await s.vehicle();
+  return labels;
+}
+
+async function edit(s, name, fill) {
+  await labelButton(s, name).click();
+  await fill(s.page.locator("#dialog"));
+  await s.button("Save").click();
+}
+
+export default [
+  {
+    name: "the list shows every label with its area",
+    async run(s) {
+      const labels = await firstLabels(s);
+      await s.until("one row a label", async () => (await s.page.locator(".label").count()) >= labels.length);
+      await s.until("the areas", async () => {
+        const { labels: now } = await s.vehicle();
+        const shown = await s.page.locator(".label .area").allInnerTexts();
+        return parseFloat(shown[0].replaceAll("\u202f", "")).toFixed(1) === now[0].area_m2.toFixed(1);
+      });
+    },
+  },
+  {
+    name: "the list can be ordered by area",
+    async run(s) {
+      await firstLabels(s);
+      await s.page.selectOption("#label-order", "area");
+      const areas = (await s.page.locator(".label .area").allInnerTexts()).map((t) => parseFloat(t.replaceAll("\u202f", "")));
+      assert.deepEqual(areas, [...areas].sort((a, b) => b - a));
+    },
+  },
+  {
+    name: "weights are sent as a whole and the life line follows the server, never ahead of it",
+    async run(s) {
+      const labels = await firstLabels(s);
+      const before = (await s.vehicle()).directive.slots.find((x) => x.slot === "utility")?.version ?? 0;
+      await slider(s, `Label ${labels[0].id}`).fill("0.8");
+      assert.equal(await send(s).innerText(), "Send 1 change");
+      await send(s).click();
+      const seen = [];
+      await s.until("the life line to end", async () => {
+        const word = await step(s);
+        if (word && word !== seen.at(-1)) seen.push(word);
+        const slot = (await s.vehicle()).directive.slots.find((x) => x.slot === "utility");
+        return slot?.version > before && word === "Applied";
+      }, { ms: 240000, advance: 1 });
+      const order = ["Queued", "On air", "Heard", "Applied"];
+      const lives = seen.slice(seen[0] === "Applied" ? 1 : 0).map((w) => order.indexOf(w));
+      assert.ok(lives.length > 1 && lives.at(-1) === 3, seen.join());
+      const sent = s.posts.at(-1).body.weights;
+      assert.equal(sent[labels[0].id], 0.8);
+      assert.ok(labels.every((l) => String(l.id) in sent), "each label has its weight in the message");
+    },
+  },
+  {
+    name: "a weight stays a draft until it is sent, and can be taken back",
+    async run(s) {
+      const labels = await firstLabels(s);
+      const before = s.posts.length;
+      const row = slider(s, `Label ${labels[1].id}`);
+      const was = await row.inputValue();
+      await row.fill(Number(was) === 0.5 ? "0.6" : "0.5");
+      await s.button("Discard").click();
+      assert.equal(await row.inputValue(), was);
+      assert.equal(await send(s).isDisabled(), true);
+      assert.equal(s.posts.length, before);
+    },
+  },
+  {
+    name: "a refusal is shown with its reason and can be sent again",
+    scenario: "refused",
+    async run(s) {
+      await s.shows("#send .lifeline", /Refused.*label 3 was retired under epoch 1/s);
+      assert.equal(await send(s).innerText(), "Send again");
+      await send(s).click();
+      await s.shows("#send .steps [aria-current]", /Applied/, { advance: 2 });
+    },
+  },
+  {
+    name: "bad input refused by the server is shown in its words",
+    scenario: "rich",
+    async run(s) {
+      await s.page.route("**/utility", (route) => route.fulfill({ status: 422, contentType: "application/json", body: '{"error":"weight of label 1 must be -1 to 1"}' }));
+      await slider(s, "Label 1").fill("0.4");
+      await send(s).click();
+      await s.shows("#send .error", /weight of label 1 must be -1 to 1/);
+      assert.equal(await send(s).innerText(), "Send 1 change");
+    },
+    tolerates: /422/,
+  },
+  {
+    name: "an edit by another operator shows, on a draft as a warning",
+    scenario: "rich",
+    async run(s) {
+      await slider(s, "Label 1").fill("0.4");
+      await s.post("/vehicles/1/utility", { weights: { 1: -0.5, 2: 0.7 }, exploration: 0.2 });
+      await s.shows(".label[data-key='1'] .note", /Set to −0.50 elsewhere/);
+      assert.equal(await slider(s, "Label 1").inputValue(), "0.4");
+      await s.until("the undrafted one to follow", async () => (await slider(s, "Label 2").inputValue()) === "0.7");
+    },
+  },
+  {
+    name: "a picture of a label is asked for, comes with progress, and is shown",
+    async run(s) {
+      await firstLabels(s);
+      const ask = s.page.getByRole("button", { name: /^Show me: a picture of/ }).first();
+      const name = (await ask.getAttribute("aria-label")).replace(/^.*picture of /, "");
+      await ask.click();
+      const picture = s.page.getByRole("button", { name: `Picture of ${name}, enlarge` });
+      await s.until("the picture", () => picture.isVisible(), { ms: 300000, advance: 2 });
+      await s.until("it to be drawn", () => picture.locator("img").evaluate((img) => img.naturalWidth > 0));
+      await picture.click();
+      await s.shows("#dialog", /received .* ago/);
+    },
+  },
+  {
+    name: "a picture that the vehicle refuses says so",
+    scenario: "rich",
+    async run(s) {
+      await s.steer({ refuse: "requests" });
+      await s.page.getByRole("button", { name: "Show me: a picture of Label 2" }).click();
+      await s.shows(".label[data-key='2'] .exemplar", /Ask again\s+Refused/, { advance: 2 });
+    },
+  },
+  {
+    name: "names, colours and merges stay in the browser and survive a reload",
+    async run(s) {
+      const [a, b] = await firstLabels(s);
+      const before = s.posts.length;
+      await edit(s, `Label ${a.id}`, async (d) => {
+        await d.getByLabel("Name").fill("Soft coral");
+        await d.getByLabel("Colour").fill("#123456");
+      });
+      await edit(s, `Label ${b.id}`, (d) => d.getByLabel("Show as part of").selectOption({ label: "Soft coral" }));
+      await s.page.reload();
+      await s.ready();
+      await s.shows(`.label[data-key='${a.id}'] .name`, /Soft coral \+1/);
+      assert.equal(await s.page.locator(`.label[data-key='${b.id}']`).count(), 0);
+      assert.equal(await s.page.locator(`.label[data-key='${a.id}'] .chip`).evaluate((c) => getComputedStyle(c).backgroundColor), "rgb(18, 52, 86)");
+      await slider(s, "Soft coral").fill("0.35");
+      assert.equal(s.posts.length, before);
+      await send(s).click();
+      await s.until("the message", () => s.posts.length > before);
+      assert.equal(s.posts.at(-1).body.weights[b.id], 0.35, "the merged label takes the weight");
+    },
+  },
+  {
+    name: "one label can be shown alone",
+    async run(s) {
+      const [first] = await firstLabels(s);
+      const chip = s.page.getByRole("button", { name: `Show only Label ${first.id} on the map` });
+      await chip.click();
+      assert.equal(await s.inPage(({ layer }) => layer.highlight), first.id);
+      await chip.click();
+      assert.equal(await s.inPage(({ layer }) => layer.highlight), null);
+    },
+  },
+];

@@ -1,0 +1,185 @@
+import assert from "node:assert/strict";
+import { PHONE } from "../stage.mjs";
+
+const view = (s) => s.inPage(({ view: v }) => ({ east: v.east, north: v.north, scale: v.scale, mode: v.mode, width: v.width, height: v.height }));
+
+/** A cell of the map with its place on the screen, near the middle of what is explored. */
+async function someCell(s) {
+  return s.inPage(({ store, view: v, shownAs, tintOf }) => {
+    const m = store.map;
+    const box = document.getElementById("chart").getBoundingClientRect();
+    const craft = store.vehicle.status ?? { x_m: 0, y_m: 0 };
+    for (let i = 0; i < m.labels.length; i += 1) {
+      const x = (m.x0 + (i % m.width) + 0.5) * m.cell_m;
+      const y = (m.y0 + Math.floor(i / m.width) + 0.5) * m.cell_m;
+      const near = store.vehicle.track.some(([, tx, ty]) => Math.hypot(tx - x, ty - y) < 0.2);
+      const [px, py] = v.toScreen(x, y);
+      const inside = px > 120 && py > 90 && px < v.width - 120 && py < v.height - 90;
+      if (m.labels[i] === 0 || !inside || near || Math.hypot(craft.x_m - x, craft.y_m - y) < 3) continue;
+      return { label: m.labels[i], tint: tintOf(shownAs(m.labels[i])), x, y, px, py, left: box.left, top: box.top };
+    }
+    return null;
+  });
+}
+
+const pixel = (s, px, py) =>
+  s.page.evaluate(([x, y]) => [...document.getElementById("chart").getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3), [Math.round(px), Math.round(py)]);
+
+async function pinch(s, from, to) {
+  const cdp = await s.context.newCDPSession(s.page);
+  const box = await s.page.locator("#chart").boundingBox();
+  const fingers = (gap) => [-1, 1].map((side, id) => ({ x: box.x + box.width / 2 + (side * gap) / 2, y: box.y + box.height / 2, id }));
+  await cdp.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: fingers(from) });
+  for (let i = 1; i <= 8; i += 1) {
+    await cdp.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: fingers(from + ((to - from) * i) / 8) });
+  }
+  await cdp.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+}
+
+export default [
+  {
+    name: "the map shows each label in its colour",
+    async run(s) {
+      if (await s.page.locator("[aria-pressed=true]", { hasText: "Grid" }).count()) await s.button("Grid").click();
+      await s.until("the label's colour on the canvas", async () => {
+        const cell = await someCell(s);
+        const seen = await pixel(s, cell.px, cell.py);
+        return seen.join() === cell.tint.join();
+      });
+    },
+  },
+  {
+    name: "the map pans and zooms by wheel, drag, keys and buttons",
+    async run(s) {
+      const box = await s.page.locator("#chart").boundingBox();
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      const first = await view(s);
+      await s.page.mouse.move(x, y);
+      await s.page.mouse.wheel(0, -300);
+      await s.until("zoom by wheel", async () => (await view(s)).scale > first.scale * 1.2);
+      const zoomed = await view(s);
+      await s.page.mouse.down();
+      await s.page.mouse.move(x + 90, y + 40, { steps: 4 });
+      await s.page.mouse.up();
+      const dragged = await view(s);
+      assert.ok(Math.abs(dragged.east - (zoomed.east - 90 / zoomed.scale)) < 0.01, "the map follows the pointer");
+      await s.page.locator("#chart").focus();
+      await s.page.keyboard.press("ArrowRight");
+      await s.page.keyboard.press("+");
+      const keyed = await view(s);
+      assert.ok(keyed.east > dragged.east && keyed.scale > dragged.scale);
+      await s.button("Fit").click();
+      assert.equal((await view(s)).mode, "fit");
+    },
+  },
+  {
+    name: "the map zooms by pinching",
+    size: PHONE,
+    async run(s) {
+      const first = await view(s);
+      await pinch(s, 60, 180);
+      const after = await view(s);
+      assert.ok(after.scale > first.scale * 2, `${first.scale} -> ${after.scale}`);
+    },
+  },
+  {
+    name: "following keeps the vehicle in the middle",
+    async run(s) {
+      await s.button("Follow").click();
+      const { status } = await s.inPage(({ store }) => ({ status: store.vehicle.status }));
+      const v = await view(s);
+      assert.ok(Math.hypot(v.east - status.x_m, v.north - status.y_m) < 1);
+    },
+  },
+  {
+    name: "hovering tells label and age",
+    async run(s) {
+      const cell = await someCell(s);
+      await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
+      await s.shows("#readout", new RegExp(`Label ${cell.label}\\b.*heard .* ago`, "s"));
+    },
+  },
+  {
+    name: "a tapped cell is read out on a phone",
+    size: PHONE,
+    async run(s) {
+      const box = await s.page.locator("#chart").boundingBox();
+      await s.page.touchscreen.tap(box.x + box.width / 2, box.y + box.height / 2);
+      await s.shows("#readout", /E .* N /s);
+    },
+  },
+  {
+    name: "with the keyboard the cross at the centre is read out",
+    async run(s) {
+      await s.page.keyboard.press("Tab");
+      while (!(await s.page.evaluate(() => document.activeElement.id === "chart"))) await s.page.keyboard.press("Tab");
+      await s.shows("#readout", /E .* N /s);
+    },
+  },
+  {
+    name: "measuring gives the distance between two clicks",
+    async run(s) {
+      await s.button("Measure").click();
+      const box = await s.page.locator("#chart").boundingBox();
+      await s.page.mouse.click(box.x + 200, box.y + 200);
+      await s.page.mouse.click(box.x + 500, box.y + 600);
+      const [points, scale] = await s.page.evaluate(async () => {
+        const [{ measure }, { view: v }] = await Promise.all([import("/js/map/measure.js"), import("/js/map/chart.js")]);
+        return [measure.points, v.scale];
+      });
+      const metres = Math.hypot(points[1][0] - points[0][0], points[1][1] - points[0][1]);
+      assert.ok(Math.abs(metres - 500 / scale) < 0.01, `${metres} against ${500 / scale}`);
+      await s.page.locator("#chart").focus();
+      await s.page.keyboard.press("Escape");
+      assert.equal(await s.button("Measure").getAttribute("aria-pressed"), "false");
+    },
+  },
+  {
+    name: "the age layer has a legend",
+    async run(s) {
+      await s.page.selectOption("#layer", "age");
+      await s.shows("#legend", /age of cells/);
+      await s.page.selectOption("#layer", "label");
+      await s.until("no legend", async () => !(await s.page.locator("#legend").isVisible()));
+    },
+  },
+  {
+    name: "planes that the server offers become layers, others stay hidden",
+    scenario: "start",
+    async run(s) {
+      const names = () => s.page.locator("#layer option").allInnerTexts();
+      assert.deepEqual(await names(), ["label", "age"]);
+      await s.steer({ planes: true, advance: 30 });
+      await s.until("more layers", async () => (await names()).join() === "label,age,confidence,curiosity,depth");
+      await s.page.selectOption("#layer", "depth");
+      await s.shows("#legend", /depth.*10 m.*25 m/s);
+    },
+  },
+  {
+    name: "grid and rings are remembered",
+    async run(s) {
+      const rings = () => s.button("Rings").getAttribute("aria-pressed");
+      assert.equal(await rings(), "false");
+      await s.button("Rings").click();
+      await s.page.reload();
+      await s.ready();
+      assert.equal(await rings(), "true");
+    },
+  },
+  {
+    name: "an empty map says so",
+    scenario: "empty",
+    run: (s) => s.shows("#map-empty", /Nothing heard from auv-1 yet/),
+  },
+  {
+    name: "a second vehicle is a choice, its map only a footprint until chosen",
+    scenario: "two",
+    async run(s) {
+      await s.page.getByRole("button", { name: /auv-2/ }).click();
+      await s.shows("#vehicle h2", /auv-2/);
+      assert.equal(await s.inPage(({ store }) => store.selectedId), 2);
+      const { labels } = await s.vehicle(2);
+      await s.until("its labels", async () => (await s.page.locator(".label").count()) === labels.length);
+    },
+  },
+];
