@@ -38,8 +38,9 @@ impl Instant {
 }
 
 impl From<Duration> for Instant {
+    /// Rounds up, so that what is due at the given time is due at the instant.
     fn from(since_origin: Duration) -> Self {
-        Self(since_origin.as_micros() as u64)
+        Self(since_origin.as_nanos().div_ceil(1000) as u64)
     }
 }
 

@@ -79,7 +79,7 @@ fn parse(dir: &Path, line: &str) -> Option<RecordedFrame> {
     let mut fields = line.split(',').map(str::trim);
     let t_s = fields.next()?;
     let file = fields.next()?;
-    let mut number = |text: Option<&str>| text?.parse::<f64>().ok().filter(|v| v.is_finite());
+    let number = |text: Option<&str>| text?.parse::<f64>().ok().filter(|v| v.is_finite());
     let (x_m, y_m) = (number(fields.next())?, number(fields.next())?);
     let (depth_m, heading_deg) = (number(fields.next())?, number(fields.next())?);
     let t_s = number(Some(t_s)).filter(|&t| t >= 0.0)?;

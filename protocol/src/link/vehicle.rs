@@ -342,8 +342,15 @@ impl VehicleLink {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
         let idle = self.is_settled();
-        let wait = if idle { affordable.max(self.status_due.since(now)) } else { affordable };
+        let wait = if idle { affordable.max(self.idle_pause()).min(self.config.status_period) } else { affordable };
         quarter_seconds(wait, 254)
+    }
+
+    /// Pause between turns while nothing is to be said: turns that only ask take at most a tenth of the budget.
+    fn idle_pause(&self) -> Duration {
+        const ASK_AND_ANSWER_BITS: f64 = 240.0;
+        let tenth = f64::from(self.budget.bits_per_s()) / 10.0;
+        Duration::from_secs_f64((ASK_AND_ANSWER_BITS / tenth).max(1.0))
     }
 
     fn fill(&mut self, builder: &mut FrameBuilder, carried: &mut Carried, now: Instant) {
