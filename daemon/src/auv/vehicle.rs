@@ -1,7 +1,7 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
 use super::exemplar::{Exemplar, encode_webp};
-use super::mapper::{MapUpdate, Mapper};
+use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::steering::Steering;
 use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
@@ -197,13 +197,13 @@ impl Vehicle {
         self.outputs.push_back(VehicleOutput::Persist);
     }
 
-    /// Answers requests for representative images that the scene model can meet by now.
-    pub fn answer_requests(&mut self, mapper: &Mapper) {
+    /// Answers requests for representative images; `exemplar` gives the best one of a label, if there is one by now.
+    pub fn answer_requests<'a>(&mut self, exemplar: &dyn Fn(u8) -> Option<&'a image::RgbImage>) {
         for &(label, serial) in &self.requests.wanted {
             if self.answered.contains(&(label, serial)) {
                 continue;
             }
-            let Some(patch) = mapper.exemplar(label) else { continue };
+            let Some(patch) = exemplar(label) else { continue };
             let webp = encode_webp(patch, EXEMPLAR_BYTES);
             let object = Exemplar { epoch: self.durable.epoch, label, serial, webp };
             if self.link.push_object(object.encode()).is_some() {

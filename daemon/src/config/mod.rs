@@ -225,6 +225,8 @@ section! {
     Runtime {
         /// Folder of what must survive a restart, and of the operator's map.
         state_dir: String = "state".into(),
+        /// Seed of the scene model.
+        seed: u64 = 1,
         /// Seconds of mission time a second.
         time_scale: f64 = 1.0,
     }

@@ -75,6 +75,7 @@ pub struct Mission {
     transmitting: [Option<Instant>; 2],
     map_version: u64,
     picture_version: u64,
+    heard_bits: u64,
     dice: Stream,
     events: Vec<SurfaceOutput>,
 }
@@ -123,6 +124,7 @@ impl Mission {
             transmitting: [None; 2],
             map_version: 0,
             picture_version: 0,
+            heard_bits: 0,
             next_recorded: 0,
             events: Vec::new(),
             config,
@@ -146,6 +148,16 @@ impl Mission {
     /// The time.
     pub fn now(&self) -> Instant {
         self.now
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Bits on air of the frames that the surface heard.
+    pub fn heard_bits(&self) -> u64 {
+        self.heard_bits
     }
 
     /// The surface, for the operator.
@@ -246,7 +258,7 @@ impl Mission {
 
     fn handle_timeouts(&mut self) -> Result<(), Problem> {
         let now = self.now;
-        for (node, ends_at) in self.transmitting.clone().into_iter().enumerate() {
+        for (node, ends_at) in self.transmitting.into_iter().enumerate() {
             if ends_at.is_some_and(|at| at <= now) {
                 self.transmitting[node] = None;
                 if node == 0 {
@@ -259,6 +271,9 @@ impl Mission {
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
             self.log.handle_fate(&arrival);
             if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
+                if arrival.to == SURFACE {
+                    self.heard_bits += self.modem.bits_on_air(bytes.len());
+                }
                 if arrival.to == VEHICLE {
                     self.vehicle.handle_frame(bytes, now)
                 } else {
@@ -390,7 +405,7 @@ impl Mission {
         let update = self.mapper.handle_frame(image, &pose, t_s);
         let session = SessionId::from_random(self.dice.below(65_536) as u16);
         self.vehicle.handle_map(&update, session, self.now);
-        self.vehicle.answer_requests(&self.mapper);
+        self.vehicle.answer_requests(&|label| self.mapper.exemplar(label));
         if self.vehicle.map_version() != self.map_version {
             self.map_version = self.vehicle.map_version();
             self.png_full_bytes += crate::picture::encode(self.vehicle.map()).map_or(0, |png| png.len() as u64);

@@ -1,14 +1,31 @@
-//! The tokio shells around the roles.
-use crate::{config::Config, problem::Problem, rehearsal::Mission};
-/// Todo
-pub fn run_vehicle(_c: Config) -> Result<(), Problem> {
-    Err(Problem::Failed("x".into()))
+//! The tokio shells around the roles: they move bytes, read the clock, keep files.
+
+mod clock;
+mod demo;
+mod durable;
+mod mapping;
+mod surface;
+mod vehicle;
+
+pub use clock::Clock;
+pub use demo::run_demo;
+pub use durable::{DurableError, load_durable, save_durable};
+pub use surface::run_surface;
+pub use vehicle::run_vehicle;
+
+use crate::problem::Problem;
+use std::hash::{BuildHasher, Hasher, RandomState};
+
+/// Random bits for sessions: not secret, only different each run.
+fn random_bits() -> u64 {
+    RandomState::new().build_hasher().finish()
 }
-/// Todo
-pub fn run_surface(_c: Config) -> Result<(), Problem> {
-    Err(Problem::Failed("x".into()))
-}
-/// Todo
-pub fn run_demo(_m: Mission, _s: f64, _p: Option<u16>) -> Result<(), Problem> {
-    Err(Problem::Failed("x".into()))
+
+/// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
+fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    // A second command in the same process (as in tests) keeps the first one's log.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
+    runtime.map_err(|e| Problem::Failed(e.to_string()))?.block_on(future)
 }

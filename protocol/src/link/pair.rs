@@ -92,7 +92,7 @@ impl<T> Pair<T> {
     pub fn handle_frame<'a>(&mut self, bytes: &'a [u8]) -> Result<Inbound<'a, T>, DropReason> {
         let result = self.read_frame(bytes);
         match &result {
-            Ok(_) => self.stats.frames_heard += 1,
+            Ok(inbound) => self.stats.frames_heard += u64::from(inbound.number.is_some()),
             Err(reason) => self.stats.drop(*reason),
         }
         result
@@ -134,8 +134,12 @@ impl<T> Pair<T> {
         }
         let window = self.window.get_or_insert_with(|| Window::opened_by(header.number, header.base));
         // A frame that is not taken has still told us the fate of ours, so that goes up with the refusal.
+        let before = window.highest();
         let number = match window.accept(header.number, header.base) {
-            Ok(number) => Some(number),
+            Ok(number) => {
+                self.stats.frames_numbered += window.highest() - before;
+                Some(number)
+            }
             Err(refusal) if fates.is_empty() && !restarted => return Err(refusal.into()),
             Err(refusal) => {
                 self.stats.drop(refusal.into());

@@ -48,6 +48,10 @@ pub struct LinkStats {
     pub frames_sent: u64,
     /// Frames taken.
     pub frames_heard: u64,
+    /// Frames that the peer numbered up to the highest one heard: what exceeds [`Self::frames_heard`] was lost.
+    pub frames_numbered: u64,
+    /// Bytes taken, by class.
+    pub heard_by_class: BTreeMap<Class, u64>,
     /// Own frames that the peer declared lost.
     pub frames_lost: u64,
     /// Own frames that the peer declared held.
@@ -75,6 +79,11 @@ impl LinkStats {
     /// Counts bytes put on air.
     pub fn count(&mut self, class: Class, bytes: usize) {
         *self.bytes_by_class.entry(class).or_default() += bytes as u64;
+    }
+
+    /// Counts bytes taken.
+    pub fn hear(&mut self, class: Class, bytes: usize) {
+        *self.heard_by_class.entry(class).or_default() += bytes as u64;
     }
 
     /// Share of judged frames that were lost.

@@ -131,7 +131,10 @@ impl Peer {
         self.master.handle_frame(bytes.len(), header.remaining, header.turn, modem, now);
         self.replica.advance_base(base);
         let version = self.replica.version();
+        let mut overhead = bytes.len();
         for chunk in chunks {
+            overhead -= chunk.payload.len();
+            self.pair.stats.hear(class_of(chunk.kind), chunk.payload.len());
             let sound = match chunk.kind {
                 ChunkKind::Map => self.replica.apply(number, chunk.payload, now).is_ok(),
                 ChunkKind::Status => self.handle_status(chunk.payload, now, events),
@@ -143,6 +146,7 @@ impl Peer {
                 self.out_of_step |= chunk.kind == ChunkKind::Map;
             }
         }
+        self.pair.stats.hear(Class::Overhead, overhead);
         if self.replica.version() != version {
             events.push_back(SurfaceEvent::MapChanged(vehicle));
         }
@@ -236,5 +240,14 @@ impl Peer {
         self.replica.clear();
         self.objects.clear();
         self.outbox.handle_peer_restart(now);
+    }
+}
+
+fn class_of(kind: ChunkKind) -> Class {
+    match kind {
+        ChunkKind::Map => Class::Map,
+        ChunkKind::Status => Class::Status,
+        ChunkKind::Slot => Class::Directive,
+        ChunkKind::Object => Class::Exemplar,
     }
 }

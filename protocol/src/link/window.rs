@@ -40,9 +40,9 @@ impl Window {
         self.base
     }
 
-    /// Frames missing so far above the base.
-    pub fn missing(&self) -> u64 {
-        self.highest - self.base - self.held.len() as u64
+    /// Highest frame number heard.
+    pub fn highest(&self) -> FrameNumber {
+        self.highest
     }
 
     /// Takes a frame, or says why not.

@@ -1,0 +1,19 @@
+//! The files of the page, embedded in the binary.
+
+static FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
+
+/// Content type and bytes of a file of the page; the empty path is its index.
+pub(super) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
+    let path = if path.is_empty() { "index.html" } else { path };
+    let &(name, bytes) = FILES.iter().find(|(name, _)| *name == path)?;
+    let content_type = match name.rsplit('.').next() {
+        Some("html") => "text/html; charset=utf-8",
+        Some("css") => "text/css; charset=utf-8",
+        Some("js") => "text/javascript; charset=utf-8",
+        Some("svg") => "image/svg+xml",
+        Some("webp") => "image/webp",
+        Some("png") => "image/png",
+        _ => "application/octet-stream",
+    };
+    Some((content_type, bytes))
+}

@@ -1,0 +1,187 @@
+//! What every page shows.
+
+use super::link_meter::LinkMeter;
+use crate::asv::{Desk, ExemplarState, Surface};
+use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
+use scenecast_protocol::link::{LinkStats, PeerView};
+use scenecast_protocol::schedule::Class;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// Facts of the mission that the surface itself does not know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissionFacts {
+    /// Name for people.
+    pub name: String,
+    /// Different for each run, so that what a browser remembers of labels is not shown on other ones.
+    pub run: String,
+    /// Mission seconds a second.
+    pub speed: f64,
+    /// Whether the survey is over.
+    pub ended: bool,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Interval to expect between two contacts before one was measured, seconds.
+    pub first_interval_s: f64,
+}
+
+/// The state at a moment and the versions of the maps.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Snapshot {
+    /// The state as JSON text.
+    pub state: String,
+    /// Version of each vehicle's map.
+    pub maps: BTreeMap<u8, u64>,
+}
+
+/// The state of the surface.
+pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now: Instant) -> Snapshot {
+    let vehicles: Vec<Value> =
+        surface.vehicles().filter_map(|(a, desk)| Some(vehicle(surface, a, desk, surface.view(a)?, facts))).collect();
+    let state = json!({
+        "now_s": seconds(now),
+        "mission": { "name": facts.name, "id": facts.run, "speed": facts.speed, "ended": facts.ended },
+        "vehicles": vehicles,
+        "link": link(surface, meter, now),
+    });
+    let maps = surface.vehicles().filter_map(|(a, _)| Some((a.number(), surface.view(a)?.replica().version())));
+    Snapshot { state: state.to_string(), maps: maps.collect() }
+}
+
+fn seconds(at: Instant) -> f64 {
+    (at.as_secs_f64() * 100.0).round() / 100.0
+}
+
+fn vehicle(surface: &Surface, address: Address, desk: &Desk, view: PeerView<'_>, facts: &MissionFacts) -> Value {
+    let labels = surface.labels(address).unwrap_or_default();
+    let bounds = surface.map(address).and_then(|m| m.bounds());
+    let interval = view.expected_interval().map_or(facts.first_interval_s, |d| d.as_secs_f64().max(1.0));
+    json!({
+        "id": address.number(),
+        "name": desk.name,
+        "heard_s": view.heard().map(seconds),
+        "expected_interval_s": interval,
+        "next_contact_s": view.next_contact().map(seconds),
+        "status": view.status().map(|(s, at)| status(s, *at)),
+        "track": desk.track.iter().map(|(at, x, y)| json!([seconds(*at), x, y])).collect::<Vec<_>>(),
+        "map": {
+            "version": view.replica().version(),
+            "cell_m": facts.cell_m,
+            "x0": bounds.map_or(0, |b| b.x),
+            "y0": bounds.map_or(0, |b| b.y),
+            "width": bounds.map_or(0, |b| b.width),
+            "height": bounds.map_or(0, |b| b.height),
+            "explored_cells": labels.values().sum::<u32>(),
+            "updated_s": view.replica().updated().map(seconds),
+            "epoch": desk.epoch,
+        },
+        "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
+        "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, view, address, facts)).collect::<Vec<_>>(),
+        "directive": { "slots": view.slots().map(slot).collect::<Vec<_>>() },
+    })
+}
+
+fn status(s: &VehicleStatus, at: Instant) -> Value {
+    let mode = match s.mode {
+        VehicleMode::Survey => "survey",
+        VehicleMode::Hold => "hold",
+        VehicleMode::Return => "return",
+        VehicleMode::Surface => "surface",
+        VehicleMode::Abort => "abort",
+        VehicleMode::Done => "done",
+    };
+    json!({
+        "at_s": seconds(at),
+        "x_m": s.x_m,
+        "y_m": s.y_m,
+        "z_m": -s.depth_m,
+        "heading_deg": s.heading_deg,
+        "sigma_m": s.sigma_m,
+        "mode": mode,
+        "waypoint": s.waypoint.map(|(x, y)| json!([x, y])),
+        "cells": s.explored_cells,
+        "labels": s.labels,
+        "fix_age_s": s.fix_age_s,
+    })
+}
+
+fn label(id: u8, cells: u32, desk: &Desk, view: PeerView<'_>, address: Address, facts: &MissionFacts) -> Value {
+    json!({
+        "id": id,
+        "cells": cells,
+        "area_m2": f64::from(cells) * facts.cell_m * facts.cell_m,
+        "weight": desk.utility.weight(id),
+        "exemplar": exemplar(id, desk, view, address),
+    })
+}
+
+fn exemplar(id: u8, desk: &Desk, view: PeerView<'_>, address: Address) -> Value {
+    let Some(e) = desk.exemplars.get(&id) else {
+        return json!({ "state": "none", "progress": 0.0, "bytes": null, "url": null, "at_s": null });
+    };
+    let request = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.life);
+    let (state, progress, bytes, here) = match &e.state {
+        ExemplarState::Asked => match request {
+            Some(LifeLine::Queued) | None => ("queued", 0.0, None, false),
+            Some(LifeLine::Refused(_)) => ("refused", 0.0, None, false),
+            Some(_) => ("on_air", 0.0, None, false),
+        },
+        ExemplarState::Coming(held, total) => ("coming", *held as f64 / (*total).max(1) as f64, Some(*total), false),
+        ExemplarState::Here(webp) => ("here", 1.0, Some(webp.len()), true),
+    };
+    let url = here.then(|| format!("/api/v1/vehicles/{}/exemplars/{id}.webp", address.number()));
+    json!({ "state": state, "progress": progress, "bytes": bytes, "url": url, "at_s": seconds(e.changed) })
+}
+
+fn slot(s: &SlotProgress) -> Value {
+    let (state, reason) = match s.life {
+        LifeLine::Queued => ("queued", None),
+        LifeLine::OnAir => ("on_air", None),
+        LifeLine::Heard => ("heard", None),
+        LifeLine::Applied => ("applied", None),
+        LifeLine::Refused(reason) => ("refused", Some(reason.explain())),
+    };
+    json!({
+        "slot": s.id.name(),
+        "version": s.version,
+        "state": state,
+        "reason": reason,
+        "issued_s": seconds(s.issued),
+        "changed_s": seconds(s.changed),
+    })
+}
+
+fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> Value {
+    let stats: Vec<(&LinkStats, PeerView<'_>)> =
+        surface.vehicles().filter_map(|(a, _)| surface.view(a)).map(|v| (v.stats(), v)).collect();
+    let sum = |of: &dyn Fn(&LinkStats) -> u64| stats.iter().map(|(s, _)| of(s)).sum::<u64>();
+    let round_trip = stats.iter().find_map(|(_, v)| v.round_trip());
+    let heard = sum(&|s| s.frames_heard);
+    let numbered = sum(&|s| s.frames_numbered);
+    let (lost, delivered) = (sum(&|s| s.frames_lost), sum(&|s| s.frames_delivered));
+    let elapsed = now.as_secs_f64().max(1.0);
+    let direction = |i: usize, frames: u64, lost: u64, class: &dyn Fn(&LinkStats, Class) -> u64| {
+        let bytes: BTreeMap<&str, u64> = Class::ALL.into_iter().map(|c| (c.name(), sum(&|s| class(s, c)))).collect();
+        let useful: u64 = bytes.iter().filter(|(name, _)| **name != "overhead").map(|(_, n)| n).sum();
+        json!({
+            "bps_1min": meter.bps_1min(i, now).round(),
+            "worst_window_bps": meter.worst_window_bps(i),
+            "loss": if frames > 0 { lost as f64 / frames as f64 } else { 0.0 },
+            "frames": frames,
+            "lost": lost,
+            "goodput_bps": (useful as f64 * 8.0 / elapsed).round(),
+            "bytes_by_class": bytes,
+        })
+    };
+    json!({
+        "budget_bps": surface.budget_bps(),
+        "budget_window_s": meter.window_s(),
+        "up": direction(0, numbered, numbered.saturating_sub(heard), &|s, c| s.heard_by_class.get(&c).copied().unwrap_or(0)),
+        "down": direction(1, lost + delivered, lost, &|s, c| s.bytes_by_class.get(&c).copied().unwrap_or(0)),
+        "round_trip_s": round_trip.map(|d| d.as_secs_f64()),
+        "backlog_bits": null,
+        "history": meter.history(),
+    })
+}

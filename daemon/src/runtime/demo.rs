@@ -1,0 +1,106 @@
+//! A rehearsal at the pace of the world, with the operator's page.
+
+use crate::console::{Console, LinkMeter, MissionFacts, answer, bind, snapshot, start};
+use crate::problem::Problem;
+use crate::rehearsal::Mission;
+use scenecast_protocol::time::Instant;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Wall time of a step.
+const TICK: Duration = Duration::from_millis(50);
+
+/// Flies a mission at `speed` mission seconds a second and serves the operator's page on `port`, until it is interrupted;
+/// without a page, until the operator has everything.
+pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), Problem> {
+    super::block_on(async move {
+        let console = match port {
+            Some(port) => {
+                let listener = bind(&format!("127.0.0.1:{port}"), "--port").await?;
+                println!("the operator's page is at http://127.0.0.1:{port} (end with Ctrl-C)");
+                Some(start(listener))
+            }
+            None => None,
+        };
+        Demo::new(mission, speed).run(console).await
+    })
+}
+
+struct Demo {
+    mission: Mission,
+    meter: LinkMeter,
+    facts: MissionFacts,
+    counted: [u64; 2],
+    published: Option<Instant>,
+}
+
+impl Demo {
+    fn new(mission: Mission, speed: f64) -> Self {
+        let facts = MissionFacts {
+            name: mission.config().mission.name.clone(),
+            run: format!("{:08x}", super::random_bits() as u32),
+            speed,
+            ended: false,
+            cell_m: mission.cell_m(),
+            first_interval_s: mission.config().link.max_idle_s + mission.config().link.max_turn_s,
+        };
+        let window = Duration::from_secs_f64(mission.config().link.budget_window_s);
+        Self { meter: LinkMeter::new(window), mission, facts, counted: [0; 2], published: None }
+    }
+
+    async fn run(mut self, mut console: Option<Console>) -> Result<(), Problem> {
+        let clock = super::clock::Clock::new(self.facts.speed);
+        let end = Instant::from_secs_f64(self.mission.config().survey.duration_s);
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        loop {
+            tokio::select! {
+                _ = tokio::signal::ctrl_c() => return Ok(()),
+                _ = tick.tick() => {}
+            }
+            let now = clock.now();
+            if now >= end && !self.facts.ended {
+                self.mission.advance(end)?;
+                self.mission.end_survey();
+                self.facts.ended = true;
+            }
+            self.mission.advance(now)?;
+            self.count();
+            let changed = !self.mission.take_events().is_empty();
+            match &mut console {
+                Some(console) => self.serve(console, changed),
+                None if self.mission.is_drained() => return Ok(()),
+                None => {}
+            }
+        }
+    }
+
+    fn serve(&mut self, console: &mut Console, mut changed: bool) {
+        let now = self.mission.now();
+        while let Ok((ask, reply)) = console.requests.try_recv() {
+            let cell_m = self.facts.cell_m;
+            // A browser that has gone away needs no answer.
+            let _ = reply.send(answer(self.mission.surface(), ask, cell_m, now));
+            changed = true;
+        }
+        let due = self.published.is_none_or(|at| now.since(at).as_secs_f64() >= self.facts.speed);
+        if changed || due {
+            self.published = Some(now);
+            let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
+            console.snapshots.send_replace(Arc::new(snapshot));
+        }
+    }
+
+    /// The page's link panel shows what the surface knows: what it heard, and what it sent.
+    fn count(&mut self) {
+        let now = self.mission.now();
+        let totals = [self.mission.heard_bits(), self.mission.audits()[1].total_bits()];
+        if totals[0] > self.counted[0] {
+            self.meter.heard(totals[0] - self.counted[0], now);
+        }
+        if totals[1] > self.counted[1] {
+            self.meter.sent(totals[1] - self.counted[1], now);
+        }
+        self.counted = totals;
+    }
+}

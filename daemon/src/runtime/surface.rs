@@ -1,0 +1,139 @@
+//! `scenecast asv`
+
+use super::clock::Clock;
+use crate::asv::{Surface, SurfaceOutput};
+use crate::config::Config;
+use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
+use crate::modem::{self, Modem, ModemEvent};
+use crate::picture;
+use crate::problem::Problem;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::oneshot;
+
+/// Runs the surface until it is interrupted.
+pub fn run_surface(config: Config) -> Result<(), Problem> {
+    super::block_on(async move {
+        let dir = PathBuf::from(&config.runtime.state_dir);
+        std::fs::create_dir_all(&dir).map_err(|e| Problem::file(&dir, e))?;
+        let clock = Clock::new(config.runtime.time_scale);
+        let profile = crate::ends::modem_profile(&config, config.modem.bit_rate);
+        let surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
+        let console = match config.console.listen.as_str() {
+            "" => None,
+            address => {
+                let console = start(bind(address, "console.listen").await?);
+                println!("the operator's page is at http://{address} (end with Ctrl-C)");
+                Some(console)
+            }
+        };
+        let facts = MissionFacts {
+            name: config.mission.name.clone(),
+            run: format!("{:08x}", super::random_bits() as u32),
+            speed: config.runtime.time_scale,
+            ended: false,
+            cell_m: crate::auv::cell_m(&config),
+            first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
+        };
+        let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
+        let modem = modem::open(&config, profile).await?;
+        Host { surface, modem, console, clock, dir, facts, meter, bits: profile }.run().await
+    })
+}
+
+struct Host {
+    surface: Surface,
+    modem: Modem,
+    console: Option<Console>,
+    clock: Clock,
+    dir: PathBuf,
+    facts: MissionFacts,
+    meter: LinkMeter,
+    bits: scenecast_protocol::mac::ModemProfile,
+}
+
+impl Host {
+    async fn run(mut self) -> Result<(), Problem> {
+        let mut second = tokio::time::interval(Duration::from_secs(1));
+        second.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        loop {
+            let changed = self.pump()?;
+            if changed {
+                self.publish();
+            }
+            let wake = self.surface.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
+            let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
+            tokio::select! {
+                _ = tokio::signal::ctrl_c() => return Ok(()),
+                _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
+                _ = second.tick() => self.publish(),
+                event = self.modem.next() => match event {
+                    ModemEvent::Sent => self.surface.handle_transmit_outcome(self.clock.now()),
+                    ModemEvent::Received(bytes) => self.handle_frame(&bytes),
+                },
+                (ask, reply) = next_request(&mut self.console) => self.answer(ask, reply),
+            }
+        }
+    }
+
+    fn handle_frame(&mut self, bytes: &[u8]) {
+        let now = self.clock.now();
+        self.meter.heard(self.bits.bits_on_air(bytes.len()), now);
+        self.surface.handle_frame(bytes, now);
+    }
+
+    fn answer(&mut self, ask: Ask, reply: oneshot::Sender<Reply>) {
+        // A browser that has gone away needs no answer.
+        let _ = reply.send(answer(&mut self.surface, ask, self.facts.cell_m, self.clock.now()));
+    }
+
+    fn publish(&mut self) {
+        if let Some(console) = &self.console {
+            let snapshot = snapshot(&self.surface, &self.facts, &self.meter, self.clock.now());
+            console.snapshots.send_replace(Arc::new(snapshot));
+        }
+    }
+
+    /// Carries out what the surface asks for; says whether the page has something new to show.
+    fn pump(&mut self) -> Result<bool, Problem> {
+        let now: Instant = self.clock.now();
+        let mut changed = false;
+        while let Some(output) = self.surface.poll_output() {
+            changed = true;
+            match output {
+                SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
+                SurfaceOutput::ExemplarHere(vehicle, label) => {
+                    tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
+                }
+                SurfaceOutput::SlotSettled(..) | SurfaceOutput::Changed(_) => {}
+            }
+        }
+        if !self.modem.is_busy()
+            && let Some(t) = self.surface.poll_transmit(now)
+        {
+            self.meter.sent(self.bits.bits_on_air(t.bytes.len()), now);
+            self.modem.send(t.bytes, self.clock)?;
+        }
+        Ok(changed)
+    }
+
+    fn write_map(&self, vehicle: Address) -> Result<(), Problem> {
+        let Some(map) = self.surface.map(vehicle) else { return Ok(()) };
+        let png = picture::encode(map).map_err(|e| Problem::Failed(e.to_string()))?;
+        picture::write_whole(&self.dir.join(format!("operator-map-{}.png", vehicle.number())), &png)
+    }
+}
+
+async fn next_request(console: &mut Option<Console>) -> Request {
+    let request = match console {
+        Some(console) => console.requests.recv().await,
+        None => None,
+    };
+    match request {
+        Some(request) => request,
+        None => std::future::pending().await,
+    }
+}

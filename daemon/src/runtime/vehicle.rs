@@ -1,0 +1,140 @@
+//! `scenecast auv`
+
+use super::clock::Clock;
+use super::durable::{load_durable, save_durable};
+use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
+use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
+use crate::config::Config;
+use crate::modem::{self, Modem, ModemEvent};
+use crate::problem::Problem;
+use crate::rehearsal::Recording;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::SessionId;
+use std::path::{Path, PathBuf};
+
+/// Runs the vehicle until it is interrupted.
+pub fn run_vehicle(config: Config) -> Result<(), Problem> {
+    super::block_on(async move {
+        let dir = PathBuf::from(&config.runtime.state_dir);
+        std::fs::create_dir_all(&dir).map_err(|e| Problem::file(&dir, e))?;
+        let state_file = dir.join("vehicle.state");
+        let durable = begin_run(&state_file)?;
+        let clock = Clock::new(config.runtime.time_scale);
+        let profile = crate::ends::modem_profile(&config, config.modem.bit_rate);
+        let session = SessionId::from_random(super::random_bits() as u16);
+        let area = survey_area(&config)?;
+        let epoch = durable.epoch;
+        let vehicle = crate::ends::vehicle(&config, profile, area, durable, session, clock.now())?;
+        let camera = Camera::open(&config, clock)?;
+        let mapper = mapping::spawn(&config, epoch)?;
+        let modem = modem::open(&config, profile).await?;
+        let at_end = camera_ends(&config);
+        Host { vehicle, camera, mapper, modem, clock, state_file, at_end, behind: 0 }.run().await
+    })
+}
+
+/// Label ids of an earlier run mean something else: each run has an epoch of its own.
+fn begin_run(state_file: &Path) -> Result<Durable, Problem> {
+    let durable = match load_durable(state_file)? {
+        Some(last) => Durable { epoch: last.epoch.wrapping_add(1), ..last },
+        None => Durable::default(),
+    };
+    save_durable(state_file, &durable)?;
+    Ok(durable)
+}
+
+fn survey_area(config: &Config) -> Result<Area, Problem> {
+    let [west, south, east, north] = config.survey.area_m;
+    if east > west && north > south {
+        return Ok(Area { west, south, east, north });
+    }
+    match config.camera.source.as_str() {
+        "" => Err(Problem::Input("survey.area_m: set the west, south, east and north limits of the survey".to_owned())),
+        source => {
+            let [west, south, east, north] = Recording::open(Recording::folder(source)?)?.limits();
+            Ok(Area { west, south, east, north })
+        }
+    }
+}
+
+fn camera_ends(config: &Config) -> bool {
+    !config.camera.source.is_empty()
+}
+
+struct Host {
+    vehicle: Vehicle,
+    camera: Camera,
+    mapper: MapperThread,
+    modem: Modem,
+    clock: Clock,
+    state_file: PathBuf,
+    /// Whether the end of the camera's frames is the end of the survey.
+    at_end: bool,
+    /// Camera frames that the scene model has not seen yet.
+    behind: u32,
+}
+
+impl Host {
+    async fn run(mut self) -> Result<(), Problem> {
+        loop {
+            self.pump()?;
+            let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
+            let wake = wake.unwrap_or_else(|| self.clock.now() + std::time::Duration::from_secs(1));
+            tokio::select! {
+                _ = tokio::signal::ctrl_c() => return Ok(()),
+                _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
+                event = self.modem.next() => match event {
+                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(),
+                    ModemEvent::Received(bytes) => self.vehicle.handle_frame(&bytes, self.clock.now()),
+                },
+                frame = self.camera.next() => {
+                    self.behind += 1;
+                    let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
+                }
+                seen = self.mapper.seen.recv() => match seen {
+                    Some(seen) => self.handle_seen(seen?),
+                    None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
+                },
+            }
+        }
+    }
+
+    fn handle_seen(&mut self, seen: Seen) {
+        let now = self.clock.now();
+        self.behind -= 1;
+        let f = &seen.frame;
+        self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+        let session = SessionId::from_random(super::random_bits() as u16);
+        self.vehicle.handle_map(&seen.update, session, now);
+        self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
+        if self.at_end && self.behind == 0 && self.camera.is_over() {
+            self.at_end = false;
+            tracing::info!("the recorded mission has ended");
+            self.vehicle.finish_survey();
+        }
+    }
+
+    fn pump(&mut self) -> Result<(), Problem> {
+        let now: Instant = self.clock.now();
+        while let Some(output) = self.vehicle.poll_output() {
+            match output {
+                VehicleOutput::Persist => {
+                    save_durable(&self.state_file, self.vehicle.durable())?;
+                    self.vehicle.handle_persisted();
+                }
+                VehicleOutput::RefineRate(rate) => {
+                    let _ = self.mapper.orders.send(ToMapper::RefineRate(rate));
+                }
+                VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
+                VehicleOutput::Waypoint(x, y) => tracing::info!("waypoint {x:.1} m east, {y:.1} m north"),
+                VehicleOutput::Hold => tracing::info!("hold"),
+            }
+        }
+        if !self.modem.is_busy()
+            && let Some(t) = self.vehicle.poll_transmit(now)
+        {
+            self.modem.send(t.bytes, self.clock)?;
+        }
+        Ok(())
+    }
+}
