@@ -15,7 +15,7 @@ struct Sent {
 /// The log of a mission's frames.
 ///
 /// One line a frame, in the order in which their fates became known: time of transmission in seconds, `up` or `down`,
-/// bytes, kind, `lost` or `ok`.
+/// bytes, kind, `ok` or `lost`, and why it was lost.
 #[derive(Debug)]
 pub struct FramesLog {
     open: BTreeMap<u64, Sent>,
@@ -28,7 +28,7 @@ pub struct FramesLog {
 
 impl Default for FramesLog {
     fn default() -> Self {
-        let text = "# time_s direction bytes kind fate\n".to_owned();
+        let text = "# time_s direction bytes kind fate [reason]\n".to_owned();
         Self { open: BTreeMap::new(), text, sent: [0; 2], lost: [0; 2] }
     }
 }
@@ -44,9 +44,13 @@ impl FramesLog {
     /// The fate of a frame is known; later copies are not logged again.
     pub fn handle_fate(&mut self, arrival: &Arrival) {
         let Some(sent) = self.open.remove(&arrival.transmission) else { return };
-        let lost = matches!(arrival.outcome, sim_channel::Outcome::Lost { .. });
-        self.lost[usize::from(sent.direction == "down")] += u64::from(lost);
-        let fate = if lost { "lost" } else { "ok" };
+        let fate = match &arrival.outcome {
+            sim_channel::Outcome::Lost { reason, .. } => {
+                self.lost[usize::from(sent.direction == "down")] += 1;
+                format!("lost {reason:?}").to_lowercase()
+            }
+            sim_channel::Outcome::Delivered { .. } => "ok".to_owned(),
+        };
         let time = arrival.sent_at.as_secs_f64();
         let _ = writeln!(self.text, "{time:.3} {} {} {} {fate}", sent.direction, sent.bytes, sent.kind);
     }
