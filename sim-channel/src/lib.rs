@@ -7,6 +7,7 @@
 pub mod acoustics;
 mod channel;
 pub mod loss;
+pub mod modem;
 mod node;
 pub mod presets;
 mod random;

@@ -1,6 +1,6 @@
 //! What a receiver learns of a transmission, and what only the simulator knows.
 
-use crate::{Duration, NodeId};
+use crate::{Duration, NodeId, Position};
 
 /// The end of one reception (or of its duplicate) at one receiver.
 #[derive(Clone, PartialEq, Debug)]
@@ -17,6 +17,12 @@ pub struct Arrival {
     pub sent_at: Duration,
     /// Slant range in metres when the transmission began.
     pub range_m: f64,
+    /// Where the sender was when the transmission began.
+    pub sender: Position,
+    /// Where the receiver was when the transmission began.
+    pub receiver: Position,
+    /// How long the signal took.
+    pub airtime: Duration,
     /// What came of it.
     pub outcome: Outcome,
 }

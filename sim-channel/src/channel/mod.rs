@@ -145,6 +145,17 @@ impl Channel {
         self.transmissions
     }
 
+    /// Ends a transmission in the middle: whoever has not yet received the whole of it loses it to noise, and its sender
+    /// falls silent at `now`.
+    pub fn cut_short(&mut self, transmission: u64, now: Duration) {
+        for reception in self.underway.values_mut().filter(|reception| reception.transmission == transmission) {
+            reception.cut_short(now);
+            if let Some(spans) = self.on_air.get_mut(&reception.from) {
+                spans.iter_mut().filter(|span| span.start == reception.sent_at).for_each(|span| span.end = now);
+            }
+        }
+    }
+
     /// When the next arrival is complete; `None` if nothing is under way.
     pub fn poll_timeout(&self) -> Option<Duration> {
         let underway = self.underway.keys().next().map(|(at, _)| *at);
@@ -197,6 +208,7 @@ impl Channel {
             transmission: self.transmissions,
             from,
             to,
+            places: [self.position(from), self.position(to)].map(Option::unwrap_or_default),
             span,
             sent_at: now,
             range_m,

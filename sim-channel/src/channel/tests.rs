@@ -295,3 +295,16 @@ fn an_hour_of_fifteen_talkative_nodes_passes_quickly() {
     }
     assert!(arrivals > 3500 * 15 * 14);
 }
+
+#[test]
+fn a_transmission_cut_short_is_lost_and_frees_the_sender() {
+    let mut channel = pair(ChannelConfig::default(), 1);
+    let number = channel.transmit(A, vec![1], SECOND, Duration::ZERO);
+    channel.cut_short(number, ms(300));
+    assert!(!channel.is_busy(A, ms(300)));
+    let whole = channel.transmit(A, vec![1], SECOND, Duration::from_secs(5));
+    channel.cut_short(whole, ms(6500));
+    let arrivals = drain(&mut channel);
+    assert_eq!(fate(&arrivals, number, B), Some(LossReason::Noise));
+    assert_eq!(fate(&arrivals, whole, B), None);
+}

@@ -1,0 +1,7 @@
+//! Transcripts and behaviour at the host's port.
+
+mod bench;
+mod burst;
+mod faults;
+mod instant;
+mod start_up;
