@@ -5,7 +5,11 @@
 
 mod agenda;
 mod basin;
+#[cfg(test)]
+mod bench;
+mod crc;
 mod fault;
+pub mod micromodem;
 mod port;
 pub mod s2c;
 

@@ -1,17 +1,10 @@
-//! Hosts at emulated modems in one water.
+//! Hosts at S2C modems in one water.
 
-use super::super::*;
-use crate::modem::Basin;
-use crate::{Channel, ChannelConfig, NodeId, Position};
-use std::collections::BTreeMap;
+pub(super) use crate::modem::bench::{Bench, SECOND, keywords};
 
-pub(super) const SECOND: Duration = Duration::from_secs(1);
-
-/// Modems 1, 2, .. on a line, `range_m` apart, and everything that their hosts were told.
-pub(super) struct Bench {
-    pub basin: Basin,
-    pub told: BTreeMap<u8, Vec<u8>>,
-}
+use crate::ChannelConfig;
+use crate::modem::Emulator;
+use crate::modem::s2c::{S2c, S2cConfig};
 
 impl Bench {
     pub(super) fn new(modems: u8, range_m: f64, config: ChannelConfig) -> Self {
@@ -19,62 +12,11 @@ impl Bench {
     }
 
     pub(super) fn of(modems: Vec<S2cConfig>, range_m: f64, config: ChannelConfig) -> Self {
-        let mut basin = Basin::new(Channel::new(config, 1));
-        let mut told = BTreeMap::new();
-        for (index, modem) in modems.into_iter().enumerate() {
-            let node = modem.address;
-            basin.channel().place(NodeId(node), Position::new(range_m * index as f64, 0.0, 0.0));
-            basin.add(NodeId(node), Box::new(S2c::new(modem)));
-            told.insert(node, Vec::new());
-        }
-        Self { basin, told }
+        let boxed = |modem: S2cConfig| (modem.address, Box::new(S2c::new(modem)) as Box<dyn Emulator>);
+        Self::join(modems.into_iter().map(boxed).collect(), range_m, config)
     }
 
     pub(super) fn calm(modems: u8) -> Self {
         Self::new(modems, 1500.0, ChannelConfig::default())
     }
-
-    pub(super) fn write(&mut self, node: u8, bytes: &[u8]) {
-        let now = self.basin.now();
-        self.basin.handle_host_bytes(NodeId(node), bytes, now);
-    }
-
-    pub(super) fn run(&mut self, length: Duration) {
-        let end = self.basin.now() + length;
-        while let Some(at) = self.basin.poll_timeout().filter(|at| *at <= end) {
-            self.basin.advance(at.max(self.basin.now()));
-            self.collect();
-        }
-        self.basin.advance(end);
-        self.collect();
-    }
-
-    fn collect(&mut self) {
-        for (node, told) in &mut self.told {
-            told.extend(self.basin.poll_host_bytes(NodeId(*node)));
-        }
-    }
-
-    /// All that was told to a host since last asked, as text.
-    pub(super) fn take(&mut self, node: u8) -> String {
-        let bytes = std::mem::take(self.told.get_mut(&node).expect("node"));
-        bytes.iter().map(|byte| char::from(*byte)).collect()
-    }
-
-    pub(super) fn lines(&mut self, node: u8) -> Vec<String> {
-        self.take(node).split_terminator("\r\n").map(str::to_string).collect()
-    }
-
-    /// Writes a line and gives the answer time to come, but nothing acoustic.
-    pub(super) fn ask(&mut self, node: u8, line: &str) -> String {
-        self.take(node);
-        self.write(node, line.as_bytes());
-        self.run(Duration::from_millis(80) + Duration::from_millis(line.len() as u64));
-        self.take(node)
-    }
-}
-
-/// The first words of lines.
-pub(super) fn keywords(lines: &[String]) -> Vec<&str> {
-    lines.iter().map(|line| line.split(',').next().unwrap_or_default()).collect()
 }
