@@ -24,6 +24,13 @@ impl Bench {
         Self { basin, told }
     }
 
+    /// Puts the modems so many metres apart.
+    pub(super) fn channel_range(&mut self, range_m: f64) {
+        for (index, node) in self.told.keys().enumerate() {
+            self.basin.channel().place(NodeId(*node), Position::new(range_m * index as f64, 0.0, 0.0));
+        }
+    }
+
     pub(super) fn write(&mut self, node: u8, bytes: &[u8]) {
         let now = self.basin.now();
         self.basin.handle_host_bytes(NodeId(node), bytes, now);

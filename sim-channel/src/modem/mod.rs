@@ -12,6 +12,7 @@ mod fault;
 pub mod micromodem;
 mod port;
 pub mod s2c;
+pub mod transparent;
 
 pub use basin::Basin;
 pub use fault::Fault;
