@@ -17,7 +17,7 @@ pub mod usbl;
 
 pub use std::time::Duration;
 
-pub use channel::{Arrival, Channel, ChannelConfig, LossReason, Outage, OutageScope, Outcome};
+pub use channel::{Arrival, Channel, ChannelConfig, LossReason, Onset, Outage, OutageScope, Outcome};
 pub use loss::LossModel;
 pub use node::{NodeId, Position};
 pub use random::Stream;

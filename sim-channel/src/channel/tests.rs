@@ -308,3 +308,19 @@ fn a_transmission_cut_short_is_lost_and_frees_the_sender() {
     assert_eq!(fate(&arrivals, number, B), Some(LossReason::Noise));
     assert_eq!(fate(&arrivals, whole, B), None);
 }
+
+#[test]
+fn onsets_come_before_arrivals_and_only_to_who_can_hear() {
+    let mut channel = pair(ChannelConfig::default(), 1);
+    channel.tell_onsets();
+    channel.transmit(A, vec![1], SECOND, Duration::ZERO);
+    assert_eq!(channel.poll_timeout(), Some(SECOND));
+    let onset = channel.poll_onset(SECOND).expect("onset");
+    assert_eq!((onset.to, onset.at, onset.airtime), (B, SECOND, SECOND));
+    assert_eq!(channel.poll_timeout(), Some(2 * SECOND));
+    assert!(channel.poll_arrival(2 * SECOND).is_some());
+    channel.transmit(A, vec![1], SECOND, 10 * SECOND);
+    channel.transmit(B, vec![1], SECOND, ms(10_900));
+    let told: Vec<_> = std::iter::from_fn(|| channel.poll_onset(20 * SECOND)).map(|onset| onset.to).collect();
+    assert_eq!(told, [A], "B spoke when A's signal came");
+}

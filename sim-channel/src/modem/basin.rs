@@ -15,7 +15,8 @@ pub struct Basin {
 
 impl Basin {
     /// The water alone; place nodes in the channel before their modems speak.
-    pub fn new(channel: Channel) -> Self {
+    pub fn new(mut channel: Channel) -> Self {
+        channel.tell_onsets();
         Self { channel, modems: BTreeMap::new(), on_air: BTreeMap::new(), hung_up: Vec::new(), now: Duration::ZERO }
     }
 
@@ -94,6 +95,11 @@ impl Basin {
         self.now = self.now.max(now);
         loop {
             let mut quiet = true;
+            while let Some(onset) = self.channel.poll_onset(now) {
+                if let Some(modem) = self.modems.get_mut(&onset.to) {
+                    modem.handle_onset(&onset, now);
+                }
+            }
             while let Some(arrival) = self.channel.poll_arrival(now) {
                 quiet = false;
                 if let Some(modem) = self.modems.get_mut(&arrival.to) {

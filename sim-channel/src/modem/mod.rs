@@ -3,6 +3,8 @@
 //! An emulator is a state machine without IO: host bytes and acoustic arrivals go in with a `now`, host bytes and
 //! transmissions come out. [`Basin`] joins several of them by a [`Channel`](crate::Channel).
 
+#![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
+
 mod agenda;
 mod basin;
 #[cfg(test)]
@@ -17,7 +19,7 @@ pub mod transparent;
 pub use basin::Basin;
 pub use fault::Fault;
 
-use crate::{Arrival, Duration};
+use crate::{Arrival, Duration, Onset};
 
 /// An emulated modem.
 pub trait Emulator: Send {
@@ -29,6 +31,9 @@ pub trait Emulator: Send {
 
     /// What has reached the host by `now`, paced by the baud rate.
     fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8>;
+
+    /// Takes the beginning of a signal at this modem. Without it the beginning is told together with the end.
+    fn handle_onset(&mut self, onset: &Onset, now: Duration);
 
     /// Takes the end of a reception at this modem, heard or not.
     fn handle_arrival(&mut self, arrival: &Arrival, now: Duration);

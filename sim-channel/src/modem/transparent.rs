@@ -6,7 +6,7 @@
 use super::agenda::Agenda;
 use super::port::Port;
 use super::{Emulator, Fault, ModemEvent, Transmission};
-use crate::{Arrival, Duration, Outcome, Stream};
+use crate::{Arrival, Duration, Onset, Outcome, Stream};
 use std::collections::VecDeque;
 
 /// The make of a pipe.
@@ -142,6 +142,8 @@ impl Emulator for Transparent {
     fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
         self.port.poll_output(now)
     }
+
+    fn handle_onset(&mut self, _onset: &Onset, _now: Duration) {}
 
     fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {
         self.handle_timeout(now);

@@ -18,14 +18,14 @@ mod transmit;
 use super::agenda::Agenda;
 use super::port::Port;
 use super::{Emulator, Fault, ModemEvent, Transmission};
-use crate::{Arrival, Duration, Stream};
+use crate::{Arrival, Duration, Onset, Stream};
 use clock::Clock;
 use cycle::Cycle;
 use nvram::Nvram;
 use packet::Packet;
 use receive::Signal;
 use sentence::{Collector, Line, Sentence, line};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use transmit::{Air, Sent};
 
 /// The make of an emulated Micromodem.
@@ -72,6 +72,8 @@ pub struct Micromodem {
     awake: bool,
     wakes_on_host: bool,
     busy_until: Duration,
+    /// Transmissions whose detection was told.
+    detected: BTreeSet<u64>,
     chance: Stream,
     events: VecDeque<ModemEvent>,
 }
@@ -91,6 +93,8 @@ enum Event {
 
 /// Between the periodic `CAREV`.
 const REVISION_EVERY: Duration = Duration::from_secs(30);
+/// Packets that may wait for the transducer.
+const QUEUE_LIMIT: usize = 8;
 /// From reset to `INIT`, and from there to the main firmware.
 const BOOT_STEP: Duration = Duration::from_millis(500);
 
@@ -113,6 +117,7 @@ impl Micromodem {
             awake: true,
             wakes_on_host: false,
             busy_until: Duration::ZERO,
+            detected: BTreeSet::new(),
             chance: Stream::new(config.seed, &[PURPOSE]),
             events: VecDeque::new(),
             config,
@@ -159,7 +164,7 @@ impl Micromodem {
     }
 
     fn on_sentence(&mut self, sentence: &Sentence, now: Duration) {
-        let busy = now < self.busy_until;
+        let busy = now < self.busy_until || self.air.queue.len() >= QUEUE_LIMIT;
         match sentence.name.as_str() {
             "CCCYC" | "CCTDP" | "CCMPC" | "CCMUC" if busy => self.complain("MODEM", 4, "Busy", now),
             "CCCYC" => self.on_cycle_command(sentence, now),
@@ -207,6 +212,7 @@ impl Micromodem {
         }
         self.awake = false;
         self.cycle = None;
+        self.detected.clear();
         self.air = Air::default();
         self.collector = Collector::default();
         self.agenda = Agenda::new();
@@ -226,6 +232,11 @@ impl Emulator for Micromodem {
 
     fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
         self.port.poll_output(now)
+    }
+
+    fn handle_onset(&mut self, onset: &Onset, now: Duration) {
+        self.handle_timeout(now);
+        self.on_onset(onset, now);
     }
 
     fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {

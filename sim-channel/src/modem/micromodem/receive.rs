@@ -5,7 +5,7 @@ use super::rates::{FSK_MINI, PSK_MINI};
 use super::sentence::to_hex;
 use super::transmit::Outgoing;
 use super::{Event, Micromodem};
-use crate::{Arrival, Duration, LossReason, Outcome};
+use crate::{Arrival, Duration, LossReason, Onset, Outcome};
 
 /// Demodulation and decoding after the end of a packet.
 const DECODING: Duration = Duration::from_millis(200);
@@ -31,36 +31,56 @@ impl Signal {
 }
 
 impl Micromodem {
-    pub(super) fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
-        if !self.awake {
-            return;
+    /// The beginning of a packet.
+    pub(super) fn on_onset(&mut self, onset: &Onset, now: Duration) {
+        let packet = Packet::decode(&onset.bytes);
+        if self.awake && packet.as_ref().is_none_or(|packet| self.notices(packet)) {
+            self.tell_detection(onset.transmission, packet.is_none_or(|packet| packet.is_psk()), now);
         }
+    }
+
+    /// PSK packets of another header version and pings of others go by unnoticed.
+    fn notices(&self, packet: &Packet) -> bool {
+        let header_version = u8::from(self.nvram.is_on("psk.packet.mod_hdr_version"));
+        let foreign = packet.is_psk() && packet.header_version != header_version;
+        let private = matches!(packet.kind, Kind::Ping | Kind::PingReply) && packet.dst != self.address();
+        !foreign && !private
+    }
+
+    pub(super) fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
+        if self.awake {
+            self.hear_end(arrival, now);
+            self.detected.remove(&arrival.transmission);
+        }
+    }
+
+    fn hear_end(&mut self, arrival: &Arrival, now: Duration) {
         let signal = Signal::of(arrival);
         let packet = match &arrival.outcome {
             Outcome::Delivered { bytes, .. } => Packet::decode(bytes),
             Outcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => None,
             Outcome::Lost { .. } => return,
         };
-        let Some(packet) = packet else { return self.tell_timeout(&signal, now) };
-        let header_version = u8::from(self.nvram.is_on("psk.packet.mod_hdr_version"));
-        let foreign = packet.is_psk() && packet.header_version != header_version;
-        let private = matches!(packet.kind, Kind::Ping | Kind::PingReply) && packet.dst != self.address();
-        if foreign || private {
-            return;
+        match packet {
+            None => self.tell_timeout(arrival.transmission, &signal, now),
+            Some(packet) if self.notices(&packet) => {
+                self.tell_detection(arrival.transmission, packet.is_psk(), now);
+                self.agenda.add(now + DECODING, Event::Received(Box::new((packet, signal))));
+            }
+            Some(_) => {}
         }
-        self.tell_detection(packet.is_psk(), now);
-        self.agenda.add(now + DECODING, Event::Received(Box::new((packet, signal))));
     }
 
-    fn tell_detection(&mut self, psk: bool, now: Duration) {
-        if self.nvram.is_on("RXP") {
+    /// `CARXP`, once for a transmission.
+    fn tell_detection(&mut self, transmission: u64, psk: bool, now: Duration) {
+        if self.detected.insert(transmission) && self.nvram.is_on("RXP") {
             self.tell(&format!("CARXP,{}", u8::from(psk)), now);
         }
     }
 
     /// A packet was detected and never understood; its statistics line is short.
-    fn tell_timeout(&mut self, signal: &Signal, now: Duration) {
-        self.tell_detection(true, now);
+    fn tell_timeout(&mut self, transmission: u64, signal: &Signal, now: Duration) {
+        self.tell_detection(transmission, true, now);
         self.tell("CAMSG,PACKET_TIMEOUT,0", now);
         if self.nvram.is_on("CST") {
             let arrived = self.clock.compact(signal.began);

@@ -24,7 +24,7 @@ use super::agenda::Agenda;
 use super::port::Port;
 use super::{Emulator, Fault, ModemEvent, Transmission};
 use crate::usbl::UsblHead;
-use crate::{Arrival, Duration, Stream};
+use crate::{Arrival, Duration, Onset, Stream};
 use air::{After, Air};
 use burst::Burst;
 use frame::Frame;
@@ -33,7 +33,7 @@ use instant::{InstantSlot, Piggyback, Synchronous};
 use reception::{LastHeard, Signal};
 use reply::Mode;
 use settings::Settings;
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use usbl_lines::Measured;
 
 /// An emulated S2C modem with one port.
@@ -58,6 +58,8 @@ pub struct S2c {
     synchronous_number: u64,
     piggyback: Option<Piggyback>,
     burst: Burst,
+    /// Transmissions whose beginning was told.
+    begun: BTreeSet<u64>,
     last: LastHeard,
     head: Option<UsblHead>,
     last_fix: Option<Measured>,
@@ -126,6 +128,7 @@ impl S2c {
             synchronous_number: 0,
             piggyback: None,
             burst: Burst::default(),
+            begun: BTreeSet::new(),
             last: LastHeard::default(),
             head: config.usbl.map(|usbl| UsblHead::new(usbl, config.seed)),
             last_fix: None,
@@ -211,6 +214,11 @@ impl Emulator for S2c {
 
     fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
         self.port.poll_output(now)
+    }
+
+    fn handle_onset(&mut self, onset: &Onset, now: Duration) {
+        self.handle_timeout(now);
+        self.on_onset(onset, now);
     }
 
     fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {

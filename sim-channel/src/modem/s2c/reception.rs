@@ -5,7 +5,7 @@ use super::config::Interpreter;
 use super::frame::{Frame, Kind};
 use super::send_command::Flag;
 use super::{Event, Physical, S2c, timing};
-use crate::{Arrival, Duration, LossReason, Outcome, Position};
+use crate::{Arrival, Duration, LossReason, Onset, Outcome, Position};
 
 /// Bit of an instant message's number that says that it opens a turn.
 const IN_TURN: u32 = 0x100;
@@ -53,34 +53,56 @@ impl Signal {
 }
 
 impl S2c {
+    /// The beginning of a signal; one of another network is not noticed.
+    pub(super) fn on_onset(&mut self, onset: &Onset, now: Duration) {
+        let foreign = Frame::decode(&onset.bytes).is_some_and(|frame| !self.network().hears(&frame.network));
+        if !self.booting && self.physical == Physical::Listen && !foreign {
+            self.tell_start(onset.transmission, now);
+        }
+    }
+
+    /// `RECVSTART`, once for a transmission.
+    fn tell_start(&mut self, transmission: u64, now: Duration) {
+        if self.begun.insert(transmission) {
+            self.notify_extended("RECVSTART", now);
+        }
+    }
+
     /// The end of a reception at this modem.
     pub(super) fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
         if self.booting || self.physical != Physical::Listen {
             return;
         }
+        self.hear_end(arrival, now);
+        self.begun.remove(&arrival.transmission);
+    }
+
+    fn hear_end(&mut self, arrival: &Arrival, now: Duration) {
         let signal = Signal::of(arrival);
         match &arrival.outcome {
-            Outcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => self.tell_failure(&signal, now),
+            Outcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => {
+                self.tell_failure(arrival.transmission, &signal, now);
+            }
             Outcome::Lost { .. } => {}
             Outcome::Delivered { bytes, .. } => match Frame::decode(bytes) {
-                None => self.tell_failure(&signal, now),
+                None => self.tell_failure(arrival.transmission, &signal, now),
                 Some(frame) if !self.network().hears(&frame.network) => {}
                 Some(frame) => {
-                    self.tell_end(&signal, now);
+                    self.tell_end(arrival.transmission, &signal, now);
                     self.agenda.add(now + timing::PROCESSING, Event::Heard(Box::new((frame, signal))));
                 }
             },
         }
     }
 
-    fn tell_failure(&mut self, signal: &Signal, now: Duration) {
-        self.notify_extended("RECVSTART", now);
+    fn tell_failure(&mut self, transmission: u64, signal: &Signal, now: Duration) {
+        self.tell_start(transmission, now);
         self.notify_extended(format!("RECVFAILED,{VELOCITY},{},{}", signal.rssi, signal.integrity / 3), now);
     }
 
-    fn tell_end(&mut self, signal: &Signal, now: Duration) {
+    fn tell_end(&mut self, transmission: u64, signal: &Signal, now: Duration) {
         let clock = self.clock_us(signal.heard_at.saturating_sub(signal.airtime));
-        self.notify_extended("RECVSTART", now);
+        self.tell_start(transmission, now);
         let us = signal.airtime.as_micros();
         self.notify_extended(format!("RECVEND,{clock},{us},{},{}", signal.rssi, signal.integrity), now);
     }
