@@ -11,6 +11,8 @@ mod basin;
 mod bench;
 mod crc;
 mod fault;
+#[cfg(test)]
+mod flood;
 pub mod micromodem;
 mod port;
 pub mod s2c;

@@ -5,6 +5,7 @@ use super::sender::Sender;
 use crate::Duration;
 use crate::modem::s2c::S2c;
 use crate::modem::s2c::air::Outgoing;
+use crate::modem::s2c::reception::Signal;
 
 /// Where the acoustic connection stands.
 #[derive(Debug, Default)]
@@ -33,6 +34,8 @@ pub(in super::super) struct Connection {
     pub silent: u32,
     /// One way, from the last frame heard of the peer.
     pub travel: Duration,
+    /// When the peer was last heard.
+    pub heard_at: Duration,
     /// Acknowledgements that wait for this modem's turn.
     pub deferred: Vec<Outgoing>,
 }
@@ -75,7 +78,7 @@ impl Link {
 }
 
 impl Connection {
-    pub(in super::super) fn new(peer: u8, session: u8, initiator: bool, travel: Duration, number: u32) -> Self {
+    pub(in super::super) fn new(peer: u8, session: u8, initiator: bool, signal: &Signal, number: u32) -> Self {
         Self {
             peer,
             session,
@@ -85,7 +88,8 @@ impl Connection {
             turn: if initiator { Turn::Talking } else { Turn::Listening },
             number,
             silent: 0,
-            travel,
+            travel: signal.travel,
+            heard_at: signal.heard_at,
             deferred: Vec::new(),
         }
     }

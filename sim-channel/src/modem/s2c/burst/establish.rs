@@ -7,6 +7,9 @@ use crate::modem::s2c::frame::{Frame, Kind};
 use crate::modem::s2c::reception::Signal;
 use crate::modem::s2c::{Event, Physical, S2c, timing};
 
+/// A connection whose peer was silent for so long does not keep others out.
+const STALE: Duration = Duration::from_secs(15);
+
 impl S2c {
     /// Looks whether burst data waits and something can be done for it.
     pub(in super::super) fn kick(&mut self, now: Duration) {
@@ -64,7 +67,7 @@ impl S2c {
         match &self.burst.link {
             Link::Establishing { peer, .. } if *peer == frame.src && self.address() > frame.src => return,
             Link::Establishing { peer, .. } if *peer != frame.src => return,
-            Link::Online(connection) if connection.peer != frame.src => return,
+            Link::Online(connection) if connection.peer != frame.src && now < connection.heard_at + STALE => return,
             _ => {}
         }
         self.requeue();
@@ -88,7 +91,7 @@ impl S2c {
 
     fn connect(&mut self, peer: u8, session: u8, initiator: bool, signal: &Signal, now: Duration) {
         self.burst.epoch += 1;
-        let connection = Connection::new(peer, session, initiator, signal.travel, self.burst.epoch);
+        let connection = Connection::new(peer, session, initiator, signal, self.burst.epoch);
         self.burst.link = Link::Online(Box::new(connection));
         let rate = self.config.bit_rate;
         self.notify_extended(format!("BITRATE,local,{rate}"), now);

@@ -177,6 +177,7 @@ impl S2c {
         let Some(connection) = self.burst.link.connection_mut().filter(ours) else { return false };
         connection.silent = 0;
         connection.travel = signal.travel;
+        connection.heard_at = signal.heard_at;
         true
     }
 
