@@ -23,6 +23,7 @@ use clock::Clock;
 use cycle::Cycle;
 use nvram::Nvram;
 use packet::Packet;
+use rates::Rate;
 use receive::Signal;
 use sentence::{Collector, Line, Sentence, line};
 use std::collections::{BTreeSet, VecDeque};
@@ -54,6 +55,14 @@ impl MicromodemConfig {
             seed: u64::from(address),
         }
     }
+}
+
+/// Air time of a packet of `frames` at a rate, for schedules and budgets; `None` for a rate above 6 or frames that do not
+/// fit.
+///
+/// Source: fixed time for each frame, from packet sizes and nominal bit rates in a band of 5 kHz.
+pub fn packet_airtime(rate: u8, frames: u8) -> Option<Duration> {
+    Rate::of(rate).filter(|rate| (1..=rate.max_frames).contains(&frames)).map(|rate| rate.airtime(frames))
 }
 
 /// An emulated Micromodem.

@@ -170,7 +170,7 @@ impl S2c {
     fn store(&mut self, name: &str) -> Answer {
         match name {
             "&W" => self.stored = self.settings.clone(),
-            "&F" => self.settings = super::settings::Settings::factory(self.config.address),
+            "&F" => self.settings = super::settings::Settings::factory(self.config.address, self.config.remote),
             "&V" => return Answer::Lines(self.all_settings()),
             _ => return "ERROR UNKNOWN COMMAND".into(),
         }

@@ -16,6 +16,8 @@ pub enum Interpreter {
 pub struct S2cConfig {
     /// Local address after the first start, 1..=254.
     pub address: u8,
+    /// Remote address of raw data after the first start, 0..=254; 0 for none.
+    pub remote: u8,
     /// The interpreter of the port.
     pub interpreter: Interpreter,
     /// Baud rate, 8N1; `None` for TCP.
@@ -41,6 +43,7 @@ impl S2cConfig {
     pub fn new(address: u8) -> Self {
         Self {
             address,
+            remote: 0,
             interpreter: Interpreter::Net,
             baud: Some(19_200),
             bit_rate: 13_000,

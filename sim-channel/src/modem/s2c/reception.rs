@@ -70,10 +70,9 @@ impl S2c {
 
     /// The end of a reception at this modem.
     pub(super) fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
-        if self.booting || self.physical != Physical::Listen {
-            return;
+        if !self.booting && self.physical == Physical::Listen {
+            self.hear_end(arrival, now);
         }
-        self.hear_end(arrival, now);
         self.begun.remove(&arrival.transmission);
     }
 

@@ -61,10 +61,11 @@ pub(super) struct Settings {
 }
 
 impl Settings {
-    /// The factory's values, but for the address.
-    pub(super) fn factory(address: u8) -> Self {
+    /// The factory's values, but for the local and the remote address.
+    pub(super) fn factory(address: u8, remote: u8) -> Self {
         let mut values: BTreeMap<_, _> = RULES.iter().map(|rule| (rule.key, rule.default)).collect();
         values.insert("AL", u32::from(address));
+        values.insert("AR", u32::from(remote));
         Self { values, pending: BTreeMap::new(), pool: 16_384 }
     }
 
@@ -113,7 +114,7 @@ mod tests {
 
     #[test]
     fn ranges_are_kept() {
-        let mut settings = Settings::factory(7);
+        let mut settings = Settings::factory(7, 0);
         assert_eq!(settings.get("AL"), 7);
         assert_eq!(settings.set("L", "4", false), Err(Refusal::OutOfRange));
         assert_eq!(settings.set("AM", "15", false), Err(Refusal::OutOfRange));
@@ -126,7 +127,7 @@ mod tests {
 
     #[test]
     fn what_waits_is_marked_until_it_takes_effect() {
-        let mut settings = Settings::factory(1);
+        let mut settings = Settings::factory(1, 0);
         assert_eq!(settings.set("ZP", "765", true), Ok(false));
         assert_eq!((settings.get("ZP"), settings.told("ZP")), (750, Some("[*]765".to_string())));
         settings.apply_pending();

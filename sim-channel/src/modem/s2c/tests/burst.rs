@@ -193,6 +193,30 @@ fn raw_data_crosses_between_ports_in_data_mode() {
 }
 
 #[test]
+fn a_line_driver_needs_only_a_stored_remote_address() {
+    let port = |address, remote| S2cConfig { interpreter: Interpreter::At, remote, ..S2cConfig::new(address) };
+    let mut bench = Bench::of(vec![port(1, 2), port(2, 1)], KILOMETRE, ChannelConfig::default());
+    assert_eq!(bench.ask(1, "+++ATZ4\r"), "+++ATZ4:2:OK\r\n");
+    bench.write(1, b"#M01, first line\r\n");
+    bench.run(10 * SECOND);
+    assert_eq!(bench.take(2), "#M01, first line\r\n");
+}
+
+#[test]
+fn a_dead_connection_keeps_nobody_out() {
+    let modems = (1..=3).map(|address| S2cConfig { baud: None, ..S2cConfig::new(address) }).collect();
+    let mut bench = Bench::of(modems, KILOMETRE, ChannelConfig::default());
+    push(&mut bench, 1, 2, b'x', 100);
+    bench.run(8 * SECOND);
+    bench.basin.channel().remove(NodeId(1));
+    bench.run(20 * SECOND);
+    bench.take(2);
+    push(&mut bench, 3, 2, b'y', 100);
+    bench.run(15 * SECOND);
+    assert_eq!(received_bytes(&bench.take(2)), 100);
+}
+
+#[test]
 fn dropping_data_empties_the_pool() {
     let mut bench = Bench::new(2, KILOMETRE, ChannelConfig::default());
     push(&mut bench, 1, 9, b'x', 100);
