@@ -1,4 +1,4 @@
-//! The modem's calendar clock, in the three spellings of its sentences.
+//! The modem's calendar clock, in the spellings of its sentences.
 
 use crate::Duration;
 
@@ -43,6 +43,12 @@ impl Clock {
         format!("{:02}{:02}{:02}", c.hour, c.minute, c.second)
     }
 
+    /// `HHMMSS.ffff`, as in `CACST` without version.
+    pub(super) fn hhmmss_fraction(&self, now: Duration) -> String {
+        let (_, us) = self.at(now);
+        format!("{}.{:04}", self.hhmmss(now), us / 100)
+    }
+
     /// `YYYYMMDDHHMMSS.ffffff`, as in version 6 of `CACST`.
     pub(super) fn compact(&self, now: Duration) -> String {
         let (c, us) = self.at(now);
@@ -51,9 +57,8 @@ impl Clock {
 
     /// `YYYYMMDD,HHMMSS.ffff`, as in `CAXST`.
     pub(super) fn date_and_time(&self, now: Duration) -> String {
-        let (c, us) = self.at(now);
-        let date = format!("{:04}{:02}{:02}", c.year, c.month, c.day);
-        format!("{date},{:02}{:02}{:02}.{:04}", c.hour, c.minute, c.second, us / 100)
+        let (c, _) = self.at(now);
+        format!("{:04}{:02}{:02},{}", c.year, c.month, c.day, self.hhmmss_fraction(now))
     }
 
     /// `YYYY-MM-DDTHH:MM:SSZ`

@@ -2,7 +2,7 @@
 
 use super::clock::Civil;
 use super::sentence::Sentence;
-use super::{Event, Micromodem};
+use super::{Event, Generation, Micromodem};
 use crate::Duration;
 
 impl Micromodem {
@@ -45,7 +45,7 @@ impl Micromodem {
     /// `$CCCFQ,<name>`, or `ALL`, or `TOP`.
     fn on_configuration_query(&mut self, sentence: &Sentence, now: Duration) {
         let name = sentence.text(0);
-        if name == "ALL" || name == "TOP" {
+        if name == "ALL" || (name == "TOP" && self.config.generation == Generation::Two) {
             let all: Vec<_> = self.nvram.all().map(|(name, value)| format!("CACFG,{name},{value}")).collect();
             all.iter().for_each(|line| self.tell(line, now));
             return;

@@ -1,4 +1,4 @@
-//! WHOI Micromodem 2: NMEA sentences over an emulated acoustic layer.
+//! WHOI Micromodem 1 and 2: NMEA sentences over an emulated acoustic layer.
 //!
 //! Cycle inits, data at rates 0 to 6, acknowledgements, flexible data, pings, user minipackets, statistics of version 6,
 //! configuration, clock and reboot, in the sequences that fielded drivers wait for.
@@ -29,9 +29,20 @@ use sentence::{Collector, Line, Sentence, line};
 use std::collections::{BTreeSet, VecDeque};
 use transmit::{Air, Sent};
 
+/// Which of the two Micromodems.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Generation {
+    /// Statistics without version; no flexible data, no `CCTMS`, `CCTMQ`, `CCALQ`.
+    One,
+    /// Statistics of version 6.
+    Two,
+}
+
 /// The make of an emulated Micromodem.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MicromodemConfig {
+    /// The sentences it knows and the layout of its statistics.
+    pub generation: Generation,
     /// `SRC` after the first start; 0 for one that was never set and so never acknowledges.
     pub address: u8,
     /// Baud rate, 8N1; `None` without pacing. At 19200 rate 5 cannot be kept fed.
@@ -45,15 +56,21 @@ pub struct MicromodemConfig {
 }
 
 impl MicromodemConfig {
-    /// A modem of that address at 19200 baud, its clock at the start of 2025.
+    /// A Micromodem 2 of that address at 19200 baud, its clock at the start of 2025.
     pub fn new(address: u8) -> Self {
         Self {
+            generation: Generation::Two,
             address,
             baud: Some(19_200),
             unix_s: 1_735_689_600,
             version: "2.0.27087".to_string(),
             seed: u64::from(address),
         }
+    }
+
+    /// A Micromodem 1 of that address, otherwise the same.
+    pub fn first_generation(address: u8) -> Self {
+        Self { generation: Generation::One, version: "0.94.0.04".to_string(), ..Self::new(address) }
     }
 }
 
@@ -174,6 +191,10 @@ impl Micromodem {
 
     fn on_sentence(&mut self, sentence: &Sentence, now: Duration) {
         let busy = now < self.busy_until || self.air.queue.len() >= QUEUE_LIMIT;
+        let newer = matches!(sentence.name.as_str(), "CCTDP" | "CCTMS" | "CCTMQ" | "CCALQ");
+        if newer && self.config.generation == Generation::One {
+            return self.complain("NMEA", 1, "Unknown command", now);
+        }
         match sentence.name.as_str() {
             "CCCYC" | "CCTDP" | "CCMPC" | "CCMUC" if busy => self.complain("MODEM", 4, "Busy", now),
             "CCCYC" => self.on_cycle_command(sentence, now),

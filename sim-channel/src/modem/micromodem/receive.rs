@@ -4,7 +4,7 @@ use super::packet::{Kind, Packet};
 use super::rates::{FSK_MINI, PSK_MINI};
 use super::sentence::to_hex;
 use super::transmit::Outgoing;
-use super::{Event, Micromodem};
+use super::{Event, Generation, Micromodem};
 use crate::{Arrival, Duration, LossReason, Onset, Outcome};
 
 /// Demodulation and decoding after the end of a packet.
@@ -83,8 +83,8 @@ impl Micromodem {
         self.tell_detection(transmission, true, now);
         self.tell("CAMSG,PACKET_TIMEOUT,0", now);
         if self.nvram.is_on("CST") {
-            let arrived = self.clock.compact(signal.began);
-            self.tell(&format!("CACST,6,2,{arrived}"), now);
+            let (version, arrived) = (self.statistics_version(), self.arrival_time(signal.began));
+            self.tell(&format!("CACST,{version}2,{arrived}"), now);
         }
     }
 
@@ -176,12 +176,24 @@ impl Micromodem {
         });
     }
 
-    /// `CACST`, version 6: every reception has one, and it comes last.
+    /// The field that tells the layout of statistics, which a Micromodem 1 does not have.
+    pub(super) fn statistics_version(&self) -> &'static str {
+        if self.config.generation == Generation::One { "" } else { "6," }
+    }
+
+    fn arrival_time(&self, at: Duration) -> String {
+        match self.config.generation {
+            Generation::One => self.clock.hhmmss_fraction(at),
+            Generation::Two => self.clock.compact(at),
+        }
+    }
+
+    /// `CACST`: every reception has one, and it comes last.
     pub(super) fn tell_statistics(&mut self, packet: &Packet, signal: &Signal, packet_type: u8, now: Duration) {
         if !self.nvram.is_on("CST") {
             return;
         }
-        let arrived = self.clock.compact(signal.began);
+        let (version, arrived) = (self.statistics_version(), self.arrival_time(signal.began));
         let Packet { src, dst, rate, .. } = packet;
         let bad = packet.frames.iter().filter(|frame| frame.is_none()).count();
         let frames = if packet.kind == Kind::CycleInit { 0 } else { packet.frames.len() };
@@ -192,7 +204,7 @@ impl Micromodem {
         let (carrier, bandwidth) = (self.nvram.number("FC0"), self.nvram.number("BW0"));
         self.tell(
             &format!(
-                "CACST,6,0,{arrived},{detector},{rate},{src:03},{dst:03},{psk_error},{packet_type},{frames},{bad},{quality},{carrier},{bandwidth}"
+                "CACST,{version}0,{arrived},{detector},{rate},{src:03},{dst:03},{psk_error},{packet_type},{frames},{bad},{quality},{carrier},{bandwidth}"
             ),
             now,
         );

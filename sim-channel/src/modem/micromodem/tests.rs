@@ -166,6 +166,29 @@ fn goby_starts_up() {
 }
 
 #[test]
+fn the_first_generation_tells_statistics_without_version() {
+    let modem = |address| MicromodemConfig { baud: None, ..MicromodemConfig::first_generation(address) };
+    let boxed = |address| (address, Box::new(Micromodem::new(modem(address))) as Box<dyn Emulator>);
+    let mut bench = Bench::join((1..=2).map(boxed).collect(), 1500.0, ChannelConfig::default());
+    ask(&mut bench, 1, "CCCYC,0,1,2,2,0,1");
+    ask(&mut bench, 1, "CCTXD,1,2,0,01");
+    bench.run(10 * SECOND);
+    assert!(bodies(&mut bench, 1)[1].starts_with("CAXST,20250101,0000"));
+    let told = bodies(&mut bench, 2);
+    let fields: Vec<_> = told.last().expect("statistics").split(',').skip(1).collect();
+    assert_eq!((fields.len(), fields[0]), (29, "0"));
+    assert_eq!((fields[1].len(), &fields[1][..4]), (11, "0000"));
+    assert_eq!(fields[12..18], ["2", "001", "002", "0", "3", "1"]);
+    for newer in ["CCTMS,2025-06-06T23:01:03Z,0", "CCTDP,2,1,0,0,00", "CCFQ,TOP", "CCALQ,0"] {
+        assert!(ask(&mut bench, 1, newer)[0].contains(",NMEA,"), "{newer}");
+    }
+    assert_eq!(ask(&mut bench, 1, "CCCLK,2025,06,06,23,01,03"), ["CACLK,2025,06,06,23,01,03"]);
+    bench.write(1, b"$CCMSC,1,1,0\r\n");
+    bench.run(2 * SECOND);
+    assert!(bodies(&mut bench, 1)[2].ends_with(",AUV,0.94.0.04"));
+}
+
+#[test]
 fn a_ping_tells_the_travel_time() {
     let mut bench = bench(2);
     assert_eq!(ask(&mut bench, 1, "CCMPC,1,2"), ["CAMPC,1,2", "CATXP,0"]);

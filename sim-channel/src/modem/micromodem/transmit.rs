@@ -67,19 +67,20 @@ impl Micromodem {
         }
     }
 
-    /// `CAXST`, version 6.
+    /// `CAXST`, version 6; without the version on a Micromodem 1.
     fn tell_transmit_statistics(&mut self, sent: &Sent, now: Duration) {
         const CLOCK_MODE: u8 = 6;
         const GOOD: u8 = 0;
         const PROBE: u32 = 200;
         let Outgoing { packet, bytes, packet_type, expected, .. } = &sent.out;
         let when = self.clock.date_and_time(sent.began);
+        let version = self.statistics_version();
         let (bandwidth, carrier) = (self.nvram.number("BW0"), self.nvram.number("FC0"));
         let route = format!("{},{},{},{}", packet.rate, packet.src, packet.dst, u8::from(packet.ack));
         let frames = packet.frames.len();
         self.tell(
             &format!(
-                "CAXST,6,{when},{CLOCK_MODE},{GOOD},{PROBE},{bandwidth},{carrier},{route},{expected},{frames},{packet_type},{bytes}"
+                "CAXST,{version}{when},{CLOCK_MODE},{GOOD},{PROBE},{bandwidth},{carrier},{route},{expected},{frames},{packet_type},{bytes}"
             ),
             now,
         );
