@@ -1,13 +1,14 @@
 //! Modems in one water: moves bytes between emulators and channel in order of time.
 
 use super::{Emulator, Fault, ModemEvent};
-use crate::{Channel, Duration, NodeId};
+use crate::{Channel, Duration, NodeId, Talker};
 use std::collections::BTreeMap;
 
 /// A channel and the emulated modems in it.
 pub struct Basin {
     channel: Channel,
     modems: BTreeMap<NodeId, Box<dyn Emulator>>,
+    talkers: Vec<Talker>,
     on_air: BTreeMap<NodeId, u64>,
     hung_up: Vec<NodeId>,
     now: Duration,
@@ -17,12 +18,24 @@ impl Basin {
     /// The water alone; place nodes in the channel before their modems speak.
     pub fn new(mut channel: Channel) -> Self {
         channel.tell_onsets();
-        Self { channel, modems: BTreeMap::new(), on_air: BTreeMap::new(), hung_up: Vec::new(), now: Duration::ZERO }
+        Self {
+            channel,
+            modems: BTreeMap::new(),
+            talkers: Vec::new(),
+            on_air: BTreeMap::new(),
+            hung_up: Vec::new(),
+            now: Duration::ZERO,
+        }
     }
 
     /// Adds the modem of a node, replacing the one it had.
     pub fn add(&mut self, node: NodeId, modem: Box<dyn Emulator>) {
         self.modems.insert(node, modem);
+    }
+
+    /// Adds a stranger who talks at random and understands nobody; place its node in the channel.
+    pub fn add_talker(&mut self, talker: Talker) {
+        self.talkers.push(talker);
     }
 
     /// The water, to move nodes or to change its conditions.
@@ -87,12 +100,19 @@ impl Basin {
 
     /// When a modem or the water has something to do.
     fn next_due(&self) -> Option<Duration> {
-        self.modems.values().filter_map(|modem| modem.poll_timeout()).chain(self.channel.poll_timeout()).min()
+        let talkers = self.talkers.iter().filter_map(Talker::poll_timeout);
+        let modems = self.modems.values().filter_map(|modem| modem.poll_timeout());
+        modems.chain(self.channel.poll_timeout()).chain(talkers).min()
     }
 
     /// Does everything that is due at `now`, until nothing is.
     fn settle(&mut self, now: Duration) {
         self.now = self.now.max(now);
+        for talker in &mut self.talkers {
+            if let Some((bytes, airtime)) = talker.poll_transmit(now) {
+                self.channel.transmit(talker.node(), bytes, airtime, now);
+            }
+        }
         loop {
             let mut quiet = true;
             while let Some(onset) = self.channel.poll_onset(now) {

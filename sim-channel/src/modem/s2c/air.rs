@@ -23,9 +23,9 @@ pub(super) enum After {
     /// The instant message of that number has been sent.
     Instant(u8),
     /// The train or probe of that turn has been sent.
-    Train(u32),
+    Train(u64),
     /// An acknowledgement that ends that turn has been sent.
-    Acknowledged(u32),
+    Acknowledged(u64),
     /// A connection request of that epoch has been sent.
     Request(u32),
     /// The connection is over.

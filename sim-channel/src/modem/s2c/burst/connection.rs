@@ -28,8 +28,8 @@ pub(in super::super) struct Connection {
     pub sender: Sender,
     pub receiver: Receiver,
     pub turn: Turn,
-    /// Counts changes of the turn, so that old timers are told from the present one.
-    pub number: u32,
+    /// Counts changes of the turn, from another start in each connection, so that old timers are told from the present.
+    pub number: u64,
     /// Trains and probes in a row that nobody answered.
     pub silent: u32,
     /// One way, from the last frame heard of the peer.
@@ -78,7 +78,7 @@ impl Link {
 }
 
 impl Connection {
-    pub(in super::super) fn new(peer: u8, session: u8, initiator: bool, signal: &Signal, number: u32) -> Self {
+    pub(in super::super) fn new(peer: u8, session: u8, initiator: bool, signal: &Signal, number: u64) -> Self {
         Self {
             peer,
             session,

@@ -91,7 +91,7 @@ impl S2c {
 
     fn connect(&mut self, peer: u8, session: u8, initiator: bool, signal: &Signal, now: Duration) {
         self.burst.epoch += 1;
-        let connection = Connection::new(peer, session, initiator, signal, self.burst.epoch);
+        let connection = Connection::new(peer, session, initiator, signal, u64::from(self.burst.epoch) << 32);
         self.burst.link = Link::Online(Box::new(connection));
         let rate = self.config.bit_rate;
         self.notify_extended(format!("BITRATE,local,{rate}"), now);

@@ -21,7 +21,7 @@ impl S2c {
     }
 
     /// It is this modem's turn.
-    pub(in super::super) fn on_turn(&mut self, number: u32, owes: bool, now: Duration) {
+    pub(in super::super) fn on_turn(&mut self, number: u64, owes: bool, now: Duration) {
         let trains = self.settings.get("ZC") as usize;
         if self.burst.link.connection().is_some_and(|connection| connection.number == number) {
             self.take_turn(owes, trains, now);
@@ -68,7 +68,7 @@ impl S2c {
     }
 
     /// Our acknowledgement has been sent, with nothing after it: the peer may go on, else both rest.
-    pub(in super::super) fn on_acknowledgement_sent(&mut self, number: u32, now: Duration) {
+    pub(in super::super) fn on_acknowledgement_sent(&mut self, number: u64, now: Duration) {
         if let Some(connection) = self.burst.link.connection_mut().filter(|connection| connection.number == number) {
             connection.turn = Turn::Listening;
             connection.number += 1;
@@ -78,7 +78,7 @@ impl S2c {
     }
 
     /// The peer did not go on.
-    pub(in super::super) fn on_rest(&mut self, number: u32, now: Duration) {
+    pub(in super::super) fn on_rest(&mut self, number: u64, now: Duration) {
         if self.burst.link.connection().is_some_and(|connection| connection.number == number) {
             self.rest(now);
         }
@@ -101,7 +101,7 @@ impl S2c {
     }
 
     /// The idle time has passed without a turn.
-    pub(in super::super) fn on_idle(&mut self, number: u32) {
+    pub(in super::super) fn on_idle(&mut self, number: u64) {
         let idle = |connection: &&Connection| connection.number == number && connection.turn == Turn::Idle;
         if self.burst.link.connection().filter(idle).is_some() {
             self.say_goodbye();
@@ -109,7 +109,7 @@ impl S2c {
     }
 
     /// The train, or a probe, has been sent: the peer owes an acknowledgement.
-    pub(in super::super) fn on_train_sent(&mut self, number: u32, now: Duration) {
+    pub(in super::super) fn on_train_sent(&mut self, number: u64, now: Duration) {
         let Some(connection) = self.burst.link.connection_mut().filter(|connection| connection.number == number) else {
             return;
         };
@@ -120,7 +120,7 @@ impl S2c {
     }
 
     /// The peer did not acknowledge: probe with one packet, or give the connection up.
-    pub(in super::super) fn on_answer_timeout(&mut self, number: u32, now: Duration) {
+    pub(in super::super) fn on_answer_timeout(&mut self, number: u64, now: Duration) {
         let patience = self.settings.get("RC").max(1);
         let Some(connection) = self.burst.link.connection_mut().filter(|connection| connection.number == number) else {
             return;

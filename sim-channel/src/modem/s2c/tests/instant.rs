@@ -3,7 +3,7 @@
 use super::bench::{Bench, SECOND, keywords};
 use crate::modem::s2c::S2cConfig;
 use crate::usbl::UsblConfig;
-use crate::{ChannelConfig, Duration, LossModel, NodeId, Outage};
+use crate::{ChannelConfig, Duration, LossModel, NodeId, Outage, Position, Talker};
 
 #[test]
 fn an_acknowledged_message_is_told_in_order_at_both_ends() {
@@ -114,6 +114,18 @@ fn a_lost_message_is_a_failed_reception() {
     bench.write(1, b"AT*SENDIM,2,2,noack,hi\r");
     bench.run(5 * SECOND);
     assert_eq!(bench.lines(2), ["RECVSTART", "RECVFAILED,0.0000,-52,59"]);
+}
+
+#[test]
+fn a_third_talker_is_noise() {
+    let mut bench = Bench::calm(2);
+    bench.ask(2, "AT@ZX1\r");
+    bench.basin.channel().place(NodeId(99), Position::new(100.0, 0.0, 0.0));
+    bench.basin.add_talker(Talker::new(NodeId(99), 20, SECOND, 5 * SECOND, 1));
+    bench.run(60 * SECOND);
+    let lines = bench.lines(2);
+    assert!(lines.len() > 10);
+    assert!(lines.iter().all(|line| line == "RECVSTART" || line.starts_with("RECVFAILED,")));
 }
 
 #[test]
