@@ -149,3 +149,14 @@ impl Basin {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_basin_may_live_on_another_thread() {
+        fn sendable<T: Send>() {}
+        sendable::<Basin>();
+    }
+}

@@ -20,19 +20,38 @@ pub mod transparent;
 
 pub use basin::Basin;
 pub use fault::Fault;
+pub use port::Port;
 
 use crate::{Arrival, Duration, Onset};
 
 /// An emulated modem.
 pub trait Emulator: Send {
+    /// The line to the host.
+    fn port(&self) -> &Port;
+
+    /// The line to the host.
+    fn port_mut(&mut self) -> &mut Port;
+
     /// Takes what the host wrote. What does not fit into `host_room` is lost, as on a line without flow control.
-    fn handle_host_bytes(&mut self, bytes: &[u8], now: Duration);
+    fn handle_host_bytes(&mut self, bytes: &[u8], now: Duration) {
+        self.port_mut().accept(bytes, now);
+        self.handle_timeout(now);
+    }
 
     /// How many bytes the host may write now.
-    fn host_room(&self) -> usize;
+    fn host_room(&self) -> usize {
+        self.port().room()
+    }
 
     /// What has reached the host by `now`, paced by the baud rate.
-    fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8>;
+    fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
+        self.port_mut().poll_output(now)
+    }
+
+    /// When `poll_host_bytes` has something to give.
+    fn poll_host_timeout(&self) -> Option<Duration> {
+        self.port().next_output()
+    }
 
     /// Takes the beginning of a signal at this modem. Without it the beginning is told together with the end.
     fn handle_onset(&mut self, onset: &Onset, now: Duration);
@@ -48,9 +67,6 @@ pub trait Emulator: Send {
 
     /// When `handle_timeout` has something to do.
     fn poll_timeout(&self) -> Option<Duration>;
-
-    /// When `poll_host_bytes` has something to give.
-    fn poll_host_timeout(&self) -> Option<Duration>;
 
     /// Lets time pass.
     fn handle_timeout(&mut self, now: Duration);

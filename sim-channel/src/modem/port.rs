@@ -1,5 +1,6 @@
 //! The line between host and modem: baud rate in both directions, and its faults.
 
+use super::Fault;
 use crate::{Duration, Stream};
 use std::collections::VecDeque;
 
@@ -10,8 +11,9 @@ const OUTPUT_LIMIT: usize = 1024 * 1024;
 /// So many bytes at a time reach the host, so that its reads split lines anywhere.
 const BURST: u32 = 16;
 
+/// A serial line or TCP connection as the modem has it: paced, bounded, and breakable.
 #[derive(Debug)]
-pub(super) struct Port {
+pub struct Port {
     byte_time: Duration,
     output: VecDeque<u8>,
     output_from: Duration,
@@ -92,17 +94,28 @@ impl Port {
         self.output.drain(..through).collect()
     }
 
-    pub(super) fn freeze(&mut self, until: Duration) {
+    fn freeze(&mut self, until: Duration) {
         self.frozen_until = self.frozen_until.max(until);
     }
 
+    /// Does those faults that are the line's own; true if this was one.
+    pub(super) fn inject(&mut self, fault: Fault, chance: &mut Stream, now: Duration) -> bool {
+        match fault {
+            Fault::Garbage(bytes) => self.garble(bytes, chance, now),
+            Fault::HalfLine => self.cut(),
+            Fault::Freeze(length) => self.freeze(now + length),
+            _ => return false,
+        }
+        true
+    }
+
     /// Drops the rear half of what waits for the host.
-    pub(super) fn cut(&mut self) {
+    fn cut(&mut self) {
         self.output.truncate(self.output.len() / 2);
     }
 
     /// Noise of the line.
-    pub(super) fn garble(&mut self, bytes: u16, chance: &mut Stream, now: Duration) {
+    fn garble(&mut self, bytes: u16, chance: &mut Stream, now: Duration) {
         let noise: Vec<u8> = (0..bytes).map(|_| chance.below(256) as u8).collect();
         self.write(&noise, now);
     }

@@ -130,17 +130,12 @@ impl Transparent {
 }
 
 impl Emulator for Transparent {
-    fn handle_host_bytes(&mut self, bytes: &[u8], now: Duration) {
-        self.port.accept(bytes, now);
-        self.handle_timeout(now);
+    fn port(&self) -> &Port {
+        &self.port
     }
 
-    fn host_room(&self) -> usize {
-        self.port.room()
-    }
-
-    fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
-        self.port.poll_output(now)
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
     }
 
     fn handle_onset(&mut self, _onset: &Onset, _now: Duration) {}
@@ -175,10 +170,6 @@ impl Emulator for Transparent {
         [self.agenda.next(), self.port.next_input()].into_iter().flatten().min()
     }
 
-    fn poll_host_timeout(&self) -> Option<Duration> {
-        self.port.next_output()
-    }
-
     fn handle_timeout(&mut self, now: Duration) {
         while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
             if let Some((_, Event::Look)) = self.agenda.pop(due) {
@@ -192,14 +183,16 @@ impl Emulator for Transparent {
     }
 
     fn inject(&mut self, fault: Fault, now: Duration) {
+        if self.port.inject(fault, &mut self.chance, now) {
+            return;
+        }
         match fault {
             Fault::Busy(length) => self.be_quiet(length, now),
             Fault::Reboot | Fault::BrownOut => self.reboot(now),
-            Fault::Garbage(bytes) => self.port.garble(bytes, &mut self.chance, now),
-            Fault::HalfLine => self.port.cut(),
-            Fault::Freeze(length) => self.port.freeze(now + length),
             // It has no address.
             Fault::WrongAddress(_) => {}
+            // Done by the port.
+            Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             Fault::BigBuffer => self.config.buffer_bytes = 1024 * 1024,
         }
     }

@@ -251,17 +251,12 @@ impl Micromodem {
 }
 
 impl Emulator for Micromodem {
-    fn handle_host_bytes(&mut self, bytes: &[u8], now: Duration) {
-        self.port.accept(bytes, now);
-        self.handle_timeout(now);
+    fn port(&self) -> &Port {
+        &self.port
     }
 
-    fn host_room(&self) -> usize {
-        self.port.room()
-    }
-
-    fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
-        self.port.poll_output(now)
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
     }
 
     fn handle_onset(&mut self, onset: &Onset, now: Duration) {
@@ -286,10 +281,6 @@ impl Emulator for Micromodem {
         [self.agenda.next(), self.port.next_input()].into_iter().flatten().min()
     }
 
-    fn poll_host_timeout(&self) -> Option<Duration> {
-        self.port.next_output()
-    }
-
     fn handle_timeout(&mut self, now: Duration) {
         while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
             if let Some((at, event)) = self.agenda.pop(due) {
@@ -301,6 +292,9 @@ impl Emulator for Micromodem {
     }
 
     fn inject(&mut self, fault: Fault, now: Duration) {
+        if self.port.inject(fault, &mut self.chance, now) {
+            return;
+        }
         match fault {
             Fault::Busy(length) => self.busy_until = now + length,
             Fault::Reboot => {
@@ -308,10 +302,9 @@ impl Emulator for Micromodem {
                 self.reboot(now);
             }
             Fault::BrownOut => self.reboot(now),
-            Fault::Garbage(bytes) => self.port.garble(bytes, &mut self.chance, now),
-            Fault::HalfLine => self.port.cut(),
-            Fault::Freeze(length) => self.port.freeze(now + length),
             Fault::WrongAddress(address) => self.nvram.set("SRC", &address.to_string()),
+            // Done by the port.
+            Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             // It asks for each frame and has no buffer that could be too big.
             Fault::BigBuffer => {}
         }

@@ -210,17 +210,12 @@ impl S2c {
 }
 
 impl Emulator for S2c {
-    fn handle_host_bytes(&mut self, bytes: &[u8], now: Duration) {
-        self.port.accept(bytes, now);
-        self.handle_timeout(now);
+    fn port(&self) -> &Port {
+        &self.port
     }
 
-    fn host_room(&self) -> usize {
-        self.port.room()
-    }
-
-    fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
-        self.port.poll_output(now)
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
     }
 
     fn handle_onset(&mut self, onset: &Onset, now: Duration) {
@@ -246,10 +241,6 @@ impl Emulator for S2c {
         [self.agenda.next(), self.port.next_input(), silence].into_iter().flatten().min()
     }
 
-    fn poll_host_timeout(&self) -> Option<Duration> {
-        self.port.next_output()
-    }
-
     fn handle_timeout(&mut self, now: Duration) {
         while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
             if let Some((at, event)) = self.agenda.pop(due) {
@@ -263,18 +254,20 @@ impl Emulator for S2c {
     }
 
     fn inject(&mut self, fault: Fault, now: Duration) {
+        if self.port.inject(fault, &mut self.chance, now) {
+            return;
+        }
         match fault {
             Fault::Busy(length) => self.busy_until = now + length,
             Fault::Reboot | Fault::BrownOut => self.reboot(now),
-            Fault::Garbage(bytes) => self.port.garble(bytes, &mut self.chance, now),
-            Fault::HalfLine => self.port.cut(),
-            Fault::Freeze(length) => self.port.freeze(now + length),
             Fault::WrongAddress(address) => {
                 for settings in [&mut self.settings, &mut self.stored] {
                     // An address out of range is none: the modem keeps its own.
                     let _ = settings.set("AL", &address.to_string(), false);
                 }
             }
+            // Done by the port.
+            Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             Fault::BigBuffer => self.settings.pool = 1024 * 1024,
         }
     }
