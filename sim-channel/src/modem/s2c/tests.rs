@@ -4,4 +4,5 @@ mod bench;
 mod burst;
 mod faults;
 mod instant;
+mod soak;
 mod start_up;
