@@ -103,7 +103,7 @@ pub fn exchange_time(question: Duration, turn_round: Duration, answer: Duration,
 /// Slant range in m, bearing clockwise from north and elevation above the horizontal in rad.
 fn polar(head: &Position, target: &Position) -> (f64, f64, f64) {
     let (east, north, down) = (target.x_m - head.x_m, target.y_m - head.y_m, target.z_m - head.z_m);
-    (head.range_m(target), east.atan2(north), (-down).atan2(east.hypot(north)))
+    (head.range_m(target), east.atan2(north), (0.0 - down).atan2(east.hypot(north)))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What a receiver learns of a transmission, and what only the simulator knows.
 
-use crate::{Duration, NodeId};
+use crate::{Duration, NodeId, Position};
+use std::sync::Arc;
 
 /// The end of one reception (or of its duplicate) at one receiver.
 #[derive(Clone, PartialEq, Debug)]
@@ -17,8 +18,31 @@ pub struct Arrival {
     pub sent_at: Duration,
     /// Slant range in metres when the transmission began.
     pub range_m: f64,
+    /// Where the sender was when the transmission began.
+    pub sender: Position,
+    /// Where the receiver was when the transmission began.
+    pub receiver: Position,
+    /// How long the signal took.
+    pub airtime: Duration,
     /// What came of it.
     pub outcome: Outcome,
+}
+
+/// A signal that begins to be heard, whatever becomes of it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Onset {
+    /// The number that `transmit` returned.
+    pub transmission: u64,
+    /// Who sent.
+    pub from: NodeId,
+    /// Who begins to hear.
+    pub to: NodeId,
+    /// Start of transmission plus propagation.
+    pub at: Duration,
+    /// How long it will last.
+    pub airtime: Duration,
+    /// What was sent; a receiver knows no more of it yet than that it is there.
+    pub bytes: Arc<Vec<u8>>,
 }
 
 /// Whether the bytes got through.

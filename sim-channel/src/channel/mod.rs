@@ -6,7 +6,7 @@ mod link;
 mod outage;
 mod reception;
 
-pub use arrival::{Arrival, LossReason, Outcome};
+pub use arrival::{Arrival, LossReason, Onset, Outcome};
 pub use config::ChannelConfig;
 pub use outage::{Outage, OutageScope};
 
@@ -32,6 +32,9 @@ pub struct Channel {
     on_air: BTreeMap<NodeId, Vec<Span>>,
     underway: BTreeMap<(Duration, u64), Reception>,
     ready: BTreeMap<(Duration, u64, u8), Arrival>,
+    /// Start and number of receptions whose onset is still to be told, and their end; only while somebody asks.
+    onsets: BTreeMap<(Duration, u64), Duration>,
+    tells_onsets: bool,
     transmissions: u64,
     receptions: u64,
 }
@@ -49,6 +52,8 @@ impl Channel {
             on_air: BTreeMap::new(),
             underway: BTreeMap::new(),
             ready: BTreeMap::new(),
+            onsets: BTreeMap::new(),
+            tells_onsets: false,
             transmissions: 0,
             receptions: 0,
         }
@@ -145,11 +150,46 @@ impl Channel {
         self.transmissions
     }
 
-    /// When the next arrival is complete; `None` if nothing is under way.
+    /// Ends a transmission in the middle: whoever has not yet received the whole of it loses it to noise, and its sender
+    /// falls silent at `now`.
+    pub fn cut_short(&mut self, transmission: u64, now: Duration) {
+        for reception in self.underway.values_mut().filter(|reception| reception.transmission == transmission) {
+            reception.cut_short(now);
+            if let Some(spans) = self.on_air.get_mut(&reception.from) {
+                spans.iter_mut().filter(|span| span.start == reception.sent_at).for_each(|span| span.end = now);
+            }
+        }
+    }
+
+    /// When the next arrival is complete, or the next onset to be told; `None` if nothing is under way.
     pub fn poll_timeout(&self) -> Option<Duration> {
         let underway = self.underway.keys().next().map(|(at, _)| *at);
         let ready = self.ready.keys().next().map(|(at, ..)| *at);
-        underway.into_iter().chain(ready).min()
+        let onset = self.onsets.keys().next().map(|(at, _)| *at);
+        [underway, ready, onset].into_iter().flatten().min()
+    }
+
+    /// From now on the beginnings of signals are told by `poll_onset`; they must be polled then.
+    pub fn tell_onsets(&mut self) {
+        self.tells_onsets = true;
+    }
+
+    /// The next signal that has begun by `now` at a receiver that is not deaf, in order of time.
+    pub fn poll_onset(&mut self, now: Duration) -> Option<Onset> {
+        while let Some(entry) = self.onsets.first_entry().filter(|entry| entry.key().0 <= now) {
+            let ((at, number), end) = entry.remove_entry();
+            if let Some(reception) = self.underway.get(&(end, number)).filter(|reception| !reception.self_deaf) {
+                return Some(Onset {
+                    transmission: reception.transmission,
+                    from: reception.from,
+                    to: reception.to,
+                    at,
+                    airtime: end.saturating_sub(at),
+                    bytes: Arc::clone(&reception.bytes),
+                });
+            }
+        }
+        None
     }
 
     /// The next arrival complete by `now`, in order of time; ties in order of transmission, receiver and copy.
@@ -197,6 +237,7 @@ impl Channel {
             transmission: self.transmissions,
             from,
             to,
+            places: [self.position(from), self.position(to)].map(Option::unwrap_or_default),
             span,
             sent_at: now,
             range_m,
@@ -218,6 +259,9 @@ impl Channel {
             old.collided |= new.audible();
         }
         self.receptions += 1;
+        if self.tells_onsets && new.audible() {
+            self.onsets.insert((new.span.start, self.receptions), new.span.end);
+        }
         self.underway.insert((new.span.end, self.receptions), new);
     }
 }

@@ -4,7 +4,7 @@ use super::link::Draws;
 use super::{Arrival, LossReason, Outcome};
 use crate::channel::link::flip_bits;
 use crate::loss::Verdict;
-use crate::{Duration, NodeId};
+use crate::{Duration, NodeId, Position};
 use std::sync::Arc;
 
 /// A span of time at one place; touching spans do not overlap.
@@ -30,6 +30,8 @@ pub(super) struct Reception {
     pub transmission: u64,
     pub from: NodeId,
     pub to: NodeId,
+    /// Of sender and receiver.
+    pub places: [Position; 2],
     pub span: Span,
     pub sent_at: Duration,
     pub range_m: f64,
@@ -44,6 +46,14 @@ impl Reception {
     /// Whether there is energy at the receiver that disturbs other signals.
     pub(super) fn audible(&self) -> bool {
         !self.in_outage && self.draws.verdict != Verdict::OutOfRange
+    }
+
+    /// Loses a signal whose sender fell silent in the middle; one that had been sent to its end is unharmed.
+    pub(super) fn cut_short(&mut self, now: Duration) {
+        let sent = now.saturating_sub(self.sent_at);
+        if sent < self.span.end.saturating_sub(self.span.start) && self.draws.verdict == Verdict::Heard {
+            self.draws.verdict = Verdict::Lost;
+        }
     }
 
     fn loss_reason(&self) -> Option<LossReason> {
@@ -77,6 +87,9 @@ impl Reception {
                 at: self.span.end.saturating_add(delay),
                 sent_at: self.sent_at,
                 range_m: self.range_m,
+                sender: self.places[0],
+                receiver: self.places[1],
+                airtime: self.span.end.saturating_sub(self.span.start),
                 outcome: match reason {
                     Some(reason) => Outcome::Lost { bytes_len: self.bytes.len(), reason },
                     None => self.delivery(copy),

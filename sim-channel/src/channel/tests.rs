@@ -1,4 +1,5 @@
 use super::*;
+use proptest::prelude::*;
 
 const A: NodeId = NodeId(1);
 const B: NodeId = NodeId(2);
@@ -294,4 +295,64 @@ fn an_hour_of_fifteen_talkative_nodes_passes_quickly() {
         }
     }
     assert!(arrivals > 3500 * 15 * 14);
+}
+
+#[test]
+fn a_transmission_cut_short_is_lost_and_frees_the_sender() {
+    let mut channel = pair(ChannelConfig::default(), 1);
+    let number = channel.transmit(A, vec![1], SECOND, Duration::ZERO);
+    channel.cut_short(number, ms(300));
+    assert!(!channel.is_busy(A, ms(300)));
+    let whole = channel.transmit(A, vec![1], SECOND, Duration::from_secs(5));
+    channel.cut_short(whole, ms(6500));
+    let arrivals = drain(&mut channel);
+    assert_eq!(fate(&arrivals, number, B), Some(LossReason::Noise));
+    assert_eq!(fate(&arrivals, whole, B), None);
+}
+
+#[test]
+fn onsets_come_before_arrivals_and_only_to_who_can_hear() {
+    let mut channel = pair(ChannelConfig::default(), 1);
+    channel.tell_onsets();
+    channel.transmit(A, vec![1], SECOND, Duration::ZERO);
+    assert_eq!(channel.poll_timeout(), Some(SECOND));
+    let onset = channel.poll_onset(SECOND).expect("onset");
+    assert_eq!((onset.to, onset.at, onset.airtime), (B, SECOND, SECOND));
+    assert_eq!(channel.poll_timeout(), Some(2 * SECOND));
+    assert!(channel.poll_arrival(2 * SECOND).is_some());
+    channel.transmit(A, vec![1], SECOND, 10 * SECOND);
+    channel.transmit(B, vec![1], SECOND, ms(10_900));
+    let told: Vec<_> = std::iter::from_fn(|| channel.poll_onset(20 * SECOND)).map(|onset| onset.to).collect();
+    assert_eq!(told, [A], "B spoke when A's signal came");
+}
+
+proptest! {
+    #[test]
+    fn every_transmission_ends_once_at_every_other_node_and_in_order(
+        seed in any::<u64>(),
+        places in proptest::collection::vec((0.0..5000.0f64, 0.0..5000.0f64), 1..7),
+        talk in proptest::collection::vec((0usize..7, 0u64..3000, 1u64..2000), 1..60),
+    ) {
+        let config = ChannelConfig { duplication: 0.1, reordering: 0.1, ..crate::presets::under_ice() };
+        let mut channel = Channel::new(config, seed);
+        for (node, (x_m, y_m)) in (0u8..).zip(&places) {
+            channel.place(NodeId(node), Position::new(*x_m, *y_m, 0.0));
+        }
+        let mut now = Duration::ZERO;
+        let mut arrivals = Vec::new();
+        for (node, pause, airtime) in &talk {
+            now += ms(*pause);
+            arrivals.extend(std::iter::from_fn(|| channel.poll_arrival(now)));
+            channel.transmit(NodeId((node % places.len()) as u8), vec![1, 2, 3], ms(*airtime), now);
+        }
+        arrivals.extend(drain(&mut channel));
+        prop_assert!(arrivals.windows(2).all(|w| w[0].at <= w[1].at));
+        let first = |a: &&Arrival| !matches!(a.outcome, Outcome::Delivered { copy: 1, .. });
+        let mut ends: Vec<_> = arrivals.iter().filter(first).map(|a| (a.transmission, a.to)).collect();
+        prop_assert_eq!(ends.len(), talk.len() * (places.len() - 1));
+        ends.sort();
+        ends.dedup();
+        prop_assert_eq!(ends.len(), talk.len() * (places.len() - 1));
+        prop_assert_eq!(channel.poll_timeout(), None);
+    }
 }

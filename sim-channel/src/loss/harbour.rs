@@ -1,5 +1,7 @@
 //! Reading Markov fits of measured links from CSV, one step of the chain being one packet.
 
+#![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
+
 use super::{GilbertElliott, ThreeState};
 use crate::{Duration, NodeId};
 use thiserror::Error;

@@ -6,12 +6,14 @@ mod dwell_chain;
 mod gilbert_elliott;
 mod harbour;
 mod independent;
+mod range_table;
 mod snr;
 mod three_state;
 mod trace;
 
 pub use gilbert_elliott::GilbertElliott;
 pub use harbour::{FitError, FittedLink};
+pub use range_table::{RangeTable, RangeTableError};
 pub use snr::Snr;
 pub use three_state::ThreeState;
 pub use trace::{Trace, TraceError};
@@ -36,6 +38,8 @@ pub enum LossModel {
     ThreeState(ThreeState),
     /// From the signal to noise ratio at the receiver.
     Snr(Snr),
+    /// From delivery measured against range.
+    Range(RangeTable),
     /// As recorded.
     Trace(Trace),
 }
@@ -49,6 +53,7 @@ impl LossModel {
             LossModel::GilbertElliott(model) => model.instance(chance),
             LossModel::ThreeState(model) => model.instance(chance),
             LossModel::Snr(model) => model.instance(),
+            LossModel::Range(table) => table.instance(),
             LossModel::Trace(trace) => trace.instance(),
         }
     }
@@ -69,6 +74,12 @@ impl From<ThreeState> for LossModel {
 impl From<Snr> for LossModel {
     fn from(model: Snr) -> Self {
         Self::Snr(model)
+    }
+}
+
+impl From<RangeTable> for LossModel {
+    fn from(table: RangeTable) -> Self {
+        Self::Range(table)
     }
 }
 

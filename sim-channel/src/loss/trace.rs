@@ -1,5 +1,7 @@
 //! Loss replayed from a record.
 
+#![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
+
 use super::{Frame, LinkLoss, Verdict};
 use crate::{Duration, Stream};
 use std::sync::Arc;

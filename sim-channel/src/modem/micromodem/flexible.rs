@@ -1,0 +1,89 @@
+//! `CCTDP`, `CARDP`: the flexible data protocol.
+
+use super::Micromodem;
+use super::packet::{Kind, Packet};
+use super::rates::{flexible_airtime, flexible_data, flexible_mini_bytes};
+use super::receive::Signal;
+use super::sentence::{Sentence, from_hex, to_hex};
+use super::transmit::Outgoing;
+use crate::Duration;
+
+impl Micromodem {
+    /// `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`
+    pub(super) fn on_flexible_command(&mut self, sentence: &Sentence, now: Duration) {
+        let fields = (sentence.number::<u8>(0), sentence.number::<u8>(1), from_hex(sentence.text(4)));
+        let (Some(dst), Some(rate), Some(data)) = fields else {
+            return self.complain("NMEA", 1, "CCTDP: wrong field", now);
+        };
+        let (ack, reserved) = (sentence.text(2), sentence.text(3));
+        let sizes = flexible_mini_bytes(rate).map(|mini| (data.len().min(mini), data.len().saturating_sub(mini)));
+        let fits = sizes.filter(|(_, rest)| *rest <= flexible_data(rate).0 && !data.is_empty());
+        let Some((mini, rest)) = fits else {
+            return self.tell(&format!("CATDP,1,0,{dst},{rate},{ack},{reserved},0,0"), now);
+        };
+        let number = self.unique.wrapping_add(1);
+        self.tell(&format!("CATDP,0,{number},{dst},{rate},{ack},{reserved},{mini},{rest}"), now);
+        let mut packet = Packet::new(Kind::Flexible, self.address(), dst);
+        (packet.rate, packet.ack) = (rate, ack == "1");
+        let (head, tail) = data.split_at(mini);
+        packet.frames.push(Some(head.to_vec()));
+        packet.frames.extend(tail.chunks(flexible_data(rate).1).map(|frame| Some(frame.to_vec())));
+        let expected = packet.frames.len() as u8;
+        self.air.queue.push_back(Outgoing {
+            airtime: flexible_airtime(rate, mini, rest),
+            bytes: data.len(),
+            packet_type: 5,
+            expected,
+            told: true,
+            then_ask: false,
+            packet,
+        });
+    }
+
+    /// `$CARDP,<src>,<dst>,<rate>,<ack>,<reserved>,<mini>,<data>`, the last two empty or triples joined by `;`.
+    pub(super) fn on_flexible(&mut self, packet: &Packet, signal: &Signal, now: Duration) {
+        let base64 = self.nvram.is_on("recv.base64data");
+        let (mini, data) = packet.frames.split_at(packet.frames.len().min(1));
+        let (mini, data) = (triples(mini, base64), triples(data, base64));
+        let Packet { src, dst, rate, ack, .. } = packet;
+        self.tell(&format!("CARDP,{src},{dst},{rate},{},0,{mini},{data}", u8::from(*ack)), now);
+        self.tell_statistics(packet, signal, 5, now);
+    }
+}
+
+/// `crc_ok;nbytes;data` for each frame.
+fn triples(frames: &[Option<Vec<u8>>], base64: bool) -> String {
+    let triple = |frame: &Option<Vec<u8>>| match frame {
+        Some(bytes) => format!("1;{};{}", bytes.len(), if base64 { to_base64(bytes) } else { to_hex(bytes) }),
+        None => "0;0;".to_string(),
+    };
+    frames.iter().map(triple).collect::<Vec<_>>().join(";")
+}
+
+/// RFC 4648, with padding.
+fn to_base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let group = |chunk: &[u8]| {
+        let bits = chunk.iter().chain([&0, &0]).take(3).fold(0usize, |bits, byte| bits << 8 | usize::from(*byte));
+        let digit = |index: usize| {
+            let sextet = bits >> (18 - 6 * index) & 63;
+            if index <= chunk.len() { char::from(*ALPHABET.get(sextet).unwrap_or(&b'=')) } else { '=' }
+        };
+        [digit(0), digit(1), digit(2), digit(3)]
+    };
+    bytes.chunks(3).flat_map(group).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_matches_the_examples_of_its_standard() {
+        let pairs =
+            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")];
+        for (plain, coded) in pairs {
+            assert_eq!(to_base64(plain.as_bytes()), coded);
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Cuts burst records into numbered packets and keeps them until they are acknowledged.
+
+use super::Record;
+use std::collections::{BTreeMap, VecDeque};
+
+/// Packets beyond the first unacknowledged one that may be under way.
+pub(in super::super) const WINDOW: u32 = 64;
+/// Flags (bit 0: last piece of its record), protocol id, length of the piece.
+const PIECE_HEADER: usize = 4;
+
+/// One direction of a connection, at its sender.
+#[derive(Debug, Default)]
+pub(in super::super) struct Sender {
+    base: u32,
+    next: u32,
+    unacked: BTreeMap<u32, Vec<u8>>,
+    /// Records begun, with the number of the packet that ends each, once it is known.
+    begun: VecDeque<(Record, Option<u32>)>,
+    /// How much of the last record begun is in packets.
+    offset: usize,
+}
+
+impl Sender {
+    pub(in super::super) fn has_unacked(&self) -> bool {
+        !self.unacked.is_empty()
+    }
+
+    /// At most `count` packets of at most `capacity` bytes: first what was lost, then new ones with records to `peer`.
+    pub(in super::super) fn train(
+        &mut self,
+        queue: &mut VecDeque<Record>,
+        peer: u8,
+        capacity: usize,
+        count: usize,
+    ) -> Vec<(u32, Vec<u8>)> {
+        let mut train: Vec<_> = self.unacked.iter().take(count).map(|(seq, bytes)| (*seq, bytes.clone())).collect();
+        while train.len() < count && self.next - self.base < WINDOW {
+            let Some(bytes) = self.new_packet(queue, peer, capacity) else { break };
+            train.push((self.next - 1, bytes));
+        }
+        train
+    }
+
+    fn new_packet(&mut self, queue: &mut VecDeque<Record>, peer: u8, capacity: usize) -> Option<Vec<u8>> {
+        let mut bytes = Vec::new();
+        while bytes.len() + PIECE_HEADER < capacity.max(PIECE_HEADER + 1) && self.open_record(queue, peer) {
+            let room = capacity.max(PIECE_HEADER + 1) - bytes.len() - PIECE_HEADER;
+            let Some((record, end)) = self.begun.back_mut() else { break };
+            let rest = record.data.get(self.offset..).unwrap_or_default();
+            let piece = rest.get(..room.min(rest.len())).unwrap_or_default();
+            let last = piece.len() == rest.len();
+            bytes.extend([u8::from(last), record.pid]);
+            bytes.extend((piece.len() as u16).to_be_bytes());
+            bytes.extend(piece);
+            self.offset += piece.len();
+            if last {
+                *end = Some(self.next);
+            }
+        }
+        if bytes.is_empty() {
+            return None;
+        }
+        self.unacked.insert(self.next, bytes.clone());
+        self.next += 1;
+        Some(bytes)
+    }
+
+    /// Whether there is a record to cut from; begins the next one to `peer` if need be.
+    fn open_record(&mut self, queue: &mut VecDeque<Record>, peer: u8) -> bool {
+        if self.begun.back().is_some_and(|(_, end)| end.is_none()) {
+            return true;
+        }
+        let record = queue.iter().position(|record| record.dst == peer).and_then(|index| queue.remove(index));
+        self.offset = 0;
+        record.map(|record| self.begun.push_back((record, None))).is_some()
+    }
+
+    /// Everything before `base` has arrived, and of what follows whatever `held` has a bit for. Returns the records that
+    /// are thereby delivered.
+    pub(in super::super) fn acknowledge(&mut self, base: u32, held: u64) -> Vec<Record> {
+        if base > self.next || base < self.base {
+            return Vec::new();
+        }
+        self.base = base;
+        self.unacked.retain(|seq, _| {
+            let beyond = u64::from(*seq).checked_sub(u64::from(base) + 1);
+            *seq >= base && !beyond.is_some_and(|bit| bit < 64 && held >> bit & 1 == 1)
+        });
+        let mut delivered = Vec::new();
+        while self.begun.front().is_some_and(|(_, end)| end.is_some_and(|end| end < base)) {
+            delivered.extend(self.begun.pop_front().map(|(record, _)| record));
+        }
+        delivered
+    }
+
+    /// All records that are not known to have arrived, in order.
+    pub(in super::super) fn into_records(self) -> Vec<Record> {
+        self.begun.into_iter().map(|(record, _)| record).collect()
+    }
+
+    /// Bytes of records not known to have arrived.
+    pub(in super::super) fn bytes(&self) -> usize {
+        self.begun.iter().map(|(record, _)| record.data.len()).sum()
+    }
+}

@@ -1,0 +1,181 @@
+//! What the host wrote, cut into commands, messages and data. Counts payload bytes, never searches them.
+
+use super::send_command::{Header, HeaderError, Problem, SendCommand, parse_header};
+use crate::Duration;
+
+/// The longest command line without payload; longer ones are answered `ERROR WRONG FORMAT`.
+const LINE_LIMIT: usize = 512;
+/// Silence before and after `+++` that makes it an escape.
+pub(super) const GUARD: Duration = Duration::from_secs(1);
+const ESCAPE: &[u8] = b"+++";
+const TIES: &[u8] = b"+++AT";
+
+/// One thing the host wrote.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) enum Input {
+    /// A command, without `AT` and terminator.
+    Command(String),
+    /// A message to send, payload complete and terminated; or what is wrong with it.
+    Send(Result<SendCommand, HeaderError>),
+    /// A line that is none.
+    WrongFormat,
+    /// Raw burst data of the data mode.
+    Data(Vec<u8>),
+    /// `+++` between silences.
+    Escape,
+}
+
+/// What a byte stream is read as.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Reading {
+    /// Raw data with `+++AT` commands in it.
+    Data,
+    /// `AT` commands only.
+    Commands,
+}
+
+/// Keeps what is not yet complete; bounded by the longest message.
+#[derive(Debug, Default)]
+pub(super) struct InputParser {
+    buffer: Vec<u8>,
+    after_cr: bool,
+    skip_line: bool,
+    last_byte: Option<Duration>,
+    guard_before: bool,
+}
+
+impl InputParser {
+    /// Takes bytes that came at `now`.
+    pub(super) fn push(&mut self, bytes: &[u8], now: Duration) {
+        let silent = self.last_byte.is_none_or(|last| now.saturating_sub(last) >= GUARD);
+        if self.buffer.is_empty() {
+            self.guard_before = silent;
+        }
+        self.last_byte = Some(now);
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    /// When silence gives what is kept another meaning.
+    pub(super) fn timeout(&self, reading: Reading) -> Option<Duration> {
+        let waits = reading == Reading::Data && !self.buffer.is_empty() && TIES.starts_with(&self.buffer);
+        self.last_byte.filter(|_| waits).map(|last| last + GUARD)
+    }
+
+    /// Silence passed: a lone `+++` is an escape, another piece of one is data.
+    pub(super) fn handle_timeout(&mut self, now: Duration, reading: Reading) -> Option<Input> {
+        self.timeout(reading).filter(|at| *at <= now)?;
+        let kept = std::mem::take(&mut self.buffer);
+        Some(if kept == ESCAPE && self.guard_before { Input::Escape } else { Input::Data(kept) })
+    }
+
+    /// The next complete thing; `reading` may change between calls.
+    pub(super) fn next(&mut self, reading: Reading) -> Option<Input> {
+        loop {
+            let first = *self.buffer.first()?;
+            if std::mem::take(&mut self.after_cr) && first == b'\n' {
+                self.buffer.remove(0);
+                continue;
+            }
+            if self.skip_line {
+                self.take_line()?;
+                self.skip_line = false;
+                continue;
+            }
+            return match reading {
+                Reading::Data => self.next_in_data(),
+                Reading::Commands => match self.next_command(0)? {
+                    Some(input) => Some(input),
+                    None => continue,
+                },
+            };
+        }
+    }
+
+    fn next_in_data(&mut self) -> Option<Input> {
+        let start = escape_start(&self.buffer);
+        if start > 0 {
+            return Some(Input::Data(self.buffer.drain(..start).collect()));
+        }
+        if self.buffer.len() < TIES.len() {
+            return None;
+        }
+        self.next_command(ESCAPE.len()).map(|input| input.unwrap_or(Input::WrongFormat))
+    }
+
+    /// A command after `prefix` bytes of escape: `None` if incomplete, `Some(None)` for an empty line.
+    fn next_command(&mut self, prefix: usize) -> Option<Option<Input>> {
+        let text = self.buffer.get(prefix..).unwrap_or_default();
+        match parse_header(text) {
+            Header::Incomplete if text.len() <= LINE_LIMIT => None,
+            Header::Message(command, header_bytes) => self.take_message(command, prefix + header_bytes).map(Some),
+            Header::Wrong(error) => {
+                self.skip_line = self.take_line().is_none();
+                Some(Some(Input::Send(Err(error))))
+            }
+            Header::Incomplete | Header::NoSend => self.take_plain(prefix),
+        }
+    }
+
+    /// The payload by its count, then the terminator.
+    fn take_message(&mut self, mut command: SendCommand, header_bytes: usize) -> Option<Input> {
+        let end = header_bytes + command.length;
+        let terminator = *self.buffer.get(end)?;
+        command.data = self.buffer.get(header_bytes..end).unwrap_or_default().to_vec();
+        if matches!(terminator, b'\r' | b'\n') {
+            self.after_cr = terminator == b'\r';
+            self.buffer.drain(..=end);
+            return Some(Input::Send(command.check_length()));
+        }
+        self.buffer.drain(..end);
+        self.skip_line = self.take_line().is_none();
+        Some(Input::Send(Err(HeaderError { name: command.service.name(), problem: Problem::Format })))
+    }
+
+    fn take_plain(&mut self, prefix: usize) -> Option<Option<Input>> {
+        let Some(line) = self.take_line() else {
+            if self.buffer.len() <= LINE_LIMIT {
+                return None;
+            }
+            self.skip_line = true;
+            return Some(Some(Input::WrongFormat));
+        };
+        let text = line.get(prefix..).unwrap_or_default();
+        if line.is_empty() {
+            return Some(None);
+        }
+        let command =
+            text.strip_prefix(b"AT").filter(|command| command.iter().all(|byte| (b' '..=b'~').contains(byte)));
+        Some(Some(match command {
+            Some(command) => Input::Command(command.iter().map(|byte| char::from(*byte)).collect()),
+            None => Input::WrongFormat,
+        }))
+    }
+
+    /// The bytes up to the next terminator, which is dropped; nothing is kept of a line being skipped without its end.
+    fn take_line(&mut self) -> Option<Vec<u8>> {
+        let Some(end) = self.buffer.iter().position(|byte| matches!(byte, b'\r' | b'\n')) else {
+            if self.skip_line || self.buffer.len() > LINE_LIMIT {
+                self.buffer.clear();
+                self.skip_line = true;
+            }
+            return None;
+        };
+        self.after_cr = self.buffer.get(end) == Some(&b'\r');
+        let line = self.buffer.drain(..=end).take(end).collect();
+        Some(line)
+    }
+}
+
+/// Where `+++AT`, or what may become it, begins; the length if nowhere.
+fn escape_start(bytes: &[u8]) -> usize {
+    (0..bytes.len())
+        .find(|start| {
+            let rest = bytes.get(*start..).unwrap_or_default();
+            rest.starts_with(TIES) || TIES.starts_with(rest)
+        })
+        .unwrap_or(bytes.len())
+}
+
+#[cfg(test)]
+#[path = "input_tests.rs"]
+mod tests;

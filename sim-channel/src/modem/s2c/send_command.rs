@@ -1,0 +1,178 @@
+//! `*SEND`, `*SENDIM`, `*SENDIMS`, `*SENDPBM`: the fields before the payload.
+
+/// The longest payload that is still counted out when it is too long to send.
+const COUNTED_LIMIT: usize = 8192;
+/// The longest field before a comma: `*SENDIMS` and 32-bit times fit.
+const FIELD_LIMIT: usize = 12;
+
+/// A message to send.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(super) struct SendCommand {
+    pub service: Service,
+    pub pid: Option<u8>,
+    pub length: usize,
+    pub dst: u8,
+    pub data: Vec<u8>,
+}
+
+/// How it is to be sent.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Service {
+    Burst,
+    Instant(Flag),
+    /// At a time of the modem's clock in us, or as soon as possible.
+    Synchronous(Option<u32>),
+    Piggyback,
+}
+
+/// Whether an instant message is acknowledged, and whether it is sent in back-off.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Flag {
+    Ack,
+    NoAck,
+    Force,
+}
+
+impl Flag {
+    pub(super) const ALL: [Flag; 3] = [Flag::Ack, Flag::NoAck, Flag::Force];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Flag::Ack => "ack",
+            Flag::NoAck => "noack",
+            Flag::Force => "force",
+        }
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|flag| flag.name() == text)
+    }
+}
+
+impl Service {
+    /// The command's name, as TIES replies repeat it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Service::Burst => "*SEND",
+            Service::Instant(_) => "*SENDIM",
+            Service::Synchronous(_) => "*SENDIMS",
+            Service::Piggyback => "*SENDPBM",
+        }
+    }
+
+    fn max_length(self) -> usize {
+        if self == Service::Burst { 1024 } else { 64 }
+    }
+}
+
+/// What is wrong with a message, and the command's name for the reply.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct HeaderError {
+    pub name: &'static str,
+    pub problem: Problem,
+}
+
+/// How a message can be wrong.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Problem {
+    Format,
+    Range,
+}
+
+/// How far the fields were understood.
+pub(super) enum Header {
+    /// Not a message command at all.
+    NoSend,
+    Incomplete,
+    Wrong(HeaderError),
+    /// The fields, and how many bytes they took.
+    Message(SendCommand, usize),
+}
+
+impl SendCommand {
+    /// Refuses a payload that is empty or longer than the service carries.
+    pub(super) fn check_length(self) -> Result<Self, HeaderError> {
+        let fits = (1..=self.service.max_length()).contains(&self.length);
+        if fits { Ok(self) } else { Err(HeaderError { name: self.service.name(), problem: Problem::Range }) }
+    }
+}
+
+/// Reads `AT*SEND..` up to the comma before the payload.
+pub(super) fn parse_header(text: &[u8]) -> Header {
+    const START: &[u8] = b"AT*SEND";
+    if !text.starts_with(START) {
+        return if START.starts_with(text) { Header::Incomplete } else { Header::NoSend };
+    }
+    let mut fields = Fields { rest: text.get(2..).unwrap_or_default() };
+    match message(&mut fields) {
+        Ok(command) => Header::Message(command, text.len() - fields.rest.len()),
+        Err(Stop::Incomplete) => Header::Incomplete,
+        Err(Stop::Wrong) => Header::Wrong(HeaderError { name: name_of(text), problem: Problem::Format }),
+    }
+}
+
+/// The longest command name that `AT*SEND..` begins with.
+fn name_of(text: &[u8]) -> &'static str {
+    let names = ["*SENDIMS", "*SENDIM", "*SENDPBM"];
+    names
+        .into_iter()
+        .find(|name| text.get(2..).is_some_and(|text| text.starts_with(name.as_bytes())))
+        .unwrap_or("*SEND")
+}
+
+enum Stop {
+    Incomplete,
+    Wrong,
+}
+
+/// Fields that end in a comma.
+struct Fields<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Fields<'a> {
+    fn next(&mut self) -> Result<&'a str, Stop> {
+        let end = self.rest.iter().position(|byte| matches!(byte, b',' | b'\r' | b'\n'));
+        match end {
+            Some(end) if self.rest.get(end) == Some(&b',') && end <= FIELD_LIMIT => {
+                let (field, rest) = self.rest.split_at_checked(end).ok_or(Stop::Wrong)?;
+                self.rest = rest.get(1..).unwrap_or_default();
+                std::str::from_utf8(field).map_err(|_| Stop::Wrong)
+            }
+            None if self.rest.len() <= FIELD_LIMIT => Err(Stop::Incomplete),
+            _ => Err(Stop::Wrong),
+        }
+    }
+
+    fn number<N: std::str::FromStr>(&mut self) -> Result<N, Stop> {
+        digits(self.next()?).ok_or(Stop::Wrong)
+    }
+}
+
+/// A number of decimal digits and nothing else.
+fn digits<N: std::str::FromStr>(text: &str) -> Option<N> {
+    text.parse().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+fn message(fields: &mut Fields<'_>) -> Result<SendCommand, Stop> {
+    let name = fields.next()?;
+    let mut length = fields.next()?;
+    let mut pid = None;
+    if let Some(id) = length.strip_prefix('p') {
+        pid = Some(digits(id).filter(|id| *id <= 7).ok_or(Stop::Wrong)?);
+        length = fields.next()?;
+    }
+    let length = digits(length).filter(|length| *length <= COUNTED_LIMIT).ok_or(Stop::Wrong)?;
+    let dst = fields.number()?;
+    let service = match name {
+        "*SEND" => Service::Burst,
+        "*SENDPBM" => Service::Piggyback,
+        "*SENDIM" => Service::Instant(Flag::parse(fields.next()?).ok_or(Stop::Wrong)?),
+        "*SENDIMS" => Service::Synchronous(match fields.next()? {
+            "" => None,
+            time => Some(digits(time).ok_or(Stop::Wrong)?),
+        }),
+        _ => return Err(Stop::Wrong),
+    };
+    Ok(SendCommand { service, pid, length, dst, data: Vec::new() })
+}

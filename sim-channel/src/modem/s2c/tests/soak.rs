@@ -1,0 +1,70 @@
+//! Hours of mixed traffic in bad water: nothing hangs, everything is accounted for.
+
+use super::bench::{Bench, SECOND};
+use crate::modem::s2c::S2cConfig;
+use crate::{ChannelConfig, Duration, Stream};
+use std::collections::BTreeMap;
+
+/// What one host was told, by keyword up to the comma or space.
+fn tally(text: &str) -> BTreeMap<&str, usize> {
+    let mut counts = BTreeMap::new();
+    for line in text.split("\r\n") {
+        *counts.entry(line.split([',', ' ']).next().unwrap_or_default()).or_default() += 1;
+    }
+    counts
+}
+
+fn soak(config: ChannelConfig, seed: u64) {
+    let modem = |address| S2cConfig { baud: Some(115_200), ..S2cConfig::new(address) };
+    let mut bench = Bench::of((1..=3).map(modem).collect(), 900.0, config);
+    for node in 1..=3 {
+        bench.ask(node, "AT!ZI5\r");
+    }
+    let mut chance = Stream::new(seed, &[]);
+    let (mut bursts, mut instants) = (BTreeMap::<u8, usize>::new(), BTreeMap::<u8, usize>::new());
+    for _ in 0..300 {
+        let from = 1 + chance.below(3) as u8;
+        let to = 1 + (from + chance.below(2) as u8) % 3;
+        let burst = chance.chance(0.5);
+        let line = if burst {
+            format!("AT*SEND,200,{to},{}\r", "b".repeat(200))
+        } else {
+            format!("AT*SENDIM,20,{to},ack,{}\r", "i".repeat(20))
+        };
+        let already = bench.told[&from].len();
+        bench.write(from, line.as_bytes());
+        bench.run(Duration::from_millis(50));
+        let accepted = bench.told[&from][already..].windows(4).any(|bytes| bytes == b"OK\r\n");
+        *if burst { &mut bursts } else { &mut instants }.entry(from).or_default() += usize::from(accepted);
+        bench.run(Duration::from_millis(chance.below(20_000) as u64));
+    }
+    bench.run(600 * SECOND);
+    for node in 1..=3 {
+        let text = bench.take(node);
+        let told = tally(&text);
+        let count = |keyword| told.get(keyword).copied().unwrap_or_default();
+        assert_eq!(count("DELIVERED") + count("FAILED"), bursts[&node], "bursts of {node}, seed {seed}: {told:?}");
+        assert_eq!(
+            count("DELIVEREDIM") + count("FAILEDIM"),
+            instants[&node],
+            "messages of {node}, seed {seed}: {told:?}"
+        );
+        assert!(count("DELIVERED") > 0 && count("DELIVEREDIM") > 0, "{told:?}");
+        assert!(bench.ask(node, "AT?S\r").contains(": INITIATION LISTEN\r\n"));
+    }
+}
+
+#[test]
+fn everything_is_reported_once_in_a_harbour() {
+    (1..=4).for_each(|seed| soak(crate::presets::shallow_harbour(), seed));
+}
+
+#[test]
+fn everything_is_reported_once_under_ice() {
+    (1..=4).for_each(|seed| soak(crate::presets::under_ice(), seed));
+}
+
+#[test]
+fn everything_is_reported_once_where_bits_flip() {
+    (1..=4).for_each(|seed| soak(ChannelConfig { corruption: 0.2, ..ChannelConfig::default() }, seed));
+}

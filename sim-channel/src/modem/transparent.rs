@@ -1,0 +1,261 @@
+//! A raw byte pipe: what one host writes, the others read, if the water lets it through.
+//!
+//! No frames, no addresses, no acknowledgement, no word of what was lost. Bytes are sent when enough of them wait or when
+//! the host pauses. The pipe may eat `+++AT` up to the end of its line, as modems that listen for an escape do.
+
+use super::agenda::Agenda;
+use super::port::Port;
+use super::{Emulator, Fault, ModemEvent, Transmission};
+use crate::{Arrival, Duration, Onset, Outcome, Stream};
+use std::collections::VecDeque;
+
+/// The make of a pipe.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct TransparentConfig {
+    /// Baud rate, 8N1; `None` without pacing.
+    pub baud: Option<u32>,
+    /// Bits a second on air.
+    pub bit_rate: u32,
+    /// Air time of the preamble of each packet.
+    pub preamble: Duration,
+    /// Most bytes in a packet.
+    pub packet_bytes: usize,
+    /// A pause of the host after which a short packet goes out.
+    pub gap: Duration,
+    /// Bytes that wait at most; more are lost without a word.
+    pub buffer_bytes: usize,
+    /// Whether `+++AT` and the rest of its line are eaten and answered `OK`.
+    pub eats_escape: bool,
+    /// Seeds the noise of the line.
+    pub seed: u64,
+}
+
+impl Default for TransparentConfig {
+    /// 9600 baud to the host and 9600 bit/s on air, packets of 256 bytes: assumed, of the order of data sheets.
+    fn default() -> Self {
+        Self {
+            baud: Some(9600),
+            bit_rate: 9600,
+            preamble: Duration::from_millis(100),
+            packet_bytes: 256,
+            gap: Duration::from_millis(30),
+            buffer_bytes: 4096,
+            eats_escape: true,
+            seed: 0,
+        }
+    }
+}
+
+/// An emulated transparent modem.
+#[derive(Debug)]
+pub struct Transparent {
+    config: TransparentConfig,
+    port: Port,
+    waiting: VecDeque<u8>,
+    last_byte: Duration,
+    eating: bool,
+    quiet_until: Duration,
+    agenda: Agenda<Event>,
+    on_air_until: Duration,
+    chance: Stream,
+    events: VecDeque<ModemEvent>,
+}
+
+#[derive(Debug)]
+enum Event {
+    /// Look whether a packet can go.
+    Look,
+}
+
+const ESCAPE: &[u8] = b"+++AT";
+/// From reset until it works again.
+const BOOT: Duration = Duration::from_secs(2);
+
+impl Transparent {
+    /// A pipe that is ready.
+    pub fn new(config: TransparentConfig) -> Self {
+        const PURPOSE: u64 = 0x7a9e;
+        Self {
+            port: Port::new(config.baud),
+            waiting: VecDeque::new(),
+            last_byte: Duration::ZERO,
+            eating: false,
+            quiet_until: Duration::ZERO,
+            agenda: Agenda::new(),
+            on_air_until: Duration::ZERO,
+            chance: Stream::new(config.seed, &[PURPOSE]),
+            events: VecDeque::new(),
+            config,
+        }
+    }
+
+    fn read_host(&mut self, bytes: &[u8], at: Duration) {
+        self.last_byte = at;
+        for byte in bytes {
+            if self.eating {
+                self.eating = !matches!(byte, b'\r' | b'\n');
+                if !self.eating {
+                    self.port.write(b"OK\r\n", at);
+                }
+            } else if self.waiting.len() < self.config.buffer_bytes {
+                self.waiting.push_back(*byte);
+                self.look_for_escape();
+            }
+        }
+        self.agenda.add(at + self.config.gap, Event::Look);
+    }
+
+    fn look_for_escape(&mut self) {
+        let tail = self.waiting.len().saturating_sub(ESCAPE.len());
+        if self.config.eats_escape && self.waiting.iter().skip(tail).eq(ESCAPE) {
+            self.waiting.truncate(tail);
+            self.eating = true;
+        }
+    }
+
+    fn reboot(&mut self, now: Duration) {
+        if now < self.on_air_until {
+            self.events.push_back(ModemEvent::CutShort);
+        }
+        self.waiting.clear();
+        self.eating = false;
+        self.on_air_until = now;
+        self.be_quiet(BOOT, now);
+    }
+
+    fn be_quiet(&mut self, length: Duration, now: Duration) {
+        self.quiet_until = now + length;
+        self.agenda.add(self.quiet_until, Event::Look);
+    }
+}
+
+impl Emulator for Transparent {
+    fn port(&self) -> &Port {
+        &self.port
+    }
+
+    fn port_mut(&mut self) -> &mut Port {
+        &mut self.port
+    }
+
+    fn handle_onset(&mut self, _onset: &Onset, _now: Duration) {}
+
+    fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {
+        self.handle_timeout(now);
+        if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
+            self.port.write(bytes, now);
+        }
+    }
+
+    fn poll_transmit(&mut self, now: Duration) -> Option<Transmission> {
+        let full = self.waiting.len() >= self.config.packet_bytes;
+        let paused = now >= self.last_byte + self.config.gap;
+        let free = now >= self.on_air_until && now >= self.quiet_until;
+        if self.waiting.is_empty() || !free || !(full || paused) {
+            return None;
+        }
+        let count = self.waiting.len().min(self.config.packet_bytes.max(1));
+        let bytes: Vec<u8> = self.waiting.drain(..count).collect();
+        let airtime = self.config.preamble + Duration::from_secs(1) * (8 * count as u32) / self.config.bit_rate.max(1);
+        self.on_air_until = now + airtime;
+        self.agenda.add(self.on_air_until, Event::Look);
+        Some(Transmission { bytes, airtime })
+    }
+
+    fn poll_event(&mut self) -> Option<ModemEvent> {
+        self.events.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Duration> {
+        [self.agenda.next(), self.port.next_input()].into_iter().flatten().min()
+    }
+
+    fn handle_timeout(&mut self, now: Duration) {
+        while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
+            if let Some((_, Event::Look)) = self.agenda.pop(due) {
+                // `poll_transmit`, which comes after every call, does what there is to do.
+                continue;
+            }
+            if let Some((at, bytes)) = self.port.take_input(due) {
+                self.read_host(&bytes, at);
+            }
+        }
+    }
+
+    fn inject(&mut self, fault: Fault, now: Duration) {
+        if self.port.inject(fault, &mut self.chance, now) {
+            return;
+        }
+        match fault {
+            Fault::Busy(length) => self.be_quiet(length, now),
+            Fault::Reboot | Fault::BrownOut => self.reboot(now),
+            // It has no address.
+            Fault::WrongAddress(_) => {}
+            // Done by the port.
+            Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
+            Fault::BigBuffer => self.config.buffer_bytes = 1024 * 1024,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ChannelConfig;
+    use crate::modem::bench::{Bench, SECOND};
+
+    fn bench(config: ChannelConfig) -> Bench {
+        let boxed = |node| (node, Box::new(Transparent::new(TransparentConfig::default())) as Box<dyn Emulator>);
+        Bench::join(vec![boxed(1), boxed(2)], 1500.0, config)
+    }
+
+    #[test]
+    fn bytes_cross_in_order_and_only_to_the_others() {
+        let mut bench = bench(ChannelConfig::default());
+        bench.write(1, b"hello");
+        bench.write(1, &[7; 600]);
+        bench.run(10 * SECOND);
+        assert_eq!(bench.told[&2], [b"hello".to_vec(), vec![7; 600]].concat());
+        assert!(bench.told[&1].is_empty());
+    }
+
+    #[test]
+    fn time_is_that_of_line_preamble_air_and_water() {
+        let mut bench = bench(ChannelConfig::default());
+        bench.write(1, &[1; 96]);
+        // 100 ms over the line, 30 ms pause, 100 ms preamble, 80 ms of bits, 1 s of water, and 1 ms a byte out.
+        bench.run(Duration::from_millis(1310));
+        assert!(bench.told[&2].is_empty());
+        bench.run(Duration::from_millis(5));
+        assert_eq!(bench.told[&2].len(), 4);
+    }
+
+    #[test]
+    fn an_escape_is_eaten_up_to_its_line_end() {
+        let mut bench = bench(ChannelConfig::default());
+        bench.write(1, b"ab+++AT?S\rcd");
+        bench.run(10 * SECOND);
+        assert_eq!(bench.take(2), "abcd");
+        assert_eq!(bench.take(1), "OK\r\n");
+    }
+
+    #[test]
+    fn too_much_is_lost_without_a_word() {
+        let mut bench = bench(ChannelConfig::default());
+        bench.basin.inject(crate::NodeId(1), Fault::Busy(30 * SECOND), Duration::ZERO);
+        bench.write(1, &[7; 10_000]);
+        bench.run(60 * SECOND);
+        assert_eq!(bench.told[&2].len(), 4096);
+        assert!(bench.told[&1].is_empty());
+    }
+
+    #[test]
+    fn both_at_once_is_a_loss_for_both() {
+        let mut bench = bench(ChannelConfig::default());
+        bench.channel_range(1.0);
+        bench.write(1, &[1; 100]);
+        bench.write(2, &[2; 100]);
+        bench.run(10 * SECOND);
+        assert!(bench.told.values().all(Vec::is_empty));
+    }
+}
