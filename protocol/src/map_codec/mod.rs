@@ -6,16 +6,21 @@
 mod bits;
 mod chunk;
 mod codec;
+mod context;
 mod grow;
 mod header;
 mod png;
+pub mod procedural;
+mod series;
 #[cfg(test)]
 mod tests;
 mod window;
 
 pub use chunk::{DecodeError, MapChunk, decode, encode};
 pub use codec::Codec;
+pub use context::train_prior;
 pub use png::restored_png;
+pub use series::encode_all;
 
 /// Most cells a patch may have; bounds what decoding a chunk allocates.
 pub const MAX_PATCH_CELLS: usize = 1 << 16;

@@ -51,6 +51,21 @@ impl Window {
         if self.wanted[i] { self.target[i] } else { self.base[i] }
     }
 
+    /// The smallest patch with just these changes; they must lie in the window.
+    pub(super) fn patch_of(&self, changes: &[(Cell, u8)]) -> Option<Patch> {
+        let rect = Rect::around(changes.iter().map(|&(cell, _)| cell))?;
+        let left = (i64::from(rect.x) - self.x) as usize;
+        let bottom = (i64::from(rect.y) - self.y) as usize;
+        let (right, top) = (left + rect.width as usize, bottom + rect.height as usize);
+        let mut patch = self.patch(Area { left, right, bottom, top });
+        patch.outcome.copy_from_slice(&patch.base);
+        for &(cell, label) in changes {
+            let row = cell.y.abs_diff(rect.y) as usize;
+            patch.outcome[row * rect.width as usize + cell.x.abs_diff(rect.x) as usize] = label;
+        }
+        Some(patch)
+    }
+
     /// The part of the window in `area` as base and outcome.
     pub(super) fn patch(&self, area: Area) -> Patch {
         let rect = Rect {
@@ -86,6 +101,12 @@ impl Area {
 
     pub(super) fn height(&self) -> usize {
         self.top - self.bottom
+    }
+
+    /// Stretches to hold the cell.
+    pub(super) fn include(&mut self, column: usize, row: usize) {
+        (self.left, self.right) = (self.left.min(column), self.right.max(column + 1));
+        (self.bottom, self.top) = (self.bottom.min(row), self.top.max(row + 1));
     }
 
     pub(super) fn cells(&self) -> usize {

@@ -31,6 +31,13 @@ pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: 
     (bytes.len() <= room).then(|| chunk(&best, bytes))
 }
 
+/// The `png` chunk that says the same as `chunk`, if it is shorter.
+pub(in crate::map_codec) fn smaller(base: &LabelGrid, growth: &Growth, other: &MapChunk) -> Option<MapChunk> {
+    let patch = growth.window.patch_of(&other.changes)?;
+    let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, Effort::Quick);
+    (bytes.len() < other.bytes.len()).then(|| chunk(&patch, bytes))
+}
+
 struct Fitter<'a> {
     base: &'a LabelGrid,
     room: usize,

@@ -1,0 +1,108 @@
+//! What the coder knows before the first cell: trained on procedural maps, shipped with the program.
+
+use super::slot::Slot;
+use super::stage::{Layout, stored_odds};
+use super::{flip, label, logistic, unseen};
+use std::sync::LazyLock;
+
+/// State of one kind of decision at the start of a chunk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct StagePrior {
+    /// Direct contexts one after another, then what keyed ones start from.
+    pub(super) slots: Vec<Slot>,
+    /// In 1/65536.
+    pub(super) weights: Vec<i32>,
+    /// Points of the correction curves, 1/2^32.
+    pub(super) curves: Vec<u32>,
+}
+
+/// State of all kinds of decision.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Prior {
+    pub(super) flip: StagePrior,
+    pub(super) unseen: StagePrior,
+    pub(super) label: StagePrior,
+}
+
+const TABLE: &[u8] = include_bytes!("prior.bin");
+
+static SHIPPED: LazyLock<Prior> = LazyLock::new(|| Prior::from_bytes(TABLE).unwrap_or_else(Prior::blank));
+
+/// Weights are stored in 1/2^12.
+const WEIGHT_SHIFT: u32 = 4;
+
+impl Prior {
+    /// The prior that both ends share.
+    pub(super) fn shipped() -> &'static Self {
+        &SHIPPED
+    }
+
+    /// A prior that knows nothing.
+    pub(super) fn blank() -> Self {
+        Self { flip: flip::LAYOUT.blank(), unseen: unseen::LAYOUT.blank(), label: label::LAYOUT.blank() }
+    }
+
+    /// Reads a table; `None` if it is not one of this layout.
+    ///
+    /// ```text
+    ///      for flip, unseen, label:  slots x (log odds i16, visits u8), weights x i16 / 2^12, curves x log odds i16
+    /// ```
+    /// Little-endian; log odds in 1/256 of a factor of two.
+    pub(super) fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut reader = Reader(bytes);
+        let prior = Self {
+            flip: reader.stage(&flip::LAYOUT)?,
+            unseen: reader.stage(&unseen::LAYOUT)?,
+            label: reader.stage(&label::LAYOUT)?,
+        };
+        reader.0.is_empty().then_some(prior)
+    }
+
+    /// The table that [`Prior::from_bytes`] reads.
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        for stage in [&self.flip, &self.unseen, &self.label] {
+            for slot in &stage.slots {
+                out.extend(stored_odds(slot.p).to_le_bytes());
+                out.push(slot.visits);
+            }
+            for &weight in &stage.weights {
+                let weight = (weight >> WEIGHT_SHIFT).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
+                out.extend(weight.to_le_bytes());
+            }
+            for &point in &stage.curves {
+                out.extend(stored_odds(point).to_le_bytes());
+            }
+        }
+        out
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn stage(&mut self, layout: &Layout) -> Option<StagePrior> {
+        let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.byte()? }));
+        let slots = slots.collect::<Option<_>>()?;
+        let weights = (0..layout.weights()).map(|_| Some(i32::from(self.number()?) << WEIGHT_SHIFT));
+        let weights = weights.collect::<Option<_>>()?;
+        let curves = (0..layout.curve_points()).map(|_| self.probability()).collect::<Option<_>>()?;
+        Some(StagePrior { slots, weights, curves })
+    }
+
+    fn probability(&mut self) -> Option<u32> {
+        Some(logistic::probability(i32::from(self.number()?)) << 16 | 0x8000)
+    }
+
+    fn number(&mut self) -> Option<i16> {
+        let (number, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(i16::from_le_bytes(*number))
+    }
+
+    fn byte(&mut self) -> Option<u8> {
+        let (&byte, rest) = self.0.split_first()?;
+        self.0 = rest;
+        Some(byte)
+    }
+}
