@@ -1,9 +1,10 @@
 //! Bytes and time of map chunks on survey series and stills, against the best PNG.
 //!
-//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png]]`; zopfli takes nearly all of the time.
+//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural]]`; zopfli takes nearly all of the time.
 #![allow(clippy::disallowed_methods)]
 
 mod png_baseline;
+mod real;
 
 use png_baseline::{delta_png, full_png};
 use scenecast_protocol::map::LabelGrid;
@@ -16,27 +17,82 @@ const SIDE: usize = 192;
 const STEPS: usize = 40;
 
 fn main() {
-    let quick = std::env::args().any(|argument| argument == "quick");
-    let seeds = if quick { 1 } else { 3 };
-    println!("series: {SIDE} x {SIDE}, {STEPS} steps, 8 labels, {seeds} scenes; bytes a step");
-    let regimes = [
+    let asked = |word: &str| std::env::args().any(|argument| argument == word);
+    let seeds = if asked("quick") { 1 } else { 3 };
+    if !asked("real") {
+        procedural(seeds);
+    }
+    if !asked("procedural") {
+        real_stills(seeds as usize);
+        real_series(seeds as usize);
+    }
+}
+
+fn real_stills(most: usize) {
+    println!("stills of real maps, {SIDE} x {SIDE}");
+    for (name, step, shift) in [
+        ("benthic_map/map_idx_2cm.png", 1, 1),
+        ("benthic_map/map_idx_10cm.png", 1, 1),
+        ("scripps_2014/2014_label_idx.png", 8, 1),
+        ("scripps_2014/2014_label_idx.png", 4, 1),
+    ] {
+        let Some(map) = real::map(name, step, shift) else { continue };
+        let mut totals = Totals::default();
+        for crop in real::crops(&map, SIDE, 3).into_iter().take(2 * most) {
+            totals.add(&series(&[Plane::uniform(SIDE, SIDE, 0), crop]));
+        }
+        totals.print(&format!("{} / {step}", name.split('/').next().unwrap_or(name)));
+    }
+}
+
+fn real_series(most: usize) {
+    println!("series over real maps; and one year to the next");
+    if let Some(map) = real::map("benthic_map/map_idx_10cm.png", 1, 1) {
+        for (name, flips) in regimes() {
+            let mut totals = Totals::default();
+            for crop in real::crops(&map, SIDE, 3).into_iter().take(most) {
+                totals.add(&series(&survey(1, crop, flips)));
+            }
+            totals.print(name);
+        }
+    }
+    let years = ["2013", "2014"].map(|year| real::map(&format!("scripps_2014/{year}_label_idx.png"), 8, 1));
+    if let [Some(before), Some(after)] = years {
+        let mut totals = Totals::default();
+        for (column, row) in [(0, 0), (180, 0), (0, 180), (180, 180)] {
+            totals.add(&series(&[&before, &after].map(|map| real::crop(map, column, row, SIDE))));
+        }
+        totals.print("2013 to 2014");
+    }
+}
+
+fn regimes() -> [(&'static str, Flips); 3] {
+    [
         ("0.5 % of border", Flips { border: 5000, anywhere: 0, settling: 0 }),
         ("3 % of border", Flips { border: 30_000, anywhere: 0, settling: 0 }),
         ("1 % of all seen", Flips { border: 0, anywhere: 10_000, settling: 0 }),
-    ];
+    ]
+}
+
+fn survey(seed: u64, scene: Plane, flips: Flips) -> Vec<Plane> {
+    let mut survey = Survey::new(seed, scene, flips, STEPS);
+    let mut maps = vec![survey.map().clone()];
+    for _ in 0..STEPS {
+        survey.advance();
+        maps.push(survey.map().clone());
+    }
+    maps
+}
+
+fn procedural(seeds: u64) {
+    println!("series: {SIDE} x {SIDE}, {STEPS} steps, 8 labels, {seeds} scenes; bytes a step");
     let mut all = Totals::default();
-    for (name, flips) in regimes {
+    for (name, flips) in regimes() {
         let mut totals = Totals::default();
         for seed in 0..seeds {
             let mut chance = Chance::new(900 + seed);
             let scene = Scene::ALL[seed as usize % 4].draw(&mut chance, SIDE, SIDE, 8);
-            let mut survey = Survey::new(seed, scene, flips, STEPS);
-            let mut maps = vec![survey.map().clone()];
-            for _ in 0..STEPS {
-                survey.advance();
-                maps.push(survey.map().clone());
-            }
-            totals.add(&series(&maps));
+            totals.add(&series(&survey(seed, scene, flips)));
         }
         totals.print(name);
         all.add(&totals);

@@ -55,10 +55,7 @@ pub fn encode(
         Codec::Context => context::best_chunk(base, &growth, room),
         Codec::Auto => {
             let by_context = context::best_chunk(base, &growth, room);
-            match by_context {
-                Some(chunk) => Some(png::smaller(base, &growth, &chunk).unwrap_or(chunk)),
-                None => png::best_chunk(base, &growth, room),
-            }
+            by_context.map(|chunk| png::smaller(base, &chunk).unwrap_or(chunk))
         }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct Canvas {
     now: Vec<u8>,
     /// Cells by label, in the base around the patch and as coded.
     census: [u32; 256],
+    /// How noisy the base is: share of cells with none like them around, in six classes.
+    pub(super) noise: usize,
 }
 
 impl Canvas {
@@ -30,7 +32,9 @@ impl Canvas {
         let mut census = [0; 256];
         area(CENSUS_MARGIN).into_iter().for_each(|label| census[usize::from(label)] += 1);
         let held = area(MARGIN as i64);
-        Self { width, height, stride: width + 2 * MARGIN, base: held.clone(), now: held, census }
+        let stride = width + 2 * MARGIN;
+        let noise = noise(&held, stride);
+        Self { width, height, stride, base: held.clone(), now: held, census, noise }
     }
 
     /// Where the cell in `column` of `row` lies.
@@ -74,5 +78,25 @@ impl Canvas {
             rows.flat_map(|row| row.iter().skip(MARGIN).take(self.width).copied()).collect()
         };
         Patch { rect, base: inside(&self.base), outcome: inside(&self.now) }
+    }
+}
+
+fn noise(labels: &[u8], stride: usize) -> usize {
+    let (mut seen, mut lonely) = (0usize, 0usize);
+    for at in stride + 1..labels.len() - stride - 1 {
+        let label = labels[at];
+        if label != 0 {
+            seen += 1;
+            let rows = [at - stride, at, at + stride];
+            let alike = rows.iter().map(|&i| labels[i - 1..i + 2].iter().filter(|&&l| l == label).count());
+            lonely += usize::from(alike.sum::<usize>() == 1);
+        }
+    }
+    match lonely * 1000 / seen.max(1) {
+        0 => usize::from(lonely > 0),
+        1..=3 => 2,
+        4..=11 => 3,
+        12..=35 => 4,
+        _ => 5,
     }
 }

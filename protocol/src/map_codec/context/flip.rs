@@ -1,36 +1,18 @@
-//! Does a cell that has a label keep it?
+//! Does a cell near a border or a change keep its label?
 
 use super::canvas::Canvas;
+use super::recent::Recent;
 use super::stage::{Contexts, Layout};
-use super::view::{View, magnitude};
+use super::view::View;
 
-pub(super) const LAYOUT: Layout =
-    Layout { direct: &[108, 512, 320, 1024, 180, 162, 60, 256], keyed: &[5, 5], sets: [9, 12], curves: 27 };
+pub(super) const LAYOUT: Layout = Layout {
+    direct: &[108, 512, 320, 1024, 180, 162, 5 * Recent::GAPS, 256, 30 * Recent::RATES, 900],
+    keyed: &[5, 5],
+    sets: [9, 12, Recent::RATES],
+    curves: 27,
+};
 
-/// What the decisions so far tell about the next.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Recent {
-    /// Seen cells since the last one that changed, apart for the inside of regions and their borders.
-    since: [usize; 3],
-}
-
-impl Recent {
-    pub(super) fn note(&mut self, view: &View, kept: bool) {
-        let since = &mut self.since[border(view)];
-        *since = if kept { *since + 1 } else { 0 };
-    }
-}
-
-/// 0 inside a region, 1 near its border, 2 where fewer than half the neighbours hold the label.
-fn border(view: &View) -> usize {
-    match view.ring(view.held).count_ones() {
-        8 => 0,
-        5..=7 => 1,
-        _ => 2,
-    }
-}
-
-pub(super) fn contexts(canvas: &Canvas, at: usize, view: &View, recent: &Recent) -> Contexts {
+pub(super) fn contexts(canvas: &Canvas, view: &View, wide: usize, calm: &Recent, border: &Recent) -> Contexts {
     let held = view.held;
     let ring = view.ring(held);
     let same = ring.count_ones() as usize;
@@ -38,11 +20,11 @@ pub(super) fn contexts(canvas: &Canvas, at: usize, view: &View, recent: &Recent)
     let changes = (view.changed.count_ones() as usize).min(3);
     let near_changes = view.changed & 63;
     let few_same = [0, 0, 1, 1, 2, 2, 3, 3, 4][same];
-    let wide = wider_ring(canvas, at, held);
+    let one_in = border.one_in() - 2;
+    let noise = canvas.noise;
     let (other, votes) = leading_other(view);
     let unseen_class = [0, 1, 1, 2, 2, 2, 2, 2, 2][unseen];
     let other_is_new = usize::from(other != 0 && (0..4).any(|i| view.changed >> i & 1 == 1 && view.behind[i] == other));
-    let gap = magnitude(recent.since[border(view)]).min(19);
     Contexts {
         direct: [
             (same * 3 + unseen_class) * 4 + changes,
@@ -51,19 +33,25 @@ pub(super) fn contexts(canvas: &Canvas, at: usize, view: &View, recent: &Recent)
             ring * 4 + changes,
             (wide * 9 + same) * 4 + (view.changed & 3),
             (votes * 9 + same) * 2 + other_is_new,
-            border(view) * 20 + gap,
+            border.gap() * 5 + few_same,
             view.ring(other) & if other == 0 { 0 } else { 255 },
-            0,
-            0,
+            (border.rate() * 5 + few_same) * 6 + noise,
+            (one_in * 10 + calm.one_in() - 2) * 9 + same,
         ],
-        keyed: [(u32::from(held), few_same), (u32::from(held) << 8 | u32::from(other), few_same), (0, 0)],
-        sets: [same, unseen_class * 4 + changes],
+        keyed: [
+            (u32::from(held), few_same),
+            (u32::from(held) << 8 | u32::from(other), few_same),
+            (0, 0),
+            (0, 0),
+            (0, 0),
+        ],
+        sets: [same, unseen_class * 4 + changes, border.rate()],
         curve: same * 3 + changes.min(2),
     }
 }
 
 /// How many of the sixteen cells two steps away differ, in five classes.
-fn wider_ring(canvas: &Canvas, at: usize, held: u8) -> usize {
+pub(super) fn wider_ring(canvas: &Canvas, at: usize, held: u8) -> usize {
     let mut differ = 0;
     for i in -2..=2 {
         differ += usize::from(canvas.near(at, i, -2) != held) + usize::from(canvas.near(at, i, 2) != held);

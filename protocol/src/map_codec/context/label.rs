@@ -5,8 +5,12 @@ use super::stage::{Contexts, Layout};
 use super::view::{View, magnitude};
 use crate::map::MAX_LABEL;
 
-pub(super) const LAYOUT: Layout =
-    Layout { direct: &[512, 512, 2048, 512, 256, 704, 128, 128], keyed: &[8, 8, 8], sets: [8, 18], curves: 16 };
+pub(super) const LAYOUT: Layout = Layout {
+    direct: &[512, 512, 2048, 512, 256, 704, 128, 128],
+    keyed: &[8, 8, 8, 128, 128],
+    sets: [8, 18, 32],
+    curves: 16,
+};
 
 /// Labels around a cell by weight of votes, heaviest first.
 #[derive(Debug, Clone, Copy, Default)]
@@ -85,8 +89,14 @@ pub(super) fn contexts(view: &View, votes: &Votes, candidate: u8, rank: usize, l
             (u32::from(candidate) << 1 | flips as u32, state),
             (u32::from(candidate) << 8 | u32::from(top), state),
             (u32::from(candidate) << 8 | u32::from(view.held), state),
+            (u32::from_be_bytes([0, candidate, w, s]), (ten & 15) * 8 + state),
+            (hash([candidate, w, s, sw, se]), (ten & 15) * 8 + state),
         ],
-        sets: [state, flips * 9 + ring.count_ones() as usize],
+        sets: [state, flips * 9 + ring.count_ones() as usize, (ten & 15) * 2 + flips],
         curve: flips * 8 + few * 2 + usize::from(voted),
     }
+}
+
+fn hash(labels: [u8; 5]) -> u32 {
+    labels.iter().fold(0, |hash: u32, &label| (hash ^ u32::from(label)).wrapping_mul(0x0100_0193).rotate_left(7))
 }

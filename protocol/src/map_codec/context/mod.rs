@@ -1,6 +1,7 @@
 //! The `context` coder: binary decisions, contexts mixed in integers, a shipped prior, state fresh for each chunk.
 
 mod arith;
+mod calm;
 mod canvas;
 mod fit;
 mod flip;
@@ -8,6 +9,7 @@ mod label;
 mod logistic;
 mod model;
 mod prior;
+mod recent;
 mod slot;
 mod stage;
 mod train;
@@ -21,7 +23,7 @@ use super::window::Patch;
 use crate::map::{LabelGrid, Rect};
 use arith::{Decoder, Encoder};
 use canvas::Canvas;
-pub(super) use fit::best_chunk;
+pub(super) use fit::{best_chunk, prefix_chunk};
 use model::Model;
 use prior::Prior;
 pub use train::train_prior;

@@ -2,21 +2,24 @@
 
 use super::arith::BitCoder;
 use super::canvas::Canvas;
-use super::flip::{self, Recent};
 use super::label::{self, Votes};
 use super::prior::Prior;
+use super::recent::Recent;
 use super::stage::{Contexts, Stage};
 use super::unseen::{self, Run};
 use super::view::View;
+use super::{calm, flip};
 use crate::map::{MAX_LABEL, UNEXPLORED};
 
 /// Adaptive state of a chunk; made afresh from the prior for each.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
+    pub(super) calm: Stage,
     pub(super) flip: Stage,
     pub(super) unseen: Stage,
     pub(super) label: Stage,
-    recent: Recent,
+    inside: Recent,
+    border: Recent,
     run: Run,
 }
 
@@ -27,10 +30,12 @@ const NEXT_LABEL: u32 = 60_000;
 impl Model {
     pub(super) fn new(prior: &'static Prior) -> Self {
         Self {
+            calm: Stage::new(&calm::LAYOUT, &prior.calm),
             flip: Stage::new(&flip::LAYOUT, &prior.flip),
             unseen: Stage::new(&unseen::LAYOUT, &prior.unseen),
             label: Stage::new(&label::LAYOUT, &prior.label),
-            recent: Recent::default(),
+            inside: Recent::default(),
+            border: Recent::default(),
             run: Run::default(),
         }
     }
@@ -51,9 +56,7 @@ impl Model {
             self.run.note(column, !kept);
             kept
         } else {
-            let contexts = flip::contexts(canvas, at, &view, &self.recent);
-            let kept = decide(&mut self.flip, coder, &contexts, wanted == view.held);
-            self.recent.note(&view, kept);
+            let kept = self.code_kept(coder, canvas, at, &view, wanted == view.held);
             self.run.note(column, true);
             kept
         };
@@ -62,6 +65,21 @@ impl Model {
             canvas.set(at, label);
         }
         Some(())
+    }
+
+    fn code_kept(&mut self, coder: &mut impl BitCoder, canvas: &Canvas, at: usize, view: &View, kept: bool) -> bool {
+        let wide = flip::wider_ring(canvas, at, view.held);
+        if wide == 0 && view.ring(view.held) == 255 && view.changed == 0 {
+            let contexts = calm::contexts(view, canvas.noise, &self.inside, &self.border);
+            let kept = decide(&mut self.calm, coder, &contexts, kept);
+            self.inside.note(kept);
+            kept
+        } else {
+            let contexts = flip::contexts(canvas, view, wide, &self.inside, &self.border);
+            let kept = decide(&mut self.flip, coder, &contexts, kept);
+            self.border.note(kept);
+            kept
+        }
     }
 
     fn code_label(&mut self, coder: &mut impl BitCoder, canvas: &Canvas, view: &View, wanted: u8) -> Option<u8> {

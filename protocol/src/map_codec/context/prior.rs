@@ -2,7 +2,7 @@
 
 use super::slot::Slot;
 use super::stage::{Layout, stored_odds};
-use super::{flip, label, logistic, unseen};
+use super::{calm, flip, label, logistic, unseen};
 use std::sync::LazyLock;
 
 /// State of one kind of decision at the start of a chunk.
@@ -19,6 +19,7 @@ pub(super) struct StagePrior {
 /// State of all kinds of decision.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Prior {
+    pub(super) calm: StagePrior,
     pub(super) flip: StagePrior,
     pub(super) unseen: StagePrior,
     pub(super) label: StagePrior,
@@ -39,18 +40,24 @@ impl Prior {
 
     /// A prior that knows nothing.
     pub(super) fn blank() -> Self {
-        Self { flip: flip::LAYOUT.blank(), unseen: unseen::LAYOUT.blank(), label: label::LAYOUT.blank() }
+        Self {
+            calm: calm::LAYOUT.blank(),
+            flip: flip::LAYOUT.blank(),
+            unseen: unseen::LAYOUT.blank(),
+            label: label::LAYOUT.blank(),
+        }
     }
 
     /// Reads a table; `None` if it is not one of this layout.
     ///
     /// ```text
-    ///      for flip, unseen, label:  slots x (log odds i16, visits u8), weights x i16 / 2^12, curves x log odds i16
+    ///      for calm, flip, unseen, label:  slots x (log odds i16, visits u16), weights x i16 / 2^12, curves x log odds i16
     /// ```
     /// Little-endian; log odds in 1/256 of a factor of two.
     pub(super) fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut reader = Reader(bytes);
         let prior = Self {
+            calm: reader.stage(&calm::LAYOUT)?,
             flip: reader.stage(&flip::LAYOUT)?,
             unseen: reader.stage(&unseen::LAYOUT)?,
             label: reader.stage(&label::LAYOUT)?,
@@ -61,10 +68,10 @@ impl Prior {
     /// The table that [`Prior::from_bytes`] reads.
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        for stage in [&self.flip, &self.unseen, &self.label] {
+        for stage in [&self.calm, &self.flip, &self.unseen, &self.label] {
             for slot in &stage.slots {
                 out.extend(stored_odds(slot.p).to_le_bytes());
-                out.push(slot.visits);
+                out.extend(slot.visits.to_le_bytes());
             }
             for &weight in &stage.weights {
                 let weight = (weight >> WEIGHT_SHIFT).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
@@ -82,7 +89,7 @@ struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
     fn stage(&mut self, layout: &Layout) -> Option<StagePrior> {
-        let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.byte()? }));
+        let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.visits()? }));
         let slots = slots.collect::<Option<_>>()?;
         let weights = (0..layout.weights()).map(|_| Some(i32::from(self.number()?) << WEIGHT_SHIFT));
         let weights = weights.collect::<Option<_>>()?;
@@ -100,9 +107,29 @@ impl Reader<'_> {
         Some(i16::from_le_bytes(*number))
     }
 
-    fn byte(&mut self) -> Option<u8> {
-        let (&byte, rest) = self.0.split_first()?;
+    fn visits(&mut self) -> Option<u16> {
+        let (number, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
-        Some(byte)
+        Some(u16::from_le_bytes(*number).min(Slot::MOST_VISITS))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_table_fits_the_layout() {
+        let prior = Prior::from_bytes(TABLE).expect("a table of this layout");
+        assert_eq!(prior.to_bytes().len(), TABLE.len());
+        assert!(Prior::from_bytes(&TABLE[1..]).is_none());
+    }
+
+    #[test]
+    fn training_repeats_itself_and_gives_a_table_of_this_layout() {
+        let table = |seed| crate::map_codec::train_prior(seed, 2, &mut |_| ());
+        assert!(table(1) == table(1));
+        assert!(table(1) != table(2));
+        assert!(Prior::from_bytes(&table(1)).is_some());
     }
 }

@@ -7,11 +7,13 @@ use super::slot::Slot;
 /// Most contexts of one kind of decision.
 pub(super) const MOST_DIRECT: usize = 10;
 /// Most contexts that go by label.
-pub(super) const MOST_KEYED: usize = 3;
+pub(super) const MOST_KEYED: usize = 5;
 /// Inputs of the mixer: every context and a constant.
 pub(super) const MOST_INPUTS: usize = MOST_DIRECT + MOST_KEYED + 1;
 /// Labels that a keyed context keeps apart at a time.
-const KEYED_PLACES: usize = 512;
+const KEYED_PLACES: usize = 2048;
+/// Mixers side by side, each with its own choice of weights.
+pub(super) const SETS: usize = 3;
 /// Steps of the correction curve.
 const CURVE: usize = 33;
 const CURVE_STEP: i32 = 256;
@@ -26,7 +28,7 @@ pub(super) struct Layout {
     /// Contexts that go by a key too: what they start from has this many values.
     pub(super) keyed: &'static [usize],
     /// Choices of weights.
-    pub(super) sets: [usize; 2],
+    pub(super) sets: [usize; SETS],
     /// Choices of correction curve.
     pub(super) curves: usize,
 }
@@ -44,7 +46,12 @@ impl Layout {
 
     /// Weights that a prior gives.
     pub(super) fn weights(&self) -> usize {
-        (self.sets[0] + self.sets[1]) * self.inputs()
+        self.sets.iter().sum::<usize>() * self.inputs() + self.curves * SETS
+    }
+
+    /// Where the weights of the mixers' own mixing begin.
+    fn second_layer(&self) -> usize {
+        self.sets.iter().sum::<usize>() * self.inputs()
     }
 
     /// Points of all correction curves.
@@ -57,7 +64,9 @@ impl Layout {
         let curve = (0..CURVE as i32).map(|i| probability((i - 16) * CURVE_STEP) << 16);
         StagePrior {
             slots: vec![Slot::BLANK; self.slots()],
-            weights: vec![ONE * 3 / 10; self.weights()],
+            weights: (0..self.weights())
+                .map(|i| if i < self.second_layer() { ONE * 3 / 10 } else { ONE / 3 })
+                .collect(),
             curves: curve.cycle().take(self.curve_points()).collect(),
         }
     }
@@ -69,7 +78,7 @@ pub(super) struct Contexts {
     pub(super) direct: [usize; MOST_DIRECT],
     /// Key, and what it starts from.
     pub(super) keyed: [(u32, usize); MOST_KEYED],
-    pub(super) sets: [usize; 2],
+    pub(super) sets: [usize; SETS],
     pub(super) curve: usize,
 }
 
@@ -106,15 +115,18 @@ struct Last {
     /// Slot of the prior that each keyed context started from.
     starts: [usize; MOST_KEYED],
     odds: [i32; MOST_INPUTS],
-    sets: [usize; 2],
-    mixed: [u32; 2],
+    sets: [usize; SETS],
+    mixed: [u32; SETS],
+    mixed_odds: [i32; SETS],
+    second: usize,
+    both: u32,
     curve: usize,
 }
 
 /// No key: labels and their pairs stay below.
 const NO_KEY: u32 = u32::MAX;
 /// How fast weights follow while coding.
-const WEIGHT_RATE: i64 = 2;
+const WEIGHT_RATE: i64 = 3;
 /// How fast correction curves follow: 1/2^n of the error.
 const CURVE_SHIFT: u32 = 7;
 
@@ -163,16 +175,23 @@ impl Stage {
 
     fn mix(&mut self, contexts: &Contexts) -> u32 {
         let inputs = self.layout.inputs();
-        self.last.sets = [contexts.sets[0] * inputs, (self.layout.sets[0] + contexts.sets[1]) * inputs];
-        let mut sum = 0;
-        for (mixed, first) in self.last.mixed.iter_mut().zip(self.last.sets) {
+        let mut first = 0;
+        for ((at, &choices), &choice) in self.last.sets.iter_mut().zip(&self.layout.sets).zip(&contexts.sets) {
+            debug_assert!(choice < choices);
+            *at = (first + choice) * inputs;
+            first += choices;
+        }
+        for (i, first) in self.last.sets.into_iter().enumerate() {
             let weights = &self.weights[first..first + inputs];
             let dot: i64 = weights.iter().zip(&self.last.odds).map(|(&w, &s)| i64::from(w) * i64::from(s)).sum();
             let odds = (dot >> 16).clamp(i64::from(-MAX_ODDS), i64::from(MAX_ODDS)) as i32;
-            *mixed = probability(odds);
-            sum += odds;
+            (self.last.mixed[i], self.last.mixed_odds[i]) = (probability(odds), odds);
         }
-        let odds = sum / 2;
+        self.last.second = self.layout.second_layer() + contexts.curve * SETS;
+        let weights = &self.weights[self.last.second..self.last.second + SETS];
+        let dot: i64 = weights.iter().zip(&self.last.mixed_odds).map(|(&w, &s)| i64::from(w) * i64::from(s)).sum();
+        let odds = (dot >> 16).clamp(i64::from(-MAX_ODDS), i64::from(MAX_ODDS)) as i32;
+        self.last.both = probability(odds);
         let along = odds + 16 * CURVE_STEP;
         let (step, rest) = ((along / CURVE_STEP) as usize, (along % CURVE_STEP) as u64);
         let at = contexts.curve * CURVE + step;
@@ -191,6 +210,11 @@ impl Stage {
             for (weight, &odds) in self.weights[first..first + inputs].iter_mut().zip(&self.last.odds) {
                 *weight += ((i64::from(odds) * error * self.weight_rate + (1 << 19)) >> 20) as i32;
             }
+        }
+        let error = goal - i64::from(self.last.both);
+        let second = &mut self.weights[self.last.second..self.last.second + SETS];
+        for (weight, &odds) in second.iter_mut().zip(&self.last.mixed_odds) {
+            *weight += ((i64::from(odds) * error * self.weight_rate + (1 << 20)) >> 21) as i32;
         }
         let point = &mut self.curves[self.last.curve];
         let goal = if bit { i64::from(u32::MAX) } else { 0 };

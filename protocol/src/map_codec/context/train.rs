@@ -119,12 +119,13 @@ impl SlotSums {
         let spread = self.ones_squared - 2.0 * p * self.ones_visits + p * p * self.visits_squared;
         let pairs = self.visits_squared - self.visits;
         let unlike = if pairs > 0.0 { (spread / (p * (1.0 - p)) - self.visits) / pairs } else { 1.0 };
-        let worth = (1.0 / unlike.clamp(0.003, 1.0) - 1.0).min(self.visits / 2.0).clamp(0.0, 250.0);
-        Slot { p: (p * 4_294_967_295.0) as u32, visits: worth as u8 }
+        let worth =
+            (1.0 / unlike.clamp(0.0005, 1.0) - 1.0).min(self.visits / 2.0).clamp(0.0, f64::from(Slot::MOST_VISITS));
+        Slot { p: (p * 4_294_967_295.0) as u32, visits: worth as u16 }
     }
 }
 
-struct Sums([Vec<SlotSums>; 3]);
+struct Sums([Vec<SlotSums>; 4]);
 
 impl Sums {
     /// `refined`: weigh chunks by what `prior` says about how alike they are.
@@ -133,7 +134,7 @@ impl Sums {
         let sums = |stage: &StagePrior| {
             stage.slots.iter().map(|slot| SlotSums { alike: alike(slot), ..SlotSums::default() }).collect()
         };
-        Self([sums(&prior.flip), sums(&prior.unseen), sums(&prior.label)])
+        Self([sums(&prior.calm), sums(&prior.flip), sums(&prior.unseen), sums(&prior.label)])
     }
 
     fn add(&mut self, model: &mut Model) {
@@ -152,17 +153,18 @@ impl Sums {
 }
 
 impl Prior {
-    fn stages(&mut self) -> [&mut StagePrior; 3] {
-        [&mut self.flip, &mut self.unseen, &mut self.label]
+    fn stages(&mut self) -> [&mut StagePrior; 4] {
+        [&mut self.calm, &mut self.flip, &mut self.unseen, &mut self.label]
     }
 }
 
 impl Model {
-    fn stages(&mut self) -> [&mut Stage; 3] {
-        [&mut self.flip, &mut self.unseen, &mut self.label]
+    fn stages(&mut self) -> [&mut Stage; 4] {
+        [&mut self.calm, &mut self.flip, &mut self.unseen, &mut self.label]
     }
 
     fn carry_weights(&mut self, before: &Self) {
+        self.calm.carry(&before.calm);
         self.flip.carry(&before.flip);
         self.unseen.carry(&before.unseen);
         self.label.carry(&before.label);

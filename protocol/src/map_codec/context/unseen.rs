@@ -1,11 +1,11 @@
 //! Does a cell without a label stay without?
 
 use super::canvas::Canvas;
-use super::stage::{Contexts, Layout};
+use super::stage::{Contexts, Layout, MOST_KEYED};
 use super::view::{View, magnitude};
 
 pub(super) const LAYOUT: Layout =
-    Layout { direct: &[256, 256, 512, 64, 81, 256, 1024, 144], keyed: &[], sets: [9, 16], curves: 9 };
+    Layout { direct: &[256, 256, 512, 64, 81, 256, 1024, 144], keyed: &[], sets: [9, 16, 16], curves: 9 };
 
 /// Length of the present run of seen or unseen cells along the row.
 #[derive(Debug, Clone, Copy, Default)]
@@ -45,8 +45,8 @@ pub(super) fn contexts(canvas: &Canvas, at: usize, place: (usize, usize), view: 
             0,
             0,
         ],
-        keyed: [(0, 0); 3],
-        sets: [states[0] * 3 + states[1], edges],
+        keyed: [(0, 0); MOST_KEYED],
+        sets: [states[0] * 3 + states[1], edges, new & 15],
         curve: states[0] * 3 + states[1],
     }
 }

@@ -32,8 +32,8 @@ pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: 
 }
 
 /// The `png` chunk that says the same as `chunk`, if it is shorter.
-pub(in crate::map_codec) fn smaller(base: &LabelGrid, growth: &Growth, other: &MapChunk) -> Option<MapChunk> {
-    let patch = growth.window.patch_of(&other.changes)?;
+pub(in crate::map_codec) fn smaller(base: &LabelGrid, other: &MapChunk) -> Option<MapChunk> {
+    let patch = Patch::of(base, &other.changes)?;
     let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, Effort::Quick);
     (bytes.len() < other.bytes.len()).then(|| chunk(&patch, bytes))
 }
