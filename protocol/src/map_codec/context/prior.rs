@@ -1,7 +1,7 @@
 //! What the coder knows before the first cell: trained on procedural maps, shipped with the program.
 
 use super::slot::Slot;
-use super::stage::{Layout, stored_odds};
+use super::stage::{INPUTS, Layout, SETS, stored_odds};
 use super::{calm, flip, label, logistic, unseen};
 use std::sync::LazyLock;
 
@@ -10,8 +10,10 @@ use std::sync::LazyLock;
 pub(super) struct StagePrior {
     /// Direct contexts one after another, then what keyed ones start from.
     pub(super) slots: Vec<Slot>,
-    /// In 1/65536.
-    pub(super) weights: Vec<i32>,
+    /// Weights of the mixers side by side, in 1/65536.
+    pub(super) weights: Vec<[i32; INPUTS]>,
+    /// Weights of the mixers among each other, in 1/65536.
+    pub(super) second: Vec<[i32; SETS]>,
     /// Points of the correction curves, 1/2^32.
     pub(super) curves: Vec<u32>,
 }
@@ -68,12 +70,15 @@ impl Prior {
     /// The table that [`Prior::from_bytes`] reads.
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        for stage in [&self.calm, &self.flip, &self.unseen, &self.label] {
+        let stages = [&self.calm, &self.flip, &self.unseen, &self.label];
+        let layouts = [&calm::LAYOUT, &flip::LAYOUT, &unseen::LAYOUT, &label::LAYOUT];
+        for (stage, layout) in stages.into_iter().zip(layouts) {
             for slot in &stage.slots {
                 out.extend(stored_odds(slot.p).to_le_bytes());
                 out.extend(slot.visits.to_le_bytes());
             }
-            for &weight in &stage.weights {
+            let used = stage.weights.iter().flat_map(|row| row.iter().take(layout.inputs()));
+            for weight in used.chain(stage.second.iter().flatten()) {
                 let weight = (weight >> WEIGHT_SHIFT).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
                 out.extend(weight.to_le_bytes());
             }
@@ -91,10 +96,19 @@ impl Reader<'_> {
     fn stage(&mut self, layout: &Layout) -> Option<StagePrior> {
         let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.visits()? }));
         let slots = slots.collect::<Option<_>>()?;
-        let weights = (0..layout.weights()).map(|_| Some(i32::from(self.number()?) << WEIGHT_SHIFT));
+        let weights = (0..layout.rows()).map(|_| self.row(layout.inputs()));
         let weights = weights.collect::<Option<_>>()?;
+        let second = (0..layout.curves).map(|_| self.row(SETS)).collect::<Option<_>>()?;
         let curves = (0..layout.curve_points()).map(|_| self.probability()).collect::<Option<_>>()?;
-        Some(StagePrior { slots, weights, curves })
+        Some(StagePrior { slots, weights, second, curves })
+    }
+
+    fn row<const N: usize>(&mut self, used: usize) -> Option<[i32; N]> {
+        let mut row = [0; N];
+        for weight in row.iter_mut().take(used) {
+            *weight = i32::from(self.number()?) << WEIGHT_SHIFT;
+        }
+        Some(row)
     }
 
     fn probability(&mut self) -> Option<u32> {

@@ -8,8 +8,8 @@ use super::slot::Slot;
 pub(super) const MOST_DIRECT: usize = 10;
 /// Most contexts that go by label.
 pub(super) const MOST_KEYED: usize = 5;
-/// Inputs of the mixer: every context and a constant.
-pub(super) const MOST_INPUTS: usize = MOST_DIRECT + MOST_KEYED + 1;
+/// Inputs of the mixer: every context and a constant; those without a context stay zero.
+pub(super) const INPUTS: usize = MOST_DIRECT + MOST_KEYED + 1;
 /// Labels that a keyed context keeps apart at a time.
 const KEYED_PLACES: usize = 2048;
 /// Mixers side by side, each with its own choice of weights.
@@ -34,7 +34,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Mixer inputs.
+    /// Mixer inputs in use.
     pub(super) fn inputs(&self) -> usize {
         self.direct.len() + self.keyed.len() + 1
     }
@@ -44,14 +44,9 @@ impl Layout {
         self.direct.iter().chain(self.keyed).sum()
     }
 
-    /// Weights that a prior gives.
-    pub(super) fn weights(&self) -> usize {
-        self.sets.iter().sum::<usize>() * self.inputs() + self.curves * SETS
-    }
-
-    /// Where the weights of the mixers' own mixing begin.
-    fn second_layer(&self) -> usize {
-        self.sets.iter().sum::<usize>() * self.inputs()
+    /// Choices of weights of all mixers.
+    pub(super) fn rows(&self) -> usize {
+        self.sets.iter().sum()
     }
 
     /// Points of all correction curves.
@@ -64,9 +59,8 @@ impl Layout {
         let curve = (0..CURVE as i32).map(|i| probability((i - 16) * CURVE_STEP) << 16);
         StagePrior {
             slots: vec![Slot::BLANK; self.slots()],
-            weights: (0..self.weights())
-                .map(|i| if i < self.second_layer() { ONE * 3 / 10 } else { ONE / 3 })
-                .collect(),
+            weights: vec![[ONE * 3 / 10; INPUTS]; self.rows()],
+            second: vec![[ONE / 3; SETS]; self.curves],
             curves: curve.cycle().take(self.curve_points()).collect(),
         }
     }
@@ -89,11 +83,12 @@ pub(super) struct Stage {
     prior: &'static StagePrior,
     slots: Vec<Slot>,
     keyed: Vec<Vec<(u32, Slot)>>,
-    weights: Vec<i32>,
+    weights: Vec<[i32; INPUTS]>,
+    second: Vec<[i32; SETS]>,
     curves: Vec<u32>,
     last: Last,
     /// How fast weights follow, in 1/2^20 of odds times error.
-    pub(super) weight_rate: i64,
+    pub(super) weight_rate: i32,
     /// Decisions counted for training.
     pub(super) tally: Option<Box<Tally>>,
 }
@@ -114,7 +109,7 @@ struct Last {
     keyed: [usize; MOST_KEYED],
     /// Slot of the prior that each keyed context started from.
     starts: [usize; MOST_KEYED],
-    odds: [i32; MOST_INPUTS],
+    odds: [i32; INPUTS],
     sets: [usize; SETS],
     mixed: [u32; SETS],
     mixed_odds: [i32; SETS],
@@ -126,7 +121,7 @@ struct Last {
 /// No key: labels and their pairs stay below.
 const NO_KEY: u32 = u32::MAX;
 /// How fast weights follow while coding.
-const WEIGHT_RATE: i64 = 3;
+const WEIGHT_RATE: i32 = 3;
 /// How fast correction curves follow: 1/2^n of the error.
 const CURVE_SHIFT: u32 = 7;
 
@@ -138,6 +133,7 @@ impl Stage {
             slots: prior.slots.clone(),
             keyed: layout.keyed.iter().map(|_| vec![(NO_KEY, Slot::BLANK); KEYED_PLACES]).collect(),
             weights: prior.weights.clone(),
+            second: prior.second.clone(),
             curves: prior.curves.clone(),
             last: Last::default(),
             weight_rate: WEIGHT_RATE,
@@ -174,23 +170,16 @@ impl Stage {
     }
 
     fn mix(&mut self, contexts: &Contexts) -> u32 {
-        let inputs = self.layout.inputs();
         let mut first = 0;
-        for ((at, &choices), &choice) in self.last.sets.iter_mut().zip(&self.layout.sets).zip(&contexts.sets) {
+        for (i, (&choices, &choice)) in self.layout.sets.iter().zip(&contexts.sets).enumerate() {
             debug_assert!(choice < choices);
-            *at = (first + choice) * inputs;
+            self.last.sets[i] = first + choice;
+            let odds = weigh(&self.weights[first + choice], &self.last.odds);
+            (self.last.mixed[i], self.last.mixed_odds[i]) = (probability(odds), odds);
             first += choices;
         }
-        for (i, first) in self.last.sets.into_iter().enumerate() {
-            let weights = &self.weights[first..first + inputs];
-            let dot: i64 = weights.iter().zip(&self.last.odds).map(|(&w, &s)| i64::from(w) * i64::from(s)).sum();
-            let odds = (dot >> 16).clamp(i64::from(-MAX_ODDS), i64::from(MAX_ODDS)) as i32;
-            (self.last.mixed[i], self.last.mixed_odds[i]) = (probability(odds), odds);
-        }
-        self.last.second = self.layout.second_layer() + contexts.curve * SETS;
-        let weights = &self.weights[self.last.second..self.last.second + SETS];
-        let dot: i64 = weights.iter().zip(&self.last.mixed_odds).map(|(&w, &s)| i64::from(w) * i64::from(s)).sum();
-        let odds = (dot >> 16).clamp(i64::from(-MAX_ODDS), i64::from(MAX_ODDS)) as i32;
+        self.last.second = contexts.curve;
+        let odds = weigh(&self.second[contexts.curve], &self.last.mixed_odds);
         self.last.both = probability(odds);
         let along = odds + 16 * CURVE_STEP;
         let (step, rest) = ((along / CURVE_STEP) as usize, (along % CURVE_STEP) as u64);
@@ -203,19 +192,12 @@ impl Stage {
 
     /// Learns what the decision was.
     pub(super) fn update(&mut self, bit: bool) {
-        let inputs = self.layout.inputs();
         let goal = if bit { 65_536 } else { 0 };
-        for (&mixed, first) in self.last.mixed.iter().zip(self.last.sets) {
-            let error = goal - i64::from(mixed);
-            for (weight, &odds) in self.weights[first..first + inputs].iter_mut().zip(&self.last.odds) {
-                *weight += ((i64::from(odds) * error * self.weight_rate + (1 << 19)) >> 20) as i32;
-            }
+        for (&mixed, row) in self.last.mixed.iter().zip(self.last.sets) {
+            follow(&mut self.weights[row], &self.last.odds, (goal - mixed as i32) * self.weight_rate);
         }
-        let error = goal - i64::from(self.last.both);
-        let second = &mut self.weights[self.last.second..self.last.second + SETS];
-        for (weight, &odds) in second.iter_mut().zip(&self.last.mixed_odds) {
-            *weight += ((i64::from(odds) * error * self.weight_rate + (1 << 20)) >> 21) as i32;
-        }
+        let error = (goal - self.last.both as i32) * self.weight_rate / 2;
+        follow(&mut self.second[self.last.second], &self.last.mixed_odds, error);
         let point = &mut self.curves[self.last.curve];
         let goal = if bit { i64::from(u32::MAX) } else { 0 };
         *point = (i64::from(*point) + ((goal - i64::from(*point)) >> CURVE_SHIFT)) as u32;
@@ -234,12 +216,29 @@ impl Stage {
     /// Takes over weights and curves.
     pub(super) fn carry(&mut self, before: &Self) {
         self.weights.clone_from(&before.weights);
+        self.second.clone_from(&before.second);
         self.curves.clone_from(&before.curves);
     }
 
-    /// Weights and curves as they are now.
-    pub(super) fn learned(&self) -> (Vec<i32>, Vec<u32>) {
-        (self.weights.clone(), self.curves.clone())
+    /// Puts weights and curves as they are now into a prior.
+    pub(super) fn teach(&self, prior: &mut StagePrior) {
+        prior.weights.clone_from(&self.weights);
+        prior.second.clone_from(&self.second);
+        prior.curves.clone_from(&self.curves);
+    }
+}
+
+/// Largest weight either way; keeps all sums within 32 bits.
+const MOST_WEIGHT: i32 = (1 << 19) - 1;
+
+fn weigh<const N: usize>(weights: &[i32; N], odds: &[i32; N]) -> i32 {
+    let sum: i32 = weights.iter().zip(odds).map(|(&weight, &odds)| (weight >> 5) * odds).sum();
+    (sum >> 11).clamp(-MAX_ODDS, MAX_ODDS)
+}
+
+fn follow<const N: usize>(weights: &mut [i32; N], odds: &[i32; N], error: i32) {
+    for (weight, &odds) in weights.iter_mut().zip(odds) {
+        *weight = (*weight + ((odds * error + (1 << 19)) >> 20)).clamp(-MOST_WEIGHT, MOST_WEIGHT);
     }
 }
 

@@ -53,7 +53,7 @@ pub fn train_prior(seed: u64, scenes: u64, progress: &mut dyn FnMut(u64)) -> Vec
             model
         });
         for (stage, prior) in last.stages().into_iter().zip(prior.stages()) {
-            (prior.weights, prior.curves) = stage.learned();
+            stage.teach(prior);
         }
     }
     prior.to_bytes()
