@@ -43,30 +43,32 @@ impl Header {
     const MAX_BYTES: usize = 13;
 
     pub(super) fn write(&self, out: &mut BitWriter) {
+        let ((place, n), (side, m)) = (self.place_size(), self.side_size());
         out.bit(self.body == Body::Context);
-        let place = smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n));
-        out.put(place as u64, 3);
-        let n = PLACE_BITS[place];
+        out.put(place, 3);
         out.put(self.patch.x as u64, n);
         out.put(self.patch.y as u64, n);
-        let (w, h) = (u64::from(self.patch.width - 1), u64::from(self.patch.height - 1));
-        let side = smallest(&SIDE_BITS, |m| (w | h) >> m == 0);
-        out.put(side as u64, 2);
-        out.put(w, SIDE_BITS[side]);
-        out.put(h, SIDE_BITS[side]);
+        out.put(side, 2);
+        out.put(u64::from(self.patch.width - 1), m);
+        out.put(u64::from(self.patch.height - 1), m);
         out.put(u64::from(self.check), 8);
     }
 
     /// Mixes the length of the finished chunk into its check.
     pub(super) fn seal(&self, chunk: &mut [u8]) {
-        let place = smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n));
-        let side = smallest(&SIDE_BITS, |m| ((self.patch.width - 1) | (self.patch.height - 1)) >> m == 0);
-        let at = (1 + 3 + 2 * PLACE_BITS[place] + 2 + 2 * SIDE_BITS[side]) as usize;
-        let [first, second] = (u16::from(chunk.len() as u8) << (8 - at % 8)).to_be_bytes();
-        chunk[at / 8] ^= first;
-        if second != 0 {
-            chunk[at / 8 + 1] ^= second;
-        }
+        let at = (1 + 3 + 2 * self.place_size().1 + 2 + 2 * self.side_size().1) as usize;
+        let length = (u16::from(chunk.len() as u8) << (8 - at % 8)).to_be_bytes();
+        chunk.iter_mut().skip(at / 8).zip(length).for_each(|(byte, length)| *byte ^= length);
+    }
+
+    /// Class and bits of a coordinate.
+    fn place_size(&self) -> (u64, u32) {
+        smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n))
+    }
+
+    /// Class and bits of a side.
+    fn side_size(&self) -> (u64, u32) {
+        smallest(&SIDE_BITS, |m| ((self.patch.width - 1) | (self.patch.height - 1)) >> m == 0)
     }
 
     /// Reads the head; `None` if the bits end early.
@@ -98,8 +100,11 @@ pub(super) fn base_check(base: &LabelGrid, patch: Rect) -> u8 {
     CRC.checksum(&base.copy_area(i64::from(patch.x) - margin, i64::from(patch.y) - margin, width, height))
 }
 
-fn smallest(sizes: &[u32], holds: impl Fn(u32) -> bool) -> usize {
-    sizes.iter().position(|&n| holds(n)).unwrap_or(sizes.len() - 1)
+/// The first size that holds, or the last, with its place in the list.
+fn smallest(sizes: &[u32], holds: impl Fn(u32) -> bool) -> (u64, u32) {
+    let mut classes = (0..).zip(sizes.iter().copied());
+    let last = classes.clone().last().unwrap_or_default();
+    classes.find(|&(_, n)| holds(n)).unwrap_or(last)
 }
 
 fn fits(value: i32, bits: u32) -> bool {
@@ -111,6 +116,7 @@ fn signed(value: u64, bits: u32) -> i32 {
 }
 
 #[cfg(test)]
+#[allow(clippy::indexing_slicing, clippy::unwrap_used)]
 mod tests {
     use super::*;
 

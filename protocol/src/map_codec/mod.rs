@@ -3,12 +3,16 @@
 //! A chunk covers one compact patch. It says the new label of the cells it changes and leaves every other cell of
 //! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
 
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod bits;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod chunk;
 mod codec;
 mod context;
 mod grow;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod header;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod png;
 pub mod procedural;
 mod series;
