@@ -8,8 +8,8 @@ mod real;
 
 use png_baseline::{delta_png, full_png};
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::map_codec::procedural::{Chance, Flips, Plane, Scene, Survey};
-use scenecast_protocol::map_codec::{Codec, decode, encode_all};
+use scenecast_protocol::map_codec::procedural::{Chance, Flips, Scene, Survey};
+use scenecast_protocol::map_codec::{Codec, Plane, decode, encode_all};
 use std::time::{Duration, Instant};
 
 const ROOMS: [usize; 3] = [64, 256, 1000];

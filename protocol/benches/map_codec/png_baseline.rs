@@ -1,6 +1,6 @@
 //! The smallest PNG files of a label map: filter None, the depths that hold it, zopfli.
 
-use scenecast_protocol::map_codec::procedural::Plane;
+use scenecast_protocol::map_codec::Plane;
 
 /// Bytes of the whole map as an indexed PNG.
 pub(crate) fn full_png(map: &Plane) -> usize {
@@ -9,25 +9,8 @@ pub(crate) fn full_png(map: &Plane) -> usize {
 
 /// Bytes of the smaller of delta image and its dirty box; pixel 0 = untouched.
 pub(crate) fn delta_png(before: &Plane, after: &Plane) -> usize {
-    let mut delta = after.clone();
-    for (new, old) in delta.labels.iter_mut().zip(&before.labels) {
-        *new = match *new {
-            same if same == *old => 0,
-            0 => 255,
-            new => new,
-        };
-    }
-    smallest_file(&delta).min(smallest_file(&dirty_box(&delta)))
-}
-
-fn dirty_box(delta: &Plane) -> Plane {
-    let dirty: Vec<usize> = (0..delta.labels.len()).filter(|&i| delta.labels[i] != 0).collect();
-    let columns = |i: &usize| i % delta.width;
-    let (left, right) = (dirty.iter().map(columns).min().unwrap_or(0), dirty.iter().map(columns).max().unwrap_or(0));
-    let (first, last) = (dirty.first().unwrap_or(&0) / delta.width, dirty.last().unwrap_or(&0) / delta.width);
-    let rows = first..=last;
-    let labels = rows.clone().flat_map(|row| (left..=right).map(move |column| delta.get(column, row))).collect();
-    Plane { width: right - left + 1, height: last - first + 1, labels }
+    let delta = after.delta_from(before);
+    smallest_file(&delta).min(smallest_file(&delta.trimmed()))
 }
 
 fn smallest_file(map: &Plane) -> usize {

@@ -1,33 +1,32 @@
 //! Crops of the shared real maps; skipped, loudly, where they are absent.
 
-use scenecast_protocol::map_codec::procedural::Plane;
-use std::fs::File;
-use std::io::BufReader;
+use scenecast_protocol::map_codec::Plane;
+use std::io::Cursor;
 use std::path::Path;
 
 /// Where the shared material lies, seen from this package.
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
 
-/// An indexed or grey map of the shared data, one cell in `step` each way, pixel value + `shift` = label.
+/// A map of the shared data, one cell in `step` each way, pixel value + `shift` = label.
 pub(crate) fn map(name: &str, step: usize, shift: u8) -> Option<Plane> {
     let path = Path::new(DATA).join(name);
-    let Ok(file) = File::open(&path) else {
+    let Ok(file) = std::fs::read(&path) else {
         println!("SKIPPED: {} is absent", path.display());
         return None;
     };
-    let mut decoder = png::Decoder::new(BufReader::new(file));
-    decoder.set_transformations(png::Transformations::IDENTITY);
-    let mut reader = decoder.read_info().expect("PNG head");
-    let mut data = vec![0; reader.output_buffer_size().expect("size")];
-    let info = reader.next_frame(&mut data).expect("PNG data");
-    let bits = info.bit_depth as usize;
-    let pixel = |column: usize, row: usize| {
-        let byte = data[row * info.line_size + column * bits / 8];
-        byte << (column * bits % 8) >> (8 - bits)
-    };
-    let (width, height) = (info.width as usize / step, info.height as usize / step);
-    let labels = (0..width * height).map(|i| pixel(i % width * step, i / width * step) + shift).collect();
+    let pixels = grey(&file);
+    let (width, height) = (pixels.width / step, pixels.height / step);
+    let labels = (0..width * height).map(|i| pixels.get(i % width * step, i / width * step) + shift).collect();
     Some(Plane { width, height, labels })
+}
+
+/// The shared maps hold the labels as grey levels of eight bits.
+fn grey(file: &[u8]) -> Plane {
+    let mut reader = png::Decoder::new(Cursor::new(file)).read_info().expect("PNG head");
+    let mut labels = vec![0; reader.output_buffer_size().expect("size")];
+    let info = reader.next_frame(&mut labels).expect("PNG data");
+    assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Grayscale, png::BitDepth::Eight));
+    Plane { width: info.width as usize, height: info.height as usize, labels }
 }
 
 /// Square crops of `side` cells, side by side, that hold at least `least` kinds of label.

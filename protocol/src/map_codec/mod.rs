@@ -9,9 +9,14 @@ mod bits;
 mod chunk;
 mod codec;
 mod context;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
+mod file;
 mod grow;
 #[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod header;
+mod plane;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
+mod plane_png;
 #[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod png;
 pub mod procedural;
@@ -23,6 +28,9 @@ mod window;
 pub use chunk::{DecodeError, MapChunk, decode, encode};
 pub use codec::Codec;
 pub use context::train_prior;
+pub use file::{ChunkFile, ChunkFileError};
+pub use plane::Plane;
+pub use plane_png::MapPngError;
 pub use png::restored_png;
 pub use series::encode_all;
 

@@ -1,7 +1,8 @@
 //! What the prior is trained on: changes as a mission has them, over procedural maps.
 
-use super::{Chance, Flips, Plane, Scene, Survey, sampler_noise};
+use super::{Chance, Flips, Scene, Survey, sampler_noise};
 use crate::map::Rect;
+use crate::map_codec::Plane;
 
 /// A change of a part of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,12 +2,10 @@
 
 mod chance;
 mod lesson;
-mod plane;
 mod scene;
 mod survey;
 
 pub use chance::Chance;
 pub use lesson::{Lesson, lessons};
-pub use plane::Plane;
 pub use scene::{Scene, sampler_noise};
 pub use survey::{Flips, Survey};

@@ -1,6 +1,7 @@
 //! Procedural scenes: spatial CRP samples, Potts fields, fractal fields, colonies on a ground; with sampler noise.
 
-use super::{Chance, Plane};
+use super::Chance;
+use crate::map_codec::Plane;
 
 /// How a scene comes about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,8 @@
 //! A survey step by step: a swath of new cells, and the sampler changing its mind about old ones.
 
+use super::Chance;
 use super::scene::sampler_noise;
-use super::{Chance, Plane};
+use crate::map_codec::Plane;
 
 /// What a step does besides showing new cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
