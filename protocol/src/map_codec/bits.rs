@@ -27,6 +27,21 @@ impl BitWriter {
         self.partial = (self.partial + 1) % 8;
     }
 
+    /// Bits written.
+    pub(super) fn len(&self) -> usize {
+        self.bytes.len() * 8 - (8 - self.partial as usize) % 8
+    }
+
+    /// Adds one to the number that the bits written make; a carry out of the first bit is lost.
+    pub(super) fn increment(&mut self) {
+        let mut carry = 1u8 << ((8 - self.partial) % 8);
+        for byte in self.bytes.iter_mut().rev() {
+            let (sum, over) = byte.overflowing_add(carry);
+            *byte = sum;
+            carry = u8::from(over);
+        }
+    }
+
     /// The bytes written; unused bits of the last one are zero.
     pub(super) fn into_bytes(self) -> Vec<u8> {
         self.bytes
@@ -43,6 +58,16 @@ pub(super) struct BitReader<'a> {
 impl<'a> BitReader<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, position: 0 }
+    }
+
+    /// Bits read.
+    pub(super) fn position(&self) -> usize {
+        self.position
+    }
+
+    /// Length of the whole string, bytes.
+    pub(super) fn total_bytes(&self) -> usize {
+        self.bytes.len()
     }
 
     /// The next bit; `None` past the end.

@@ -4,7 +4,7 @@ use super::bits::BitReader;
 use super::grow::Growth;
 use super::header::{Body, Header, base_check};
 use super::window::Patch;
-use super::{Codec, png};
+use super::{Codec, context, png};
 use crate::map::{Cell, LabelGrid, Rect};
 
 /// One encoded change of the map.
@@ -25,7 +25,7 @@ pub enum DecodeError {
     /// The patch is larger than allowed or leaves the 32-bit grid.
     #[error("map chunk has an impossible patch")]
     BadGeometry,
-    /// The chunk was coded against another base.
+    /// The chunk was coded against another base, or has a byte too many or too few.
     #[error("map chunk was coded against another base")]
     BaseMismatch,
     /// The body is not one that the encoder writes.
@@ -50,8 +50,14 @@ pub fn encode(
     wanted: &dyn Fn(Cell) -> bool,
 ) -> Option<MapChunk> {
     let growth = Growth::around(base, target, seed, room, wanted)?;
-    let _ = codec;
-    png::best_chunk(base, &growth, room)
+    match codec {
+        Codec::Png => png::best_chunk(base, &growth, room),
+        Codec::Context => context::best_chunk(base, &growth, room),
+        Codec::Auto => {
+            let by_context = context::best_chunk(base, &growth, room);
+            by_context.map(|chunk| png::smaller(base, &chunk).unwrap_or(chunk))
+        }
+    }
 }
 
 /// The changes in a chunk: cells with their new labels (0 = becomes unexplored), row by row.
@@ -63,14 +69,13 @@ pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeE
     if !header.geometry_is_sound() {
         return Err(DecodeError::BadGeometry);
     }
-    if header.check != base_check(base, header.patch) {
+    if header.check != base_check(base, header.patch) ^ bytes.len() as u8 {
         return Err(DecodeError::BaseMismatch);
     }
     let patch = header.patch;
-    let held = base.copy_area(i64::from(patch.x), i64::from(patch.y), patch.width as usize, patch.height as usize);
     match header.body {
-        Body::Png => png::read(bits, patch, held),
-        Body::Context => Err(DecodeError::UnknownCodec),
+        Body::Png => png::read(bits, base, patch),
+        Body::Context => context::read(bits, base, patch),
     }
     .map(|patch| patch.changes())
 }

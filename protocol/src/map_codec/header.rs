@@ -15,15 +15,16 @@ pub(super) enum Body {
 /// Head of every chunk; most significant bit first, followed directly by the body.
 ///
 /// ```text
-///  bits  1      2            n + n         2           m + m             8
+///  bits  1      3            n + n         2           m + m             8
 ///      +------+------------+-------------+-----------+-----------------+-------+
 ///      | body | place size | x, y        | side size | width-1 height-1 | check |
 ///      +------+------------+-------------+-----------+-----------------+-------+
 /// ```
 /// * body: 0 = png, 1 = context.
-/// * place size: n = 8, 11, 16, 32 bits; x, y = south-west cell of the patch, two's complement.
-/// * side size: m = 4, 6, 8, 10 bits; width x height at most [`MAX_PATCH_CELLS`].
-/// * check: CRC-8 over the base in the patch and [`CHECK_MARGIN`] cells around it.
+/// * place size: n = 7, 8, 9, 10, 11, 12, 16, 32 bits; x, y = south-west cell of the patch, two's complement.
+/// * side size: m = 4, 6, 7, 10 bits; width x height at most [`MAX_PATCH_CELLS`].
+/// * check: CRC-8 over the base in the patch and [`CHECK_MARGIN`] cells around it, xor the low byte of the length
+///   of the chunk; so a byte too many or too few is refused too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) body: Body,
@@ -31,35 +32,49 @@ pub(super) struct Header {
     pub(super) check: u8,
 }
 
-const PLACE_BITS: [u32; 4] = [8, 11, 16, 32];
-const SIDE_BITS: [u32; 4] = [4, 6, 8, 10];
+const PLACE_BITS: [u32; 8] = [7, 8, 9, 10, 11, 12, 16, 32];
+const SIDE_BITS: [u32; 4] = [4, 6, 7, 10];
 /// Cells around the patch that the check covers too.
-pub(super) const CHECK_MARGIN: usize = 2;
+pub(super) const CHECK_MARGIN: usize = 16;
 
 impl Header {
     /// The longest head in bytes.
     #[cfg(test)]
-    pub(super) const MAX_BYTES: usize = 13;
+    const MAX_BYTES: usize = 13;
 
     pub(super) fn write(&self, out: &mut BitWriter) {
+        let ((place, n), (side, m)) = (self.place_size(), self.side_size());
         out.bit(self.body == Body::Context);
-        let place = smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n));
-        out.put(place as u64, 2);
-        let n = PLACE_BITS[place];
+        out.put(place, 3);
         out.put(self.patch.x as u64, n);
         out.put(self.patch.y as u64, n);
-        let (w, h) = (u64::from(self.patch.width - 1), u64::from(self.patch.height - 1));
-        let side = smallest(&SIDE_BITS, |m| (w | h) >> m == 0);
-        out.put(side as u64, 2);
-        out.put(w, SIDE_BITS[side]);
-        out.put(h, SIDE_BITS[side]);
+        out.put(side, 2);
+        out.put(u64::from(self.patch.width - 1), m);
+        out.put(u64::from(self.patch.height - 1), m);
         out.put(u64::from(self.check), 8);
+    }
+
+    /// Mixes the length of the finished chunk into its check.
+    pub(super) fn seal(&self, chunk: &mut [u8]) {
+        let at = (1 + 3 + 2 * self.place_size().1 + 2 + 2 * self.side_size().1) as usize;
+        let length = (u16::from(chunk.len() as u8) << (8 - at % 8)).to_be_bytes();
+        chunk.iter_mut().skip(at / 8).zip(length).for_each(|(byte, length)| *byte ^= length);
+    }
+
+    /// Class and bits of a coordinate.
+    fn place_size(&self) -> (u64, u32) {
+        smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n))
+    }
+
+    /// Class and bits of a side.
+    fn side_size(&self) -> (u64, u32) {
+        smallest(&SIDE_BITS, |m| ((self.patch.width - 1) | (self.patch.height - 1)) >> m == 0)
     }
 
     /// Reads the head; `None` if the bits end early.
     pub(super) fn read(bits: &mut BitReader<'_>) -> Option<Self> {
         let body = if bits.bit()? { Body::Context } else { Body::Png };
-        let n = *PLACE_BITS.get(bits.take(2)? as usize)?;
+        let n = *PLACE_BITS.get(bits.take(3)? as usize)?;
         let (x, y) = (signed(bits.take(n)?, n), signed(bits.take(n)?, n));
         let m = *SIDE_BITS.get(bits.take(2)? as usize)?;
         let (width, height) = (bits.take(m)? as u32 + 1, bits.take(m)? as u32 + 1);
@@ -85,8 +100,11 @@ pub(super) fn base_check(base: &LabelGrid, patch: Rect) -> u8 {
     CRC.checksum(&base.copy_area(i64::from(patch.x) - margin, i64::from(patch.y) - margin, width, height))
 }
 
-fn smallest(sizes: &[u32; 4], holds: impl Fn(u32) -> bool) -> usize {
-    sizes.iter().position(|&n| holds(n)).unwrap_or(sizes.len() - 1)
+/// The first size that holds, or the last, with its place in the list.
+fn smallest(sizes: &[u32], holds: impl Fn(u32) -> bool) -> (u64, u32) {
+    let mut classes = (0..).zip(sizes.iter().copied());
+    let last = classes.clone().last().unwrap_or_default();
+    classes.find(|&(_, n)| holds(n)).unwrap_or(last)
 }
 
 fn fits(value: i32, bits: u32) -> bool {
@@ -98,6 +116,7 @@ fn signed(value: u64, bits: u32) -> i32 {
 }
 
 #[cfg(test)]
+#[allow(clippy::indexing_slicing, clippy::unwrap_used)]
 mod tests {
     use super::*;
 
@@ -111,8 +130,12 @@ mod tests {
     fn a_typical_head_keeps_its_golden_bytes() {
         let patch = Rect { x: 200, y: -3, width: 40, height: 24 };
         let header = Header { body: Body::Context, patch, check: 0xA5 };
-        // 1 | 01 | 00011001000 | 11111111101 | 01 | 100111 | 010111 | 10100101 | 0
-        assert_eq!(bytes_of(header), [0xA3, 0x23, 0xFE, 0xB3, 0xAF, 0x4A]);
+        // 1 | 010 | 011001000 | 111111101 | 01 | 100111 | 010111 | 10100101 | 0000
+        assert_eq!(bytes_of(header), [0xA6, 0x47, 0xF5, 0x9D, 0x7A, 0x50]);
+        // Six bytes: xor 00000110 into the check.
+        let mut bytes = bytes_of(header);
+        header.seal(&mut bytes);
+        assert_eq!(bytes, [0xA6, 0x47, 0xF5, 0x9D, 0x7A, 0x30]);
     }
 
     #[test]

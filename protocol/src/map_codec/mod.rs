@@ -3,19 +3,36 @@
 //! A chunk covers one compact patch. It says the new label of the cells it changes and leaves every other cell of
 //! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
 
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod bits;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod chunk;
 mod codec;
+mod context;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
+mod file;
 mod grow;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod header;
+mod plane;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
+mod plane_png;
+#[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod png;
+pub mod procedural;
+mod series;
 #[cfg(test)]
 mod tests;
 mod window;
 
 pub use chunk::{DecodeError, MapChunk, decode, encode};
 pub use codec::Codec;
+pub use context::train_prior;
+pub use file::{ChunkFile, ChunkFileError};
+pub use plane::Plane;
+pub use plane_png::MapPngError;
 pub use png::restored_png;
+pub use series::encode_all;
 
 /// Most cells a patch may have; bounds what decoding a chunk allocates.
 pub const MAX_PATCH_CELLS: usize = 1 << 16;

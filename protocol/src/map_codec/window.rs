@@ -88,6 +88,12 @@ impl Area {
         self.top - self.bottom
     }
 
+    /// Stretches to hold the cell.
+    pub(super) fn include(&mut self, column: usize, row: usize) {
+        (self.left, self.right) = (self.left.min(column), self.right.max(column + 1));
+        (self.bottom, self.top) = (self.bottom.min(row), self.top.max(row + 1));
+    }
+
     pub(super) fn cells(&self) -> usize {
         self.width() * self.height()
     }
@@ -102,6 +108,37 @@ pub(super) struct Patch {
 }
 
 impl Patch {
+    /// Every change in `rect`.
+    pub(super) fn between(base: &LabelGrid, target: &LabelGrid, rect: Rect) -> Self {
+        let (width, height) = (rect.width as usize, rect.height as usize);
+        let copy = |grid: &LabelGrid| grid.copy_area(i64::from(rect.x), i64::from(rect.y), width, height);
+        let (base, mut outcome) = (copy(base), copy(target));
+        // 255 is no label: such a cell stays as it is.
+        outcome.iter_mut().zip(&base).filter(|(new, _)| **new > MAX_LABEL).for_each(|(new, &old)| *new = old);
+        Self { rect, base, outcome }
+    }
+
+    /// The smallest patch with just these changes.
+    pub(super) fn of(base: &LabelGrid, changes: &[(Cell, u8)]) -> Option<Self> {
+        let rect = Rect::around(changes.iter().map(|&(cell, _)| cell))?;
+        let mut patch = Self::between(base, base, rect);
+        for &(cell, label) in changes {
+            let row = cell.y.abs_diff(rect.y) as usize;
+            patch.outcome[row * rect.width as usize + cell.x.abs_diff(rect.x) as usize] = label;
+        }
+        Some(patch)
+    }
+
+    /// The rows that hold the first `count` cells, the cells after those unchanged.
+    pub(super) fn first_cells(&self, count: usize) -> Self {
+        let width = self.rect.width as usize;
+        let height = count.div_ceil(width);
+        let base = self.base[..height * width].to_vec();
+        let mut outcome = self.outcome[..count].to_vec();
+        outcome.extend(&base[count..]);
+        Self { rect: Rect { height: height as u32, ..self.rect }, base, outcome }
+    }
+
     /// Changed cells with their new labels, row by row.
     pub(super) fn changes(&self) -> Vec<(Cell, u8)> {
         let pairs = self.base.iter().zip(&self.outcome);

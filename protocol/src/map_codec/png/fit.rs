@@ -11,7 +11,7 @@ use crate::map_codec::window::Patch;
 /// The chunk of at most `room` bytes with the most changes along `growth`; `None` if not even its seed fits.
 pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: usize) -> Option<MapChunk> {
     let mut fitter = Fitter { base, room, deflater: Deflater::new() };
-    let patch_of = |i: usize| growth.window.patch(growth.areas[i]).trimmed();
+    let patch_of = |i: usize| growth.window.patch(*growth.areas.get(i)?).trimmed();
     let mut best = patch_of(0)?;
     let (mut fitting, mut too_large, mut step) = (0, growth.areas.len(), 1);
     // Steps that double, then halving: most rooms hold few changes.
@@ -29,6 +29,13 @@ pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: 
     }
     let bytes = write(&mut fitter.deflater, &head(base, best.rect), &best, Effort::Full);
     (bytes.len() <= room).then(|| chunk(&best, bytes))
+}
+
+/// The `png` chunk that says the same as `chunk`, if it is shorter.
+pub(in crate::map_codec) fn smaller(base: &LabelGrid, other: &MapChunk) -> Option<MapChunk> {
+    let patch = Patch::of(base, &other.changes)?;
+    let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, Effort::Quick);
+    (bytes.len() < other.bytes.len()).then(|| chunk(&patch, bytes))
 }
 
 struct Fitter<'a> {

@@ -14,7 +14,7 @@ use super::header::Header;
 use super::window::Patch;
 use crate::map::{LabelGrid, Rect};
 use deflate::Deflater;
-pub(super) use fit::best_chunk;
+pub(super) use fit::{best_chunk, smaller};
 use pixels::{Depth, Palette};
 
 /// How hard to look for a short body.
@@ -34,6 +34,7 @@ fn write(deflater: &mut Deflater, head: &Header, patch: &Patch, effort: Effort) 
         palette.write(&mut bits, depth);
         let mut bytes = bits.into_bytes();
         bytes.extend(deflater.shortest(&scanlines, effort));
+        head.seal(&mut bytes);
         bytes
     };
     let tried = if effort == Effort::Full { &palettes } else { palettes.split_at(palettes.len() - 1).1 };
@@ -55,9 +56,10 @@ fn read_body(mut bits: BitReader<'_>, rect: Rect) -> Result<Body, DecodeError> {
     Ok(Body { palette, depth, scanlines })
 }
 
-/// Reads a body whose patch holds `held` in the base, row by row.
-pub(super) fn read(bits: BitReader<'_>, rect: Rect, held: Vec<u8>) -> Result<Patch, DecodeError> {
+/// Reads the body of a chunk for `rect`.
+pub(super) fn read(bits: BitReader<'_>, base: &LabelGrid, rect: Rect) -> Result<Patch, DecodeError> {
     let body = read_body(bits, rect)?;
+    let held = base.copy_area(i64::from(rect.x), i64::from(rect.y), rect.width as usize, rect.height as usize);
     let outcome = pixels::unpack(rect, &held, &body.palette, body.depth, &body.scanlines)?;
     Ok(Patch { rect, base: held, outcome })
 }

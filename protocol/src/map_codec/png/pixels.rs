@@ -1,5 +1,7 @@
 //! Patch to scanlines and back.
 
+use std::collections::BTreeMap;
+
 use crate::map::{MAX_LABEL, Rect, UNEXPLORED};
 use crate::map_codec::DecodeError;
 use crate::map_codec::bits::{BitReader, BitWriter};
@@ -48,13 +50,13 @@ pub(super) enum Palette {
 impl Palette {
     /// The palettes worth trying: the labels themselves, and a list if that makes pixels narrower.
     pub(super) fn choices(patch: &Patch) -> Vec<Self> {
-        let mut used = [0usize; 256];
+        let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
         for (_, label) in patch.changes() {
-            used[usize::from(stored(label))] += 1;
+            *counts.entry(stored(label)).or_default() += 1;
         }
-        let mut list: Vec<u8> = (1..=CLEARED).filter(|&v| used[usize::from(v)] > 0).collect();
-        let direct = Self::Labels { highest: list.last().copied().unwrap_or(0) };
-        list.sort_by_key(|&v| std::cmp::Reverse(used[usize::from(v)]));
+        let direct = Self::Labels { highest: counts.keys().last().copied().unwrap_or(0) };
+        let mut list: Vec<u8> = counts.keys().copied().collect();
+        list.sort_by_key(|entry| std::cmp::Reverse(counts.get(entry)));
         let list = Self::List(list);
         if list.narrowest() < direct.narrowest() { vec![direct, list] } else { vec![direct] }
     }
@@ -135,13 +137,13 @@ pub(super) fn pack(patch: &Patch, palette: &Palette, depth: Depth) -> Vec<u8> {
     let width = patch.rect.width as usize;
     let mut out = Vec::with_capacity(packed_len(patch.rect, depth));
     for (old, new) in patch.base.chunks(width).zip(patch.outcome.chunks(width)) {
-        let mut row = vec![0u8; stride(patch.rect, depth)];
-        for (column, (old, new)) in old.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new) {
-            debug_assert_ne!(old, new);
-            let place = column * usize::from(depth.0);
-            row[1 + place / 8] |= palette.pixel(stored(*new)) << (8 - usize::from(depth.0) - place % 8);
+        let mut line = BitWriter::default();
+        line.put(0, 8);
+        for (old, new) in old.iter().zip(new) {
+            let pixel = if old == new { 0 } else { palette.pixel(stored(*new)) };
+            line.put(u64::from(pixel), u32::from(depth.0));
         }
-        out.extend(row);
+        out.extend(line.into_bytes());
     }
     out
 }

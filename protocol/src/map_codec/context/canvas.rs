@@ -1,0 +1,102 @@
+//! The patch and what lies around it, as the coder sees it: new labels where it has been, old ones elsewhere.
+
+use crate::map::{LabelGrid, Rect};
+use crate::map_codec::window::Patch;
+
+/// Cells around the patch that contexts look at.
+pub(super) const MARGIN: usize = 3;
+/// Cells around the patch whose labels are expected first.
+const CENSUS_MARGIN: i64 = 16;
+
+/// Labels in and around a patch.
+#[derive(Debug, Clone)]
+pub(super) struct Canvas {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    stride: usize,
+    base: Vec<u8>,
+    now: Vec<u8>,
+    /// Cells by label, in the base around the patch and as coded.
+    census: [u32; 256],
+    /// How noisy the base is: share of cells with none like them around, in six classes.
+    pub(super) noise: usize,
+}
+
+impl Canvas {
+    pub(super) fn new(base: &LabelGrid, rect: Rect) -> Self {
+        let (width, height) = (rect.width as usize, rect.height as usize);
+        let area = |margin: i64| {
+            let (w, h) = (width + 2 * margin as usize, height + 2 * margin as usize);
+            base.copy_area(i64::from(rect.x) - margin, i64::from(rect.y) - margin, w, h)
+        };
+        let mut census = [0; 256];
+        area(CENSUS_MARGIN).into_iter().for_each(|label| census[usize::from(label)] += 1);
+        let held = area(MARGIN as i64);
+        let stride = width + 2 * MARGIN;
+        let noise = noise(&held, stride);
+        Self { width, height, stride, base: held.clone(), now: held, census, noise }
+    }
+
+    /// Where the cell in `column` of `row` lies.
+    pub(super) fn at(&self, column: usize, row: usize) -> usize {
+        (row + MARGIN) * self.stride + column + MARGIN
+    }
+
+    /// The label that the cell had.
+    pub(super) fn held(&self, at: usize) -> u8 {
+        self.base[at]
+    }
+
+    /// The label `east` and `north` of the cell: new where coded, old elsewhere.
+    #[inline(always)]
+    pub(super) fn near(&self, at: usize, east: isize, north: isize) -> u8 {
+        self.now[at.wrapping_add_signed(east + north * self.stride as isize)]
+    }
+
+    /// Whether the cell `east` and `north` of the cell has been coded and changed.
+    #[inline(always)]
+    pub(super) fn changed(&self, at: usize, east: isize, north: isize) -> bool {
+        let i = at.wrapping_add_signed(east + north * self.stride as isize);
+        self.now[i] != self.base[i]
+    }
+
+    /// Writes the cell's new label.
+    pub(super) fn set(&mut self, at: usize, label: u8) {
+        self.now[at] = label;
+        self.census[usize::from(label)] += 1;
+    }
+
+    /// How many cells hold `label`, nearly.
+    pub(super) fn count(&self, label: u8) -> u32 {
+        self.census[usize::from(label)]
+    }
+
+    /// The coded patch.
+    pub(super) fn into_patch(self, rect: Rect) -> Patch {
+        let inside = |cells: &[u8]| -> Vec<u8> {
+            let rows = cells.chunks(self.stride).skip(MARGIN).take(self.height);
+            rows.flat_map(|row| row.iter().skip(MARGIN).take(self.width).copied()).collect()
+        };
+        Patch { rect, base: inside(&self.base), outcome: inside(&self.now) }
+    }
+}
+
+fn noise(labels: &[u8], stride: usize) -> usize {
+    let (mut seen, mut lonely) = (0usize, 0usize);
+    for at in stride + 1..labels.len() - stride - 1 {
+        let label = labels[at];
+        if label != 0 {
+            seen += 1;
+            let rows = [at - stride, at, at + stride];
+            let alike = rows.iter().map(|&i| labels[i - 1..i + 2].iter().filter(|&&l| l == label).count());
+            lonely += usize::from(alike.sum::<usize>() == 1);
+        }
+    }
+    match lonely * 1000 / seen.max(1) {
+        0 => usize::from(lonely > 0),
+        1..=3 => 2,
+        4..=11 => 3,
+        12..=35 => 4,
+        _ => 5,
+    }
+}

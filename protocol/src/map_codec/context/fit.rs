@@ -1,0 +1,80 @@
+//! The largest `context` chunk that fits.
+
+use super::{LastRow, Reach, head, write};
+use crate::map::LabelGrid;
+use crate::map_codec::MapChunk;
+use crate::map_codec::chunk::chunk;
+use crate::map_codec::grow::Growth;
+use crate::map_codec::window::Patch;
+
+/// The chunk of at most `room` bytes with the most changes found along `growth`; `None` if not even its seed fits.
+///
+/// Each trial codes a whole patch, so there are few: up to [`TRIALS`] once something fits.
+pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: usize) -> Option<MapChunk> {
+    let (mut least, mut too_large) = (0, growth.areas.len());
+    let mut best: Option<MapChunk> = None;
+    let mut short: Option<(Patch, Reach)> = None;
+    let mut guess = too_large - 1;
+    let mut trials = 0;
+    while least < too_large && (best.is_none() || trials < TRIALS) {
+        trials += 1;
+        let patch = growth.window.patch(growth.areas[guess]).trimmed()?;
+        let (bytes, reach) = write_whole(base, &patch, room);
+        let cells = growth.areas[guess].cells();
+        let goal = if reach.all { cells * room / bytes.len().max(1) } else { reach.cells * 15 / 16 };
+        if reach.all {
+            let full = bytes.len() * 100 / room;
+            (least, best) = (guess + 1, Some(chunk(&patch, bytes)));
+            if full >= FULL_ENOUGH {
+                break;
+            }
+        } else {
+            (too_large, short) = (guess, Some((patch, reach)));
+        }
+        // Where the bits of this trial say that the room ends.
+        let by_size = growth.areas.partition_point(|area| area.cells() <= goal).saturating_sub(1);
+        guess = by_size.clamp(least, too_large.max(least + 1) - 1);
+    }
+    let best = best?;
+    let longer = short.and_then(|(patch, reach)| {
+        let part = patch.first_cells(reach.cells.max(1)).changes();
+        let worth = part.len() > best.changes.len() && part.iter().any(|&(cell, _)| cell == growth.seed());
+        if worth { cut(base, &patch, reach, room) } else { None }
+    });
+    let holds_seed = |chunk: &MapChunk| chunk.changes.iter().any(|&(cell, _)| cell == growth.seed());
+    Some(longer.filter(|chunk| holds_seed(chunk) && chunk.changes.len() > best.changes.len()).unwrap_or(best))
+}
+
+/// Patches to code before settling for one that fits.
+const TRIALS: usize = 4;
+/// Per cent of the room that are full enough to look no further.
+const FULL_ENOUGH: usize = 94;
+
+fn write_whole(base: &LabelGrid, patch: &Patch, room: usize) -> (Vec<u8>, Reach) {
+    write(base, &head(base, patch.rect), patch, LastRow(patch.rect.width as usize), room * 8)
+}
+
+/// The chunk for the first cells of `patch`, row by row, as many as fit; `None` if no change fits.
+pub(in crate::map_codec) fn prefix_chunk(base: &LabelGrid, patch: &Patch, room: usize) -> Option<MapChunk> {
+    let (bytes, reach) = write_whole(base, patch, room);
+    if reach.all { Some(chunk(patch, bytes)) } else { cut(base, patch, reach, room) }
+}
+
+/// The chunk for the first `reach.cells` of `patch` or a few less.
+fn cut(base: &LabelGrid, patch: &Patch, reach: Reach, room: usize) -> Option<MapChunk> {
+    let width = patch.rect.width as usize;
+    let mut cells = reach.cells;
+    // The head grows by the length of the last row: a few cells fewer may fit.
+    for _ in 0..8 {
+        let changed = |i: &usize| patch.base.get(*i) != patch.outcome.get(*i);
+        cells = (0..cells).rev().find(changed)? + 1;
+        let part = patch.first_cells(cells);
+        let last_row = LastRow(cells - (part.rect.height as usize - 1) * width);
+        let (bytes, reach) = write(base, &head(base, part.rect), &part, last_row, room * 8);
+        if reach.all {
+            return Some(chunk(&part, bytes));
+        }
+        cells = reach.cells.min(cells - 1);
+    }
+    None
+}

@@ -1,0 +1,119 @@
+//! The `context` coder: binary decisions, contexts mixed in integers, a shipped prior, state fresh for each chunk.
+
+mod arith;
+mod calm;
+mod canvas;
+mod fit;
+mod flip;
+mod label;
+mod logistic;
+mod model;
+mod prior;
+mod recent;
+mod slot;
+mod stage;
+mod train;
+mod unseen;
+mod view;
+
+use super::DecodeError;
+use super::bits::{BitReader, BitWriter};
+use super::header::Header;
+use super::window::Patch;
+use crate::map::{LabelGrid, Rect};
+use arith::{Decoder, Encoder};
+use canvas::Canvas;
+pub(super) use fit::{best_chunk, prefix_chunk};
+use model::Model;
+use prior::Prior;
+pub use train::train_prior;
+
+/// Where the last row ends.
+///
+/// ```text
+///  bits  1     as many as width - 1 has, if short
+///      +-------+----------------------------------+
+///      | short | cells of the last row, at least 1 |
+///      +-------+----------------------------------+
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct LastRow(usize);
+
+impl LastRow {
+    fn bits(width: usize) -> u32 {
+        (width - 1).checked_ilog2().map_or(0, |top| top + 1)
+    }
+
+    fn write(self, width: usize, out: &mut BitWriter) {
+        out.bit(self.0 < width);
+        if self.0 < width {
+            out.put(self.0 as u64 - 1, Self::bits(width));
+        }
+    }
+
+    fn read(width: usize, bits: &mut BitReader<'_>) -> Result<Self, DecodeError> {
+        match bits.bit().ok_or(DecodeError::Truncated)? {
+            false => Ok(Self(width)),
+            true => {
+                let cells = bits.take(Self::bits(width)).ok_or(DecodeError::Truncated)? as usize + 1;
+                if cells < width { Ok(Self(cells)) } else { Err(DecodeError::Corrupt) }
+            }
+        }
+    }
+}
+
+/// Cells of a patch in the order they are coded, as (column, row).
+fn order(width: usize, height: usize, last: LastRow) -> impl Iterator<Item = (usize, usize)> {
+    let cells = (height - 1) * width + last.0;
+    (0..cells).map(move |i| (i % width, i / width))
+}
+
+/// How far a patch got within the room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Reach {
+    /// Cells coded within the room.
+    cells: usize,
+    /// Whether that is all of them.
+    all: bool,
+}
+
+/// The chunk for the first `cells` of `patch`, and how many of them fit `room_bits`; the rest was not looked at.
+fn write(base: &LabelGrid, head: &Header, patch: &Patch, last: LastRow, room_bits: usize) -> (Vec<u8>, Reach) {
+    let (width, height) = (patch.rect.width as usize, patch.rect.height as usize);
+    let mut bits = BitWriter::default();
+    head.write(&mut bits);
+    last.write(width, &mut bits);
+    let mut encoder = Encoder::new(bits);
+    let mut canvas = Canvas::new(base, patch.rect);
+    let mut model = Model::new(Prior::shipped());
+    let mut cells = 0;
+    for (place, &label) in order(width, height, last).zip(&patch.outcome) {
+        let coded = model.code_cell(&mut encoder, &mut canvas, place, label);
+        debug_assert!(coded.is_some());
+        if encoder.bits() > room_bits {
+            return (Vec::new(), Reach { cells, all: false });
+        }
+        cells += 1;
+    }
+    let mut bytes = encoder.finish();
+    head.seal(&mut bytes);
+    (bytes, Reach { cells, all: true })
+}
+
+/// Reads the body of a chunk for `rect`.
+pub(super) fn read(mut bits: BitReader<'_>, base: &LabelGrid, rect: Rect) -> Result<Patch, DecodeError> {
+    let (width, height) = (rect.width as usize, rect.height as usize);
+    let last = LastRow::read(width, &mut bits)?;
+    let mut decoder = Decoder::new(bits);
+    let mut canvas = Canvas::new(base, rect);
+    let mut model = Model::new(Prior::shipped());
+    for place in order(width, height, last) {
+        model.code_cell(&mut decoder, &mut canvas, place, 0).ok_or(DecodeError::Corrupt)?;
+    }
+    if decoder.ended_well() { Ok(canvas.into_patch(rect)) } else { Err(DecodeError::Corrupt) }
+}
+
+/// Head of a `context` chunk for `rect`.
+fn head(base: &LabelGrid, rect: Rect) -> Header {
+    super::chunk::header_for(base, super::header::Body::Context, rect)
+}

@@ -1,0 +1,130 @@
+//! A patch as a string of decisions: which cells keep their label, and what the others get.
+
+use super::arith::BitCoder;
+use super::canvas::Canvas;
+use super::label::{self, Votes};
+use super::prior::Prior;
+use super::recent::Recent;
+use super::stage::{Contexts, Stage};
+use super::unseen::{self, Run};
+use super::view::View;
+use super::{calm, flip};
+use crate::map::{MAX_LABEL, UNEXPLORED};
+
+/// Adaptive state of a chunk; made afresh from the prior for each.
+#[derive(Debug, Clone)]
+pub(super) struct Model {
+    pub(super) calm: Stage,
+    pub(super) flip: Stage,
+    pub(super) unseen: Stage,
+    pub(super) label: Stage,
+    inside: Recent,
+    border: Recent,
+    run: Run,
+}
+
+/// Probability of `true`, in 1/65536, of the rare decisions past the candidates.
+const CLEARED: u32 = 1 << 12;
+const NEXT_LABEL: u32 = 60_000;
+
+impl Model {
+    pub(super) fn new(prior: &'static Prior) -> Self {
+        Self {
+            calm: Stage::new(&calm::LAYOUT, &prior.calm),
+            flip: Stage::new(&flip::LAYOUT, &prior.flip),
+            unseen: Stage::new(&unseen::LAYOUT, &prior.unseen),
+            label: Stage::new(&label::LAYOUT, &prior.label),
+            inside: Recent::default(),
+            border: Recent::default(),
+            run: Run::default(),
+        }
+    }
+
+    /// Codes one cell: an encoder takes `wanted` as its new label, a decoder ignores it. `None` if no label is left.
+    pub(super) fn code_cell(
+        &mut self,
+        coder: &mut impl BitCoder,
+        canvas: &mut Canvas,
+        (column, row): (usize, usize),
+        wanted: u8,
+    ) -> Option<()> {
+        let at = canvas.at(column, row);
+        let view = View::of(canvas, at);
+        let kept = if view.held == UNEXPLORED {
+            let contexts = unseen::contexts(canvas, at, (column, row), &view, &self.run);
+            let kept = decide(&mut self.unseen, coder, &contexts, wanted == view.held);
+            self.run.note(column, !kept);
+            kept
+        } else {
+            let kept = self.code_kept(coder, canvas, at, &view, wanted == view.held);
+            self.run.note(column, true);
+            kept
+        };
+        if !kept {
+            let label = self.code_label(coder, canvas, &view, wanted)?;
+            canvas.set(at, label);
+        }
+        Some(())
+    }
+
+    fn code_kept(&mut self, coder: &mut impl BitCoder, canvas: &Canvas, at: usize, view: &View, kept: bool) -> bool {
+        let wide = flip::wider_ring(canvas, at, view.held);
+        if wide == 0 && view.ring(view.held) == 255 && view.changed == 0 {
+            let contexts = calm::contexts(view, canvas.noise, &self.inside, &self.border);
+            let kept = decide(&mut self.calm, coder, &contexts, kept);
+            self.inside.note(kept);
+            kept
+        } else {
+            let contexts = flip::contexts(canvas, view, wide, &self.inside, &self.border);
+            let kept = decide(&mut self.flip, coder, &contexts, kept);
+            self.border.note(kept);
+            kept
+        }
+    }
+
+    fn code_label(&mut self, coder: &mut impl BitCoder, canvas: &Canvas, view: &View, wanted: u8) -> Option<u8> {
+        let votes = Votes::around(view);
+        let in_use = (1..=MAX_LABEL).filter(|&l| l != view.held && canvas.count(l) > 0).count();
+        for (rank, &(candidate, _)) in votes.ranked().iter().enumerate() {
+            let contexts = label::contexts(view, &votes, candidate, rank, in_use.saturating_sub(rank));
+            if decide(&mut self.label, coder, &contexts, wanted == candidate) {
+                return Some(candidate);
+            }
+        }
+        let voted = votes.ranked().len();
+        for (i, candidate) in label::others(canvas, view, &votes).into_iter().enumerate() {
+            let contexts = label::contexts(view, &votes, candidate, voted + i, in_use.saturating_sub(voted + i));
+            if decide(&mut self.label, coder, &contexts, wanted == candidate) {
+                return Some(candidate);
+            }
+        }
+        if view.held != UNEXPLORED && coder.code(wanted == UNEXPLORED, CLEARED) {
+            return Some(UNEXPLORED);
+        }
+        new_label(coder, canvas, view.held, wanted)
+    }
+}
+
+fn decide(stage: &mut Stage, coder: &mut impl BitCoder, contexts: &Contexts, bit: bool) -> bool {
+    let one = stage.predict(contexts);
+    let bit = coder.code(bit, one);
+    stage.update(bit);
+    bit
+}
+
+/// A label that is not in use around: mostly the lowest one, or the one after the highest in use.
+fn new_label(coder: &mut impl BitCoder, canvas: &Canvas, held: u8, wanted: u8) -> Option<u8> {
+    let free = |label: &u8| canvas.count(*label) == 0 && *label != held;
+    let lowest = (1..=MAX_LABEL).find(free)?;
+    if coder.code(wanted == lowest, NEXT_LABEL / 2) {
+        return Some(lowest);
+    }
+    let above = (1..=MAX_LABEL).rev().take_while(free).last();
+    if let Some(above) = above.filter(|&label| label != lowest)
+        && coder.code(wanted == above, NEXT_LABEL / 2)
+    {
+        return Some(above);
+    }
+    let label = (0..8).rev().fold(0, |label, i| label << 1 | u8::from(coder.code(wanted >> i & 1 == 1, 1 << 15)));
+    (free(&label) && (1..=MAX_LABEL).contains(&label)).then_some(label)
+}

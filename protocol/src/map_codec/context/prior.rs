@@ -1,0 +1,149 @@
+//! What the coder knows before the first cell: trained on procedural maps, shipped with the program.
+
+use super::slot::Slot;
+use super::stage::{INPUTS, Layout, SETS, stored_odds};
+use super::{calm, flip, label, logistic, unseen};
+use std::sync::LazyLock;
+
+/// State of one kind of decision at the start of a chunk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct StagePrior {
+    /// Direct contexts one after another, then what keyed ones start from.
+    pub(super) slots: Vec<Slot>,
+    /// Weights of the mixers side by side, in 1/65536.
+    pub(super) weights: Vec<[i32; INPUTS]>,
+    /// Weights of the mixers among each other, in 1/65536.
+    pub(super) second: Vec<[i32; SETS]>,
+    /// Points of the correction curves, 1/2^32.
+    pub(super) curves: Vec<u32>,
+}
+
+/// State of all kinds of decision.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Prior {
+    pub(super) calm: StagePrior,
+    pub(super) flip: StagePrior,
+    pub(super) unseen: StagePrior,
+    pub(super) label: StagePrior,
+}
+
+const TABLE: &[u8] = include_bytes!("prior.bin");
+
+static SHIPPED: LazyLock<Prior> = LazyLock::new(|| Prior::from_bytes(TABLE).unwrap_or_else(Prior::blank));
+
+/// Weights are stored in 1/2^12.
+const WEIGHT_SHIFT: u32 = 4;
+
+impl Prior {
+    /// The prior that both ends share.
+    pub(super) fn shipped() -> &'static Self {
+        &SHIPPED
+    }
+
+    /// A prior that knows nothing.
+    pub(super) fn blank() -> Self {
+        Self {
+            calm: calm::LAYOUT.blank(),
+            flip: flip::LAYOUT.blank(),
+            unseen: unseen::LAYOUT.blank(),
+            label: label::LAYOUT.blank(),
+        }
+    }
+
+    /// Reads a table; `None` if it is not one of this layout.
+    ///
+    /// ```text
+    ///      for calm, flip, unseen, label:  slots x (log odds i16, visits u16), weights x i16 / 2^12, curves x log odds i16
+    /// ```
+    /// Little-endian; log odds in 1/256 of a factor of two.
+    pub(super) fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut reader = Reader(bytes);
+        let prior = Self {
+            calm: reader.stage(&calm::LAYOUT)?,
+            flip: reader.stage(&flip::LAYOUT)?,
+            unseen: reader.stage(&unseen::LAYOUT)?,
+            label: reader.stage(&label::LAYOUT)?,
+        };
+        reader.0.is_empty().then_some(prior)
+    }
+
+    /// The table that [`Prior::from_bytes`] reads.
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        let stages = [&self.calm, &self.flip, &self.unseen, &self.label];
+        let layouts = [&calm::LAYOUT, &flip::LAYOUT, &unseen::LAYOUT, &label::LAYOUT];
+        for (stage, layout) in stages.into_iter().zip(layouts) {
+            for slot in &stage.slots {
+                out.extend(stored_odds(slot.p).to_le_bytes());
+                out.extend(slot.visits.to_le_bytes());
+            }
+            let used = stage.weights.iter().flat_map(|row| row.iter().take(layout.inputs()));
+            for weight in used.chain(stage.second.iter().flatten()) {
+                let weight = (weight >> WEIGHT_SHIFT).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
+                out.extend(weight.to_le_bytes());
+            }
+            for &point in &stage.curves {
+                out.extend(stored_odds(point).to_le_bytes());
+            }
+        }
+        out
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn stage(&mut self, layout: &Layout) -> Option<StagePrior> {
+        let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.visits()? }));
+        let slots = slots.collect::<Option<_>>()?;
+        let weights = (0..layout.rows()).map(|_| self.row(layout.inputs()));
+        let weights = weights.collect::<Option<_>>()?;
+        let second = (0..layout.curves).map(|_| self.row(SETS)).collect::<Option<_>>()?;
+        let curves = (0..layout.curve_points()).map(|_| self.probability()).collect::<Option<_>>()?;
+        Some(StagePrior { slots, weights, second, curves })
+    }
+
+    fn row<const N: usize>(&mut self, used: usize) -> Option<[i32; N]> {
+        let mut row = [0; N];
+        for weight in row.iter_mut().take(used) {
+            *weight = i32::from(self.number()?) << WEIGHT_SHIFT;
+        }
+        Some(row)
+    }
+
+    fn probability(&mut self) -> Option<u32> {
+        Some(logistic::probability(i32::from(self.number()?)) << 16 | 0x8000)
+    }
+
+    fn number(&mut self) -> Option<i16> {
+        let (number, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(i16::from_le_bytes(*number))
+    }
+
+    fn visits(&mut self) -> Option<u16> {
+        let (number, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(u16::from_le_bytes(*number).min(Slot::MOST_VISITS))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shipped_table_fits_the_layout() {
+        let prior = Prior::from_bytes(TABLE).expect("a table of this layout");
+        assert_eq!(prior.to_bytes().len(), TABLE.len());
+        assert!(Prior::from_bytes(&TABLE[1..]).is_none());
+    }
+
+    #[test]
+    fn training_repeats_itself_and_gives_a_table_of_this_layout() {
+        let table = |seed| crate::map_codec::train_prior(seed, 2, &mut |_| ());
+        assert!(table(1) == table(1));
+        assert!(table(1) != table(2));
+        assert!(Prior::from_bytes(&table(1)).is_some());
+    }
+}

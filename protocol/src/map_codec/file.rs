@@ -1,0 +1,207 @@
+//! A file of chunks that turn one map into another.
+
+use super::{Codec, DecodeError, Plane, decode, encode_all};
+use crate::map::Rect;
+
+/// Chunks of one change, in order, and the size of the map they are for.
+///
+/// ```text
+///      +--------+---------+-------------+--------------+-----------+----------------------------+
+///      | "SCMC" | version | width (u32) | height (u32) | count u32 | count x (length u16, bytes) |
+///      +--------+---------+-------------+--------------+-----------+----------------------------+
+/// ```
+/// Little-endian; version 1.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ChunkFile {
+    /// Columns of the map.
+    pub width: u32,
+    /// Rows of the map.
+    pub height: u32,
+    /// The bytes of each chunk.
+    pub chunks: Vec<Vec<u8>>,
+}
+
+/// Why a file of chunks cannot be made or used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ChunkFileError {
+    /// The first bytes are others.
+    #[error("not a file of map chunks")]
+    NotChunks,
+    /// Written by another version.
+    #[error("file version {0}; this program reads version {VERSION}")]
+    Version(u8),
+    /// The file ends early or goes on after the last chunk.
+    #[error("the file of map chunks is cut off or has bytes after its end")]
+    Length,
+    /// The map has more than 2^26 cells.
+    #[error("a map of {0} x {1} cells is too large")]
+    TooLarge(u32, u32),
+    /// Base and target, or base and file, differ in size.
+    #[error("the base map is {base_width} x {base_height}, the other {width} x {height}")]
+    Size {
+        /// Columns of the base.
+        base_width: usize,
+        /// Rows of the base.
+        base_height: usize,
+        /// Columns of the other.
+        width: usize,
+        /// Rows of the other.
+        height: usize,
+    },
+    /// No cell fits the room.
+    #[error("a chunk of {0} bytes holds no cell")]
+    Room(usize),
+    /// A chunk is refused.
+    #[error("chunk {index}: {error}")]
+    Chunk {
+        /// Which, from 0.
+        index: usize,
+        /// Why.
+        error: DecodeError,
+    },
+    /// A chunk changes cells outside the map.
+    #[error("chunk {0} changes cells outside the map")]
+    Outside(usize),
+}
+
+const MAGIC: [u8; 4] = *b"SCMC";
+const VERSION: u8 = 1;
+/// Cells of the largest map that a file may be for.
+const MOST_CELLS: u64 = 1 << 26;
+
+impl ChunkFile {
+    /// The chunks of at most `room` bytes that turn `base` into `target`, and how many cells they change.
+    pub fn encode(codec: Codec, base: &Plane, target: &Plane, room: usize) -> Result<(Self, usize), ChunkFileError> {
+        same_size(base, target.width, target.height)?;
+        let chunks = encode_all(codec, &base.to_grid(), &target.to_grid(), room.min(usize::from(u16::MAX)));
+        let chunks = chunks.ok_or(ChunkFileError::Room(room))?;
+        let changed = chunks.iter().map(|chunk| chunk.changes.len()).sum();
+        let (width, height) = (target.width as u32, target.height as u32);
+        Ok((Self { width, height, chunks: chunks.into_iter().map(|chunk| chunk.bytes).collect() }, changed))
+    }
+
+    /// The map that `base` becomes; without a base, the one that nothing becomes.
+    pub fn apply(&self, base: Option<&Plane>) -> Result<Plane, ChunkFileError> {
+        let (width, height) = (self.width as usize, self.height as usize);
+        if let Some(base) = base {
+            same_size(base, width, height)?;
+        }
+        let base = base.map(Plane::to_grid).unwrap_or_default();
+        let bounds = Rect { x: 0, y: 0, width: self.width, height: self.height };
+        let mut map = base.clone();
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            let changes = decode(&base, chunk).map_err(|error| ChunkFileError::Chunk { index, error })?;
+            if !changes.iter().all(|&(cell, _)| bounds.contains(cell)) {
+                return Err(ChunkFileError::Outside(index));
+            }
+            for (cell, label) in changes {
+                map.set(cell, label);
+            }
+        }
+        Ok(Plane::from_grid(&map, width, height))
+    }
+
+    /// The file.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::from(MAGIC);
+        out.push(VERSION);
+        for number in [self.width, self.height, self.chunks.len() as u32] {
+            out.extend(number.to_le_bytes());
+        }
+        for chunk in &self.chunks {
+            out.extend((chunk.len() as u16).to_le_bytes());
+            out.extend(chunk);
+        }
+        out
+    }
+
+    /// Reads a file.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, ChunkFileError> {
+        let (magic, rest) = bytes.split_first_chunk::<4>().ok_or(ChunkFileError::NotChunks)?;
+        if *magic != MAGIC {
+            return Err(ChunkFileError::NotChunks);
+        }
+        let (&version, rest) = rest.split_first().ok_or(ChunkFileError::Length)?;
+        if version != VERSION {
+            return Err(ChunkFileError::Version(version));
+        }
+        let mut reader = Reader(rest);
+        let (width, height, count) = (reader.number()?, reader.number()?, reader.number()?);
+        if u64::from(width) * u64::from(height) > MOST_CELLS {
+            return Err(ChunkFileError::TooLarge(width, height));
+        }
+        let chunks = (0..count).map(|_| reader.chunk()).collect::<Result<_, _>>()?;
+        if reader.0.is_empty() { Ok(Self { width, height, chunks }) } else { Err(ChunkFileError::Length) }
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn number(&mut self) -> Result<u32, ChunkFileError> {
+        let (number, rest) = self.0.split_first_chunk().ok_or(ChunkFileError::Length)?;
+        self.0 = rest;
+        Ok(u32::from_le_bytes(*number))
+    }
+
+    fn chunk(&mut self) -> Result<Vec<u8>, ChunkFileError> {
+        let (length, rest) = self.0.split_first_chunk().ok_or(ChunkFileError::Length)?;
+        let length = usize::from(u16::from_le_bytes(*length));
+        let (chunk, rest) = rest.split_at_checked(length).ok_or(ChunkFileError::Length)?;
+        self.0 = rest;
+        Ok(chunk.to_vec())
+    }
+}
+
+fn same_size(base: &Plane, width: usize, height: usize) -> Result<(), ChunkFileError> {
+    let (base_width, base_height) = (base.width, base.height);
+    if (base_width, base_height) == (width, height) {
+        Ok(())
+    } else {
+        Err(ChunkFileError::Size { base_width, base_height, width, height })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::map_codec::procedural::{Chance, Scene, sampler_noise};
+
+    fn maps() -> (Plane, Plane) {
+        let mut chance = Chance::new(3);
+        let before = Scene::Colonies.draw(&mut chance, 60, 40, 6);
+        let mut after = before.clone();
+        sampler_noise(&mut chance, &mut after, 50_000, 10_000);
+        (before, after)
+    }
+
+    #[test]
+    fn a_file_turns_the_base_into_the_target_whatever_the_codec() {
+        let (before, after) = maps();
+        for codec in [Codec::Auto, Codec::Png, Codec::Context] {
+            let (file, changed) = ChunkFile::encode(codec, &before, &after, 64).unwrap();
+            assert!(changed > 0 && file.chunks.len() > 1);
+            let file = ChunkFile::from_bytes(&file.to_bytes()).unwrap();
+            assert_eq!(file.apply(Some(&before)).unwrap(), after);
+            let (still, _) = ChunkFile::encode(codec, &Plane::uniform(60, 40, 0), &after, 200).unwrap();
+            assert_eq!(still.apply(None).unwrap(), after);
+        }
+    }
+
+    #[test]
+    fn files_cut_off_or_for_another_base_are_refused() {
+        let (before, after) = maps();
+        let bytes = ChunkFile::encode(Codec::Auto, &before, &after, 100).unwrap().0.to_bytes();
+        for length in 0..bytes.len() {
+            assert!(ChunkFile::from_bytes(bytes.get(..length).unwrap()).is_err());
+        }
+        let longer: Vec<u8> = bytes.iter().copied().chain([0]).collect();
+        assert_eq!(ChunkFile::from_bytes(&longer), Err(ChunkFileError::Length));
+        let file = ChunkFile::from_bytes(&bytes).unwrap();
+        assert!(matches!(file.apply(Some(&Plane::uniform(9, 9, 1))), Err(ChunkFileError::Size { .. })));
+        assert!(matches!(file.apply(Some(&Plane::uniform(60, 40, 1))), Err(ChunkFileError::Chunk { .. })));
+        let tiny = ChunkFile::encode(Codec::Auto, &before, &after, 3);
+        assert_eq!(tiny, Err(ChunkFileError::Room(3)));
+    }
+}

@@ -1,0 +1,82 @@
+//! A dense map of labels.
+
+use crate::map::{Cell, LabelGrid};
+
+/// Labels of a `width` x `height` map, row by row; 0 = unexplored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Plane {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Labels, row by row.
+    pub labels: Vec<u8>,
+}
+
+impl Plane {
+    /// A map with one label everywhere.
+    pub fn uniform(width: usize, height: usize, label: u8) -> Self {
+        Self { width, height, labels: vec![label; width * height] }
+    }
+
+    /// The map as a grid whose cell (0, 0) is the first label.
+    pub fn to_grid(&self) -> LabelGrid {
+        let cells = self.labels.iter().enumerate().filter(|&(_, &label)| label != 0);
+        cells.map(|(i, &label)| (Cell::new((i % self.width) as i32, (i / self.width) as i32), label)).collect()
+    }
+
+    /// The part of `grid` from cell (0, 0) on that has `width` columns and `height` rows.
+    pub fn from_grid(grid: &LabelGrid, width: usize, height: usize) -> Self {
+        Self { width, height, labels: grid.copy_area(0, 0, width, height) }
+    }
+
+    /// What changes from `before`, which has the same size: 0 = untouched, 255 = becomes unexplored.
+    pub fn delta_from(&self, before: &Self) -> Self {
+        let delta = self.labels.iter().zip(&before.labels).map(|(&new, &old)| match new {
+            same if same == old => 0,
+            0 => 255,
+            new => new,
+        });
+        Self { width: self.width, height: self.height, labels: delta.collect() }
+    }
+
+    /// The smallest part that holds every cell other than 0; one cell if there is none.
+    pub fn trimmed(&self) -> Self {
+        let set: Vec<usize> = (0..self.labels.len()).filter(|&i| self.labels[i] != 0).collect();
+        let columns = || set.iter().map(|i| i % self.width);
+        let (left, right) = (columns().min().unwrap_or(0), columns().max().unwrap_or(0));
+        let (first, last) = (set.first().unwrap_or(&0) / self.width, set.last().unwrap_or(&0) / self.width);
+        let labels = (first..=last).flat_map(|row| (left..=right).map(move |column| self.get(column, row))).collect();
+        Self { width: right - left + 1, height: last - first + 1, labels }
+    }
+
+    /// The label in `column` of `row`.
+    pub fn get(&self, column: usize, row: usize) -> u8 {
+        self.labels[row * self.width + column]
+    }
+
+    /// Sets the label in `column` of `row`.
+    pub fn set(&mut self, column: usize, row: usize, label: u8) {
+        self.labels[row * self.width + column] = label;
+    }
+
+    /// Labels of the up to eight cells around place `i`.
+    pub fn around(&self, i: usize) -> impl Iterator<Item = u8> + '_ {
+        let (column, row) = (i % self.width, i / self.width);
+        let columns = column.saturating_sub(1)..(column + 2).min(self.width);
+        (row.saturating_sub(1)..(row + 2).min(self.height))
+            .flat_map(move |r| columns.clone().map(move |c| (c, r)))
+            .filter(move |&place| place != (column, row))
+            .map(|(c, r)| self.get(c, r))
+    }
+
+    /// Whether the cell at place `i` touches one with another label, other than unexplored, along a side.
+    pub fn on_border(&self, i: usize) -> bool {
+        let (column, row) = (i % self.width, i / self.width);
+        let other = |label: u8| label != 0 && label != self.labels[i];
+        (column > 0 && other(self.labels[i - 1]))
+            || (column + 1 < self.width && other(self.labels[i + 1]))
+            || (row > 0 && other(self.labels[i - self.width]))
+            || (row + 1 < self.height && other(self.labels[i + self.width]))
+    }
+}
