@@ -24,17 +24,39 @@ pub fn mutual_information_nats(pairs: impl Iterator<Item = (u32, u32)>) -> Mutua
         *right.entry(b).or_default() += 1;
         n += 1;
     }
-    if n == 0 {
-        return MutualInformation::default();
+    MutualInformation::of_counts(left.into_values(), right.into_values(), joint.into_values(), n)
+}
+
+impl MutualInformation {
+    /// From a joint table of `columns` columns, row by row.
+    pub fn of_table(joint: &[u64], columns: usize) -> Self {
+        let columns = columns.max(1);
+        let mut right = vec![0; columns];
+        for row in joint.chunks(columns) {
+            right.iter_mut().zip(row).for_each(|(sum, count)| *sum += count);
+        }
+        let left = joint.chunks(columns).map(|row| row.iter().sum());
+        Self::of_counts(left, right.iter().copied(), joint.iter().copied(), right.iter().sum())
     }
-    let (own, other) = (entropy(left.into_values(), n), entropy(right.into_values(), n));
-    let nats = (own + other - entropy(joint.into_values(), n)).max(0.0);
-    let scale = (own * other).sqrt();
-    MutualInformation { nats, normalised: if scale > 1e-12 { nats / scale } else { 0.0 }, n }
+
+    fn of_counts(
+        left: impl Iterator<Item = u64>,
+        right: impl Iterator<Item = u64>,
+        joint: impl Iterator<Item = u64>,
+        n: u64,
+    ) -> Self {
+        if n == 0 {
+            return Self::default();
+        }
+        let (own, other) = (entropy(left, n), entropy(right, n));
+        let nats = (own + other - entropy(joint, n)).max(0.0);
+        let scale = (own * other).sqrt();
+        Self { nats, normalised: if scale > 1e-12 { nats / scale } else { 0.0 }, n }
+    }
 }
 
 fn entropy(counts: impl Iterator<Item = u64>, n: u64) -> f64 {
-    counts.map(|count| count as f64 / n as f64).map(|share| -share * share.ln()).sum()
+    counts.filter(|&count| count > 0).map(|count| count as f64 / n as f64).map(|share| -share * share.ln()).sum()
 }
 
 #[cfg(test)]

@@ -46,16 +46,13 @@ impl Texture {
         let places = || down.iter().flat_map(|&v| across.iter().map(move |&u| (u, v)));
         let energies: Vec<[f32; SCALES]> = places().map(|(u, v)| self.energies(levels, u, v)).collect();
         if learn {
-            for energy in &energies {
-                self.energy.iter_mut().zip(energy).for_each(|(moments, &value)| moments.add(value));
-            }
+            Moments::learn(&mut self.energy, &energies);
         }
         let scales = self.energy.map(|moments| moments.scale());
         words.extend(energies.iter().zip(places()).map(|(energy, (u, v))| {
             let mut id = 0;
             for (value, (mean, gain)) in energy.iter().zip(scales) {
-                let z = (value - mean) * gain;
-                id = id * 6 + CUTS.iter().map(|&cut| u32::from(z > cut)).sum::<u32>();
+                id = id * 6 + sextile((value - mean) * gain);
             }
             Word { id: first_id + id, u, v }
         }));
@@ -84,6 +81,11 @@ impl Texture {
         let power: f32 = response.iter().map(|value| value * value).sum();
         (power + 1e-5).ln()
     }
+}
+
+/// Which of six parts of equal share a z-score falls in.
+pub(super) fn sextile(z: f32) -> u32 {
+    CUTS.iter().map(|&cut| u32::from(z > cut)).sum()
 }
 
 /// Even and odd Gabor filters, without answer to a constant.
