@@ -249,11 +249,13 @@ impl Channel {
         }
     }
 
-    /// Adds a reception to those under way, marking collisions in both directions.
+    /// Adds a reception to those under way, marking collisions in both directions. Signals of one sender follow each other
+    /// in the water as they left it: they do not collide, though motion may make their rounded spans touch.
     fn enter(&mut self, mut new: Reception) {
         let own = self.on_air.get(&new.to).map(Vec::as_slice).unwrap_or_default();
         new.self_deaf = self.config.half_duplex && own.iter().any(|span| span.overlaps(&new.span));
-        let overlapping = self.underway.values_mut().filter(|old| old.to == new.to && old.span.overlaps(&new.span));
+        let meets = |old: &&mut Reception| old.to == new.to && old.from != new.from && old.span.overlaps(&new.span);
+        let overlapping = self.underway.values_mut().filter(meets);
         for old in overlapping {
             new.collided |= old.audible();
             old.collided |= new.audible();
