@@ -156,6 +156,7 @@ pub const KEYS: &[Key] = &[
     ),
     key("console.listen", "", Text, "s", "ADDRESS:PORT of the operator's page; empty: none"),
     key("runtime.state_dir", "", Text, "as", "folder of what must survive a restart, and of the operator's map"),
+    key("runtime.seed", "", Range(0.0, 9e15), "a", "seed of the scene model: the same recording gives the same map"),
     key(
         "runtime.time_scale",
         "",

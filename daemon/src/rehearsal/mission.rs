@@ -433,6 +433,12 @@ impl Mission {
         self.meter.look(self.vehicle.map(), operator, versions, self.now);
     }
 
+    /// Metres between where the vehicle is and where it believes to be.
+    pub fn position_error_m(&self) -> f64 {
+        let (x, y) = self.vehicle.navigator().position();
+        (x - self.motion.x_m).hypot(y - self.motion.y_m)
+    }
+
     /// Edge of a cell in metres.
     pub fn cell_m(&self) -> f64 {
         cell_m(&self.config)

@@ -1,0 +1,116 @@
+//! Rehearsed missions.
+
+use proptest::prelude::*;
+use scenecast::config::{self, Config};
+use scenecast::rehearsal::{Mission, MissionOptions, World, report};
+use serde_json::Value;
+use std::time::Duration;
+
+fn config(sets: &[&str]) -> Config {
+    let small =
+        ["survey.duration_s=120", "camera.width_px=320", "camera.height_px=240", "scene.refine_words_per_s=20000"];
+    let sets: Vec<String> = small.iter().chain(sets).map(|s| (*s).to_owned()).collect();
+    config::load(None, &sets).unwrap()
+}
+
+/// A small reef, drawn once.
+fn reef() -> World {
+    static REEF: std::sync::OnceLock<World> = std::sync::OnceLock::new();
+    REEF.get_or_init(|| World::procedural(5, 0.01)).clone()
+}
+
+fn fly(sets: &[&str], seed: u64) -> Value {
+    let mut mission = Mission::new(config(sets), MissionOptions { world: reef(), seed, record: None }).unwrap();
+    mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
+    report(&mission, "test").figures
+}
+
+fn assert_sound(figures: &Value) {
+    assert_eq!(figures["map"]["agreement_final"], 1.0, "{figures}");
+    assert_eq!(figures["directives"]["applied_twice"], 0);
+    let link = &figures["link"];
+    for end in ["up", "down"] {
+        let limit = link["budget_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
+        let largest = link[end]["largest_transmission_bits"].as_f64().unwrap();
+        let worst = link[end]["worst_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
+        assert!(worst <= limit + largest, "{end}: {worst} bits in a window");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 18, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_operators_map_equals_the_vehicles_once_the_channel_has_drained(
+        seed in 0u64..1000,
+        loss in prop_oneof![Just("0"), Just("0.1"), Just("0.3")],
+        frame in prop_oneof![Just("64"), Just("256"), Just("1000")],
+        codec in prop_oneof![Just("png"), Just("context")],
+        budget in prop_oneof![Just("300"), Just("2000"), Just("10000")],
+    ) {
+        let sets = [
+            format!("channel.loss={loss}"), format!("link.frame_bytes={frame}"), format!("map.codec={codec}"),
+            format!("link.budget_bps={budget}"), "channel.duplication=0.1".into(), "channel.reordering=0.1".into(),
+            "channel.corruption=0.05".into(),
+        ];
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        assert_sound(&fly(&sets, seed));
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_report() {
+    let first = fly(&["channel.loss=0.2"], 7).to_string();
+    assert_eq!(first, fly(&["channel.loss=0.2"], 7).to_string());
+    assert_ne!(first, fly(&["channel.loss=0.2"], 8).to_string());
+}
+
+#[test]
+fn directives_images_and_fixes_reach_the_vehicle_and_what_it_answers_comes_back() {
+    let figures = fly(&["survey.duration_s=400"], 3);
+    assert_sound(&figures);
+    assert_eq!(figures["directives"]["issued"], figures["directives"]["applied"], "{figures}");
+    assert!(figures["directives"]["issued"].as_u64() >= Some(4));
+    assert_eq!(figures["exemplars"]["requested"], figures["exemplars"]["delivered"]);
+    assert!(figures["exemplars"]["delivered"].as_u64() >= Some(2));
+    assert!(figures["fixes"]["applied"].as_u64() >= Some(30));
+    assert!(figures["scene"]["labels"].as_u64() >= Some(2));
+}
+
+#[test]
+fn the_map_codes_far_smaller_than_whole_pngs() {
+    let figures = fly(&["survey.duration_s=300"], 4);
+    let payload = figures["map"]["payload_bytes"].as_f64().unwrap();
+    assert!(payload < figures["map"]["png_full_bytes"].as_f64().unwrap() / 10.0, "{figures}");
+}
+
+/// How far the map's labels are shifted against the sea floor, by the vehicle's belief.
+fn position_error(sets: &[&str]) -> f64 {
+    let mut config = config(sets);
+    config.operator.script = "none".into();
+    let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 11, record: None }).unwrap();
+    mission.run(Duration::from_secs(600), &mut |_| {}).unwrap();
+    mission.position_error_m()
+}
+
+#[test]
+fn without_fixes_dead_reckoning_drifts_and_fixes_correct_it() {
+    let sets = ["survey.duration_s=400", "navigation.drift_percent=5"];
+    let adrift = position_error(&[&sets[..], &["navigation.fix_period_s=0"]].concat());
+    let fixed = position_error(&sets);
+    assert!(adrift > 3.0 * fixed && adrift > 1.0, "{adrift} m without fixes, {fixed} m with");
+}
+
+#[test]
+fn a_real_reef_is_surveyed_into_more_than_one_label() {
+    let Some(data) = scenecast_tests::shared_data() else { return };
+    let image = data.join("eilatmixx/LFT_0109.jpg");
+    let world = World::from_files(&image, Some(&data.join("eilatmixx/LFT_0109_label.png")), 0.01).unwrap();
+    let mut mission =
+        Mission::new(config(&["survey.duration_s=300"]), MissionOptions { world, seed: 1, record: None }).unwrap();
+    mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
+    let figures = report(&mission, "test").figures;
+    assert_sound(&figures);
+    assert!(figures["scene"]["labels"].as_u64() > Some(1));
+    assert!(figures["scene"]["mutual_information_nats"].as_f64() > Some(0.02), "{figures}");
+}

@@ -1,0 +1,59 @@
+//! The operator's page and API of a running demo.
+
+use scenecast_tests::{Process, free_port, http, wait_until};
+use serde_json::Value;
+use std::time::Duration;
+
+fn state(port: u16) -> Option<Value> {
+    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
+}
+
+fn slot(state: &Value, name: &str) -> Option<String> {
+    let slots = state["vehicles"][0]["directive"]["slots"].as_array()?;
+    slots.iter().find(|s| s["slot"] == name)?["state"].as_str().map(str::to_owned)
+}
+
+const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
+
+#[test]
+fn an_operator_sees_the_map_sends_weights_and_gets_an_image() {
+    let port = free_port();
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
+    let limit = Duration::from_secs(60);
+    wait_until("labels on the map", limit, || {
+        state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 1))
+    });
+    let label = state(port).unwrap()["vehicles"][0]["labels"][0]["id"].as_u64().unwrap();
+    let weights = format!("{{\"weights\": {{\"{label}\": 0.8}}, \"exploration\": 0.2}}");
+    assert_eq!(http(port, "POST", "/api/v1/vehicles/1/utility", ORDER, &weights).unwrap().0, 202);
+    wait_until("the weights are applied", limit, || {
+        slot(&state(port).unwrap(), "utility").as_deref() == Some("applied")
+    });
+    let order = format!("{{\"label\": {label}}}");
+    assert_eq!(http(port, "POST", "/api/v1/vehicles/1/exemplars", ORDER, &order).unwrap().0, 202);
+    wait_until("the image is here", limit, || {
+        state(port).unwrap()["vehicles"][0]["labels"][0]["exemplar"]["state"] == "here"
+    });
+    let (status, webp) = http(port, "GET", &format!("/api/v1/vehicles/1/exemplars/{label}.webp"), "", "").unwrap();
+    assert!(status == 200 && webp.starts_with(b"RIFF"));
+    let (status, page) = http(port, "GET", "/", "", "").unwrap();
+    assert!(status == 200 && String::from_utf8_lossy(&page).contains("<title>"));
+}
+
+#[test]
+fn wrong_orders_and_strangers_are_refused() {
+    let port = free_port();
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--duration", "600"]);
+    wait_until("the page answers", Duration::from_secs(30), || state(port).is_some());
+    let refused = |path: &str, headers: &str, body: &str| http(port, "POST", path, headers, body).unwrap();
+    let (status, said) = refused("/api/v1/vehicles/1/utility", ORDER, "{\"weights\": {\"9\": 0.5}}");
+    assert_eq!(status, 422);
+    assert!(String::from_utf8_lossy(&said).contains("label 9"), "{}", String::from_utf8_lossy(&said));
+    assert_eq!(refused("/api/v1/budget", ORDER, "{\"budget_bps\": 1}").0, 422);
+    assert_eq!(refused("/api/v1/budget", "Content-Type: application/json\r\n", "{\"budget_bps\": 1000}").0, 403);
+    let stranger = format!("{ORDER}Origin: http://elsewhere.example\r\n");
+    assert_eq!(refused("/api/v1/budget", &stranger, "{\"budget_bps\": 1000}").0, 403);
+    assert_eq!(http(port, "GET", "/api/v1/vehicles/7/map", "", "").unwrap().0, 404);
+    assert_eq!(refused("/api/v1/budget", ORDER, &"x".repeat(100_000)).0, 413);
+}

@@ -1,0 +1,142 @@
+//! The two ends as processes, over TCP and over real serial devices.
+
+use scenecast::config;
+use scenecast::rehearsal::{Mission, MissionOptions, World};
+use scenecast_tests::{Process, free_port, http, scratch, wait_until};
+use serialport::{SerialPort, TTYPort};
+use std::io::{Read, Write};
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+const SHARED: [&str; 3] = ["camera.width_px=320", "camera.height_px=240", "operator.script=none"];
+
+/// A recorded mission, and the map that `sim` makes of it.
+fn recorded() -> &'static (std::path::PathBuf, Vec<u8>) {
+    static RECORDED: OnceLock<(std::path::PathBuf, Vec<u8>)> = OnceLock::new();
+    RECORDED.get_or_init(|| {
+        let dir = scratch("recorded");
+        let fly = |sets: &[String], record| {
+            let sets: Vec<String> = SHARED.iter().map(|s| (*s).to_owned()).chain(sets.iter().cloned()).collect();
+            let config = config::load(None, &sets).unwrap();
+            let options = MissionOptions { world: World::procedural(2, 0.01), seed: 1, record };
+            let mut mission = Mission::new(config, options).unwrap();
+            mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
+            mission
+        };
+        fly(&["survey.duration_s=60".into()], Some(dir.clone()));
+        let replay = fly(&["survey.duration_s=90".into(), format!("camera.source=frames:{}", dir.display())], None);
+        assert!(replay.is_drained());
+        let map = scenecast::picture::encode(replay.vehicle().map()).unwrap();
+        (dir, map)
+    })
+}
+
+/// Both ends' arguments over a link; the map must become the one that `sim` makes.
+fn assert_map_arrives(name: &str, vehicle_link: &[String], surface_link: &[String]) {
+    let (recording, expected) = recorded();
+    let dir = scratch(name);
+    let port = free_port();
+    let path = |p: &Path| p.display().to_string();
+    let vehicle_file = dir.join("auv.toml");
+    let surface_file = dir.join("asv.toml");
+    std::fs::write(&vehicle_file, format!("[camera]\nsource = \"frames:{}\"\n", path(recording))).unwrap();
+    std::fs::write(&surface_file, format!("[console]\nlisten = \"127.0.0.1:{port}\"\n")).unwrap();
+    let arguments = |command: &str, file: &Path, state: &str, link: &[String]| {
+        let common = [format!("runtime.state_dir=\"{}\"", path(&dir.join(state))), "runtime.time_scale=20".to_owned()];
+        let sets = common.into_iter().chain(link.iter().cloned()).flat_map(|s| ["--set".to_owned(), s]);
+        [command.to_owned(), "--config".to_owned(), path(file)].into_iter().chain(sets).collect::<Vec<String>>()
+    };
+    let surface = arguments("asv", &surface_file, "asv", surface_link);
+    let vehicle = arguments("auv", &vehicle_file, "auv", vehicle_link);
+    let borrowed = |a: &[String]| Process::start(&a.iter().map(String::as_str).collect::<Vec<_>>());
+    let _surface = borrowed(&surface);
+    let _vehicle = borrowed(&vehicle);
+    let map = dir.join("asv/operator-map-1.png");
+    wait_until("the operator's map equals the one of the rehearsal", Duration::from_secs(120), || {
+        std::fs::read(&map).is_ok_and(|png| png == *expected)
+    });
+    let (status, page) = http(port, "GET", "/api/v1/vehicles/1/map.png", "", "").unwrap();
+    assert_eq!((status, page), (200, expected.clone()), "the page has the same map");
+}
+
+#[test]
+fn a_map_arrives_over_tcp_and_equals_the_one_of_the_rehearsal() {
+    let port = free_port();
+    assert_map_arrives(
+        "tcp",
+        &[format!("modem.connect=127.0.0.1:{port}")],
+        &[format!("modem.listen=127.0.0.1:{port}")],
+    );
+}
+
+/// Joins two pseudo-terminals like a null modem, garbling the stream in between at first.
+fn null_modem() -> (String, String, [TTYPort; 2]) {
+    let (a, a_end) = TTYPort::pair().unwrap();
+    let (b, b_end) = TTYPort::pair().unwrap();
+    let names = (a_end.name().unwrap(), b_end.name().unwrap());
+    for (mut from, mut to) in [(a.try_clone_native().unwrap(), b.try_clone_native().unwrap()), (b, a)] {
+        from.set_timeout(Duration::from_millis(200)).unwrap();
+        std::thread::spawn(move || {
+            let _ = to.write_all(b"\x00+garbage++\xff");
+            let mut buffer = [0; 512];
+            loop {
+                match from.read(&mut buffer) {
+                    Ok(0) => return,
+                    Ok(n) => {
+                        if to.write_all(&buffer[..n]).is_err() {
+                            return;
+                        }
+                    }
+                    Err(e) if e.kind() == std::io::ErrorKind::TimedOut => {}
+                    Err(_) => return,
+                }
+            }
+        });
+    }
+    (names.0, names.1, [a_end, b_end])
+}
+
+#[test]
+fn a_map_arrives_over_serial_devices_and_equals_the_one_of_the_rehearsal() {
+    let (a, b, _held) = null_modem();
+    let link = |device: String| {
+        vec!["modem.kind=transparent".to_owned(), format!("modem.device={device}"), "modem.baud=115200".to_owned()]
+    };
+    assert_map_arrives("serial", &link(a), &link(b));
+}
+
+#[test]
+fn a_vehicle_that_is_killed_and_comes_back_is_heard_again() {
+    let (recording, expected) = recorded();
+    let dir = scratch("killed");
+    let port = free_port();
+    let file = |name: &str, text: String| {
+        let path = dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let common = "[runtime]\ntime_scale = 20\n";
+    let state = |who: &str| format!("state_dir = \"{}\"\n", dir.join(who).display());
+    let source = recording.display();
+    let vehicle_file = file(
+        "auv.toml",
+        format!(
+            "{common}{}[modem]\nconnect = \"127.0.0.1:{port}\"\n[camera]\nsource = \"frames:{source}\"\n",
+            state("auv")
+        ),
+    );
+    let surface_file = file(
+        "asv.toml",
+        format!("{common}{}[modem]\nlisten = \"127.0.0.1:{port}\"\n[console]\nlisten = \"\"\n", state("asv")),
+    );
+    let _surface = Process::start(&["asv", "--config", &surface_file]);
+    let mut vehicle = Process::start(&["auv", "--config", &vehicle_file]);
+    let map = dir.join("asv/operator-map-1.png");
+    wait_until("a first map", Duration::from_secs(60), || map.exists());
+    vehicle.kill();
+    let _again = Process::start(&["auv", "--config", &vehicle_file]);
+    wait_until("the map of the second run", Duration::from_secs(120), || {
+        std::fs::read(&map).is_ok_and(|png| png == *expected)
+    });
+}
