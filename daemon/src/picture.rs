@@ -5,19 +5,13 @@ use scenecast_protocol::map::{Cell, LabelGrid, Rect};
 use std::io::Write;
 use std::path::Path;
 
-/// Colour of a label: 0 black, others spread over hue and lightness so that neighbours in number differ.
+/// Colours of the labels 1..=254, those of the operator's page.
+static PALETTE: [u32; 254] = include!(concat!(env!("OUT_DIR"), "/palette.rs"));
+
+/// Colour of a label: black where nothing was seen.
 pub fn colour(label: u8) -> [u8; 3] {
-    if label == 0 {
-        return [0, 0, 0];
-    }
-    // The golden angle visits the hues evenly whatever the number of labels.
-    let hue = f64::from(label) * 137.507_764;
-    let light = [0.60, 0.72, 0.48][usize::from(label) % 3];
-    let channel = |shift: f64| {
-        let h = (hue + shift).to_radians().cos();
-        ((light + 0.28 * h).clamp(0.0, 1.0) * 255.0) as u8
-    };
-    [channel(0.0), channel(-120.0), channel(120.0)]
+    let rgb = usize::from(label).checked_sub(1).and_then(|i| PALETTE.get(i)).copied().unwrap_or(0);
+    [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]
 }
 
 /// The map within `bounds` as an indexed PNG, north up; pixel value = label.

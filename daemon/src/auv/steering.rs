@@ -2,7 +2,7 @@
 
 use scenecast_protocol::directive::Utility;
 use scenecast_protocol::map::LabelGrid;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Limits of the survey, metres from the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,7 +91,7 @@ impl Steering {
         waypoint
     }
 
-    /// The candidate with the greatest gain of utility a metre of way.
+    /// The candidate with the greatest gain of utility a metre of way, what is seen on the way included.
     fn greedy(&self, from: (f64, f64), map: &LabelGrid, utility: &Utility) -> (f64, f64) {
         let worth = self.worth_of_blocks(map, utility);
         let inner = self.area.shrunk(self.footprint.across.min(self.footprint.along) / 2.0);
@@ -106,7 +106,7 @@ impl Steering {
                 if distance < step / 2.0 {
                     continue;
                 }
-                let gain: f64 = self.blocks_around(at).filter_map(|b| worth.get(&b)).sum();
+                let gain: f64 = self.blocks_on_way(from, at, step).iter().filter_map(|b| worth.get(b)).sum();
                 // The way to turn and settle counts as half a footprint.
                 let rate = gain / (distance + step);
                 if rate > best.0 {
@@ -139,6 +139,16 @@ impl Steering {
             }
         }
         worth
+    }
+
+    /// Blocks that the camera sees on the straight way from one place to another, looking every `step` metres.
+    fn blocks_on_way(&self, from: (f64, f64), to: (f64, f64), step: f64) -> BTreeSet<(i32, i32)> {
+        let looks = ((to.0 - from.0).hypot(to.1 - from.1) / step).ceil().max(1.0);
+        let at = |i: u32| {
+            let share = f64::from(i) / looks;
+            (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share)
+        };
+        (1..=looks as u32).flat_map(|i| self.blocks_around(at(i))).collect()
     }
 
     /// Blocks within half a footprint of a place, in metres.

@@ -39,7 +39,7 @@ pub struct Snapshot {
 /// The state of the surface.
 pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now: Instant) -> Snapshot {
     let vehicles: Vec<Value> =
-        surface.vehicles().filter_map(|(a, desk)| Some(vehicle(surface, a, desk, surface.view(a)?, facts))).collect();
+        surface.vehicles().filter_map(|(a, desk)| vehicle(surface, a, desk, facts, now)).collect();
     let state = json!({
         "now_s": seconds(now),
         "mission": { "name": facts.name, "id": facts.run, "speed": facts.speed, "ended": facts.ended },
@@ -54,16 +54,17 @@ fn seconds(at: Instant) -> f64 {
     (at.as_secs_f64() * 100.0).round() / 100.0
 }
 
-fn vehicle(surface: &Surface, address: Address, desk: &Desk, view: PeerView<'_>, facts: &MissionFacts) -> Value {
+fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFacts, now: Instant) -> Option<Value> {
+    let view = surface.view(address)?;
     let labels = surface.labels(address).unwrap_or_default();
     let bounds = surface.map(address).and_then(|m| m.bounds());
     let interval = view.expected_interval().map_or(facts.first_interval_s, |d| d.as_secs_f64().max(1.0));
-    json!({
+    Some(json!({
         "id": address.number(),
         "name": desk.name,
         "heard_s": view.heard().map(seconds),
         "expected_interval_s": interval,
-        "next_contact_s": view.next_contact().map(seconds),
+        "next_contact_s": view.next_contact(now).map(seconds),
         "status": view.status().map(|(s, at)| status(s, *at)),
         "track": desk.track.iter().map(|(at, x, y)| json!([seconds(*at), x, y])).collect::<Vec<_>>(),
         "map": {
@@ -80,7 +81,7 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, view: PeerView<'_>,
         "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
         "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, view, address, facts)).collect::<Vec<_>>(),
         "directive": { "slots": view.slots().map(slot).collect::<Vec<_>>() },
-    })
+    }))
 }
 
 fn status(s: &VehicleStatus, at: Instant) -> Value {

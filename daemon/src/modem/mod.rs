@@ -13,6 +13,7 @@ use crate::problem::Problem;
 use crate::runtime::Clock;
 use bytes::Bytes;
 use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::schedule::Audit;
 use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
@@ -35,12 +36,31 @@ pub struct Modem {
     /// The slowest of the ways to the water: bits a second.
     pace_bps: f64,
     busy_until: Option<Instant>,
+    /// What went on air, counted at the door, and what the configuration allows in a window.
+    audit: Audit,
+    window_bits: f64,
 }
 
 impl Modem {
     /// Whether a transmission is under way.
     pub fn is_busy(&self) -> bool {
         self.busy_until.is_some()
+    }
+
+    /// The budget has changed.
+    pub fn set_budget(&mut self, bits_per_s: u32) {
+        self.window_bits = self.window_bits.max(f64::from(bits_per_s) * self.window_s());
+    }
+
+    fn window_s(&self) -> f64 {
+        self.audit.window().as_secs_f64()
+    }
+
+    /// Writes what went on air to the log.
+    pub fn log_audit(&self) {
+        let a = &self.audit;
+        let (frames, bits, worst) = (a.transmissions(), a.total_bits(), a.worst_window_bps());
+        tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the worst window");
     }
 
     /// Puts a frame on air. A frame that the modem cannot take is lost like one on the way, and the link repairs it.
@@ -52,7 +72,15 @@ impl Modem {
                 self.profile.frame_bytes
             )));
         }
-        let bits = self.profile.bits_on_air(bytes.len()) as f64;
+        let bits_on_air = self.profile.bits_on_air(bytes.len());
+        self.audit.record(bits_on_air, clock.now());
+        if self.audit.worst_window_bits() as f64 > self.window_bits + self.audit.largest_bits() as f64 {
+            tracing::error!(
+                "the bit budget was exceeded: {:.0} bit/s in the worst window",
+                self.audit.worst_window_bps()
+            );
+        }
+        let bits = bits_on_air as f64;
         self.busy_until = Some(clock.wall(clock.now() + Duration::from_secs_f64(bits / self.pace_bps)));
         if self.outgoing.try_send(bytes.into()).is_err() {
             tracing::warn!("the modem is not connected: a frame is lost");
@@ -95,5 +123,7 @@ pub async fn open(config: &Config, profile: ModemProfile) -> Result<Modem, Probl
         }
         _ => tcp::open(&m.listen, &m.connect, profile.frame_bytes, to_modem, from_modem).await?,
     }
-    Ok(Modem { outgoing, incoming, profile, pace_bps, busy_until: None })
+    let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
+    let window_bits = f64::from(config.link.budget_bps) * config.link.budget_window_s;
+    Ok(Modem { outgoing, incoming, profile, pace_bps, busy_until: None, audit, window_bits })
 }

@@ -64,6 +64,8 @@ pub struct Mission {
     pub(super) png_full_bytes: u64,
     pub(super) ended: Option<Instant>,
     pub(super) update: Option<MapUpdate>,
+    /// Where the vehicle was when it saw something, by its own belief.
+    pub(super) track: Vec<(f64, f64)>,
     channel: Channel,
     modem: ModemProfile,
     script: Script,
@@ -121,6 +123,7 @@ impl Mission {
             png_full_bytes: 0,
             ended: None,
             update: None,
+            track: Vec::new(),
             transmitting: [None; 2],
             map_version: 0,
             picture_version: 0,
@@ -402,6 +405,7 @@ impl Mission {
             let frame = RecordedFrame { t_s, file: Default::default(), x_m: pose.x, y_m: pose.y, depth_m, heading_rad };
             recorder.push(image, &frame)?;
         }
+        self.track.push((pose.x, pose.y));
         let update = self.mapper.handle_frame(image, &pose, t_s);
         let session = SessionId::from_random(self.dice.below(65_536) as u16);
         self.vehicle.handle_map(&update, session, self.now);

@@ -7,6 +7,7 @@ mod meter;
 mod mission;
 mod motion;
 mod outputs;
+mod panorama;
 mod recording;
 mod report;
 mod script;

@@ -1,6 +1,7 @@
 //! The files of a rehearsal.
 
 use super::mission::Mission;
+use super::panorama::panorama;
 use super::report::Report;
 use crate::picture;
 use crate::problem::Problem;
@@ -18,6 +19,8 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     if mission.world.is_annotated() {
         write_map(&dir.join("truth.png"), &truth(mission, bounds), bounds)?;
     }
+    let panorama = panorama(mission).map_err(|e| Problem::Failed(e.to_string()))?;
+    picture::write_whole(&dir.join("mission.png"), &panorama)?;
     let exemplars = dir.join("exemplars");
     std::fs::create_dir_all(&exemplars).map_err(|e| failed(&exemplars, e))?;
     for (label, webp) in mission.exemplars() {

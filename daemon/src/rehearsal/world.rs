@@ -50,6 +50,14 @@ impl World {
         self.classes.is_some()
     }
 
+    /// The colour of the sea floor at a place in metres; `None` outside the image.
+    pub fn colour_at(&self, x_m: f64, y_m: f64) -> Option<[u8; 3]> {
+        let (column, line) =
+            (x_m / self.metres_per_pixel, f64::from(self.image.height()) - y_m / self.metres_per_pixel);
+        let inside = column >= 0.0 && line >= 0.0;
+        inside.then(|| self.image.get_pixel_checked(column as u32, line as u32)).flatten().map(|p| p.0)
+    }
+
     /// What a down-looking camera sees at a place (metres) and heading (radians clockwise from north). Beyond its limits
     /// the image is mirrored.
     pub fn view(&self, x_m: f64, y_m: f64, heading_rad: f64, width: u32, height: u32) -> RgbImage {

@@ -67,7 +67,7 @@ impl Host {
             let wake = self.surface.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
             let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => return Ok(()),
+                _ = tokio::signal::ctrl_c() => return Ok(self.modem.log_audit()),
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 _ = second.tick() => self.publish(),
                 event = self.modem.next() => match event {
@@ -111,6 +111,7 @@ impl Host {
                 SurfaceOutput::SlotSettled(..) | SurfaceOutput::Changed(_) => {}
             }
         }
+        self.modem.set_budget(self.surface.budget_bps());
         if !self.modem.is_busy()
             && let Some(t) = self.surface.poll_transmit(now)
         {

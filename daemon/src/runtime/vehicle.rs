@@ -81,7 +81,7 @@ impl Host {
             let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
             let wake = wake.unwrap_or_else(|| self.clock.now() + std::time::Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => return Ok(()),
+                _ = tokio::signal::ctrl_c() => return Ok(self.modem.log_audit()),
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 event = self.modem.next() => match event {
                     ModemEvent::Sent => self.vehicle.handle_transmit_outcome(),
@@ -130,6 +130,7 @@ impl Host {
                 VehicleOutput::Hold => tracing::info!("hold"),
             }
         }
+        self.modem.set_budget(self.vehicle.budget_bps());
         if !self.modem.is_busy()
             && let Some(t) = self.vehicle.poll_transmit(now)
         {

@@ -56,9 +56,9 @@ impl<'a> PeerView<'a> {
         self.0.interval
     }
 
-    /// When the next turn will be granted at the latest, if nothing is on air.
-    pub fn next_contact(&self) -> Option<Instant> {
-        self.0.master.next_wakeup()
+    /// When the next turn will be granted at the latest; `now` if that is due.
+    pub fn next_contact(&self, now: Instant) -> Option<Instant> {
+        self.0.master.next_wakeup().map(|at| at.max(now))
     }
 
     /// Two-way propagation.

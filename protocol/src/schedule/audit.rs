@@ -46,6 +46,11 @@ impl Audit {
         self.transmissions += 1;
     }
 
+    /// The window.
+    pub fn window(&self) -> Duration {
+        self.window
+    }
+
     /// Most bits that began within any window.
     pub fn worst_window_bits(&self) -> u64 {
         self.worst_bits
