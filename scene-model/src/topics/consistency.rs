@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::labels::{LANES, label_of, word_of};
-use super::{Birth, SceneConfig, SceneModel};
+use super::{Birth, Kernel, SceneConfig, SceneModel};
 use crate::project::Observation;
 
 #[derive(Clone, Debug)]
@@ -95,6 +95,30 @@ proptest! {
         let map = model.label_map();
         prop_assert!(map.is_sorted_by_key(|cell| (cell.y, cell.x)));
         prop_assert!(map.iter().all(|cell| (0.0..=1.0).contains(&cell.confidence) && cell.perplexity >= 0.99));
+    }
+
+    #[test]
+    fn every_kernel_gives_the_same_labels_bit_for_bit(
+        steps in prop::collection::vec(step(), 1..8),
+        max_labels in prop::sample::select(vec![1u32, 8, 16, 17, 32, 40, 100, 112, 150]),
+        gamma in prop::sample::select(vec![1e-4, 1.0]),
+        seed in any::<u64>(),
+    ) {
+        let config = SceneConfig {
+            cell_m: [1.0; 3], gamma, max_labels, vocabulary: 24, seed, ..SceneConfig::default()
+        };
+        let run = |kernel| {
+            let mut model = SceneModel::new(config.clone()).unwrap();
+            assert!(model.use_kernel(kernel));
+            steps.iter().for_each(|step| take(&mut model, step));
+            let cells = model.parts().0;
+            let words: Vec<Vec<u32>> = (0..cells.len() as u32).map(|cell| cells.words(cell).to_vec()).collect();
+            (words, model.label_map())
+        };
+        let portable = run(Kernel::Portable);
+        for kernel in [Kernel::Avx2, Kernel::Avx512].into_iter().filter(|kernel| kernel.is_available()) {
+            prop_assert_eq!(&run(kernel), &portable);
+        }
     }
 
     #[test]

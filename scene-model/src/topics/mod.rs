@@ -22,6 +22,7 @@ mod model;
 mod schedule;
 
 pub use config::{Birth, ConfigError, SceneConfig};
+pub use kernel::Kernel;
 pub use label_map::FlatCell;
 pub use labels::TopicId;
 pub use model::{Inserted, SceneModel};

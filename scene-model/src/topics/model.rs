@@ -6,6 +6,7 @@ use super::cells::Cells;
 use super::config::{ConfigError, SceneConfig};
 use super::gibbs::Workbench;
 use super::grid::coord_of;
+use super::kernel::Kernel;
 use super::label_map::{FlatCell, MapCache};
 use super::labels::Labels;
 use super::schedule::{Mixed, phase_words};
@@ -33,6 +34,7 @@ const TOUCH_SHARE: usize = 4;
 #[derive(Debug)]
 pub struct SceneModel {
     config: SceneConfig,
+    kernel: Kernel,
     cells: Cells,
     labels: Labels,
     bench: Workbench,
@@ -51,9 +53,11 @@ impl SceneModel {
     pub fn new(config: SceneConfig) -> Result<Self, ConfigError> {
         config.check()?;
         let labels = Labels::new(&config);
+        let kernel = Kernel::detect();
         Ok(Self {
             cells: Cells::new(labels.blocks),
-            bench: Workbench::new(labels.blocks),
+            bench: Workbench::new(labels.blocks, kernel),
+            kernel,
             schedule: Mixed::default(),
             chance: Stream::new(config.seed),
             phases: 0,
@@ -68,6 +72,20 @@ impl SceneModel {
     /// The parameters that the model was made with.
     pub fn config(&self) -> &SceneConfig {
         &self.config
+    }
+
+    /// The vector units in use.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
+    /// Uses other vector units, if this machine has them; the labels stay the same bit for bit.
+    pub fn use_kernel(&mut self, kernel: Kernel) -> bool {
+        if kernel.is_available() {
+            self.kernel = kernel;
+            self.bench = Workbench::new(self.labels.blocks, kernel);
+        }
+        self.kernel == kernel
     }
 
     /// Time of the newest observation, seconds; minus infinity before the first.
@@ -106,7 +124,7 @@ impl SceneModel {
         touched.dedup_by_key(|entry| entry.0);
         for &(cell, first) in touched.iter() {
             let phase = self.next_phase();
-            self.bench.resample(&mut self.cells, &self.labels, cell, first, phase);
+            self.bench.resample(&mut self.cells, &self.labels, [(cell, first)], phase);
             self.bench.settle(&mut self.labels);
             self.touch(cell);
         }
@@ -168,11 +186,9 @@ impl SceneModel {
     /// Resamples cells of one colour.
     fn phase(&mut self, cells: &[u32]) -> u64 {
         let phase = self.next_phase();
-        let mut done = 0;
-        for &cell in cells {
-            done += self.bench.resample(&mut self.cells, &self.labels, cell, 0, phase);
-            self.touch(cell);
-        }
+        let list = cells.iter().map(|&cell| (cell, 0));
+        let done = self.bench.resample(&mut self.cells, &self.labels, list, phase);
+        cells.iter().for_each(|&cell| self.touch(cell));
         self.bench.settle(&mut self.labels);
         done
     }
@@ -221,7 +237,7 @@ impl SceneModel {
 
     fn fresh_map(&self) -> MutexGuard<'_, MapCache> {
         let mut map = self.map.lock().unwrap_or_else(PoisonError::into_inner);
-        map.refresh(&self.cells, &self.labels);
+        map.refresh(self.kernel, &self.cells, &self.labels);
         map
     }
 }
