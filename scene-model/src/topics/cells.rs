@@ -1,7 +1,7 @@
 //! The cells of the world, by dense id: words with their labels, label counts, neighbours.
 
 use super::grid::{Coord, NONE, SpatialHash, colour_of, neighbours_of};
-use super::labels::{LANES, Lanes, UNLABELLED, pack};
+use super::labels::{LANES, Lanes, UNLABELLED, label_of, pack};
 
 /// All cells seen so far, in the order of their first observation.
 #[derive(Clone, Debug)]
@@ -93,6 +93,15 @@ impl Cells {
         self.counts.resize(self.counts.len() + self.width(), 0);
         self.neighbours.push(neighbours);
         cell
+    }
+
+    /// Makes a cell of a checkpoint with its labelled words.
+    pub(crate) fn restore(&mut self, coord: Coord, words: &[u32]) {
+        let cell = self.find_or_add(coord);
+        self.total += words.len() as u64;
+        self.words[cell as usize] = words.to_vec();
+        let counts = self.counts_mut(cell);
+        words.iter().for_each(|&packed| counts[label_of(packed) as usize] += 1);
     }
 
     /// Adds a word without a label.

@@ -92,6 +92,25 @@ impl Labels {
         labels
     }
 
+    /// Slots of a checkpoint; the counts are still to come.
+    pub(crate) fn restore(config: &super::SceneConfig, topics: &[Option<TopicId>], next_topic: u32) -> Self {
+        Self { topics: topics.to_vec(), next_topic, ..Self::new(config) }
+    }
+
+    /// Counts labelled words.
+    pub(crate) fn count(&mut self, words: &[u32]) {
+        for &packed in words {
+            let slot = label_of(packed) as usize;
+            self.rows[word_of(packed) as usize * self.blocks + slot / LANES].0[slot % LANES] += 1;
+            self.totals[slot] += 1;
+        }
+    }
+
+    /// Topic of each slot, and the serial number of the next birth.
+    pub(crate) fn topics(&self) -> (&[Option<TopicId>], u32) {
+        (&self.topics, self.next_topic)
+    }
+
     /// Slot that stands for a new label, if there is room for one.
     pub(crate) fn birth_slot(&self) -> Option<u32> {
         self.birth_slot

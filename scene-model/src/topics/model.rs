@@ -3,6 +3,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::cells::Cells;
+use super::checkpoint::Snapshot;
 use super::config::{ConfigError, SceneConfig};
 use super::gibbs::Workbench;
 use super::grid::coord_of;
@@ -67,6 +68,44 @@ impl SceneModel {
             labels,
             config,
         })
+    }
+
+    pub(super) fn snapshot(&self) -> Snapshot {
+        let (topics, next_topic) = self.labels.topics();
+        let cells = (0..self.cells.len() as u32).map(|cell| (self.cells.coord(cell), self.cells.words(cell).to_vec()));
+        Snapshot {
+            config: self.config.clone(),
+            chance: self.chance.clone(),
+            phases: self.phases,
+            next_touch: self.next_touch,
+            last_seen_s: self.last_seen_s,
+            recent: self.schedule.recent().to_vec(),
+            topics: topics.to_vec(),
+            next_topic,
+            cells: cells.collect(),
+        }
+    }
+
+    /// From a snapshot that was checked; every cell is evaluated anew.
+    pub(super) fn restore(snapshot: Snapshot) -> Self {
+        let (cells, labels) = snapshot.rebuild();
+        let kernel = Kernel::detect();
+        let (mut schedule, mut map) = (Mixed::default(), MapCache::default());
+        schedule.just_seen(&snapshot.recent);
+        (0..cells.len() as u32).for_each(|cell| map.touch(cell));
+        Self {
+            bench: Workbench::new(labels.blocks, kernel),
+            kernel,
+            schedule,
+            chance: snapshot.chance,
+            phases: snapshot.phases,
+            next_touch: snapshot.next_touch,
+            last_seen_s: snapshot.last_seen_s,
+            map: Mutex::new(map),
+            config: snapshot.config,
+            cells,
+            labels,
+        }
     }
 
     /// The parameters that the model was made with.

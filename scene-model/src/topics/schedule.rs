@@ -30,6 +30,11 @@ impl Mixed {
         self.recent.extend_from_slice(cells);
     }
 
+    /// The cells that were just observed.
+    pub(crate) fn recent(&self) -> &[u32] {
+        &self.recent
+    }
+
     /// Cells with about `words` words, by checkerboard colour; at least one if there is any.
     pub(crate) fn draw(&mut self, cells: &Cells, words: u64, chance: &mut Stream) -> [Vec<u32>; 2] {
         let mut round = [Vec::new(), Vec::new()];

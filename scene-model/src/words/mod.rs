@@ -67,6 +67,18 @@ impl WordConfig {
     }
 }
 
+/// What an extractor measures words against; keep it with the model, or the words mean something else after a restart.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Measures {
+    config: WordConfig,
+    frames: u32,
+    stretch: Stretch,
+    colour: Colour,
+    context: Context,
+    spread: Spread,
+    texture: [Moments; 3],
+}
+
 /// First id of the `kind`-th vocabulary: colour, context, spread, texture, binary, none.
 fn first_id(kind: usize) -> u32 {
     let sizes = [colour::SIZE, context::SIZE, context::SPREAD_SIZE, texture::SIZE, binary::SIZE];
@@ -98,6 +110,33 @@ impl WordExtractor {
             spread: Spread::default(),
             texture: Texture::default(),
             binary: Binary::default(),
+        }
+    }
+
+    /// An extractor that goes on where another one was.
+    pub fn from_measures(measures: Measures) -> Self {
+        Self {
+            config: measures.config,
+            frames: measures.frames,
+            stretch: measures.stretch,
+            colour: measures.colour,
+            context: measures.context,
+            spread: measures.spread,
+            texture: Texture::with_energy(measures.texture),
+            binary: Binary::default(),
+        }
+    }
+
+    /// What the words are measured against by now.
+    pub fn measures(&self) -> Measures {
+        Measures {
+            config: self.config.clone(),
+            frames: self.frames,
+            stretch: self.stretch.clone(),
+            colour: self.colour.clone(),
+            context: self.context.clone(),
+            spread: self.spread.clone(),
+            texture: self.texture.learnt(),
         }
     }
 
@@ -172,7 +211,7 @@ pub(crate) fn mean_lab(image: &RgbImage, cell_px: f32) -> (usize, usize, Vec<[f3
 }
 
 /// Running mean and variance of one measure.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Moments {
     count: f64,
     sum: f64,
@@ -243,6 +282,16 @@ mod tests {
         let first = extractor.extract(&speckle(160, 120), 20.0);
         extractor.extract(&RgbImage::from_pixel(160, 120, Rgb([200, 10, 10])), 20.0);
         assert_eq!(extractor.extract(&speckle(160, 120), 20.0), first);
+    }
+
+    #[test]
+    fn words_keep_their_meaning_through_a_restart() {
+        let mut extractor = WordExtractor::new(&WordConfig::default());
+        extractor.extract(&speckle(160, 120), 20.0);
+        let bytes = postcard::to_allocvec(&extractor.measures()).unwrap();
+        let mut restarted = WordExtractor::from_measures(postcard::from_bytes(&bytes).unwrap());
+        let next = speckle(200, 100);
+        assert_eq!(restarted.extract(&next, 20.0), extractor.extract(&next, 20.0));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Tone stretch: the 1st to 99th percentile of each channel becomes 0 to 1.
 
 use image::RgbImage;
+use serde::{Deserialize, Serialize};
 
 use super::plane::Plane;
 
@@ -8,7 +9,7 @@ const LOW: f64 = 0.01;
 const HIGH: f64 = 0.99;
 
 /// Channel histograms of the frames learnt from, and the stretch that follows from them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Stretch {
     histograms: [Vec<u64>; 3],
     /// Value at 0 and 1 / range, per channel.
