@@ -140,3 +140,27 @@ proptest! {
         prop_assert_eq!(watched.label_map(), unwatched.label_map());
     }
 }
+
+#[test]
+fn the_number_of_threads_does_not_change_a_label() {
+    let observations: Vec<Observation> = (0..600_000u32)
+        .map(|i| Observation {
+            word: (i * 7 + i / 6000 * 11) % 24,
+            x: f64::from(i % 60),
+            y: f64::from(i / 60 % 60),
+            z: 0.0,
+        })
+        .collect();
+    let run = |threads| {
+        let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 24, ..SceneConfig::default() };
+        let mut model = SceneModel::new(config).unwrap();
+        model.use_threads(threads);
+        model.insert(0.0, &observations);
+        model.sweep(2);
+        model.refine(50_000);
+        model.assert_consistent();
+        (0..model.parts().0.len() as u32).map(|cell| model.parts().0.words(cell).to_vec()).collect::<Vec<_>>()
+    };
+    let alone = run(1);
+    assert!(run(2) == alone && run(3) == alone);
+}

@@ -1,62 +1,114 @@
 //! A phase of the sampler: cells that are no neighbours, against global counts that stand still.
 
 use super::cells::Cells;
-use super::kernel::{Kernel, Moves, Seat};
+use super::kernel::{Job, Kernel, Moves, Seat};
 use super::labels::Labels;
-use crate::random::derive;
 
 /// Cells that are resampled side by side: one word has to wait for the word before it in the same cell only.
 const SEATS: usize = 4;
+/// A thread is not worth its start for fewer words.
+const WORDS_PER_THREAD: usize = 4096;
+
+/// The sampling threads of a model.
+#[derive(Clone, Debug)]
+pub(crate) struct Workshop {
+    benches: Vec<Workbench>,
+}
+
+impl Workshop {
+    pub(crate) fn new(blocks: usize, kernel: Kernel, threads: usize) -> Self {
+        Self { benches: vec![Workbench::new(blocks, kernel); threads.max(1)] }
+    }
+
+    pub(crate) fn threads(&self) -> usize {
+        self.benches.len()
+    }
+
+    /// Resamples the words of cells, each from an index on, and settles all counts.
+    ///
+    /// The cells must be no neighbours of each other: then each one's labels depend on nothing that changes meanwhile,
+    /// and the outcome not on the number of threads. Returns the number of words.
+    pub(crate) fn phase(
+        &mut self,
+        cells: &mut Cells,
+        labels: &mut Labels,
+        list: impl Iterator<Item = (u32, usize)>,
+        phase: u64,
+    ) -> u64 {
+        let mut words = 0;
+        let job = |(cell, first)| {
+            let taken = std::mem::take(cells.words_mut(cell));
+            words += taken.len() - first;
+            Job { cell, first, words: taken }
+        };
+        let mut jobs: Vec<Job> = list.map(job).collect();
+        let threads = (words / WORDS_PER_THREAD).clamp(1, self.benches.len());
+        let share = jobs.len().div_ceil(threads).max(1);
+        let (mine, others) = self.benches.split_at_mut(1);
+        let (all_cells, all_labels) = (&*cells, &*labels);
+        std::thread::scope(|scope| {
+            for bench in others.iter_mut().take(threads - 1) {
+                let part = jobs.split_off(jobs.len().saturating_sub(share));
+                scope.spawn(move || bench.resample(all_cells, all_labels, part, phase));
+            }
+            mine[0].resample(all_cells, all_labels, jobs, phase);
+        });
+        for bench in self.benches.iter_mut().take(threads) {
+            bench.settle(cells, labels);
+        }
+        labels.settle();
+        words as u64
+    }
+}
 
 /// Working memory of one sampling thread.
 #[derive(Clone, Debug)]
-pub(crate) struct Workbench {
+struct Workbench {
     kernel: Kernel,
     seats: Vec<Seat>,
     moves: Moves,
+    finished: Vec<Job>,
+    /// Label counts of the finished cells.
+    counts: Vec<u16>,
 }
 
 impl Workbench {
-    pub(crate) fn new(blocks: usize, kernel: Kernel) -> Self {
-        Self { kernel, seats: vec![Seat::new(blocks); SEATS], moves: Moves::default() }
+    fn new(blocks: usize, kernel: Kernel) -> Self {
+        let seats = vec![Seat::new(blocks); SEATS];
+        Self { kernel, seats, moves: Moves::default(), finished: Vec::new(), counts: Vec::new() }
     }
 
-    /// Resamples the words of cells, each from an index on; the global counts wait for [`Workbench::settle`].
-    ///
-    /// The cells must be no neighbours of each other. Returns the number of words.
-    pub(crate) fn resample(
-        &mut self,
-        cells: &mut Cells,
-        labels: &Labels,
-        list: impl IntoIterator<Item = (u32, usize)>,
-        phase: u64,
-    ) -> u64 {
-        let mut waiting = list.into_iter();
+    fn resample(&mut self, cells: &Cells, labels: &Labels, jobs: Vec<Job>, phase: u64) {
+        let mut waiting = jobs.into_iter();
         let mut taken = 0;
-        let mut done = 0;
         loop {
             while taken < SEATS
-                && let Some((cell, first)) = waiting.next()
+                && let Some(job) = waiting.next()
             {
-                self.seats[taken].take(cells, labels, cell, first, derive(phase, u64::from(cell)));
+                self.seats[taken].take(cells, labels, job, phase);
                 taken += 1;
             }
             let seats = &mut self.seats[..taken];
-            let Some(steps) = seats.iter().map(Seat::rest).min() else { return done };
+            let Some(steps) = seats.iter().map(Seat::rest).min() else { return };
             self.moves.reserve(steps * taken);
             self.kernel.advance(labels, seats, steps, &mut self.moves);
-            done += (steps * taken) as u64;
-            for index in (0..taken).rev().filter(|&index| self.seats[index].rest() == 0).collect::<Vec<_>>() {
-                self.seats[index].give_back(cells, labels);
-                taken -= 1;
-                self.seats.swap(index, taken);
+            for index in (0..taken).rev() {
+                if self.seats[index].rest() == 0 {
+                    self.finished.push(self.seats[index].finish(labels, &mut self.counts));
+                    taken -= 1;
+                    self.seats.swap(index, taken);
+                }
             }
         }
     }
 
-    /// Brings the global counts up to date at the end of a phase.
-    pub(crate) fn settle(&mut self, labels: &mut Labels) {
+    /// Brings the cells and the global counts up to date.
+    fn settle(&mut self, cells: &mut Cells, labels: &mut Labels) {
+        for (job, counts) in self.finished.drain(..).zip(self.counts.chunks_exact(cells.width())) {
+            *cells.words_mut(job.cell) = job.words;
+            cells.counts_mut(job.cell).copy_from_slice(counts);
+        }
+        self.counts.clear();
         labels.relabel(self.moves.take());
-        labels.settle();
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::cells::Cells;
 use super::checkpoint::Snapshot;
 use super::config::{ConfigError, SceneConfig};
-use super::gibbs::Workbench;
+use super::gibbs::Workshop;
 use super::grid::coord_of;
 use super::kernel::Kernel;
 use super::label_map::{FlatCell, MapCache};
@@ -38,7 +38,7 @@ pub struct SceneModel {
     kernel: Kernel,
     cells: Cells,
     labels: Labels,
-    bench: Workbench,
+    workshop: Workshop,
     schedule: Mixed,
     chance: Stream,
     /// Number of phases so far: the key of the next one's random numbers.
@@ -57,7 +57,7 @@ impl SceneModel {
         let kernel = Kernel::detect();
         Ok(Self {
             cells: Cells::new(labels.blocks),
-            bench: Workbench::new(labels.blocks, kernel),
+            workshop: Workshop::new(labels.blocks, kernel, 1),
             kernel,
             schedule: Mixed::default(),
             chance: Stream::new(config.seed),
@@ -94,7 +94,7 @@ impl SceneModel {
         schedule.just_seen(&snapshot.recent);
         (0..cells.len() as u32).for_each(|cell| map.touch(cell));
         Self {
-            bench: Workbench::new(labels.blocks, kernel),
+            workshop: Workshop::new(labels.blocks, kernel, 1),
             kernel,
             schedule,
             chance: snapshot.chance,
@@ -122,9 +122,14 @@ impl SceneModel {
     pub fn use_kernel(&mut self, kernel: Kernel) -> bool {
         if kernel.is_available() {
             self.kernel = kernel;
-            self.bench = Workbench::new(self.labels.blocks, kernel);
+            self.workshop = Workshop::new(self.labels.blocks, kernel, self.workshop.threads());
         }
         self.kernel == kernel
+    }
+
+    /// Samples with so many threads (1 at the start); the labels stay the same bit for bit.
+    pub fn use_threads(&mut self, threads: usize) {
+        self.workshop = Workshop::new(self.labels.blocks, self.kernel, threads);
     }
 
     /// Time of the newest observation, seconds; minus infinity before the first.
@@ -163,8 +168,7 @@ impl SceneModel {
         touched.dedup_by_key(|entry| entry.0);
         for &(cell, first) in touched.iter() {
             let phase = self.next_phase();
-            self.bench.resample(&mut self.cells, &self.labels, [(cell, first)], phase);
-            self.bench.settle(&mut self.labels);
+            self.workshop.phase(&mut self.cells, &mut self.labels, [(cell, first)].into_iter(), phase);
             self.touch(cell);
         }
         if !touched.is_empty() {
@@ -226,9 +230,8 @@ impl SceneModel {
     fn phase(&mut self, cells: &[u32]) -> u64 {
         let phase = self.next_phase();
         let list = cells.iter().map(|&cell| (cell, 0));
-        let done = self.bench.resample(&mut self.cells, &self.labels, list, phase);
+        let done = self.workshop.phase(&mut self.cells, &mut self.labels, list, phase);
         cells.iter().for_each(|&cell| self.touch(cell));
-        self.bench.settle(&mut self.labels);
         done
     }
 

@@ -7,8 +7,8 @@ use super::cells::Cells;
 use crate::random::Stream;
 
 /// Words in a phase: a share of all words, so that a young model is not sampled against stale counts.
-const PHASE_SHARE: u64 = 64;
-const PHASE_WORDS: u64 = 16_384;
+const PHASE_SHARE: u64 = 32;
+const PHASE_WORDS: u64 = 32_768;
 
 /// Most words that a phase may hold.
 pub(crate) fn phase_words(total: u64) -> u64 {

@@ -118,7 +118,7 @@ impl WordExtractor {
         Self {
             config: measures.config,
             frames: measures.frames,
-            stretch: measures.stretch,
+            stretch: measures.stretch.restored(),
             colour: measures.colour,
             context: measures.context,
             spread: measures.spread,

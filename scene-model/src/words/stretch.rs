@@ -23,6 +23,12 @@ impl Default for Stretch {
 }
 
 impl Stretch {
+    /// Makes sure that what was read back has the right shape.
+    pub(crate) fn restored(mut self) -> Self {
+        self.histograms.iter_mut().for_each(|histogram| histogram.resize(256, 0));
+        self
+    }
+
     /// Takes a frame into the estimate.
     pub(crate) fn learn(&mut self, frame: &RgbImage) {
         let [red, green, blue] = &mut self.histograms;

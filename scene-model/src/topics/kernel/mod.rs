@@ -12,7 +12,7 @@ mod seat;
 mod votes;
 
 use super::labels::Labels;
-pub(crate) use seat::{Moves, Seat};
+pub(crate) use seat::{Job, Moves, Seat};
 pub(crate) use votes::Ballot;
 
 /// A word that changed its label.

@@ -1,6 +1,7 @@
 //! A cell on the workbench: its words, how far they are resampled, and the label counts around it.
 
 use super::Move;
+use crate::random::derive;
 use crate::topics::cells::Cells;
 use crate::topics::labels::{LANES, Labels, Lanes};
 
@@ -55,14 +56,15 @@ impl Seat {
         (self.at - self.first) as u64
     }
 
-    /// Takes a cell's words from `first` on onto the bench.
-    pub(crate) fn take(&mut self, cells: &mut Cells, labels: &Labels, cell: u32, first: usize, key: u64) {
-        cells.gather(cell, &mut self.near, &mut self.around);
+    /// Takes a job onto the bench.
+    pub(crate) fn take(&mut self, cells: &Cells, labels: &Labels, job: Job, phase: u64) {
+        cells.gather(job.cell, &mut self.near, &mut self.around);
         for ((here, near), prior) in self.here.iter_mut().zip(&self.near).zip(&labels.prior) {
             here.0 = std::array::from_fn(|lane| near.0[lane] + prior.0[lane]);
         }
-        self.words = std::mem::take(cells.words_mut(cell));
-        (self.cell, self.at, self.first, self.key, self.births) = (cell, first, first, key, 0);
+        self.words = job.words;
+        (self.cell, self.at, self.first, self.births) = (job.cell, job.first, job.first, 0);
+        self.key = derive(phase, u64::from(job.cell));
     }
 
     /// Takes one word's label out of the counts.
@@ -87,20 +89,27 @@ impl Seat {
         self.here[block].0[lane] = self.near[block].0[lane] + labels.prior[block].0[lane];
     }
 
-    /// Puts the words back, with the cell's new label counts.
-    pub(crate) fn give_back(&mut self, cells: &mut Cells, labels: &Labels) {
-        *cells.words_mut(self.cell) = std::mem::take(&mut self.words);
-        self.at = 0;
-        let counts = cells.counts_mut(self.cell);
-        for (counts, (near, around)) in
-            counts.as_chunks_mut::<LANES>().0.iter_mut().zip(self.near.iter().zip(&self.around))
-        {
-            *counts = std::array::from_fn(|lane| (near.0[lane] - around.0[lane]) as i32 as u16);
+    /// Gives the words back; the cell's new label counts are added to `counts`.
+    pub(crate) fn finish(&mut self, labels: &Labels, counts: &mut Vec<u16>) -> Job {
+        let start = counts.len();
+        for (near, around) in self.near.iter().zip(&self.around) {
+            let own: [u16; LANES] = std::array::from_fn(|lane| (near.0[lane] - around.0[lane]) as i32 as u16);
+            counts.extend_from_slice(&own);
         }
         if let Some(birth) = labels.birth_slot() {
-            counts[birth as usize] += self.births;
+            counts[start + birth as usize] += self.births;
         }
+        self.at = 0;
+        Job { cell: self.cell, first: self.first, words: std::mem::take(&mut self.words) }
     }
+}
+
+/// A cell to resample: its words, from `first` on.
+#[derive(Clone, Debug)]
+pub(crate) struct Job {
+    pub(crate) cell: u32,
+    pub(crate) first: usize,
+    pub(crate) words: Vec<u32>,
 }
 
 /// Label changes of a phase, written without branches: what lies past `len` is scrap.
