@@ -1,53 +1,85 @@
-//! Words resampled per second on the synthetic workload.
+//! Words resampled per CPU-second on the synthetic workload, for each kernel, beside a plain re-implementation.
+//!
+//! `cargo bench -p scene-model --bench sampler`. It is its own harness because the figure of interest is a ratio within
+//! one run. CPU time is of the sampling thread (Linux; elsewhere wall time).
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
 
-#[path = "workload/mod.rs"]
+mod plain;
 mod workload;
 
 use std::time::Instant;
 
+use plain::Plain;
 use scene_model::topics::{Kernel, SceneConfig, SceneModel};
 use scene_model::tuning::mutual_information_nats;
+use workload::Workload;
+
+const SWEEPS: u32 = 30;
+const KERNELS: [Kernel; 3] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512];
 
 fn main() {
     let work = workload::workload(1, 100, 100, 1000);
-    for kernel in [Kernel::Portable, Kernel::Avx2, Kernel::Avx512] {
-        for max_labels in [8, 16, 32, 100] {
-            let config =
-                SceneConfig { cell_m: [1.0; 3], vocabulary: work.vocabulary, max_labels, ..SceneConfig::default() };
-            let mut model = SceneModel::new(config).unwrap();
-            if !model.use_kernel(kernel) {
-                continue;
-            }
-            let start = Instant::now();
-            model.insert(0.0, &work.observations);
-            let inserted = start.elapsed().as_secs_f64();
-            let start = cpu_seconds();
-            let words = model.sweep(30);
-            let seconds = cpu_seconds() - start;
-            let start = Instant::now();
-            let map = model.label_map();
-            let map_ms = start.elapsed().as_secs_f64() * 1e3;
-            let start = Instant::now();
-            model.label_map();
-            let map2_ms = start.elapsed().as_secs_f64() * 1e3;
-            let pairs = map.iter().map(|c| (c.topic.0, work.truth[(c.y * work.side + c.x) as usize]));
-            let score = mutual_information_nats(pairs);
-            println!(
-                "{:8} K {max_labels:3}: {:6.1} M words/s, insert {:.0} ms, map {map_ms:.1} ms, again {map2_ms:.2} ms, MI {:.3}, labels {}, perplexity {:.1}",
-                kernel.name(),
-                words as f64 / seconds / 1e6,
-                inserted * 1e3,
-                score.nats,
-                model.labels(),
-                model.perplexity(),
-            );
+    println!("{} words in {} cells, V = {}", work.observations.len(), work.truth.len(), work.vocabulary);
+    println!("M words per CPU-second, {SWEEPS} sweeps, births on (in brackets: times the plain algorithm)");
+    for max_labels in [8, 16, 32, 100] {
+        let plain = plain_rate(&work, max_labels);
+        print!("K {max_labels:3}: plain {plain:4.1}");
+        for kernel in KERNELS.into_iter().filter(|kernel| kernel.is_available()) {
+            let (rate, _) = sampled(&work, max_labels, kernel, 1);
+            print!(", {} {rate:.1} ({:.0} x)", kernel.name(), rate / plain);
         }
+        println!();
     }
+    let wall = |threads| {
+        let start = Instant::now();
+        sampled(&work, 16, Kernel::detect(), threads);
+        start.elapsed().as_secs_f64()
+    };
+    println!("wall time at K 16 with insertion: 1 thread {:.2} s, 2 threads {:.2} s", wall(1), wall(2));
+    quality();
+}
+
+/// Mutual information with the true labels over 8 seeds.
+fn quality() {
+    let mut scores: Vec<f64> = (1..=8)
+        .map(|seed| {
+            let work = workload::workload(seed, 100, 100, 1000);
+            let (_, model) = sampled(&work, 16, Kernel::detect(), 1);
+            let truth = |x: i32, y: i32| work.truth[(y * work.side + x) as usize];
+            let pairs = model.label_map().into_iter().map(|cell| (cell.topic.0, truth(cell.x, cell.y)));
+            mutual_information_nats(pairs).nats / entropy(&work.truth)
+        })
+        .collect();
+    scores.sort_by(f64::total_cmp);
+    println!("MI / entropy of the truth over 8 seeds: median {:.3}, worst {:.3}", scores[4], scores[0]);
+}
+
+fn entropy(labels: &[u32]) -> f64 {
+    mutual_information_nats(labels.iter().map(|&label| (label, label))).nats
+}
+
+fn sampled(work: &Workload, max_labels: u32, kernel: Kernel, threads: usize) -> (f64, SceneModel) {
+    let config = SceneConfig { cell_m: [1.0; 3], vocabulary: work.vocabulary, max_labels, ..SceneConfig::default() };
+    let mut model = SceneModel::new(config).unwrap();
+    model.use_kernel(kernel);
+    model.use_threads(threads);
+    model.insert(0.0, &work.observations);
+    let start = cpu_seconds();
+    let words = model.sweep(SWEEPS);
+    (words as f64 / (cpu_seconds() - start) / 1e6, model)
+}
+
+fn plain_rate(work: &Workload, labels: u32) -> f64 {
+    let mut plain = Plain::new(work, labels as usize);
+    let start = cpu_seconds();
+    let words = plain.sweep();
+    words as f64 / (cpu_seconds() - start) / 1e6
 }
 
 /// CPU time of this thread, seconds.
 fn cpu_seconds() -> f64 {
+    thread_local!(static START: Instant = Instant::now());
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-9
+    let spent = text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map(|ns| ns * 1e-9);
+    spent.unwrap_or_else(|| START.with(|start| start.elapsed()).as_secs_f64())
 }
