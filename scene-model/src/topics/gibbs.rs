@@ -46,13 +46,17 @@ impl Workshop {
         let share = jobs.len().div_ceil(threads).max(1);
         let (mine, others) = self.benches.split_at_mut(1);
         let (all_cells, all_labels) = (&*cells, &*labels);
-        std::thread::scope(|scope| {
-            for bench in others.iter_mut().take(threads - 1) {
-                let part = jobs.split_off(jobs.len().saturating_sub(share));
-                scope.spawn(move || bench.resample(all_cells, all_labels, part, phase));
-            }
-            mine[0].resample(all_cells, all_labels, jobs, phase);
-        });
+        if threads == 1 {
+            mine[0].resample(all_cells, all_labels, std::mem::take(&mut jobs), phase);
+        } else {
+            std::thread::scope(|scope| {
+                for bench in others.iter_mut().take(threads - 1) {
+                    let part = jobs.split_off(jobs.len().saturating_sub(share));
+                    scope.spawn(move || bench.resample(all_cells, all_labels, part, phase));
+                }
+                mine[0].resample(all_cells, all_labels, jobs, phase);
+            });
+        }
         for bench in self.benches.iter_mut().take(threads) {
             bench.settle(cells, labels);
         }

@@ -127,6 +127,21 @@ impl WordExtractor {
         }
     }
 
+    /// Measures learnt from a set of images before a mission, frozen: tones from all of them first, then the rest.
+    ///
+    /// Each image comes with the edge of a cell in its pixels; those that [`WordExtractor::extract`] would refuse are
+    /// passed over.
+    pub fn train(config: &WordConfig, images: &[(RgbImage, f32)]) -> Measures {
+        let mut extractor = Self::new(config);
+        let usable = || images.iter().filter(|(image, cell_px)| is_usable(image, *cell_px));
+        usable().for_each(|(image, _)| extractor.stretch.learn(image));
+        for (image, cell_px) in usable() {
+            extractor.words(image, *cell_px, true);
+        }
+        extractor.frames = u32::MAX;
+        extractor.measures()
+    }
+
     /// What the words are measured against by now.
     pub fn measures(&self) -> Measures {
         Measures {
@@ -150,7 +165,7 @@ impl WordExtractor {
     /// A frame without pixels or a `cell_px` that is not above 0 gives no words. The same frames in the same order give
     /// the same words.
     pub fn extract(&mut self, frame: &RgbImage, cell_px: f32) -> Vec<Word> {
-        if frame.width() == 0 || frame.height() == 0 || cell_px.is_nan() || cell_px <= 0.0 {
+        if !is_usable(frame, cell_px) {
             return Vec::new();
         }
         let learn = self.frames < self.config.warm_up_frames.max(1);
@@ -158,6 +173,10 @@ impl WordExtractor {
         if learn {
             self.stretch.learn(frame);
         }
+        self.words(frame, cell_px, learn)
+    }
+
+    fn words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool) -> Vec<Word> {
         let mut words = Vec::new();
         self.colour_words(frame, cell_px, learn, &mut words);
         self.texture_words(frame, cell_px, learn, &mut words);
@@ -194,6 +213,10 @@ impl WordExtractor {
             self.binary.extract(&levels[1], spacing(cell_px, binary), first_id(4), words);
         }
     }
+}
+
+fn is_usable(frame: &RgbImage, cell_px: f32) -> bool {
+    frame.width() > 0 && frame.height() > 0 && cell_px > 0.0
 }
 
 /// Distance between the words of a kind, pixels.
@@ -292,6 +315,16 @@ mod tests {
         let mut restarted = WordExtractor::from_measures(postcard::from_bytes(&bytes).unwrap());
         let next = speckle(200, 100);
         assert_eq!(restarted.extract(&next, 20.0), extractor.extract(&next, 20.0));
+    }
+
+    #[test]
+    fn trained_measures_stand_still() {
+        let images = [(speckle(100, 80), 20.0), (RgbImage::from_pixel(50, 50, Rgb([200, 9, 9])), 20.0)];
+        let measures = WordExtractor::train(&WordConfig::default(), &images);
+        let mut extractor = WordExtractor::from_measures(measures);
+        let first = extractor.extract(&images[0].0, 20.0);
+        extractor.extract(&images[1].0, 20.0);
+        assert_eq!(extractor.extract(&images[0].0, 20.0), first);
     }
 
     #[test]
