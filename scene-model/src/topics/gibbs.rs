@@ -1,5 +1,7 @@
 //! A phase of the sampler: cells that are no neighbours, against global counts that stand still.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::cells::Cells;
 use super::kernel::{Job, Kernel, Moves, Seat};
 use super::labels::Labels;
@@ -41,20 +43,20 @@ impl Workshop {
             words += taken.len() - first;
             Job { cell, first, words: taken }
         };
-        let mut jobs: Vec<Job> = list.map(job).collect();
+        let jobs: Vec<Job> = list.map(job).collect();
         let threads = (words / WORDS_PER_THREAD).clamp(1, self.benches.len());
-        let share = jobs.len().div_ceil(threads).max(1);
-        let (mine, others) = self.benches.split_at_mut(1);
         let (all_cells, all_labels) = (&*cells, &*labels);
+        let queue = Mutex::new(jobs.into_iter());
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let (mine, others) = self.benches.split_at_mut(1);
         if threads == 1 {
-            mine[0].resample(all_cells, all_labels, std::mem::take(&mut jobs), phase);
+            mine[0].resample(all_cells, all_labels, next, phase);
         } else {
             std::thread::scope(|scope| {
                 for bench in others.iter_mut().take(threads - 1) {
-                    let part = jobs.split_off(jobs.len().saturating_sub(share));
-                    scope.spawn(move || bench.resample(all_cells, all_labels, part, phase));
+                    scope.spawn(|| bench.resample(all_cells, all_labels, next, phase));
                 }
-                mine[0].resample(all_cells, all_labels, jobs, phase);
+                mine[0].resample(all_cells, all_labels, next, phase);
             });
         }
         for bench in self.benches.iter_mut().take(threads) {
@@ -82,12 +84,11 @@ impl Workbench {
         Self { kernel, seats, moves: Moves::default(), finished: Vec::new(), counts: Vec::new() }
     }
 
-    fn resample(&mut self, cells: &Cells, labels: &Labels, jobs: Vec<Job>, phase: u64) {
-        let mut waiting = jobs.into_iter();
+    fn resample(&mut self, cells: &Cells, labels: &Labels, mut next: impl FnMut() -> Option<Job>, phase: u64) {
         let mut taken = 0;
         loop {
             while taken < SEATS
-                && let Some(job) = waiting.next()
+                && let Some(job) = next()
             {
                 self.seats[taken].take(cells, labels, job, phase);
                 taken += 1;
