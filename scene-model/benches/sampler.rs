@@ -4,11 +4,13 @@
 //! one run. CPU time is of the sampling thread (Linux; elsewhere wall time).
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
 
+mod cpu;
 mod plain;
 mod workload;
 
 use std::time::Instant;
 
+use cpu::cpu_seconds;
 use plain::Plain;
 use scene_model::topics::{Kernel, SceneConfig, SceneModel};
 use scene_model::tuning::mutual_information_nats;
@@ -90,12 +92,4 @@ fn plain_rate(work: &Workload, labels: u32) -> f64 {
     let start = cpu_seconds();
     let words = plain.sweep();
     words as f64 / (cpu_seconds() - start) / 1e6
-}
-
-/// CPU time of this thread, seconds.
-fn cpu_seconds() -> f64 {
-    thread_local!(static START: Instant = Instant::now());
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let spent = text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map(|ns| ns * 1e-9);
-    spent.unwrap_or_else(|| START.with(|start| start.elapsed()).as_secs_f64())
 }
