@@ -24,6 +24,7 @@ pub struct Exemplar {
 pub struct ExemplarStore {
     per_label: usize,
     edge_px: u32,
+    apart_m: f64,
     topics: BTreeMap<TopicId, Vec<Exemplar>>,
 }
 
@@ -33,7 +34,12 @@ const MAX_TOPICS: usize = 256;
 impl ExemplarStore {
     /// A store of at most `per_label` patches of `edge_px` x `edge_px` pixels for each of at most 256 topics.
     pub fn new(per_label: usize, edge_px: u32) -> Self {
-        Self { per_label: per_label.max(1), edge_px: edge_px.max(1), topics: BTreeMap::new() }
+        Self { per_label: per_label.max(1), edge_px: edge_px.max(1), apart_m: 0.5, topics: BTreeMap::new() }
+    }
+
+    /// Keeps patches of one topic at least so far apart, metres (default 0.5), so that they are no views of one thing.
+    pub fn with_distance(self, apart_m: f64) -> Self {
+        Self { apart_m, ..self }
     }
 
     /// Offers a patch; it is scaled to the store's size and kept if its score is high enough.
@@ -49,7 +55,13 @@ impl ExemplarStore {
         } else {
             imageops::resize(&patch, edge, edge, imageops::FilterType::Triangle)
         };
+        let apart = self.apart_m;
         let kept = self.topics.entry(topic).or_default();
+        let near = |other: &Exemplar| (other.place.0 - place.0).hypot(other.place.1 - place.1) < apart;
+        if kept.iter().any(|other| near(other) && other.score >= score) {
+            return;
+        }
+        kept.retain(|other| !near(other));
         let rank = kept.partition_point(|other| other.score >= score);
         kept.insert(rank, Exemplar { patch, score, t_s, place });
         kept.truncate(self.per_label);
@@ -89,7 +101,17 @@ mod tests {
     use super::*;
 
     fn offer(store: &mut ExemplarStore, topic: u32, score: f32) {
-        store.offer(TopicId(topic), RgbImage::new(20, 10), score, 1.0, (0.0, 0.0));
+        store.offer(TopicId(topic), RgbImage::new(20, 10), score, 1.0, (f64::from(score) * 100.0, 0.0));
+    }
+
+    #[test]
+    fn of_two_views_of_one_place_the_better_is_kept() {
+        let mut store = ExemplarStore::new(4, 8);
+        for (score, east) in [(0.5, 0.0), (0.4, 0.1), (0.3, 9.0), (0.8, 0.2)] {
+            store.offer(TopicId(1), RgbImage::new(8, 8), score, 1.0, (east, 0.0));
+        }
+        let scores: Vec<f32> = store.all(TopicId(1)).iter().map(|exemplar| exemplar.score).collect();
+        assert_eq!(scores, [0.8, 0.3]);
     }
 
     #[test]

@@ -23,6 +23,15 @@ pub struct PublishedCell {
     pub perplexity: f32,
 }
 
+/// Number of cells of each published label.
+pub fn label_areas(cells: &[PublishedCell]) -> BTreeMap<u8, u32> {
+    let mut areas = BTreeMap::new();
+    for cell in cells {
+        *areas.entry(cell.label).or_default() += 1;
+    }
+    areas
+}
+
 /// Which published id stands for which topic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabelBook {
@@ -171,6 +180,7 @@ mod tests {
         book.publish(&row(&[2, 2, 2, 7]));
         assert_eq!(labels(&book.publish(&row(&[2, 2, 2, 7]))), [2, 2, 2, 1]);
         assert_eq!((book.topic_of(1), book.topic_of(2)), (Some(TopicId(7)), Some(TopicId(2))));
+        assert_eq!(label_areas(&book.publish(&row(&[2, 2, 2, 7]))), BTreeMap::from([(1, 1), (2, 3)]));
         assert_eq!((book.topic_of(0), book.topic_of(3)), (None, None));
     }
 

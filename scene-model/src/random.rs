@@ -25,7 +25,7 @@ pub(crate) fn unit_f32(key: u64, counter: u64) -> f32 {
 }
 
 /// A sequence of values, for code where only the order matters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Stream {
     key: u64,
     counter: u64,

@@ -2,6 +2,7 @@
 
 mod noise;
 mod patches;
+mod sample;
 mod skin;
 
 use image::RgbImage;
@@ -9,6 +10,7 @@ use image::RgbImage;
 use crate::random::derive;
 use noise::Noise;
 use patches::Patches;
+pub use sample::{LabelWorld, sample};
 use skin::Skin;
 
 /// A procedural sea floor with known truth.

@@ -51,7 +51,7 @@ impl Cells {
         &self.words[cell as usize]
     }
 
-    pub(crate) fn words_mut(&mut self, cell: u32) -> &mut [u32] {
+    pub(crate) fn words_mut(&mut self, cell: u32) -> &mut Vec<u32> {
         &mut self.words[cell as usize]
     }
 
@@ -63,6 +63,11 @@ impl Cells {
     pub(crate) fn counts(&self, cell: u32) -> &[u16] {
         let width = self.width();
         &self.counts[cell as usize * width..][..width]
+    }
+
+    pub(crate) fn counts_mut(&mut self, cell: u32) -> &mut [u16] {
+        let width = self.width();
+        &mut self.counts[cell as usize * width..][..width]
     }
 
     pub(crate) fn neighbours(&self, cell: u32) -> &[u32; 6] {
@@ -90,40 +95,31 @@ impl Cells {
         cell
     }
 
+    /// Makes a cell of a checkpoint with its labelled words.
+    pub(crate) fn restore(&mut self, coord: Coord, words: &[u32]) {
+        let cell = self.find_or_add(coord);
+        self.total += words.len() as u64;
+        self.words[cell as usize] = words.to_vec();
+        let counts = self.counts_mut(cell);
+        words.iter().for_each(|&packed| counts[label_of(packed) as usize] += 1);
+    }
+
     /// Adds a word without a label.
     pub(crate) fn push(&mut self, cell: u32, word: u32) {
         self.words[cell as usize].push(pack(word, UNLABELLED));
         self.total += 1;
     }
 
-    /// Label counts of a cell and its neighbours together, into `sum` (one number per slot).
-    pub(crate) fn gather(&self, cell: u32, sum: &mut [Lanes]) {
-        set_counts(sum, self.counts(cell));
+    /// Label counts of a cell's neighbours into `around`, with its own into `near` (one number per slot).
+    pub(crate) fn gather(&self, cell: u32, near: &mut [Lanes], around: &mut [Lanes]) {
+        around.fill(Lanes([0.0; LANES]));
         for &other in self.neighbours(cell) {
             if other != NONE {
-                add_counts(sum, self.counts(other));
+                add_counts(around, self.counts(other));
             }
         }
-    }
-
-    /// Makes the label counts of a cell those of its words.
-    pub(crate) fn recount(&mut self, cell: u32) {
-        let width = self.width();
-        let counts = &mut self.counts[cell as usize * width..][..width];
-        counts.fill(0);
-        for &packed in &self.words[cell as usize] {
-            if let Some(count) = counts.get_mut(label_of(packed) as usize) {
-                *count += 1;
-            }
-        }
-    }
-}
-
-fn set_counts(sum: &mut [Lanes], counts: &[u16]) {
-    for (lanes, counts) in sum.iter_mut().zip(counts.as_chunks::<LANES>().0) {
-        for (lane, &count) in lanes.0.iter_mut().zip(counts) {
-            *lane = f32::from(count);
-        }
+        near.copy_from_slice(around);
+        add_counts(near, self.counts(cell));
     }
 }
 

@@ -69,6 +69,7 @@ pub struct ConfigError {
 
 pub(crate) const MAX_LABELS: u32 = 1024;
 pub(crate) const MAX_VOCABULARY: u32 = 1 << 20;
+const MAX_TABLE: u64 = 1 << 28;
 
 impl SceneConfig {
     /// Says which parameter is out of range, if any.
@@ -83,6 +84,9 @@ impl SceneConfig {
         }
         within("max_labels", self.max_labels, MAX_LABELS, "1 to 1024")?;
         within("vocabulary", self.vocabulary, MAX_VOCABULARY, "1 to 1048576")?;
+        if u64::from(self.vocabulary) * u64::from(self.max_labels) > MAX_TABLE {
+            return Err(refuse("max_labels", self.max_labels, "at most 2^28 / vocabulary (a table of 1 GB)"));
+        }
         within("max_words_per_cell", self.max_words_per_cell, 65_535, "1 to 65535")
     }
 

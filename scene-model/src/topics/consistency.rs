@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::labels::{LANES, label_of, word_of};
-use super::{Birth, SceneConfig, SceneModel};
+use super::{Birth, Kernel, SceneConfig, SceneModel};
 use crate::project::Observation;
 
 #[derive(Clone, Debug)]
@@ -98,6 +98,30 @@ proptest! {
     }
 
     #[test]
+    fn every_kernel_gives_the_same_labels_bit_for_bit(
+        steps in prop::collection::vec(step(), 1..8),
+        max_labels in prop::sample::select(vec![1u32, 8, 16, 17, 32, 40, 100, 112, 150]),
+        gamma in prop::sample::select(vec![1e-4, 1.0]),
+        seed in any::<u64>(),
+    ) {
+        let config = SceneConfig {
+            cell_m: [1.0; 3], gamma, max_labels, vocabulary: 24, seed, ..SceneConfig::default()
+        };
+        let run = |kernel| {
+            let mut model = SceneModel::new(config.clone()).unwrap();
+            assert!(model.use_kernel(kernel));
+            steps.iter().for_each(|step| take(&mut model, step));
+            let cells = model.parts().0;
+            let words: Vec<Vec<u32>> = (0..cells.len() as u32).map(|cell| cells.words(cell).to_vec()).collect();
+            (words, model.label_map())
+        };
+        let portable = run(Kernel::Portable);
+        for kernel in [Kernel::Avx2, Kernel::Avx512].into_iter().filter(|kernel| kernel.is_available()) {
+            prop_assert_eq!(&run(kernel), &portable);
+        }
+    }
+
+    #[test]
     fn an_incremental_map_equals_one_made_afresh(
         steps in prop::collection::vec(step(), 1..8),
         seed in any::<u64>(),
@@ -115,4 +139,28 @@ proptest! {
         unwatched.sweep(1);
         prop_assert_eq!(watched.label_map(), unwatched.label_map());
     }
+}
+
+#[test]
+fn the_number_of_threads_does_not_change_a_label() {
+    let observations: Vec<Observation> = (0..600_000u32)
+        .map(|i| Observation {
+            word: (i * 7 + i / 6000 * 11) % 24,
+            x: f64::from(i % 60),
+            y: f64::from(i / 60 % 60),
+            z: 0.0,
+        })
+        .collect();
+    let run = |threads| {
+        let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 24, ..SceneConfig::default() };
+        let mut model = SceneModel::new(config).unwrap();
+        model.use_threads(threads);
+        model.insert(0.0, &observations);
+        model.sweep(2);
+        model.refine(50_000);
+        model.assert_consistent();
+        (0..model.parts().0.len() as u32).map(|cell| model.parts().0.words(cell).to_vec()).collect::<Vec<_>>()
+    };
+    let alone = run(1);
+    assert!(run(2) == alone && run(3) == alone);
 }

@@ -2,6 +2,7 @@
 
 use super::cells::Cells;
 use super::evaluate::{CellView, Evaluator};
+use super::kernel::Kernel;
 use super::labels::{Labels, TopicId};
 
 /// One cell of the map flattened to two dimensions.
@@ -45,12 +46,12 @@ impl MapCache {
     }
 
     /// Evaluates what is out of date.
-    pub(crate) fn refresh(&mut self, cells: &Cells, labels: &Labels) {
+    pub(crate) fn refresh(&mut self, kernel: Kernel, cells: &Cells, labels: &Labels) {
         self.views.resize(cells.len(), None);
         let mut evaluator = Evaluator::new(labels);
         for cell in self.stale.drain(..) {
             self.is_stale[cell as usize] = false;
-            self.views[cell as usize] = Some(evaluator.view(cells, cell));
+            self.views[cell as usize] = Some(evaluator.view(kernel, cells, cell));
         }
         if self.order.len() < cells.len() {
             self.order.extend(self.order.len() as u32..cells.len() as u32);

@@ -5,6 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::kernel::Move;
+
 /// Label slots come in blocks of this many, whatever the width of the machine's vectors.
 pub(crate) const LANES: usize = 16;
 
@@ -90,6 +92,25 @@ impl Labels {
         labels
     }
 
+    /// Slots of a checkpoint; the counts are still to come.
+    pub(crate) fn restore(config: &super::SceneConfig, topics: &[Option<TopicId>], next_topic: u32) -> Self {
+        Self { topics: topics.to_vec(), next_topic, ..Self::new(config) }
+    }
+
+    /// Counts labelled words.
+    pub(crate) fn count(&mut self, words: &[u32]) {
+        for &packed in words {
+            let slot = label_of(packed) as usize;
+            self.rows[word_of(packed) as usize * self.blocks + slot / LANES].0[slot % LANES] += 1;
+            self.totals[slot] += 1;
+        }
+    }
+
+    /// Topic of each slot, and the serial number of the next birth.
+    pub(crate) fn topics(&self) -> (&[Option<TopicId>], u32) {
+        (&self.topics, self.next_topic)
+    }
+
     /// Slot that stands for a new label, if there is room for one.
     pub(crate) fn birth_slot(&self) -> Option<u32> {
         self.birth_slot
@@ -109,16 +130,25 @@ impl Labels {
         self.topics.get(slot as usize).copied().flatten()
     }
 
-    /// Moves one word from a slot (or none) to another.
-    #[inline]
-    pub(crate) fn relabel(&mut self, word: u32, old: u32, new: u32) {
-        let row = &mut self.rows[word as usize * self.blocks..][..self.blocks];
-        if old != UNLABELLED {
-            row[old as usize / LANES].0[old as usize % LANES] -= 1;
-            self.totals[old as usize] -= 1;
+    /// Takes the label changes of a phase into the counts.
+    ///
+    /// Totals are gathered in four parts, or each change would wait for the one before it.
+    pub(crate) fn relabel(&mut self, moves: &[Move]) {
+        let blocks = self.blocks;
+        let mut gains = vec![[0i32; 4]; self.totals.len()];
+        for (index, change) in moves.iter().enumerate() {
+            let (old, new) = (usize::from(change.old), usize::from(change.new));
+            let row = &mut self.rows[change.word as usize * blocks..][..blocks];
+            if old < gains.len() {
+                row[old / LANES].0[old % LANES] -= 1;
+                gains[old][index % 4] -= 1;
+            }
+            row[new / LANES].0[new % LANES] += 1;
+            gains[new][index % 4] += 1;
         }
-        row[new as usize / LANES].0[new as usize % LANES] += 1;
-        self.totals[new as usize] += 1;
+        for (total, gain) in self.totals.iter_mut().zip(gains) {
+            *total = total.wrapping_add_signed(gain.iter().map(|&part| i64::from(part)).sum());
+        }
     }
 
     /// Gives topics to slots that were born, retires empty ones, and refreshes what the kernel reads.

@@ -9,6 +9,7 @@
 //! nor the number of threads. Births of one phase share one new label.
 
 mod cells;
+mod checkpoint;
 mod config;
 #[cfg(test)]
 mod consistency;
@@ -21,7 +22,9 @@ mod labels;
 mod model;
 mod schedule;
 
+pub use checkpoint::CheckpointError;
 pub use config::{Birth, ConfigError, SceneConfig};
+pub use kernel::Kernel;
 pub use label_map::FlatCell;
 pub use labels::TopicId;
 pub use model::{Inserted, SceneModel};

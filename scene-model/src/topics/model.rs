@@ -3,9 +3,11 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::cells::Cells;
+use super::checkpoint::Snapshot;
 use super::config::{ConfigError, SceneConfig};
-use super::gibbs::Workbench;
+use super::gibbs::Workshop;
 use super::grid::coord_of;
+use super::kernel::Kernel;
 use super::label_map::{FlatCell, MapCache};
 use super::labels::Labels;
 use super::schedule::{Mixed, phase_words};
@@ -33,9 +35,10 @@ const TOUCH_SHARE: usize = 4;
 #[derive(Debug)]
 pub struct SceneModel {
     config: SceneConfig,
+    kernel: Kernel,
     cells: Cells,
     labels: Labels,
-    bench: Workbench,
+    workshop: Workshop,
     schedule: Mixed,
     chance: Stream,
     /// Number of phases so far: the key of the next one's random numbers.
@@ -51,9 +54,11 @@ impl SceneModel {
     pub fn new(config: SceneConfig) -> Result<Self, ConfigError> {
         config.check()?;
         let labels = Labels::new(&config);
+        let kernel = Kernel::detect();
         Ok(Self {
             cells: Cells::new(labels.blocks),
-            bench: Workbench::new(labels.blocks),
+            workshop: Workshop::new(labels.blocks, kernel, 1),
+            kernel,
             schedule: Mixed::default(),
             chance: Stream::new(config.seed),
             phases: 0,
@@ -65,9 +70,66 @@ impl SceneModel {
         })
     }
 
+    pub(super) fn snapshot(&self) -> Snapshot {
+        let (topics, next_topic) = self.labels.topics();
+        let cells = (0..self.cells.len() as u32).map(|cell| (self.cells.coord(cell), self.cells.words(cell).to_vec()));
+        Snapshot {
+            config: self.config.clone(),
+            chance: self.chance.clone(),
+            phases: self.phases,
+            next_touch: self.next_touch,
+            last_seen_s: self.last_seen_s,
+            recent: self.schedule.recent().to_vec(),
+            topics: topics.to_vec(),
+            next_topic,
+            cells: cells.collect(),
+        }
+    }
+
+    /// From a snapshot that was checked; every cell is evaluated anew.
+    pub(super) fn restore(snapshot: Snapshot) -> Self {
+        let (cells, labels) = snapshot.rebuild();
+        let kernel = Kernel::detect();
+        let (mut schedule, mut map) = (Mixed::default(), MapCache::default());
+        schedule.just_seen(&snapshot.recent);
+        (0..cells.len() as u32).for_each(|cell| map.touch(cell));
+        Self {
+            workshop: Workshop::new(labels.blocks, kernel, 1),
+            kernel,
+            schedule,
+            chance: snapshot.chance,
+            phases: snapshot.phases,
+            next_touch: snapshot.next_touch,
+            last_seen_s: snapshot.last_seen_s,
+            map: Mutex::new(map),
+            config: snapshot.config,
+            cells,
+            labels,
+        }
+    }
+
     /// The parameters that the model was made with.
     pub fn config(&self) -> &SceneConfig {
         &self.config
+    }
+
+    /// The vector units in use.
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
+    /// Uses other vector units, if this machine has them; the labels stay the same bit for bit.
+    pub fn use_kernel(&mut self, kernel: Kernel) -> bool {
+        if kernel.is_available() {
+            self.kernel = kernel;
+            self.workshop = Workshop::new(self.labels.blocks, kernel, self.workshop.threads());
+        }
+        self.kernel == kernel
+    }
+
+    /// Samples with so many threads (1 at the start); the labels stay the same bit for bit.
+    pub fn use_threads(&mut self, threads: usize) {
+        self.workshop = Workshop::new(self.labels.blocks, self.kernel, threads);
     }
 
     /// Time of the newest observation, seconds; minus infinity before the first.
@@ -106,8 +168,7 @@ impl SceneModel {
         touched.dedup_by_key(|entry| entry.0);
         for &(cell, first) in touched.iter() {
             let phase = self.next_phase();
-            self.bench.resample(&mut self.cells, &self.labels, cell, first, phase);
-            self.bench.settle(&mut self.labels);
+            self.workshop.phase(&mut self.cells, &mut self.labels, [(cell, first)].into_iter(), phase);
             self.touch(cell);
         }
         if !touched.is_empty() {
@@ -168,12 +229,9 @@ impl SceneModel {
     /// Resamples cells of one colour.
     fn phase(&mut self, cells: &[u32]) -> u64 {
         let phase = self.next_phase();
-        let mut done = 0;
-        for &cell in cells {
-            done += self.bench.resample(&mut self.cells, &self.labels, cell, 0, phase);
-            self.touch(cell);
-        }
-        self.bench.settle(&mut self.labels);
+        let list = cells.iter().map(|&cell| (cell, 0));
+        let done = self.workshop.phase(&mut self.cells, &mut self.labels, list, phase);
+        cells.iter().for_each(|&cell| self.touch(cell));
         done
     }
 
@@ -221,7 +279,7 @@ impl SceneModel {
 
     fn fresh_map(&self) -> MutexGuard<'_, MapCache> {
         let mut map = self.map.lock().unwrap_or_else(PoisonError::into_inner);
-        map.refresh(&self.cells, &self.labels);
+        map.refresh(self.kernel, &self.cells, &self.labels);
         map
     }
 }

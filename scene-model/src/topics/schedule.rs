@@ -7,8 +7,8 @@ use super::cells::Cells;
 use crate::random::Stream;
 
 /// Words in a phase: a share of all words, so that a young model is not sampled against stale counts.
-const PHASE_SHARE: u64 = 64;
-const PHASE_WORDS: u64 = 16_384;
+const PHASE_SHARE: u64 = 32;
+const PHASE_WORDS: u64 = 32_768;
 
 /// Most words that a phase may hold.
 pub(crate) fn phase_words(total: u64) -> u64 {
@@ -28,6 +28,11 @@ impl Mixed {
     pub(crate) fn just_seen(&mut self, cells: &[u32]) {
         self.recent.clear();
         self.recent.extend_from_slice(cells);
+    }
+
+    /// The cells that were just observed.
+    pub(crate) fn recent(&self) -> &[u32] {
+        &self.recent
     }
 
     /// Cells with about `words` words, by checkerboard colour; at least one if there is any.

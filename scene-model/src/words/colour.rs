@@ -1,5 +1,7 @@
 //! Colour words: z-scored CIE Lab on an 8 x 8 x 8 lattice.
 
+use serde::{Deserialize, Serialize};
+
 use super::field::Field;
 use super::{Moments, Word};
 
@@ -11,7 +13,7 @@ const REACH: f32 = 2.0;
 pub(crate) const SIZE: u32 = LEVELS * LEVELS * LEVELS;
 
 /// Mean and spread of L, a and b in the frames learnt from.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Colour {
     lab: [Moments; 3],
 }

@@ -3,6 +3,8 @@
 //! Fine colour words say what a point looks like, these say what it is part of; on real reefs they lift the map more
 //! than any finer vocabulary did (README).
 
+use serde::{Deserialize, Serialize};
+
 use super::colour::level;
 use super::field::Field;
 use super::texture::sextile;
@@ -21,7 +23,7 @@ pub(crate) const SIZE: u32 = COLOUR_LEVELS * COLOUR_LEVELS * COLOUR_LEVELS * CON
 pub(crate) const SPREAD_SIZE: u32 = 216;
 
 /// Mean L, a, b and the logarithm of the spread of L, around each point.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Context {
     measures: [Moments; 4],
 }
@@ -48,7 +50,7 @@ impl Context {
 }
 
 /// Logarithms of the spreads of L, a and b, around each point.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Spread {
     measures: [Moments; 3],
 }

@@ -67,6 +67,18 @@ impl WordConfig {
     }
 }
 
+/// What an extractor measures words against; keep it with the model, or the words mean something else after a restart.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Measures {
+    config: WordConfig,
+    frames: u32,
+    stretch: Stretch,
+    colour: Colour,
+    context: Context,
+    spread: Spread,
+    texture: [Moments; 3],
+}
+
 /// First id of the `kind`-th vocabulary: colour, context, spread, texture, binary, none.
 fn first_id(kind: usize) -> u32 {
     let sizes = [colour::SIZE, context::SIZE, context::SPREAD_SIZE, texture::SIZE, binary::SIZE];
@@ -101,6 +113,48 @@ impl WordExtractor {
         }
     }
 
+    /// An extractor that goes on where another one was.
+    pub fn from_measures(measures: Measures) -> Self {
+        Self {
+            config: measures.config,
+            frames: measures.frames,
+            stretch: measures.stretch.restored(),
+            colour: measures.colour,
+            context: measures.context,
+            spread: measures.spread,
+            texture: Texture::with_energy(measures.texture),
+            binary: Binary::default(),
+        }
+    }
+
+    /// Measures learnt from a set of images before a mission, frozen: tones from all of them first, then the rest.
+    ///
+    /// Each image comes with the edge of a cell in its pixels; those that [`WordExtractor::extract`] would refuse are
+    /// passed over.
+    pub fn train(config: &WordConfig, images: &[(RgbImage, f32)]) -> Measures {
+        let mut extractor = Self::new(config);
+        let usable = || images.iter().filter(|(image, cell_px)| is_usable(image, *cell_px));
+        usable().for_each(|(image, _)| extractor.stretch.learn(image));
+        for (image, cell_px) in usable() {
+            extractor.words(image, *cell_px, true);
+        }
+        extractor.frames = u32::MAX;
+        extractor.measures()
+    }
+
+    /// What the words are measured against by now.
+    pub fn measures(&self) -> Measures {
+        Measures {
+            config: self.config.clone(),
+            frames: self.frames,
+            stretch: self.stretch.clone(),
+            colour: self.colour.clone(),
+            context: self.context.clone(),
+            spread: self.spread.clone(),
+            texture: self.texture.learnt(),
+        }
+    }
+
     /// Number of different words.
     pub fn vocabulary_size(&self) -> u32 {
         self.config.vocabulary_size()
@@ -111,7 +165,7 @@ impl WordExtractor {
     /// A frame without pixels or a `cell_px` that is not above 0 gives no words. The same frames in the same order give
     /// the same words.
     pub fn extract(&mut self, frame: &RgbImage, cell_px: f32) -> Vec<Word> {
-        if frame.width() == 0 || frame.height() == 0 || cell_px.is_nan() || cell_px <= 0.0 {
+        if !is_usable(frame, cell_px) {
             return Vec::new();
         }
         let learn = self.frames < self.config.warm_up_frames.max(1);
@@ -119,6 +173,10 @@ impl WordExtractor {
         if learn {
             self.stretch.learn(frame);
         }
+        self.words(frame, cell_px, learn)
+    }
+
+    fn words(&mut self, frame: &RgbImage, cell_px: f32, learn: bool) -> Vec<Word> {
         let mut words = Vec::new();
         self.colour_words(frame, cell_px, learn, &mut words);
         self.texture_words(frame, cell_px, learn, &mut words);
@@ -157,6 +215,10 @@ impl WordExtractor {
     }
 }
 
+fn is_usable(frame: &RgbImage, cell_px: f32) -> bool {
+    frame.width() > 0 && frame.height() > 0 && cell_px > 0.0
+}
+
 /// Distance between the words of a kind, pixels.
 fn spacing(cell_px: f32, per_cell: u32) -> f32 {
     cell_px / (per_cell as f32).sqrt()
@@ -172,7 +234,7 @@ pub(crate) fn mean_lab(image: &RgbImage, cell_px: f32) -> (usize, usize, Vec<[f3
 }
 
 /// Running mean and variance of one measure.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Moments {
     count: f64,
     sum: f64,
@@ -243,6 +305,26 @@ mod tests {
         let first = extractor.extract(&speckle(160, 120), 20.0);
         extractor.extract(&RgbImage::from_pixel(160, 120, Rgb([200, 10, 10])), 20.0);
         assert_eq!(extractor.extract(&speckle(160, 120), 20.0), first);
+    }
+
+    #[test]
+    fn words_keep_their_meaning_through_a_restart() {
+        let mut extractor = WordExtractor::new(&WordConfig::default());
+        extractor.extract(&speckle(160, 120), 20.0);
+        let bytes = postcard::to_allocvec(&extractor.measures()).unwrap();
+        let mut restarted = WordExtractor::from_measures(postcard::from_bytes(&bytes).unwrap());
+        let next = speckle(200, 100);
+        assert_eq!(restarted.extract(&next, 20.0), extractor.extract(&next, 20.0));
+    }
+
+    #[test]
+    fn trained_measures_stand_still() {
+        let images = [(speckle(100, 80), 20.0), (RgbImage::from_pixel(50, 50, Rgb([200, 9, 9])), 20.0)];
+        let measures = WordExtractor::train(&WordConfig::default(), &images);
+        let mut extractor = WordExtractor::from_measures(measures);
+        let first = extractor.extract(&images[0].0, 20.0);
+        extractor.extract(&images[1].0, 20.0);
+        assert_eq!(extractor.extract(&images[0].0, 20.0), first);
     }
 
     #[test]

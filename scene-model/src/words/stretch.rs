@@ -1,6 +1,7 @@
 //! Tone stretch: the 1st to 99th percentile of each channel becomes 0 to 1.
 
 use image::RgbImage;
+use serde::{Deserialize, Serialize};
 
 use super::plane::Plane;
 
@@ -8,7 +9,7 @@ const LOW: f64 = 0.01;
 const HIGH: f64 = 0.99;
 
 /// Channel histograms of the frames learnt from, and the stretch that follows from them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Stretch {
     histograms: [Vec<u64>; 3],
     /// Value at 0 and 1 / range, per channel.
@@ -22,6 +23,12 @@ impl Default for Stretch {
 }
 
 impl Stretch {
+    /// Makes sure that what was read back has the right shape.
+    pub(crate) fn restored(mut self) -> Self {
+        self.histograms.iter_mut().for_each(|histogram| histogram.resize(256, 0));
+        self
+    }
+
     /// Takes a frame into the estimate.
     pub(crate) fn learn(&mut self, frame: &RgbImage) {
         let [red, green, blue] = &mut self.histograms;

@@ -32,6 +32,16 @@ impl Default for Texture {
 }
 
 impl Texture {
+    /// A filter bank with what was learnt before.
+    pub(crate) fn with_energy(energy: [Moments; SCALES]) -> Self {
+        Self { energy, ..Self::default() }
+    }
+
+    /// Log energy at each scale in the frames learnt from.
+    pub(crate) fn learnt(&self) -> [Moments; SCALES] {
+        self.energy
+    }
+
     /// One word for each position of a grid of `spacing` pixels.
     pub(crate) fn extract(
         &mut self,

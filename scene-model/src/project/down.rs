@@ -1,5 +1,6 @@
-//! From pixels to the world: where on the sea floor a visual word lies.
+//! The camera of a survey vehicle: straight down on flat ground.
 
+use super::Observation;
 use crate::words::Word;
 
 /// Where the camera is: local ENU metres (x east, y north, z up) and heading.
@@ -16,19 +17,6 @@ pub struct Pose {
     pub z: f64,
     /// Radians, counter-clockwise from north.
     pub yaw_rad: f64,
-}
-
-/// A visual word in the world: local ENU metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observation {
-    /// Word id, below the vocabulary size.
-    pub word: u32,
-    /// East, metres.
-    pub x: f64,
-    /// North, metres.
-    pub y: f64,
-    /// Up, metres.
-    pub z: f64,
 }
 
 /// A camera that looks straight down on flat ground at a known altitude.

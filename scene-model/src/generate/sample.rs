@@ -1,0 +1,140 @@
+//! Random worlds of the spatial CRP itself, as the paper's figure shows them.
+
+use crate::random::Stream;
+
+/// A world of labels drawn from the prior: one customer in each cell's restaurant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LabelWorld {
+    /// Cells across.
+    pub columns: usize,
+    /// Cells down.
+    pub rows: usize,
+    /// Label of each cell, row by row, numbered from 0 in the order of birth.
+    pub labels: Vec<u32>,
+}
+
+/// Draws a world of `columns` x `rows` cells with `customers` words in each.
+///
+/// Cells come in as an explorer would see them, each next to one that is there. Each word sits down at label k with weight n_k + `alpha`, where n_k counts the label in the cell and its Von Neumann
+/// neighbours, or at a new one with weight `gamma`; the cell shows the label that most of its words have (ties to the
+/// oldest). Both weights are at or above 0.
+pub fn sample(seed: u64, columns: usize, rows: usize, alpha: f64, gamma: f64, customers: u32) -> LabelWorld {
+    let mut chance = Stream::new(seed);
+    let mut tables: Vec<Vec<(u32, u32)>> = vec![Vec::new(); columns * rows];
+    let mut room = Room { alpha, gamma, words: Vec::new() };
+    for cell in growth(columns, rows, &mut chance) {
+        let mut near: Vec<(u32, u32)> = Vec::new();
+        for &(label, words) in neighbours(cell, columns, rows).flat_map(|other| &tables[other]) {
+            count(&mut near, label, words);
+        }
+        for _ in 0..customers.max(1) {
+            let label = room.sit_down(&near, &mut chance);
+            count(&mut near, label, 1);
+            count(&mut tables[cell], label, 1);
+        }
+    }
+    let shown = |table: &Vec<(u32, u32)>| {
+        table.iter().max_by_key(|(label, words)| (*words, std::cmp::Reverse(*label))).map_or(0, |most| most.0)
+    };
+    LabelWorld { columns, rows, labels: tables.iter().map(shown).collect() }
+}
+
+/// All cells in random order, each but the first next to an earlier one.
+fn growth(columns: usize, rows: usize, chance: &mut Stream) -> Vec<usize> {
+    let mut reached = vec![false; columns * rows];
+    let mut edge = Vec::new();
+    let mut order = Vec::with_capacity(columns * rows);
+    if !reached.is_empty() {
+        edge.push(chance.below(columns * rows));
+        reached[edge[0]] = true;
+    }
+    while !edge.is_empty() {
+        let cell = edge.swap_remove(chance.below(edge.len()));
+        order.push(cell);
+        for other in neighbours(cell, columns, rows) {
+            if !std::mem::replace(&mut reached[other], true) {
+                edge.push(other);
+            }
+        }
+    }
+    order
+}
+
+/// All labels of the world.
+struct Room {
+    alpha: f64,
+    gamma: f64,
+    /// Words of each label.
+    words: Vec<u32>,
+}
+
+impl Room {
+    fn sit_down(&mut self, near: &[(u32, u32)], chance: &mut Stream) -> u32 {
+        let occupied: u32 = near.iter().map(|entry| entry.1).sum();
+        let elsewhere = self.alpha * self.words.len() as f64;
+        let mut aim = chance.unit() * (f64::from(occupied) + elsewhere + self.gamma);
+        for &(label, words) in near {
+            aim -= f64::from(words);
+            if aim < 0.0 {
+                return self.seat(label);
+            }
+        }
+        let index = if self.alpha > 0.0 { (aim / self.alpha) as usize } else { usize::MAX };
+        self.seat(index.min(self.words.len()) as u32)
+    }
+
+    fn seat(&mut self, label: u32) -> u32 {
+        if label as usize == self.words.len() {
+            self.words.push(0);
+        }
+        self.words[label as usize] += 1;
+        label
+    }
+}
+
+fn neighbours(cell: usize, columns: usize, rows: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (cell % columns, cell / columns);
+    let places = [
+        (x > 0).then(|| cell - 1),
+        (x + 1 < columns).then(|| cell + 1),
+        (y > 0).then(|| cell - columns),
+        (y + 1 < rows).then(|| cell + columns),
+    ];
+    places.into_iter().flatten()
+}
+
+fn count(table: &mut Vec<(u32, u32)>, label: u32, words: u32) {
+    match table.iter_mut().find(|entry| entry.0 == label) {
+        Some(entry) => entry.1 += words,
+        None => table.push((label, words)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(alpha: f64, gamma: f64) -> usize {
+        let world = sample(3, 40, 40, alpha, gamma, 8);
+        world.labels.iter().collect::<std::collections::BTreeSet<_>>().len()
+    }
+
+    #[test]
+    fn gamma_sets_the_number_of_labels() {
+        assert!(labels(1e-4, 1e-3) < labels(1e-4, 0.1));
+        assert!(labels(1e-4, 0.1) < labels(1e-4, 2.0));
+    }
+
+    #[test]
+    fn neighbours_often_share_a_label() {
+        let world = sample(1, 50, 50, 1e-4, 0.01, 8);
+        let same = (0..50 * 49).filter(|&i| world.labels[i] == world.labels[i + 50]).count();
+        assert!(same > 50 * 49 * 2 / 3, "{same}");
+        assert_eq!(sample(1, 50, 50, 1e-4, 0.01, 8), world);
+    }
+
+    #[test]
+    fn an_empty_world_has_no_labels() {
+        assert!(sample(1, 0, 5, 0.1, 0.1, 1).labels.is_empty());
+    }
+}

@@ -1,0 +1,143 @@
+//! Algorithm 1 of the paper: words of an RGB-D image, back-projected and turned into the world.
+
+use super::Observation;
+use crate::words::Word;
+
+/// Intrinsics of a pinhole camera, pixels: x to the right, y down, z ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PinholeCamera {
+    /// Focal length across.
+    pub fx: f64,
+    /// Focal length down.
+    pub fy: f64,
+    /// Column of the optical axis.
+    pub cx: f64,
+    /// Row of the optical axis.
+    pub cy: f64,
+}
+
+/// Camera-to-world transform: a unit quaternion and a position.
+///
+/// A camera that looks straight down with the top of its image to the north has the quaternion (1, 0, 0, 0) in the
+/// order x, y, z, w: half a turn about east.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraPose {
+    /// Position of the camera: local ENU, metres.
+    pub position: [f64; 3],
+    /// Rotation as x, y, z, w (the order of the TUM RGB-D files); any length above 0 will do.
+    pub rotation: [f64; 4],
+}
+
+/// Distance along the optical axis of each pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthImage {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Metres, row by row from the top; 0, negative or not a number where there is no reading.
+    pub metres: Vec<f32>,
+}
+
+/// Words in the world, and how many had no depth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Projected {
+    /// Words with a position.
+    pub observations: Vec<Observation>,
+    /// Words without a depth reading under them, skipped.
+    pub without_depth: u64,
+}
+
+impl PinholeCamera {
+    /// Puts the words of a frame into the world by the depth under each; the depth image may have another size.
+    pub fn project(&self, size: (u32, u32), depth: &DepthImage, pose: &CameraPose, words: &[Word]) -> Projected {
+        let mut projected = Projected::default();
+        for word in words {
+            match depth.at(word.u / size.0 as f32, word.v / size.1 as f32) {
+                Some(metres) => projected.observations.push(self.place(word, metres, pose)),
+                None => projected.without_depth += 1,
+            }
+        }
+        projected
+    }
+
+    /// Puts the words of a frame onto a plane at a constant distance along the optical axis, metres.
+    pub fn project_flat(&self, metres: f64, pose: &CameraPose, words: &[Word]) -> Vec<Observation> {
+        words.iter().map(|word| self.place(word, metres, pose)).collect()
+    }
+
+    fn place(&self, word: &Word, metres: f64, pose: &CameraPose) -> Observation {
+        let right = (f64::from(word.u) - self.cx) / self.fx * metres;
+        let down = (f64::from(word.v) - self.cy) / self.fy * metres;
+        let [x, y, z] = pose.to_world([right, down, metres]);
+        Observation { word: word.id, x, y, z }
+    }
+}
+
+impl CameraPose {
+    /// A point of the camera's frame in the world.
+    pub fn to_world(&self, point: [f64; 3]) -> [f64; 3] {
+        let [x, y, z, w] = self.rotation;
+        let scale = 2.0 / (x * x + y * y + z * z + w * w);
+        let rows = [
+            [1.0 - scale * (y * y + z * z), scale * (x * y - z * w), scale * (x * z + y * w)],
+            [scale * (x * y + z * w), 1.0 - scale * (x * x + z * z), scale * (y * z - x * w)],
+            [scale * (x * z - y * w), scale * (y * z + x * w), 1.0 - scale * (x * x + y * y)],
+        ];
+        std::array::from_fn(|i| {
+            self.position[i] + rows[i][0] * point[0] + rows[i][1] * point[1] + rows[i][2] * point[2]
+        })
+    }
+}
+
+impl DepthImage {
+    /// The reading at a place given as shares of width and height.
+    fn at(&self, across: f32, down: f32) -> Option<f64> {
+        if !(0.0..1.0).contains(&across) || !(0.0..1.0).contains(&down) {
+            return None;
+        }
+        let column = (across * self.width as f32) as usize;
+        let row = (down * self.height as f32) as usize;
+        let metres = *self.metres.get(row * self.width as usize + column)?;
+        (metres.is_finite() && metres > 0.0).then_some(f64::from(metres))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: PinholeCamera = PinholeCamera { fx: 100.0, fy: 100.0, cx: 50.0, cy: 40.0 };
+    const DOWN: CameraPose = CameraPose { position: [10.0, 20.0, -5.0], rotation: [1.0, 0.0, 0.0, 0.0] };
+
+    fn word(u: f32, v: f32) -> Word {
+        Word { id: 3, u, v }
+    }
+
+    #[test]
+    fn a_camera_that_looks_down_sees_the_ground_below_it() {
+        let seen = CAMERA.project_flat(2.0, &DOWN, &[word(50.0, 40.0), word(100.0, 0.0)]);
+        assert_eq!((seen[0].x, seen[0].y, seen[0].z), (10.0, 20.0, -7.0));
+        assert_eq!((seen[1].x, seen[1].y, seen[1].z), (11.0, 20.8, -7.0));
+    }
+
+    #[test]
+    fn words_without_depth_are_counted_and_skipped() {
+        let metres = vec![0.0, f32::NAN, -1.0, 4.0];
+        let depth = DepthImage { width: 2, height: 2, metres };
+        let words = [word(10.0, 10.0), word(60.0, 10.0), word(10.0, 70.0), word(60.0, 70.0), word(-1.0, 5.0)];
+        let projected = CAMERA.project((100, 80), &depth, &DOWN, &words);
+        assert_eq!(projected.without_depth, 4);
+        assert_eq!(projected.observations.len(), 1);
+        assert!((projected.observations[0].z + 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn both_cameras_agree_on_flat_ground() {
+        let pose = super::super::Pose { x: 10.0, y: 20.0, z: -5.0, yaw_rad: 0.0 };
+        let camera = super::super::DownCamera { metres_per_pixel: 0.02, altitude_m: 2.0 };
+        let words = [word(13.0, 70.0)];
+        let (a, b) = (camera.project(100, 80, &pose, &words)[0], CAMERA.project_flat(2.0, &DOWN, &words)[0]);
+        assert!((a.x - b.x).abs() < 1e-9 && (a.y - b.y).abs() < 1e-9 && (a.z - b.z).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,234 @@
+//! A model as bytes: everything that cannot be derived, with a version and a CRC.
+//!
+//! ```text
+//!  0        8         12         20                     20 + n    24 + n
+//!  | magic  | version | length n | snapshot (postcard)  | CRC-32  |
+//! ```
+//! All numbers are little-endian; the CRC (ISO HDLC) covers everything before it. Counts, neighbours and the kernel's
+//! vectors are derived on loading.
+
+use serde::{Deserialize, Serialize};
+
+use super::cells::Cells;
+use super::config::{ConfigError, SceneConfig};
+use super::grid::Coord;
+use super::labels::{Labels, TopicId, label_of, word_of};
+use super::model::SceneModel;
+use crate::random::Stream;
+
+const MAGIC: [u8; 8] = *b"SCNMODEL";
+const VERSION: u32 = 1;
+const HEADER: usize = 20;
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// Why bytes are no checkpoint that this program can go on from.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CheckpointError {
+    /// The bytes do not begin as a checkpoint does.
+    #[error("not a scene model checkpoint")]
+    Foreign,
+    /// The checkpoint is of another version.
+    #[error("checkpoint version {found}, this program reads version {VERSION}")]
+    Version {
+        /// Version of the checkpoint.
+        found: u32,
+    },
+    /// The length or the checksum is wrong: cut off or damaged.
+    #[error("checkpoint is cut off or damaged")]
+    Damaged,
+    /// The checksum is right but the content cannot be.
+    #[error("checkpoint content is inconsistent: {0}")]
+    Inconsistent(&'static str),
+    /// A parameter is out of its range.
+    #[error("checkpoint parameter {0}")]
+    Config(#[from] ConfigError),
+}
+
+/// What a checkpoint holds.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Snapshot {
+    pub(super) config: SceneConfig,
+    pub(super) chance: Stream,
+    pub(super) phases: u64,
+    pub(super) next_touch: u32,
+    pub(super) last_seen_s: f64,
+    pub(super) recent: Vec<u32>,
+    pub(super) topics: Vec<Option<TopicId>>,
+    pub(super) next_topic: u32,
+    /// Coordinates and packed words of each cell.
+    pub(super) cells: Vec<(Coord, Vec<u32>)>,
+}
+
+impl SceneModel {
+    /// The whole state as bytes, for [`SceneModel::load`].
+    pub fn save(&self) -> Vec<u8> {
+        let content = postcard::to_allocvec(&self.snapshot()).unwrap_or_default();
+        let mut bytes = Vec::with_capacity(HEADER + content.len() + 4);
+        bytes.extend(MAGIC);
+        bytes.extend(VERSION.to_le_bytes());
+        bytes.extend((content.len() as u64).to_le_bytes());
+        bytes.extend(content);
+        bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+        bytes
+    }
+
+    /// A model that goes on exactly where the saved one was: same labels, same topics, same random numbers.
+    pub fn load(bytes: &[u8]) -> Result<Self, CheckpointError> {
+        let content = unwrap(bytes)?;
+        let snapshot: Snapshot =
+            postcard::from_bytes(content).map_err(|_| CheckpointError::Inconsistent("fields do not parse"))?;
+        snapshot.config.check()?;
+        snapshot.check()?;
+        Ok(Self::restore(snapshot))
+    }
+}
+
+fn unwrap(bytes: &[u8]) -> Result<&[u8], CheckpointError> {
+    let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointError::Foreign)?;
+    let (version, rest) = rest.split_first_chunk::<4>().ok_or(CheckpointError::Damaged)?;
+    let found = u32::from_le_bytes(*version);
+    if found != VERSION {
+        return Err(CheckpointError::Version { found });
+    }
+    let (length, rest) = rest.split_first_chunk::<8>().ok_or(CheckpointError::Damaged)?;
+    let (content, sum) = rest.split_last_chunk::<4>().ok_or(CheckpointError::Damaged)?;
+    let covered = &bytes[..bytes.len() - sum.len()];
+    if u64::from_le_bytes(*length) != content.len() as u64 || u32::from_le_bytes(*sum) != CRC.checksum(covered) {
+        return Err(CheckpointError::Damaged);
+    }
+    Ok(content)
+}
+
+impl Snapshot {
+    fn check(&self) -> Result<(), CheckpointError> {
+        let fail = |what| Err(CheckpointError::Inconsistent(what));
+        if self.topics.len() != self.config.max_labels as usize {
+            return fail("number of label slots");
+        }
+        if self.topics.iter().flatten().any(|topic| topic.0 >= self.next_topic) {
+            return fail("a topic that was not born yet");
+        }
+        let mut used = vec![false; self.topics.len()];
+        for (coord, words) in &self.cells {
+            if words.is_empty() || words.len() > self.config.max_words_per_cell as usize {
+                return fail("number of words in a cell");
+            }
+            if coord.iter().any(|index| index.unsigned_abs() > 1 << 30) {
+                return fail("a cell out of reach");
+            }
+            for &packed in words {
+                let Some(used) = used.get_mut(label_of(packed) as usize) else {
+                    return fail("a label beyond the bound");
+                };
+                *used = true;
+                if word_of(packed) >= self.config.vocabulary {
+                    return fail("a word beyond the vocabulary");
+                }
+            }
+        }
+        if self.topics.iter().zip(&used).any(|(topic, used)| topic.is_some() != *used) {
+            return fail("a label without words, or words without a label");
+        }
+        let mut coords: Vec<Coord> = self.cells.iter().map(|cell| cell.0).collect();
+        coords.sort_unstable();
+        if coords.windows(2).any(|pair| pair[0] == pair[1]) {
+            return fail("a cell that is there twice");
+        }
+        let count = self.cells.len() as u32;
+        if self.recent.iter().any(|&cell| cell >= count) || self.next_touch > count {
+            return fail("a cell that is not there");
+        }
+        Ok(())
+    }
+
+    /// Cells and labels with all that is derived.
+    pub(super) fn rebuild(&self) -> (Cells, Labels) {
+        let mut labels = Labels::restore(&self.config, &self.topics, self.next_topic);
+        let mut cells = Cells::new(labels.blocks);
+        for (coord, words) in &self.cells {
+            cells.restore(*coord, words);
+            labels.count(words);
+        }
+        labels.settle();
+        (cells, labels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::project::Observation;
+    use proptest::prelude::*;
+
+    fn model(seed: u64) -> SceneModel {
+        let config = SceneConfig { cell_m: [1.0; 3], gamma: 0.01, vocabulary: 30, seed, ..SceneConfig::default() };
+        let mut model = SceneModel::new(config).unwrap();
+        for t in 0..4 {
+            feed(&mut model, t);
+        }
+        model
+    }
+
+    fn feed(model: &mut SceneModel, t: u32) {
+        let seen = |i: u32| Observation {
+            word: (i * 7 + i / 100 * 11) % 30,
+            x: f64::from(i % 13) - 6.0,
+            y: f64::from(i / 40 + t) - 3.0,
+            z: 0.0,
+        };
+        model.insert(f64::from(t), &(0..400).map(seen).collect::<Vec<_>>());
+        model.refine(900);
+    }
+
+    #[test]
+    fn a_loaded_model_goes_on_as_the_saved_one() {
+        let mut saved = model(5);
+        let mut loaded = SceneModel::load(&saved.save()).unwrap();
+        loaded.assert_consistent();
+        assert_eq!(loaded.save(), saved.save());
+        for t in 4..7 {
+            feed(&mut saved, t);
+            feed(&mut loaded, t);
+        }
+        saved.sweep(1);
+        loaded.sweep(1);
+        assert_eq!(saved.label_map(), loaded.label_map());
+        assert_eq!(saved.save(), loaded.save());
+    }
+
+    #[test]
+    fn an_empty_model_survives() {
+        let empty = SceneModel::new(SceneConfig::default()).unwrap();
+        assert_eq!(SceneModel::load(&empty.save()).unwrap().cells(), 0);
+    }
+
+    #[test]
+    fn other_bytes_are_refused_by_name() {
+        let bytes = model(1).save();
+        assert_eq!(SceneModel::load(b"PNG").unwrap_err(), CheckpointError::Foreign);
+        assert_eq!(SceneModel::load(&bytes[..bytes.len() - 1]).unwrap_err(), CheckpointError::Damaged);
+        let mut newer = bytes.clone();
+        newer[8] = 9;
+        assert_eq!(SceneModel::load(&newer).unwrap_err(), CheckpointError::Version { found: 9 });
+    }
+
+    proptest! {
+        #[test]
+        fn damage_never_panics_and_is_never_taken(at in any::<prop::sample::Index>(), bit in 0u8..8) {
+            let mut bytes = model(2).save();
+            let at = at.index(bytes.len());
+            bytes[at] ^= 1 << bit;
+            prop_assert!(SceneModel::load(&bytes).is_err());
+        }
+
+        #[test]
+        fn content_under_a_right_checksum_never_panics(content in prop::collection::vec(any::<u8>(), 0..200)) {
+            let mut bytes = MAGIC.to_vec();
+            bytes.extend(VERSION.to_le_bytes());
+            bytes.extend((content.len() as u64).to_le_bytes());
+            bytes.extend(content);
+            bytes.extend(CRC.checksum(&bytes).to_le_bytes());
+            drop(SceneModel::load(&bytes));
+        }
+    }
+}
