@@ -3,7 +3,7 @@
 use super::window::Patch;
 use super::{Codec, MAX_PATCH_CELLS, MAX_PATCH_SIDE, MapChunk, context, encode, png};
 use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Chunks of at most `room` bytes that together turn `base` into `target`; each decodes alone against `base`.
 ///
@@ -16,10 +16,14 @@ pub fn encode_all(codec: Codec, base: &LabelGrid, target: &LabelGrid, room: usiz
     if codec == Codec::Png {
         return one_after_another(codec, base, target, room, dirty);
     }
-    let Some(bounds) = Rect::around(dirty.iter().map(|&(y, x)| Cell::new(x, y))) else { return Some(Vec::new()) };
     let mut chunks = Vec::new();
-    for strip in strips(bounds, likely_bits(target, &dirty), room * 8) {
-        chunks.extend(strip_chunks(base, target, strip, room)?);
+    for region in regions(&dirty) {
+        let Some(bounds) = Rect::around(region.iter().map(|&(y, x)| Cell::new(x, y))) else { continue };
+        for strip in strips(bounds, likely_bits(target, &region), room * 8) {
+            let inside = |&&(y, x): &&(i32, i32)| strip.contains(Cell::new(x, y));
+            let left: BTreeSet<(i32, i32)> = region.iter().filter(inside).copied().collect();
+            chunks.extend(strip_chunks(base, target, strip, room, left)?);
+        }
     }
     if codec == Codec::Auto {
         chunks = chunks.into_iter().map(|chunk| png::smaller(base, &chunk).unwrap_or(chunk)).collect();
@@ -43,6 +47,33 @@ fn one_after_another(
         chunks.push(chunk);
     }
     Some(chunks)
+}
+
+/// Edge of the blocks that [`regions`] puts together, as bits; changes farther apart are not worth one patch.
+const BLOCK_BITS: u32 = 8;
+
+/// The changes in groups of adjoining blocks.
+fn regions(dirty: &BTreeSet<(i32, i32)>) -> Vec<BTreeSet<(i32, i32)>> {
+    let mut blocks: BTreeMap<(i32, i32), Vec<(i32, i32)>> = BTreeMap::new();
+    for &(y, x) in dirty {
+        blocks.entry((y >> BLOCK_BITS, x >> BLOCK_BITS)).or_default().push((y, x));
+    }
+    let mut regions = Vec::new();
+    while let Some((first, cells)) = blocks.pop_first() {
+        let mut region = BTreeSet::from_iter(cells);
+        let mut edge = vec![first];
+        while let Some((row, column)) = edge.pop() {
+            let around = (-1..=1).flat_map(|north| (-1..=1).map(move |east| (row + north, column + east)));
+            for block in around {
+                if let Some(cells) = blocks.remove(&block) {
+                    region.extend(cells);
+                    edge.push(block);
+                }
+            }
+        }
+        regions.push(region);
+    }
+    regions
 }
 
 /// A guess at the bits of all changes, from how each goes on from its western and southern neighbours.
@@ -71,26 +102,84 @@ fn strips(bounds: Rect, bits: usize, room_bits: usize) -> Vec<Rect> {
     (0..count).map(strip).collect()
 }
 
-/// Chunks for the strip from south to north, each as full as it gets.
-fn strip_chunks(base: &LabelGrid, target: &LabelGrid, strip: Rect, room: usize) -> Option<Vec<MapChunk>> {
+/// Chunks for the changes `left` in the strip, from south to north, each as full as it gets.
+fn strip_chunks(
+    base: &LabelGrid,
+    target: &LabelGrid,
+    strip: Rect,
+    room: usize,
+    mut left: BTreeSet<(i32, i32)>,
+) -> Option<Vec<MapChunk>> {
     let mut chunks: Vec<MapChunk> = Vec::new();
     let most_rows = (MAX_PATCH_CELLS as u32 / strip.width).min(MAX_PATCH_SIDE as u32);
-    // Rows below, and cells of the first row, that have been sent.
-    let (mut row, mut sent) = (0, 0);
-    while row < strip.height {
-        let y = strip.y.wrapping_add_unsigned(row);
-        let height = most_rows.min(strip.height - row);
+    while let Some(&(y, x)) = left.first() {
+        let height = most_rows.min(strip.height - y.abs_diff(strip.y));
         let mut patch = Patch::between(base, target, Rect { y, height, ..strip });
-        let done = sent as usize;
-        patch.outcome[..done].copy_from_slice(&patch.base[..done]);
-        let Some(patch) = patch.trimmed() else {
-            (row, sent) = (row + height, 0);
-            continue;
-        };
-        let chunk = context::prefix_chunk(base, &patch, room)?;
-        let last = chunk.changes.last().map(|&(cell, _)| cell)?;
-        (row, sent) = (last.y.abs_diff(strip.y), last.x.abs_diff(strip.x) + 1);
+        let sent = x.abs_diff(strip.x) as usize;
+        patch.outcome[..sent].copy_from_slice(&patch.base[..sent]);
+        let chunk = context::prefix_chunk(base, &patch.trimmed()?, room)?;
+        for &(cell, _) in &chunk.changes {
+            left.remove(&(cell.y, cell.x));
+        }
         chunks.push(chunk);
     }
     Some(chunks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::procedural::{Chance, Flips, Scene, Survey};
+    use super::super::{Plane, decode};
+    use super::*;
+
+    /// Maps of a small survey, one a step.
+    fn survey(scene: Scene) -> Vec<Plane> {
+        let scene = scene.draw(&mut Chance::new(42), 96, 96, 8);
+        let mut survey = Survey::new(7, scene, Flips { border: 10_000, anywhere: 2000, settling: 0 }, 12);
+        let mut maps = vec![survey.map().clone()];
+        for _ in 0..12 {
+            survey.advance();
+            maps.push(survey.map().clone());
+        }
+        maps
+    }
+
+    fn bytes(codec: Codec, maps: &[Plane], room: usize) -> usize {
+        let mut bytes = 0;
+        for pair in maps.windows(2) {
+            let (base, target) = (pair[0].to_grid(), pair[1].to_grid());
+            let mut replica = base.clone();
+            for chunk in encode_all(codec, &base, &target, room).expect("room for a cell") {
+                assert!(chunk.bytes.len() <= room);
+                bytes += chunk.bytes.len();
+                for (cell, label) in decode(&base, &chunk.bytes).expect("own chunk") {
+                    assert_eq!(replica.set(cell, label), base.get(cell), "a cell was sent twice");
+                }
+            }
+            assert_eq!(replica, target);
+        }
+        bytes
+    }
+
+    #[test]
+    fn a_survey_arrives_whole_in_far_fewer_bytes_than_png_chunks_take() {
+        for scene in Scene::ALL {
+            let maps = survey(scene);
+            for (room, most) in [(64, 60), (256, 60), (1000, 60)] {
+                let (context, png) = (bytes(Codec::Auto, &maps, room), bytes(Codec::Png, &maps, room));
+                assert!(context * 100 <= png * most, "{scene:?}, {room} bytes: {context} against {png}");
+            }
+        }
+    }
+
+    #[test]
+    fn changes_far_apart_and_wider_than_a_patch_are_tiled() {
+        let far = [(-30_000, 5), (0, -2000), (0, 0), (1500, 3), (1501, 40_000), (i32::MAX, i32::MIN)];
+        let target: LabelGrid = far.into_iter().map(|(x, y)| (Cell::new(x, y), 3)).collect();
+        for codec in [Codec::Auto, Codec::Png] {
+            let chunks = encode_all(codec, &LabelGrid::default(), &target, 64).expect("room for a cell");
+            let cells: usize = chunks.iter().map(|chunk| chunk.changes.len()).sum();
+            assert_eq!(cells, far.len());
+        }
+    }
 }

@@ -23,9 +23,8 @@ pub(super) struct Model {
     run: Run,
 }
 
-/// Probability of `true`, in 1/65536, of the rare decisions past the candidates.
+/// Probability of `true`, in 1/65536, that a label past the candidates is none.
 const CLEARED: u32 = 1 << 12;
-const NEXT_LABEL: u32 = 60_000;
 
 impl Model {
     pub(super) fn new(prior: &'static Prior) -> Self {
@@ -112,19 +111,22 @@ fn decide(stage: &mut Stage, coder: &mut impl BitCoder, contexts: &Contexts, bit
     bit
 }
 
-/// A label that is not in use around: mostly the lowest one, or the one after the highest in use.
+/// A label that is not in use around, by its place among those: low ones are likely.
 fn new_label(coder: &mut impl BitCoder, canvas: &Canvas, held: u8, wanted: u8) -> Option<u8> {
-    let free = |label: &u8| canvas.count(*label) == 0 && *label != held;
-    let lowest = (1..=MAX_LABEL).find(free)?;
-    if coder.code(wanted == lowest, NEXT_LABEL / 2) {
-        return Some(lowest);
+    let free = || (1..=MAX_LABEL).filter(|&label| canvas.count(label) == 0 && label != held);
+    let place = free().take_while(|&label| label < wanted).count();
+    let mut first = 0;
+    for (bits, one) in NEW_LABELS {
+        if coder.code(place < first + (1 << bits), one) {
+            let within = place.saturating_sub(first);
+            let offset =
+                (0..bits).rev().fold(0, |n, i| n << 1 | usize::from(coder.code(within >> i & 1 == 1, 1 << 15)));
+            return free().nth(first + offset);
+        }
+        first += 1 << bits;
     }
-    let above = (1..=MAX_LABEL).rev().take_while(free).last();
-    if let Some(above) = above.filter(|&label| label != lowest)
-        && coder.code(wanted == above, NEXT_LABEL / 2)
-    {
-        return Some(above);
-    }
-    let label = (0..8).rev().fold(0, |label, i| label << 1 | u8::from(coder.code(wanted >> i & 1 == 1, 1 << 15)));
-    (free(&label) && (1..=MAX_LABEL).contains(&label)).then_some(label)
+    None
 }
+
+/// How many new labels, as bits, come next, and how likely it is one of them, in 1/65536; the last one is sure.
+const NEW_LABELS: [(u32, u32); 6] = [(2, 26_000), (2, 32_000), (3, 45_000), (4, 45_000), (5, 40_000), (8, 65_535)];
