@@ -17,6 +17,18 @@ pub fn vehicle_address(config: &Config) -> Result<Address, Problem> {
     Address::vehicle(number).ok_or_else(|| Problem::Input(format!("vehicle.address = {number}: allowed is 1 to 14")))
 }
 
+/// Bits of framing that a transparent modem puts on air with each frame: delimiters and stuffing.
+const FRAMING_BITS: u64 = 8 * 7;
+
+/// The modem of a process.
+pub fn modem_of_process(config: &Config) -> ModemProfile {
+    let mut profile = modem_profile(config, config.modem.bit_rate);
+    if config.modem.kind == "transparent" {
+        profile.overhead_bits += FRAMING_BITS;
+    }
+    profile
+}
+
 /// The modem, at `bit_rate_bps` on air.
 pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     ModemProfile {
@@ -59,7 +71,7 @@ pub fn vehicle(
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let navigator = Navigator::new(x, y, depth, config.navigation.drift_percent / 100.0);
-    let mut vehicle = Vehicle::new(link, navigator, steering, durable);
+    let mut vehicle = Vehicle::new(link, navigator, steering, durable, now);
     if whole {
         vehicle.send_whole_png();
     }

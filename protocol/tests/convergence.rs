@@ -4,7 +4,7 @@ mod pair;
 
 use pair::{Pair, Water, auv, hold, patchy, utility};
 use proptest::prelude::*;
-use scenecast_protocol::directive::LifeLine;
+use scenecast_protocol::directive::{LifeLine, Slot, Utility};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::map_codec::Codec;
 use std::time::Duration;
@@ -43,7 +43,7 @@ proptest! {
         for (step, what) in restarts.into_iter().enumerate() {
             let map = patchy(24, step as u64);
             pair.vehicle.set_map(map.iter(), pair.now);
-            pair.surface.issue(auv(), utility(step as i8), pair.now);
+            pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
             pair.run(pair.now + Duration::from_secs(40), false);
             match what {
                 0 => pair.restart_vehicle(&map),
@@ -62,15 +62,15 @@ proptest! {
     ) {
         let mut pair = Pair::new(seed, 64, 10_000, Codec::Png, water);
         for (step, what) in restarts.into_iter().enumerate() {
-            pair.surface.issue(auv(), utility(step as i8 + 1), pair.now);
-            pair.surface.issue(auv(), hold(step % 2 == 0), pair.now);
+            pair.surface.issue(auv(), utility(step as i8 + 1), pair.now).unwrap();
+            pair.surface.issue(auv(), hold(step % 2 == 0), pair.now).unwrap();
             pair.run(pair.now + Duration::from_secs(1 + (seed >> step & 31)), false);
             if what == 0 {
                 pair.restart_vehicle(&patchy(2, 0));
             }
         }
         pair.run(pair.now + Duration::from_secs(3000), false);
-        let utilities: Vec<_> = pair.applied.iter().filter(|s| matches!(s, scenecast_protocol::directive::Slot::Utility(_))).collect();
+        let utilities: Vec<_> = pair.applied.iter().filter(|s| matches!(s, Slot::Utility(_))).collect();
         for (i, u) in utilities.iter().enumerate() {
             prop_assert!(!utilities[..i].contains(u), "applied twice: {:?}", u);
         }
@@ -78,6 +78,48 @@ proptest! {
         let view = pair.surface.vehicle(auv()).unwrap();
         prop_assert!(view.slots().all(|s| s.life == LifeLine::Applied));
     }
+}
+
+const CALM: Water =
+    Water { loss: 0.05, duplication: 0.0, reordering: 0.0, corruption: 0.0, propagation: Duration::from_millis(100) };
+
+#[test]
+fn an_end_that_was_not_heard_for_hours_is_heard_again() {
+    for mute in [[true, false], [false, true], [true, true]] {
+        let mut pair = Pair::new(3, 64, 10_000, Codec::Png, CALM);
+        pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
+        pair.run(pair.now + Duration::from_secs(60), false);
+        pair.mute = mute;
+        for phase in 0..600 {
+            pair.vehicle.set_map(patchy(20, phase).iter(), pair.now);
+            pair.surface.issue(auv(), utility((phase % 100) as i8), pair.now).unwrap();
+            pair.run(pair.now + Duration::from_secs(60), false);
+        }
+        pair.mute = [false; 2];
+        pair.run(pair.now + Duration::from_secs(300), true);
+        assert!(pair.is_converged(), "mute {mute:?}: {:?}", pair.vehicle.stats());
+    }
+}
+
+#[test]
+fn a_large_directive_gets_through_while_many_losses_are_acknowledged() {
+    let mut pair = Pair::new(9, 64, 10_000, Codec::Png, Water { loss: 0.45, ..CALM });
+    pair.vehicle.set_map(speckled(120, 1), pair.now);
+    pair.run(pair.now + Duration::from_secs(30), false);
+    let weights = (1..=14).map(|label| (label, 50)).collect();
+    let utility = Slot::Utility(Utility { weights, ..Utility::default() });
+    pair.surface.issue(auv(), utility.clone(), pair.now).unwrap();
+    pair.run(pair.now + Duration::from_secs(120), false);
+    assert_eq!(pair.applied, [utility]);
+}
+
+#[test]
+fn a_directive_that_fits_no_frame_is_refused_where_it_is_issued() {
+    let mut pair = Pair::new(9, 64, 10_000, Codec::Png, CALM);
+    let weights = (1..=100).map(|label| (label, 50)).collect();
+    let utility = Slot::Utility(Utility { weights, ..Utility::default() });
+    let refused = pair.surface.issue(auv(), utility, pair.now).unwrap_err().to_string();
+    assert!(refused.contains("a frame has room for"), "{refused}");
 }
 
 /// Labels without any order, so that there is always more to send than the channel carries.

@@ -101,6 +101,9 @@ impl Desk {
     pub fn handle_exemplar(&mut self, exemplar: Exemplar, now: Instant) -> bool {
         let wanted = exemplar.epoch == self.epoch;
         let Some(desk) = self.exemplars.get_mut(&exemplar.label).filter(|_| wanted) else { return false };
+        if desk.serial != exemplar.serial {
+            return false;
+        }
         (desk.state, desk.changed) = (ExemplarState::Here(exemplar.webp), now);
         true
     }

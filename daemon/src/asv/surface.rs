@@ -127,7 +127,7 @@ impl Surface {
     }
 
     fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
-        let version = self.link.issue(vehicle, slot, now).ok_or_else(|| "no such vehicle".to_owned())?;
+        let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)
     }

@@ -37,6 +37,7 @@ pub struct Mapper {
     book: LabelBook,
     exemplars: ExemplarStore,
     refine_words_per_s: f64,
+    configured_words_per_s: f64,
     last_s: Option<f64>,
     flat: Vec<FlatCell>,
 }
@@ -78,14 +79,15 @@ impl Mapper {
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
+            configured_words_per_s: f64::from(config.scene.refine_words_per_s),
             last_s: None,
             flat: Vec::new(),
         })
     }
 
-    /// Sets the words resampled a second of mission time.
+    /// Sets the words resampled a second of mission time; 0: as configured.
     pub fn set_refine_rate(&mut self, words_per_s: u32) {
-        self.refine_words_per_s = f64::from(words_per_s);
+        self.refine_words_per_s = if words_per_s == 0 { self.configured_words_per_s } else { f64::from(words_per_s) };
     }
 
     /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.

@@ -29,6 +29,8 @@ pub struct Durable {
     pub hold: bool,
     /// Budget in force, bits a second.
     pub budget_bps: Option<u32>,
+    /// Words to resample a second, if the operator has said so.
+    pub refine_words_per_s: Option<u32>,
 }
 
 /// What the vehicle asks of its host.
@@ -40,7 +42,7 @@ pub enum VehicleOutput {
     Waypoint(f64, f64),
     /// Stay where you are.
     Hold,
-    /// Resample so many words a second.
+    /// Resample so many words a second; 0: as configured.
     RefineRate(u32),
     /// A slot was decided about.
     Applied(AppliedSlot),
@@ -80,7 +82,7 @@ pub struct Vehicle {
 
 impl Vehicle {
     /// A vehicle at its start; `durable` is what survived the last run, with the epoch this run begins.
-    pub fn new(link: VehicleLink, navigator: Navigator, steering: Steering, durable: Durable) -> Self {
+    pub fn new(link: VehicleLink, navigator: Navigator, steering: Steering, durable: Durable, now: Instant) -> Self {
         let utility = durable.utility.clone().map(|(epoch, exploration, curiosity, weights)| Utility {
             epoch,
             exploration,
@@ -105,6 +107,13 @@ impl Vehicle {
             whole_png: None,
             outstanding: None,
         };
+        if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
+            let other = SlotState::Refused(RefusalReason::OtherEpoch);
+            vehicle.link.decide(SlotId::Utility, other, now);
+            vehicle.durable.inbox = vehicle.link.persistent_state().clone();
+            vehicle.outputs.push_back(VehicleOutput::Persist);
+        }
+        vehicle.outputs.extend(vehicle.durable.refine_words_per_s.map(VehicleOutput::RefineRate));
         vehicle.follow_utility();
         vehicle
     }
@@ -192,7 +201,7 @@ impl Vehicle {
         self.durable.epoch = epoch;
         self.utility = None;
         self.requests = Requests::default();
-        self.answered.clear();
+        self.forget_answers();
         self.follow_utility();
         self.outputs.push_back(VehicleOutput::Persist);
     }
@@ -253,9 +262,17 @@ impl Vehicle {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
                 VehicleEvent::ObjectDelivered(id) if self.outstanding == Some(id) => self.outstanding = None,
                 VehicleEvent::ObjectDelivered(_) => {}
-                VehicleEvent::SurfaceRestarted => self.answered.clear(),
+                VehicleEvent::SurfaceRestarted => self.forget_answers(),
             }
         }
+    }
+
+    /// The surface has none of the images that were sent.
+    fn forget_answers(&mut self) {
+        self.link.cancel_objects();
+        self.answered.clear();
+        self.outstanding = None;
+        self.whole_png = self.whole_png.map(|_| 0);
     }
 
     fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
@@ -281,6 +298,7 @@ impl Vehicle {
                 Ok(())
             }
             Slot::Settings(settings) => {
+                self.durable.refine_words_per_s = Some(settings.refine_words_per_s);
                 self.outputs.push_back(VehicleOutput::RefineRate(settings.refine_words_per_s));
                 Ok(())
             }

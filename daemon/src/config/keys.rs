@@ -54,7 +54,7 @@ pub const KEYS: &[Key] = &[
         "bits on air that this end may send, mean over the window",
     ),
     key("link.budget_window_s", "s", Range(1.0, 3600.0), "asr", "window over which the budget is kept"),
-    key("link.frame_bytes", "bytes", Range(32.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
+    key("link.frame_bytes", "bytes", Range(48.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
     key(
         "link.exemplar_share",
         "",

@@ -33,7 +33,25 @@ pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, Problem> {
             section.insert(name.to_owned(), value);
         }
     }
-    table.try_into().map_err(|e: toml::de::Error| Problem::Input(e.message().to_owned()))
+    let config: Config = table.try_into().map_err(|e: toml::de::Error| Problem::Input(e.message().to_owned()))?;
+    check_together(&config)?;
+    Ok(config)
+}
+
+/// What no single value tells: a turn must have room for a frame.
+fn check_together(config: &Config) -> Result<(), Problem> {
+    const LONGEST_FRAME_S: f64 = 55.0;
+    let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
+    for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
+        if bits / rate > LONGEST_FRAME_S {
+            let least = (bits / LONGEST_FRAME_S).ceil();
+            let frame = config.link.frame_bytes;
+            let what =
+                format!("{key} = {rate}: a frame of link.frame_bytes = {frame} takes longer than {LONGEST_FRAME_S} s");
+            return Err(Problem::Input(format!("{what}; allowed is {least} bit/s or more, or a smaller frame")));
+        }
+    }
+    Ok(())
 }
 
 fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), Problem> {
@@ -184,7 +202,7 @@ mod tests {
         let said = message(&["link.frame_bytes=9"]);
         assert_eq!(
             said,
-            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 32 to 1024 bytes"
+            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 48 to 1024 bytes"
         );
     }
 

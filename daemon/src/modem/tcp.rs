@@ -30,26 +30,31 @@ pub(super) async fn open(
     }
 }
 
+/// Serves one connection at a time. A new one replaces the old, which may be the remains of a peer that lost power.
 async fn accept(
     listener: TcpListener,
     most: usize,
     mut to_modem: mpsc::Receiver<Bytes>,
     from_modem: mpsc::Sender<Bytes>,
 ) {
+    let mut next = None;
     loop {
-        let stream = match listener.accept().await {
-            Ok((stream, peer)) => {
-                tracing::info!("modem: {peer} connected");
-                stream
-            }
+        let accepted = match next.take() {
+            Some(accepted) => accepted,
+            None => listener.accept().await,
+        };
+        let (stream, peer) = match accepted {
+            Ok(accepted) => accepted,
             Err(e) => {
                 tracing::warn!("modem: {e}");
                 tokio::time::sleep(FIRST_PAUSE).await;
                 continue;
             }
         };
-        if serve(stream, most, &mut to_modem, &from_modem).await {
-            return;
+        tracing::info!("modem: {peer} connected");
+        tokio::select! {
+            host_is_gone = serve(stream, most, &mut to_modem, &from_modem) => if host_is_gone { return },
+            accepted = listener.accept() => next = Some(accepted),
         }
     }
 }

@@ -32,6 +32,7 @@ pub struct Meter {
     delays: Delays,
     seen: Option<(u64, u64)>,
     agreement: f64,
+    mapped: bool,
     integral: f64,
     seconds: f64,
     last: Option<Instant>,
@@ -42,7 +43,8 @@ impl Meter {
     /// Looks at both maps; `versions` tell whether either has changed since the last look.
     pub fn look(&mut self, vehicle: &LabelGrid, operator: &LabelGrid, versions: (u64, u64), now: Instant) {
         if let Some(last) = self.last.replace(now) {
-            let passed = now.since(last).as_secs_f64();
+            // Before the vehicle has a map there is nothing to agree about.
+            let passed = if self.mapped { now.since(last).as_secs_f64() } else { 0.0 };
             self.integral += self.agreement * passed;
             self.seconds += passed;
         }
@@ -58,7 +60,8 @@ impl Meter {
                 still.insert(cell, self.differing.remove(&cell).unwrap_or(now));
             }
         }
-        self.agreement = if explored == 0 { 0.0 } else { 1.0 - still.len() as f64 / f64::from(explored) };
+        self.mapped = explored > 0;
+        self.agreement = if explored == 0 { 1.0 } else { 1.0 - still.len() as f64 / f64::from(explored) };
         for since in std::mem::replace(&mut self.differing, still).into_values() {
             self.delays.push(now.since(since).as_secs_f64());
         }

@@ -154,7 +154,7 @@ fn directives(m: &Mission) -> Value {
         "issued": issued,
         "applied": seen.len(),
         "applied_twice": seen.values().filter(|&&n| n > 1).count(),
-        "refused": m.applied.iter().filter(|a| matches!(a.state, SlotState::Refused(_))).count(),
+        "refused": m.applied.iter().filter(|a| a.id != SlotId::Fix && matches!(a.state, SlotState::Refused(_))).count(),
         "latency_s": summary(delays.summary()),
     })
 }

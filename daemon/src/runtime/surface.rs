@@ -20,7 +20,7 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         let dir = PathBuf::from(&config.runtime.state_dir);
         std::fs::create_dir_all(&dir).map_err(|e| Problem::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
-        let profile = crate::ends::modem_profile(&config, config.modem.bit_rate);
+        let profile = crate::ends::modem_of_process(&config);
         let surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
         let console = match config.console.listen.as_str() {
             "" => None,
@@ -67,7 +67,10 @@ impl Host {
             let wake = self.surface.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
             let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => return Ok(self.modem.log_audit()),
+                _ = tokio::signal::ctrl_c() => {
+                    self.modem.log_audit();
+                    return Ok(());
+                }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 _ = second.tick() => self.publish(),
                 event = self.modem.next() => match event {

@@ -20,7 +20,7 @@ pub fn run_vehicle(config: Config) -> Result<(), Problem> {
         let state_file = dir.join("vehicle.state");
         let durable = begin_run(&state_file)?;
         let clock = Clock::new(config.runtime.time_scale);
-        let profile = crate::ends::modem_profile(&config, config.modem.bit_rate);
+        let profile = crate::ends::modem_of_process(&config);
         let session = SessionId::from_random(super::random_bits() as u16);
         let area = survey_area(&config)?;
         let epoch = durable.epoch;
@@ -81,7 +81,10 @@ impl Host {
             let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
             let wake = wake.unwrap_or_else(|| self.clock.now() + std::time::Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => return Ok(self.modem.log_audit()),
+                _ = tokio::signal::ctrl_c() => {
+                    self.modem.log_audit();
+                    return Ok(());
+                }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 event = self.modem.next() => match event {
                     ModemEvent::Sent => self.vehicle.handle_transmit_outcome(),

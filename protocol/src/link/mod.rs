@@ -18,7 +18,7 @@ pub use pair::{Inbound, Pair};
 pub use sessions::{Sessions, Sighting};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
-pub use surface::{SurfaceConfig, SurfaceEvent, SurfaceLink};
+pub use surface::{IssueError, SurfaceConfig, SurfaceEvent, SurfaceLink};
 pub use surface_peer::PeerView;
 pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{Refusal, Window};
@@ -37,7 +37,7 @@ pub struct Transmit {
 /// Why the link asks to be woken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wakeup {
-    /// Its granted turn begins, or its budget allows the next frame.
+    /// Its granted turn begins.
     Turn,
     /// The surface may grant the next turn.
     Grant,

@@ -1,7 +1,7 @@
 //! The state of one pair of ends.
 
 use super::{DropReason, Flight, FrameNumber, LinkStats, Refusal, Sessions, Sighting, Window};
-use crate::wire::{AckStatement, Address, Chunks, Frame, FrameBuilder, Header, MissionId, SessionId};
+use crate::wire::{Address, Chunks, Frame, FrameBuilder, Header, MissionId, SessionId};
 
 /// What a taken frame tells.
 #[derive(Debug)]
@@ -34,9 +34,6 @@ pub struct Pair<T> {
 }
 
 impl<T> Pair<T> {
-    /// Most bytes of a frame that an acknowledgement may take.
-    const ACK_ROOM: usize = 24;
-
     /// A pair that has not met; `own` is the random session of this run.
     pub fn new(mission: MissionId, us: Address, peer: Address, own: SessionId) -> Self {
         let stats = LinkStats::default();
@@ -151,10 +148,18 @@ impl<T> Pair<T> {
         Ok(Inbound { header, restarted, fates, number, base, chunks })
     }
 
-    /// Starts the next frame; a hello if the peer's session is not known or `hello` is asked for.
-    pub fn begin_frame(&mut self, size: usize, remaining: u8, turn: Option<u8>, hello: bool) -> (FrameBuilder, bool) {
+    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement; a hello if the peer's session is not known or
+    /// `hello` is asked for.
+    pub fn begin_frame(
+        &mut self,
+        size: usize,
+        ack_room: usize,
+        remaining: u8,
+        turn: Option<u8>,
+        hello: bool,
+    ) -> (FrameBuilder, bool) {
         let hello = hello || !self.is_met();
-        let ack = if hello { None } else { self.statement() };
+        let ack = if hello { None } else { self.window.as_mut().and_then(|w| w.statement(ack_room)) };
         let header = Header {
             from: self.us,
             to: self.peer,
@@ -185,10 +190,6 @@ impl<T> Pair<T> {
         self.sessions.renew(own);
         self.flight.handle_peer_restart();
         self.window = None;
-    }
-
-    fn statement(&mut self) -> Option<AckStatement> {
-        self.window.as_mut()?.statement(Self::ACK_ROOM)
     }
 }
 

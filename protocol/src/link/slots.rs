@@ -14,6 +14,8 @@ pub struct SlotInboxState {
     pub retired: VecDeque<u16>,
     /// Latest version seen, by slot.
     pub versions: [Option<u16>; SLOTS],
+    /// What was decided about it, as in the status, by slot.
+    pub decisions: [u8; SLOTS],
 }
 
 /// Filters the slots that arrive, and reports what was decided.
@@ -27,12 +29,12 @@ impl SlotInbox {
     /// Ended series to remember.
     const MEMORY: usize = 16;
 
-    /// An inbox that continues from what survived; the slots seen then count as applied.
+    /// An inbox that continues from what survived.
     pub fn restore(state: SlotInboxState) -> Self {
         let mut reports = [SlotReport::default(); SLOTS];
-        for (report, version) in reports.iter_mut().zip(state.versions) {
-            if let Some(version) = version {
-                *report = SlotReport { version_low: version as u8, state: SlotState::Applied };
+        for (report, (version, code)) in reports.iter_mut().zip(state.versions.into_iter().zip(state.decisions)) {
+            if let (Some(version), Some(state)) = (version, SlotState::from_code(code)) {
+                *report = SlotReport { version_low: version as u8, state };
             }
         }
         Self { state, reports }
@@ -68,6 +70,7 @@ impl SlotInbox {
     pub fn decide(&mut self, id: SlotId, state: SlotState) {
         if let Some(version) = self.state.versions[id.index()] {
             self.reports[id.index()] = SlotReport { version_low: version as u8, state };
+            self.state.decisions[id.index()] = state.code();
         }
     }
 
@@ -79,6 +82,7 @@ impl SlotInbox {
             }
         }
         self.state.versions = [None; SLOTS];
+        self.state.decisions = [0; SLOTS];
         self.reports = [SlotReport::default(); SLOTS];
     }
 }

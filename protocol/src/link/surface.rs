@@ -1,8 +1,8 @@
 //! The surface's end of the link.
 
-use super::surface_peer::Peer;
+use super::surface_peer::{Peer, SHORT_ACK};
 use super::{PeerView, Transmit, Wakeup};
-use crate::directive::{Slot, SlotId};
+use crate::directive::{Slot, SlotId, VersionedSlot};
 use crate::mac::{MasterConfig, ModemProfile};
 use crate::schedule::BitBudget;
 use crate::time::Instant;
@@ -25,6 +25,25 @@ pub struct SurfaceConfig {
     pub master: MasterConfig,
     /// The vehicles to speak with.
     pub vehicles: Vec<Address>,
+}
+
+/// Bytes of a frame that a slot can not have: header, turn, a short acknowledgement, chunk header, CRC.
+const SLOT_OVERHEAD: usize = 10 + 1 + SHORT_ACK + 3 + 4;
+
+/// Why a slot cannot be issued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum IssueError {
+    /// There is no such vehicle.
+    #[error("no such vehicle")]
+    NoVehicle,
+    /// It does not fit a frame.
+    #[error("it takes {bytes} bytes, and a frame has room for {room}: set a larger link.frame_bytes or say less")]
+    TooLarge {
+        /// Bytes of the slot.
+        bytes: usize,
+        /// Bytes that fit.
+        room: usize,
+    },
 }
 
 /// What the link tells its host.
@@ -102,9 +121,14 @@ impl SurfaceLink {
         self.peers.get(&vehicle).map(PeerView)
     }
 
-    /// Issues a new version of a slot to a vehicle; `None` if there is no such vehicle.
-    pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Option<u16> {
-        self.peers.get_mut(&vehicle).map(|p| p.issue(slot, now))
+    /// Issues a new version of a slot to a vehicle.
+    pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, IssueError> {
+        let room = self.config.modem.frame_bytes.saturating_sub(SLOT_OVERHEAD);
+        let bytes = VersionedSlot::encode(0, 0, &slot).len();
+        if bytes > room {
+            return Err(IssueError::TooLarge { bytes, room });
+        }
+        self.peers.get_mut(&vehicle).map(|p| p.issue(slot, now)).ok_or(IssueError::NoVehicle)
     }
 
     /// Changes the surface's own bit budget.
@@ -135,6 +159,7 @@ impl SurfaceLink {
         if peer.out_of_step {
             let own = SessionId::from_random(next_random(&mut self.random));
             peer.resync(own, now);
+            self.events.push_back(SurfaceEvent::MapChanged(peer.pair.peer()));
         }
     }
 
@@ -180,7 +205,7 @@ impl SurfaceLink {
             self.grant = peer.master.grant(&self.config.modem);
             peer.outbox.begin_turn();
             peer.master.begin(self.grant, now);
-            self.hello = peer.master.unanswered() >= 2 && peer.master.unanswered().is_multiple_of(2);
+            self.hello = says_hello(peer.master.unanswered()) || peer.pair.is_full();
         }
         let (transmit, last) = peer.write_frame(&self.config.modem, self.grant, self.hello, now);
         self.on_air = Some(last);
@@ -201,6 +226,12 @@ impl SurfaceLink {
     fn draw(&mut self) -> u16 {
         next_random(&mut self.random)
     }
+}
+
+/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while every
+/// one, so that the numbers of unheard frames do not run out.
+fn says_hello(unanswered: u32) -> bool {
+    unanswered >= 2 && (unanswered.is_multiple_of(2) || unanswered >= 16)
 }
 
 /// Sixteen bits of a splitmix64 sequence.

@@ -11,6 +11,9 @@ use crate::wire::{Address, ChunkKind, FrameBuilder, MissionId, SessionId, Vehicl
 use std::collections::VecDeque;
 use std::time::Duration;
 
+/// Bytes of acknowledgement that every frame of the surface has room for.
+pub(super) const SHORT_ACK: usize = 6;
+
 /// What a frame to a vehicle carried: versions of slots.
 type Carried = Vec<(SlotId, u16, usize)>;
 
@@ -208,12 +211,16 @@ impl Peer {
         now: Instant,
     ) -> (Transmit, bool) {
         let base_distance = self.pair.base_distance();
-        let (mut builder, hello) = self.pair.begin_frame(modem.frame_bytes, 0, Some(grant), hello);
+        let waiting = self.outbox.next(modem.frame_bytes, now).map(|(.., slot)| slot.len());
+        let ack_room = waiting.map_or(modem.frame_bytes / 2, |slot| {
+            modem.frame_bytes.saturating_sub(slot + 18).clamp(SHORT_ACK, modem.frame_bytes / 2)
+        });
+        let (mut builder, hello) = self.pair.begin_frame(modem.frame_bytes, ack_room, 0, Some(grant), hello);
         let mut carried = Carried::new();
         if !hello {
             self.fill(&mut builder, &mut carried, now);
         }
-        let more = !hello && self.outbox.next(modem.frame_bytes - 24, now).is_some();
+        let more = !carried.is_empty() && self.outbox.next(modem.frame_bytes, now).is_some();
         builder.set_remaining(u8::from(more), base_distance);
         let payload: usize = carried.iter().map(|(_, _, n)| n).sum();
         self.pair.stats.count(Class::Directive, payload);

@@ -169,6 +169,11 @@ impl VehicleLink {
         self.objects.push(bytes)
     }
 
+    /// Stops sending every object.
+    pub fn cancel_objects(&mut self) {
+        self.objects = ObjectSender::default();
+    }
+
     /// Stops sending an object.
     pub fn cancel_object(&mut self, id: ObjectId) {
         self.objects.cancel(id);
@@ -287,9 +292,16 @@ impl VehicleLink {
         let fitting = grant.frames_left(&modem, now);
         let wanted = self.frames_wanted().clamp(1, u32::from(u8::MAX));
         let frames = self.budget.affordable(frame_bits, fitting.min(wanted), now);
-        if frames == 0 || self.pair.is_full() {
+        if frames == 0 {
             self.grant = None;
             return None;
+        }
+        if self.pair.is_full() {
+            // The surface has heard nothing for so long that numbers run out: it gets everything afresh.
+            let session = self.next_session();
+            self.pair.renew(session);
+            self.map.handle_peer_restart(now);
+            self.objects.handle_peer_restart();
         }
         let (bytes, last) = self.write_frame(frames, now);
         if last {
@@ -298,6 +310,11 @@ impl VehicleLink {
         self.on_air = true;
         self.budget.spend(modem.bits_on_air(bytes.bytes.len()), now);
         Some(bytes)
+    }
+
+    /// A session that differs from every recent one.
+    fn next_session(&self) -> SessionId {
+        SessionId::from_random(self.pair.own_session().get().wrapping_mul(0x6255).wrapping_add(0x3619))
     }
 
     fn frames_wanted(&self) -> u32 {
@@ -315,7 +332,7 @@ impl VehicleLink {
         let remaining = (frames - 1) as u8;
         let wish = (remaining == 0).then(|| self.wish(now));
         let base_distance = self.pair.base_distance();
-        let (mut builder, hello) = self.pair.begin_frame(size, remaining, wish, false);
+        let (mut builder, hello) = self.pair.begin_frame(size, size / 6, remaining, wish, false);
         let mut carried = Carried::new();
         let before = builder.room();
         if !hello {
@@ -381,7 +398,12 @@ impl VehicleLink {
         let Some(status) = self.status.as_mut().filter(|_| now >= self.status_due) else { return };
         status.base_digest = self.map.acked_digest();
         status.slots = self.inbox.reports();
-        let bytes = status.encode();
+        let mut bytes = status.encode();
+        if room_for_payload(builder.room()) < bytes.len() + 1 {
+            // Where a frame is small, the waypoint is what can be missed.
+            status.waypoint = None;
+            bytes = status.encode();
+        }
         if !builder.push(ChunkKind::Status, &bytes) {
             return;
         }

@@ -144,7 +144,7 @@ impl VehicleStatus {
         put24(&mut out, self.explored_cells.min(0xFF_FFFF));
         out.extend_from_slice(&self.base_digest.to_be_bytes());
         out.extend(self.slots.iter().map(|s| s.version_low));
-        out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | state_code(s.state))));
+        out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | s.state.code())));
         if let Some((x, y)) = self.waypoint {
             put24(&mut out, decimetres(x) as u32);
             put24(&mut out, decimetres(y) as u32);
@@ -170,7 +170,7 @@ impl VehicleStatus {
         let versions = r.take(SLOTS)?;
         let states = r.take(SLOTS.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
         for ((slot, &version_low), code) in status.slots.iter_mut().zip(versions).zip(states) {
-            *slot = SlotReport { version_low, state: state_from(code).ok_or(StatusError::BadField)? };
+            *slot = SlotReport { version_low, state: SlotState::from_code(code).ok_or(StatusError::BadField)? };
         }
         if head & 0b1_0000 != 0 {
             status.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
@@ -187,19 +187,22 @@ impl VehicleStatus {
     }
 }
 
-fn state_code(state: SlotState) -> u8 {
-    match state {
-        SlotState::Unknown => 0,
-        SlotState::Applied => 1,
-        SlotState::Refused(reason) => reason.code(),
+impl SlotState {
+    /// The number on the wire: 0 unknown, 1 applied, 2..=15 a reason of refusal.
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Self::Unknown => 0,
+            Self::Applied => 1,
+            Self::Refused(reason) => reason.code(),
+        }
     }
-}
 
-fn state_from(code: u8) -> Option<SlotState> {
-    match code {
-        0 => Some(SlotState::Unknown),
-        1 => Some(SlotState::Applied),
-        code => RefusalReason::from_code(code).map(SlotState::Refused),
+    pub(crate) fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Unknown),
+            1 => Some(Self::Applied),
+            code => RefusalReason::from_code(code).map(Self::Refused),
+        }
     }
 }
 

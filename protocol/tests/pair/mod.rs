@@ -23,6 +23,8 @@ pub(crate) struct Water {
 
 pub(crate) struct Pair {
     pub(crate) now: Instant,
+    /// Whether nothing of the surface (0) or of the vehicle (1) gets through.
+    pub(crate) mute: [bool; 2],
     pub(crate) vehicle: VehicleLink,
     pub(crate) surface: SurfaceLink,
     pub(crate) water: Water,
@@ -59,6 +61,7 @@ impl Pair {
         let window = Duration::from_secs(10);
         Self {
             now,
+            mute: [false; 2],
             vehicle: vehicle(modem, budget_bps, codec, seed as u16, SlotInboxState::default(), now),
             surface: surface(modem, budget_bps, seed, now),
             water,
@@ -160,7 +163,7 @@ impl Pair {
         self.schedule(end, Event::Sent { by_vehicle });
         let copies = 1 + u32::from(self.draw() < self.water.duplication);
         for _ in 0..copies {
-            if self.draw() < self.water.loss {
+            if self.draw() < self.water.loss || self.mute[usize::from(by_vehicle)] {
                 continue;
             }
             let mut bytes = bytes.clone();
