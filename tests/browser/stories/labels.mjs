@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 
-const slider = (s, name) => s.page.getByRole("slider", { name: `Weight of ${name}` });
+const slider = (s, name) => s.page.getByRole("slider", { name: `Weight of ${name}`, exact: true });
 const send = (s) => s.page.locator("#send-weights");
 const step = (s) => s.page.locator("#send [aria-current=step]").innerText({ timeout: 300 }).catch(() => null);
 const labelButton = (s, name) => s.page.locator(".label .name", { hasText: name }).first();

@@ -43,7 +43,7 @@ export default [
       const late = await s.context.newPage();
       await late.goto(s.url);
       await late.locator(".slots", { hasText: "Constraints" }).waitFor();
-      await s.until("the weight", async () => (await late.getByRole("slider", { name: "Weight of Label 1" }).inputValue()) === "0.5");
+      await s.until("the weight", async () => (await late.getByRole("slider", { name: "Weight of Label 1", exact: true }).inputValue()) === "0.5");
     },
   },
 ];
