@@ -130,3 +130,16 @@ fn labels_are_never_renamed_while_a_mission_streams_in() {
     assert_eq!(book.epoch(), 7);
     assert!(meanings.len() > 1 && meanings.len() <= 40, "{} labels", meanings.len());
 }
+
+#[test]
+fn the_edge_of_the_seen_predicts_what_comes_next() {
+    let mut model = SceneModel::new(SceneConfig { cell_m: [1.0; 3], vocabulary: 4, ..config(1) }).unwrap();
+    model.insert(0.0, &vec![Observation { word: 2, x: 0.5, y: 0.5, z: 0.0 }; 50]);
+    model.sweep(5);
+    let topic = model.label_map()[0].topic;
+    let beside = model.expected_at([1.5, 0.5, 0.0]);
+    assert_eq!(beside[0].0, topic);
+    assert!((beside.iter().map(|entry| entry.1).sum::<f32>() - 1.0).abs() < 1e-5);
+    assert!(model.expected_at([3.5, 0.5, 0.0]).is_empty());
+    assert!(model.expected_at([f64::NAN, 0.5, 0.0]).is_empty());
+}

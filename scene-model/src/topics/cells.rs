@@ -104,6 +104,17 @@ impl Cells {
         words.iter().for_each(|&packed| counts[label_of(packed) as usize] += 1);
     }
 
+    /// Label counts around a place, whether it has a cell or not: of its cell and the six next to it.
+    pub(crate) fn counts_around(&self, coord: Coord) -> Vec<u32> {
+        let mut sums = vec![0; self.width()];
+        for there in std::iter::once(coord).chain(neighbours_of(coord)) {
+            if let Some(cell) = self.hash.get(there) {
+                sums.iter_mut().zip(self.counts(cell)).for_each(|(sum, &count)| *sum += u32::from(count));
+            }
+        }
+        sums
+    }
+
     /// Adds a word without a label.
     pub(crate) fn push(&mut self, cell: u32, word: u32) {
         self.words[cell as usize].push(pack(word, UNLABELLED));

@@ -9,7 +9,7 @@ use super::gibbs::Workshop;
 use super::grid::coord_of;
 use super::kernel::Kernel;
 use super::label_map::{FlatCell, MapCache};
-use super::labels::Labels;
+use super::labels::{Labels, TopicId};
 use super::schedule::{Mixed, phase_words};
 use crate::project::Observation;
 use crate::random::{Stream, derive};
@@ -275,6 +275,25 @@ impl SceneModel {
     #[cfg(test)]
     pub(crate) fn parts(&self) -> (&Cells, &Labels) {
         (&self.cells, &self.labels)
+    }
+
+    /// What the model expects at a place (metres), seen already or not: each topic in use with its prior share there,
+    /// (n_k + alpha) / sum, largest first, ties to the oldest. Empty where nothing was seen at or next to the place.
+    pub fn expected_at(&self, position: [f64; 3]) -> Vec<(TopicId, f32)> {
+        let Some(coord) = coord_of(position, self.config.cell_m) else { return Vec::new() };
+        let counts = self.cells.counts_around(coord);
+        let total: u32 = counts.iter().sum();
+        if total == 0 {
+            return Vec::new();
+        }
+        let mass = f64::from(total) + self.config.alpha * self.labels.active() as f64;
+        let share = |(slot, &count): (usize, &u32)| {
+            let topic = self.labels.topic(slot as u32)?;
+            Some((topic, ((f64::from(count) + self.config.alpha) / mass) as f32))
+        };
+        let mut shares: Vec<(TopicId, f32)> = counts.iter().enumerate().filter_map(share).collect();
+        shares.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        shares
     }
 
     fn fresh_map(&self) -> MutexGuard<'_, MapCache> {
