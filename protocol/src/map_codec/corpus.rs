@@ -57,7 +57,7 @@ fn context_chunks_keep_their_golden_bytes() {
 
 const PNG: &str =
     "0e9e5694a360636060606062201670330c4fc0c20906400a530e2ac189550eae11bb3e883c363998461cfac0f2147aea3f4d82ea1f6e2900";
-const CONTEXT: &str = "8e9e5694bc79c03d79933aaea651efbe9bbedaef366b891cd66e2525d1c45d83e9b53aa840d1e0";
+const CONTEXT: &str = "8e9e5694bc79c7a0f7d79aa0026eed74d0eca676e59de9c14617954c2644f2f7591908097e78d5";
 
 #[test]
 #[ignore = "writes the corpus anew"]

@@ -1,7 +1,10 @@
 //! What every chunk promises, whichever coder wrote it.
 
+use super::bits::BitWriter;
+use super::chunk::header_for;
+use super::header::Body;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
-use crate::map::{Cell, LabelGrid, Rect};
+use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
@@ -108,6 +111,26 @@ proptest! {
         (base, _, _) in change(), bytes in prop::collection::vec(any::<u8>(), 0..80),
     ) {
         let _ = decode(&base, &bytes);
+        let _ = restored_png(&bytes);
+    }
+
+    #[test]
+    fn arbitrary_bodies_behind_a_right_head_are_read_or_refused_without_panic(
+        (base, _, _) in change(), context: bool, x in -30..30i32, y in -30..30i32,
+        width in 1..60u32, height in 1..60u32, body in prop::collection::vec(any::<u8>(), 0..120),
+    ) {
+        let patch = Rect { x, y, width, height };
+        let head = header_for(&base, if context { Body::Context } else { Body::Png }, patch);
+        let mut bits = BitWriter::default();
+        head.write(&mut bits);
+        body.iter().for_each(|&byte| bits.put(u64::from(byte), 8));
+        let mut bytes = bits.into_bytes();
+        head.seal(&mut bytes);
+        match decode(&base, &bytes) {
+            Ok(changes) => prop_assert!(changes.iter().all(|&(cell, label)| patch.contains(cell)
+                && label <= MAX_LABEL && base.get(cell) != label)),
+            Err(error) => prop_assert!(!matches!(error, DecodeError::BaseMismatch | DecodeError::BadGeometry)),
+        }
         let _ = restored_png(&bytes);
     }
 

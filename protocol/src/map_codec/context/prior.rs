@@ -27,6 +27,8 @@ pub(super) struct Prior {
     pub(super) label: StagePrior,
 }
 
+/// Written by `cargo run --release -p scenecast-protocol --example train_prior 1 1500 prior.bin`; part of the wire
+/// format: another table is another coder.
 const TABLE: &[u8] = include_bytes!("prior.bin");
 
 static SHIPPED: LazyLock<Prior> = LazyLock::new(|| Prior::from_bytes(TABLE).unwrap_or_else(Prior::blank));
