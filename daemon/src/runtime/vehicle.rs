@@ -119,6 +119,7 @@ impl Host {
 
     fn pump(&mut self) -> Result<(), Problem> {
         let now: Instant = self.clock.now();
+        self.vehicle.steer();
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => {
