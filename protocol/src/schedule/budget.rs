@@ -13,9 +13,10 @@ use std::time::Duration;
 ///   the bucket, which then leaves a debt). This bounds the long-run mean where a transmission is large against a window.
 #[derive(Debug, Clone)]
 pub struct BitBudget {
-    bits_per_s: f64,
+    bits_per_s: u32,
     window: Duration,
-    tokens: f64,
+    /// Millionths of a bit, so that a rate times microseconds is exact; below zero is debt.
+    tokens: i128,
     filled: Instant,
     recent: VecDeque<(Instant, u64)>,
     recent_bits: u64,
@@ -24,14 +25,14 @@ pub struct BitBudget {
 impl BitBudget {
     /// A budget of `bits_per_s` over `window`, unused at `now`.
     pub fn new(bits_per_s: u32, window: Duration, now: Instant) -> Self {
-        let rate = f64::from(bits_per_s.max(1));
-        let tokens = rate * window.as_secs_f64();
-        Self { bits_per_s: rate, window, tokens, filled: now, recent: VecDeque::new(), recent_bits: 0 }
+        let bits_per_s = bits_per_s.max(1);
+        let tokens = i128::from(bits_per_s) * window.as_micros() as i128;
+        Self { bits_per_s, window, tokens, filled: now, recent: VecDeque::new(), recent_bits: 0 }
     }
 
     /// Bits a second.
     pub fn bits_per_s(&self) -> u32 {
-        self.bits_per_s as u32
+        self.bits_per_s
     }
 
     /// The window.
@@ -42,26 +43,26 @@ impl BitBudget {
     /// Changes the rate from `now` on; what was sent stays counted.
     pub fn set_rate(&mut self, bits_per_s: u32, now: Instant) {
         self.advance(now);
-        self.bits_per_s = f64::from(bits_per_s.max(1));
+        self.bits_per_s = bits_per_s.max(1);
         self.tokens = self.tokens.min(self.capacity());
     }
 
     /// When a transmission of `bits` may begin; `now` if it may at once.
     pub fn earliest(&self, bits: u64, now: Instant) -> Instant {
         let mut at = now;
-        let tokens = self.tokens + self.bits_per_s * now.since(self.filled).as_secs_f64();
-        let short = (bits as f64).min(self.capacity()) - tokens;
-        if short > 0.0 {
-            at = now + Duration::from_micros((short / self.bits_per_s * 1e6).ceil() as u64);
+        let short = millionths(bits).min(self.capacity()) - self.tokens - self.gained(now);
+        if short > 0 {
+            let micros = short.div_euclid(i128::from(self.bits_per_s)) + 1;
+            at = now + Duration::from_micros(micros as u64);
         }
         let limit = self.capacity();
-        let mut sum = self.recent_bits as f64;
+        let mut sum = millionths(self.recent_bits);
         for &(sent, sent_bits) in &self.recent {
             if sum < limit {
                 break;
             }
             at = at.max(sent + self.window);
-            sum -= sent_bits as f64;
+            sum -= millionths(sent_bits);
         }
         at
     }
@@ -81,18 +82,21 @@ impl BitBudget {
     /// Counts a transmission that begins at `now`.
     pub fn spend(&mut self, bits: u64, now: Instant) {
         self.advance(now);
-        self.tokens -= bits as f64;
+        self.tokens -= millionths(bits);
         self.recent.push_back((now, bits));
         self.recent_bits += bits;
     }
 
-    fn capacity(&self) -> f64 {
-        self.bits_per_s * self.window.as_secs_f64()
+    fn capacity(&self) -> i128 {
+        i128::from(self.bits_per_s) * self.window.as_micros() as i128
+    }
+
+    fn gained(&self, now: Instant) -> i128 {
+        i128::from(self.bits_per_s) * now.since(self.filled).as_micros() as i128
     }
 
     fn advance(&mut self, now: Instant) {
-        let gained = self.bits_per_s * now.since(self.filled).as_secs_f64();
-        self.tokens = (self.tokens + gained).min(self.capacity());
+        self.tokens = (self.tokens + self.gained(now)).min(self.capacity());
         self.filled = self.filled.max(now);
         while let Some(&(sent, bits)) = self.recent.front()
             && now.since(sent) >= self.window
@@ -101,6 +105,10 @@ impl BitBudget {
             self.recent_bits -= bits;
         }
     }
+}
+
+fn millionths(bits: u64) -> i128 {
+    i128::from(bits) * 1_000_000
 }
 
 #[cfg(test)]
