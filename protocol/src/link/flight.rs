@@ -34,9 +34,9 @@ impl<T> Flight<T> {
         self.next - self.horizon >= MAX_WINDOW
     }
 
-    /// Whether every frame's fate is known.
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
+    /// The last frame whose fate is known.
+    pub fn horizon(&self) -> FrameNumber {
+        self.horizon
     }
 
     /// The next frame was written and carries `content`.

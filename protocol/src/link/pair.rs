@@ -65,9 +65,9 @@ impl<T> Pair<T> {
         self.flight.is_full()
     }
 
-    /// Whether the fate of some frame is unknown.
-    pub fn awaits_ack(&self) -> bool {
-        !self.flight.is_empty()
+    /// The last frame whose fate is known.
+    pub fn horizon(&self) -> FrameNumber {
+        self.flight.horizon()
     }
 
     /// Number of the next frame; the peer sees its low bits.

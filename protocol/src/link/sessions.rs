@@ -20,15 +20,20 @@ pub struct Sessions {
     own: SessionId,
     peer: Option<SessionId>,
     retired: VecDeque<SessionId>,
+    /// A retired run that is heard while the known one is silent, and how often.
+    returning: Option<(SessionId, u32)>,
 }
 
 impl Sessions {
     /// Ended runs to remember.
     const MEMORY: usize = 16;
+    /// Frames of a retired run, with none of the known one between them, after which it counts as alive. A frame that was
+    /// long under way can make an ended run look new and the living one retired; this undoes it.
+    const RETURNS: u32 = 3;
 
     /// A session of ours toward a peer that we know nothing of.
     pub fn new(own: SessionId) -> Self {
-        Self { own, peer: None, retired: VecDeque::new() }
+        Self { own, peer: None, retired: VecDeque::new(), returning: None }
     }
 
     /// Our own session.
@@ -49,11 +54,14 @@ impl Sessions {
     /// Takes note of the session in a verified frame.
     pub fn observe(&mut self, session: SessionId) -> Sighting {
         if self.peer == Some(session) {
+            self.returning = None;
             return Sighting::Known;
         }
-        if self.retired.contains(&session) {
+        if self.retired.contains(&session) && !self.has_returned(session) {
             return Sighting::Retired;
         }
+        self.returning = None;
+        self.retired.retain(|&old| old != session);
         if let Some(old) = self.peer.replace(session) {
             self.retired.push_back(old);
             if self.retired.len() > Self::MEMORY {
@@ -61,5 +69,27 @@ impl Sessions {
             }
         }
         Sighting::New
+    }
+
+    fn has_returned(&mut self, session: SessionId) -> bool {
+        let before = self.returning.filter(|(s, _)| *s == session).map_or(0, |(_, n)| n);
+        self.returning = Some((session, before + 1));
+        before + 1 >= Self::RETURNS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_living_run_comes_back_after_a_late_frame_of_an_ended_one_displaced_it() {
+        let [ended, living] = [1, 2].map(SessionId::from_random);
+        let mut sessions = Sessions::new(SessionId::from_random(9));
+        assert_eq!(sessions.observe(living), Sighting::New);
+        assert_eq!(sessions.observe(ended), Sighting::New, "never heard before: it may be a restart");
+        let seen: Vec<Sighting> = (0..4).map(|_| sessions.observe(living)).collect();
+        assert_eq!(seen, [Sighting::Retired, Sighting::Retired, Sighting::New, Sighting::Known]);
+        assert_eq!(sessions.observe(ended), Sighting::Retired);
     }
 }

@@ -203,8 +203,7 @@ impl SurfaceLink {
         if fresh {
             self.current = Some(vehicle);
             self.grant = peer.master.grant(&self.config.modem);
-            peer.outbox.begin_turn();
-            peer.master.begin(self.grant, now);
+            peer.begin_turn(self.grant, now);
             self.hello = says_hello(peer.master.unanswered()) || peer.pair.is_full();
         }
         let (transmit, last) = peer.write_frame(&self.config.modem, self.grant, self.hello, now);

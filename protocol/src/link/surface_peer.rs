@@ -30,6 +30,10 @@ pub(super) struct Peer {
     /// Smoothed time between two answered turns.
     interval: Option<Duration>,
     answered: Option<Instant>,
+    /// Number of the first frame of the last turn: an answer has judged it.
+    turn_began: u64,
+    /// Whether the last turn was a hello, which has no number that an answer could name.
+    greeted: bool,
     /// The two ends were found to differ: a new session is to be begun.
     pub(super) out_of_step: bool,
 }
@@ -99,6 +103,8 @@ impl Peer {
             heard: None,
             interval: None,
             answered: None,
+            turn_began: 0,
+            greeted: false,
             out_of_step: false,
         }
     }
@@ -111,7 +117,14 @@ impl Peer {
         now: Instant,
         events: &mut VecDeque<SurfaceEvent>,
     ) {
-        let Ok(inbound) = self.pair.handle_frame(bytes) else { return };
+        let inbound = match self.pair.handle_frame(bytes) {
+            Ok(inbound) => inbound,
+            Err(reason) => {
+                // The vehicle builds on what we never acknowledged: it took us for another run in between.
+                self.out_of_step |= reason == DropReason::NoBase;
+                return;
+            }
+        };
         let vehicle = self.pair.peer();
         if inbound.restarted {
             self.replica.clear();
@@ -131,7 +144,9 @@ impl Peer {
         let Some(number) = number else { return };
         self.heard = Some(now);
         self.measure_interval(now);
-        self.master.handle_frame(bytes.len(), header.remaining, header.turn, modem, now);
+        if self.greeted || self.pair.horizon() >= self.turn_began {
+            self.master.handle_answer(bytes.len(), header.remaining, header.turn, modem, now);
+        }
         self.replica.advance_base(base);
         let version = self.replica.version();
         let mut overhead = bytes.len();
@@ -202,6 +217,13 @@ impl Peer {
         modem.bits_on_air(if slots { modem.frame_bytes } else { modem.frame_bytes.min(40) })
     }
 
+    /// A turn of the surface begins.
+    pub(super) fn begin_turn(&mut self, grant: u8, now: Instant) {
+        self.outbox.begin_turn();
+        self.master.begin(grant, now);
+        self.turn_began = self.pair.next_number();
+    }
+
     /// The next frame of the surface's turn and whether it is the last.
     pub(super) fn write_frame(
         &mut self,
@@ -216,6 +238,7 @@ impl Peer {
             modem.frame_bytes.saturating_sub(slot + 18).clamp(SHORT_ACK, modem.frame_bytes / 2)
         });
         let (mut builder, hello) = self.pair.begin_frame(modem.frame_bytes, ack_room, 0, Some(grant), hello);
+        self.greeted = hello;
         let mut carried = Carried::new();
         if !hello {
             self.fill(&mut builder, &mut carried, now);

@@ -142,9 +142,7 @@ impl VehicleLink {
 
     /// Whether the surface is known to hold the map, and every object.
     pub fn is_settled(&self) -> bool {
-        (self.map.is_settled() || !self.config.replicate_map)
-            && self.objects.backlog_bytes() == 0
-            && !self.pair.awaits_ack()
+        (self.map.is_settled() || !self.config.replicate_map) && self.objects.is_empty()
     }
 
     /// What each label is worth to the operator, 0..=1; what differs from his picture goes out in that order.
@@ -219,7 +217,16 @@ impl VehicleLink {
 
     /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
-        let Ok(inbound) = self.pair.handle_frame(bytes) else { return };
+        let inbound = match self.pair.handle_frame(bytes) {
+            Ok(inbound) => inbound,
+            Err(reason) => {
+                // The surface builds on what we never acknowledged: it took us for another run in between.
+                if reason == DropReason::NoBase {
+                    self.start_afresh(now);
+                }
+                return;
+            }
+        };
         if inbound.restarted {
             self.map.handle_peer_restart(now);
             self.objects.handle_peer_restart();
@@ -297,11 +304,8 @@ impl VehicleLink {
             return None;
         }
         if self.pair.is_full() {
-            // The surface has heard nothing for so long that numbers run out: it gets everything afresh.
-            let session = self.next_session();
-            self.pair.renew(session);
-            self.map.handle_peer_restart(now);
-            self.objects.handle_peer_restart();
+            // The surface has heard nothing for so long that numbers run out.
+            self.start_afresh(now);
         }
         let (bytes, last) = self.write_frame(frames, now);
         if last {
@@ -312,9 +316,12 @@ impl VehicleLink {
         Some(bytes)
     }
 
-    /// A session that differs from every recent one.
-    fn next_session(&self) -> SessionId {
-        SessionId::from_random(self.pair.own_session().get().wrapping_mul(0x6255).wrapping_add(0x3619))
+    /// Begins a session that differs from every recent one; the surface gets everything anew.
+    fn start_afresh(&mut self, now: Instant) {
+        let session = self.pair.own_session().get().wrapping_mul(0x6255).wrapping_add(0x3619);
+        self.pair.renew(SessionId::from_random(session));
+        self.map.handle_peer_restart(now);
+        self.objects.handle_peer_restart();
     }
 
     fn frames_wanted(&self) -> u32 {

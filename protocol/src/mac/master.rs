@@ -126,12 +126,17 @@ impl Master {
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, now: Instant) {
         let flight =
             self.round_trip.map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 2 + Duration::from_millis(200));
-        let until = now + flight + profile.turn_around * 2 + profile.frame_airtime();
+        // A vehicle farther away than it was thought to be must not be talked over for ever.
+        let patience = Duration::from_secs(1) * self.unanswered.saturating_sub(4).min(10);
+        let until = now + patience + flight + profile.turn_around * 2 + profile.frame_airtime();
         self.state = State::Granted { granted: now, until };
     }
 
-    /// A frame of the vehicle was heard, which it says `remaining` more will follow; `wish` is its turn byte.
-    pub fn handle_frame(
+    /// A frame of the vehicle was heard, after which it says `remaining` more will follow; `wish` is its turn byte.
+    ///
+    /// Only for a frame that proves that the vehicle has heard the grant: one that was late under way or came twice tells
+    /// nothing about the turn or the round trip.
+    pub fn handle_answer(
         &mut self,
         bytes: usize,
         remaining: u8,

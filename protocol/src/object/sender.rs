@@ -48,6 +48,11 @@ impl ObjectSender {
         self.objects.retain(|&serial, _| serial as u8 != id.0);
     }
 
+    /// Whether the peer is known to have every object.
+    pub fn is_empty(&self) -> bool {
+        self.objects.is_empty()
+    }
+
     /// Bytes that wait for their first or next transmission.
     pub fn backlog_bytes(&self) -> usize {
         self.objects.values().flat_map(|o| &o.state).filter(|&&s| s == ByteState::Missing).count()
