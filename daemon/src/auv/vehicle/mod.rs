@@ -1,5 +1,7 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
+mod obey;
+
 use super::exemplar::{Exemplar, encode_webp};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
@@ -11,7 +13,6 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{SessionId, SlotState, VehicleMode, VehicleStatus};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
-use std::time::Duration;
 
 /// Most bytes of a representative image.
 const EXEMPLAR_BYTES: usize = 700;
@@ -284,68 +285,6 @@ impl Vehicle {
         self.durable.inbox = self.link.persistent_state().clone();
         self.outputs.push_back(VehicleOutput::Persist);
         self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));
-    }
-
-    fn apply(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
-        match slot {
-            Slot::Utility(utility) => self.apply_utility(utility),
-            Slot::Constraints(constraints) => {
-                self.durable.hold = constraints.hold;
-                self.waypoint = None;
-                if constraints.hold {
-                    self.outputs.push_back(VehicleOutput::Hold);
-                }
-                Ok(())
-            }
-            Slot::Settings(settings) => {
-                self.durable.refine_words_per_s = Some(settings.refine_words_per_s);
-                self.outputs.push_back(VehicleOutput::RefineRate(settings.refine_words_per_s));
-                Ok(())
-            }
-            Slot::Budget(budget) if (10..=10_000_000).contains(&budget.bits_per_s) => {
-                self.link.set_budget(budget.bits_per_s, now);
-                self.durable.budget_bps = Some(budget.bits_per_s);
-                Ok(())
-            }
-            Slot::Budget(_) => Err(RefusalReason::OutOfRange),
-            Slot::Requests(requests) if requests.epoch != self.durable.epoch => Err(RefusalReason::OtherEpoch),
-            Slot::Requests(requests) if requests.wanted.iter().any(|&(l, _)| l == 0 || l > self.labels) => {
-                Err(RefusalReason::UnknownLabel)
-            }
-            Slot::Requests(requests) => {
-                self.requests = requests;
-                Ok(())
-            }
-            Slot::Fix(fix) => {
-                let taken = now - Duration::from_secs_f64(fix.age_s);
-                let used = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
-                self.fixes_applied += u64::from(used);
-                if used { Ok(()) } else { Err(RefusalReason::TooOld) }
-            }
-        }
-    }
-
-    fn apply_utility(&mut self, utility: Utility) -> Result<(), RefusalReason> {
-        if !utility.is_in_range() {
-            return Err(RefusalReason::OutOfRange);
-        }
-        if utility.epoch != self.durable.epoch {
-            return Err(RefusalReason::OtherEpoch);
-        }
-        if utility.weights.keys().any(|&label| label > self.labels) {
-            return Err(RefusalReason::UnknownLabel);
-        }
-        let u = &utility;
-        self.durable.utility = Some((u.epoch, u.exploration, u.curiosity, u.weights.clone()));
-        self.utility = Some(utility);
-        self.waypoint = None;
-        self.follow_utility();
-        Ok(())
-    }
-
-    fn follow_utility(&mut self) {
-        let utility = self.utility.clone().unwrap_or_default();
-        self.link.set_interest(|label| utility.weight(label));
     }
 
     /// The host has made [`Self::durable`] durable.
