@@ -4,7 +4,17 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let arguments = scenecast::cli::Arguments::parse();
+    let arguments = match scenecast::cli::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(e) if !e.use_stderr() => e.exit(),
+        Err(e) => {
+            let text = e.to_string();
+            let what = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+            let rest: Vec<&str> = text.lines().skip(1).map(str::trim).take_while(|l| !l.is_empty()).collect();
+            eprintln!("scenecast: {what} {} (scenecast COMMAND --help tells what there is)", rest.join(" "));
+            return ExitCode::from(2);
+        }
+    };
     match scenecast::cli::run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(problem) => {

@@ -94,9 +94,13 @@ pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
     let failed = |e: std::io::Error| Problem::Failed(format!("{}: {e}", path.display()));
     let part = path.with_extension("part");
-    let mut file = std::fs::File::create(&part).map_err(failed)?;
-    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed)?;
-    std::fs::rename(&part, path).map_err(failed)?;
+    let written = std::fs::File::create(&part)
+        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
+        .and_then(|()| std::fs::rename(&part, path));
+    if let Err(e) = written {
+        let _ = std::fs::remove_file(&part);
+        return Err(failed(e));
+    }
     if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
         std::fs::File::open(dir).and_then(|d| d.sync_all()).map_err(failed)?;
     }

@@ -30,7 +30,10 @@ impl Problem {
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Input(what) | Self::Failed(what) => f.write_str(what),
+            // One line, whatever a library has put into its message.
+            Self::Input(what) | Self::Failed(what) => {
+                f.write_str(&what.split_whitespace().collect::<Vec<_>>().join(" "))
+            }
         }
     }
 }

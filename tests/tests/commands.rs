@@ -41,6 +41,10 @@ fn wrong_input_is_answered_with_one_line_that_says_what_is_allowed() {
     assert_refused(&["sim", "--set", "channel.loss=2", "--out", out], &["channel.loss", "0 to 0.99"]);
     assert_refused(&["sim", "--set", "map.codec=jpeg", "--out", out], &["map.codec", "auto, png, context"]);
     assert_refused(&["sim", "--duration", "nan", "--out", out], &["survey.duration_s"]);
+    assert_refused(&["sim", "--set", "survey.area_m=[5,5,1,1]", "--out", out], &["survey.area_m", "at least 1 m"]);
+    assert_refused(&["sim", "--set", "survey.area_m=[500,500,600,600]", "--out", out], &["survey.area_m", "26 m east"]);
+    assert_refused(&["sim", "--duration", "-5", "--out", out], &["survey.duration_s", "from 0"]);
+    assert_refused(&["sim"], &["--out"]);
     assert_refused(&["auv", "--config", "nowhere.toml"], &["nowhere.toml"]);
     assert!(!dir.join("out").exists(), "nothing was written");
 }

@@ -22,10 +22,10 @@ pub(super) struct WorldArguments {
     #[arg(long, value_name = "LABELS", requires = "mosaic")]
     pub annotations: Option<PathBuf>,
     /// Size of the image's pixels on the sea floor [default: camera.metres_per_pixel]
-    #[arg(long, value_name = "M", requires = "mosaic")]
+    #[arg(long, value_name = "M", requires = "mosaic", allow_negative_numbers = true)]
     pub metres_per_pixel: Option<f64>,
     /// Length of the survey in seconds
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Seed of everything random
     #[arg(long, default_value_t = 1)]
@@ -77,7 +77,7 @@ pub(super) struct Sim {
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
     /// Longest time in seconds for the link to carry what is left after the survey
-    #[arg(long, value_name = "SECONDS", default_value_t = 7200.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 7200.0, allow_negative_numbers = true)]
     drain: f64,
     /// Folder for report.json, maps, images and frames.log
     #[arg(long, value_name = "DIR")]

@@ -38,9 +38,15 @@ pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, Problem> {
     Ok(config)
 }
 
-/// What no single value tells: a turn must have room for a frame.
+/// What no single value tells: an area has a size, a turn has room for a frame.
 fn check_together(config: &Config) -> Result<(), Problem> {
     const LONGEST_FRAME_S: f64 = 55.0;
+    let [west, south, east, north] = config.survey.area_m;
+    if config.survey.area_m != [0.0; 4] && !(east - west >= 1.0 && north - south >= 1.0) {
+        let given = format!("survey.area_m = {:?}", config.survey.area_m);
+        let rule = "west, south, east, north with east and north at least 1 m above west and south, or all 0";
+        return Err(Problem::Input(format!("{given} is not allowed: it takes {rule}")));
+    }
     let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
     for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
         if bits / rate > LONGEST_FRAME_S {

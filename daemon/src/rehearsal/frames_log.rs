@@ -7,15 +7,24 @@ use std::fmt::Write;
 /// What is kept of a frame until its fate is known.
 #[derive(Debug, Clone)]
 struct Sent {
+    at_s: f64,
     direction: &'static str,
     bytes: usize,
     kind: &'static str,
 }
 
+impl Sent {
+    fn write(&self, fate: &str, text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{:.3} {} {} {} {fate}", self.at_s, self.direction, self.bytes, self.kind);
+    }
+}
+
 /// The log of a mission's frames.
 ///
 /// One line a frame, in the order in which their fates became known: time of transmission in seconds, `up` or `down`,
-/// bytes, kind, `ok` or `lost`, and why it was lost.
+/// bytes, kind, `ok` or `lost` and why, or `open`: still under
+/// way at the end.
 #[derive(Debug)]
 pub struct FramesLog {
     open: BTreeMap<u64, Sent>,
@@ -35,10 +44,10 @@ impl Default for FramesLog {
 
 impl FramesLog {
     /// A frame went on air.
-    pub fn handle_sent(&mut self, transmission: u64, up: bool, bytes: usize, kind: &'static str) {
+    pub fn handle_sent(&mut self, transmission: u64, up: bool, bytes: usize, kind: &'static str, at_s: f64) {
         let direction = if up { "up" } else { "down" };
         self.sent[usize::from(!up)] += 1;
-        self.open.insert(transmission, Sent { direction, bytes, kind });
+        self.open.insert(transmission, Sent { at_s, direction, bytes, kind });
     }
 
     /// The fate of a frame is known; later copies are not logged again.
@@ -51,12 +60,15 @@ impl FramesLog {
             }
             sim_channel::Outcome::Delivered { .. } => "ok".to_owned(),
         };
-        let time = arrival.sent_at.as_secs_f64();
-        let _ = writeln!(self.text, "{time:.3} {} {} {} {fate}", sent.direction, sent.bytes, sent.kind);
+        sent.write(&fate, &mut self.text);
     }
 
-    /// The log so far.
-    pub fn text(&self) -> &str {
-        &self.text
+    /// The log so far; what is still under way is `open`.
+    pub fn text(&self) -> String {
+        let mut text = self.text.clone();
+        for sent in self.open.values() {
+            sent.write("open", &mut text);
+        }
+        text
     }
 }

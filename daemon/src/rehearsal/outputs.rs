@@ -12,7 +12,8 @@ use std::path::Path;
 /// Writes report, maps, images and frame log into a folder, which is made.
 pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path) -> Result<(), Problem> {
     let failed = |path: &Path, e: std::io::Error| Problem::Failed(format!("{}: {e}", path.display()));
-    std::fs::create_dir_all(dir).map_err(|e| failed(dir, e))?;
+    std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, format!("cannot be used as a folder: {e}")))?;
+    remove_old(dir);
     let bounds = mission.vehicle.map().bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
     write_map(&dir.join("vehicle-map.png"), mission.vehicle.map(), bounds)?;
     write_map(&dir.join("operator-map.png"), &mission.operator_map(), bounds)?;
@@ -31,6 +32,19 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     figures["wall"] = wall;
     let text = serde_json::to_string_pretty(&figures).map_err(|e| Problem::Failed(e.to_string()))? + "\n";
     picture::write_whole(&dir.join("report.json"), text.as_bytes())
+}
+
+/// Removes what an earlier run left that this one may not write again.
+fn remove_old(dir: &Path) {
+    // What is not there need not be removed; what cannot be removed is complained of when it is written.
+    let _ = std::fs::remove_file(dir.join("truth.png"));
+    for entry in std::fs::read_dir(dir.join("exemplars")).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("label-") && name.ends_with(".webp") {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
 }
 
 fn write_map(path: &Path, map: &LabelGrid, bounds: Rect) -> Result<(), Problem> {

@@ -102,7 +102,16 @@ fn mirror(at: f64, size: u32) -> u32 {
 }
 
 fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
-    let reader = image::ImageReader::open(path).map_err(|e| Problem::file(path, e))?;
+    let bytes = std::fs::read(path).map_err(|e| Problem::file(path, e))?;
+    // The decoder fills the missing part of a cut JPEG with grey, which would be surveyed as sea floor.
+    let cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
+    if cut {
+        return Err(Problem::file(
+            path,
+            "not an image that can be read: the JPEG has no end, so a part of it is missing",
+        ));
+    }
+    let reader = image::ImageReader::new(std::io::Cursor::new(bytes));
     let reader = reader.with_guessed_format().map_err(|e| Problem::file(path, e))?;
     reader.decode().map_err(|e| Problem::file(path, format!("not an image that can be read: {e}")))
 }

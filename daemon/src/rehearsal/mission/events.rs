@@ -113,7 +113,7 @@ impl Mission {
         let from = if node == 0 { VEHICLE } else { SURFACE };
         let n = bytes.len();
         let transmission = self.channel.transmit(from, bytes, airtime, self.now.into());
-        self.log.handle_sent(transmission, node == 0, n, kind);
+        self.log.handle_sent(transmission, node == 0, n, kind, self.now.as_secs_f64());
         self.transmitting[node] = Some(self.now + airtime);
     }
 

@@ -95,6 +95,11 @@ impl Mission {
             source => Some(Recording::open(Recording::folder(source)?)?),
         };
         let area = survey_area(&config, recording.as_ref(), &world);
+        if recording.is_none() && !overlap(&area, &world.area()) {
+            let a = world.area();
+            let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);
+            return Err(Problem::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
+        }
         let mut dice = Stream::new(seed, &[2]);
         let session = SessionId::from_random(dice.below(65_536) as u16);
         let vehicle = ends::vehicle(&config, modem, area, Durable::default(), session, now)?;
@@ -271,6 +276,10 @@ fn survey_area(config: &Config, recording: Option<&Recording>, world: &World) ->
         }
         None => world.area(),
     }
+}
+
+fn overlap(a: &Area, b: &Area) -> bool {
+    a.west < b.east && b.west < a.east && a.south < b.north && b.south < a.north
 }
 
 fn channel_config(config: &Config) -> ChannelConfig {
