@@ -67,24 +67,51 @@ pub fn read_whole(object: &[u8]) -> Option<LabelGrid> {
     decode(png, i32::from_be_bytes(*x), i32::from_be_bytes(*y)).ok()
 }
 
-/// Reads an indexed PNG as a map whose south-west cell is `(x0, y0)`.
-pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
+/// The raw indices of an image, row by row from the top.
+pub struct Indices {
+    /// One index a pixel.
+    pub pixels: Vec<u8>,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// Most cells of a whole map that is received.
+const MAX_RECEIVED_CELLS: u64 = 1 << 22;
+
+/// Reads the indices of an indexed PNG of at most `most` pixels; `None` if it is another kind of file.
+pub fn read_indices(bytes: &[u8], most: u64) -> Result<Option<Indices>, String> {
     let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
-    let mut reader = decoder.read_info().map_err(|e| e.to_string())?;
+    let Ok(mut reader) = decoder.read_info() else { return Ok(None) };
+    let (width, height) = (reader.info().width, reader.info().height);
     if reader.info().color_type != png::ColorType::Indexed {
-        return Err("not an indexed PNG".to_owned());
+        return Ok(None);
+    }
+    if u64::from(width) * u64::from(height) > most {
+        return Err(format!("{width} x {height} pixels are more than the {most} allowed"));
     }
     let depth = reader.info().bit_depth as usize;
-    let mut pixels = vec![0; reader.output_buffer_size().ok_or("too large")?];
-    let info = reader.next_frame(&mut pixels).map_err(|e| e.to_string())?;
+    let mut raw = vec![0; reader.output_buffer_size().unwrap_or(0)];
+    let info = reader.next_frame(&mut raw).map_err(|e| e.to_string())?;
+    let index = |line: &[u8], column: usize| {
+        let bit = column * depth;
+        let byte = line.get(bit / 8).copied().unwrap_or(0);
+        byte >> (8 - depth - bit % 8) & (0xFFu16 >> (8 - depth)) as u8
+    };
+    let lines = raw.chunks(info.line_size).take(height as usize);
+    let pixels = lines.flat_map(|line| (0..width as usize).map(move |column| index(line, column))).collect();
+    Ok(Some(Indices { pixels, width, height }))
+}
+
+/// Reads an indexed PNG as a map whose south-west cell is `(x0, y0)`.
+pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
+    let image = read_indices(bytes, MAX_RECEIVED_CELLS)?.ok_or("not an indexed PNG")?;
     let mut grid = LabelGrid::default();
-    for (row, line) in pixels.chunks(info.line_size).take(info.height as usize).enumerate() {
-        for column in 0..info.width as usize {
-            let bit = column * depth;
-            let byte = line.get(bit / 8).copied().unwrap_or(0);
-            let label = byte >> (8 - depth - bit % 8) & (0xFFu16 >> (8 - depth)) as u8;
-            grid.set(Cell::new(x0 + column as i32, y0 + (info.height as usize - 1 - row) as i32), label);
+    for (row, line) in (0..image.height).rev().zip(image.pixels.chunks(image.width as usize)) {
+        for (column, &label) in (0..image.width).zip(line) {
+            grid.set(Cell::new(x0.wrapping_add_unsigned(column), y0.wrapping_add_unsigned(row)), label);
         }
     }
     Ok(grid)
@@ -122,6 +149,15 @@ mod tests {
             assert_eq!(decode(&png, bounds.x, bounds.y).unwrap(), grid, "{labels} labels");
             assert_eq!(read_whole(&with_place(&grid, &png)).unwrap(), grid);
         }
+    }
+
+    #[test]
+    fn a_received_map_that_claims_too_much_is_refused() {
+        let grid: LabelGrid = [(Cell::new(0, 0), 1)].into_iter().collect();
+        let huge = Rect { x: 0, y: 0, width: 1 << 12, height: (1 << 10) + 1 };
+        assert!(decode(&encode_within(&grid, huge).unwrap(), 0, 0).is_err());
+        let small = encode_within(&grid, Rect { x: 0, y: 0, width: 3, height: 2 }).unwrap();
+        assert!(decode(&small, i32::MAX, i32::MAX).is_ok(), "a place at the end of the world is no panic");
     }
 
     #[test]

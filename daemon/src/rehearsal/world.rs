@@ -1,6 +1,7 @@
 //! The sea floor of a rehearsal.
 
 use crate::auv::Area;
+use crate::picture::{Indices, read_indices};
 use crate::problem::Problem;
 use image::RgbImage;
 use scenecast_protocol::map::Cell;
@@ -118,8 +119,11 @@ fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
 
 /// Classes from a grey or indexed image: the pixel value is the class.
 fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, Problem> {
-    let (classes, width, height) = match read_indexed(path)? {
-        Some(indexed) => indexed,
+    let bytes = std::fs::read(path).map_err(|e| Problem::file(path, e))?;
+    let unreadable = |e| Problem::file(path, format!("not an image that can be read: {e}"));
+    let indices = read_indices(&bytes, u64::from(u32::MAX)).map_err(unreadable)?;
+    let (classes, width, height) = match indices {
+        Some(Indices { pixels, width, height }) => (pixels, width, height),
         None => {
             let grey = match read_image(path)? {
                 image::DynamicImage::ImageLuma8(grey) => grey,
@@ -134,29 +138,6 @@ fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, Problem> {
         return Err(Problem::file(path, what));
     }
     Ok(classes)
-}
-
-/// The raw indices of an indexed PNG, `None` if the file is not one.
-fn read_indexed(path: &Path) -> Result<Option<(Vec<u8>, u32, u32)>, Problem> {
-    let file = std::fs::File::open(path).map_err(|e| Problem::file(path, e))?;
-    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
-    decoder.set_transformations(png::Transformations::IDENTITY);
-    let Ok(mut reader) = decoder.read_info() else { return Ok(None) };
-    let (width, height) = (reader.info().width, reader.info().height);
-    if reader.info().color_type != png::ColorType::Indexed {
-        return Ok(None);
-    }
-    let depth = reader.info().bit_depth as usize;
-    let mut raw = vec![0; reader.output_buffer_size().unwrap_or(0)];
-    let info =
-        reader.next_frame(&mut raw).map_err(|e| Problem::file(path, format!("not an image that can be read: {e}")))?;
-    let index = |line: &[u8], x: usize| {
-        let bit = x * depth;
-        line[bit / 8] >> (8 - depth - bit % 8) & (0xFFu16 >> (8 - depth)) as u8
-    };
-    let lines = raw.chunks(info.line_size).take(height as usize);
-    let classes = lines.flat_map(|line| (0..width as usize).map(move |x| index(line, x))).collect();
-    Ok(Some((classes, width, height)))
 }
 
 #[cfg(test)]
