@@ -39,6 +39,12 @@ pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     }
 }
 
+/// The limits of the survey that are configured, if any.
+pub fn configured_area(config: &Config) -> Option<Area> {
+    let [west, south, east, north] = config.survey.area_m;
+    (east > west && north > south).then_some(Area { west, south, east, north })
+}
+
 /// What the camera sees.
 pub fn footprint(config: &Config) -> Footprint {
     let mpp = config.camera.metres_per_pixel;

@@ -1,5 +1,6 @@
 //! Recorded missions: images and where they were taken.
 
+use crate::auv::Area;
 use crate::problem::Problem;
 use image::RgbImage;
 use std::fmt::Write;
@@ -67,10 +68,14 @@ impl Recording {
         dir.map(Path::new).ok_or_else(|| Problem::Input(format!("camera.source = {source:?}: it takes frames:DIR")))
     }
 
-    /// Limits of the places in the recording, metres: west, south, east, north.
-    pub fn limits(&self) -> [f64; 4] {
-        self.frames.iter().fold([f64::MAX, f64::MAX, f64::MIN, f64::MIN], |l, f| {
-            [l[0].min(f.x_m), l[1].min(f.y_m), l[2].max(f.x_m), l[3].max(f.y_m)]
+    /// Limits of the places in the recording.
+    pub fn area(&self) -> Area {
+        let nowhere = Area { west: f64::MAX, south: f64::MAX, east: f64::MIN, north: f64::MIN };
+        self.frames.iter().fold(nowhere, |a, f| Area {
+            west: a.west.min(f.x_m),
+            south: a.south.min(f.y_m),
+            east: a.east.max(f.x_m),
+            north: a.north.max(f.y_m),
         })
     }
 }

@@ -73,13 +73,10 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// The camera that the configuration names.
-    pub(super) fn open(config: &Config, clock: Clock) -> Result<Self, Problem> {
-        let frames = match config.camera.source.as_str() {
-            "" => Vec::new(),
-            source => Recording::open(Recording::folder(source)?)?.frames,
-        };
-        Ok(Self { frames: frames.into_iter().peekable(), clock })
+    /// A camera that plays a recording, if there is one.
+    pub(super) fn new(recording: Option<Recording>, clock: Clock) -> Self {
+        let frames = recording.map(|r| r.frames).unwrap_or_default();
+        Self { frames: frames.into_iter().peekable(), clock }
     }
 
     /// Whether all frames were taken.

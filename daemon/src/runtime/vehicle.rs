@@ -22,13 +22,17 @@ pub fn run_vehicle(config: Config) -> Result<(), Problem> {
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
         let session = SessionId::from_random(super::random_bits() as u16);
-        let area = survey_area(&config)?;
+        let recording = match config.camera.source.as_str() {
+            "" => None,
+            source => Some(Recording::open(Recording::folder(source)?)?),
+        };
+        let area = survey_area(&config, recording.as_ref())?;
         let epoch = durable.epoch;
         let vehicle = crate::ends::vehicle(&config, profile, area, durable, session, clock.now())?;
-        let camera = Camera::open(&config, clock)?;
+        let at_end = recording.is_some();
+        let camera = Camera::new(recording, clock);
         let mapper = mapping::spawn(&config, epoch)?;
         let modem = modem::open(&config, profile).await?;
-        let at_end = camera_ends(&config);
         Host { vehicle, camera, mapper, modem, clock, state_file, at_end, behind: 0 }.run().await
     })
 }
@@ -43,22 +47,10 @@ fn begin_run(state_file: &Path) -> Result<Durable, Problem> {
     Ok(durable)
 }
 
-fn survey_area(config: &Config) -> Result<Area, Problem> {
-    let [west, south, east, north] = config.survey.area_m;
-    if east > west && north > south {
-        return Ok(Area { west, south, east, north });
-    }
-    match config.camera.source.as_str() {
-        "" => Err(Problem::Input("survey.area_m: set the west, south, east and north limits of the survey".to_owned())),
-        source => {
-            let [west, south, east, north] = Recording::open(Recording::folder(source)?)?.limits();
-            Ok(Area { west, south, east, north })
-        }
-    }
-}
-
-fn camera_ends(config: &Config) -> bool {
-    !config.camera.source.is_empty()
+fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, Problem> {
+    let area = crate::ends::configured_area(config).or_else(|| recording.map(Recording::area));
+    let missing = "survey.area_m: set the west, south, east and north limits of the survey";
+    area.ok_or_else(|| Problem::Input(missing.to_owned()))
 }
 
 struct Host {

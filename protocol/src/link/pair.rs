@@ -75,11 +75,6 @@ impl<T> Pair<T> {
         self.flight.next_number()
     }
 
-    /// Distance of the next frame to the last one whose fate is known.
-    pub fn base_distance(&self) -> u16 {
-        self.flight.base_distance()
-    }
-
     /// The window of heard frames, if there is one.
     pub fn window_mut(&mut self) -> Option<&mut Window> {
         self.window.as_mut()

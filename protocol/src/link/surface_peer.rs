@@ -232,7 +232,6 @@ impl Peer {
         hello: bool,
         now: Instant,
     ) -> (Transmit, bool) {
-        let base_distance = self.pair.base_distance();
         let waiting = self.outbox.next(modem.frame_bytes, now).map(|(.., slot)| slot.len());
         let ack_room = waiting.map_or(modem.frame_bytes / 2, |slot| {
             modem.frame_bytes.saturating_sub(slot + 18).clamp(SHORT_ACK, modem.frame_bytes / 2)
@@ -244,7 +243,7 @@ impl Peer {
             self.fill(&mut builder, &mut carried, now);
         }
         let more = !carried.is_empty() && self.outbox.next(modem.frame_bytes, now).is_some();
-        builder.set_remaining(u8::from(more), base_distance);
+        builder.set_remaining(u8::from(more));
         let payload: usize = carried.iter().map(|(_, _, n)| n).sum();
         self.pair.stats.count(Class::Directive, payload);
         let kind = if carried.is_empty() { "grant" } else { "directive" };

@@ -6,9 +6,6 @@ use super::cursor::Reader;
 use super::{MAX_WINDOW, WIRE_VERSION};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
 
-/// Most bytes of a frame that are not chunks, when nothing was lost.
-pub const OVERHEAD_MAX: usize = 16;
-
 /// Frames shorter than this end in a 24-bit CRC, longer ones in a 32-bit one.
 const LONG_FRAME: usize = 128;
 
@@ -207,7 +204,8 @@ pub struct FrameBuilder {
     bytes: Vec<u8>,
     size: usize,
     flags: u8,
-    has_chunks: bool,
+    /// Where the count of remaining frames stands.
+    remaining_at: usize,
 }
 
 impl FrameBuilder {
@@ -223,9 +221,10 @@ impl FrameBuilder {
         } else {
             bytes.extend_from_slice(&(header.base | 0x8000).to_be_bytes());
         }
+        let remaining_at = bytes.len();
         bytes.push(header.remaining);
         bytes.extend(header.turn);
-        let mut builder = Self { bytes, size, flags, has_chunks: false };
+        let mut builder = Self { bytes, size, flags, remaining_at };
         let room = builder.room();
         if let Some(ack) = &header.ack
             && ack.encode(room, &mut builder.bytes)
@@ -236,16 +235,10 @@ impl FrameBuilder {
     }
 
     /// Corrects the count of frames that follow in this turn.
-    pub fn set_remaining(&mut self, remaining: u8, base_distance: u16) {
-        let at = if base_distance < 128 { 7 } else { 8 };
-        if let Some(byte) = self.bytes.get_mut(at) {
+    pub fn set_remaining(&mut self, remaining: u8) {
+        if let Some(byte) = self.bytes.get_mut(self.remaining_at) {
             *byte = remaining;
         }
-    }
-
-    /// Whether nothing but the header was written.
-    pub fn is_bare(&self) -> bool {
-        !self.has_chunks
     }
 
     /// Bytes that chunks can still take, their headers included.
@@ -255,9 +248,7 @@ impl FrameBuilder {
 
     /// Adds a chunk; says whether it fitted.
     pub fn push(&mut self, kind: ChunkKind, payload: &[u8]) -> bool {
-        let fitted = push_chunk(kind, payload, self.room(), &mut self.bytes);
-        self.has_chunks |= fitted;
-        fitted
+        push_chunk(kind, payload, self.room(), &mut self.bytes)
     }
 
     /// Seals the frame to the receiver's session (`None` in a hello); a full frame is padded to its size, a `short` one

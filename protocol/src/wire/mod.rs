@@ -12,7 +12,7 @@ mod status;
 pub use ack::{AckStatement, MAX_WINDOW};
 pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};
 pub use cursor::{Reader, Truncated};
-pub use frame::{Address, Frame, FrameBuilder, FrameError, Header, MissionId, OVERHEAD_MAX, SessionId, crc_len};
+pub use frame::{Address, Frame, FrameBuilder, FrameError, Header, MissionId, SessionId, crc_len};
 pub use number::unwrap_number;
 pub use status::{SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
 

@@ -265,17 +265,7 @@ pub(crate) fn pose_of(vehicle: &Vehicle) -> Pose {
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>, world: &World) -> Area {
-    let [west, south, east, north] = config.survey.area_m;
-    if east > west && north > south {
-        return Area { west, south, east, north };
-    }
-    match recording {
-        Some(recording) => {
-            let [west, south, east, north] = recording.limits();
-            Area { west, south, east, north }
-        }
-        None => world.area(),
-    }
+    ends::configured_area(config).unwrap_or_else(|| recording.map_or_else(|| world.area(), Recording::area))
 }
 
 fn overlap(a: &Area, b: &Area) -> bool {

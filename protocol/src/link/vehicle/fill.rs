@@ -23,7 +23,6 @@ impl VehicleLink {
         let size = self.config.modem.frame_bytes;
         let remaining = (frames - 1) as u8;
         let wish = (remaining == 0).then(|| self.wish(now));
-        let base_distance = self.pair.base_distance();
         let (mut builder, hello) = self.pair.begin_frame(size, size / 6, remaining, wish, false);
         let mut carried = Carried::new();
         let before = builder.room();
@@ -33,7 +32,7 @@ impl VehicleLink {
         let room_left = builder.room();
         let exhausted = room_left > before / 2;
         if exhausted && remaining > 0 {
-            builder.set_remaining(0, base_distance);
+            builder.set_remaining(0);
         }
         let last = remaining == 0 || exhausted;
         let kind = carried.iter().max_by_key(|(_, n)| *n).map_or("ack", |(p, _)| p.class().name());
