@@ -6,10 +6,11 @@ mod settings;
 mod utility;
 
 pub use fix::Fix;
-pub use outbox::{LifeLine, SlotOutbox, SlotProgress};
+pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
 pub use settings::{Budget, Constraints, Requests, Settings};
 pub use utility::Utility;
 
+use crate::schedule::Class;
 use crate::wire::{Reader, Truncated};
 
 /// Number of slots.
@@ -40,6 +41,11 @@ impl SlotId {
     /// Place in [`Self::ALL`] and number on the wire.
     pub fn index(self) -> usize {
         self as usize
+    }
+
+    /// What its bits count as.
+    pub fn class(self) -> Class {
+        if self == Self::Fix { Class::Fix } else { Class::Directive }
     }
 
     /// Name for people.

@@ -34,6 +34,19 @@ pub struct SlotProgress {
     pub issued: Instant,
     /// When `life` last changed.
     pub changed: Instant,
+    /// When it was last put into a frame.
+    pub sent: Option<Instant>,
+}
+
+/// A slot that waits to be heard, as it would go into a frame now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PendingSlot {
+    /// Which slot.
+    pub id: SlotId,
+    /// Its version.
+    pub version: u16,
+    /// The chunk.
+    pub bytes: Vec<u8>,
 }
 
 /// The directive of one vehicle as the surface keeps it.
@@ -41,14 +54,12 @@ pub struct SlotProgress {
 pub struct SlotOutbox {
     series: u16,
     slots: [Option<SlotProgress>; SLOTS],
-    /// Slots put into a frame of the current turn.
-    sent_this_turn: [bool; SLOTS],
 }
 
 impl SlotOutbox {
     /// An empty directive whose versions count in `series`, a random number drawn at each start of the surface.
     pub fn new(series: u16) -> Self {
-        Self { series, slots: Default::default(), sent_this_turn: [false; SLOTS] }
+        Self { series, slots: Default::default() }
     }
 
     /// Issues a new version of a slot, which supersedes the older one; returns its version.
@@ -56,8 +67,8 @@ impl SlotOutbox {
         let id = slot.id();
         let entry = &mut self.slots[id.index()];
         let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
-        *entry = Some(SlotProgress { id, version, slot, life: LifeLine::Queued, issued: now, changed: now });
-        self.sent_this_turn[id.index()] = false;
+        *entry =
+            Some(SlotProgress { id, version, slot, life: LifeLine::Queued, issued: now, changed: now, sent: None });
         version
     }
 
@@ -71,23 +82,26 @@ impl SlotOutbox {
         self.progress().any(|s| matches!(s.life, LifeLine::Queued | LifeLine::OnAir))
     }
 
-    /// A new turn begins: whatever is not known to have been heard may go out again.
-    pub fn begin_turn(&mut self) {
-        self.sent_this_turn = [false; SLOTS];
-    }
-
-    /// The bytes of the next slot worth sending that fit `room`, with its identity; commands before fixes.
-    pub fn next(&self, room: usize, now: Instant) -> Option<(SlotId, u16, Vec<u8>)> {
+    /// The slots that the vehicle is not known to have heard, commands before fixes, as they would go out at `now`; without
+    /// those that went out after `again_before`.
+    pub fn pending(&self, now: Instant, again_before: Instant) -> Vec<PendingSlot> {
         self.progress()
-            .filter(|s| matches!(s.life, LifeLine::Queued | LifeLine::OnAir) && !self.sent_this_turn[s.id.index()])
-            .map(|s| (s.id, s.version, VersionedSlot::encode(self.series, s.version, &dated(s, now))))
-            .find(|(_, _, bytes)| bytes.len() <= room)
+            .filter(|s| matches!(s.life, LifeLine::Queued | LifeLine::OnAir))
+            .filter(|s| s.sent.is_none_or(|at| at <= again_before))
+            .map(|s| PendingSlot {
+                id: s.id,
+                version: s.version,
+                bytes: VersionedSlot::encode(self.series, s.version, &dated(s, now)),
+            })
+            .collect()
     }
 
     /// A frame with this version of the slot was written.
     pub fn mark_on_air(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.sent_this_turn[id.index()] = true;
         self.advance(id, version, LifeLine::OnAir, now, |life| life == LifeLine::Queued);
+        if let Some(slot) = self.slots.get_mut(id.index()).and_then(Option::as_mut) {
+            slot.sent = Some(now);
+        }
     }
 
     /// The vehicle acknowledged a frame with this version.
@@ -122,10 +136,9 @@ impl SlotOutbox {
     pub fn handle_peer_restart(&mut self, now: Instant) {
         for slot in self.slots.iter_mut().flatten() {
             if matches!(slot.life, LifeLine::OnAir | LifeLine::Heard) {
-                (slot.life, slot.changed) = (LifeLine::Queued, now);
+                (slot.life, slot.changed, slot.sent) = (LifeLine::Queued, now, None);
             }
         }
-        self.begin_turn();
     }
 
     fn advance(

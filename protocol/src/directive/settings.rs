@@ -1,5 +1,6 @@
 //! The slots that set how a vehicle behaves.
 
+use crate::schedule::Shares;
 use crate::wire::{Reader, Truncated};
 
 /// Where and how the vehicle may move.
@@ -44,24 +45,33 @@ impl Settings {
     }
 }
 
-/// Bits that the vehicle may put on air.
+/// Bits that the vehicle may put on air, and on what.
 ///
 /// ```text
 /// bytes 0-2: budget in bits a second, 1..=16 777 215
+/// bytes 3-7: least shares in percent of directive, status, fix, map, exemplar; together at most 100
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {
     /// Bits a second over the vehicle's budget window.
     pub bits_per_s: u32,
+    /// Least share of each class while it has something to send.
+    pub shares: Shares,
 }
 
 impl Budget {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(self.bits_per_s.min(0xFF_FFFF).to_be_bytes().get(1..).unwrap_or_default());
+        out.extend_from_slice(&self.shares.0);
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        Ok(Self { bits_per_s: r.u24()? })
+        let bits_per_s = r.u24()?;
+        let mut shares = [0; 5];
+        for share in &mut shares {
+            *share = r.u8()?;
+        }
+        Ok(Self { bits_per_s, shares: Shares(shares) })
     }
 }
 

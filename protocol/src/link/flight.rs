@@ -58,10 +58,4 @@ impl<T> Flight<T> {
         let lost = |number: u64| statement.lost.binary_search(&((horizon - number) as u16)).is_ok();
         judged.into_iter().map(|(number, content)| (content, !lost(number))).collect()
     }
-
-    /// The peer knows nothing of any frame so far.
-    pub fn handle_peer_restart(&mut self) {
-        self.frames.clear();
-        self.horizon = self.next - 1;
-    }
 }

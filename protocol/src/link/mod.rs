@@ -1,25 +1,35 @@
 //! Two ends that agree, whatever the water does to the frames between them.
 //!
 //! [`VehicleLink`] and [`SurfaceLink`] are the ends. What they share, the state of a pair of ends, is in [`Pair`], split by
-//! concern: [`Sessions`] (who restarted), [`Flight`] (frames of unknown fate), [`Window`] (frames heard).
+//! concern: who speaks with whom (`meeting`, `run`), [`Flight`] (frames of unknown fate), [`Window`] (frames heard).
 
+mod discovery;
+mod estimate;
 mod flight;
+mod meeting;
 mod pair;
-mod sessions;
+mod run;
 mod slots;
 mod stats;
 mod surface;
+mod surface_grant;
 mod surface_peer;
+mod surface_polled;
+mod surface_pool;
+mod surface_turn;
+mod surface_view;
 mod vehicle;
 mod window;
 
+pub use estimate::{Goodput, Loss};
 pub use flight::Flight;
 pub use pair::{Inbound, Pair};
-pub use sessions::{Sessions, Sighting};
+pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
 pub use surface::{IssueError, SurfaceConfig, SurfaceEvent, SurfaceLink};
-pub use surface_peer::PeerView;
+pub use surface_polled::Cycle;
+pub use surface_view::PeerView;
 pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{Refusal, Window};
 

@@ -1,43 +1,63 @@
 //! The state of one pair of ends.
 
-use super::{DropReason, Flight, FrameNumber, LinkStats, Refusal, Sessions, Sighting, Window};
-use crate::wire::{Address, Chunks, Frame, FrameBuilder, Header, MissionId, SessionId};
+use super::meeting::{Greeting, Meeting};
+use super::run::{Authenticity, Identity};
+use super::{DropReason, FrameNumber, LinkStats, Refusal, Window};
+use crate::seal::{Direction, SessionKey, TAG_BYTES};
+use crate::wire::{Address, Chunks, Envelope, Frame, FrameBuilder, Header, MissionId, Seal, Stamp};
 
-/// What a taken frame tells.
+/// What a verified frame tells.
 #[derive(Debug)]
 pub struct Inbound<'a, T> {
-    /// Its header.
-    pub header: Header,
     /// Whether the peer has restarted: all it had acknowledged is void. To be handled before everything else.
     pub restarted: bool,
     /// What own frames carried that are newly judged, and whether they arrived; in the order sent.
     pub fates: Vec<(T, bool)>,
-    /// Its number, unless it is a hello.
+    /// Its number, if it was taken.
     pub number: Option<FrameNumber>,
+    /// Whether no later frame was heard before it.
+    pub is_latest: bool,
     /// The sender bases its map chunks on every frame up to here.
     pub base: FrameNumber,
-    /// What it carries.
-    pub chunks: Chunks<'a>,
+    frame: Frame<'a>,
 }
 
-/// Sessions, flight, window and counters toward one peer; `T` is what a frame carried.
+impl<T> Inbound<'_, T> {
+    /// Its header.
+    pub fn header(&self) -> &Header {
+        &self.frame.header
+    }
+
+    /// What it carries; nothing if it was not taken.
+    pub fn chunks(&self) -> Chunks<'_> {
+        if self.number.is_some() { self.frame.chunks() } else { Chunks::default() }
+    }
+}
+
+/// Runs, flight, window and counters toward one peer; `T` is what a frame carried.
 #[derive(Debug)]
 pub struct Pair<T> {
     mission: MissionId,
     us: Address,
     peer: Address,
-    sessions: Sessions,
-    flight: Flight<T>,
-    window: Option<Window>,
+    authenticity: Option<Authenticity>,
+    meeting: Meeting<T>,
+    /// At the vehicle: the last frame that gave a turn wants our hello for an answer.
+    owes_hello: bool,
+    /// Frames in a row that some other run of the peer seems to have sent.
+    strays: u32,
     /// Counters.
     pub stats: LinkStats,
 }
 
 impl<T> Pair<T> {
-    /// A pair that has not met; `own` is the random session of this run.
-    pub fn new(mission: MissionId, us: Address, peer: Address, own: SessionId) -> Self {
-        let stats = LinkStats::default();
-        Self { mission, us, peer, sessions: Sessions::new(own), flight: Flight::default(), window: None, stats }
+    /// Strays after which the peer is taken to mean another run of ours or its.
+    const STRAYS: u32 = 3;
+
+    /// A pair that has not met; `seed` is random for each start of the program.
+    pub fn new(mission: MissionId, us: Address, peer: Address, authenticity: Option<Authenticity>, seed: u64) -> Self {
+        let (meeting, stats) = (Meeting::new(seed), LinkStats::default());
+        Self { mission, us, peer, authenticity, meeting, owes_hello: false, strays: 0, stats }
     }
 
     /// The other end.
@@ -45,91 +65,144 @@ impl<T> Pair<T> {
         self.peer
     }
 
-    /// Whether the peer's session is known.
+    /// Whether there is a run of the peer to speak with.
     pub fn is_met(&self) -> bool {
-        self.sessions.peer().is_some()
-    }
-
-    /// Our session.
-    pub fn own_session(&self) -> SessionId {
-        self.sessions.own()
-    }
-
-    /// The peer's session.
-    pub fn peer_session(&self) -> Option<SessionId> {
-        self.sessions.peer()
+        self.meeting.run().is_some() && !self.meeting.is_leaving()
     }
 
     /// Whether frames of unknown fate fill the window.
     pub fn is_full(&self) -> bool {
-        self.flight.is_full()
+        self.meeting.run().is_some_and(|r| r.flight.is_full())
     }
 
     /// The last frame whose fate is known.
     pub fn horizon(&self) -> FrameNumber {
-        self.flight.horizon()
+        self.meeting.run().map_or(0, |r| r.flight.horizon())
     }
 
     /// Number of the next frame; the peer sees its low bits.
     pub fn next_number(&self) -> FrameNumber {
-        self.flight.next_number()
+        self.meeting.run().map_or(0, |r| r.flight.next_number())
     }
 
     /// The window of heard frames, if there is one.
     pub fn window_mut(&mut self) -> Option<&mut Window> {
-        self.window.as_mut()
+        self.meeting.run_mut().map(|r| &mut r.window)
+    }
+
+    /// Whether the peer seems to speak with another run than we do.
+    pub fn has_lost_touch(&self) -> bool {
+        self.strays >= Self::STRAYS
+    }
+
+    /// Frames heard that wait for our statement.
+    pub fn unstated(&self) -> u64 {
+        self.meeting.run().map_or(0, |r| r.window.unstated())
+    }
+
+    /// Bytes of the statement that the next frame would carry.
+    pub fn statement_bytes(&self) -> usize {
+        self.meeting.run().map_or(0, |r| r.window.statement_bytes())
+    }
+
+    /// Bytes that a frame of ours ends in, and of the nonce of a hello.
+    pub fn seal_bytes(&self) -> usize {
+        match (self.is_keyed(self.direction_out()), self.is_met()) {
+            (true, true) => TAG_BYTES,
+            (true, false) => TAG_BYTES + 8,
+            (false, _) => 4,
+        }
+    }
+
+    fn direction_out(&self) -> Direction {
+        if self.us == Address::SURFACE { Direction::Down } else { Direction::Up }
+    }
+
+    fn direction_in(&self) -> Direction {
+        if self.us == Address::SURFACE { Direction::Up } else { Direction::Down }
+    }
+
+    fn is_keyed(&self, direction: Direction) -> bool {
+        self.authenticity.as_ref().is_some_and(|a| a.all || matches!(direction, Direction::Down))
     }
 
     /// Reads a frame of this peer; what is dropped is counted.
-    pub fn handle_frame<'a>(&mut self, bytes: &'a [u8]) -> Result<Inbound<'a, T>, DropReason> {
-        let result = self.read_frame(bytes);
-        match &result {
-            Ok(inbound) => self.stats.frames_heard += u64::from(inbound.number.is_some()),
-            Err(reason) => self.stats.drop(*reason),
+    pub fn handle_frame<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
+        let result = match envelope.header.hello {
+            true => self.read_hello(envelope),
+            false => self.read_numbered(envelope),
+        };
+        if let Err(reason) = &result {
+            self.stats.drop(*reason);
         }
         result
     }
 
-    fn read_frame<'a>(&mut self, bytes: &'a [u8]) -> Result<Inbound<'a, T>, DropReason> {
-        let own = self.sessions.own();
-        let frame = Frame::decode(bytes, self.mission, self.us, |_| own)?;
-        if frame.header.from != self.peer {
-            return Err(DropReason::Stranger);
+    fn read_hello<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
+        let header = &envelope.header;
+        let own = if self.us == Address::SURFACE { Some(self.meeting.own()) } else { None };
+        let (session, nonce) = own.map_or((0, 0), |o| (o.session.get(), o.nonce));
+        let frame = match &self.authenticity {
+            Some(a) => envelope.open(&Seal::Hello(&a.key, self.mission, session, nonce)),
+            None => envelope.open(&Seal::Crc(self.mission, session)),
+        };
+        let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
+        let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
+        let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
+        let greeting = match own {
+            Some(_) => self.meeting.handle_answer(peer, key),
+            None => self.meeting.handle_call(peer, key),
+        };
+        if greeting == Greeting::Retired {
+            return Err(DropReason::OldSession);
         }
+        let is_new = greeting == Greeting::New;
+        self.owes_hello = is_new && own.is_none();
+        let restarted = is_new && own.is_some();
+        self.stats.peer_restarts += u64::from(restarted);
+        self.strays = 0;
+        Ok(Inbound { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, frame })
+    }
+
+    fn read_numbered<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
+        let (mission, direction) = (self.mission, self.direction_in());
+        let keyed = self.is_keyed(direction);
+        let offered = self.meeting.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let restarted = offered.is_some();
+        let known = || self.meeting.run().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let Some(frame) = offered.or_else(known) else {
+            let reason = self.refuse(envelope, self.meeting.own().session.get());
+            let stray = self.meeting.run().is_some_and(|r| r.peer.session != envelope.header.session);
+            self.strays += u32::from(stray && (reason == DropReason::OldSession || keyed));
+            return Err(reason);
+        };
         if !frame.chunks().are_sound() {
             return Err(DropReason::Malformed);
         }
-        let restarted = match self.sessions.observe(frame.header.session) {
-            Sighting::Known => false,
-            Sighting::New => true,
-            Sighting::Retired => return Err(DropReason::OldSession),
-        };
+        self.strays = 0;
         if restarted {
+            self.meeting.accept_offered();
             self.stats.peer_restarts += 1;
-            self.flight.handle_peer_restart();
-            self.window = None;
         }
-        let header = frame.header.clone();
-        if header.hello {
-            return Ok(Inbound {
-                header,
-                restarted,
-                fates: Vec::new(),
-                number: None,
-                base: 0,
-                chunks: Chunks::default(),
-            });
+        self.owes_hello = self.meeting.is_leaving();
+        if self.owes_hello {
+            return Ok(Inbound { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, frame });
         }
-        let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| self.flight.handle_statement(ack));
+        self.take(frame, restarted)
+    }
+
+    fn take<'a>(&mut self, frame: Frame<'a>, restarted: bool) -> Result<Inbound<'a, T>, DropReason> {
+        let header = &frame.header;
+        let Some(run) = self.meeting.run_mut() else { return Err(DropReason::Stranger) };
+        let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| run.flight.handle_statement(ack));
         for (_, delivered) in &fates {
-            *(if *delivered { &mut self.stats.frames_delivered } else { &mut self.stats.frames_lost }) += 1;
+            self.stats.judge(*delivered);
         }
-        let window = self.window.get_or_insert_with(|| Window::opened_by(header.number, header.base));
         // A frame that is not taken has still told us the fate of ours, so that goes up with the refusal.
-        let before = window.highest();
-        let number = match window.accept(header.number, header.base) {
+        let before = run.window.highest();
+        let number = match run.window.accept(header.number, header.base) {
             Ok(number) => {
-                self.stats.frames_numbered += window.highest() - before;
+                self.stats.take(before, number);
                 Some(number)
             }
             Err(refusal) if fates.is_empty() && !restarted => return Err(refusal.into()),
@@ -138,53 +211,108 @@ impl<T> Pair<T> {
                 None
             }
         };
-        let base = window.base();
-        let chunks = if number.is_some() { frame.chunks() } else { Chunks::default() };
-        Ok(Inbound { header, restarted, fates, number, base, chunks })
+        let is_latest = number.is_some_and(|n| n > before);
+        Ok(Inbound { restarted, fates, number, is_latest, base: run.window.base(), frame })
     }
 
-    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement; a hello if the peer's session is not known or
-    /// `hello` is asked for.
+    /// Why a frame that does not open is not ours, as far as it can be told.
+    fn refuse(&mut self, envelope: &Envelope<'_>, session: u16) -> DropReason {
+        let expected =
+            if envelope.header.hello { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
+        let plain = || envelope.open(&Seal::Crc(self.mission, session)).is_some();
+        match (expected, envelope.header.keyed) {
+            (false, true) => DropReason::Keyed,
+            (true, false) if plain() => DropReason::Unauthenticated,
+            (false, false) if !envelope.header.hello && plain() => DropReason::OldSession,
+            _ => DropReason::Checksum,
+        }
+    }
+
+    /// Whether the next frame is a hello: the peer is to be told of our run.
+    pub fn must_greet(&self) -> bool {
+        self.owes_hello || self.meeting.run().is_none()
+    }
+
+    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement; a hello if `hello` is asked for or nobody was met.
     pub fn begin_frame(
         &mut self,
         size: usize,
         ack_room: usize,
-        remaining: u8,
         turn: Option<u8>,
+        stamp: Option<Stamp>,
         hello: bool,
-    ) -> (FrameBuilder, bool) {
-        let hello = hello || !self.is_met();
-        let ack = if hello { None } else { self.window.as_mut().and_then(|w| w.statement(ack_room)) };
+    ) -> FrameBuilder {
+        let hello = hello || self.must_greet();
+        let own = self.meeting.offered().filter(|_| hello).map_or(self.meeting.own(), |r| r.own);
+        let direction = self.direction_out();
+        let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
+        let run = self.meeting.run_mut().filter(|_| !hello);
+        let (number, base) = run.as_ref().map_or((0, 1), |r| (r.flight.next_number() as u16, r.flight.base_distance()));
         let header = Header {
             from: self.us,
             to: self.peer,
-            session: self.sessions.own(),
-            number: self.flight.next_number() as u16,
-            base: self.flight.base_distance(),
-            remaining,
+            session: own.session,
+            number,
+            base,
+            remaining: 0,
             turn,
-            ack,
+            stamp,
+            nonce: (hello && keyed).then_some(own.nonce),
+            ack: run.and_then(|r| r.window.statement(ack_room)),
             hello,
+            keyed,
         };
-        (FrameBuilder::new(&header, size), hello)
+        FrameBuilder::new(&header, size)
     }
 
-    /// Seals a frame and remembers what it carries.
+    /// Closes a frame and remembers what it carries.
     pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, hello: bool, short: bool) -> Vec<u8> {
         self.stats.frames_sent += 1;
-        if hello {
-            return builder.finish(self.mission, None, short);
+        let direction = self.direction_out();
+        if hello || self.must_greet() {
+            let to = self.meeting.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
+            let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
+            return match &self.authenticity {
+                Some(a) => builder.finish(&Seal::Hello(&a.key, self.mission, session, nonce), short),
+                None => builder.finish(&Seal::Crc(self.mission, session), short),
+            };
         }
-        self.flight.push(carried);
-        builder.finish(self.mission, self.sessions.peer(), short)
+        let (mission, keyed) = (self.mission, self.is_keyed(direction));
+        let Some(run) = self.meeting.run_mut() else { return Vec::new() };
+        let number = run.flight.next_number();
+        run.flight.push(carried);
+        match run.key.as_ref().filter(|_| keyed) {
+            Some(key) => builder.finish(&Seal::Session(key, direction, number), short),
+            None => builder.finish(&Seal::Crc(mission, run.peer.session.get()), short),
+        }
     }
 
     /// Begins a new run of ours toward the peer, because what the two ends hold does not agree.
-    pub fn renew(&mut self, own: SessionId) {
+    pub fn renew(&mut self) {
         self.stats.resyncs += 1;
-        self.sessions.renew(own);
-        self.flight.handle_peer_restart();
-        self.window = None;
+        self.strays = 0;
+        if self.us == Address::SURFACE {
+            self.meeting.renew_surface();
+        } else {
+            let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
+            self.meeting.renew_vehicle(key);
+            self.owes_hello = self.meeting.is_leaving();
+        }
+    }
+}
+
+/// The key of a run of ours with a run of the peer.
+fn session_key(
+    authenticity: Option<Authenticity>,
+    mission: MissionId,
+    us: Address,
+    peer: Address,
+) -> impl Fn(Identity, Identity) -> Option<SessionKey> {
+    move |own, other| {
+        let a = authenticity.as_ref()?;
+        let (surface, vehicle) = if us == Address::SURFACE { (own, other) } else { (other, own) };
+        let number = if us == Address::SURFACE { peer.number() } else { us.number() };
+        Some(a.key.session(mission.0, number, surface.nonce, vehicle.nonce, a.encrypt))
     }
 }
 

@@ -1,6 +1,8 @@
-//! What a link counts.
+//! What a link counts and estimates.
 
+use super::estimate::{Goodput, Loss};
 use crate::schedule::Class;
+use crate::time::Instant;
 use crate::wire::FrameError;
 use std::collections::BTreeMap;
 
@@ -27,6 +29,10 @@ pub enum DropReason {
     NoBase,
     /// From nobody we know.
     Stranger,
+    /// It has no tag, and we have a key: it may be anybody's.
+    Unauthenticated,
+    /// It has a tag, and we have no key.
+    Keyed,
 }
 
 impl From<FrameError> for DropReason {
@@ -68,6 +74,14 @@ pub struct LinkStats {
     pub peer_restarts: u64,
     /// Times that the two maps were found to differ and were sent afresh.
     pub resyncs: u64,
+    /// Recent loss of own frames, as the peer declares it.
+    pub loss_out: Loss,
+    /// Recent loss of the peer's frames, by the gaps in their numbers.
+    pub loss_in: Loss,
+    /// Useful bits that the peer declared held.
+    pub goodput_out: Goodput,
+    /// Useful bits taken.
+    pub goodput_in: Goodput,
 }
 
 impl LinkStats {
@@ -76,14 +90,44 @@ impl LinkStats {
         *self.dropped.entry(reason).or_default() += 1;
     }
 
+    /// Frames that were refused because they were not authentic.
+    pub fn refused(&self) -> u64 {
+        self.dropped.get(&DropReason::Unauthenticated).copied().unwrap_or_default()
+    }
+
     /// Counts bytes put on air.
     pub fn count(&mut self, class: Class, bytes: usize) {
         *self.bytes_by_class.entry(class).or_default() += bytes as u64;
     }
 
     /// Counts bytes taken.
-    pub fn hear(&mut self, class: Class, bytes: usize) {
+    pub fn hear(&mut self, class: Class, bytes: usize, now: Instant) {
         *self.heard_by_class.entry(class).or_default() += bytes as u64;
+        if class != Class::Overhead {
+            self.goodput_in.count(bytes, now);
+        }
+    }
+
+    /// Counts bytes of a chunk that the peer declared held.
+    pub fn deliver(&mut self, class: Class, bytes: usize, now: Instant) {
+        *self.delivered_by_class.entry(class).or_default() += bytes as u64;
+        self.goodput_out.count(bytes, now);
+    }
+
+    /// Counts the fate of an own frame.
+    pub(super) fn judge(&mut self, delivered: bool) {
+        *(if delivered { &mut self.frames_delivered } else { &mut self.frames_lost }) += 1;
+        self.loss_out.count(!delivered);
+    }
+
+    /// Counts a frame that was taken, after `before` had been the highest number heard.
+    pub(super) fn take(&mut self, before: u64, number: u64) {
+        self.frames_heard += 1;
+        self.frames_numbered += number.saturating_sub(before);
+        for _ in 0..number.saturating_sub(before + 1).min(256) {
+            self.loss_in.count(true);
+        }
+        self.loss_in.count(false);
     }
 
     /// Share of judged frames that were lost.

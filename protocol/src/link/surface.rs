@@ -1,12 +1,16 @@
 //! The surface's end of the link.
 
-use super::surface_peer::{Peer, SHORT_ACK};
-use super::{PeerView, Transmit, Wakeup};
+use super::discovery::Discovery;
+use super::surface_peer::Peer;
+use super::surface_turn::{Ready, room_for_slot};
+use super::{Authenticity, DropReason, FrameNumber, PeerView, Transmit};
 use crate::directive::{Slot, SlotId, VersionedSlot};
 use crate::mac::{MasterConfig, ModemProfile};
-use crate::schedule::BitBudget;
+use crate::map::{Replica, StateReplica};
+use crate::schedule::{BitBudget, ClassShares, Shares};
+use crate::seal::TAG_BYTES;
 use crate::time::Instant;
-use crate::wire::{Address, MissionId, SessionId};
+use crate::wire::{Address, Envelope, MissionId};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -21,14 +25,17 @@ pub struct SurfaceConfig {
     pub budget_bps: u32,
     /// Window of the budget.
     pub budget_window: Duration,
+    /// Least share of each class while it has something to send.
+    pub shares: Shares,
     /// How turns are granted.
     pub master: MasterConfig,
-    /// The vehicles to speak with.
+    /// The vehicles to speak with from the beginning.
     pub vehicles: Vec<Address>,
+    /// Longest time between two calls for vehicles that are not known; `None`: there are no calls.
+    pub call_every: Option<Duration>,
+    /// How frames are made authentic, if they are.
+    pub authenticity: Option<Authenticity>,
 }
-
-/// Bytes of a frame that a slot can not have: header, turn, a short acknowledgement, chunk header, CRC.
-const SLOT_OVERHEAD: usize = 10 + 1 + SHORT_ACK + 3 + 4;
 
 /// Why a slot cannot be issued.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -49,6 +56,8 @@ pub enum IssueError {
 /// What the link tells its host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SurfaceEvent {
+    /// A vehicle answered a call that nobody had known of.
+    VehicleFound(Address),
     /// The operator's map of a vehicle has changed.
     MapChanged(Address),
     /// A status came in.
@@ -77,58 +86,102 @@ impl SurfaceEvent {
     pub const OBJECT_HEAD: usize = 3;
 }
 
-/// The surface's end of the link: grants turns, holds a replica a vehicle, sends each its directive.
-#[derive(Debug)]
-pub struct SurfaceLink {
-    config: SurfaceConfig,
-    peers: BTreeMap<Address, Peer>,
-    budget: BitBudget,
-    /// Whose turn it is; the surface speaks with one vehicle at a time.
-    current: Option<Address>,
-    grant: u8,
-    hello: bool,
-    on_air: Option<bool>,
-    random: u64,
-    events: VecDeque<SurfaceEvent>,
+/// A frame that the modem has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OnAir {
+    pub(super) to: Address,
+    pub(super) number: Option<FrameNumber>,
+    /// Whether a turn ends with it.
+    pub(super) last: bool,
 }
 
-impl SurfaceLink {
+/// The surface's end of the link: grants turns, holds a replica a vehicle, sends each its directive.
+#[derive(Debug)]
+pub struct SurfaceLink<R: StateReplica = Replica> {
+    pub(super) config: SurfaceConfig,
+    pub(super) peers: BTreeMap<Address, Peer<R>>,
+    pub(super) budget: BitBudget,
+    pub(super) shares: ClassShares,
+    /// Whose turn it is; the surface speaks with one vehicle at a time.
+    pub(super) current: Option<Address>,
+    /// What is left of the surface's own turn.
+    pub(super) turn: VecDeque<Ready>,
+    pub(super) in_modem: VecDeque<OnAir>,
+    pub(super) discovery: Discovery,
+    pub(super) cycle: super::surface_polled::Cycles,
+    series: u16,
+    pub(super) random: u64,
+    events: VecDeque<SurfaceEvent>,
+    /// Frames that no vehicle that we know has sent.
+    strangers: u64,
+}
+
+impl<R: StateReplica> SurfaceLink<R> {
     /// An end that has met nobody; `seed` is random for each run.
     pub fn new(config: SurfaceConfig, seed: u64, now: Instant) -> Self {
-        let budget = BitBudget::new(config.budget_bps, config.budget_window, now);
+        let mut random = seed;
+        let series = crate::random::next(&mut random) as u16;
+        let known = !config.vehicles.is_empty();
         let mut link = Self {
             peers: BTreeMap::new(),
-            budget,
+            budget: BitBudget::new(config.budget_bps, config.budget_window, now),
+            shares: ClassShares::new(config.shares),
             current: None,
-            grant: 0,
-            hello: false,
-            on_air: None,
-            random: seed,
+            turn: VecDeque::new(),
+            in_modem: VecDeque::new(),
+            discovery: Discovery::new(config.call_every, known, config.master.max_propagation, now),
+            cycle: super::surface_polled::Cycles::default(),
+            series,
+            random,
             events: VecDeque::new(),
+            strangers: 0,
             config,
         };
-        let series = link.draw();
         for vehicle in link.config.vehicles.clone() {
-            let own = SessionId::from_random(link.draw());
-            let peer = Peer::new(link.config.mission, vehicle, own, series, link.config.master, now);
-            link.peers.insert(vehicle, peer);
+            link.add(vehicle, now);
         }
         link
     }
 
+    fn add(&mut self, vehicle: Address, now: Instant) {
+        let seed = crate::random::next(&mut self.random);
+        let c = &self.config;
+        let peer = Peer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
+        self.peers.insert(vehicle, peer);
+    }
+
     /// A vehicle as it is known now.
-    pub fn vehicle(&self, vehicle: Address) -> Option<PeerView<'_>> {
+    pub fn vehicle(&self, vehicle: Address) -> Option<PeerView<'_, R>> {
         self.peers.get(&vehicle).map(PeerView)
+    }
+
+    /// The vehicles that are known.
+    pub fn vehicles(&self) -> impl Iterator<Item = Address> + '_ {
+        self.peers.keys().copied()
+    }
+
+    /// Frames of this mission that no known vehicle has sent, or that could not be read.
+    pub fn strangers(&self) -> u64 {
+        self.strangers
     }
 
     /// Issues a new version of a slot to a vehicle.
     pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, IssueError> {
-        let room = self.config.modem.frame_bytes.saturating_sub(SLOT_OVERHEAD);
+        let seal = if self.config.authenticity.is_some() { TAG_BYTES } else { 4 };
+        let room = room_for_slot(self.config.modem.frame_bytes, seal);
         let bytes = VersionedSlot::encode(0, 0, &slot).len();
         if bytes > room {
             return Err(IssueError::TooLarge { bytes, room });
         }
         self.peers.get_mut(&vehicle).map(|p| p.issue(slot, now)).ok_or(IssueError::NoVehicle)
+    }
+
+    /// Issues a new version of a slot to several vehicles; each acknowledges and decides for itself.
+    pub fn issue_to(&mut self, vehicles: &[Address], slot: &Slot, now: Instant) -> Result<Vec<u16>, IssueError> {
+        if vehicles.iter().any(|v| !self.peers.contains_key(v)) {
+            return Err(IssueError::NoVehicle);
+        }
+        vehicles.iter().map(|&v| self.issue(v, slot.clone(), now)).collect()
     }
 
     /// Changes the surface's own bit budget.
@@ -141,6 +194,16 @@ impl SurfaceLink {
         self.budget.bits_per_s()
     }
 
+    /// Changes the least shares of the classes.
+    pub fn set_shares(&mut self, shares: Shares) {
+        self.shares.set(shares);
+    }
+
+    /// The least shares of the classes.
+    pub fn shares(&self) -> Shares {
+        self.shares.shares()
+    }
+
     /// The next thing to tell the host.
     pub fn poll_event(&mut self) -> Option<SurfaceEvent> {
         self.events.pop_front()
@@ -148,96 +211,60 @@ impl SurfaceLink {
 
     /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
-        let Some(peer) = bytes.get(1).and_then(|b| Address::vehicle(b >> 4)).and_then(|a| self.peers.get_mut(&a))
-        else {
-            if let Some(first) = self.peers.values_mut().next() {
-                first.pair.stats.drop(super::DropReason::Stranger);
-            }
-            return;
+        let envelope = match Envelope::decode(bytes, |to| to == Address::SURFACE) {
+            Ok(envelope) if envelope.header.from.is_vehicle() => envelope,
+            Ok(_) => return self.drop_strange(DropReason::Stranger),
+            Err(e) => return self.drop_strange(e.into()),
         };
-        peer.handle_frame(bytes, &self.config.modem, now, &mut self.events);
+        let from = envelope.header.from;
+        let authenticity = self.config.authenticity.as_ref();
+        if self.discovery.is_answered_by(&envelope, self.config.mission, authenticity, now) {
+            return self.handle_here(from, now);
+        }
+        let Some(peer) = self.peers.get_mut(&from) else { return self.drop_strange(DropReason::Stranger) };
+        peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);
         if peer.out_of_step {
-            let own = SessionId::from_random(next_random(&mut self.random));
-            peer.resync(own, now);
-            self.events.push_back(SurfaceEvent::MapChanged(peer.pair.peer()));
+            peer.resync(now);
+            self.events.push_back(SurfaceEvent::MapChanged(from));
+        }
+        if peer.pair.unstated() > 0 {
+            peer.answer_due.get_or_insert(now + Duration::from_secs(2));
+        }
+    }
+
+    fn handle_here(&mut self, from: Address, now: Instant) {
+        match self.peers.get_mut(&from) {
+            Some(peer) => peer.master.hurry(now),
+            None => {
+                self.add(from, now);
+                self.events.push_back(SurfaceEvent::VehicleFound(from));
+            }
+        }
+    }
+
+    fn drop_strange(&mut self, reason: DropReason) {
+        self.strangers += 1;
+        if let Some(first) = self.peers.values_mut().next() {
+            first.pair.stats.drop(reason);
         }
     }
 
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
-        let last = self.on_air.take() == Some(true);
-        if last && let Some(peer) = self.current.and_then(|a| self.peers.get_mut(&a)) {
+        let Some(sent) = self.in_modem.pop_front() else { return };
+        let Some(peer) = self.peers.get_mut(&sent.to) else { return };
+        peer.handle_sent(sent.number, now);
+        if sent.last {
             peer.master.handle_turn_sent(&self.config.modem, now);
+            self.cycle.handle_turn_sent();
         }
     }
 
-    /// When [`Self::poll_transmit`] next may have a frame by itself.
-    pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
-        if self.on_air.is_some() {
-            return None;
-        }
-        let busy = self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged());
-        let next = match busy {
-            Some(peer) => peer.master.next_wakeup(),
-            None => self.peers.values().filter_map(|p| p.master.next_wakeup()).min(),
-        };
-        next.map(|at| (at, Wakeup::Grant))
+    /// Puts a frame into the modem.
+    pub(super) fn send(&mut self, ready: Ready, last: bool, now: Instant) -> Transmit {
+        let to = ready.transmit.to;
+        self.in_modem.push_back(OnAir { to, number: ready.number, last });
+        self.budget.spend(self.config.modem.bits_on_air(ready.transmit.bytes.len()), now);
+        ready.transmit
     }
-
-    /// The next frame of the surface's turn, if it has one and the budget allows it.
-    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
-        if self.on_air.is_some() {
-            return None;
-        }
-        let speaking = self.current.filter(|a| self.peers.get(a).is_some_and(|p| p.master.is_speaking()));
-        let (vehicle, fresh) = match speaking {
-            Some(vehicle) => (vehicle, false),
-            None => (self.choose(now)?, true),
-        };
-        let peer = self.peers.get_mut(&vehicle)?;
-        let allowed = self.budget.earliest(peer.next_frame_bits(&self.config.modem, now), now);
-        if allowed > now {
-            peer.master.postpone(allowed);
-            return None;
-        }
-        if fresh {
-            self.current = Some(vehicle);
-            self.grant = peer.master.grant(&self.config.modem);
-            peer.begin_turn(self.grant, now);
-            self.hello = says_hello(peer.master.unanswered()) || peer.pair.is_full();
-        }
-        let (transmit, last) = peer.write_frame(&self.config.modem, self.grant, self.hello, now);
-        self.on_air = Some(last);
-        self.budget.spend(self.config.modem.bits_on_air(transmit.bytes.len()), now);
-        Some(transmit)
-    }
-
-    /// The vehicle to speak with next: of those that are due, the one that waited longest.
-    fn choose(&self, now: Instant) -> Option<Address> {
-        let engaged = self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged());
-        if engaged.is_some_and(|p| !p.master.may_speak(false, now)) {
-            return None;
-        }
-        let due = |p: &&Peer| p.master.may_speak(p.outbox.has_backlog(), now);
-        self.peers.values().filter(due).min_by_key(|p| (p.master.begun(), p.pair.peer())).map(|p| p.pair.peer())
-    }
-
-    fn draw(&mut self) -> u16 {
-        next_random(&mut self.random)
-    }
-}
-
-/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while every
-/// one, so that the numbers of unheard frames do not run out.
-fn says_hello(unanswered: u32) -> bool {
-    unanswered >= 2 && (unanswered.is_multiple_of(2) || unanswered >= 16)
-}
-
-/// Sixteen bits of a splitmix64 sequence.
-fn next_random(state: &mut u64) -> u16 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z ^ z >> 31) as u16
 }

@@ -1,110 +1,83 @@
 //! What the surface keeps for one vehicle.
 
-use super::{DropReason, Inbound, LinkStats, Pair, SurfaceEvent, Transmit};
-use crate::directive::{Slot, SlotId, SlotOutbox, SlotProgress};
-use crate::mac::{Master, MasterConfig, ModemProfile};
-use crate::map::Replica;
+use super::surface_view::Contact;
+use super::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
+use crate::directive::{Slot, SlotId, SlotOutbox};
+use crate::mac::{ClockMap, Master, MasterConfig, ModemProfile};
+use crate::map::StateReplica;
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, FrameBuilder, MissionId, SessionId, VehicleStatus, room_for_payload};
+use crate::wire::{Address, ChunkKind, Envelope, Header, MissionId, Stamp, VehicleStatus};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Bytes of acknowledgement that every frame of the surface has room for.
-pub(super) const SHORT_ACK: usize = 6;
+/// What a frame to a vehicle carried: versions of slots, each with its bytes.
+pub(super) type Carried = Vec<(SlotId, u16, usize)>;
 
-/// What a frame to a vehicle carried: versions of slots.
-type Carried = Vec<(SlotId, u16, usize)>;
+/// The two chunks of a status, of which one may be here before the other.
+#[derive(Debug, Default)]
+pub(super) struct StatusParts {
+    status: VehicleStatus,
+    pose: Option<Instant>,
+    report: Option<Instant>,
+    /// Both are here.
+    pub(super) whole: Option<(VehicleStatus, Instant)>,
+}
 
 /// A vehicle as the surface knows it.
 #[derive(Debug)]
-pub(super) struct Peer {
+pub(super) struct Peer<R> {
     pub(super) pair: Pair<Carried>,
     pub(super) master: Master,
     pub(super) outbox: SlotOutbox,
-    replica: Replica,
+    pub(super) replica: R,
     objects: ObjectReceiver,
-    status: Option<(VehicleStatus, Instant)>,
-    heard: Option<Instant>,
-    /// Smoothed time between two answered turns.
-    interval: Option<Duration>,
-    answered: Option<Instant>,
+    pub(super) status: StatusParts,
+    pub(super) contact: Contact,
+    pub(super) clock: Option<ClockMap>,
     /// Number of the first frame of the last turn: an answer has judged it.
-    turn_began: u64,
+    pub(super) turn_began: FrameNumber,
     /// Whether the last turn was a hello, which has no number that an answer could name.
-    greeted: bool,
-    /// The two ends were found to differ: a new session is to be begun.
+    pub(super) greeted: bool,
+    /// When frames left the modem, by number: what a stamp of the vehicle refers to.
+    sent: VecDeque<(FrameNumber, Instant)>,
+    /// Where the modem decides when to speak: when the vehicle is to have our acknowledgement, or our hello.
+    pub(super) answer_due: Option<Instant>,
+    pub(super) hello_due: Instant,
+    pub(super) hellos: u32,
+    /// The two ends were found to differ: a new run is to be begun.
     pub(super) out_of_step: bool,
 }
 
-/// A read-only view of a vehicle for the host.
-#[derive(Debug, Clone, Copy)]
-pub struct PeerView<'a>(pub(super) &'a Peer);
+impl<R: StateReplica> Peer<R> {
+    /// Frames of ours whose end is remembered.
+    const SENT: usize = 64;
 
-impl<'a> PeerView<'a> {
-    /// The operator's map of this vehicle.
-    pub fn replica(&self) -> &'a Replica {
-        &self.0.replica
-    }
-
-    /// The last status and when it came in.
-    pub fn status(&self) -> Option<&'a (VehicleStatus, Instant)> {
-        self.0.status.as_ref()
-    }
-
-    /// When a frame was last taken.
-    pub fn heard(&self) -> Option<Instant> {
-        self.0.heard
-    }
-
-    /// Time between two answered turns, smoothed.
-    pub fn expected_interval(&self) -> Option<Duration> {
-        self.0.interval
-    }
-
-    /// When the next turn will be granted at the latest; `now` if that is due.
-    pub fn next_contact(&self, now: Instant) -> Option<Instant> {
-        self.0.master.next_wakeup().map(|at| at.max(now))
-    }
-
-    /// Two-way propagation.
-    pub fn round_trip(&self) -> Option<Duration> {
-        self.0.master.round_trip()
-    }
-
-    /// The slots that were issued and how far they have come.
-    pub fn slots(&self) -> impl Iterator<Item = &'a SlotProgress> + use<'a> {
-        self.0.outbox.progress()
-    }
-
-    /// Counters.
-    pub fn stats(&self) -> &'a LinkStats {
-        &self.0.pair.stats
-    }
-}
-
-impl Peer {
     pub(super) fn new(
         mission: MissionId,
         vehicle: Address,
-        own: SessionId,
+        authenticity: Option<Authenticity>,
+        seed: u64,
         series: u16,
         config: MasterConfig,
         now: Instant,
     ) -> Self {
         Self {
-            pair: Pair::new(mission, Address::SURFACE, vehicle, own),
+            pair: Pair::new(mission, Address::SURFACE, vehicle, authenticity, seed),
             master: Master::new(config, now),
             outbox: SlotOutbox::new(series),
-            replica: Replica::default(),
+            replica: R::default(),
             objects: ObjectReceiver::default(),
-            status: None,
-            heard: None,
-            interval: None,
-            answered: None,
+            status: StatusParts::default(),
+            contact: Contact::default(),
+            clock: None,
             turn_began: 0,
             greeted: false,
+            sent: VecDeque::new(),
+            answer_due: None,
+            hello_due: now,
+            hellos: 0,
             out_of_step: false,
         }
     }
@@ -112,97 +85,118 @@ impl Peer {
     /// Takes a frame of this vehicle.
     pub(super) fn handle_frame(
         &mut self,
-        bytes: &[u8],
+        envelope: &Envelope<'_>,
+        bytes: usize,
         modem: &ModemProfile,
         now: Instant,
         events: &mut VecDeque<SurfaceEvent>,
     ) {
-        let inbound = match self.pair.handle_frame(bytes) {
+        let inbound = match self.pair.handle_frame(envelope) {
             Ok(inbound) => inbound,
             Err(reason) => {
-                // The vehicle builds on what we never acknowledged: it took us for another run in between.
-                self.out_of_step |= reason == DropReason::NoBase;
+                // The vehicle builds on what we never acknowledged, or means another run of ours than we do.
+                let strays = self.pair.has_lost_touch() && self.master.unanswered() >= 2;
+                self.out_of_step |= reason == DropReason::NoBase || strays;
                 return;
             }
         };
         let vehicle = self.pair.peer();
         if inbound.restarted {
-            self.replica.clear();
-            self.objects.clear();
-            self.status = None;
-            self.outbox.handle_peer_restart(now);
+            self.forget_peer(now);
             events.push_back(SurfaceEvent::VehicleRestarted(vehicle));
         }
-        let Inbound { header, fates, number, base, chunks, .. } = inbound;
-        for ((id, version, bytes), delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |x| (x, d)))
+        let header = inbound.header().clone();
+        for ((id, version, n), delivered) in
+            inbound.fates.iter().flat_map(|(carried, d)| carried.iter().map(move |x| (*x, *d)))
         {
             if delivered {
-                *self.pair.stats.delivered_by_class.entry(Class::Directive).or_default() += bytes as u64;
+                self.pair.stats.deliver(id.class(), n, now);
                 self.outbox.mark_heard(id, version, now);
             }
         }
-        let Some(number) = number else { return };
-        self.heard = Some(now);
-        self.measure_interval(now);
-        if self.greeted || self.pair.horizon() >= self.turn_began {
-            self.master.handle_answer(bytes.len(), header.remaining, header.turn, modem, now);
+        if header.hello {
+            self.contact.hear(now);
+            self.handle_turn(&header, bytes, modem, now);
+            return;
         }
-        self.replica.advance_base(base);
+        let Some(number) = inbound.number else { return };
+        self.contact.hear(now);
+        if inbound.is_latest {
+            self.handle_stamp(&header, bytes, modem, now);
+            self.handle_turn(&header, bytes, modem, now);
+        }
+        self.replica.advance_base(inbound.base);
         let version = self.replica.version();
-        let mut overhead = bytes.len();
-        for chunk in chunks {
-            overhead -= chunk.payload.len();
-            self.pair.stats.hear(class_of(chunk.kind), chunk.payload.len());
+        let mut overhead = bytes;
+        for chunk in inbound.chunks() {
+            overhead = overhead.saturating_sub(chunk.payload.len());
+            self.pair.stats.hear(class_of(chunk.kind), chunk.payload.len(), now);
             let sound = match chunk.kind {
-                ChunkKind::Map => self.replica.apply(number, chunk.payload, now).is_ok(),
-                ChunkKind::Status => self.handle_status(chunk.payload, now, events),
-                ChunkKind::Object => self.handle_object(chunk.payload, events),
+                ChunkKind::Map => self.replica.apply(number, chunk.payload, now),
+                ChunkKind::Pose | ChunkKind::Report => {
+                    self.status.read(chunk.kind, chunk.payload, now)
+                        && Self::settle(&mut self.status, &mut self.outbox, vehicle, chunk.kind, now, events)
+                }
+                ChunkKind::Object => handle_object(&mut self.objects, vehicle, chunk.payload, events),
                 ChunkKind::Slot => false,
             };
             if !sound {
                 self.pair.stats.drop(DropReason::Malformed);
                 self.out_of_step |= chunk.kind == ChunkKind::Map;
             }
+            if chunk.kind == ChunkKind::Report && self.status.status.base_digest != self.replica.base_digest() {
+                self.out_of_step = true;
+            }
         }
-        self.pair.stats.hear(Class::Overhead, overhead);
+        self.pair.stats.hear(Class::Overhead, overhead, now);
         if self.replica.version() != version {
             events.push_back(SurfaceEvent::MapChanged(vehicle));
         }
     }
 
-    fn measure_interval(&mut self, now: Instant) {
-        if let Some(last) = self.answered {
-            let gap = now.since(last);
-            self.interval =
-                Some(self.interval.map_or(gap, |old| if gap > old { (old + gap) / 2 } else { (old * 15 + gap) / 16 }));
+    fn handle_turn(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
+        if self.greeted || self.pair.horizon() >= self.turn_began {
+            self.master.handle_answer(bytes, header.remaining, header.turn, modem, now);
+            self.hellos = 0;
         }
-        self.answered = Some(now);
     }
 
-    fn handle_status(&mut self, payload: &[u8], now: Instant, events: &mut VecDeque<SurfaceEvent>) -> bool {
-        let Ok(status) = VehicleStatus::decode(payload) else { return false };
-        if status.base_digest != self.replica.base_digest() {
-            self.out_of_step = true;
+    fn handle_stamp(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
+        let Some(Stamp::Vehicle { clock_ms, heard, held }) = header.stamp else { return };
+        let began = now - modem.airtime(bytes);
+        let sent = self.sent.iter().rev().find(|(number, _)| *number as u8 == heard).map(|(_, at)| *at);
+        if let Some(sent) = sent.filter(|&at| at + held <= began) {
+            self.master.handle_round_trip(began.since(sent).saturating_sub(held));
         }
-        let vehicle = self.pair.peer();
-        for id in self.outbox.handle_report(&status, now) {
-            events.push_back(SurfaceEvent::SlotSettled(vehicle, id));
-        }
-        self.status = Some((status, now));
-        events.push_back(SurfaceEvent::Status(vehicle));
-        true
+        let one_way = self.master.round_trip().unwrap_or_default() / 2;
+        self.clock = Some(ClockMap::measured(clock_ms, modem.airtime(bytes) + one_way, now));
     }
 
-    fn handle_object(&mut self, payload: &[u8], events: &mut VecDeque<SurfaceEvent>) -> bool {
-        let Ok(part) = Part::decode(payload) else { return false };
-        let vehicle = self.pair.peer();
-        events.push_back(match self.objects.handle_part(&part) {
-            Received::Complete(_, bytes) => SurfaceEvent::Object(vehicle, bytes),
-            Received::Progress(id, held, total) => {
-                let head = self.objects.head(id, SurfaceEvent::OBJECT_HEAD).map(<[u8]>::to_vec);
-                SurfaceEvent::ObjectProgress { vehicle, head, held, total }
+    /// A frame of ours has left the modem.
+    pub(super) fn handle_sent(&mut self, number: Option<FrameNumber>, now: Instant) {
+        let Some(number) = number else { return };
+        self.sent.push_back((number, now));
+        if self.sent.len() > Self::SENT {
+            self.sent.pop_front();
+        }
+    }
+
+    fn settle(
+        parts: &mut StatusParts,
+        outbox: &mut SlotOutbox,
+        vehicle: Address,
+        kind: ChunkKind,
+        now: Instant,
+        events: &mut VecDeque<SurfaceEvent>,
+    ) -> bool {
+        if kind == ChunkKind::Report {
+            for id in outbox.handle_report(&parts.status, now) {
+                events.push_back(SurfaceEvent::SlotSettled(vehicle, id));
             }
-        });
+        }
+        if parts.whole.is_some() {
+            events.push_back(SurfaceEvent::Status(vehicle));
+        }
         true
     }
 
@@ -211,71 +205,67 @@ impl Peer {
         self.outbox.issue(slot, now)
     }
 
-    /// Bits on air that the next frame of a turn will take at most.
-    pub(super) fn next_frame_bits(&self, modem: &ModemProfile, now: Instant) -> u64 {
-        let slots = self.outbox.next(modem.frame_bytes, now).is_some() && self.pair.is_met();
-        modem.bits_on_air(if slots { modem.frame_bytes } else { modem.frame_bytes.min(40) })
-    }
-
-    /// A turn of the surface begins.
-    pub(super) fn begin_turn(&mut self, grant: u8, now: Instant) {
-        self.outbox.begin_turn();
-        self.master.begin(grant, now);
-        self.turn_began = self.pair.next_number();
-    }
-
-    /// The next frame of the surface's turn and whether it is the last.
-    pub(super) fn write_frame(
-        &mut self,
-        modem: &ModemProfile,
-        grant: u8,
-        hello: bool,
-        now: Instant,
-    ) -> (Transmit, bool) {
-        let waiting = self.outbox.next(modem.frame_bytes, now).map(|(.., slot)| slot.len());
-        let ack_room = waiting.map_or(modem.frame_bytes / 2, |slot| {
-            modem.frame_bytes.saturating_sub(slot + 18).clamp(SHORT_ACK, modem.frame_bytes / 2)
-        });
-        let (mut builder, hello) = self.pair.begin_frame(modem.frame_bytes, ack_room, 0, Some(grant), hello);
-        self.greeted = hello;
-        let mut carried = Carried::new();
-        if !hello {
-            self.fill(&mut builder, &mut carried, now);
-        }
-        let more = !carried.is_empty() && self.outbox.next(modem.frame_bytes, now).is_some();
-        builder.set_remaining(u8::from(more));
-        let payload: usize = carried.iter().map(|(_, _, n)| n).sum();
-        self.pair.stats.count(Class::Directive, payload);
-        let kind = if carried.is_empty() { "grant" } else { "directive" };
-        let bytes = self.pair.finish_frame(builder, carried, hello, true);
-        self.pair.stats.count(Class::Overhead, bytes.len() - payload);
-        (Transmit { to: self.pair.peer(), bytes, kind }, !more)
-    }
-
-    fn fill(&mut self, builder: &mut FrameBuilder, carried: &mut Carried, now: Instant) {
-        while let Some((id, version, bytes)) = self.outbox.next(room_for_payload(builder.room()), now) {
-            if !builder.push(ChunkKind::Slot, &bytes) {
-                return;
-            }
-            self.outbox.mark_on_air(id, version, now);
-            carried.push((id, version, bytes.len()));
-        }
-    }
-
     /// Begins a new run toward the vehicle.
-    pub(super) fn resync(&mut self, own: SessionId, now: Instant) {
+    pub(super) fn resync(&mut self, now: Instant) {
         self.out_of_step = false;
-        self.pair.renew(own);
+        self.pair.renew();
+        self.forget_peer(now);
+    }
+
+    /// Nothing is known of what the vehicle has or had.
+    fn forget_peer(&mut self, now: Instant) {
         self.replica.clear();
         self.objects.clear();
+        self.status = StatusParts::default();
+        self.sent.clear();
+        self.turn_began = 0;
         self.outbox.handle_peer_restart(now);
+        self.hello_due = now;
     }
+
+    /// Time after which a slot that was not acknowledged goes out again where the modem decides when to speak.
+    pub(super) fn patience(&self) -> Duration {
+        self.master.round_trip().unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4)
+    }
+}
+
+impl StatusParts {
+    fn read(&mut self, kind: ChunkKind, payload: &[u8], now: Instant) -> bool {
+        let (read, at) = match kind {
+            ChunkKind::Pose => (self.status.read_pose(payload), &mut self.pose),
+            _ => (self.status.read_report(payload), &mut self.report),
+        };
+        if read.is_ok() {
+            *at = Some(now);
+        }
+        if let (Some(pose), Some(_)) = (self.pose, self.report) {
+            self.whole = Some((self.status.clone(), pose));
+        }
+        read.is_ok()
+    }
+}
+
+fn handle_object(
+    objects: &mut ObjectReceiver,
+    vehicle: Address,
+    payload: &[u8],
+    events: &mut VecDeque<SurfaceEvent>,
+) -> bool {
+    let Ok(part) = Part::decode(payload) else { return false };
+    events.push_back(match objects.handle_part(&part) {
+        Received::Complete(_, bytes) => SurfaceEvent::Object(vehicle, bytes),
+        Received::Progress(id, held, total) => {
+            let head = objects.head(id, SurfaceEvent::OBJECT_HEAD).map(<[u8]>::to_vec);
+            SurfaceEvent::ObjectProgress { vehicle, head, held, total }
+        }
+    });
+    true
 }
 
 fn class_of(kind: ChunkKind) -> Class {
     match kind {
         ChunkKind::Map => Class::Map,
-        ChunkKind::Status => Class::Status,
+        ChunkKind::Pose | ChunkKind::Report => Class::Status,
         ChunkKind::Slot => Class::Directive,
         ChunkKind::Object => Class::Exemplar,
     }

@@ -15,10 +15,10 @@ pub enum Refusal {
     NoBase,
 }
 
-/// What was heard of one session of a peer.
+/// What was heard of one run of a peer.
 ///
 /// Invariants: `base <= closed <= highest`; a frame up to `closed` that is not in `held` never will be.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Window {
     base: FrameNumber,
     closed: FrameNumber,
@@ -28,13 +28,6 @@ pub struct Window {
 }
 
 impl Window {
-    /// A window that opens with the first frame heard: what the sender calls known is none of our business.
-    pub fn opened_by(number_low: u16, base_distance: u16) -> Self {
-        let number = u64::from(number_low) + 0x1_0000;
-        let base = number - u64::from(base_distance);
-        Self { base, closed: base, highest: base, held: BTreeSet::new(), unpersisted: BTreeSet::new() }
-    }
-
     /// The last frame whose fate the sender is known to know.
     pub fn base(&self) -> FrameNumber {
         self.base
@@ -43,6 +36,11 @@ impl Window {
     /// Highest frame number heard.
     pub fn highest(&self) -> FrameNumber {
         self.highest
+    }
+
+    /// Frames heard that no statement has spoken of yet, and those that were lost between them.
+    pub fn unstated(&self) -> u64 {
+        self.highest - self.closed
     }
 
     /// Takes a frame, or says why not.
@@ -79,20 +77,37 @@ impl Window {
     ///
     /// What the verdict calls lost is closed: it will not be taken later.
     pub fn statement(&mut self, room: usize) -> Option<AckStatement> {
-        let mut horizon = self.unpersisted.first().map_or(self.highest, |&n| n - 1);
+        let mut horizon = self.utmost();
         loop {
-            if horizon <= self.base {
-                return None;
-            }
-            let lost = (self.base + 1..=horizon).rev().filter(|n| !self.held.contains(n));
-            let lost: Vec<u16> = lost.map(|n| (horizon - n) as u16).collect();
-            let statement = AckStatement { horizon_low: (horizon & 0xFFF) as u16, lost };
+            let statement = self.verdict(horizon)?;
             if statement.encode(room, &mut Vec::new()) {
                 self.closed = self.closed.max(horizon);
                 return Some(statement);
             }
             horizon = self.base + (horizon - self.base) * 3 / 4;
         }
+    }
+
+    /// Bytes that a statement on all that was heard takes.
+    pub fn statement_bytes(&self) -> usize {
+        let mut bytes = Vec::new();
+        if let Some(statement) = self.verdict(self.utmost()) {
+            statement.encode(usize::MAX, &mut bytes);
+        }
+        bytes.len()
+    }
+
+    fn utmost(&self) -> FrameNumber {
+        self.unpersisted.first().map_or(self.highest, |&n| n - 1)
+    }
+
+    fn verdict(&self, horizon: FrameNumber) -> Option<AckStatement> {
+        if horizon <= self.base {
+            return None;
+        }
+        let lost = (self.base + 1..=horizon).rev().filter(|n| !self.held.contains(n));
+        let lost: Vec<u16> = lost.map(|n| (horizon - n) as u16).collect();
+        Some(AckStatement { horizon_low: (horizon & 0xFFF) as u16, lost })
     }
 }
 
@@ -106,12 +121,10 @@ mod tests {
         /// Both ends agree for ever on what was delivered up to the sender's horizon.
         #[test]
         fn sender_and_receiver_agree_on_every_fate(
-            events in proptest::collection::vec((0u8..10, 0usize..40, 3usize..20), 1..400), start in 0u64..70_000,
+            events in proptest::collection::vec((0u8..10, 0usize..40, 3usize..20), 1..400),
         ) {
             let mut flight = Flight::<u64>::default();
-            for _ in 0..start % 7 { flight.push(0); }
-            flight.handle_peer_restart();
-            let mut window: Option<Window> = None;
+            let mut window = Window::default();
             let mut water: Vec<(u64, u16)> = Vec::new();
             let mut taken = BTreeSet::new();
             let mut fates = Vec::new();
@@ -123,13 +136,12 @@ mod tests {
                     }
                     5..8 if !water.is_empty() => {
                         let (number, distance) = water.remove(pick % water.len());
-                        let w = window.get_or_insert_with(|| Window::opened_by(number as u16, distance));
-                        if w.accept(number as u16, distance).is_ok() {
+                        if window.accept(number as u16, distance).is_ok() {
                             prop_assert!(taken.insert(number), "frame {} taken twice", number);
                         }
                     }
                     _ => {
-                        let statement = window.as_mut().and_then(|w| w.statement(room));
+                        let statement = window.statement(room);
                         if let Some(s) = statement.filter(|_| pick % 3 > 0) {
                             fates.extend(flight.handle_statement(&s));
                         }
@@ -144,7 +156,7 @@ mod tests {
 
     #[test]
     fn what_is_not_durable_is_not_acknowledged() {
-        let mut w = Window::opened_by(1, 1);
+        let mut w = Window::default();
         let first = w.accept(1, 1).unwrap();
         w.hold_back(first);
         assert_eq!(w.statement(10), None);

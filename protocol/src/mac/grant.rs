@@ -19,9 +19,18 @@ pub struct Grant {
 }
 
 impl Grant {
-    /// The turn granted by a frame heard at `now`, after which the surface sends `remaining` more.
+    /// Bits on air that one unit of what remains of the surface's turn stands for.
+    const REMAINING_BITS: u64 = 32;
+
+    /// What remains of the surface's turn, as its frames say it: rounded up, 255 is that or more.
+    pub fn code_remaining(bits_on_air: u64) -> u8 {
+        bits_on_air.div_ceil(Self::REMAINING_BITS).min(255) as u8
+    }
+
+    /// The turn granted by a frame heard at `now`, after which so much `remaining` of the surface's turn follows.
     pub fn heard(quarters: u8, remaining: u8, profile: &ModemProfile, now: Instant) -> Self {
-        let begins = now + profile.frame_airtime() * u32::from(remaining) + profile.turn_around;
+        let rest = profile.time_of(u64::from(remaining) * Self::REMAINING_BITS);
+        let begins = now + rest + profile.turn_around;
         Self { begins, ends: begins + Duration::from_millis(250) * u32::from(quarters) }
     }
 

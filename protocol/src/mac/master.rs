@@ -2,6 +2,7 @@
 
 use super::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// How the surface grants turns to one vehicle.
@@ -32,7 +33,7 @@ enum State {
     Idle { next: Instant },
     /// The surface is on air.
     Speaking,
-    /// The vehicle has the turn: nothing heard yet since the grant ended at `granted`.
+    /// The vehicle has the turn, and nothing was heard yet.
     Granted { granted: Instant, until: Instant },
     /// The vehicle is speaking.
     Listening { until: Instant },
@@ -43,28 +44,32 @@ enum State {
 pub struct Master {
     config: MasterConfig,
     state: State,
-    round_trip: Option<Duration>,
+    /// Recent measurements of the two-way propagation; the least of them counts, for every error makes it look longer.
+    round_trips: VecDeque<Duration>,
     unanswered: u32,
     granted_airtime: Duration,
     begun: Option<Instant>,
 }
 
 impl Master {
+    /// Measurements of the round trip that are kept.
+    const ROUND_TRIPS: usize = 4;
+
     /// A master that may grant its first turn at `now`.
     pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self {
             config,
             state: State::Idle { next: now },
-            round_trip: None,
+            round_trips: VecDeque::new(),
             unanswered: 0,
             granted_airtime: Duration::ZERO,
             begun: None,
         }
     }
 
-    /// Two-way propagation, smoothed; `None` before the first answer.
+    /// Two-way propagation; `None` before the first measurement.
     pub fn round_trip(&self) -> Option<Duration> {
-        self.round_trip
+        self.round_trips.iter().min().copied()
     }
 
     /// Grants in a row that were not answered.
@@ -75,11 +80,6 @@ impl Master {
     /// When the last turn began.
     pub fn begun(&self) -> Option<Instant> {
         self.begun
-    }
-
-    /// Whether the surface's own turn is under way.
-    pub fn is_speaking(&self) -> bool {
-        self.state == State::Speaking
     }
 
     /// Whether the medium is taken by a turn of this vehicle or a grant to it.
@@ -105,11 +105,27 @@ impl Master {
         }
     }
 
-    /// The turn to grant: long against what changing hands costs, in quarter seconds.
-    pub fn grant(&self, profile: &ModemProfile) -> u8 {
-        let cost = self.round_trip.unwrap_or(self.config.max_propagation * 2) + profile.turn_around * 2;
+    /// When a vehicle that does not answer is tried again although others wait: ever more seldom.
+    pub fn retry_at(&self) -> Instant {
+        let Some(begun) = self.begun.filter(|_| self.unanswered >= 3) else { return Instant::ZERO };
+        begun + Duration::from_secs(1 << (self.unanswered - 1).min(7))
+    }
+
+    /// The vehicle is there after all: it is spoken with as soon as possible.
+    pub fn hurry(&mut self, now: Instant) {
+        self.unanswered = self.unanswered.min(2);
+        if let State::Idle { next } = &mut self.state {
+            *next = (*next).min(now);
+        }
+    }
+
+    /// The turn to grant where `vehicles` share the medium: long against what changing hands costs, in quarter seconds.
+    pub fn grant(&self, profile: &ModemProfile, vehicles: usize) -> u8 {
+        let cost = self.round_trip().unwrap_or(self.config.max_propagation * 2) + profile.turn_around * 2;
         let least = profile.frame_airtime() + Duration::from_secs(1);
-        quarter_seconds((cost * 8).max(least).min(self.config.max_turn.max(least)), 255)
+        // With several, each waits for all the others: shorter turns cost some capacity and save much waiting.
+        let most = self.config.max_turn.div_f64((vehicles.max(1) as f64).sqrt()).max(cost * 2);
+        quarter_seconds((cost * 8).min(most).max(least), 255)
     }
 
     /// The surface begins its turn. A turn that begins while an answer was due counts as unanswered.
@@ -122,20 +138,35 @@ impl Master {
         self.state = State::Speaking;
     }
 
+    /// Something was said outside of turns.
+    pub fn note_begun(&mut self, now: Instant) {
+        self.begun = Some(now);
+    }
+
     /// The last frame of the surface's turn has left the modem.
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, now: Instant) {
         let flight =
-            self.round_trip.map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 2 + Duration::from_millis(200));
+            self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
         // A vehicle farther away than it was thought to be must not be talked over for ever.
         let patience = Duration::from_secs(1) * self.unanswered.saturating_sub(4).min(10);
         let until = now + patience + flight + profile.turn_around * 2 + profile.frame_airtime();
         self.state = State::Granted { granted: now, until };
     }
 
+    /// A measurement of the two-way propagation.
+    pub fn handle_round_trip(&mut self, measured: Duration) {
+        if measured <= self.config.max_propagation * 8 {
+            self.round_trips.push_back(measured);
+            if self.round_trips.len() > Self::ROUND_TRIPS {
+                self.round_trips.pop_front();
+            }
+        }
+    }
+
     /// A frame of the vehicle was heard, after which it says `remaining` more will follow; `wish` is its turn byte.
     ///
     /// Only for a frame that proves that the vehicle has heard the grant: one that was late under way or came twice tells
-    /// nothing about the turn or the round trip.
+    /// nothing about the turn.
     pub fn handle_answer(
         &mut self,
         bytes: usize,
@@ -144,9 +175,12 @@ impl Master {
         profile: &ModemProfile,
         now: Instant,
     ) {
-        if let State::Granted { granted, .. } = self.state {
+        if let State::Granted { granted, .. } = self.state
+            && self.round_trips.is_empty()
+        {
+            // Until a stamp tells, what the whole answer took is the most that it can be.
             let both_ways = now.since(granted).saturating_sub(profile.airtime(bytes) + profile.turn_around);
-            self.round_trip = Some(self.round_trip.map_or(both_ways, |old| follow(old, both_ways)));
+            self.handle_round_trip(both_ways);
         }
         self.unanswered = 0;
         if remaining > 0 {
@@ -167,9 +201,4 @@ impl Master {
         }
         self.state = State::Idle { next: at };
     }
-}
-
-/// Follows a shorter round trip fast and a longer one slowly: a lost first frame of an answer makes it look longer.
-fn follow(old: Duration, measured: Duration) -> Duration {
-    if measured < old { (old + measured) / 2 } else { (old * 15 + measured.min(old * 2)) / 16 }
 }

@@ -1,15 +1,34 @@
 //! Medium access: who may speak, and for how long.
 //!
-//! `Shared` access, for modems that leave half duplex to the host: the surface grants turns, a vehicle speaks only in one.
-//! No clock is shared; every wait comes from measured ranges and known airtimes.
+//! No clock is shared; every wait comes from measured ranges and known airtimes. What the modem does by itself decides how
+//! turns are made: [`Access`].
 
+mod clock_map;
+mod floor;
 mod grant;
 mod master;
 
+pub use clock_map::ClockMap;
+pub use floor::Floor;
 pub use grant::{Grant, quarter_seconds};
 pub use master::{Master, MasterConfig};
 
 use std::time::Duration;
+
+/// How the ends share the medium; the modem's driver chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Access {
+    /// The surface grants turns, a vehicle speaks only in one. Also right for a full-duplex link.
+    #[default]
+    Shared,
+    /// The modem does half duplex, and repeats, by itself; each end speaks as long as the modem's pool takes frames.
+    ModemOwned {
+        /// Frames that may be in the modem at a time: a turn's worth, so that what waits there does not grow old.
+        pool_frames: u32,
+    },
+    /// The modem asks for the frames of a cycle that the surface's modem has begun.
+    Polled,
+}
 
 /// What the link must know of the modem.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +41,8 @@ pub struct ModemProfile {
     pub overhead_bits: u64,
     /// Time from the end of a reception or transmission to the beginning of one's own.
     pub turn_around: Duration,
+    /// How the ends share the medium.
+    pub access: Access,
 }
 
 impl ModemProfile {
@@ -32,7 +53,12 @@ impl ModemProfile {
 
     /// Time on air of a transmission of `bytes`.
     pub fn airtime(&self, bytes: usize) -> Duration {
-        Duration::from_secs_f64(self.bits_on_air(bytes) as f64 / self.bit_rate_bps.max(1.0))
+        self.time_of(self.bits_on_air(bytes))
+    }
+
+    /// Time that `bits` take on air.
+    pub fn time_of(&self, bits: u64) -> Duration {
+        Duration::from_secs_f64(bits as f64 / self.bit_rate_bps.max(1.0))
     }
 
     /// Time on air of a full frame.

@@ -4,11 +4,13 @@ mod digest;
 mod grid;
 mod replica;
 mod source;
+mod stream;
 
 pub use digest::MapDigest;
 pub use grid::{Cell, LabelGrid, Rect, TILE};
 pub use replica::Replica;
-pub use source::{CellWorth, MapSource};
+pub use source::MapSource;
+pub use stream::{StateReplica, StateSource};
 
 /// Label of a cell nobody has seen.
 pub const UNEXPLORED: u8 = 0;

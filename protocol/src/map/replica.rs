@@ -1,7 +1,7 @@
 //! The surface's side of the map: the picture, and the bases that the next chunks may refer to.
 
-use super::{Cell, LabelGrid, MapDigest};
-use crate::map_codec::{self, DecodeError};
+use super::{Cell, LabelGrid, MapDigest, StateReplica};
+use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
@@ -32,11 +32,6 @@ impl Replica {
         &self.shown
     }
 
-    /// Counts the times that [`Self::shown`] has changed.
-    pub fn version(&self) -> u64 {
-        self.version
-    }
-
     /// When [`Self::shown`] was last confirmed or changed by the vehicle.
     pub fn updated(&self) -> Option<Instant> {
         self.updated
@@ -46,24 +41,11 @@ impl Replica {
     pub fn heard(&self, cell: Cell) -> Option<Instant> {
         self.heard.get(&cell).map(|h| h.at)
     }
+}
 
-    /// Fingerprint of the base: the map that the vehicle knows us to hold.
-    pub fn base_digest(&self) -> u16 {
-        self.base_digest.value()
-    }
-
-    /// The vehicle now bases its chunks on every frame up to `horizon`.
-    pub fn advance_base(&mut self, horizon: u64) {
-        let later = self.log.split_off(&(horizon + 1));
-        for (cell, label) in std::mem::replace(&mut self.log, later).into_values().flatten() {
-            let old = self.base.set(cell, label);
-            self.base_digest.change(cell, old, label);
-        }
-    }
-
-    /// Applies a map chunk of frame `number`; frames may come in any order.
-    pub fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> Result<(), DecodeError> {
-        let changes = map_codec::decode(&self.base, chunk)?;
+impl StateReplica for Replica {
+    fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
+        let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
         self.updated = Some(now);
         let mut changed = false;
         for &(cell, label) in &changes {
@@ -74,11 +56,26 @@ impl Replica {
         }
         self.version += u64::from(changed);
         self.log.entry(number).or_default().extend(changes);
-        Ok(())
+        true
     }
 
-    /// Forgets everything: the vehicle began afresh.
-    pub fn clear(&mut self) {
+    fn advance_base(&mut self, horizon: u64) {
+        let later = self.log.split_off(&(horizon + 1));
+        for (cell, label) in std::mem::replace(&mut self.log, later).into_values().flatten() {
+            let old = self.base.set(cell, label);
+            self.base_digest.change(cell, old, label);
+        }
+    }
+
+    fn base_digest(&self) -> u16 {
+        self.base_digest.value()
+    }
+
+    fn version(&self) -> u64 {
+        self.version
+    }
+
+    fn clear(&mut self) {
         *self = Self { version: self.version + 1, ..Self::default() };
     }
 }

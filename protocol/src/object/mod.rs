@@ -6,6 +6,7 @@ mod sender;
 pub use receiver::{ObjectReceiver, Received};
 pub use sender::ObjectSender;
 
+pub type SymbolRun = std::ops::Range<usize>;
 use crate::wire::{Reader, Truncated};
 
 /// Largest object in bytes.

@@ -73,13 +73,14 @@ impl ObjectSender {
     }
 
     /// A frame with this part was written.
-    pub fn mark_in_flight(&mut self, id: ObjectId, range: Range<usize>) {
-        self.mark(id, range, |_| ByteState::InFlight);
+    pub fn set_loss(&mut self, _: f64) {}
+    pub fn mark_in_flight(&mut self, id: ObjectId, range: &Range<usize>) {
+        self.mark(id, range.clone(), |_| ByteState::InFlight);
     }
 
     /// The fate of a frame with this part is known; returns whether the object is now complete at the peer.
-    pub fn handle_fate(&mut self, id: ObjectId, range: Range<usize>, delivered: bool) -> bool {
-        self.mark(id, range, |state| match state {
+    pub fn handle_fate(&mut self, id: ObjectId, range: &Range<usize>, delivered: bool) -> bool {
+        self.mark(id, range.clone(), |state| match state {
             ByteState::Delivered => ByteState::Delivered,
             _ if delivered => ByteState::Delivered,
             _ => ByteState::Missing,

@@ -67,6 +67,12 @@ impl BitBudget {
         at
     }
 
+    /// Whether less than half of what a window allows was sent in the last one.
+    pub fn is_plentiful(&self, now: Instant) -> bool {
+        let recent: u64 = self.recent.iter().filter(|(at, _)| now.since(*at) < self.window).map(|(_, bits)| bits).sum();
+        millionths(recent) * 2 < self.capacity()
+    }
+
     /// How many transmissions of `bits` each may begin back to back at `now`, at most `most`.
     pub fn affordable(&self, bits: u64, most: u32, now: Instant) -> u32 {
         let mut trial = self.clone();

@@ -6,4 +6,4 @@ mod shares;
 
 pub use audit::Audit;
 pub use budget::BitBudget;
-pub use shares::{Class, ClassShares};
+pub use shares::{Class, ClassShares, Shares};

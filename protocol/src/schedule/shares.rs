@@ -3,10 +3,12 @@
 /// What bits are spent on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
-    /// Slots of the directive.
+    /// Slots of the directive but for the fix.
     Directive,
     /// The vehicle's status.
     Status,
+    /// Position fixes.
+    Fix,
     /// The label map.
     Map,
     /// Representative images.
@@ -16,14 +18,17 @@ pub enum Class {
 }
 
 impl Class {
-    /// Every class.
-    pub const ALL: [Self; 5] = [Self::Directive, Self::Status, Self::Map, Self::Exemplar, Self::Overhead];
+    /// Every class; what comes first goes first where no share says otherwise.
+    pub const ALL: [Self; 6] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar, Self::Overhead];
+    /// The classes that have a share.
+    pub const SHARED: [Self; 5] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar];
 
     /// Name for people and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Directive => "directive",
             Self::Status => "status",
+            Self::Fix => "fix",
             Self::Map => "map",
             Self::Exemplar => "exemplar",
             Self::Overhead => "overhead",
@@ -31,54 +36,119 @@ impl Class {
     }
 }
 
-/// Minimum shares of map and exemplars when both have something to send; a class with nothing to send lends its share.
-#[derive(Debug, Clone)]
+/// Least share of each of [`Class::SHARED`] in percent of the bytes that an end sends, while the class has something to send.
+/// They add up to 100 at most; what is left over goes to the class that comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shares(pub [u8; 5]);
+
+impl Default for Shares {
+    fn default() -> Self {
+        Self([10, 5, 5, 50, 20])
+    }
+}
+
+impl Shares {
+    /// Whether they leave room for each other.
+    pub fn is_sound(&self) -> bool {
+        self.0.iter().map(|&s| u32::from(s)).sum::<u32>() <= 100
+    }
+
+    /// The share of a class in 0..=1.
+    pub fn of(&self, class: Class) -> f64 {
+        let at = Class::SHARED.iter().position(|&c| c == class);
+        at.and_then(|i| self.0.get(i)).map_or(0.0, |&percent| f64::from(percent) / 100.0)
+    }
+}
+
+/// Keeps the shares: a class with nothing to send lends its share, and does not get it back later.
+#[derive(Debug, Clone, Default)]
 pub struct ClassShares {
-    exemplar: f64,
-    /// Bytes by which exemplars are ahead of their share.
-    ahead: f64,
+    shares: Shares,
+    /// Bytes that a class was owed and did not get while it waited.
+    owed: [f64; 5],
 }
 
 impl ClassShares {
-    /// Most bytes of lead or arrears that are remembered.
+    /// Most bytes that are owed or ahead.
     const MEMORY: f64 = 4096.0;
 
-    /// Exemplars get `exemplar` (0..=1) of the bytes, the map the rest.
-    pub fn new(exemplar: f64) -> Self {
-        Self { exemplar: exemplar.clamp(0.0, 1.0), ahead: 0.0 }
+    /// Nothing is owed yet.
+    pub fn new(shares: Shares) -> Self {
+        Self { shares, owed: [0.0; 5] }
     }
 
-    /// Which of the two comes next when both have something to send.
-    pub fn turn(&self) -> Class {
-        if self.ahead < 0.0 { Class::Exemplar } else { Class::Map }
+    /// The shares in force.
+    pub fn shares(&self) -> Shares {
+        self.shares
     }
 
-    /// Counts bytes sent for a class while both had something to send.
-    pub fn spend(&mut self, class: Class, bytes: usize) {
-        let bytes = bytes as f64;
-        match class {
-            Class::Exemplar => self.ahead += bytes * (1.0 - self.exemplar),
-            Class::Map => self.ahead -= bytes * self.exemplar,
-            _ => {}
+    /// Other shares from now on.
+    pub fn set(&mut self, shares: Shares) {
+        self.shares = shares;
+    }
+
+    /// Which of the waiting classes comes next: the one that is owed most, or else the first.
+    pub fn next(&self, waiting: &[Class]) -> Option<Class> {
+        let owed = |c: Class| self.slot(c).and_then(|i| self.owed.get(i)).copied().unwrap_or_default();
+        let most = waiting.iter().copied().filter(|&c| owed(c) > 0.0).max_by(|&a, &b| owed(a).total_cmp(&owed(b)));
+        most.or_else(|| waiting.iter().copied().min())
+    }
+
+    /// Counts bytes sent for a class while `waiting` (that class too) had something to send.
+    pub fn spend(&mut self, class: Class, bytes: usize, waiting: &[Class]) {
+        if waiting.len() < 2 {
+            return;
         }
-        self.ahead = self.ahead.clamp(-Self::MEMORY, Self::MEMORY);
+        let bytes = bytes as f64;
+        for &c in waiting {
+            let earned = self.shares.of(c) * bytes - if c == class { bytes } else { 0.0 };
+            if let Some(owed) = self.slot(c).and_then(|i| self.owed.get_mut(i)) {
+                *owed = (*owed + earned).clamp(-Self::MEMORY, Self::MEMORY);
+            }
+        }
+    }
+
+    fn slot(&self, class: Class) -> Option<usize> {
+        Class::SHARED.iter().position(|&c| c == class)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_class_gets_at_least_its_share_while_it_waits(
+            shares in proptest::array::uniform5(0u8..=20), sizes in proptest::array::uniform5(1usize..200),
+        ) {
+            let mut keeper = ClassShares::new(Shares(shares));
+            let mut sent = [0usize; 5];
+            for _ in 0..4000 {
+                let class = keeper.next(&Class::SHARED).unwrap();
+                let i = Class::SHARED.iter().position(|&c| c == class).unwrap();
+                keeper.spend(class, sizes[i], &Class::SHARED);
+                sent[i] += sizes[i];
+            }
+            let total = sent.iter().sum::<usize>() as f64;
+            for (i, &bytes) in sent.iter().enumerate() {
+                let least = total * f64::from(shares[i]) / 100.0 - 5.0 * 200.0;
+                prop_assert!(bytes as f64 >= least, "class {}: {:?} of {:?}", i, sent, shares);
+            }
+        }
+    }
 
     #[test]
-    fn exemplars_get_their_share_and_no_more_while_both_are_backlogged() {
-        let mut shares = ClassShares::new(0.2);
-        let (mut map, mut exemplar) = (0, 0);
+    fn exemplars_get_their_share_and_no_more_while_the_map_waits() {
+        let waiting = [Class::Map, Class::Exemplar];
+        let mut keeper = ClassShares::new(Shares([10, 5, 5, 50, 20]));
+        let mut exemplar = 0;
         for _ in 0..1000 {
-            let class = shares.turn();
-            shares.spend(class, 50);
-            *(if class == Class::Map { &mut map } else { &mut exemplar }) += 50;
+            let class = keeper.next(&waiting).unwrap();
+            keeper.spend(class, 50, &waiting);
+            exemplar += usize::from(class == Class::Exemplar);
         }
-        let share = f64::from(exemplar) / f64::from(map + exemplar);
-        assert!((0.19..0.21).contains(&share), "{share}");
+        assert!((190..=210).contains(&exemplar), "{exemplar} of 1000");
     }
 }

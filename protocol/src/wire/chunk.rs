@@ -8,26 +8,29 @@ pub const MAX_CHUNK_HEADER: usize = 3;
 pub enum ChunkKind {
     /// A patch of the label map.
     Map,
-    /// The vehicle's status.
-    Status,
+    /// Where the vehicle is and what it does.
+    Pose,
     /// One slot of the directive.
     Slot,
     /// A part of an object that is larger than a frame.
     Object,
+    /// What the vehicle says of its map and of the directive.
+    Report,
 }
 
 impl ChunkKind {
     fn code(self) -> u8 {
         match self {
             Self::Map => 1,
-            Self::Status => 2,
+            Self::Pose => 2,
             Self::Slot => 3,
             Self::Object => 4,
+            Self::Report => 5,
         }
     }
 
     fn from_code(code: u8) -> Option<Self> {
-        [Self::Map, Self::Status, Self::Slot, Self::Object].into_iter().find(|k| k.code() == code)
+        [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report].into_iter().find(|k| k.code() == code)
     }
 }
 
@@ -38,7 +41,7 @@ impl ChunkKind {
 /// +-----+---------+----------------+-----------+
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
-/// kind     0 nothing more in this frame, 1 map, 2 status, 3 slot, 4 object; 5..7 reserved: the frame is refused
+/// kind     0 nothing more in this frame, 1 map, 2 pose, 3 slot, 4 object, 5 report; 6, 7 reserved: the frame is refused
 /// length   0..28 bytes of payload; 29: 29 + next byte; 30: next two bytes; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

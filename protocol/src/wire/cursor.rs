@@ -67,4 +67,9 @@ impl<'a> Reader<'a> {
     pub fn u32(&mut self) -> Result<u32, Truncated> {
         self.array().map(u32::from_be_bytes)
     }
+
+    /// Eight bytes.
+    pub fn u64(&mut self) -> Result<u64, Truncated> {
+        self.array().map(u64::from_be_bytes)
+    }
 }

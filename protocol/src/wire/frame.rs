@@ -1,101 +1,18 @@
-//! Frames: what one modem transmission carries.
+//! Frames: what one modem transmission carries, and what it ends in.
 
-use super::ack::AckStatement;
+use super::WIRE_VERSION;
 use super::chunk::{ChunkKind, Chunks, push_chunk};
-use super::cursor::Reader;
-use super::{MAX_WINDOW, WIRE_VERSION};
+use super::cursor::{Reader, Truncated};
+use super::header::{Address, Header, MissionId};
+use crate::seal::{Direction, MissionKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
+use std::borrow::Cow;
 
 /// Frames shorter than this end in a 24-bit CRC, longer ones in a 32-bit one.
 const LONG_FRAME: usize = 128;
 
 static CRC24: Crc<u32> = Crc::<u32>::new(&CRC_24_OPENPGP);
 static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
-
-/// Who speaks or is spoken to: 0 the surface, 1..=14 vehicles, 15 everybody.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Address(u8);
-
-impl Address {
-    /// The surface end.
-    pub const SURFACE: Self = Self(0);
-
-    /// The vehicle with this number; `None` outside 1..=14.
-    pub fn vehicle(number: u8) -> Option<Self> {
-        (1..=14).contains(&number).then_some(Self(number))
-    }
-
-    /// The number on the wire.
-    pub fn number(self) -> u8 {
-        self.0
-    }
-}
-
-/// Keeps missions apart that share the water: it seeds every CRC, so a frame of another mission does not verify.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct MissionId(pub u32);
-
-/// Random number of one run of one end; 0 is never drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SessionId(std::num::NonZeroU16);
-
-impl SessionId {
-    /// A session id from 16 random bits.
-    pub fn from_random(bits: u16) -> Self {
-        Self(std::num::NonZeroU16::new(bits).unwrap_or(std::num::NonZeroU16::MAX))
-    }
-
-    /// The number on the wire.
-    pub fn get(self) -> u16 {
-        self.0.get()
-    }
-}
-
-/// The header of a frame.
-///
-/// ```text
-///  0                   1                   2                   3
-///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
-/// +-----+-+-+-+-+-+-------+-------+-------------------------------+
-/// |ver=1|A|T|H|0|0| from  |  to   | session of the sender         |
-/// +-----+-+-+-+-+-+-------+-------+-------+-------+---------------+
-/// | number                        | base (1-2)    | remaining     |
-/// +-------------------------------+---------------+---------------+
-/// | [turn]        | [ack statement ...]           | chunks ... CRC|
-/// +---------------+-------------------------------+---------------+
-/// A          an ack statement is present
-/// T          a turn byte is present
-/// H          hello: the sender does not know the receiver's session; such a frame has no chunks
-/// number     of this frame in the sender's session toward this receiver, wraps
-/// base       number minus the last frame whose fate the sender knows, 1..=2048; 0..127 in one byte, else two with the
-///            first one's top bit set (7 high bits, then 8 low bits)
-/// remaining  frames that follow in this turn, 255 = 255 or more
-/// turn       from the surface: airtime granted, in quarter seconds (0 = none);
-///            from a vehicle: when it would use another turn, in quarter seconds from now (0 = at once, 255 = not known)
-/// CRC        over mission id (4 bytes), the receiver's session (2 bytes, 0 in a hello) and the frame before the CRC:
-///            CRC-24/OPENPGP in frames under 128 bytes, CRC-32/ISCSI in longer ones
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Header {
-    /// Sender.
-    pub from: Address,
-    /// Receiver.
-    pub to: Address,
-    /// The sender's session.
-    pub session: SessionId,
-    /// Low 16 bits of the frame's number.
-    pub number: u16,
-    /// `number` minus the sender's horizon.
-    pub base: u16,
-    /// Frames that follow in this turn.
-    pub remaining: u8,
-    /// The turn byte.
-    pub turn: Option<u8>,
-    /// What the sender says of the frames it heard from the receiver.
-    pub ack: Option<AckStatement>,
-    /// Whether the sender does not know the receiver's session.
-    pub hello: bool,
-}
 
 /// Why received bytes are no frame for us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -110,27 +27,71 @@ pub enum FrameError {
     #[error("the frame is for another address")]
     NotForUs,
     /// Corrupted, of another mission, or sealed to a session that is not ours.
-    #[error("the checksum does not match")]
+    #[error("the checksum or tag does not match")]
     Checksum,
     /// A field has a value that no sender writes.
     #[error("the frame has a field out of range")]
     BadField,
 }
 
-/// A verified frame.
-#[derive(Debug, Clone)]
-pub struct Frame<'a> {
-    /// Its header.
-    pub header: Header,
-    body: &'a [u8],
+impl From<Truncated> for FrameError {
+    fn from(_: Truncated) -> Self {
+        Self::Truncated
+    }
 }
 
-/// Bytes of CRC at the end of a frame of `len` bytes.
-pub fn crc_len(len: usize) -> usize {
-    if len < LONG_FRAME { 3 } else { 4 }
+/// What a frame ends in, and what that proves.
+#[derive(Debug, Clone, Copy)]
+pub enum Seal<'a> {
+    /// A CRC over the mission, the receiver's session (0 if it is not known) and the frame.
+    Crc(MissionId, u16),
+    /// The tag of a hello: mission, the receiver's session and nonce (0 if they are not known) and the frame.
+    Hello(&'a MissionKey, MissionId, u16, u64),
+    /// The tag of a numbered frame; the number is unbounded.
+    Session(&'a SessionKey, Direction, u64),
 }
 
-fn seal(frame: &[u8], len: usize, mission: MissionId, to_session: u16) -> u32 {
+impl Seal<'_> {
+    /// Bytes that a frame of `len` bytes ends in.
+    pub fn bytes(keyed: bool, len: usize) -> usize {
+        match (keyed, len < LONG_FRAME) {
+            (true, _) => TAG_BYTES,
+            (false, true) => 3,
+            (false, false) => 4,
+        }
+    }
+
+    fn hello_parts<'p>(
+        mission: &'p [u8; 4],
+        session: &'p [u8; 2],
+        nonce: &'p [u8; 8],
+        frame: &'p [u8],
+    ) -> [&'p [u8]; 4] {
+        [mission, session, nonce, frame]
+    }
+
+    /// Writes the end of a frame of `len` bytes in all, whose chunks begin at `body_at`.
+    fn close(&self, bytes: &mut Vec<u8>, body_at: usize, len: usize) {
+        match *self {
+            Self::Crc(mission, session) => {
+                let crc = checksum(bytes, len, mission, session).to_be_bytes();
+                bytes.extend_from_slice(crc.get(4 - Self::bytes(false, len)..).unwrap_or_default());
+            }
+            Self::Hello(key, mission, session, nonce) => {
+                let (m, s, n) = (mission.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
+                let tag = key.hello_tag(&Self::hello_parts(&m, &s, &n, bytes));
+                bytes.extend_from_slice(&tag);
+            }
+            Self::Session(key, direction, number) => {
+                let (head, body) = bytes.split_at_mut(body_at);
+                let tag: Tag = key.seal(direction, number, head, body);
+                bytes.extend_from_slice(&tag);
+            }
+        }
+    }
+}
+
+fn checksum(frame: &[u8], len: usize, mission: MissionId, to_session: u16) -> u32 {
     let crc = if len < LONG_FRAME { &CRC24 } else { &CRC32 };
     let mut digest = crc.digest();
     digest.update(&mission.0.to_be_bytes());
@@ -139,62 +100,72 @@ fn seal(frame: &[u8], len: usize, mission: MissionId, to_session: u16) -> u32 {
     digest.finalize()
 }
 
-impl<'a> Frame<'a> {
-    /// Verifies and reads a frame; `ours` are the sessions under which we may be addressed now (one a peer).
-    pub fn decode(
-        bytes: &'a [u8],
-        mission: MissionId,
-        us: Address,
-        ours: impl Fn(Address) -> SessionId,
-    ) -> Result<Self, FrameError> {
-        let crc_len = crc_len(bytes.len());
-        let (covered, crc) =
-            bytes.len().checked_sub(crc_len).and_then(|n| bytes.split_at_checked(n)).ok_or(FrameError::Truncated)?;
+/// A frame whose header could be read, and that nobody has verified yet.
+#[derive(Debug, Clone)]
+pub struct Envelope<'a> {
+    /// What it claims.
+    pub header: Header,
+    head: &'a [u8],
+    body: &'a [u8],
+    end: &'a [u8],
+}
+
+/// A verified frame.
+#[derive(Debug, Clone)]
+pub struct Frame<'a> {
+    /// Its header.
+    pub header: Header,
+    body: Cow<'a, [u8]>,
+}
+
+impl<'a> Envelope<'a> {
+    /// Reads the header of a frame; `to_us` says which addresses are ours.
+    pub fn decode(bytes: &'a [u8], to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
+        let keyed = bytes.first().is_some_and(|flags| flags & 1 != 0);
+        let end = bytes.len().checked_sub(Seal::bytes(keyed, bytes.len())).ok_or(FrameError::Truncated)?;
+        let (covered, end) = bytes.split_at_checked(end).ok_or(FrameError::Truncated)?;
         let mut reader = Reader::new(covered);
-        let truncated = |_| FrameError::Truncated;
-        let flags = reader.u8().map_err(truncated)?;
-        if flags >> 5 != WIRE_VERSION {
-            return Err(FrameError::Version(flags >> 5));
-        }
-        let addresses = reader.u8().map_err(truncated)?;
-        let (from, to) = (Address(addresses >> 4), Address(addresses & 15));
-        if to != us || from == us || from.0 == 15 {
-            return Err(FrameError::NotForUs);
-        }
-        let hello = flags & 0b100 != 0;
-        let session = if hello { 0 } else { ours(from).get() };
-        let received = crc.iter().fold(0u32, |acc, &b| acc << 8 | u32::from(b));
-        if seal(covered, bytes.len(), mission, session) != received {
-            return Err(FrameError::Checksum);
-        }
-        let header = Self::read_header(&mut reader, flags, from, to)?;
-        Ok(Self { header, body: reader.rest() })
+        let header = Header::decode(&mut reader, to_us)?;
+        let body = reader.rest();
+        let head = covered.get(..covered.len() - body.len()).ok_or(FrameError::Truncated)?;
+        Ok(Self { header, head, body, end })
     }
 
-    fn read_header(r: &mut Reader<'_>, flags: u8, from: Address, to: Address) -> Result<Header, FrameError> {
-        let truncated = |_| FrameError::Truncated;
-        if flags & 0b11 != 0 {
-            return Err(FrameError::BadField);
-        }
-        let session = std::num::NonZeroU16::new(r.u16().map_err(truncated)?).ok_or(FrameError::BadField)?;
-        let number = r.u16().map_err(truncated)?;
-        let base = match r.u8().map_err(truncated)? {
-            b if b < 128 => u16::from(b),
-            b => u16::from(b & 127) << 8 | u16::from(r.u8().map_err(truncated)?),
+    /// Whether the frame was sealed so, and is what its sender wrote.
+    pub fn open(&self, seal: &Seal<'_>) -> Option<Frame<'a>> {
+        let mut body = Cow::Borrowed(self.body);
+        let sound = match *seal {
+            Seal::Crc(mission, session) => !self.header.keyed && self.crc_matches(mission, session),
+            Seal::Hello(key, mission, session, nonce) => {
+                let (m, s, n) = (mission.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
+                let frame = [self.head, self.body].concat();
+                let parts = Seal::hello_parts(&m, &s, &n, &frame);
+                self.header.keyed && <&Tag>::try_from(self.end).is_ok_and(|tag| key.verify_hello(&parts, tag))
+            }
+            Seal::Session(key, direction, number) => {
+                self.header.keyed && key.open(direction, number, self.head, body.to_mut(), self.end)
+            }
         };
-        if base == 0 || u64::from(base) > MAX_WINDOW {
-            return Err(FrameError::BadField);
-        }
-        let remaining = r.u8().map_err(truncated)?;
-        let turn = (flags & 0b1000 != 0).then(|| r.u8()).transpose().map_err(truncated)?;
-        let ack = (flags & 0b1_0000 != 0).then(|| AckStatement::decode(r)).transpose().map_err(truncated)?;
-        let hello = flags & 0b100 != 0;
-        Ok(Header { from, to, session: SessionId(session), number, base, remaining, turn, ack, hello })
+        sound.then(|| Frame { header: self.header.clone(), body })
     }
 
+    fn crc_matches(&self, mission: MissionId, session: u16) -> bool {
+        let len = self.head.len() + self.body.len() + self.end.len();
+        let received = self.end.iter().fold(0u32, |acc, &b| acc << 8 | u32::from(b));
+        let crc = if len < LONG_FRAME { &CRC24 } else { &CRC32 };
+        let mut digest = crc.digest();
+        digest.update(&mission.0.to_be_bytes());
+        digest.update(&session.to_be_bytes());
+        digest.update(self.head);
+        digest.update(self.body);
+        digest.finalize() == received
+    }
+}
+
+impl Frame<'_> {
     /// What the frame carries.
-    pub fn chunks(&self) -> Chunks<'a> {
-        Chunks::new(self.body)
+    pub fn chunks(&self) -> Chunks<'_> {
+        Chunks::new(&self.body)
     }
 }
 
@@ -203,38 +174,29 @@ impl<'a> Frame<'a> {
 pub struct FrameBuilder {
     bytes: Vec<u8>,
     size: usize,
-    flags: u8,
-    /// Where the count of remaining frames stands.
+    keyed: bool,
     remaining_at: usize,
+    body_at: usize,
 }
 
 impl FrameBuilder {
     /// Starts a frame of at most `size` bytes; the ack statement is written only if it fits.
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
-        let flags = WIRE_VERSION << 5 | u8::from(header.turn.is_some()) << 3 | u8::from(header.hello) << 2;
-        bytes.extend_from_slice(&[flags, header.from.0 << 4 | header.to.0]);
-        bytes.extend_from_slice(&header.session.get().to_be_bytes());
-        bytes.extend_from_slice(&header.number.to_be_bytes());
-        if header.base < 128 {
-            bytes.push(header.base as u8);
-        } else {
-            bytes.extend_from_slice(&(header.base | 0x8000).to_be_bytes());
-        }
-        let remaining_at = bytes.len();
-        bytes.push(header.remaining);
-        bytes.extend(header.turn);
-        let mut builder = Self { bytes, size, flags, remaining_at };
+        let remaining_at = header.encode(&mut bytes);
+        let mut builder = Self { bytes, size, keyed: header.keyed, remaining_at, body_at: 0 };
         let room = builder.room();
         if let Some(ack) = &header.ack
             && ack.encode(room, &mut builder.bytes)
+            && let Some(flags) = builder.bytes.first_mut()
         {
-            builder.flags |= 0b1_0000;
+            *flags |= Header::ACK_FLAG;
         }
+        builder.body_at = builder.bytes.len();
         builder
     }
 
-    /// Corrects the count of frames that follow in this turn.
+    /// Corrects what follows in this turn.
     pub fn set_remaining(&mut self, remaining: u8) {
         if let Some(byte) = self.bytes.get_mut(self.remaining_at) {
             *byte = remaining;
@@ -243,7 +205,7 @@ impl FrameBuilder {
 
     /// Bytes that chunks can still take, their headers included.
     pub fn room(&self) -> usize {
-        self.size.saturating_sub(self.bytes.len() + crc_len(self.size))
+        self.size.saturating_sub(self.bytes.len() + Seal::bytes(self.keyed, self.size))
     }
 
     /// Adds a chunk; says whether it fitted.
@@ -251,94 +213,146 @@ impl FrameBuilder {
         push_chunk(kind, payload, self.room(), &mut self.bytes)
     }
 
-    /// Seals the frame to the receiver's session (`None` in a hello); a full frame is padded to its size, a `short` one
-    /// ends where its content ends.
-    pub fn finish(mut self, mission: MissionId, to: Option<SessionId>, short: bool) -> Vec<u8> {
-        if let Some(first) = self.bytes.first_mut() {
-            *first = self.flags;
+    /// Bytes that the frame will have.
+    pub fn len(&self, short: bool) -> usize {
+        if !short {
+            return self.size;
         }
-        let full = self.size - crc_len(self.size);
-        if !short || (self.bytes.len() + 3 >= LONG_FRAME) {
-            self.bytes.resize(full, 0);
+        let content = self.bytes.len();
+        match (self.keyed, content + 3 < LONG_FRAME) {
+            (true, _) => content + TAG_BYTES,
+            (false, true) => content + 3,
+            (false, false) => content + 4,
         }
-        let len = if self.bytes.len() == full { self.size } else { self.bytes.len() + 3 };
-        let crc = seal(&self.bytes, len, mission, to.map_or(0, SessionId::get));
-        let crc_bytes = crc.to_be_bytes();
-        self.bytes.extend_from_slice(crc_bytes.get(4 - crc_len(len)..).unwrap_or_default());
+    }
+
+    /// Closes the frame; a full frame is padded to its size, a `short` one ends where its content ends.
+    pub fn finish(mut self, seal: &Seal<'_>, short: bool) -> Vec<u8> {
+        let len = self.len(short);
+        self.bytes.resize(len - Seal::bytes(self.keyed, len), 0);
+        seal.close(&mut self.bytes, self.body_at, len);
         self.bytes
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{AckStatement, SessionId, Stamp, room_for_payload};
     use super::*;
     use proptest::prelude::*;
+    use std::time::Duration;
 
     const MISSION: MissionId = MissionId(0x5CE7_0001);
 
     fn header() -> Header {
         Header {
-            from: Address(1),
+            from: Address::vehicle(1).unwrap(),
             to: Address::SURFACE,
             session: SessionId::from_random(0x1234),
             number: 0x00FF,
             base: 3,
             remaining: 2,
             turn: None,
+            stamp: None,
+            nonce: None,
             ack: Some(AckStatement { horizon_low: 5, lost: vec![] }),
             hello: false,
+            keyed: false,
         }
     }
 
-    fn decode(bytes: &[u8], session: u16) -> Result<Frame<'_>, FrameError> {
-        Frame::decode(bytes, MISSION, Address::SURFACE, |_| SessionId::from_random(session))
+    fn envelope(bytes: &[u8]) -> Result<Envelope<'_>, FrameError> {
+        Envelope::decode(bytes, |to| to == Address::SURFACE)
+    }
+
+    fn verifies(bytes: &[u8], seal: &Seal<'_>) -> bool {
+        envelope(bytes).is_ok_and(|e| e.open(seal).is_some())
+    }
+
+    fn key() -> MissionKey {
+        MissionKey::from_bytes([7; 16])
     }
 
     #[test]
     fn golden_bytes_of_a_small_map_frame() {
         let mut b = FrameBuilder::new(&header(), 64);
         assert!(b.push(ChunkKind::Map, &[0xAA, 0xBB]));
-        let bytes = b.finish(MISSION, Some(SessionId::from_random(0x4321)), true);
-        assert_eq!(bytes[..13], [0x30, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
-        assert_eq!(bytes[13..], [0x75, 0xbd, 0x8e]);
-        let frame = decode(&bytes, 0x4321).unwrap();
+        let bytes = b.finish(&Seal::Crc(MISSION, 0x4321), true);
+        assert_eq!(bytes[..13], [0x50, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
+        assert_eq!(bytes[13..], [0x66, 0x9f, 0xf8]);
+        let frame = envelope(&bytes).unwrap().open(&Seal::Crc(MISSION, 0x4321)).unwrap();
         assert_eq!(frame.header, header());
+    }
+
+    #[test]
+    fn golden_bytes_of_a_keyed_hello() {
+        let stamp = Stamp::Surface { clock_ms: 5, one_way: Some(Duration::from_millis(7)) };
+        let hello = Header {
+            from: Address::SURFACE,
+            to: Address::vehicle(2).unwrap(),
+            number: 0,
+            base: 1,
+            remaining: 0,
+            turn: Some(9),
+            stamp: Some(stamp),
+            nonce: Some(0x0102_0304_0506_0708),
+            ack: None,
+            hello: true,
+            keyed: true,
+            ..header()
+        };
+        let bytes = FrameBuilder::new(&hello, 64).finish(&Seal::Hello(&key(), MISSION, 0, 0), true);
+        let expected = [0x4F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];
+        assert_eq!(bytes[..22], expected);
+        assert_eq!(bytes.len(), 30);
+        let read = Envelope::decode(&bytes, |to| to.number() == 2).unwrap();
+        assert_eq!(read.open(&Seal::Hello(&key(), MISSION, 0, 0)).unwrap().header, hello);
+        assert!(read.open(&Seal::Hello(&key(), MISSION, 0, 1)).is_none(), "another run's nonce");
     }
 
     #[test]
     fn a_frame_of_64_bytes_spends_at_most_14_on_everything_but_payload() {
         let mut b = FrameBuilder::new(&header(), 64);
-        let payload = vec![1; room_for_payload_of(&b)];
+        let payload = vec![1; room_for_payload(b.room())];
         assert!(b.push(ChunkKind::Map, &payload));
         assert!(payload.len() >= 50, "{} bytes of payload", payload.len());
-        assert_eq!(b.finish(MISSION, None, false).len(), 64);
-    }
-
-    fn room_for_payload_of(b: &FrameBuilder) -> usize {
-        super::super::room_for_payload(b.room())
+        assert_eq!(b.finish(&Seal::Crc(MISSION, 0), false).len(), 64);
     }
 
     #[test]
     fn frames_of_another_mission_or_session_do_not_verify() {
-        let bytes = FrameBuilder::new(&header(), 64).finish(MISSION, Some(SessionId::from_random(7)), false);
-        assert!(decode(&bytes, 7).is_ok());
-        assert_eq!(decode(&bytes, 8).err(), Some(FrameError::Checksum));
-        let other = Frame::decode(&bytes, MissionId(9), Address::SURFACE, |_| SessionId::from_random(7));
-        assert_eq!(other.err(), Some(FrameError::Checksum));
+        let bytes = FrameBuilder::new(&header(), 64).finish(&Seal::Crc(MISSION, 7), false);
+        assert!(verifies(&bytes, &Seal::Crc(MISSION, 7)));
+        assert!(!verifies(&bytes, &Seal::Crc(MISSION, 8)));
+        assert!(!verifies(&bytes, &Seal::Crc(MissionId(9), 7)));
     }
 
     proptest! {
         #[test]
         fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&bytes, 1);
+            verifies(&bytes, &Seal::Crc(MISSION, 1));
+            verifies(&bytes, &Seal::Hello(&key(), MISSION, 1, 1));
+            verifies(&bytes, &Seal::Session(&key().session(1, 1, 2, 3, true), Direction::Up, 4));
         }
 
         #[test]
-        fn a_flipped_bit_is_noticed(size in 32usize..300, bit in 0usize..256, short: bool) {
-            let mut bytes = FrameBuilder::new(&header(), size).finish(MISSION, Some(SessionId::from_random(7)), short);
+        fn a_flipped_bit_is_noticed(size in 32usize..300, fill in 0usize..300, bit: usize, short: bool, keyed: bool) {
+            let session = key().session(1, 1, 2, 3, fill % 2 == 0);
+            let seal = if keyed { Seal::Session(&session, Direction::Up, 255) } else { Seal::Crc(MISSION, 7) };
+            let mut b = FrameBuilder::new(&Header { keyed, ..header() }, size);
+            let payload = vec![5; fill.min(room_for_payload(b.room()))];
+            prop_assert!(b.push(ChunkKind::Map, &payload));
+            let announced = b.len(short);
+            let mut bytes = b.finish(&seal, short);
+            prop_assert_eq!(bytes.len(), announced);
+            prop_assert!(bytes.len() <= size);
+            {
+                let frame = envelope(&bytes).unwrap().open(&seal).unwrap();
+                prop_assert_eq!(frame.chunks().next().map(|c| c.payload.to_vec()), Some(payload));
+            }
             let bit = bit % (bytes.len() * 8);
             bytes[bit / 8] ^= 1 << (bit % 8);
-            prop_assert!(decode(&bytes, 7).is_err());
+            prop_assert!(!verifies(&bytes, &seal));
         }
     }
 }

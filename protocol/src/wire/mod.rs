@@ -6,15 +6,19 @@ mod ack;
 mod chunk;
 mod cursor;
 mod frame;
+mod header;
 mod number;
+mod stamp;
 mod status;
 
 pub use ack::{AckStatement, MAX_WINDOW};
 pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};
 pub use cursor::{Reader, Truncated};
-pub use frame::{Address, Frame, FrameBuilder, FrameError, Header, MissionId, SessionId, crc_len};
+pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
+pub use header::{Address, Header, MissionId, SessionId};
 pub use number::unwrap_number;
+pub use stamp::Stamp;
 pub use status::{SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
 
 /// Version of the wire; a frame of another version is counted and dropped.
-pub const WIRE_VERSION: u8 = 1;
+pub const WIRE_VERSION: u8 = 2;

@@ -50,9 +50,10 @@ pub struct SlotReport {
     pub state: SlotState,
 }
 
-/// What the vehicle says of itself.
+/// What the vehicle says of itself, in two chunks that each fit a small frame.
 ///
 /// ```text
+/// pose
 /// byte  bits  field                 unit, range
 ///  0    3     mode                  0 survey, 1 hold, 2 return, 3 surface, 4 abort, 5 done
 ///  0    1     a waypoint follows
@@ -63,13 +64,17 @@ pub struct SlotReport {
 ///  9    8     heading               1/256 of a turn, clockwise from north
 /// 10    8     position sigma        quarter metres, 255 = 63.75 m or more
 /// 11    8     age of the last fix   seconds, 254 = that or more, 255 = no fix yet
-/// 12    8     label epoch
-/// 13    8     labels on the map     0..254
-/// 14-16 24    explored cells
-/// 17-18 16    digest of the map that the surface is known to hold (the base of this frame)
-/// 19-24 48    six slot reports: version, low 8 bits
-/// 25-27 24    six slot reports: 4 bits each: 0 unknown, 1 applied, 2..15 refusal reason
-/// 28-33 48    [waypoint x, y]       decimetres, signed
+/// 12-14 24    explored cells
+/// 15-20 48    [waypoint x, y]       decimetres, signed
+///
+/// report
+///  0    8     label epoch
+///  1    8     labels on the map     0..254
+///  2-3  16    digest of the map that the surface is known to hold (the base of this frame)
+///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
+///  6    8     frames refused for want of authenticity, 255 = that or more
+///  7-12 48    six slot reports: version, low 8 bits
+/// 13-15 24    six slot reports: 4 bits each: 0 unknown, 1 applied, 2..15 refusal reason
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
@@ -89,14 +94,18 @@ pub struct VehicleStatus {
     pub fix_age_s: Option<f64>,
     /// Where it is going, metres east and north.
     pub waypoint: Option<(f64, f64)>,
+    /// Explored cells on its map.
+    pub explored_cells: u32,
     /// Epoch of its label ids.
     pub epoch: u8,
     /// Labels on its map.
     pub labels: u8,
-    /// Explored cells on its map.
-    pub explored_cells: u32,
     /// Digest of the map that it knows the surface to hold.
     pub base_digest: u16,
+    /// Bits a second that it may send, with 12 bits of precision.
+    pub budget_bps: u32,
+    /// Frames that it refused because they were not authentic.
+    pub refused_frames: u8,
     /// Decisions about the slots of the directive, by slot.
     pub slots: [SlotReport; SLOTS],
 }
@@ -126,59 +135,85 @@ fn put24(out: &mut Vec<u8>, value: u32) {
     out.extend_from_slice(value.to_be_bytes().get(1..).unwrap_or_default());
 }
 
-impl VehicleStatus {
-    /// Bytes that a status takes at most.
-    pub const MAX_BYTES: usize = 34;
+/// Bits a second as 12 bits of value and 4 bits of shift, rounded down.
+fn code_rate(bits_per_s: u32) -> u16 {
+    let shift = (32 - bits_per_s.leading_zeros()).saturating_sub(12).min(15);
+    ((bits_per_s >> shift).min(0xFFF) << 4 | shift) as u16
+}
 
-    /// The bytes on the wire; values out of range are clamped to it.
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(Self::MAX_BYTES);
-        out.push(self.mode.code() << 5 | u8::from(self.waypoint.is_some()) << 4);
+fn decode_rate(code: u16) -> u32 {
+    u32::from(code >> 4) << (code & 15)
+}
+
+impl VehicleStatus {
+    /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
+    pub fn encode_pose(&self, room: usize) -> Vec<u8> {
+        let waypoint = self.waypoint.filter(|_| room >= 21);
+        let mut out = vec![self.mode.code() << 5 | u8::from(waypoint.is_some()) << 4];
         put24(&mut out, decimetres(self.x_m) as u32);
         put24(&mut out, decimetres(self.y_m) as u32);
         out.extend_from_slice(&((self.depth_m * 10.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
         out.push(((self.heading_deg / 360.0 * 256.0).round() as i64 & 255) as u8);
         out.push((self.sigma_m * 4.0).round().clamp(0.0, 255.0) as u8);
         out.push(self.fix_age_s.map_or(255, |age| age.round().clamp(0.0, 254.0) as u8));
-        out.extend_from_slice(&[self.epoch, self.labels]);
         put24(&mut out, self.explored_cells.min(0xFF_FFFF));
-        out.extend_from_slice(&self.base_digest.to_be_bytes());
-        out.extend(self.slots.iter().map(|s| s.version_low));
-        out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | s.state.code())));
-        if let Some((x, y)) = self.waypoint {
+        if let Some((x, y)) = waypoint {
             put24(&mut out, decimetres(x) as u32);
             put24(&mut out, decimetres(y) as u32);
         }
         out
     }
 
-    /// Reads a status.
-    pub fn decode(bytes: &[u8]) -> Result<Self, StatusError> {
+    /// The report chunk.
+    pub fn encode_report(&self) -> Vec<u8> {
+        let mut out = vec![self.epoch, self.labels];
+        out.extend_from_slice(&self.base_digest.to_be_bytes());
+        out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
+        out.push(self.refused_frames);
+        out.extend(self.slots.iter().map(|s| s.version_low));
+        out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | s.state.code())));
+        out
+    }
+
+    /// Reads a pose; the rest stays as it is.
+    pub fn read_pose(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
         let mode = VehicleMode::ALL.get(usize::from(head >> 5)).copied().ok_or(StatusError::BadField)?;
         let metres = |dm: i32| f64::from(dm) / 10.0;
-        let mut status = Self { mode, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..Self::default() };
-        status.depth_m = f64::from(r.u16()?) / 10.0;
-        status.heading_deg = f64::from(r.u8()?) / 256.0 * 360.0;
-        status.sigma_m = f64::from(r.u8()?) / 4.0;
-        status.fix_age_s = Some(r.u8()?).filter(|&age| age != 255).map(f64::from);
-        status.epoch = r.u8()?;
-        status.labels = r.u8()?;
-        status.explored_cells = r.u24()?;
-        status.base_digest = r.u16()?;
-        let versions = r.take(SLOTS)?;
-        let states = r.take(SLOTS.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
-        for ((slot, &version_low), code) in status.slots.iter_mut().zip(versions).zip(states) {
-            *slot = SlotReport { version_low, state: SlotState::from_code(code).ok_or(StatusError::BadField)? };
-        }
+        let mut read = Self { mode, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..self.clone() };
+        read.depth_m = f64::from(r.u16()?) / 10.0;
+        read.heading_deg = f64::from(r.u8()?) / 256.0 * 360.0;
+        read.sigma_m = f64::from(r.u8()?) / 4.0;
+        read.fix_age_s = Some(r.u8()?).filter(|&age| age != 255).map(f64::from);
+        read.explored_cells = r.u24()?;
+        read.waypoint = None;
         if head & 0b1_0000 != 0 {
-            status.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
+            read.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
         }
         if head & 15 != 0 || !r.rest().is_empty() {
             return Err(StatusError::Length);
         }
-        Ok(status)
+        *self = read;
+        Ok(())
+    }
+
+    /// Reads a report; the rest stays as it is.
+    pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
+        let mut r = Reader::new(bytes);
+        let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
+        read.budget_bps = decode_rate(r.u16()?);
+        read.refused_frames = r.u8()?;
+        let versions = r.take(SLOTS)?;
+        let states = r.take(SLOTS.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
+        for ((slot, &version_low), code) in read.slots.iter_mut().zip(versions).zip(states) {
+            *slot = SlotReport { version_low, state: SlotState::from_code(code).ok_or(StatusError::BadField)? };
+        }
+        if !r.rest().is_empty() {
+            return Err(StatusError::Length);
+        }
+        *self = read;
+        Ok(())
     }
 
     /// The report about one slot.
@@ -225,27 +260,37 @@ mod tests {
             sigma_m: 1.25,
             fix_age_s: Some(8.0),
             waypoint: None,
+            explored_cells: 4000,
             epoch: 1,
             labels: 9,
-            explored_cells: 4000,
             base_digest: 0xBEEF,
+            budget_bps: 10_000,
+            refused_frames: 3,
             slots,
         };
-        let bytes = status.encode();
-        let expected: [u8; 28] = [
-            0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 1, 9, 0, 0x0F, 0xA0, 0xBE, 0xEF, 7, 0, 0, 0, 0, 2,
-            0x10, 0, 0x02,
-        ];
-        assert_eq!(bytes, expected);
-        assert_eq!(VehicleStatus::decode(&bytes), Ok(status));
+        let (pose, report) = (status.encode_pose(99), status.encode_report());
+        assert_eq!(pose, [0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
+        assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 7, 0, 0, 0, 0, 2, 0x10, 0, 0x02]);
+        let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
+        back.read_pose(&pose).unwrap();
+        back.read_report(&report).unwrap();
+        assert_eq!(back, status);
     }
 
     proptest! {
         #[test]
-        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
-            if let Ok(status) = VehicleStatus::decode(&bytes) {
-                prop_assert_eq!(status.encode(), bytes);
+        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..24)) {
+            let mut status = VehicleStatus::default();
+            if status.read_pose(&bytes).is_ok() {
+                prop_assert_eq!(status.encode_pose(99), bytes.clone());
             }
+            let _ = status.read_report(&bytes);
+        }
+
+        #[test]
+        fn a_rate_comes_back_within_a_thousandth(rate in 1u32..10_000_000) {
+            let back = decode_rate(code_rate(rate));
+            prop_assert!(back <= rate && rate - back <= rate / 1000, "{} became {}", rate, back);
         }
     }
 }

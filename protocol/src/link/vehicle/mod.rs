@@ -1,18 +1,18 @@
 //! The vehicle's end of the link.
 
 mod fill;
+mod receive;
+mod turn;
 
-use super::{DropReason, Inbound, LinkStats, Pair, SlotInbox, SlotInboxState, Transmit, Wakeup};
-use crate::directive::{Slot, SlotId, VersionedSlot};
-use crate::mac::{Grant, ModemProfile};
-use crate::map::{Cell, LabelGrid, MapSource, UNEXPLORED};
-use crate::map_codec::Codec;
-use crate::object::{ObjectId, ObjectSender};
-use crate::schedule::{BitBudget, Class, ClassShares};
+use super::{Authenticity, LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
+use crate::directive::{Slot, SlotId};
+use crate::mac::{ClockMap, Floor, ModemProfile};
+use crate::map::{Cell, LabelGrid, MapSource, StateSource};
+use crate::object::{ObjectId, ObjectSender, SymbolRun};
+use crate::schedule::{BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, MissionId, SessionId, SlotState, VehicleStatus};
+use crate::wire::{Address, MissionId, SessionId, SlotState, VehicleStatus};
 use std::collections::VecDeque;
-use std::ops::Range;
 use std::time::Duration;
 
 /// Settings of the vehicle's end.
@@ -28,14 +28,12 @@ pub struct VehicleConfig {
     pub budget_bps: u32,
     /// Window of the budget.
     pub budget_window: Duration,
-    /// Map codec.
-    pub codec: Codec,
-    /// Whether the map is replicated cell by cell; if not, the host sends it otherwise.
-    pub replicate_map: bool,
-    /// Share of exemplars against the map while both have something to send.
-    pub exemplar_share: f64,
+    /// Least share of each class while it has something to send.
+    pub shares: Shares,
     /// Time between two statuses; longer where the budget is small, so that they take at most a tenth of it.
     pub status_period: Duration,
+    /// How frames are made authentic, if they are.
+    pub authenticity: Option<Authenticity>,
 }
 
 /// What the link tells its host.
@@ -58,100 +56,107 @@ pub enum VehicleEvent {
 }
 
 #[derive(Debug)]
-enum Part {
-    Map(Vec<(Cell, u8)>),
-    Object(ObjectId, Range<usize>),
-    Status,
+enum Part<C> {
+    Map(C),
+    Object(ObjectId, SymbolRun),
+    Pose,
+    Report,
 }
 
-impl Part {
+impl<C> Part<C> {
     fn class(&self) -> Class {
         match self {
             Self::Map(_) => Class::Map,
             Self::Object(..) => Class::Exemplar,
-            Self::Status => Class::Status,
+            Self::Pose | Self::Report => Class::Status,
         }
     }
 }
 
 /// What a frame carried, each with its bytes.
-type Carried = Vec<(Part, usize)>;
+type Carried<C> = Vec<(Part<C>, usize)>;
 
-/// The vehicle's end of the link: replicates the map and status upward, receives the directive.
+/// The last frame of the surface that a stamp of ours can name.
+#[derive(Debug, Clone, Copy)]
+struct HeardLast {
+    number: u64,
+    at: Instant,
+}
+
+/// The vehicle's end of the link: replicates a state and the status upward, receives the directive.
 #[derive(Debug)]
-pub struct VehicleLink {
+pub struct VehicleLink<S: StateSource = MapSource> {
     config: VehicleConfig,
-    pair: Pair<Carried>,
+    pair: Pair<Carried<S::Carried>>,
     budget: BitBudget,
-    map: MapSource,
-    worth: [f64; 256],
+    source: S,
     objects: ObjectSender,
     shares: ClassShares,
     inbox: SlotInbox,
     status: Option<VehicleStatus>,
-    status_due: Instant,
-    grant: Option<Grant>,
-    on_air: bool,
-    /// Learned size of the map stream, bytes a changed cell.
-    bytes_per_cell: f64,
+    pose_due: Instant,
+    report_due: Instant,
+    floor: Floor,
+    /// Frames of this turn, to be sent again if nothing else is left to say.
+    said: Vec<Vec<u8>>,
+    repeats: VecDeque<Vec<u8>>,
+    /// Where the modem decides when to speak: when the surface is to have our acknowledgement, or our hello.
+    answer_due: Option<Instant>,
+    /// The session and nonce of a call that is to be answered.
+    called: Option<(SessionId, u64)>,
+    /// When the budget allows the next frame, if it did not allow the last one that was wanted.
+    blocked_until: Option<Instant>,
+    heard: Option<HeardLast>,
+    clock: Option<ClockMap>,
+    one_way: Option<Duration>,
+    /// Seeds the choice of when to answer a call.
+    random: u64,
     events: VecDeque<VehicleEvent>,
 }
 
-impl VehicleLink {
-    /// An end that has met nobody; `session` is random for each run, `restored` is what survived the last one.
-    pub fn new(config: VehicleConfig, session: SessionId, restored: SlotInboxState, now: Instant) -> Self {
+impl<S: StateSource> VehicleLink<S> {
+    /// An end that has met nobody and replicates `source`; `seed` is random for each run, `restored` is what survived the
+    /// last one.
+    pub fn with_source(config: VehicleConfig, source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
+        let pair = Pair::new(config.mission, config.address, Address::SURFACE, config.authenticity.clone(), seed);
         Self {
-            pair: Pair::new(config.mission, config.address, Address::SURFACE, session),
+            pair,
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
-            shares: ClassShares::new(config.exemplar_share),
+            shares: ClassShares::new(config.shares),
             config,
-            map: MapSource::default(),
-            worth: [0.0; 256],
+            source,
             objects: ObjectSender::default(),
             inbox: SlotInbox::restore(restored),
             status: None,
-            status_due: now,
-            grant: None,
-            on_air: false,
-            bytes_per_cell: 1.0,
+            pose_due: now,
+            report_due: now,
+            floor: Floor::default(),
+            said: Vec::new(),
+            repeats: VecDeque::new(),
+            answer_due: None,
+            called: None,
+            blocked_until: None,
+            heard: None,
+            clock: None,
+            one_way: None,
+            random: seed ^ 0x0CA1_15EA,
             events: VecDeque::new(),
         }
     }
 
-    /// Sets labels of cells; what the surface does not hold yet is sent when there is room.
-    pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
-        self.map.set(cells, now)
+    /// What is replicated.
+    pub fn source(&self) -> &S {
+        &self.source
     }
 
-    /// Begins a new run toward the surface, which then forgets the map it has: label ids start afresh.
-    pub fn renew(&mut self, session: SessionId, now: Instant) {
-        self.pair.renew(session);
-        let labelled: Vec<Cell> = self.map.target().iter().map(|(cell, _)| cell).collect();
-        self.map.set(labelled.into_iter().map(|cell| (cell, UNEXPLORED)), now);
-        self.map.handle_peer_restart(now);
-        self.objects = ObjectSender::default();
+    /// What is replicated, to change it.
+    pub fn source_mut(&mut self) -> &mut S {
+        &mut self.source
     }
 
-    /// The map as the vehicle sees it.
-    pub fn map(&self) -> &LabelGrid {
-        self.map.target()
-    }
-
-    /// Versions of the map so far.
-    pub fn map_version(&self) -> u64 {
-        self.map.version()
-    }
-
-    /// Whether the surface is known to hold the map, and every object.
+    /// Whether the surface is known to hold the replicated state, and every object.
     pub fn is_settled(&self) -> bool {
-        (self.map.is_settled() || !self.config.replicate_map) && self.objects.is_empty()
-    }
-
-    /// What each label is worth to the operator, 0..=1; what differs from his picture goes out in that order.
-    pub fn set_interest(&mut self, weight: impl Fn(u8) -> f64) {
-        for (label, worth) in self.worth.iter_mut().enumerate() {
-            *worth = weight(label as u8).abs().min(1.0);
-        }
+        self.source.is_settled() && self.objects.is_empty()
     }
 
     /// The status to tell next; position and time are the host's at the moment of the call.
@@ -161,7 +166,7 @@ impl VehicleLink {
 
     /// Whether a status would go into a frame written now, so that the host may bring it up to date.
     pub fn wants_status(&self, now: Instant) -> bool {
-        now >= self.status_due
+        now >= self.pose_due.min(self.report_due)
     }
 
     /// Queues an object for the surface.
@@ -179,9 +184,10 @@ impl VehicleLink {
         self.objects.cancel(id);
     }
 
-    /// Changes the bit budget.
+    /// Changes the bit budget; the surface learns of it by the next report.
     pub fn set_budget(&mut self, bits_per_s: u32, now: Instant) {
         self.budget.set_rate(bits_per_s, now);
+        self.report_due = now;
     }
 
     /// The bit budget.
@@ -189,10 +195,20 @@ impl VehicleLink {
         self.budget.bits_per_s()
     }
 
+    /// Changes the least shares of the classes.
+    pub fn set_shares(&mut self, shares: Shares) {
+        self.shares.set(shares);
+    }
+
+    /// The least shares of the classes.
+    pub fn shares(&self) -> Shares {
+        self.shares.shares()
+    }
+
     /// The host's decision about the latest version of a slot.
     pub fn decide(&mut self, id: SlotId, state: SlotState, now: Instant) {
         self.inbox.decide(id, state);
-        self.status_due = now;
+        self.report_due = now;
     }
 
     /// What must survive a restart.
@@ -212,117 +228,84 @@ impl VehicleLink {
         &self.pair.stats
     }
 
+    /// The surface's clock, once a frame with a stamp was heard.
+    pub fn surface_clock(&self) -> Option<ClockMap> {
+        self.clock
+    }
+
+    /// One-way propagation, as the surface has measured it.
+    pub fn one_way(&self) -> Option<Duration> {
+        self.one_way
+    }
+
     /// The next thing to tell the host.
     pub fn poll_event(&mut self) -> Option<VehicleEvent> {
         self.events.pop_front()
     }
 
-    /// Takes received bytes.
-    pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
-        let inbound = match self.pair.handle_frame(bytes) {
-            Ok(inbound) => inbound,
-            Err(reason) => {
-                // The surface builds on what we never acknowledged: it took us for another run in between.
-                if reason == DropReason::NoBase {
-                    self.start_afresh(now);
-                }
-                return;
-            }
-        };
-        if inbound.restarted {
-            self.map.handle_peer_restart(now);
-            self.objects.handle_peer_restart();
-            self.status_due = now;
-            self.events.push_back(VehicleEvent::SurfaceRestarted);
-        }
-        let Inbound { header, fates, number, chunks, .. } = inbound;
-        self.handle_fates(fates, now);
-        for chunk in chunks {
-            match (chunk.kind, number) {
-                (ChunkKind::Slot, Some(number)) => self.handle_slot(chunk.payload, number),
-                _ => self.pair.stats.drop(DropReason::Malformed),
-            }
-        }
-        if let Some(quarters) = header.turn
-            && (number.is_some() || header.hello)
-        {
-            self.grant = (quarters > 0).then(|| Grant::heard(quarters, header.remaining, &self.config.modem, now));
-        }
-    }
-
-    fn handle_fates(&mut self, fates: Vec<(Carried, bool)>, now: Instant) {
-        for (part, bytes, delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |(p, b)| (p, b, d)))
-        {
-            if delivered {
-                *self.pair.stats.delivered_by_class.entry(part.class()).or_default() += bytes as u64;
-            }
-            match part {
-                Part::Map(changes) => self.map.handle_fate(&changes, delivered, now),
-                Part::Object(id, range) => {
-                    if self.objects.handle_fate(id, range, delivered) {
-                        self.events.push_back(VehicleEvent::ObjectDelivered(id));
-                    }
-                }
-                Part::Status if !delivered => self.status_due = now,
-                Part::Status => {}
-            }
-        }
-    }
-
-    fn handle_slot(&mut self, payload: &[u8], number: u64) {
-        match VersionedSlot::decode(payload) {
-            Ok(slot) if self.inbox.admit(&slot) => {
-                if let Some(window) = self.pair.window_mut() {
-                    window.hold_back(number);
-                }
-                self.events.push_back(VehicleEvent::Slot { id: slot.id, version: slot.version, content: slot.content });
-            }
-            Ok(_) => {}
-            Err(_) => self.pair.stats.drop(DropReason::Malformed),
-        }
-    }
-
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self) {
-        self.on_air = false;
+        self.floor.handle_sent();
+    }
+
+    /// The modem asks for `frames` frames of a cycle that begins now ([`crate::mac::Access::Polled`]).
+    pub fn handle_poll(&mut self, frames: u32) {
+        self.begin_turn();
+        self.floor.handle_poll(frames);
+    }
+
+    /// Begins a new run toward the surface, which then forgets what it has.
+    pub fn renew(&mut self, now: Instant) {
+        self.pair.renew();
+        self.forget_peer(now);
+    }
+
+    /// The surface holds nothing of ours any more.
+    fn forget_peer(&mut self, now: Instant) {
+        self.source.handle_peer_restart(now);
+        self.objects.handle_peer_restart();
+        (self.pose_due, self.report_due, self.heard) = (now, now, None);
+        self.begin_turn();
     }
 
     /// When [`Self::poll_transmit`] next may have a frame, if the link is not waiting for the surface.
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
-        let grant = self.grant.filter(|_| !self.on_air)?;
-        Some((grant.begins, Wakeup::Turn))
+        self.next_wakeup().map(|at| (at, Wakeup::Turn))
+    }
+}
+
+impl VehicleLink {
+    /// An end that replicates a label map and has met nobody; `seed` is random for each run, `restored` is what survived the
+    /// last one.
+    pub fn new(
+        config: VehicleConfig,
+        codec: crate::map_codec::Codec,
+        seed: u64,
+        restored: SlotInboxState,
+        now: Instant,
+    ) -> Self {
+        Self::with_source(config, MapSource::new(codec), seed, restored, now)
     }
 
-    /// The next frame of the turn, if there is a turn and the budget allows it.
-    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
-        let grant = self.grant.filter(|g| !self.on_air && now >= g.begins)?;
-        let modem = self.config.modem;
-        let frame_bits = modem.bits_on_air(modem.frame_bytes);
-        let fitting = grant.frames_left(&modem, now);
-        let wanted = self.frames_wanted().clamp(1, u32::from(u8::MAX));
-        let frames = self.budget.affordable(frame_bits, fitting.min(wanted), now);
-        if frames == 0 {
-            self.grant = None;
-            return None;
-        }
-        if self.pair.is_full() {
-            // The surface has heard nothing for so long that numbers run out.
-            self.start_afresh(now);
-        }
-        let (bytes, last) = self.write_frame(frames, now);
-        if last {
-            self.grant = None;
-        }
-        self.on_air = true;
-        self.budget.spend(modem.bits_on_air(bytes.bytes.len()), now);
-        Some(bytes)
+    /// Sets labels of cells; what the surface does not hold yet is sent when there is room.
+    pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
+        self.source.set(cells, now)
     }
 
-    /// Begins a session that differs from every recent one; the surface gets everything anew.
-    fn start_afresh(&mut self, now: Instant) {
-        let session = self.pair.own_session().get().wrapping_mul(0x6255).wrapping_add(0x3619);
-        self.pair.renew(SessionId::from_random(session));
-        self.map.handle_peer_restart(now);
-        self.objects.handle_peer_restart();
+    /// Label ids start afresh: begins a new run toward the surface, which then forgets the map it has.
+    pub fn begin_epoch(&mut self, now: Instant) {
+        self.source.clear(now);
+        self.renew(now);
+        self.cancel_objects();
+    }
+
+    /// The map as the vehicle sees it.
+    pub fn map(&self) -> &LabelGrid {
+        self.source.target()
+    }
+
+    /// Versions of the map so far.
+    pub fn map_version(&self) -> u64 {
+        self.source.version()
     }
 }

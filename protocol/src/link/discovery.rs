@@ -1,0 +1,114 @@
+//! Calling for vehicles that are not known.
+
+use super::Transmit;
+use super::run::{Authenticity, Identity};
+use crate::mac::{ModemProfile, quarter_seconds};
+use crate::time::Instant;
+use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};
+use std::time::Duration;
+
+/// Calls everybody from time to time; who is not spoken with answers at a moment of its own choosing.
+#[derive(Debug)]
+pub(super) struct Discovery {
+    /// Longest time between two calls; `None`: only configured vehicles are spoken with.
+    every: Option<Duration>,
+    pause: Duration,
+    next: Instant,
+    open: Option<(Identity, Instant)>,
+    /// Longest one-way propagation.
+    reach: Duration,
+}
+
+impl Discovery {
+    /// Pause before the second call while nobody is known.
+    const FIRST_PAUSE: Duration = Duration::from_secs(5);
+    /// Time in which called vehicles choose when to answer.
+    const ANSWERS: Duration = Duration::from_secs(2);
+
+    pub(super) fn new(every: Option<Duration>, anybody_known: bool, reach: Duration, now: Instant) -> Self {
+        let pause = if anybody_known { every.unwrap_or_default() } else { Self::FIRST_PAUSE };
+        let next = if anybody_known { now + pause } else { now };
+        Self { every, pause, next, open: None, reach }
+    }
+
+    /// When the next call is due, or when the answers to the last one are all in.
+    pub(super) fn next_wakeup(&self, now: Instant) -> Option<Instant> {
+        self.every?;
+        Some(self.listens_until(now).unwrap_or(self.next))
+    }
+
+    /// Until when the medium is left to those who answer.
+    pub(super) fn listens_until(&self, now: Instant) -> Option<Instant> {
+        self.open.map(|(_, until)| until).filter(|&until| now < until)
+    }
+
+    /// Whether it is time to call.
+    pub(super) fn is_due(&self, now: Instant) -> bool {
+        self.every.is_some() && now >= self.next && self.listens_until(now).is_none()
+    }
+
+    /// The budget does not allow a call before `at`.
+    pub(super) fn postpone(&mut self, at: Instant) {
+        self.next = self.next.max(at);
+    }
+
+    /// A call.
+    pub(super) fn write(
+        &mut self,
+        mission: MissionId,
+        modem: &ModemProfile,
+        authenticity: Option<&Authenticity>,
+        random: &mut u64,
+        now: Instant,
+    ) -> Transmit {
+        let session = SessionId::from_random(crate::random::next(random) as u16);
+        let own = Identity { session, nonce: crate::random::next(random) };
+        let header = Header {
+            from: Address::SURFACE,
+            to: Address::EVERYBODY,
+            session,
+            number: 0,
+            base: 1,
+            remaining: 0,
+            turn: Some(quarter_seconds(Self::ANSWERS, 255)),
+            stamp: None,
+            nonce: authenticity.map(|_| own.nonce),
+            ack: None,
+            hello: true,
+            keyed: authenticity.is_some(),
+        };
+        let builder = FrameBuilder::new(&header, modem.frame_bytes);
+        let bytes = match authenticity {
+            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, 0, 0), true),
+            None => builder.finish(&Seal::Crc(mission, 0), true),
+        };
+        let answers = (self.reach + modem.turn_around) * 2 + Self::ANSWERS + modem.airtime(bytes.len()) * 2;
+        let until = now + answers;
+        self.open = Some((own, until));
+        self.next = until + self.pause;
+        self.pause = (self.pause * 2).min(self.every.unwrap_or_default()).max(Self::FIRST_PAUSE);
+        Transmit { to: Address::EVERYBODY, bytes, kind: "call" }
+    }
+
+    /// Whether a hello answers the last call.
+    pub(super) fn is_answered_by(
+        &self,
+        envelope: &Envelope<'_>,
+        mission: MissionId,
+        authenticity: Option<&Authenticity>,
+        now: Instant,
+    ) -> bool {
+        let Some((call, until)) = self.open.filter(|_| envelope.header.hello) else { return false };
+        let session = call.session.get();
+        let sound = match authenticity {
+            Some(a) => envelope.open(&Seal::Hello(&a.key, mission, session, call.nonce)).is_some(),
+            None => envelope.open(&Seal::Crc(mission, session)).is_some(),
+        };
+        sound && now < until + Duration::from_secs(10)
+    }
+
+    /// Bytes of a call.
+    pub(super) const fn bytes(keyed: bool) -> usize {
+        if keyed { 9 + 8 + 8 } else { 9 + 3 }
+    }
+}

@@ -1,0 +1,151 @@
+//! What the surface says in a turn.
+
+use super::FrameNumber;
+use super::Transmit;
+use super::surface_peer::{Carried, Peer};
+use crate::directive::PendingSlot;
+use crate::mac::{Grant, ModemProfile};
+use crate::map::StateReplica;
+use crate::schedule::{Class, ClassShares};
+use crate::time::Instant;
+use crate::wire::{ChunkKind, Stamp, room_for_payload};
+
+/// Bytes of acknowledgement that every frame of the surface has room for.
+const SHORT_ACK: usize = 4;
+/// Bytes of a frame that a slot can not have: header, turn, a short acknowledgement, chunk header.
+const SLOT_OVERHEAD: usize = 9 + 1 + SHORT_ACK + 1;
+/// Frames smaller than this have no room for a stamp beside a slot.
+const SMALL_FRAME: usize = 48;
+
+/// Bytes that a slot may have in a frame of `frame_bytes` that ends in `seal` bytes.
+pub(super) fn room_for_slot(frame_bytes: usize, seal: usize) -> usize {
+    frame_bytes.saturating_sub(SLOT_OVERHEAD + seal)
+}
+
+/// A frame of the surface, ready to go.
+#[derive(Debug)]
+pub(super) struct Ready {
+    pub(super) transmit: Transmit,
+    /// Its number, unless it is a hello.
+    pub(super) number: Option<FrameNumber>,
+}
+
+/// What the next turn will be made of: the slots of each frame.
+type Plan = Vec<Vec<PendingSlot>>;
+
+impl<R: StateReplica> Peer<R> {
+    /// The frames of a turn: the slots that wait, then a grant; each so often that one gets through.
+    pub(super) fn plan_turn(
+        &self,
+        modem: &ModemProfile,
+        hello: bool,
+        copies: u32,
+        shares: &ClassShares,
+        now: Instant,
+    ) -> Plan {
+        let copies = copies as usize;
+        if hello || !self.pair.is_met() {
+            return vec![Vec::new(); copies.min(2)];
+        }
+        let groups =
+            pack(self.outbox.pending(now, now), room_for_slot(modem.frame_bytes, self.pair.seal_bytes()), shares);
+        let grants = if groups.is_empty() { copies } else { 1 };
+        let mut plan = Plan::new();
+        for _ in 0..copies {
+            plan.extend(groups.iter().cloned());
+        }
+        plan.extend(vec![Vec::new(); grants]);
+        plan
+    }
+
+    /// Writes the frames of a plan; `grant` is the turn byte, if turns are granted.
+    pub(super) fn write_turn(
+        &mut self,
+        plan: &[Vec<PendingSlot>],
+        modem: &ModemProfile,
+        grant: Option<u8>,
+        hello: bool,
+        now: Instant,
+    ) -> Vec<Ready> {
+        self.turn_began = self.pair.next_number();
+        self.greeted = hello || !self.pair.is_met();
+        let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem)).sum();
+        let mut at = now;
+        let mut turn = Vec::with_capacity(plan.len());
+        for slots in plan {
+            bits_left -= self.bits(slots, modem);
+            let ready = self.write_frame(slots, modem, grant, Grant::code_remaining(bits_left), hello, at);
+            at = at + modem.airtime(ready.transmit.bytes.len());
+            turn.push(ready);
+        }
+        turn
+    }
+
+    /// Bits on air that a frame with these slots takes at most.
+    pub(super) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile) -> u64 {
+        const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
+        let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
+        let bytes = HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes();
+        modem.bits_on_air(bytes.min(modem.frame_bytes))
+    }
+
+    fn write_frame(
+        &mut self,
+        slots: &[PendingSlot],
+        modem: &ModemProfile,
+        grant: Option<u8>,
+        remaining: u8,
+        hello: bool,
+        at: Instant,
+    ) -> Ready {
+        let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
+        let has_room = modem.frame_bytes >= SMALL_FRAME + chunks;
+        let one_way = self.master.round_trip().map(|both| both / 2);
+        let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
+        let fixed = 9 + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
+        let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
+        let number = (!hello && self.pair.is_met()).then(|| self.pair.next_number());
+        let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), hello);
+        builder.set_remaining(remaining);
+        let mut carried = Carried::new();
+        for slot in slots {
+            if room_for_payload(builder.room()) >= slot.bytes.len() && builder.push(ChunkKind::Slot, &slot.bytes) {
+                self.outbox.mark_on_air(slot.id, slot.version, at);
+                self.pair.stats.count(slot.id.class(), slot.bytes.len());
+                carried.push((slot.id, slot.version, slot.bytes.len()));
+            }
+        }
+        let kind = match (number, carried.first()) {
+            (None, _) => "hello",
+            (_, None) => "grant",
+            (_, Some((id, ..))) => id.class().name(),
+        };
+        let payload: usize = carried.iter().map(|(_, _, n)| n).sum();
+        let bytes = self.pair.finish_frame(builder, carried, hello, true);
+        self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
+        Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind }, number }
+    }
+}
+
+/// Puts slots into as few frames as their order allows: commands before fixes, unless fixes are owed their share.
+fn pack(mut slots: Vec<PendingSlot>, room: usize, shares: &ClassShares) -> Vec<Vec<PendingSlot>> {
+    let mut waiting: Vec<Class> = slots.iter().map(|s| s.id.class()).collect();
+    waiting.dedup();
+    if let Some(first) = shares.next(&waiting) {
+        slots.sort_by_key(|s| s.id.class() != first);
+    }
+    let mut groups: Vec<Vec<PendingSlot>> = Vec::new();
+    let mut used = room;
+    for slot in slots {
+        let bytes = slot.bytes.len() + 2;
+        if used + bytes > room || groups.is_empty() {
+            groups.push(Vec::new());
+            used = 0;
+        }
+        used += bytes;
+        if let Some(group) = groups.last_mut() {
+            group.push(slot);
+        }
+    }
+    groups
+}

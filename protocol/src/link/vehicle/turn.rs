@@ -1,0 +1,234 @@
+//! When the vehicle speaks, and how a turn ends.
+
+use super::{Carried, VehicleLink};
+use crate::link::Transmit;
+use crate::mac::{Access, quarter_seconds};
+use crate::map::StateSource;
+use crate::schedule::Class;
+use crate::time::Instant;
+use crate::wire::{Address, FrameBuilder, Header, Seal, Stamp};
+use std::time::Duration;
+
+/// Frames smaller than this have no room for both a status and a stamp.
+const SMALL_FRAME: usize = 48;
+/// Probability that content may be lost for good in a turn that has room to repeat it.
+const RISK: f64 = 0.05;
+
+/// A frame about to be filled.
+struct Plan {
+    /// Frames of this turn after this one.
+    remaining: u32,
+    /// Whether nothing new is expected to follow it in this turn.
+    is_last_new: bool,
+    /// Times that what a turn says may be said.
+    copies: u32,
+}
+
+impl<S: StateSource> VehicleLink<S> {
+    /// The next frame, if it is our turn, there is a reason to speak and the budget allows it.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        let modem = self.config.modem;
+        if self.floor.is_over(&modem, now) {
+            self.end_turn();
+        }
+        let open = self.floor.frames(&modem, now).min(u32::from(u8::MAX));
+        if open == 0 || !self.has_reason_to_speak(now) {
+            return None;
+        }
+        let bits = modem.bits_on_air(modem.frame_bytes);
+        let frames = self.budget.affordable(bits, open, now);
+        if frames == 0 {
+            self.blocked_until = Some(self.budget.earliest(bits, now));
+            self.end_turn();
+            return None;
+        }
+        self.blocked_until = None;
+        if self.pair.is_full() {
+            // The surface has heard nothing for so long that numbers run out.
+            self.renew(now);
+        }
+        let (transmit, last) = match (self.called.take(), self.repeats.pop_front()) {
+            (Some(call), _) => (self.write_here(call), true),
+            (None, Some(bytes)) => {
+                self.pair.stats.count(Class::Overhead, bytes.len());
+                (Transmit { to: Address::SURFACE, bytes, kind: "again" }, self.repeats.is_empty())
+            }
+            (None, None) => self.write_frame(frames, now),
+        };
+        self.floor.spend(last);
+        if last {
+            self.begin_turn();
+        }
+        self.budget.spend(modem.bits_on_air(transmit.bytes.len()), now);
+        Some(transmit)
+    }
+
+    /// Nothing was said in this turn yet.
+    pub(super) fn begin_turn(&mut self) {
+        self.said.clear();
+        self.repeats.clear();
+    }
+
+    fn end_turn(&mut self) {
+        self.floor.give_up();
+        self.begin_turn();
+    }
+
+    fn has_reason_to_speak(&self, now: Instant) -> bool {
+        if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+            return true;
+        }
+        let answer = self.answer_due.is_some_and(|at| now >= at) || self.called.is_some();
+        let news = self.source.backlog_bytes() > 0 || self.objects.backlog_bytes() > 0;
+        answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
+    }
+
+    pub(super) fn next_wakeup(&self) -> Option<Instant> {
+        if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+            return self.floor.next_wakeup();
+        }
+        let status = self.status.as_ref().filter(|_| self.pair.is_met()).map(|_| self.pose_due.min(self.report_due));
+        let due = [status, self.answer_due].into_iter().flatten().min();
+        match self.blocked_until {
+            Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
+            None => due,
+        }
+    }
+
+    fn frames_wanted(&self) -> u32 {
+        let room = self.config.modem.frame_bytes.saturating_sub(14).max(1);
+        let bytes = self.source.backlog_bytes() + self.objects.backlog_bytes();
+        bytes.div_ceil(room).clamp(1, 255) as u32
+    }
+
+    /// How often what a turn says is said, so that a loss need not wait for the next one: as the loss that was measured
+    /// asks, if the budget is far from spent.
+    fn copies(&self, now: Instant) -> u32 {
+        let is_shared = self.config.modem.access == Access::Shared;
+        if is_shared && self.budget.is_plentiful(now) { self.pair.stats.loss_out.copies(RISK, 4) } else { 1 }
+    }
+
+    /// Frames that may be repeated at the end of a turn: about as long as changing hands takes.
+    fn most_repeats(&self) -> u32 {
+        let modem = &self.config.modem;
+        let hands = (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2;
+        let frame = modem.frame_airtime().as_secs_f64();
+        ((hands.as_secs_f64() / frame) as u32).max(2)
+    }
+
+    fn plan(&self, frames: u32, now: Instant) -> Plan {
+        if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
+            return Plan { remaining: 0, is_last_new: false, copies: 1 };
+        }
+        let wanted = self.frames_wanted();
+        let copies = self.copies(now);
+        let repeats = ((self.said.len() as u32 + wanted) * (copies - 1)).min(self.most_repeats());
+        Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1, copies }
+    }
+
+    fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
+        let modem = self.config.modem;
+        let size = modem.frame_bytes;
+        let greets = self.pair.must_greet();
+        let plan = if greets { Plan { remaining: 0, is_last_new: true, copies: 1 } } else { self.plan(frames, now) };
+        let wish = (plan.is_last_new && !greets).then(|| self.wish(now));
+        let stamp = self.stamp(now).filter(|_| plan.is_last_new || self.said.is_empty());
+        let ack_room = if size < SMALL_FRAME { 3 } else { size / 6 };
+        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, false);
+        let mut carried = Carried::new();
+        if !greets {
+            self.fill(&mut builder, &mut carried, now);
+        }
+        let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
+        let said_all = takes_turns && !greets && self.source.backlog_bytes() + self.objects.backlog_bytes() == 0;
+        let remaining = match said_all {
+            // What was said is said again as far as that is of use.
+            true if !carried.is_empty() => {
+                let again = (self.said.len() as u32 + 1) * (plan.copies - 1);
+                again.min(self.most_repeats()).min(frames - 1)
+            }
+            true => 0,
+            // Where nothing more fits, what is left waits for the next turn.
+            false if carried.is_empty() => 0,
+            false => plan.remaining,
+        };
+        builder.set_remaining(remaining.min(255) as u8);
+        let last = remaining == 0;
+        let transmit = self.close(builder, carried, greets, last || !takes_turns);
+        if !greets {
+            self.remember(&transmit, said_all, remaining);
+        }
+        self.answer_due = greets.then(|| now + Duration::from_secs(10));
+        (transmit, last && takes_turns)
+    }
+
+    fn close(&mut self, builder: FrameBuilder, carried: Carried<S::Carried>, hello: bool, short: bool) -> Transmit {
+        let kind = carried.iter().max_by_key(|(_, n)| *n).map_or("ack", |(p, _)| p.class().name());
+        let payload: usize = carried.iter().map(|(_, n)| n).sum();
+        for (part, n) in &carried {
+            self.pair.stats.count(part.class(), *n);
+        }
+        let bytes = self.pair.finish_frame(builder, carried, hello, short);
+        self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
+        Transmit { to: Address::SURFACE, bytes, kind }
+    }
+
+    /// Keeps what was said in this turn; once all is said, the rest of the turn goes to saying it again.
+    fn remember(&mut self, transmit: &Transmit, said_all: bool, remaining: u32) {
+        const MOST_KEPT: usize = 64;
+        if self.said.len() < MOST_KEPT {
+            self.said.push(transmit.bytes.clone());
+        }
+        if said_all && remaining > 0 {
+            self.repeats = self.said.iter().cycle().take(remaining as usize).cloned().collect();
+        }
+    }
+
+    fn stamp(&self, now: Instant) -> Option<Stamp> {
+        let heard = self.heard.filter(|_| self.config.modem.frame_bytes >= SMALL_FRAME)?;
+        Some(Stamp::Vehicle { clock_ms: Stamp::clock(now), heard: heard.number as u8, held: now.since(heard.at) })
+    }
+
+    /// "Here": the answer to a call for vehicles that are not known.
+    fn write_here(&mut self, (session, nonce): (crate::wire::SessionId, u64)) -> Transmit {
+        let authenticity = self.config.authenticity.clone();
+        let header = Header {
+            from: self.config.address,
+            to: Address::SURFACE,
+            session,
+            number: 0,
+            base: 1,
+            remaining: 0,
+            turn: None,
+            stamp: None,
+            nonce: authenticity.as_ref().map(|_| nonce),
+            ack: None,
+            hello: true,
+            keyed: authenticity.is_some(),
+        };
+        let builder = FrameBuilder::new(&header, self.config.modem.frame_bytes);
+        let mission = self.config.mission;
+        let bytes = match &authenticity {
+            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, session.get(), nonce), true),
+            None => builder.finish(&Seal::Crc(mission, session.get()), true),
+        };
+        self.pair.stats.count(Class::Overhead, bytes.len());
+        Transmit { to: Address::SURFACE, bytes, kind: "hello" }
+    }
+
+    /// When another turn would be of use, as the turn byte says it.
+    fn wish(&self, now: Instant) -> u8 {
+        let modem = &self.config.modem;
+        let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
+        let idle = self.is_settled();
+        let wait = if idle { affordable.max(self.idle_pause()).min(self.config.status_period) } else { affordable };
+        quarter_seconds(wait, 254)
+    }
+
+    /// Pause between turns while nothing is to be said: turns that only ask take at most a tenth of the budget.
+    fn idle_pause(&self) -> Duration {
+        const ASK_AND_ANSWER_BITS: f64 = 240.0;
+        let tenth = f64::from(self.budget.bits_per_s()) / 10.0;
+        Duration::from_secs_f64((ASK_AND_ANSWER_BITS / tenth).max(1.0))
+    }
+}

@@ -1,0 +1,119 @@
+//! Time stamps, so that each end can tell how far away the other is and what its clock says.
+
+use super::cursor::{Reader, Truncated};
+use super::header::Address;
+use crate::time::Instant;
+use std::time::Duration;
+
+/// Milliseconds of a clock since any origin, low 24 bits: they come round after 4 h 39 min.
+const CLOCK_BITS: u32 = 24;
+
+/// When a frame was sent, by the sender's clock.
+///
+/// ```text
+/// from the surface, 5 bytes
+/// byte  field
+///  0-2  clock when the transmission of this frame began   milliseconds, low 24 bits
+///  3-4  one-way propagation as the surface knows it       milliseconds, 0..=65 534; 65 535 = not known
+///
+/// from a vehicle, 6 bytes
+///  0-2  clock when the transmission of this frame began   milliseconds, low 24 bits
+///  3    number of the surface's frame that was heard last, low 8 bits
+///  4-5  from the end of its reception to the beginning of this frame   milliseconds, 0..=65 535
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stamp {
+    /// Of the surface.
+    Surface {
+        /// Clock, milliseconds, low 24 bits.
+        clock_ms: u32,
+        /// One-way propagation, if it is known.
+        one_way: Option<Duration>,
+    },
+    /// Of a vehicle.
+    Vehicle {
+        /// Clock, milliseconds, low 24 bits.
+        clock_ms: u32,
+        /// Low 8 bits of the number of the surface's frame that was heard last.
+        heard: u8,
+        /// Time since the end of its reception.
+        held: Duration,
+    },
+}
+
+impl Stamp {
+    /// Bytes of a surface's stamp.
+    pub const SURFACE_BYTES: usize = 5;
+    /// Bytes of a vehicle's stamp.
+    pub const VEHICLE_BYTES: usize = 6;
+
+    /// What the clock shows on the wire at `now`.
+    pub fn clock(now: Instant) -> u32 {
+        (now.as_micros() / 1000) as u32 & ((1 << CLOCK_BITS) - 1)
+    }
+
+    /// The moment nearest to `near`, by the clock that wrote it, at which it showed `clock_ms`; in microseconds.
+    pub fn unwrap_clock(clock_ms: u32, near_us: i64) -> i64 {
+        let turn = 1_000_i64 << CLOCK_BITS;
+        let at = i64::from(clock_ms) * 1000;
+        let turns = (near_us - at + turn / 2).div_euclid(turn);
+        at + turns * turn
+    }
+
+    /// Sender's clock, milliseconds, low 24 bits.
+    pub fn clock_ms(&self) -> u32 {
+        match *self {
+            Self::Surface { clock_ms, .. } | Self::Vehicle { clock_ms, .. } => clock_ms,
+        }
+    }
+
+    pub(super) fn decode(from: Address, r: &mut Reader<'_>) -> Result<Self, Truncated> {
+        let clock_ms = r.u24()?;
+        if from == Address::SURFACE {
+            let one_way = Some(r.u16()?).filter(|&ms| ms != u16::MAX).map(|ms| Duration::from_millis(ms.into()));
+            return Ok(Self::Surface { clock_ms, one_way });
+        }
+        Ok(Self::Vehicle { clock_ms, heard: r.u8()?, held: Duration::from_millis(r.u16()?.into()) })
+    }
+
+    pub(super) fn encode(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(self.clock_ms().to_be_bytes().get(1..).unwrap_or_default());
+        let millis = |d: Duration, most: u16| (d.as_millis().min(u128::from(most)) as u16).to_be_bytes();
+        match *self {
+            Self::Surface { one_way, .. } => {
+                out.extend_from_slice(&one_way.map_or(u16::MAX.to_be_bytes(), |d| millis(d, u16::MAX - 1)));
+            }
+            Self::Vehicle { heard, held, .. } => {
+                out.push(heard);
+                out.extend_from_slice(&millis(held, u16::MAX));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn golden_bytes_of_both_stamps() {
+        let mut bytes = Vec::new();
+        Stamp::Surface { clock_ms: 0x01_0203, one_way: Some(Duration::from_millis(667)) }.encode(&mut bytes);
+        Stamp::Surface { clock_ms: 1, one_way: None }.encode(&mut bytes);
+        Stamp::Vehicle { clock_ms: 0xFF_FFFF, heard: 9, held: Duration::from_millis(258) }.encode(&mut bytes);
+        assert_eq!(bytes, [1, 2, 3, 0x02, 0x9B, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 9, 1, 2]);
+        let mut r = Reader::new(&bytes);
+        let stamp = Stamp::decode(Address::SURFACE, &mut r).unwrap();
+        assert_eq!(stamp, Stamp::Surface { clock_ms: 0x01_0203, one_way: Some(Duration::from_millis(667)) });
+    }
+
+    proptest! {
+        #[test]
+        fn a_clock_unwraps_to_the_nearest_moment(at in 0u64..1 << 50, drift_us in -8_000_000_000i64..8_000_000_000) {
+            let shown = Stamp::clock(Instant::from_micros(at));
+            let near = at as i64 + drift_us;
+            prop_assert_eq!(Stamp::unwrap_clock(shown, near), at as i64 / 1000 * 1000);
+        }
+    }
+}
