@@ -8,5 +8,6 @@ pub mod map;
 pub mod map_codec;
 pub mod object;
 pub mod schedule;
+pub mod seal;
 pub mod time;
 pub mod wire;

@@ -1,0 +1,94 @@
+//! The key of one pair of runs: seals and opens frames.
+
+use super::Tag;
+use super::prf::{Secret, ShortTagged, encrypt, join, mac};
+use ascon_aead::aead::{AeadInOut, KeyInit};
+use std::fmt;
+
+/// Which way a frame goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// From the surface to the vehicle.
+    Down,
+    /// From the vehicle to the surface.
+    Up,
+}
+
+/// Seals and opens the frames of one pair of runs; wiped from memory when dropped.
+///
+/// A frame is a head, which stays readable, and a body, which is encrypted in a session that encrypts. Both are
+/// authentic, and so are the direction and the number.
+pub struct SessionKey {
+    cipher: ShortTagged,
+    encrypt: bool,
+}
+
+impl SessionKey {
+    pub(super) fn new(key: &Secret, encrypt: bool) -> Self {
+        Self { cipher: ShortTagged::new(&(**key).into()), encrypt }
+    }
+
+    /// The tag of a frame; in a session that encrypts, `body` is encrypted in place.
+    ///
+    /// `number` counts the frames of this direction without bounds and never comes again with other content: two
+    /// bodies encrypted under one number would tell their difference.
+    pub fn seal(&self, direction: Direction, number: u64, head: &[u8], body: &mut [u8]) -> Tag {
+        let nonce = nonce(direction, number);
+        let tag = if self.encrypt {
+            encrypt(&self.cipher, &nonce, head, body)
+        } else {
+            mac(&self.cipher, &nonce, &join(&[head, body]))
+        };
+        tag.into()
+    }
+
+    /// Whether the frame is what was sealed; in a session that encrypts, `body` is then decrypted in place.
+    ///
+    /// If it is not, an encrypted body is filled with zeros and one that is not encrypted is left as it was. A tag
+    /// whose length is not 8 bytes is a wrong one. Takes the same time for every wrong tag.
+    pub fn open(&self, direction: Direction, number: u64, head: &[u8], body: &mut [u8], tag: &[u8]) -> bool {
+        let Ok(tag) = Tag::try_from(tag) else {
+            if self.encrypt {
+                body.fill(0);
+            }
+            return false;
+        };
+        let nonce = nonce(direction, number).into();
+        let opened = if self.encrypt {
+            self.cipher.decrypt_inout_detached(&nonce, head, body.into(), &tag.into())
+        } else {
+            let nothing: &mut [u8] = &mut [];
+            self.cipher.decrypt_inout_detached(&nonce, &join(&[head, body]), nothing.into(), &tag.into())
+        };
+        opened.is_ok()
+    }
+}
+
+impl fmt::Debug for SessionKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SessionKey").field("encrypt", &self.encrypt).finish_non_exhaustive()
+    }
+}
+
+/// The nonce of a frame.
+///
+/// ```text
+/// byte 0           0 down, 1 up
+/// bytes 1 to 7     0
+/// bytes 8 to 15    number, the most significant byte first
+/// ```
+fn nonce(direction: Direction, number: u64) -> [u8; 16] {
+    let up = u128::from(direction == Direction::Up);
+    (up << 120 | u128::from(number)).to_be_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_bytes_of_a_nonce() {
+        assert_eq!(nonce(Direction::Down, 0x0102_0304_0506_0708), [0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(nonce(Direction::Up, 1), [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1]);
+    }
+}
