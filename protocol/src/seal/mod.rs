@@ -1,6 +1,6 @@
 //! The cryptography of authentic frames: keys, tags, and nothing of the frames themselves.
 //!
-//! One primitive does all: Ascon-AEAD128 (NIST SP 800-232), as [`prf`] says for sub-keys and tags and as the
+//! One primitive does all: Ascon-AEAD128 (NIST SP 800-232), as `prf.rs` says for sub-keys and tags and as the
 //! standard says for frames.
 //!
 //! ```text
