@@ -5,6 +5,8 @@ mod demo;
 mod durable;
 mod journal;
 mod mapping;
+#[cfg(test)]
+mod power_cuts;
 mod surface;
 mod vehicle;
 
