@@ -3,6 +3,7 @@
 use super::journal::{Damage, Journal, JournalError, Storage};
 use crate::auv::Durable;
 use crate::problem::Problem;
+use std::path::Path;
 
 /// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.
 const JOURNAL: &str = "vehicle.journal";
@@ -66,9 +67,65 @@ fn refuse_earlier_build(storage: &impl Storage) -> Result<(), Problem> {
     }
 }
 
-fn for_people(place: &std::path::Path, error: JournalError) -> Problem {
+fn for_people(place: &Path, error: JournalError) -> Problem {
     match error {
         JournalError::Damage(damage) => Problem::file(place, damage),
         other => Problem::Failed(format!("{}: {other}", place.display())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::journal::disk::Disk;
+    use super::*;
+    use scenecast_protocol::link::SlotInboxState;
+
+    fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), Problem> {
+        Keeper::begin_run(disk.clone())
+    }
+
+    #[test]
+    fn a_run_has_the_state_of_the_last_one_and_an_epoch_of_its_own() {
+        let disk = Disk::default();
+        let (mut keeper, durable) = begin(&disk).unwrap();
+        assert_eq!(durable, Durable::default());
+        let held = Durable { epoch: 4, hold: true, budget_bps: Some(500), ..durable };
+        keeper.save(&held).unwrap();
+        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 5, ..held.clone() });
+        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 6, ..held });
+    }
+
+    #[test]
+    fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
+        let versions = [None, Some(300), None, None, None, Some(1)];
+        let inbox = SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2] };
+        let utility = Some((3, 50, -1, [(2, -3)].into()));
+        let durable = Durable { inbox, epoch: 3, utility, hold: true, budget_bps: Some(500), refine_words_per_s: None };
+        let golden = [
+            &[1, 7, 2, 5, 6][..],
+            &[0, 1, 172, 2, 0, 0, 0, 1, 1],
+            &[0, 1, 0, 0, 0, 2],
+            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 0],
+        ];
+        assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
+        assert_eq!(decode(&golden.concat()), Some(durable));
+    }
+
+    #[test]
+    fn what_cannot_be_gone_on_from_is_refused_in_one_line() {
+        let refused = |name: &str, content: &[u8]| {
+            let disk = Disk::default();
+            disk.put(name, content);
+            begin(&disk).err().unwrap()
+        };
+        let input = |text: &str| Problem::Input(text.to_owned());
+        let other = "vehicle.journal: the file is of another version of scenecast; use that one, or move the file away to \
+                     begin a new mission";
+        assert_eq!(refused("vehicle.journal", b"scVJRN99"), input(other));
+        let damaged = "vehicle.journal: damaged at byte 0; restore the file, or move it away to begin a new mission";
+        assert_eq!(refused("vehicle.journal", b""), input(damaged));
+        let earlier = "vehicle.state: the state of an earlier build, which this one does not read; move it away to begin a \
+                       new mission";
+        assert_eq!(refused("vehicle.state", b"scVSTA01"), input(earlier));
     }
 }

@@ -17,7 +17,7 @@ use std::path::Path;
 pub fn run_vehicle(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
         let dir = Path::new(&config.runtime.state_dir);
-        let folder = Folder::create(dir).map_err(|e| Problem::file(dir, e))?;
+        let folder = Folder::hold(dir).map_err(|e| Problem::file(dir, e))?;
         let (keeper, durable) = Keeper::begin_run(folder)?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);

@@ -1,6 +1,6 @@
 //! What the journal asks of a file system.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
@@ -31,21 +31,30 @@ pub(crate) trait Storage {
     fn sync_folder(&mut self) -> io::Result<()>;
 }
 
-/// A folder of the machine's file system.
+/// A folder of the machine's file system, held by one process.
 pub(crate) struct Folder {
     path: PathBuf,
+    handle: File,
 }
 
 impl Folder {
-    /// The folder, which is created if it is not there, with every folder above it.
-    pub(crate) fn create(path: &Path) -> io::Result<Self> {
+    /// The folder, which is created if it is not there; an error if another process holds it.
+    pub(crate) fn hold(path: &Path) -> io::Result<Self> {
         create_folder(path)?;
-        Ok(Self { path: path.to_owned() })
+        let handle = File::open(path)?;
+        match handle.try_lock() {
+            Err(TryLockError::WouldBlock) => Err(io::Error::new(ErrorKind::ResourceBusy, HELD)),
+            // A file system without locks has to do without.
+            Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => Err(e),
+            _ => Ok(Self { path: path.to_owned(), handle }),
+        }
     }
 }
 
-/// A new folder is as safe as its name in the one above.
-fn create_folder(path: &Path) -> io::Result<()> {
+const HELD: &str = "another process keeps its state there; stop it, or set another runtime.state_dir";
+
+/// Creates a folder and those above it; a new one is as safe as its name in the one above.
+pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
     if path.as_os_str().is_empty() || path.is_dir() {
         return Ok(());
     }
@@ -95,6 +104,51 @@ impl Storage for Folder {
     }
 
     fn sync_folder(&mut self) -> io::Result<()> {
-        sync_folder(&self.path)
+        self.handle.sync_all()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Journal, record};
+    use super::*;
+
+    const NAME: &str = "test.journal";
+
+    fn scratch(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("scenecast-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        path
+    }
+
+    fn open(path: &Path) -> (Journal<Folder>, Option<Vec<u8>>) {
+        Journal::open(Folder::hold(path).unwrap(), NAME, 4 * record::BLOCK).unwrap()
+    }
+
+    #[test]
+    fn a_journal_in_a_new_folder_comes_back_without_its_torn_end() {
+        let path = scratch("journal").join("a/b");
+        let (mut journal, found) = open(&path);
+        assert_eq!(found, None);
+        (0..10u8).for_each(|n| journal.persist(&[n]).unwrap());
+        drop(journal);
+        let file = path.join(NAME);
+        let whole = fs::read(&file).unwrap();
+        fs::write(&file, [&whole[..], &record::encode(11, b"torn")[..20]].concat()).unwrap();
+        fs::write(path.join("test.journal.part"), "left by a power cut").unwrap();
+        let (mut journal, found) = open(&path);
+        assert_eq!(found, Some(vec![9]));
+        journal.persist(&[10]).unwrap();
+        assert_eq!(fs::read(&file).unwrap(), record::encode(11, &[10]), "a run begins a new file");
+        assert_eq!(fs::read_dir(&path).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_is_held_by_one_process() {
+        let path = scratch("held");
+        let first = Folder::hold(&path).unwrap();
+        assert_eq!(Folder::hold(&path).err().unwrap().to_string(), HELD);
+        drop(first);
+        assert!(Folder::hold(&path).is_ok());
     }
 }
