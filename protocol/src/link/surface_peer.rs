@@ -198,6 +198,7 @@ impl Peer {
         let vehicle = self.pair.peer();
         events.push_back(match self.objects.handle_part(&part) {
             Received::Complete(_, bytes) => SurfaceEvent::Object(vehicle, bytes),
+            Received::Nothing => return true,
             Received::Progress(id, held, total) => {
                 let head = self.objects.head(id, SurfaceEvent::OBJECT_HEAD).map(<[u8]>::to_vec);
                 SurfaceEvent::ObjectProgress { vehicle, head, held, total }

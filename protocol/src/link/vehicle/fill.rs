@@ -70,7 +70,7 @@ impl VehicleLink {
             let exemplar_first = !both || self.shares.turn() == Class::Exemplar;
             let spent = match object {
                 Some((id, range, bytes)) if exemplar_first && builder.push(ChunkKind::Object, &bytes) => {
-                    self.objects.mark_in_flight(id, range.clone());
+                    self.objects.mark_in_flight(id, &range);
                     carried.push((Part::Object(id, range), bytes.len()));
                     (Class::Exemplar, bytes.len())
                 }

@@ -7,12 +7,11 @@ use crate::directive::{Slot, SlotId, VersionedSlot};
 use crate::mac::{Grant, ModemProfile};
 use crate::map::{Cell, LabelGrid, MapSource, UNEXPLORED};
 use crate::map_codec::Codec;
-use crate::object::{ObjectId, ObjectSender};
+use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BitBudget, Class, ClassShares};
 use crate::time::Instant;
 use crate::wire::{Address, ChunkKind, MissionId, SessionId, SlotState, VehicleStatus};
 use std::collections::VecDeque;
-use std::ops::Range;
 use std::time::Duration;
 
 /// Settings of the vehicle's end.
@@ -60,7 +59,7 @@ pub enum VehicleEvent {
 #[derive(Debug)]
 enum Part {
     Map(Vec<(Cell, u8)>),
-    Object(ObjectId, Range<usize>),
+    Object(ObjectId, SymbolRun),
     Status,
 }
 
@@ -171,7 +170,7 @@ impl VehicleLink {
 
     /// Stops sending every object.
     pub fn cancel_objects(&mut self) {
-        self.objects = ObjectSender::default();
+        self.objects.cancel_all();
     }
 
     /// Stops sending an object.
@@ -259,7 +258,7 @@ impl VehicleLink {
             match part {
                 Part::Map(changes) => self.map.handle_fate(&changes, delivered, now),
                 Part::Object(id, range) => {
-                    if self.objects.handle_fate(id, range, delivered) {
+                    if self.objects.handle_fate(id, &range, delivered) {
                         self.events.push_back(VehicleEvent::ObjectDelivered(id));
                     }
                 }
