@@ -73,7 +73,7 @@ proptest! {
                 _ => {}
             }
         }
-        pair.run(pair.now + Duration::from_secs(20_000), true);
+        pair.run(pair.now + Duration::from_secs(100_000), true);
         prop_assert!(pair.is_converged(), "maps differ: {:?}", pair.vehicle.stats());
         assert_budget(&pair, budget);
     }
@@ -91,14 +91,21 @@ proptest! {
                 pair.restart_vehicle(&patchy(2, 0));
             }
         }
-        pair.run(pair.now + Duration::from_secs(6000), false);
+        let applied = |pair: &Pair| {
+            pair.surface.vehicle(auv()).unwrap().slots().all(|s| s.life == LifeLine::Applied)
+        };
+        for _ in 0..1000 {
+            pair.run(pair.now + Duration::from_secs(100), false);
+            if applied(&pair) {
+                break;
+            }
+        }
         let utilities: Vec<_> = pair.applied.iter().filter(|s| matches!(s, Slot::Utility(_))).collect();
         for (i, u) in utilities.iter().enumerate() {
             prop_assert!(!utilities[..i].contains(u), "applied twice: {:?}", u);
         }
         prop_assert_eq!(utilities.last().copied(), Some(&utility(8)));
-        let view = pair.surface.vehicle(auv()).unwrap();
-        prop_assert!(view.slots().all(|s| s.life == LifeLine::Applied));
+        prop_assert!(applied(&pair), "{:?}", pair.vehicle.stats());
     }
 }
 

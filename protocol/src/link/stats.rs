@@ -68,6 +68,8 @@ pub struct LinkStats {
     pub chunks_sent: u64,
     /// Bytes put on air, by class.
     pub bytes_by_class: BTreeMap<Class, u64>,
+    /// Bytes of frames that were put on air again, unchanged; they are in no class.
+    pub repeated_bytes: u64,
     /// Bytes of chunks that the peer declared held, by class.
     pub delivered_by_class: BTreeMap<Class, u64>,
     /// Restarts of the peer that were noticed.

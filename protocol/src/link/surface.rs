@@ -263,7 +263,8 @@ impl<R: StateReplica> SurfaceLink<R> {
         let Some(peer) = self.peers.get_mut(&sent.to) else { return };
         peer.handle_sent(sent.number, now);
         if sent.last {
-            peer.master.handle_turn_sent(&self.config.modem, now);
+            let losable = peer.pair.stats.loss_in.copies(0.03, 8) - 1;
+            peer.master.handle_turn_sent(&self.config.modem, losable, now);
             self.cycle.handle_turn_sent();
         }
     }

@@ -37,11 +37,11 @@ impl<R: StateReplica> SurfaceLink<R> {
         }
         let busy = self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged());
         if let Some(peer) = busy {
-            return peer.master.next_wakeup();
+            return peer.master.next_wakeup(false);
         }
         let alone = self.peers.len() == 1;
         let due = |p: &super::surface_peer::Peer<R>| {
-            p.master.next_wakeup().map(|at| if alone { at } else { at.max(p.master.retry_at()) })
+            p.master.next_wakeup(p.outbox.has_backlog()).map(|at| if alone { at } else { at.max(p.master.retry_at()) })
         };
         self.peers.values().filter_map(due).chain(self.discovery.next_wakeup(now)).min()
     }
@@ -60,7 +60,11 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// Writes the next turn, to whom it is due; says whether there is one.
     pub(super) fn begin_turn(&mut self, now: Instant) -> bool {
-        let Some(vehicle) = self.choose(now) else { return self.call(now) };
+        // A call goes first: vehicles that always have more to say would never let it come up.
+        if self.call(now) {
+            return true;
+        }
+        let Some(vehicle) = self.choose(now) else { return false };
         let active = self.peers.values().filter(|p| p.master.unanswered() < 3).count();
         let plentiful = self.budget.is_plentiful(now);
         let Some(peer) = self.peers.get_mut(&vehicle) else { return false };
@@ -94,8 +98,9 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// Calls for unknown vehicles, if it is time.
     fn call(&mut self, now: Instant) -> bool {
-        let engaged = self.current.and_then(|a| self.peers.get(&a)).is_some_and(|p| p.master.is_engaged());
-        if engaged || !self.discovery.is_due(now) || self.peers.len() >= 14 {
+        let engaged = self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged());
+        let taken = engaged.is_some_and(|p| !p.master.may_speak(false, now));
+        if taken || !self.discovery.is_due(now) || self.peers.len() >= 14 {
             return false;
         }
         let modem: ModemProfile = self.config.modem;

@@ -52,12 +52,12 @@ impl<R: StateReplica> Peer<R> {
             room_for_slot(modem.frame_bytes, self.pair.full_seal_bytes(modem.frame_bytes)),
             shares,
         );
-        let grants = if groups.is_empty() { copies } else { 1 };
         let mut plan = Plan::new();
         for _ in 0..copies {
             plan.extend(groups.iter().cloned());
         }
-        plan.extend(vec![Vec::new(); grants]);
+        // Slots leave little room for acknowledgements, so the grants that carry all of them follow.
+        plan.extend(vec![Vec::new(); copies]);
         plan
     }
 

@@ -33,8 +33,16 @@ impl Contact {
 }
 
 /// A read-only view of a vehicle for the host.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct PeerView<'a, R: StateReplica = Replica>(pub(super) &'a Peer<R>);
+
+impl<R: StateReplica> Clone for PeerView<'_, R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R: StateReplica> Copy for PeerView<'_, R> {}
 
 impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The operator's copy of what the vehicle replicates.
@@ -59,7 +67,7 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
 
     /// When the next turn will be granted at the latest; `now` if that is due.
     pub fn next_contact(&self, now: Instant) -> Option<Instant> {
-        self.0.master.next_wakeup().map(|at| at.max(now))
+        self.0.master.next_wakeup(false).map(|at| at.max(now))
     }
 
     /// Two-way propagation.

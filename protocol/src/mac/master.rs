@@ -20,7 +20,7 @@ impl Default for MasterConfig {
     fn default() -> Self {
         Self {
             max_propagation: Duration::from_millis(2200),
-            max_turn: Duration::from_secs(12),
+            max_turn: Duration::from_secs(14),
             max_idle: Duration::from_secs(10),
         }
     }
@@ -29,8 +29,8 @@ impl Default for MasterConfig {
 /// What the medium is doing, as far as the surface knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum State {
-    /// Nobody speaks; the next grant goes out at the given time.
-    Idle { next: Instant },
+    /// Nobody speaks; the next grant goes out at the given time, with news from `ready` on.
+    Idle { ready: Instant, next: Instant },
     /// The surface is on air.
     Speaking,
     /// The vehicle has the turn, and nothing was heard yet.
@@ -59,7 +59,7 @@ impl Master {
     pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self {
             config,
-            state: State::Idle { next: now },
+            state: State::Idle { ready: now, next: now },
             round_trips: VecDeque::new(),
             unanswered: 0,
             granted_airtime: Duration::ZERO,
@@ -90,16 +90,16 @@ impl Master {
     /// Whether the surface may begin its turn at `now`; `news` ends an idle pause.
     pub fn may_speak(&self, news: bool, now: Instant) -> bool {
         match self.state {
-            State::Idle { next } => news || now >= next,
+            State::Idle { ready, next } => now >= next || (news && now >= ready),
             State::Speaking => false,
             State::Granted { until, .. } | State::Listening { until } => now >= until,
         }
     }
 
-    /// When [`Self::may_speak`] next turns true by itself.
-    pub fn next_wakeup(&self) -> Option<Instant> {
+    /// When [`Self::may_speak`] next turns true by itself; `news` as there.
+    pub fn next_wakeup(&self, news: bool) -> Option<Instant> {
         match self.state {
-            State::Idle { next } => Some(next),
+            State::Idle { ready, next } => Some(if news { ready.min(next) } else { next }),
             State::Speaking => None,
             State::Granted { until, .. } | State::Listening { until } => Some(until),
         }
@@ -114,7 +114,7 @@ impl Master {
     /// The vehicle is there after all: it is spoken with as soon as possible.
     pub fn hurry(&mut self, now: Instant) {
         self.unanswered = self.unanswered.min(2);
-        if let State::Idle { next } = &mut self.state {
+        if let State::Idle { next, .. } = &mut self.state {
             *next = (*next).min(now);
         }
     }
@@ -125,7 +125,7 @@ impl Master {
         let least = profile.frame_airtime() + Duration::from_secs(1);
         // With several, each waits for all the others: shorter turns cost some capacity and save much waiting.
         let most = self.config.max_turn.div_f64((vehicles.max(1) as f64).sqrt()).max(cost * 2);
-        quarter_seconds((cost * 8).min(most).max(least), 255)
+        quarter_seconds((cost * 16).min(most).max(least), 255)
     }
 
     /// The surface begins its turn. A turn that begins while an answer was due counts as unanswered.
@@ -143,13 +143,14 @@ impl Master {
         self.begun = Some(now);
     }
 
-    /// The last frame of the surface's turn has left the modem.
-    pub fn handle_turn_sent(&mut self, profile: &ModemProfile, now: Instant) {
+    /// The last frame of the surface's turn has left the modem; of the answer, up to `losable` frames may be lost in a row.
+    pub fn handle_turn_sent(&mut self, profile: &ModemProfile, losable: u32, now: Instant) {
         let flight =
             self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
         // A vehicle farther away than it was thought to be must not be talked over for ever.
         let patience = Duration::from_secs(1) * self.unanswered.saturating_sub(4).min(10);
-        let until = now + patience + flight + profile.turn_around * 2 + profile.frame_airtime();
+        let answer = (profile.frame_airtime() * (losable + 1)).min(self.granted_airtime.max(profile.frame_airtime()));
+        let until = now + patience + flight + profile.turn_around * 2 + answer;
         self.state = State::Granted { granted: now, until };
     }
 
@@ -191,7 +192,8 @@ impl Master {
             return;
         }
         let pause = wish.map_or(Duration::ZERO, |quarters| Duration::from_millis(250) * u32::from(quarters));
-        self.state = State::Idle { next: now + profile.turn_around + pause.min(self.config.max_idle) };
+        let ready = now + profile.turn_around;
+        self.state = State::Idle { ready, next: ready + pause.min(self.config.max_idle) };
     }
 
     /// Nothing may be sent before `at` (the budget does not allow it): wait until then.
@@ -199,6 +201,6 @@ impl Master {
         if let State::Granted { .. } = self.state {
             self.unanswered += 1;
         }
-        self.state = State::Idle { next: at };
+        self.state = State::Idle { ready: at, next: at };
     }
 }

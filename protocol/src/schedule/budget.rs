@@ -78,13 +78,14 @@ impl BitBudget {
         millionths(recent) * 2 < self.capacity()
     }
 
-    /// How many transmissions of `bits` each may begin back to back at `now`, at most `most`.
-    pub fn affordable(&self, bits: u64, most: u32, now: Instant) -> u32 {
+    /// How many transmissions of `bits` may begin one after the other from `now` on, each taking `airtime`; at most `most`.
+    pub fn affordable(&self, bits: u64, airtime: Duration, most: u32, now: Instant) -> u32 {
         let mut trial = self.clone();
         (0..most)
-            .take_while(|_| {
-                let ok = trial.earliest(bits, now) <= now;
-                trial.spend(bits, now);
+            .take_while(|&before| {
+                let at = now + airtime * before;
+                let ok = trial.earliest(bits, at) <= at;
+                trial.spend(bits, at);
                 ok
             })
             .count() as u32

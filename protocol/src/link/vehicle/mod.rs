@@ -98,7 +98,8 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     report_due: Instant,
     floor: Floor,
     /// Frames of this turn, to be sent again if nothing else is left to say.
-    said: Vec<Vec<u8>>,
+    said: VecDeque<Vec<u8>>,
+    said_frames: usize,
     repeats: VecDeque<Vec<u8>>,
     /// Where the modem decides when to speak: when the surface is to have our acknowledgement, or our hello.
     answer_due: Option<Instant>,
@@ -131,7 +132,8 @@ impl<S: StateSource> VehicleLink<S> {
             pose_due: now,
             report_due: now,
             floor: Floor::default(),
-            said: Vec::new(),
+            said: VecDeque::new(),
+            said_frames: 0,
             repeats: VecDeque::new(),
             answer_due: None,
             called: None,

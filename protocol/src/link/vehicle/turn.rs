@@ -7,12 +7,13 @@ use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
 use crate::wire::{Address, FrameBuilder, Header, Seal, Stamp};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
 const SMALL_FRAME: usize = 48;
-/// Probability that content may be lost for good in a turn that has room to repeat it.
-const RISK: f64 = 0.05;
+/// Probability that something of what a turn says may be lost with all its copies, where there is time to repeat it.
+const RISK: f64 = 0.1;
 
 /// A frame about to be filled.
 struct Plan {
@@ -36,7 +37,7 @@ impl<S: StateSource> VehicleLink<S> {
             return None;
         }
         let bits = modem.bits_on_air(modem.frame_bytes);
-        let frames = self.budget.affordable(bits, open, now);
+        let frames = self.budget.affordable(bits, modem.frame_airtime(), open, now);
         if frames == 0 {
             self.blocked_until = Some(self.budget.earliest(bits, now));
             self.end_turn();
@@ -50,7 +51,7 @@ impl<S: StateSource> VehicleLink<S> {
         let (transmit, last) = match (self.called.take(), self.repeats.pop_front()) {
             (Some(call), _) => (self.write_here(call), true),
             (None, Some(bytes)) => {
-                self.pair.stats.count(Class::Overhead, bytes.len());
+                self.pair.stats.repeated_bytes += bytes.len() as u64;
                 (Transmit { to: Address::SURFACE, bytes, kind: "again" }, self.repeats.is_empty())
             }
             (None, None) => self.write_frame(frames, now),
@@ -66,6 +67,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Nothing was said in this turn yet.
     pub(super) fn begin_turn(&mut self) {
         self.said.clear();
+        self.said_frames = 0;
         self.repeats.clear();
     }
 
@@ -101,19 +103,58 @@ impl<S: StateSource> VehicleLink<S> {
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
-    /// How often what a turn says is said, so that a loss need not wait for the next one: as the loss that was measured
-    /// asks, if the budget is far from spent.
-    fn copies(&self, now: Instant) -> u32 {
-        let is_shared = self.config.modem.access == Access::Shared;
-        if is_shared && self.budget.is_plentiful(now) { self.pair.stats.loss_out.copies(RISK, 4) } else { 1 }
+    /// How often what a turn of `frames` frames says is said, so that a loss need not wait for the next one: as the loss that
+    /// was measured asks, if the budget is not what limits the link.
+    fn copies(&self, frames: u32, now: Instant) -> u32 {
+        let modem = &self.config.modem;
+        let budget_binds = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
+        match modem.access {
+            Access::Shared if !budget_binds || self.budget.is_plentiful(now) => {
+                self.pair.stats.loss_out.copies(RISK / f64::from(frames.max(1)), 6)
+            }
+            _ => 1,
+        }
     }
 
-    /// Frames that may be repeated at the end of a turn: about as long as changing hands takes.
-    fn most_repeats(&self) -> u32 {
+    /// Room for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and then
+    /// now and again.
+    fn ack_room(&self, is_last_new: bool) -> usize {
+        const SELDOM: usize = 8;
+        let size = self.config.modem.frame_bytes;
+        let said = self.said_frames;
+        let early = said < self.pair.stats.loss_out.copies(0.001, 12) as usize;
+        match early || is_last_new || said.is_multiple_of(SELDOM) {
+            true if size < SMALL_FRAME => 3,
+            true => size / 6,
+            false => 0,
+        }
+    }
+
+    /// Time that may go to repetitions at the end of a turn: about as long as changing hands takes.
+    fn time_to_repeat(&self) -> Duration {
         let modem = &self.config.modem;
         let hands = (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2;
-        let frame = modem.frame_airtime().as_secs_f64();
-        ((hands.as_secs_f64() / frame) as u32).max(2)
+        hands.max(modem.frame_airtime() * 2)
+    }
+
+    /// How many frames to say again once all is said, with a last new one of `own` bytes; at most `most`.
+    fn count_repeats(&self, own: usize, copies: u32, most: u32) -> u32 {
+        let modem = &self.config.modem;
+        let round = std::iter::once(own).chain(self.said.iter().rev().map(Vec::len));
+        let mut time = self.time_to_repeat();
+        let mut fits = |bytes: usize| {
+            time = time.saturating_sub(modem.airtime(bytes));
+            !time.is_zero()
+        };
+        (0..copies.saturating_sub(1)).flat_map(|_| round.clone()).take(most as usize).take_while(|&n| fits(n)).count()
+            as u32
+    }
+
+    /// The last `count` frames of this turn, round and round, the last one at the end: it tells what follows.
+    fn again(&self, count: u32) -> VecDeque<Vec<u8>> {
+        let mut again: VecDeque<Vec<u8>> = self.said.iter().rev().cycle().take(count as usize).cloned().collect();
+        again.make_contiguous().reverse();
+        again
     }
 
     fn plan(&self, frames: u32, now: Instant) -> Plan {
@@ -121,8 +162,10 @@ impl<S: StateSource> VehicleLink<S> {
             return Plan { remaining: 0, is_last_new: false, copies: 1 };
         }
         let wanted = self.frames_wanted();
-        let copies = self.copies(now);
-        let repeats = ((self.said.len() as u32 + wanted) * (copies - 1)).min(self.most_repeats());
+        let said = self.said.len() as u32 + wanted;
+        let copies = self.copies(said, now);
+        let time = self.time_to_repeat().as_secs_f64() / self.config.modem.frame_airtime().as_secs_f64();
+        let repeats = (said * (copies - 1)).min(time as u32);
         Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1, copies }
     }
 
@@ -132,8 +175,8 @@ impl<S: StateSource> VehicleLink<S> {
         let greets = self.pair.must_greet();
         let plan = if greets { Plan { remaining: 0, is_last_new: true, copies: 1 } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !greets).then(|| self.wish(now));
-        let stamp = self.stamp(now).filter(|_| plan.is_last_new || self.said.is_empty());
-        let ack_room = if size < SMALL_FRAME { 3 } else { size / 6 };
+        let stamp = self.stamp(now).filter(|_| plan.is_last_new || self.said_frames == 0);
+        let ack_room = self.ack_room(plan.is_last_new);
         let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, false);
         let mut carried = Carried::new();
         if !greets {
@@ -143,10 +186,7 @@ impl<S: StateSource> VehicleLink<S> {
         let said_all = takes_turns && !greets && self.source.backlog_bytes() + self.objects.backlog_bytes() == 0;
         let remaining = match said_all {
             // What was said is said again as far as that is of use.
-            true if !carried.is_empty() => {
-                let again = (self.said.len() as u32 + 1) * (plan.copies - 1);
-                again.min(self.most_repeats()).min(frames - 1)
-            }
+            true if !carried.is_empty() => self.count_repeats(builder.len(true), plan.copies, frames - 1),
             true => 0,
             // Where nothing more fits, what is left waits for the next turn.
             false if carried.is_empty() => 0,
@@ -154,7 +194,7 @@ impl<S: StateSource> VehicleLink<S> {
         };
         builder.set_remaining(remaining.min(255) as u8);
         let last = remaining == 0;
-        let transmit = self.close(builder, carried, greets, last || !takes_turns);
+        let transmit = self.close(builder, carried, greets, last || said_all || !takes_turns);
         if !greets {
             self.remember(&transmit, said_all, remaining);
         }
@@ -176,11 +216,13 @@ impl<S: StateSource> VehicleLink<S> {
     /// Keeps what was said in this turn; once all is said, the rest of the turn goes to saying it again.
     fn remember(&mut self, transmit: &Transmit, said_all: bool, remaining: u32) {
         const MOST_KEPT: usize = 64;
-        if self.said.len() < MOST_KEPT {
-            self.said.push(transmit.bytes.clone());
+        self.said_frames += 1;
+        if self.said.len() == MOST_KEPT {
+            self.said.pop_front();
         }
+        self.said.push_back(transmit.bytes.clone());
         if said_all && remaining > 0 {
-            self.repeats = self.said.iter().cycle().take(remaining as usize).cloned().collect();
+            self.repeats = self.again(remaining);
         }
     }
 
