@@ -106,11 +106,32 @@ fn the_same_arguments_give_the_same_report_byte_for_byte_but_for_the_wall_clock(
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    for command in [&["demo"][..], &["sim"], &["auv"], &["asv"], &["bench", "fidelity"], &["config"]] {
+    for command in [
+        &["demo"][..],
+        &["sim"],
+        &["auv"],
+        &["asv"],
+        &["bench", "fidelity"],
+        &["config"],
+        &["key", "new"],
+        &["key", "show"],
+    ] {
         let output = run(&[command, &["--help"]].concat());
         assert!(output.status.success());
         assert!(String::from_utf8_lossy(&output.stdout).contains("Example: scenecast"), "{command:?}");
     }
+}
+
+#[test]
+fn a_key_is_made_once_and_shown() {
+    let file = scratch("key").join("mission.key");
+    let file = file.to_str().unwrap();
+    let said = |output: std::process::Output| String::from_utf8_lossy(&output.stdout).into_owned();
+    let made = said(run(&["key", "new", "--out", file]));
+    assert!(made.starts_with(&format!("{file}: fingerprint ")) && made.contains("link.key_file"), "{made}");
+    assert_refused(&["key", "new", "--out", file], &[file, "not overwritten"]);
+    assert_eq!(said(run(&["key", "show", file])).trim(), made.lines().next().unwrap());
+    assert_refused(&["key", "show", "nowhere.key"], &["nowhere.key"]);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 mod bench;
 mod demo;
+mod key;
 mod node;
 mod progress;
 mod sim;
@@ -32,6 +33,9 @@ enum Command {
     /// Measure.
     #[command(subcommand)]
     Bench(bench::Bench),
+    /// Make or show the key by which both ends know each other's frames.
+    #[command(subcommand)]
+    Key(key::Key),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -44,6 +48,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Auv(node) => node.run_vehicle(),
         Command::Asv(node) => node.run_surface(),
         Command::Bench(bench) => bench.run(),
+        Command::Key(key) => key.run(),
         Command::Config(print) => print.run(),
     }
 }

@@ -74,6 +74,21 @@ pub const KEYS: &[Key] = &[
     ),
     key("link.turn_around_s", "s", Range(0.0, 10.0), "asr", "time that a modem needs between receiving and sending"),
     key(
+        "link.key_file",
+        "",
+        Text,
+        "asr",
+        "file of the mission key (scenecast key new), the same at both ends; empty: frames are not authenticated",
+    ),
+    key(
+        "link.authenticate",
+        "",
+        Choice(&["down", "all"]),
+        "asr",
+        "frames that the key authenticates, the same at both ends; down: from the surface to the vehicle; all: both ways",
+    ),
+    key("link.encrypt", "", Flag, "asr", "whether authentic frames are encrypted too, the same at both ends"),
+    key(
         "modem.kind",
         "",
         Choice(&["tcp", "transparent"]),

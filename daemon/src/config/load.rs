@@ -38,7 +38,7 @@ pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, Problem> {
     Ok(config)
 }
 
-/// What no single value tells: an area has a size, a turn has room for a frame.
+/// What no single value tells: an area has a size, a turn has room for a frame, a seal needs a key.
 fn check_together(config: &Config) -> Result<(), Problem> {
     const LONGEST_FRAME_S: f64 = 55.0;
     let [west, south, east, north] = config.survey.area_m;
@@ -46,6 +46,12 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         let given = format!("survey.area_m = {:?}", config.survey.area_m);
         let rule = "west, south, east, north with east and north at least 1 m above west and south, or all 0";
         return Err(Problem::Input(format!("{given} is not allowed: it takes {rule}")));
+    }
+    let link = &config.link;
+    if link.key_file.is_empty() && (link.encrypt || link.authenticate == "all") {
+        let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
+        let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
+        return Err(Problem::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
     }
     let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
     for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
@@ -220,6 +226,16 @@ mod tests {
         assert!(said.starts_with("x.toml:2: link.budget_bps = 5"), "{said}");
         let broken = read_file(Path::new("x.toml"), "[link]\n\nbudget_bps = = 5\n", &mut given).unwrap_err();
         assert!(broken.to_string().starts_with("x.toml:3: "), "{broken}");
+    }
+
+    #[test]
+    fn sealing_without_a_key_is_refused() {
+        for set in ["link.encrypt=true", "link.authenticate=all"] {
+            let said = message(&[set]);
+            assert!(said.contains(set.split('=').next().unwrap()) && said.contains("link.key_file"), "{said}");
+        }
+        let all = ["link.encrypt=true", "link.authenticate=all", "link.key_file=k"].map(str::to_owned);
+        assert!(load(None, &all).is_ok());
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! One configuration for the sea and for rehearsal.
 
+mod key_file;
 mod keys;
 mod load;
 mod print;
 
+pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
 pub use print::print;
@@ -93,6 +95,12 @@ section! {
         max_range_m: f64 = 3000.0,
         /// Seconds that a modem needs between receiving and sending.
         turn_around_s: f64 = 0.2,
+        /// File of the mission key; empty = frames are not authenticated.
+        key_file: String = String::new(),
+        /// `down` or `all`.
+        authenticate: String = "down".into(),
+        /// Whether authentic frames are encrypted too.
+        encrypt: bool = false,
     }
 }
 section! {

@@ -11,7 +11,7 @@ const FINGERPRINT: &[u8; 16] = b"scenecast-print1";
 const HELLO: &[u8; 16] = b"scenecast-hello1";
 const SESSION: &[u8; 16] = b"scenecast-sessn1";
 
-/// The nonce of every hello tag: under the hello key nothing is ever encrypted, see [`prf`].
+/// The nonce of every hello tag: under the hello key nothing is ever encrypted, see `prf`.
 const HELLO_NONCE: &[u8; 16] = &[0; 16];
 
 /// The secret of a mission, 16 bytes that both ends hold; wiped from memory when dropped.

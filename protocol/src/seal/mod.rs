@@ -1,6 +1,6 @@
 //! The cryptography of authentic frames: keys, tags, and nothing of the frames themselves.
 //!
-//! One primitive does all: Ascon-AEAD128 (NIST SP 800-232, section 4), as [`prf`] says for sub-keys and tags and as the
+//! One primitive does all: Ascon-AEAD128 (NIST SP 800-232), as `prf.rs` says for sub-keys and tags and as the
 //! standard says for frames.
 //!
 //! ```text
@@ -26,7 +26,7 @@ pub use text::KeyError;
 
 /// What proves that a frame comes from a holder of the key: the first 8 bytes of the 16 of Ascon-AEAD128.
 ///
-/// A guess is right once in 2^64; SP 800-232 (section 4.2.1) allows 4 to 16 bytes and asks for reasons below 8.
+/// A guess is right once in 2^64. A truncated tag is one of the options of SP 800-232.
 pub type Tag = [u8; TAG_BYTES];
 
 /// Bytes of a [`Tag`].
