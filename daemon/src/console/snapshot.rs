@@ -4,6 +4,7 @@ use super::link_meter::LinkMeter;
 use crate::asv::{Desk, ExemplarState, Surface};
 use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
 use scenecast_protocol::link::{LinkStats, PeerView};
+use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
@@ -79,7 +80,7 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
             "epoch": desk.epoch,
         },
         "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
-        "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, view, address, facts)).collect::<Vec<_>>(),
+        "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect::<Vec<_>>(),
         "directive": { "slots": view.slots().map(slot).collect::<Vec<_>>() },
     }))
 }
@@ -108,7 +109,7 @@ fn status(s: &VehicleStatus, at: Instant) -> Value {
     })
 }
 
-fn label(id: u8, cells: u32, desk: &Desk, view: PeerView<'_>, address: Address, facts: &MissionFacts) -> Value {
+fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address, facts: &MissionFacts) -> Value {
     json!({
         "id": id,
         "cells": cells,
@@ -118,7 +119,7 @@ fn label(id: u8, cells: u32, desk: &Desk, view: PeerView<'_>, address: Address, 
     })
 }
 
-fn exemplar(id: u8, desk: &Desk, view: PeerView<'_>, address: Address) -> Value {
+fn exemplar(id: u8, desk: &Desk, view: &PeerView<'_>, address: Address) -> Value {
     let Some(e) = desk.exemplars.get(&id) else {
         return json!({ "state": "none", "progress": 0.0, "bytes": null, "url": null, "at_s": null });
     };

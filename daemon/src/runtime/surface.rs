@@ -65,7 +65,8 @@ impl Host {
             if changed {
                 self.publish();
             }
-            let wake = self.surface.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
+            let now = self.clock.now();
+            let wake = self.surface.poll_timeout(now).map(|(at, _)| at).filter(|&at| at > now);
             let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
             tokio::select! {
                 _ = tokio::signal::ctrl_c() => {
@@ -109,6 +110,9 @@ impl Host {
             changed = true;
             match output {
                 SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
+                SurfaceOutput::VehicleFound(vehicle) => {
+                    tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
+                }
                 SurfaceOutput::ExemplarHere(vehicle, label) => {
                     tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
                 }

@@ -10,7 +10,6 @@ use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
 use crate::rehearsal::Recording;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SessionId;
 use std::path::Path;
 
 /// Runs the vehicle until it is interrupted.
@@ -21,14 +20,13 @@ pub fn run_vehicle(config: Config) -> Result<(), Problem> {
         let (keeper, durable) = Keeper::begin_run(folder)?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
-        let session = SessionId::from_random(super::random_bits() as u16);
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
         let epoch = durable.epoch;
-        let vehicle = crate::ends::vehicle(&config, profile, area, durable, session, clock.now())?;
+        let vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
         let at_end = recording.is_some();
         let camera = Camera::new(recording, clock);
         let mapper = mapping::spawn(&config, epoch)?;
@@ -89,8 +87,7 @@ impl Host {
         self.behind -= 1;
         let f = &seen.frame;
         self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
-        let session = SessionId::from_random(super::random_bits() as u16);
-        self.vehicle.handle_map(&seen.update, session, now);
+        self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
         if self.at_end && self.behind == 0 && self.camera.is_over() {
             self.at_end = false;
