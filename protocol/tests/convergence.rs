@@ -2,23 +2,45 @@
 
 mod pair;
 
-use pair::{Pair, Water, auv, hold, patchy, utility};
+use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{LifeLine, Slot, Utility};
+use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::map_codec::Codec;
 use std::time::Duration;
 
 fn water() -> impl Strategy<Value = Water> {
-    (0.0..0.5f64, 0.0..0.2f64, 0.0..0.2f64, 0.0..0.2f64, 30u64..2000).prop_map(
-        |(loss, duplication, reordering, corruption, ms)| Water {
+    (0.0..0.9f64, 0.0..0.2f64, 0.0..0.2f64, 0.0..0.2f64, 0.0..0.2f64, 30u64..2000).prop_map(
+        |(loss, duplication, reordering, corruption, talker, ms)| Water {
             loss,
             duplication,
             reordering,
             corruption,
+            talker,
             propagation: Duration::from_millis(ms),
         },
     )
+}
+
+fn setup() -> impl Strategy<Value = Setup> {
+    let access = prop_oneof![
+        3 => Just(Access::Shared),
+        1 => Just(Access::ModemOwned { pool_frames: 8 }),
+        1 => Just(Access::Polled),
+    ];
+    let frame = prop_oneof![Just(32usize), Just(64), Just(256), Just(1000)];
+    let budget = prop_oneof![Just(1000u32), Just(10_000)];
+    let codec = prop_oneof![Just(Codec::Png), Just(Codec::Context)];
+    (frame, budget, codec, access, 0u8..6).prop_map(|(frame_bytes, budget_bps, codec, access, keyed)| {
+        let setup = Setup { access, ..Setup::new(frame_bytes, budget_bps, codec) };
+        match keyed {
+            1 => setup.keyed(false, false),
+            2 if frame_bytes >= 48 => setup.keyed(true, false),
+            3 if frame_bytes >= 48 => setup.keyed(true, true),
+            _ => setup,
+        }
+    })
 }
 
 fn assert_budget(pair: &Pair, budget_bps: u32) {
@@ -35,11 +57,11 @@ proptest! {
     fn the_operators_map_becomes_the_vehicles_whatever_the_water_and_the_restarts(
         seed: u64,
         water in water(),
-        frame in prop_oneof![Just(64usize), Just(256), Just(1000)],
-        budget in prop_oneof![Just(1000u32), Just(10_000)],
+        setup in setup(),
         restarts in proptest::collection::vec(0u8..6, 6),
     ) {
-        let mut pair = Pair::new(seed, frame, budget, Codec::Auto, water);
+        let budget = setup.budget_bps;
+        let mut pair = Pair::new(seed, setup, water);
         for (step, what) in restarts.into_iter().enumerate() {
             let map = patchy(24, step as u64);
             pair.vehicle.set_map(map.iter(), pair.now);
@@ -51,16 +73,16 @@ proptest! {
                 _ => {}
             }
         }
-        pair.run(pair.now + Duration::from_secs(4000), true);
+        pair.run(pair.now + Duration::from_secs(20_000), true);
         prop_assert!(pair.is_converged(), "maps differ: {:?}", pair.vehicle.stats());
         assert_budget(&pair, budget);
     }
 
     #[test]
     fn each_version_is_applied_at_most_once_and_the_last_one_is_in_force(
-        seed: u64, water in water(), restarts in proptest::collection::vec(0u8..4, 8),
+        seed: u64, water in water(), setup in setup(), restarts in proptest::collection::vec(0u8..4, 8),
     ) {
-        let mut pair = Pair::new(seed, 64, 10_000, Codec::Png, water);
+        let mut pair = Pair::new(seed, setup, water);
         for (step, what) in restarts.into_iter().enumerate() {
             pair.surface.issue(auv(), utility(step as i8 + 1), pair.now).unwrap();
             pair.surface.issue(auv(), hold(step % 2 == 0), pair.now).unwrap();
@@ -69,7 +91,7 @@ proptest! {
                 pair.restart_vehicle(&patchy(2, 0));
             }
         }
-        pair.run(pair.now + Duration::from_secs(3000), false);
+        pair.run(pair.now + Duration::from_secs(6000), false);
         let utilities: Vec<_> = pair.applied.iter().filter(|s| matches!(s, Slot::Utility(_))).collect();
         for (i, u) in utilities.iter().enumerate() {
             prop_assert!(!utilities[..i].contains(u), "applied twice: {:?}", u);
@@ -80,13 +102,19 @@ proptest! {
     }
 }
 
-const CALM: Water =
-    Water { loss: 0.05, duplication: 0.0, reordering: 0.0, corruption: 0.0, propagation: Duration::from_millis(100) };
+const CALM: Water = Water {
+    loss: 0.05,
+    duplication: 0.0,
+    reordering: 0.0,
+    corruption: 0.0,
+    talker: 0.0,
+    propagation: Duration::from_millis(100),
+};
 
 #[test]
 fn an_end_that_was_not_heard_for_hours_is_heard_again() {
     for mute in [[true, false], [false, true], [true, true]] {
-        let mut pair = Pair::new(3, 64, 10_000, Codec::Png, CALM);
+        let mut pair = Pair::new(3, Setup::new(64, 10_000, Codec::Png), CALM);
         pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
         pair.run(pair.now + Duration::from_secs(60), false);
         pair.mute = mute;
@@ -103,7 +131,7 @@ fn an_end_that_was_not_heard_for_hours_is_heard_again() {
 
 #[test]
 fn a_large_directive_gets_through_while_many_losses_are_acknowledged() {
-    let mut pair = Pair::new(9, 64, 10_000, Codec::Png, Water { loss: 0.45, ..CALM });
+    let mut pair = Pair::new(9, Setup::new(64, 10_000, Codec::Png), Water { loss: 0.45, ..CALM });
     pair.vehicle.set_map(speckled(120, 1), pair.now);
     pair.run(pair.now + Duration::from_secs(30), false);
     let weights = (1..=14).map(|label| (label, 50)).collect();
@@ -115,7 +143,7 @@ fn a_large_directive_gets_through_while_many_losses_are_acknowledged() {
 
 #[test]
 fn a_directive_that_fits_no_frame_is_refused_where_it_is_issued() {
-    let mut pair = Pair::new(9, 64, 10_000, Codec::Png, CALM);
+    let mut pair = Pair::new(9, Setup::new(64, 10_000, Codec::Png), CALM);
     let weights = (1..=100).map(|label| (label, 50)).collect();
     let utility = Slot::Utility(Utility { weights, ..Utility::default() });
     let refused = pair.surface.issue(auv(), utility, pair.now).unwrap_err().to_string();
@@ -139,9 +167,10 @@ fn a_clean_channel_is_mostly_spent_on_the_map() {
         duplication: 0.0,
         reordering: 0.0,
         corruption: 0.0,
+        talker: 0.0,
         propagation: Duration::from_millis(667),
     };
-    let mut pair = Pair::new(1, 256, 10_000, Codec::Png, water);
+    let mut pair = Pair::new(1, Setup::new(256, 10_000, Codec::Png), water);
     let start = pair.now;
     for phase in 0..30 {
         pair.vehicle.set_map(speckled(200, phase), pair.now);

@@ -93,11 +93,11 @@ mod tests {
             let mut lost = losses.into_iter();
             loop {
                 let (id, range, part) = sender.next_part(room).expect("incomplete, so something is missing");
-                sender.mark_in_flight(id, range.clone());
+                sender.mark_in_flight(id, &range);
                 let delivered = !lost.next().unwrap_or(false);
                 let complete = delivered
                     && matches!(receiver.handle_part(&Part::decode(&part).unwrap()), Received::Complete(_, b) if b == bytes);
-                if sender.handle_fate(id, range, delivered) {
+                if sender.handle_fate(id, &range, delivered) {
                     prop_assert!(complete);
                     break;
                 }

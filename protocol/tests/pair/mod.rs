@@ -1,14 +1,18 @@
 //! Two ends on a virtual clock with an unkind pipe between them.
 
 use scenecast_protocol::directive::{Constraints, Slot, Utility};
-use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink};
-use scenecast_protocol::mac::{MasterConfig, ModemProfile};
+use scenecast_protocol::link::{
+    Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
+};
+use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::Audit;
+use scenecast_protocol::schedule::{Audit, Shares};
+use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SessionId, SlotState, VehicleStatus};
-use std::collections::BTreeMap;
+use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// What the water does to frames.
@@ -18,7 +22,40 @@ pub(crate) struct Water {
     pub(crate) duplication: f64,
     pub(crate) reordering: f64,
     pub(crate) corruption: f64,
+    /// Share of transmissions after which a stranger says something of its own, or repeats what it heard.
+    pub(crate) talker: f64,
     pub(crate) propagation: Duration,
+}
+
+/// What the two ends have in common.
+#[derive(Debug, Clone)]
+pub(crate) struct Setup {
+    pub(crate) frame_bytes: usize,
+    pub(crate) budget_bps: u32,
+    pub(crate) codec: Codec,
+    pub(crate) access: Access,
+    pub(crate) authenticity: Option<Authenticity>,
+}
+
+impl Setup {
+    pub(crate) fn new(frame_bytes: usize, budget_bps: u32, codec: Codec) -> Self {
+        Self { frame_bytes, budget_bps, codec, access: Access::Shared, authenticity: None }
+    }
+
+    pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
+        let key = Arc::new(MissionKey::from_bytes([42; 16]));
+        Self { authenticity: Some(Authenticity { key, all, encrypt }), ..self }
+    }
+
+    fn modem(&self) -> ModemProfile {
+        ModemProfile {
+            frame_bytes: self.frame_bytes,
+            bit_rate_bps: 10_000.0,
+            overhead_bits: 0,
+            turn_around: Duration::from_millis(200),
+            access: self.access,
+        }
+    }
 }
 
 pub(crate) struct Pair {
@@ -31,11 +68,12 @@ pub(crate) struct Pair {
     pub(crate) audits: [Audit; 2],
     /// Slots applied at the vehicle: series is constant a run of the surface, so versions must not repeat.
     pub(crate) applied: Vec<Slot>,
-    modem: ModemProfile,
-    budget_bps: u32,
-    codec: Codec,
+    setup: Setup,
     random: u64,
     on_air: BTreeMap<(Instant, u64), Event>,
+    /// What waits in each modem, and whether it is sending.
+    modems: [(VecDeque<Vec<u8>>, bool); 2],
+    overheard: VecDeque<Vec<u8>>,
     serial: u64,
     durable: SlotInboxState,
 }
@@ -43,6 +81,7 @@ pub(crate) struct Pair {
 enum Event {
     Sent { by_vehicle: bool },
     Arrives { at_vehicle: bool, bytes: Vec<u8> },
+    Poll { of_vehicle: bool, frames: u32 },
 }
 
 pub(crate) fn auv() -> Address {
@@ -50,28 +89,22 @@ pub(crate) fn auv() -> Address {
 }
 
 impl Pair {
-    pub(crate) fn new(seed: u64, frame_bytes: usize, budget_bps: u32, codec: Codec, water: Water) -> Self {
-        let modem = ModemProfile {
-            frame_bytes,
-            bit_rate_bps: 10_000.0,
-            overhead_bits: 0,
-            turn_around: Duration::from_millis(200),
-        };
+    pub(crate) fn new(seed: u64, setup: Setup, water: Water) -> Self {
         let now = Instant::from_secs_f64(1000.0);
         let window = Duration::from_secs(10);
         Self {
             now,
             mute: [false; 2],
-            vehicle: vehicle(modem, budget_bps, codec, seed as u16, SlotInboxState::default(), now),
-            surface: surface(modem, budget_bps, seed, now),
+            vehicle: vehicle(&setup, seed ^ 0xA5A5, SlotInboxState::default(), now),
+            surface: surface(&setup, seed, now),
             water,
             audits: [Audit::new(window), Audit::new(window)],
             applied: Vec::new(),
-            modem,
-            budget_bps,
-            codec,
+            setup,
             random: seed ^ 0xABCD,
             on_air: BTreeMap::new(),
+            modems: Default::default(),
+            overheard: VecDeque::new(),
             serial: 0,
             durable: SlotInboxState::default(),
         }
@@ -83,16 +116,21 @@ impl Pair {
     }
 
     pub(crate) fn restart_vehicle(&mut self, map: &LabelGrid) {
-        let session = (self.draw() * 65535.0) as u16;
-        self.vehicle = vehicle(self.modem, self.budget_bps, self.codec, session, self.durable.clone(), self.now);
+        let seed = (self.draw() * 1e15) as u64;
+        self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
         self.vehicle.set_map(map.iter(), self.now);
-        self.on_air.retain(|_, e| !matches!(e, Event::Sent { by_vehicle: true }));
+        self.forget_modem(true);
     }
 
     pub(crate) fn restart_surface(&mut self) {
         let seed = (self.draw() * 1e15) as u64;
-        self.surface = surface(self.modem, self.budget_bps, seed, self.now);
-        self.on_air.retain(|_, e| !matches!(e, Event::Sent { by_vehicle: false }));
+        self.surface = surface(&self.setup, seed, self.now);
+        self.forget_modem(false);
+    }
+
+    fn forget_modem(&mut self, of_vehicle: bool) {
+        self.modems[usize::from(of_vehicle)] = (VecDeque::new(), false);
+        self.on_air.retain(|_, e| !matches!(e, Event::Sent { by_vehicle } if *by_vehicle == of_vehicle));
     }
 
     pub(crate) fn shown(&self) -> &LabelGrid {
@@ -110,12 +148,11 @@ impl Pair {
             if stop_when_converged && self.is_converged() {
                 return;
             }
-            let timers = [self.vehicle.poll_timeout(), self.surface.poll_timeout()];
-            let timer = timers.into_iter().flatten().map(|(at, _)| at).min();
+            let timers = [self.vehicle.poll_timeout(), self.surface.poll_timeout(self.now)];
+            let timer = timers.into_iter().flatten().map(|(at, _)| at).filter(|&at| at > self.now).min();
             let event = self.on_air.first_key_value().map(|((at, _), _)| *at);
-            let Some(next) = timer.into_iter().chain(event).min() else { return };
-            // A timer that has passed but led to no frame waits for the next event.
-            let next = if next <= self.now { event.unwrap_or(self.now + Duration::from_millis(50)) } else { next };
+            // A timer that has passed but led to no frame waits for the next event, or a while.
+            let next = timer.into_iter().chain(event).min().unwrap_or(self.now + Duration::from_millis(200));
             if next > until {
                 self.now = until;
                 return;
@@ -130,10 +167,17 @@ impl Pair {
 
     fn handle(&mut self, event: Event) {
         match event {
-            Event::Sent { by_vehicle: true } => self.vehicle.handle_transmit_outcome(),
-            Event::Sent { by_vehicle: false } => self.surface.handle_transmit_outcome(self.now),
+            Event::Sent { by_vehicle } => {
+                self.modems[usize::from(by_vehicle)].1 = false;
+                match by_vehicle {
+                    true => self.vehicle.handle_transmit_outcome(),
+                    false => self.surface.handle_transmit_outcome(self.now),
+                }
+            }
             Event::Arrives { at_vehicle: true, bytes } => self.vehicle.handle_frame(&bytes, self.now),
             Event::Arrives { at_vehicle: false, bytes } => self.surface.handle_frame(&bytes, self.now),
+            Event::Poll { of_vehicle: true, frames } => self.vehicle.handle_poll(frames),
+            Event::Poll { of_vehicle: false, frames } => self.surface.handle_poll(frames),
         }
     }
 
@@ -148,33 +192,84 @@ impl Pair {
         }
         while self.surface.poll_event().is_some() {}
         self.vehicle.set_status(VehicleStatus { labels: 3, ..VehicleStatus::default() });
-        if let Some(t) = self.vehicle.poll_transmit(self.now) {
-            self.transmit(t.bytes, true);
+        self.begin_cycle();
+        while let Some(t) = self.vehicle.poll_transmit(self.now) {
+            self.modems[1].0.push_back(t.bytes);
         }
-        if let Some(t) = self.surface.poll_transmit(self.now) {
-            self.transmit(t.bytes, false);
+        while let Some(t) = self.surface.poll_transmit(self.now) {
+            self.modems[0].0.push_back(t.bytes);
+        }
+        for by_vehicle in [false, true] {
+            let modem = &mut self.modems[usize::from(by_vehicle)];
+            if !modem.1
+                && let Some(bytes) = modem.0.pop_front()
+            {
+                modem.1 = true;
+                self.transmit(bytes, by_vehicle);
+            }
+        }
+    }
+
+    /// The modem's own cycle: an initiation packet that may be lost, then the sender's host is asked for frames.
+    fn begin_cycle(&mut self) {
+        if self.setup.access != Access::Polled {
+            return;
+        }
+        let Some(cycle) = self.surface.poll_cycle(self.now) else { return };
+        let of_vehicle = cycle.from == auv();
+        let heard = !of_vehicle || (self.draw() >= self.water.loss && !self.mute[0]);
+        let way = if of_vehicle { self.water.propagation } else { Duration::ZERO };
+        if heard {
+            let at = self.now + way + Duration::from_millis(300);
+            self.schedule(at, Event::Poll { of_vehicle, frames: cycle.frames.min(8) });
         }
     }
 
     fn transmit(&mut self, bytes: Vec<u8>, by_vehicle: bool) {
-        assert!(bytes.len() <= self.modem.frame_bytes);
-        self.audits[usize::from(by_vehicle)].record(self.modem.bits_on_air(bytes.len()), self.now);
-        let end = self.now + self.modem.airtime(bytes.len());
+        let modem = self.setup.modem();
+        assert!(bytes.len() <= modem.frame_bytes);
+        self.audits[usize::from(by_vehicle)].record(modem.bits_on_air(bytes.len()), self.now);
+        let end = self.now + modem.airtime(bytes.len());
         self.schedule(end, Event::Sent { by_vehicle });
         let copies = 1 + u32::from(self.draw() < self.water.duplication);
         for _ in 0..copies {
             if self.draw() < self.water.loss || self.mute[usize::from(by_vehicle)] {
                 continue;
             }
-            let mut bytes = bytes.clone();
-            if self.draw() < self.water.corruption {
-                let bit = (self.draw() * bytes.len() as f64 * 8.0) as usize;
-                bytes[bit / 8] ^= 1 << (bit % 8);
-            }
+            let bytes = self.damaged(bytes.clone());
             let late = if self.draw() < self.water.reordering { self.draw() * 20.0 } else { 0.0 };
             let at = end + self.water.propagation + Duration::from_secs_f64(late);
             self.schedule(at, Event::Arrives { at_vehicle: !by_vehicle, bytes });
         }
+        self.overheard.push_back(bytes);
+        self.overheard.truncate(200);
+        if self.draw() < self.water.talker {
+            self.talk(end);
+        }
+    }
+
+    fn damaged(&mut self, mut bytes: Vec<u8>) -> Vec<u8> {
+        if self.draw() < self.water.corruption {
+            let bit = (self.draw() * bytes.len() as f64 * 8.0) as usize;
+            bytes[bit / 8] ^= 1 << (bit % 8);
+        }
+        bytes
+    }
+
+    /// A third talker: noise, or something that it overheard a while ago, changed or not.
+    fn talk(&mut self, at: Instant) {
+        let pick = (self.draw() * self.overheard.len() as f64) as usize;
+        let mut bytes = self.overheard[pick].clone();
+        match (self.draw() * 3.0) as u32 {
+            0 => bytes.iter_mut().for_each(|b| *b = b.wrapping_mul(31).wrapping_add(7)),
+            1 => {
+                let at = (self.draw() * bytes.len() as f64) as usize;
+                bytes[at] = bytes[at].wrapping_add(1);
+            }
+            _ => {}
+        }
+        let at_vehicle = self.draw() < 0.5;
+        self.schedule(at, Event::Arrives { at_vehicle, bytes });
     }
 
     fn schedule(&mut self, at: Instant, event: Event) {
@@ -183,36 +278,31 @@ impl Pair {
     }
 }
 
-fn vehicle(
-    modem: ModemProfile,
-    budget_bps: u32,
-    codec: Codec,
-    session: u16,
-    durable: SlotInboxState,
-    now: Instant,
-) -> VehicleLink {
+fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
     let config = VehicleConfig {
         address: auv(),
         mission: MissionId(7),
-        modem,
-        budget_bps,
+        modem: setup.modem(),
+        budget_bps: setup.budget_bps,
         budget_window: Duration::from_secs(10),
-        codec,
-        replicate_map: true,
-        exemplar_share: 0.2,
+        shares: Shares::default(),
         status_period: Duration::from_secs(10),
+        authenticity: setup.authenticity.clone(),
     };
-    VehicleLink::new(config, SessionId::from_random(session), durable, now)
+    VehicleLink::new(config, setup.codec, seed, durable, now)
 }
 
-fn surface(modem: ModemProfile, budget_bps: u32, seed: u64, now: Instant) -> SurfaceLink {
+fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
     let config = SurfaceConfig {
         mission: MissionId(7),
-        modem,
-        budget_bps,
+        modem: setup.modem(),
+        budget_bps: setup.budget_bps,
         budget_window: Duration::from_secs(10),
+        shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: vec![auv()],
+        call_every: None,
+        authenticity: setup.authenticity.clone(),
     };
     SurfaceLink::new(config, seed, now)
 }
