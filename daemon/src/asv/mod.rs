@@ -1,6 +1,7 @@
 //! The surface: holds the operator's map of each vehicle, sends each its directive.
 
 mod desk;
+mod pauses;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};

@@ -71,6 +71,21 @@ impl Surface {
         self.link.budget_bps()
     }
 
+    /// Least shares of the classes in what the surface sends.
+    pub fn shares(&self) -> Shares {
+        self.link.shares()
+    }
+
+    /// Frames that no known vehicle has sent, or that could not be read.
+    pub fn strangers(&self) -> u64 {
+        self.link.strangers()
+    }
+
+    /// An earlier run may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.link.assume_budget_spent(now);
+    }
+
     /// The next thing to tell the host.
     pub fn poll_output(&mut self) -> Option<SurfaceOutput> {
         self.outputs.pop_front()
@@ -164,6 +179,9 @@ impl Surface {
                 self.outputs.push_back(output);
             }
         }
+        let link = &self.link;
+        let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.heard()) == Some(now);
+        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.hear(now));
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {

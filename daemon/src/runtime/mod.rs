@@ -5,6 +5,8 @@ mod demo;
 mod durable;
 mod journal;
 mod mapping;
+mod refusals;
+mod reload;
 #[cfg(test)]
 mod power_cuts;
 mod surface;
@@ -13,6 +15,7 @@ mod vehicle;
 pub use clock::Clock;
 pub use demo::run_demo;
 pub(crate) use journal::sync_folder;
+pub use reload::Load;
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 

@@ -126,7 +126,7 @@ impl World {
         self.operate();
         while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= Instant::ZERO + TICK * self.ticks) {
             match due.remove() {
-                Event::Sent { by_vehicle: true } => self.onboard.vehicle.handle_transmit_outcome(),
+                Event::Sent { by_vehicle: true } => self.onboard.vehicle.handle_transmit_outcome(self.now()),
                 Event::Sent { by_vehicle: false } => self.surface.handle_transmit_outcome(self.now()),
                 Event::Arrives { at_vehicle: true, bytes } => self.run_vehicle(Some(&bytes)),
                 Event::Arrives { at_vehicle: false, bytes } => self.surface.handle_frame(&bytes, self.now()),

@@ -2,6 +2,7 @@
 
 use super::clock::Clock;
 use super::journal::create_folder;
+use super::refusals::{Refusals, warn_without_key};
 use crate::asv::{Surface, SurfaceOutput};
 use crate::config::Config;
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
@@ -19,10 +20,15 @@ use tokio::sync::oneshot;
 pub fn run_surface(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
         let dir = PathBuf::from(&config.runtime.state_dir);
+        let is_again = dir.exists();
         create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
-        let surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
+        warn_without_key(&config);
+        let mut surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
+        if is_again {
+            surface.assume_budget_spent(clock.now());
+        }
         let console = match config.console.listen.as_str() {
             "" => None,
             address => {
@@ -31,17 +37,10 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
                 Some(console)
             }
         };
-        let facts = MissionFacts {
-            name: config.mission.name.clone(),
-            run: format!("{:08x}", super::random_bits() as u32),
-            speed: config.runtime.time_scale,
-            ended: false,
-            cell_m: crate::auv::cell_m(&config),
-            first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
-        };
+        let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = modem::open(&config, profile).await?;
-        Host { surface, modem, console, clock, dir, facts, meter, bits: profile }.run().await
+        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals: Refusals::default() }.run().await
     })
 }
 
@@ -54,6 +53,7 @@ struct Host {
     facts: MissionFacts,
     meter: LinkMeter,
     bits: scenecast_protocol::mac::ModemProfile,
+    refusals: Refusals,
 }
 
 impl Host {
@@ -88,6 +88,8 @@ impl Host {
         let now = self.clock.now();
         self.meter.heard(self.bits.bits_on_air(bytes.len()), now);
         self.surface.handle_frame(bytes, now);
+        let views = self.surface.vehicles().filter_map(|(a, _)| self.surface.view(a));
+        views.for_each(|v| self.refusals.note(v.stats()));
     }
 
     fn answer(&mut self, ask: Ask, reply: oneshot::Sender<Reply>) {

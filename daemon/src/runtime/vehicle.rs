@@ -4,17 +4,23 @@ use super::clock::Clock;
 use super::durable::Keeper;
 use super::journal::Folder;
 use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
-use crate::auv::{Area, Vehicle, VehicleOutput};
+use super::refusals::{Refusals, warn_without_key};
+use super::reload::{Load, Reload};
+use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
 use crate::rehearsal::Recording;
+use scenecast_protocol::directive::Budget;
+use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use std::path::Path;
 
-/// Runs the vehicle until it is interrupted.
-pub fn run_vehicle(config: Config) -> Result<(), Problem> {
+/// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
+pub fn run_vehicle(load: Load) -> Result<(), Problem> {
     super::block_on(async move {
+        let config = load()?;
+        warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
         let folder = Folder::hold(dir).map_err(|e| Problem::file(dir, e))?;
         let (keeper, durable) = Keeper::begin_run(folder)?;
@@ -26,12 +32,17 @@ pub fn run_vehicle(config: Config) -> Result<(), Problem> {
         };
         let area = survey_area(&config, recording.as_ref())?;
         let epoch = durable.epoch;
-        let vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
+        let is_again = durable != Durable::default();
+        let mut vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
+        if is_again {
+            vehicle.assume_budget_spent(clock.now());
+        }
         let at_end = recording.is_some();
         let camera = Camera::new(recording, clock);
         let mapper = mapping::spawn(&config, epoch)?;
         let modem = modem::open(&config, profile).await?;
-        Host { vehicle, camera, mapper, modem, clock, keeper, at_end, behind: 0 }.run().await
+        let (reload, refusals) = (Reload::new(load)?, Refusals::default());
+        Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, at_end, behind: 0 }.run().await
     })
 }
 
@@ -48,6 +59,8 @@ struct Host {
     modem: Modem,
     clock: Clock,
     keeper: Keeper<Folder>,
+    reload: Reload,
+    refusals: Refusals,
     /// Whether the end of the camera's frames is the end of the survey.
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
@@ -67,9 +80,13 @@ impl Host {
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 event = self.modem.next() => match event {
-                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(),
-                    ModemEvent::Received(bytes) => self.vehicle.handle_frame(&bytes, self.clock.now()),
+                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(self.clock.now()),
+                    ModemEvent::Received(bytes) => {
+                        self.vehicle.handle_frame(&bytes, self.clock.now());
+                        self.refusals.note(self.vehicle.stats());
+                    }
                 },
+                config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => {
                     self.behind += 1;
                     let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
@@ -80,6 +97,13 @@ impl Host {
                 },
             }
         }
+    }
+
+    /// Budget and shares of the configuration are in force, whatever the surface said before.
+    fn follow(&mut self, config: &Config) {
+        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares) };
+        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %", budget.bits_per_s, budget.shares.0);
+        self.vehicle.set_budget(budget, self.clock.now());
     }
 
     fn handle_seen(&mut self, seen: Seen) {

@@ -163,6 +163,11 @@ impl Vehicle {
         self.link.budget_bps()
     }
 
+    /// An earlier run may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.link.assume_budget_spent(now);
+    }
+
     /// Fixes that corrected the estimate.
     pub fn fixes_applied(&self) -> u64 {
         self.fixes_applied
@@ -296,8 +301,8 @@ impl Vehicle {
     }
 
     /// The transmission that was handed out has left the modem.
-    pub fn handle_transmit_outcome(&mut self) {
-        self.link.handle_transmit_outcome();
+    pub fn handle_transmit_outcome(&mut self, now: Instant) {
+        self.link.handle_transmit_outcome(now);
     }
 
     /// The next frame to put on air.

@@ -38,7 +38,7 @@ impl Mission {
             if ends_at.is_some_and(|at| at <= now) {
                 self.transmitting[node] = None;
                 if node == 0 {
-                    self.vehicle.handle_transmit_outcome()
+                    self.vehicle.handle_transmit_outcome(now)
                 } else {
                     self.surface.handle_transmit_outcome(now)
                 }

@@ -164,6 +164,11 @@ impl Mission {
         &self.config
     }
 
+    /// The modem of both ends.
+    pub fn modem(&self) -> &ModemProfile {
+        &self.modem
+    }
+
     /// Bits on air of the frames that the surface heard.
     pub fn heard_bits(&self) -> u64 {
         self.heard_bits
