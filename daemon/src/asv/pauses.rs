@@ -13,14 +13,16 @@ pub struct Pauses {
 impl Pauses {
     /// A pause is forgotten in so many times its length.
     const MEMORY: u32 = 8;
+    /// A pause up to this length is as usual as it is long.
+    const SHORT: Duration = Duration::from_secs(60);
 
     /// A frame was heard.
     pub fn hear(&mut self, now: Instant) {
         let Some(last) = self.heard.replace(now) else { return };
         let pause = now.since(last);
         self.longest = Some(match self.longest {
-            // What is far beyond the usual was an outage, and makes the next one no more usual.
-            Some(longest) => pause.min(longest * 2).max(longest.saturating_sub(pause / Self::MEMORY)),
+            // What is long and far beyond the usual was an outage, and makes the next one hardly more usual.
+            Some(longest) => pause.min(Self::SHORT.max(longest * 2)).max(longest.saturating_sub(pause / Self::MEMORY)),
             None => pause,
         });
     }
@@ -65,6 +67,6 @@ mod tests {
         let mut pauses = Pauses::default();
         (1..=20).for_each(|i| pauses.hear(Instant::ZERO + Duration::from_secs(10) * i));
         pauses.hear(Instant::ZERO + Duration::from_secs(4000));
-        assert_eq!(pauses.expected(), Some(Duration::from_secs(20)));
+        assert_eq!(pauses.expected(), Some(Duration::from_secs(60)));
     }
 }
