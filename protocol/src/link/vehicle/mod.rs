@@ -176,7 +176,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// Stops sending every object.
     pub fn cancel_objects(&mut self) {
-        self.objects = ObjectSender::default();
+        self.objects.cancel_all();
     }
 
     /// Stops sending an object.
