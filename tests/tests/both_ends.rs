@@ -30,7 +30,8 @@ fn start(dir: &Path, vehicle_key: &str, surface_key: &str, link: &str) -> (u16, 
         seal(vehicle_key)
     );
     std::fs::write(dir.join("auv.toml"), format!("{vehicle}{link}")).unwrap();
-    let process = |role: &str| Process::start(&[role, "--config", dir.join(role).with_extension("toml").to_str().unwrap()]);
+    let process =
+        |role: &str| Process::start(&[role, "--config", dir.join(role).with_extension("toml").to_str().unwrap()]);
     (page, process("asv"), process("auv"))
 }
 

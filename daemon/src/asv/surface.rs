@@ -144,11 +144,12 @@ impl Surface {
             let sum: u32 = shares.0.iter().map(|&s| u32::from(s)).sum();
             return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
         }
+        let vehicles: Vec<Address> = self.desks.keys().copied().collect();
+        let slot = Slot::Budget(Budget { bits_per_s, shares });
+        vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
         self.link.set_budget(bits_per_s, now);
         self.link.set_shares(shares);
-        let vehicles: Vec<Address> = self.desks.keys().copied().collect();
-        let budget = Budget { bits_per_s, shares };
-        vehicles.into_iter().try_for_each(|v| self.issue(v, Slot::Budget(budget), now).map(drop))
+        Ok(())
     }
 
     /// Sends a position fix.

@@ -41,7 +41,6 @@ pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, Problem> {
 /// What no single value tells: an area has a size, a turn has room for a frame, a seal needs a key.
 fn check_together(config: &Config) -> Result<(), Problem> {
     const LONGEST_FRAME_S: f64 = 55.0;
-    const LEAST_KEYED_FRAME: u32 = 48;
     let [west, south, east, north] = config.survey.area_m;
     if config.survey.area_m != [0.0; 4] && !(east - west >= 1.0 && north - south >= 1.0) {
         let given = format!("survey.area_m = {:?}", config.survey.area_m);
@@ -55,13 +54,7 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
         return Err(Problem::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
     }
-    if link.authenticate == "all" && link.frame_bytes < LEAST_KEYED_FRAME {
-        let frame = link.frame_bytes;
-        let why = "a report of the vehicle does not fit a smaller frame beside the tag";
-        return Err(Problem::Input(format!(
-            "link.frame_bytes = {frame} is not allowed with link.authenticate = \"all\": it takes {LEAST_KEYED_FRAME} or more, for {why}"
-        )));
-    }
+    check_frame(link)?;
     let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
     for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
         if bits / rate > LONGEST_FRAME_S {
@@ -73,6 +66,21 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         }
     }
     Ok(())
+}
+
+/// Under a key a frame ends in a tag, beside which the longest thing that cannot be cut must fit.
+fn check_frame(link: &Link) -> Result<(), Problem> {
+    let (least, with, what) = match (link.key_file.as_str(), link.authenticate.as_str()) {
+        ("", _) => return Ok(()),
+        (_, "all") => (48, "link.authenticate = \"all\"", "the vehicle's report"),
+        _ => (36, "a link.key_file", "a position fix"),
+    };
+    if link.frame_bytes >= least {
+        return Ok(());
+    }
+    let given = format!("link.frame_bytes = {}", link.frame_bytes);
+    let why = format!("{what} does not fit a smaller frame beside the tag");
+    Err(Problem::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
 }
 
 fn check_shares(link: &Link) -> Result<(), Problem> {
@@ -283,7 +291,9 @@ mod tests {
     fn a_frame_with_a_tag_has_room_for_a_report() {
         let sealed = ["link.authenticate=all", "link.key_file=k", "link.frame_bytes=40"];
         let said = message(&sealed);
-        assert!(said.starts_with("link.frame_bytes = 40") && said.contains("48 or more"), "{said}");
+        assert!(said.starts_with("link.frame_bytes = 40") && said.contains("48 to 1024"), "{said}");
+        let said = message(&["link.key_file=k", "link.frame_bytes=32"]);
+        assert!(said.contains("a position fix") && said.contains("36 to 1024"), "{said}");
         assert!(load(None, &sealed[2..].iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()).is_ok());
     }
 

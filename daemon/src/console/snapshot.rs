@@ -119,9 +119,7 @@ fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, desk: &Desk, fact
 /// What was measured of the water to one vehicle.
 fn link_of(view: &PeerView<'_>, now: Instant) -> Value {
     let stats = view.stats();
-    let direction = |loss: &Loss, goodput: &Goodput| {
-        json!({ "loss": loss.share(), "goodput_bps": goodput.bits_per_s(now).round() })
-    };
+    let direction = |loss: &Loss, goodput: &Goodput| json!({ "loss": loss.share(), "goodput_bps": goodput.bits_per_s(now).round() });
     json!({
         "up": direction(&stats.loss_in, &stats.goodput_in),
         "down": direction(&stats.loss_out, &stats.goodput_out),

@@ -5,10 +5,10 @@ mod demo;
 mod durable;
 mod journal;
 mod mapping;
-mod refusals;
-mod reload;
 #[cfg(test)]
 mod power_cuts;
+mod refusals;
+mod reload;
 mod surface;
 mod vehicle;
 

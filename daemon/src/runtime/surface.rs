@@ -40,7 +40,9 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = modem::open(&config, profile).await?;
-        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals: Refusals::default() }.run().await
+        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals: Refusals::default() }
+            .run()
+            .await
     })
 }
 

@@ -60,7 +60,10 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// Writes the next turn, to whom it is due; says whether there is one.
     pub(super) fn begin_turn(&mut self, now: Instant) -> bool {
-        let Some(vehicle) = self.choose(now) else { return self.call(now) };
+        if self.call(now) {
+            return true;
+        }
+        let Some(vehicle) = self.choose(now) else { return false };
         let active = self.peers.values().filter(|p| p.master.unanswered() < 3).count();
         let plentiful = self.budget.is_plentiful(now);
         let Some(peer) = self.peers.get_mut(&vehicle) else { return false };
@@ -94,8 +97,11 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// Calls for unknown vehicles, if it is time.
     fn call(&mut self, now: Instant) -> bool {
-        let engaged = self.current.and_then(|a| self.peers.get(&a)).is_some_and(|p| p.master.is_engaged());
-        if engaged || !self.discovery.is_due(now) || self.peers.len() >= 14 {
+        let engaged = self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged());
+        if engaged.is_some_and(|p| !p.master.may_speak(false, now))
+            || !self.discovery.is_due(now)
+            || self.peers.len() >= 14
+        {
             return false;
         }
         let modem: ModemProfile = self.config.modem;

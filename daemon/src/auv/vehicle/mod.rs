@@ -7,7 +7,6 @@ use super::exemplar::{Exemplar, encode_webp};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::steering::Steering;
-use whole_png::WholePng;
 use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -15,6 +14,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
+use whole_png::WholePng;
 
 /// Most bytes of a representative image.
 const EXEMPLAR_BYTES: usize = 700;
