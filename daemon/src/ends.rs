@@ -2,13 +2,15 @@
 
 use crate::asv::Surface;
 use crate::auv::{Area, Durable, Footprint, Navigator, Steering, Vehicle, cell_m};
-
-use crate::config::Config;
+use crate::config::{Config, load_key};
 use crate::problem::Problem;
-use scenecast_protocol::link::{SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
-use scenecast_protocol::mac::{MasterConfig, ModemProfile};
+use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
+use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SessionId};
+use scenecast_protocol::wire::{Address, MissionId};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// The vehicle that a configuration speaks of.
@@ -36,6 +38,7 @@ pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
         bit_rate_bps,
         overhead_bits: u64::from(config.modem.overhead_bits),
         turn_around: Duration::from_secs_f64(config.link.turn_around_s),
+        access: Access::Shared,
     }
 }
 
@@ -51,54 +54,73 @@ pub fn footprint(config: &Config) -> Footprint {
     Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }
 }
 
-/// A vehicle that surveys `area`; `session` is random for each run.
+/// How frames are made authentic, as both ends must have it; `None` without a key.
+fn authenticity(config: &Config) -> Result<Option<Authenticity>, Problem> {
+    let (all, encrypt) = (config.link.authenticate == "all", config.link.encrypt);
+    Ok(load_key(config)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
+}
+
+/// A vehicle that surveys `area`; `seed` is random for each run.
 pub fn vehicle(
     config: &Config,
     modem: ModemProfile,
     area: Area,
     durable: Durable,
-    session: SessionId,
+    seed: u64,
     now: Instant,
 ) -> Result<Vehicle, Problem> {
-    let whole = config.map.stream == "whole-png";
     let link = VehicleConfig {
         address: vehicle_address(config)?,
         mission: MissionId(config.mission.id),
         modem,
         budget_bps: durable.budget_bps.unwrap_or(config.link.budget_bps),
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),
-        codec: config.map.codec.parse().unwrap_or_default(),
-        exemplar_share: config.link.exemplar_share,
-        replicate_map: !whole,
+        shares: Shares(durable.shares.unwrap_or(config.link.shares)),
         status_period: Duration::from_secs_f64(config.link.status_period_s),
+        authenticity: authenticity(config)?,
     };
-    let link = VehicleLink::new(link, session, durable.inbox.clone(), now);
+    let codec = config.map.codec.parse().unwrap_or_default();
+    let link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     let steering = Steering::new(area, footprint(config), cell_m(config));
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let navigator = Navigator::new(x, y, depth, config.navigation.drift_percent / 100.0);
     let mut vehicle = Vehicle::new(link, navigator, steering, durable, now);
-    if whole {
+    if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }
     Ok(vehicle)
 }
 
-/// A surface that speaks with the configured vehicle; `seed` is random for each run.
+/// The vehicles that the surface speaks with from the beginning, by address and name.
+fn vehicles(config: &Config) -> Result<BTreeMap<Address, String>, Problem> {
+    let own = vehicle_address(config)?;
+    if config.link.vehicles.is_empty() {
+        return Ok(BTreeMap::from([(own, config.vehicle.name.clone())]));
+    }
+    let addresses = config.link.vehicles.iter().filter_map(|&number| Address::vehicle(number));
+    let named = |a: Address| (a, if a == own { config.vehicle.name.clone() } else { Surface::name_of(a) });
+    Ok(addresses.map(named).collect())
+}
+
+/// A surface that speaks with the configured vehicles; `seed` is random for each run.
 pub fn surface(config: &Config, modem: ModemProfile, seed: u64, now: Instant) -> Result<Surface, Problem> {
-    let vehicle = vehicle_address(config)?;
+    let vehicles = vehicles(config)?;
     let link = SurfaceConfig {
         mission: MissionId(config.mission.id),
         modem,
         budget_bps: config.link.budget_bps,
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),
+        shares: Shares(config.link.shares),
         master: MasterConfig {
             max_propagation: Duration::from_secs_f64(config.link.max_range_m / 1480.0),
             max_turn: Duration::from_secs_f64(config.link.max_turn_s),
             max_idle: Duration::from_secs_f64(config.link.max_idle_s),
         },
-        vehicles: vec![vehicle],
+        vehicles: vehicles.keys().copied().collect(),
+        call_every: (config.link.call_every_s > 0.0).then(|| Duration::from_secs_f64(config.link.call_every_s)),
+        authenticity: authenticity(config)?,
     };
     let link = SurfaceLink::new(link, seed, now);
-    Ok(Surface::new(link, [(vehicle, config.vehicle.name.clone())]))
+    Ok(Surface::new(link, vehicles))
 }

@@ -6,6 +6,7 @@ pub mod cli;
 pub mod config;
 pub mod console;
 mod ends;
+mod figures;
 pub mod modem;
 pub mod picture;
 mod problem;

@@ -69,6 +69,12 @@ impl Process {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+
+    /// Asks it to read its configuration again.
+    pub fn hang_up(&self) {
+        let sent = Command::new("kill").args(["-HUP", &self.0.id().to_string()]).status();
+        assert!(sent.is_ok_and(|s| s.success()), "the process can be signalled");
+    }
 }
 
 impl Drop for Process {

@@ -32,7 +32,7 @@ fn wrong_input_is_answered_with_one_line_that_says_what_is_allowed() {
     assert_refused(&["sim", "--scenario", "nowhere.toml", "--out", out], &["nowhere.toml"]);
     assert_refused(
         &["sim", "--scenario", &path(&scenario), "--out", out],
-        &["scenario.toml:3", "link.frame_bytes", "48 to 1024"],
+        &["scenario.toml:3", "link.frame_bytes", "32 to 1024"],
     );
     assert_refused(
         &["sim", "--scenario", &path(&misspelt), "--out", out],

@@ -1,5 +1,6 @@
 //! What the operator has and asked for, for one vehicle.
 
+use super::pauses::Pauses;
 use crate::auv::Exemplar;
 use scenecast_protocol::directive::{Requests, Utility};
 use scenecast_protocol::map::LabelGrid;
@@ -44,6 +45,8 @@ pub struct Desk {
     pub epoch: u8,
     /// The last whole map, where the vehicle sends those.
     pub whole: Option<LabelGrid>,
+    /// How long it is usually silent.
+    pub pauses: Pauses,
 }
 
 impl Desk {
@@ -59,6 +62,7 @@ impl Desk {
             track: VecDeque::new(),
             epoch: 0,
             whole: None,
+            pauses: Pauses::default(),
         }
     }
 

@@ -1,6 +1,9 @@
 //! The surface: holds the operator's map of each vehicle, sends each its directive.
 
+#[cfg(test)]
+mod calls;
 mod desk;
+mod pauses;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};

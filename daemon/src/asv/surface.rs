@@ -6,6 +6,7 @@ use crate::picture;
 use scenecast_protocol::directive::{Budget, Constraints, Fix, Slot, SlotId, Utility};
 use scenecast_protocol::link::{PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::{BTreeMap, VecDeque};
@@ -15,6 +16,8 @@ use std::collections::{BTreeMap, VecDeque};
 pub enum SurfaceOutput {
     /// The operator's map of a vehicle has changed.
     MapChanged(Address),
+    /// A vehicle answered that nobody had known of.
+    VehicleFound(Address),
     /// An image of a label is here.
     ExemplarHere(Address, u8),
     /// A slot is in force or was refused.
@@ -35,6 +38,11 @@ impl Surface {
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
         Self { link, desks, outputs: VecDeque::new() }
+    }
+
+    /// Name for people of a vehicle that has none.
+    pub fn name_of(vehicle: Address) -> String {
+        format!("vehicle {}", vehicle.number())
     }
 
     /// The vehicles.
@@ -61,6 +69,21 @@ impl Surface {
     /// Bits a second that the surface may use.
     pub fn budget_bps(&self) -> u32 {
         self.link.budget_bps()
+    }
+
+    /// Least shares of the classes in what the surface sends.
+    pub fn shares(&self) -> Shares {
+        self.link.shares()
+    }
+
+    /// Frames that no known vehicle has sent, or that could not be read.
+    pub fn strangers(&self) -> u64 {
+        self.link.strangers()
+    }
+
+    /// An earlier run may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.link.assume_budget_spent(now);
     }
 
     /// The next thing to tell the host.
@@ -111,14 +134,22 @@ impl Surface {
         self.issue(vehicle, Slot::Constraints(Constraints { hold }), now)
     }
 
-    /// Changes the bit budget of the surface and of every vehicle.
-    pub fn set_budget(&mut self, bits_per_s: u32, now: Instant) -> Result<(), String> {
+    /// Changes the bit budget of the surface and of every vehicle, and the least shares of the classes if there are any.
+    pub fn set_budget(&mut self, bits_per_s: u32, shares: Option<Shares>, now: Instant) -> Result<(), String> {
         if !(10..=10_000_000).contains(&bits_per_s) {
             return Err(format!("budget_bps {bits_per_s} is not within 10 to 10000000"));
         }
-        self.link.set_budget(bits_per_s, now);
+        let shares = shares.unwrap_or(self.link.shares());
+        if !shares.is_sound() {
+            let sum: u32 = shares.0.iter().map(|&s| u32::from(s)).sum();
+            return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
+        }
         let vehicles: Vec<Address> = self.desks.keys().copied().collect();
-        vehicles.into_iter().try_for_each(|v| self.issue(v, Slot::Budget(Budget { bits_per_s }), now).map(drop))
+        let slot = Slot::Budget(Budget { bits_per_s, shares });
+        vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
+        self.link.set_budget(bits_per_s, now);
+        self.link.set_shares(shares);
+        Ok(())
     }
 
     /// Sends a position fix.
@@ -149,10 +180,17 @@ impl Surface {
                 self.outputs.push_back(output);
             }
         }
+        let link = &self.link;
+        let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.heard()) == Some(now);
+        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.hear(now));
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
         match event {
+            SurfaceEvent::VehicleFound(vehicle) => {
+                self.desks.entry(vehicle).or_insert_with(|| Desk::new(Self::name_of(vehicle)));
+                Some(SurfaceOutput::VehicleFound(vehicle))
+            }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::SlotSettled(vehicle, slot) => Some(SurfaceOutput::SlotSettled(vehicle, slot)),
@@ -192,7 +230,7 @@ impl Surface {
     }
 
     /// When to ask for the next frame.
-    pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
-        self.link.poll_timeout()
+    pub fn poll_timeout(&self, now: Instant) -> Option<(Instant, Wakeup)> {
+        self.link.poll_timeout(now)
     }
 }

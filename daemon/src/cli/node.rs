@@ -22,7 +22,7 @@ pub(super) struct Node {
 
 impl Node {
     pub(super) fn run_vehicle(self) -> Result<(), Problem> {
-        runtime::run_vehicle(config::load(Some(&self.config), &self.sets)?)
+        runtime::run_vehicle(Box::new(move || config::load(Some(&self.config), &self.sets)))
     }
 
     pub(super) fn run_surface(self) -> Result<(), Problem> {

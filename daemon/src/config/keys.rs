@@ -7,6 +7,8 @@ pub enum Allowed {
     Range(f64, f64),
     /// One of these words.
     Choice(&'static [&'static str]),
+    /// Any number of whole numbers from the first to the second, all different.
+    List(f64, f64),
     /// Any text.
     Text,
     /// `true` or `false`.
@@ -32,7 +34,7 @@ const fn key(name: &'static str, unit: &'static str, allowed: Allowed, roles: &'
     Key { name, unit, allowed, roles, doc }
 }
 
-use Allowed::{Choice, Flag, Range, Text};
+use Allowed::{Choice, Flag, List, Range, Text};
 
 /// Every key, in the order of the files.
 pub const KEYS: &[Key] = &[
@@ -54,17 +56,31 @@ pub const KEYS: &[Key] = &[
         "bits on air that this end may send, mean over the window",
     ),
     key("link.budget_window_s", "s", Range(1.0, 3600.0), "asr", "window over which the budget is kept"),
-    key("link.frame_bytes", "bytes", Range(48.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
+    key("link.frame_bytes", "bytes", Range(32.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
     key(
-        "link.exemplar_share",
-        "",
-        Range(0.0, 0.9),
-        "ar",
-        "share of representative images while map and images both wait",
+        "link.shares",
+        "%",
+        Range(0.0, 100.0),
+        "asr",
+        "least shares of directive, status, fix, map and exemplar while each has something to send; together at most 100",
     ),
     key("link.status_period_s", "s", Range(1.0, 3600.0), "ar", "time between two statuses of the vehicle"),
     key("link.max_turn_s", "s", Range(1.0, 60.0), "sr", "longest turn that the surface grants"),
     key("link.max_idle_s", "s", Range(0.5, 600.0), "sr", "longest pause between turns when nothing is to be said"),
+    key(
+        "link.call_every_s",
+        "s",
+        Range(0.0, 86_400.0),
+        "sr",
+        "longest time between two calls for vehicles that are not known; 0: only the configured ones are spoken with",
+    ),
+    key(
+        "link.vehicles",
+        "",
+        List(1.0, 14.0),
+        "s",
+        "addresses of the vehicles that the surface speaks with from the beginning; empty: the one of vehicle.address",
+    ),
     key(
         "link.max_range_m",
         "m",

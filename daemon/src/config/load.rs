@@ -1,6 +1,6 @@
 //! Reading of configuration files and `--set` options.
 
-use super::{Allowed, Config, KEYS, Key};
+use super::{Allowed, Config, KEYS, Key, Link};
 use crate::problem::Problem;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
@@ -48,11 +48,13 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         return Err(Problem::Input(format!("{given} is not allowed: it takes {rule}")));
     }
     let link = &config.link;
+    check_shares(link)?;
     if link.key_file.is_empty() && (link.encrypt || link.authenticate == "all") {
         let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
         let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
         return Err(Problem::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
     }
+    check_frame(link)?;
     let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
     for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
         if bits / rate > LONGEST_FRAME_S {
@@ -64,6 +66,30 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         }
     }
     Ok(())
+}
+
+/// Under a key a frame ends in a tag, beside which the longest thing that cannot be cut must fit.
+fn check_frame(link: &Link) -> Result<(), Problem> {
+    let (least, with, what) = match (link.key_file.as_str(), link.authenticate.as_str()) {
+        ("", _) => return Ok(()),
+        (_, "all") => (48, "link.authenticate = \"all\"", "the vehicle's report"),
+        _ => (36, "a link.key_file", "a position fix"),
+    };
+    if link.frame_bytes >= least {
+        return Ok(());
+    }
+    let given = format!("link.frame_bytes = {}", link.frame_bytes);
+    let why = format!("{what} does not fit a smaller frame beside the tag");
+    Err(Problem::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
+}
+
+fn check_shares(link: &Link) -> Result<(), Problem> {
+    let sum: u32 = link.shares.iter().map(|&s| u32::from(s)).sum();
+    if sum <= 100 {
+        return Ok(());
+    }
+    let given = format!("link.shares = {:?}", link.shares);
+    Err(Problem::Input(format!("{given} is not allowed: they add up to {sum} %, and together they take 100 or less")))
 }
 
 fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), Problem> {
@@ -124,7 +150,10 @@ fn check(given: &Given) -> Result<Value, Problem> {
 
 /// `value` in the type of `default`, if it lies within what the key allows.
 fn fit(value: &Value, default: &Value, key: &Key) -> Option<Value> {
-    let in_range = |x: f64| matches!(key.allowed, Allowed::Range(low, high) if (low..=high).contains(&x));
+    let in_range = |x: f64| match key.allowed {
+        Allowed::Range(low, high) | Allowed::List(low, high) => (low..=high).contains(&x),
+        _ => false,
+    };
     match (default, value) {
         (Value::Integer(_), Value::Integer(i)) => in_range(*i as f64).then(|| value.clone()),
         (Value::Float(_), Value::Float(f)) => in_range(*f).then(|| value.clone()),
@@ -134,6 +163,11 @@ fn fit(value: &Value, default: &Value, key: &Key) -> Option<Value> {
             Allowed::Choice(words) => words.contains(&s.as_str()).then(|| value.clone()),
             _ => Some(value.clone()),
         },
+        (Value::Array(_), Value::Array(v)) if matches!(key.allowed, Allowed::List(..)) => {
+            let is_number = |x: &Value| x.as_integer().is_some_and(|i| in_range(i as f64));
+            let differ = (1..v.len()).all(|i| !v[..i].contains(&v[i]));
+            (v.iter().all(is_number) && differ).then(|| value.clone())
+        }
         (Value::Array(d), Value::Array(v)) if d.len() == v.len() => {
             d.iter().zip(v).map(|(d, v)| fit(v, d, key)).collect::<Option<Vec<_>>>().map(Value::Array)
         }
@@ -153,7 +187,11 @@ impl Key {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
         match (self.allowed, default) {
             (Allowed::Range(low, high), Value::Integer(_)) => format!("a whole number from {low} to {high}{unit}"),
-            (Allowed::Range(low, high), Value::Array(a)) => format!("{} numbers from {low} to {high}{unit}", a.len()),
+            (Allowed::Range(low, high), Value::Array(a)) => {
+                let whole = if a.iter().all(Value::is_integer) { "whole " } else { "" };
+                format!("{} {whole}numbers from {low} to {high}{unit}", a.len())
+            }
+            (Allowed::List(low, high), _) => format!("a list of different whole numbers from {low} to {high}{unit}"),
             (Allowed::Range(low, high), _) => format!("a number from {low} to {high}{unit}"),
             (Allowed::Choice(words), _) => format!("one of {}", words.join(", ")),
             (Allowed::Text, _) => "text in quotes".to_owned(),
@@ -214,7 +252,7 @@ mod tests {
         let said = message(&["link.frame_bytes=9"]);
         assert_eq!(
             said,
-            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 48 to 1024 bytes"
+            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 32 to 1024 bytes"
         );
     }
 
@@ -236,6 +274,27 @@ mod tests {
         }
         let all = ["link.encrypt=true", "link.authenticate=all", "link.key_file=k"].map(str::to_owned);
         assert!(load(None, &all).is_ok());
+    }
+
+    #[test]
+    fn shares_add_up_to_a_hundred_at_most_and_vehicles_differ() {
+        let said = message(&["link.shares=[10, 5, 5, 60, 30]"]);
+        assert!(said.contains("link.shares = [10, 5, 5, 60, 30]") && said.contains("110 %"), "{said}");
+        let said = message(&["link.shares=[10, 5]"]);
+        assert!(said.ends_with("it takes 5 whole numbers from 0 to 100 %"), "{said}");
+        let said = message(&["link.vehicles=[2, 2]"]);
+        assert!(said.ends_with("it takes a list of different whole numbers from 1 to 14"), "{said}");
+        assert_eq!(load(None, &["link.vehicles=[1, 3]".into()]).unwrap().link.vehicles, [1, 3]);
+    }
+
+    #[test]
+    fn a_frame_with_a_tag_has_room_for_a_report() {
+        let sealed = ["link.authenticate=all", "link.key_file=k", "link.frame_bytes=40"];
+        let said = message(&sealed);
+        assert!(said.starts_with("link.frame_bytes = 40") && said.contains("48 to 1024"), "{said}");
+        let said = message(&["link.key_file=k", "link.frame_bytes=32"]);
+        assert!(said.contains("a position fix") && said.contains("36 to 1024"), "{said}");
+        assert!(load(None, &sealed[2..].iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()).is_ok());
     }
 
     #[test]

@@ -10,6 +10,7 @@ pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
 pub use print::print;
 
+use scenecast_protocol::schedule::Shares;
 use serde::{Deserialize, Serialize};
 
 /// Every setting; see [`KEYS`] for meaning, unit and range of each.
@@ -83,14 +84,18 @@ section! {
         budget_window_s: f64 = 10.0,
         /// Bytes of a full frame.
         frame_bytes: u32 = 256,
-        /// Share of representative images while map and images both wait.
-        exemplar_share: f64 = 0.2,
+        /// Least shares in percent of directive, status, fix, map, exemplar.
+        shares: [u8; 5] = Shares::default().0,
         /// Seconds between two statuses.
         status_period_s: f64 = 10.0,
         /// Longest turn in seconds.
         max_turn_s: f64 = 12.0,
         /// Longest pause between turns in seconds.
         max_idle_s: f64 = 10.0,
+        /// Longest time in seconds between two calls for vehicles that are not known; 0 = no calls.
+        call_every_s: f64 = 300.0,
+        /// Addresses that the surface speaks with from the beginning; empty = that of `vehicle.address`.
+        vehicles: Vec<u8> = Vec::new(),
         /// Greatest range in metres to wait an answer for.
         max_range_m: f64 = 3000.0,
         /// Seconds that a modem needs between receiving and sending.

@@ -4,7 +4,8 @@ use super::base64;
 use crate::asv::{ExemplarState, Surface};
 use crate::picture;
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::Rect;
+use scenecast_protocol::map::{Rect, StateReplica};
+use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use serde_json::{Value, json};
@@ -25,8 +26,8 @@ pub enum Ask {
     Request(u8, u8),
     /// Tell the vehicle to stay, or to go on.
     Hold(u8, bool),
-    /// Change the bit budget.
-    Budget(u32),
+    /// Change the bit budget, and the least shares if there are any.
+    Budget(u32, Option<Shares>),
 }
 
 /// An answer.
@@ -64,7 +65,7 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
                 _ => Reply::NotFound,
             }
         }
-        Ask::Budget(bps) => match surface.set_budget(bps, now) {
+        Ask::Budget(bps, shares) => match surface.set_budget(bps, shares, now) {
             Ok(()) => Reply::Accepted(json!({ "slot": SlotId::Budget.name() })),
             Err(why) => Reply::Refused(why),
         },

@@ -11,6 +11,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use futures_util::Stream;
+use scenecast_protocol::schedule::Shares;
 use serde::Deserialize;
 use serde_json::json;
 use std::collections::{BTreeMap, VecDeque};
@@ -203,10 +204,22 @@ async fn constraints(State(shared): State<Shared>, Path(id): Path<u8>, Json(body
 #[serde(deny_unknown_fields)]
 struct BudgetBody {
     budget_bps: u32,
+    shares: Option<SharesBody>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SharesBody {
+    directive: u8,
+    status: u8,
+    fix: u8,
+    map: u8,
+    exemplar: u8,
 }
 
 async fn budget(State(shared): State<Shared>, Json(body): Json<BudgetBody>) -> Response {
-    shared.ask(Ask::Budget(body.budget_bps)).await
+    let shares = body.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
+    shared.ask(Ask::Budget(body.budget_bps, shares)).await
 }
 
 async fn page(uri: Uri) -> Response {

@@ -2,11 +2,15 @@
 
 use super::link_meter::LinkMeter;
 use crate::asv::{Desk, ExemplarState, Surface};
+use crate::config::Config;
+use crate::figures::dropped;
 use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
-use scenecast_protocol::link::{LinkStats, PeerView};
+use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
+use scenecast_protocol::mac::{ClockMap, ModemProfile};
+use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{Address, Stamp, VehicleMode, VehicleStatus};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -23,8 +27,28 @@ pub struct MissionFacts {
     pub ended: bool,
     /// Edge of a cell, metres.
     pub cell_m: f64,
+    /// Longest pause between two turns while nothing is to be said, seconds.
+    pub idle_s: f64,
     /// Interval to expect between two contacts before one was measured, seconds.
     pub first_interval_s: f64,
+    /// Bits on air of a full frame.
+    pub frame_bits: u64,
+}
+
+impl MissionFacts {
+    /// A mission that has just begun; `run` is random for each run.
+    pub fn new(config: &Config, modem: &ModemProfile, run: u64, speed: f64) -> Self {
+        Self {
+            name: config.mission.name.clone(),
+            run: format!("{:08x}", run as u32),
+            speed,
+            ended: false,
+            cell_m: crate::auv::cell_m(config),
+            idle_s: config.link.max_idle_s,
+            first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
+            frame_bits: modem.bits_on_air(modem.frame_bytes),
+        }
+    }
 }
 
 /// The state at a moment and the versions of the maps.
@@ -58,12 +82,11 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
     let view = surface.view(address)?;
     let labels = surface.labels(address).unwrap_or_default();
     let bounds = surface.map(address).and_then(|m| m.bounds());
-    let interval = view.expected_interval().map_or(facts.first_interval_s, |d| d.as_secs_f64().max(1.0));
     Some(json!({
         "id": address.number(),
         "name": desk.name,
         "heard_s": view.heard().map(seconds),
-        "expected_interval_s": interval,
+        "expected_interval_s": expected_interval_s(surface, &view, desk, facts),
         "next_contact_s": view.next_contact(now).map(seconds),
         "status": view.status().map(|(s, at)| status(s, *at)),
         "track": desk.track.iter().map(|(at, x, y)| json!([seconds(*at), x, y])).collect::<Vec<_>>(),
@@ -79,9 +102,38 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
             "epoch": desk.epoch,
         },
         "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
-        "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, view, address, facts)).collect::<Vec<_>>(),
+        "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect::<Vec<_>>(),
+        "link": link_of(&view, now),
         "directive": { "slots": view.slots().map(slot).collect::<Vec<_>>() },
     }))
+}
+
+/// The silence that is nothing to wonder at: what is usual, or what an idle link and the smaller budget make of it.
+fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, desk: &Desk, facts: &MissionFacts) -> f64 {
+    let theirs = view.status().map_or(u32::MAX, |(s, _)| s.budget_bps);
+    let budget_bps = surface.budget_bps().min(theirs).max(1);
+    let least = facts.idle_s + facts.frame_bits as f64 / f64::from(budget_bps);
+    desk.pauses.expected().map_or(facts.first_interval_s, |d| d.as_secs_f64()).max(least)
+}
+
+/// What was measured of the water to one vehicle.
+fn link_of(view: &PeerView<'_>, now: Instant) -> Value {
+    let stats = view.stats();
+    let direction = |loss: &Loss, goodput: &Goodput| json!({ "loss": loss.share(), "goodput_bps": goodput.bits_per_s(now).round() });
+    json!({
+        "up": direction(&stats.loss_in, &stats.goodput_in),
+        "down": direction(&stats.loss_out, &stats.goodput_out),
+        "round_trip_s": view.round_trip().map(|d| d.as_secs_f64()),
+        "one_way_s": view.round_trip().map(|d| d.as_secs_f64() / 2.0),
+        "clock_ahead_s": view.clock().map(|c| clock_ahead_s(&c, now)),
+        "dropped": dropped(stats),
+    })
+}
+
+/// How far the vehicle's clock is ahead of ours; clocks on the wire come round after 4 h 39 min.
+fn clock_ahead_s(clock: &ClockMap, now: Instant) -> f64 {
+    let ahead_ms = clock.to_theirs(now).wrapping_sub(Stamp::clock(now)) << 8;
+    f64::from(ahead_ms as i32 >> 8) / 1000.0
 }
 
 fn status(s: &VehicleStatus, at: Instant) -> Value {
@@ -105,10 +157,12 @@ fn status(s: &VehicleStatus, at: Instant) -> Value {
         "cells": s.explored_cells,
         "labels": s.labels,
         "fix_age_s": s.fix_age_s,
+        "budget_bps": s.budget_bps,
+        "refused_frames": s.refused_frames,
     })
 }
 
-fn label(id: u8, cells: u32, desk: &Desk, view: PeerView<'_>, address: Address, facts: &MissionFacts) -> Value {
+fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address, facts: &MissionFacts) -> Value {
     json!({
         "id": id,
         "cells": cells,
@@ -118,7 +172,7 @@ fn label(id: u8, cells: u32, desk: &Desk, view: PeerView<'_>, address: Address, 
     })
 }
 
-fn exemplar(id: u8, desk: &Desk, view: PeerView<'_>, address: Address) -> Value {
+fn exemplar(id: u8, desk: &Desk, view: &PeerView<'_>, address: Address) -> Value {
     let Some(e) = desk.exemplars.get(&id) else {
         return json!({ "state": "none", "progress": 0.0, "bytes": null, "url": null, "at_s": null });
     };
@@ -179,6 +233,8 @@ fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> Value {
     json!({
         "budget_bps": surface.budget_bps(),
         "budget_window_s": meter.window_s(),
+        "shares": Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name(), s)).collect::<BTreeMap<_, _>>(),
+        "strangers": surface.strangers(),
         "up": direction(0, numbered, numbered.saturating_sub(heard), &|s, c| s.heard_by_class.get(&c).copied().unwrap_or(0)),
         "down": direction(1, lost + delivered, lost, &|s, c| s.bytes_by_class.get(&c).copied().unwrap_or(0)),
         "round_trip_s": round_trip.map(|d| d.as_secs_f64()),

@@ -1,6 +1,7 @@
 //! The figures of a mission.
 
 use super::mission::Mission;
+use crate::figures::dropped;
 use scene_model::tuning::mutual_information_nats;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::LabelGrid;
@@ -113,14 +114,21 @@ fn link(m: &Mission) -> Value {
     let goodput = (delivered(m.vehicle.stats()) + down) as f64 * 8.0 / seconds;
     let [up_audit, down_audit] = &m.audits;
     let worst = up_audit.worst_window_bps().max(down_audit.worst_window_bps());
+    let view = m.surface.view(m.address);
+    let at_surface = view.as_ref().map(|v| v.stats().clone()).unwrap_or_default();
     let one = |i: usize| {
         let audit = &m.audits[i];
+        let heard_by = [&at_surface, m.vehicle.stats()][i];
+        let (loss, goodput) = (&heard_by.loss_in, &heard_by.goodput_in);
         json!({
             "sent_bps": round(audit.total_bits() as f64 / seconds),
             "worst_window_bps": round(audit.worst_window_bps()),
             "largest_transmission_bits": audit.largest_bits(),
             "frames_sent": m.log.sent[i],
             "frames_lost": m.log.lost[i],
+            "loss_measured": round(loss.share()),
+            "goodput_last_minute_bps": round(goodput.bits_per_s(m.now())),
+            "dropped": dropped(heard_by),
         })
     };
     json!({
@@ -134,6 +142,7 @@ fn link(m: &Mission) -> Value {
         "frames_lost": m.log.lost.iter().sum::<u64>(),
         "goodput_bps": round(goodput),
         "bytes_by_class": by_class(m),
+        "round_trip_s": view.and_then(|v| v.round_trip()).map(|d| round(d.as_secs_f64())),
         "up": one(0),
         "down": one(1),
     })

@@ -36,14 +36,7 @@ struct Demo {
 
 impl Demo {
     fn new(mission: Mission, speed: f64) -> Self {
-        let facts = MissionFacts {
-            name: mission.config().mission.name.clone(),
-            run: format!("{:08x}", super::random_bits() as u32),
-            speed,
-            ended: false,
-            cell_m: mission.cell_m(),
-            first_interval_s: mission.config().link.max_idle_s + mission.config().link.max_turn_s,
-        };
+        let facts = MissionFacts::new(mission.config(), mission.modem(), super::random_bits(), speed);
         let window = Duration::from_secs_f64(mission.config().link.budget_window_s);
         Self { meter: LinkMeter::new(window), mission, facts, counted: [0; 2], published: None }
     }

@@ -100,12 +100,20 @@ mod tests {
         let versions = [None, Some(300), None, None, None, Some(1)];
         let inbox = SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2] };
         let utility = Some((3, 50, -1, [(2, -3)].into()));
-        let durable = Durable { inbox, epoch: 3, utility, hold: true, budget_bps: Some(500), refine_words_per_s: None };
+        let durable = Durable {
+            inbox,
+            epoch: 3,
+            utility,
+            hold: true,
+            budget_bps: Some(500),
+            shares: Some([10, 5, 5, 50, 20]),
+            refine_words_per_s: None,
+        };
         let golden = [
             &[1, 7, 2, 5, 6][..],
             &[0, 1, 172, 2, 0, 0, 0, 1, 1],
             &[0, 1, 0, 0, 0, 2],
-            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 0],
+            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));

@@ -7,12 +7,15 @@ mod journal;
 mod mapping;
 #[cfg(test)]
 mod power_cuts;
+mod refusals;
+mod reload;
 mod surface;
 mod vehicle;
 
 pub use clock::Clock;
 pub use demo::run_demo;
 pub(crate) use journal::sync_folder;
+pub use reload::Load;
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 

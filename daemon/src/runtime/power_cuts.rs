@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use scenecast_protocol::directive::{Fix, LifeLine, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, SessionId};
+use scenecast_protocol::wire::Address;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -126,7 +126,7 @@ impl World {
         self.operate();
         while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= Instant::ZERO + TICK * self.ticks) {
             match due.remove() {
-                Event::Sent { by_vehicle: true } => self.onboard.vehicle.handle_transmit_outcome(),
+                Event::Sent { by_vehicle: true } => self.onboard.vehicle.handle_transmit_outcome(self.now()),
                 Event::Sent { by_vehicle: false } => self.surface.handle_transmit_outcome(self.now()),
                 Event::Arrives { at_vehicle: true, bytes } => self.run_vehicle(Some(&bytes)),
                 Event::Arrives { at_vehicle: false, bytes } => self.surface.handle_frame(&bytes, self.now()),
@@ -147,12 +147,12 @@ impl World {
         match self.ticks {
             30 => {
                 self.surface.set_hold(auv, true, now).unwrap();
-                self.surface.set_budget(5000, now).unwrap();
+                self.surface.set_budget(5000, None, now).unwrap();
             }
             60 => drop(self.surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
             90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
             120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), 0.5, now).unwrap()),
-            150 => self.surface.set_budget(9000, now).unwrap(),
+            150 => self.surface.set_budget(9000, None, now).unwrap(),
             _ => {}
         }
     }
@@ -219,8 +219,7 @@ impl World {
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
         let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, labels: LABELS };
-        let session = session(&mut self.chance);
-        onboard.vehicle.handle_map(&update, session, Instant::ZERO + TICK * self.ticks);
+        onboard.vehicle.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 
     fn host_step(&self) -> Result<(), End> {
@@ -269,17 +268,14 @@ fn start(
             Ok((keeper, durable)) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
                 let profile = ends::modem_of_process(config);
-                let vehicle = ends::vehicle(config, profile, area, durable.clone(), session(chance), now).unwrap();
+                let seed = chance.below(1 << 30) as u64;
+                let vehicle = ends::vehicle(config, profile, area, durable.clone(), seed, now).unwrap();
                 let book_epoch = durable.epoch;
                 return Onboard { keeper, vehicle, saved: durable, book_epoch };
             }
             Err(problem) => assert!(disk.is_off(), "{problem}"),
         }
     }
-}
-
-fn session(chance: &mut Chance) -> SessionId {
-    SessionId::from_random(chance.below(1 << 16) as u16)
 }
 
 #[test]

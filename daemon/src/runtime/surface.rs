@@ -2,6 +2,7 @@
 
 use super::clock::Clock;
 use super::journal::create_folder;
+use super::refusals::{Refusals, warn_without_key};
 use crate::asv::{Surface, SurfaceOutput};
 use crate::config::Config;
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
@@ -19,10 +20,15 @@ use tokio::sync::oneshot;
 pub fn run_surface(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
         let dir = PathBuf::from(&config.runtime.state_dir);
+        let is_again = dir.exists();
         create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
-        let surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
+        warn_without_key(&config);
+        let mut surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
+        if is_again {
+            surface.assume_budget_spent(clock.now());
+        }
         let console = match config.console.listen.as_str() {
             "" => None,
             address => {
@@ -31,17 +37,12 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
                 Some(console)
             }
         };
-        let facts = MissionFacts {
-            name: config.mission.name.clone(),
-            run: format!("{:08x}", super::random_bits() as u32),
-            speed: config.runtime.time_scale,
-            ended: false,
-            cell_m: crate::auv::cell_m(&config),
-            first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
-        };
+        let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = modem::open(&config, profile).await?;
-        Host { surface, modem, console, clock, dir, facts, meter, bits: profile }.run().await
+        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals: Refusals::default() }
+            .run()
+            .await
     })
 }
 
@@ -54,6 +55,7 @@ struct Host {
     facts: MissionFacts,
     meter: LinkMeter,
     bits: scenecast_protocol::mac::ModemProfile,
+    refusals: Refusals,
 }
 
 impl Host {
@@ -65,7 +67,8 @@ impl Host {
             if changed {
                 self.publish();
             }
-            let wake = self.surface.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
+            let now = self.clock.now();
+            let wake = self.surface.poll_timeout(now).map(|(at, _)| at).filter(|&at| at > now);
             let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
             tokio::select! {
                 _ = tokio::signal::ctrl_c() => {
@@ -87,6 +90,8 @@ impl Host {
         let now = self.clock.now();
         self.meter.heard(self.bits.bits_on_air(bytes.len()), now);
         self.surface.handle_frame(bytes, now);
+        let views = self.surface.vehicles().filter_map(|(a, _)| self.surface.view(a));
+        views.for_each(|v| self.refusals.note(v.stats()));
     }
 
     fn answer(&mut self, ask: Ask, reply: oneshot::Sender<Reply>) {
@@ -109,6 +114,9 @@ impl Host {
             changed = true;
             match output {
                 SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
+                SurfaceOutput::VehicleFound(vehicle) => {
+                    tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
+                }
                 SurfaceOutput::ExemplarHere(vehicle, label) => {
                     tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
                 }

@@ -4,36 +4,45 @@ use super::clock::Clock;
 use super::durable::Keeper;
 use super::journal::Folder;
 use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
-use crate::auv::{Area, Vehicle, VehicleOutput};
+use super::refusals::{Refusals, warn_without_key};
+use super::reload::{Load, Reload};
+use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
 use crate::rehearsal::Recording;
+use scenecast_protocol::directive::Budget;
+use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SessionId;
 use std::path::Path;
 
-/// Runs the vehicle until it is interrupted.
-pub fn run_vehicle(config: Config) -> Result<(), Problem> {
+/// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
+pub fn run_vehicle(load: Load) -> Result<(), Problem> {
     super::block_on(async move {
+        let config = load()?;
+        warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
         let folder = Folder::hold(dir).map_err(|e| Problem::file(dir, e))?;
         let (keeper, durable) = Keeper::begin_run(folder)?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
-        let session = SessionId::from_random(super::random_bits() as u16);
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
         let epoch = durable.epoch;
-        let vehicle = crate::ends::vehicle(&config, profile, area, durable, session, clock.now())?;
+        let is_again = durable != Durable::default();
+        let mut vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
+        if is_again {
+            vehicle.assume_budget_spent(clock.now());
+        }
         let at_end = recording.is_some();
         let camera = Camera::new(recording, clock);
         let mapper = mapping::spawn(&config, epoch)?;
         let modem = modem::open(&config, profile).await?;
-        Host { vehicle, camera, mapper, modem, clock, keeper, at_end, behind: 0 }.run().await
+        let (reload, refusals) = (Reload::new(load)?, Refusals::default());
+        Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, at_end, behind: 0 }.run().await
     })
 }
 
@@ -50,6 +59,8 @@ struct Host {
     modem: Modem,
     clock: Clock,
     keeper: Keeper<Folder>,
+    reload: Reload,
+    refusals: Refusals,
     /// Whether the end of the camera's frames is the end of the survey.
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
@@ -69,9 +80,13 @@ impl Host {
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 event = self.modem.next() => match event {
-                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(),
-                    ModemEvent::Received(bytes) => self.vehicle.handle_frame(&bytes, self.clock.now()),
+                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(self.clock.now()),
+                    ModemEvent::Received(bytes) => {
+                        self.vehicle.handle_frame(&bytes, self.clock.now());
+                        self.refusals.note(self.vehicle.stats());
+                    }
                 },
+                config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => {
                     self.behind += 1;
                     let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
@@ -84,13 +99,19 @@ impl Host {
         }
     }
 
+    /// Budget and shares of the configuration are in force, whatever the surface said before.
+    fn follow(&mut self, config: &Config) {
+        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares) };
+        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %", budget.bits_per_s, budget.shares.0);
+        self.vehicle.set_budget(budget, self.clock.now());
+    }
+
     fn handle_seen(&mut self, seen: Seen) {
         let now = self.clock.now();
         self.behind -= 1;
         let f = &seen.frame;
         self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
-        let session = SessionId::from_random(super::random_bits() as u16);
-        self.vehicle.handle_map(&seen.update, session, now);
+        self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
         if self.at_end && self.behind == 0 && self.camera.is_over() {
             self.at_end = false;

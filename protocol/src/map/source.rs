@@ -51,7 +51,7 @@ impl MapSource {
 
     /// What each label is worth to the operator, 0..=1; what differs from his picture goes out in that order.
     pub fn set_interest(&mut self, weight: impl Fn(u8) -> f64) {
-        for (label, worth) in (0..).zip(self.interest.iter_mut()) {
+        for (label, worth) in (0..=u8::MAX).zip(self.interest.iter_mut()) {
             *worth = weight(label).abs().min(1.0);
         }
     }

@@ -7,7 +7,7 @@ import { ageOf, store } from "../store.js";
 import { drawHistory } from "./history.js";
 import { lifeline, slotOf } from "./lifeline.js";
 
-const CLASSES = ["map", "status", "directive", "exemplar", "overhead"];
+const CLASSES = ["map", "status", "directive", "fix", "exemplar", "overhead"];
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};
@@ -27,7 +27,7 @@ function direction(name, title) {
 }
 
 export function startLink() {
-  for (const [key, name] of [["loss", "Frames lost, up / down"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"], ["backlog", "Backlog"]]) {
+  for (const [key, name] of [["loss", "Frames lost, up / down"], ["lately", "Lost lately, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"], ["backlog", "Backlog"]]) {
     const [node, set] = row(name);
     values[key] = set;
     list.append(node);
@@ -75,6 +75,11 @@ function update() {
   refreshDirection(directions.up, link.up, link);
   refreshDirection(directions.down, link.down, link);
   values.loss(`${percent(link.up.loss, 1)} / ${percent(link.down.loss, 1)}`);
+  const own = store.vehicle?.link;
+  values.lately(own ? `${percent(own.up.loss, 1)} / ${percent(own.down.loss, 1)}` : none);
+  values.refused(`${store.vehicle?.status?.refused_frames ?? 0} / ${own?.dropped.unauthenticated ?? 0}`);
+  const ownBudget = store.vehicle?.status?.budget_bps;
+  values.own(ownBudget ? rate(ownBudget) : none);
   values.goodput(`${rate(link.up.goodput_bps)} / ${rate(link.down.goodput_bps)}`);
   values.trip(link.round_trip_s === null ? none : `${link.round_trip_s.toFixed(2)} s`);
   values.backlog(backlog(link));

@@ -1,6 +1,7 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
 mod obey;
+mod whole_png;
 
 use super::exemplar::{Exemplar, encode_webp};
 use super::mapper::MapUpdate;
@@ -10,9 +11,10 @@ use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utili
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{SessionId, SlotState, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
+use whole_png::WholePng;
 
 /// Most bytes of a representative image.
 const EXEMPLAR_BYTES: usize = 700;
@@ -28,8 +30,10 @@ pub struct Durable {
     pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
     /// Whether the vehicle is told to hold.
     pub hold: bool,
-    /// Budget in force, bits a second.
+    /// Budget in force, bits a second, if somebody has changed it.
     pub budget_bps: Option<u32>,
+    /// Least shares in force in percent, if somebody has changed them.
+    pub shares: Option<[u8; 5]>,
     /// Words to resample a second, if the operator has said so.
     pub refine_words_per_s: Option<u32>,
 }
@@ -78,8 +82,8 @@ pub struct Vehicle {
     done: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
-    whole_png: Option<u64>,
-    outstanding: Option<scenecast_protocol::object::ObjectId>,
+    /// Instead of the link's map, for comparison.
+    whole_png: Option<WholePng>,
 }
 
 impl Vehicle {
@@ -107,7 +111,6 @@ impl Vehicle {
             outputs: VecDeque::new(),
             fixes_applied: 0,
             whole_png: None,
-            outstanding: None,
         };
         if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
@@ -122,7 +125,7 @@ impl Vehicle {
 
     /// Sends the whole map as a PNG whenever it has changed instead of what changed, for comparison.
     pub fn send_whole_png(&mut self) {
-        self.whole_png = Some(0);
+        self.whole_png = Some(WholePng::default());
     }
 
     /// What must survive a restart.
@@ -137,17 +140,17 @@ impl Vehicle {
 
     /// The map as the vehicle sees it.
     pub fn map(&self) -> &LabelGrid {
-        self.link.map()
+        self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
     }
 
     /// Versions of the map so far.
     pub fn map_version(&self) -> u64 {
-        self.link.map_version()
+        self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
     }
 
     /// Whether the surface is known to have everything.
     pub fn is_settled(&self) -> bool {
-        self.link.is_settled()
+        self.link.is_settled() && self.whole_png.as_ref().is_none_or(WholePng::is_settled)
     }
 
     /// Counters of the link.
@@ -158,6 +161,11 @@ impl Vehicle {
     /// Bits a second that the link may use.
     pub fn budget_bps(&self) -> u32 {
         self.link.budget_bps()
+    }
+
+    /// An earlier run may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.link.assume_budget_spent(now);
     }
 
     /// Fixes that corrected the estimate.
@@ -186,20 +194,25 @@ impl Vehicle {
     }
 
     /// The scene model has a new map.
-    pub fn handle_map(&mut self, update: &MapUpdate, session: SessionId, now: Instant) {
+    pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
         if update.epoch != self.durable.epoch {
-            self.begin_epoch(update.epoch, session, now);
+            self.begin_epoch(update.epoch, now);
         }
         self.labels = update.labels;
         self.explored = update.cells.len() as u32;
-        self.link.set_map(update.cells.iter().copied(), now);
+        let cells = update.cells.iter().copied();
+        match &mut self.whole_png {
+            Some(whole) => whole.set(cells),
+            None => drop(self.link.set_map(cells, now)),
+        }
         let at = self.navigator.position();
         self.steering.handle_view(at);
     }
 
-    /// Label ids start afresh: the surface learns it by a new session, before any of the new ids.
-    fn begin_epoch(&mut self, epoch: u8, session: SessionId, now: Instant) {
-        self.link.renew(session, now);
+    /// Label ids start afresh: the surface learns it by a new run, before any of the new ids.
+    fn begin_epoch(&mut self, epoch: u8, now: Instant) {
+        self.link.begin_epoch(now);
+        self.whole_png = self.whole_png.take().map(|_| WholePng::default());
         self.durable.epoch = epoch;
         self.utility = None;
         self.requests = Requests::default();
@@ -223,18 +236,6 @@ impl Vehicle {
         }
     }
 
-    /// For comparison: the whole map as a PNG, once the last one is through and the map has changed.
-    fn push_whole_png(&mut self) {
-        let version = self.link.map_version();
-        if self.outstanding.is_some() || self.whole_png.is_none_or(|sent| sent == version) {
-            return;
-        }
-        if let Ok(png) = crate::picture::encode(self.link.map()) {
-            self.outstanding = self.link.push_object(crate::picture::with_place(self.link.map(), &png));
-            self.whole_png = Some(version);
-        }
-    }
-
     /// Chooses a waypoint if there is none or the last one is reached.
     pub fn steer(&mut self) {
         if self.durable.hold || self.done {
@@ -243,7 +244,8 @@ impl Vehicle {
         let at = self.navigator.position();
         let reached = self.waypoint.is_none_or(|w| (w.0 - at.0).hypot(w.1 - at.1) < 0.5);
         if reached {
-            let next = self.steering.next_waypoint(at, self.link.map(), self.utility.as_ref());
+            let map = self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map);
+            let next = self.steering.next_waypoint(at, map, self.utility.as_ref());
             self.waypoint = Some(next);
             self.outputs.push_back(VehicleOutput::Waypoint(next.0, next.1));
         }
@@ -262,8 +264,11 @@ impl Vehicle {
         while let Some(event) = self.link.poll_event() {
             match event {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
-                VehicleEvent::ObjectDelivered(id) if self.outstanding == Some(id) => self.outstanding = None,
-                VehicleEvent::ObjectDelivered(_) => {}
+                VehicleEvent::ObjectDelivered(id) => {
+                    if let Some(whole) = &mut self.whole_png {
+                        whole.handle_delivered(id);
+                    }
+                }
                 VehicleEvent::SurfaceRestarted => self.forget_answers(),
             }
         }
@@ -273,8 +278,9 @@ impl Vehicle {
     fn forget_answers(&mut self) {
         self.link.cancel_objects();
         self.answered.clear();
-        self.outstanding = None;
-        self.whole_png = self.whole_png.map(|_| 0);
+        if let Some(whole) = &mut self.whole_png {
+            whole.send_again();
+        }
     }
 
     fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
@@ -295,8 +301,8 @@ impl Vehicle {
     }
 
     /// The transmission that was handed out has left the modem.
-    pub fn handle_transmit_outcome(&mut self) {
-        self.link.handle_transmit_outcome();
+    pub fn handle_transmit_outcome(&mut self, now: Instant) {
+        self.link.handle_transmit_outcome(now);
     }
 
     /// The next frame to put on air.
@@ -305,7 +311,9 @@ impl Vehicle {
             let status = self.status(now);
             self.link.set_status(status);
         }
-        self.push_whole_png();
+        if let Some(whole) = &mut self.whole_png {
+            whole.push(&mut self.link);
+        }
         self.link.poll_transmit(now)
     }
 
@@ -339,6 +347,6 @@ impl Vehicle {
 
     /// Labels of cells as the vehicle sees them.
     pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
-        self.link.map().iter()
+        self.map().iter()
     }
 }

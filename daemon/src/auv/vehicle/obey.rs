@@ -1,7 +1,7 @@
 //! What the vehicle does with a slot of the directive.
 
 use super::{Vehicle, VehicleOutput};
-use scenecast_protocol::directive::{RefusalReason, Slot, Utility};
+use scenecast_protocol::directive::{Budget, RefusalReason, Slot, Utility};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -22,9 +22,8 @@ impl Vehicle {
                 self.outputs.push_back(VehicleOutput::RefineRate(settings.refine_words_per_s));
                 Ok(())
             }
-            Slot::Budget(budget) if (10..=10_000_000).contains(&budget.bits_per_s) => {
-                self.link.set_budget(budget.bits_per_s, now);
-                self.durable.budget_bps = Some(budget.bits_per_s);
+            Slot::Budget(budget) if is_in_range(&budget) => {
+                self.follow_budget(budget, now);
                 Ok(())
             }
             Slot::Budget(_) => Err(RefusalReason::OutOfRange),
@@ -65,6 +64,23 @@ impl Vehicle {
 
     pub(super) fn follow_utility(&mut self) {
         let utility = self.utility.clone().unwrap_or_default();
-        self.link.set_interest(|label| utility.weight(label));
+        self.link.source_mut().set_interest(|label| utility.weight(label));
     }
+
+    /// Changes budget and shares on the vehicle itself; the surface learns of it by the next report.
+    pub fn set_budget(&mut self, budget: Budget, now: Instant) {
+        self.follow_budget(budget, now);
+        self.outputs.push_back(VehicleOutput::Persist);
+    }
+
+    fn follow_budget(&mut self, budget: Budget, now: Instant) {
+        self.link.set_budget(budget.bits_per_s, now);
+        self.link.set_shares(budget.shares);
+        self.durable.budget_bps = Some(budget.bits_per_s);
+        self.durable.shares = Some(budget.shares.0);
+    }
+}
+
+fn is_in_range(budget: &Budget) -> bool {
+    (10..=10_000_000).contains(&budget.bits_per_s) && budget.shares.is_sound()
 }

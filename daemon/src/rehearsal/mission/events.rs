@@ -8,7 +8,6 @@ use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SessionId;
 use sim_channel::{Outcome, Position};
 use std::time::Duration;
 
@@ -16,7 +15,7 @@ impl Mission {
     pub(super) fn next_event(&self) -> Option<Instant> {
         let links = [
             self.vehicle.poll_timeout().filter(|_| self.transmitting[0].is_none()),
-            self.surface.poll_timeout().filter(|_| self.transmitting[1].is_none()),
+            self.surface.poll_timeout(self.now).filter(|_| self.transmitting[1].is_none()),
         ];
         // A wake-up that has passed led to no frame: it waits for another event.
         let links = links.into_iter().flatten().map(|(at, _)| at).filter(|&at| at > self.now);
@@ -39,7 +38,7 @@ impl Mission {
             if ends_at.is_some_and(|at| at <= now) {
                 self.transmitting[node] = None;
                 if node == 0 {
-                    self.vehicle.handle_transmit_outcome()
+                    self.vehicle.handle_transmit_outcome(now)
                 } else {
                     self.surface.handle_transmit_outcome(now)
                 }
@@ -181,8 +180,7 @@ impl Mission {
         }
         self.track.push((pose.x, pose.y));
         let update = self.mapper.handle_frame(image, &pose, t_s);
-        let session = SessionId::from_random(self.dice.below(65_536) as u16);
-        self.vehicle.handle_map(&update, session, self.now);
+        self.vehicle.handle_map(&update, self.now);
         self.vehicle.answer_requests(&|label| self.mapper.exemplar(label));
         if self.vehicle.map_version() != self.map_version {
             self.map_version = self.vehicle.map_version();

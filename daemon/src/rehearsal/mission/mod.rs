@@ -18,7 +18,7 @@ use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, SessionId};
+use scenecast_protocol::wire::Address;
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Position, Stream};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -100,9 +100,8 @@ impl Mission {
             let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);
             return Err(Problem::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
         }
-        let mut dice = Stream::new(seed, &[2]);
-        let session = SessionId::from_random(dice.below(65_536) as u16);
-        let vehicle = ends::vehicle(&config, modem, area, Durable::default(), session, now)?;
+        let dice = Stream::new(seed, &[2]);
+        let vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
         let surface = ends::surface(&config, modem, seed ^ 0x5EA, now)?;
         let (x, y) = vehicle.navigator().position();
         let drift = config.navigation.drift_percent / 100.0;
@@ -163,6 +162,11 @@ impl Mission {
     /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// The modem of both ends.
+    pub fn modem(&self) -> &ModemProfile {
+        &self.modem
     }
 
     /// Bits on air of the frames that the surface heard.

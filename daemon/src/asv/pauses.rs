@@ -1,0 +1,72 @@
+//! How long a vehicle is usually silent.
+
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+/// The longest pause between two frames of a vehicle lately, whatever the frames of one turn do in between.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pauses {
+    heard: Option<Instant>,
+    longest: Option<Duration>,
+}
+
+impl Pauses {
+    /// A pause is forgotten in so many times its length.
+    const MEMORY: u32 = 8;
+    /// A pause up to this length is as usual as it is long.
+    const SHORT: Duration = Duration::from_secs(60);
+
+    /// A frame was heard.
+    pub fn hear(&mut self, now: Instant) {
+        let Some(last) = self.heard.replace(now) else { return };
+        let pause = now.since(last);
+        self.longest = Some(match self.longest {
+            // What is long and far beyond the usual was an outage, and makes the next one hardly more usual.
+            Some(longest) => pause.min(Self::SHORT.max(longest * 2)).max(longest.saturating_sub(pause / Self::MEMORY)),
+            None => pause,
+        });
+    }
+
+    /// The pause to expect between two frames; `None` before the second one.
+    pub fn expected(&self) -> Option<Duration> {
+        self.longest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Longest silence against what was expected then, after a while, over turns of `frames` frames and a pause.
+    fn worst(frames: u32, frame: Duration, pause: Duration) -> f64 {
+        let (mut pauses, mut now, mut worst) = (Pauses::default(), Instant::ZERO, 0.0);
+        for turn in 0..50 {
+            for _ in 0..frames {
+                now = now + frame;
+                pauses.hear(now);
+            }
+            let expected = pauses.expected().unwrap().as_secs_f64();
+            if turn > 10 {
+                worst = f64::max(worst, pause.as_secs_f64() / expected);
+            }
+            now = now + pause - frame;
+        }
+        worst
+    }
+
+    #[test]
+    fn no_pause_between_turns_looks_like_silence_however_many_frames_a_turn_has() {
+        for (frames, frame_ms, pause_s) in [(2, 200, 10), (60, 200, 10), (3, 5000, 120), (20, 6000, 240)] {
+            let most = worst(frames, Duration::from_millis(frame_ms), Duration::from_secs(pause_s));
+            assert!(most < 2.0, "{frames} frames, then {pause_s} s: {most} times what was expected");
+        }
+    }
+
+    #[test]
+    fn an_outage_does_not_make_silence_usual() {
+        let mut pauses = Pauses::default();
+        (1..=20).for_each(|i| pauses.hear(Instant::ZERO + Duration::from_secs(10) * i));
+        pauses.hear(Instant::ZERO + Duration::from_secs(4000));
+        assert_eq!(pauses.expected(), Some(Duration::from_secs(60)));
+    }
+}

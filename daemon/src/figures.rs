@@ -1,0 +1,26 @@
+//! What a link has counted and measured, for people and programs.
+
+use scenecast_protocol::link::{DropReason, LinkStats};
+use std::collections::BTreeMap;
+
+/// Received bytes that were dropped, by the name of the reason.
+pub fn dropped(stats: &LinkStats) -> BTreeMap<&'static str, u64> {
+    stats.dropped.iter().map(|(&reason, &n)| (name(reason), n)).collect()
+}
+
+fn name(reason: DropReason) -> &'static str {
+    match reason {
+        DropReason::Truncated => "truncated",
+        DropReason::Version => "version",
+        DropReason::NotForUs => "not_for_us",
+        DropReason::Checksum => "checksum",
+        DropReason::Malformed => "malformed",
+        DropReason::OldSession => "old_session",
+        DropReason::Duplicate => "duplicate",
+        DropReason::Late => "late",
+        DropReason::NoBase => "no_base",
+        DropReason::Stranger => "stranger",
+        DropReason::Unauthenticated => "unauthenticated",
+        DropReason::Keyed => "keyed",
+    }
+}

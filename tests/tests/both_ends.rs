@@ -1,0 +1,87 @@
+//! Both ends as processes under one key: budget and shares change from either end.
+
+use scenecast_tests::{Process, free_port, http, run, scratch, wait_until};
+use serde_json::Value;
+use std::path::Path;
+use std::time::Duration;
+
+const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
+const LIMIT: Duration = Duration::from_secs(60);
+
+fn state(port: u16) -> Option<Value> {
+    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
+}
+
+/// Starts both ends; the vehicle's file has `link`.
+fn start(dir: &Path, vehicle_key: &str, surface_key: &str, link: &str) -> (u16, Process, Process) {
+    let (modem, page) = (free_port(), free_port());
+    let seal = |key: &str| format!("key_file = \"{key}\"\nauthenticate = \"all\"\nencrypt = true\n");
+    let runtime = |who: &str| format!("[runtime]\ntime_scale = 20\nstate_dir = \"{}\"\n", dir.join(who).display());
+    let surface = format!(
+        "{}[link]\n{}[modem]\nlisten = \"127.0.0.1:{modem}\"\n[console]\nlisten = \"127.0.0.1:{page}\"\n",
+        runtime("asv"),
+        seal(surface_key)
+    );
+    std::fs::write(dir.join("asv.toml"), surface).unwrap();
+    let vehicle = format!(
+        "{}[survey]\narea_m = [0, 0, 20, 20]\n[modem]\nconnect = \"127.0.0.1:{modem}\"\n[link]\n{}",
+        runtime("auv"),
+        seal(vehicle_key)
+    );
+    std::fs::write(dir.join("auv.toml"), format!("{vehicle}{link}")).unwrap();
+    let process =
+        |role: &str| Process::start(&[role, "--config", dir.join(role).with_extension("toml").to_str().unwrap()]);
+    (page, process("asv"), process("auv"))
+}
+
+fn key(dir: &Path, name: &str) -> String {
+    let file = dir.join(name).display().to_string();
+    assert!(run(&["key", "new", "--out", &file]).status.success());
+    file
+}
+
+#[test]
+fn budget_and_shares_change_from_either_end_under_a_key() {
+    let dir = scratch("either-end");
+    let key = key(&dir, "mission.key");
+    let (page, _surface, vehicle) = start(&dir, &key, &key, "budget_bps = 4000\n");
+    let budget = || state(page)?["vehicles"][0]["status"]["budget_bps"].as_u64();
+    wait_until("the vehicle's budget is told", LIMIT, || budget() == Some(4000));
+    let order = |map: u32| {
+        format!(
+            "{{\"budget_bps\": 6000, \"shares\": {{\"directive\": 10, \"status\": 5, \"fix\": 5, \"map\": {map}, \
+             \"exemplar\": 30}}}}"
+        )
+    };
+    let (status, said) = http(page, "POST", "/api/v1/budget", ORDER, &order(60)).unwrap();
+    assert_eq!((status, String::from_utf8_lossy(&said).contains("110 percent")), (422, true));
+    assert_eq!(http(page, "POST", "/api/v1/budget", ORDER, &order(40)).unwrap().0, 202);
+    wait_until("the surface's word is in force", LIMIT, || budget() == Some(6000));
+    let now = state(page).unwrap();
+    assert_eq!((now["link"]["budget_bps"].as_u64(), now["link"]["shares"]["map"].as_u64()), (Some(6000), Some(40)));
+    let file = dir.join("auv.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("budget_bps = 4000", "budget_bps = 2000")).unwrap();
+    vehicle.hang_up();
+    wait_until("the vehicle's own word is in force", LIMIT, || budget() == Some(2000));
+    std::fs::write(&file, "[link]\nbudget_bps = 1\n").unwrap();
+    vehicle.hang_up();
+    let heard = || state(page)?["vehicles"][0]["heard_s"].as_f64();
+    let before = heard().unwrap();
+    wait_until("the vehicle goes on with what it had", LIMIT, || heard().is_some_and(|at| at > before + 30.0));
+    assert_eq!(budget(), Some(2000));
+    let vehicle = &state(page).unwrap()["vehicles"][0];
+    assert_eq!(vehicle["status"]["refused_frames"], 0);
+    assert!(vehicle["link"]["round_trip_s"].is_number() && vehicle["link"]["clock_ahead_s"].is_number(), "{vehicle}");
+}
+
+#[test]
+fn an_end_with_another_key_is_not_heard() {
+    let dir = scratch("another-key");
+    let (page, _surface, _vehicle) = start(&dir, &key(&dir, "one.key"), &key(&dir, "other.key"), "");
+    wait_until("two minutes of the mission pass", LIMIT, || {
+        state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0))
+    });
+    assert!(state(page).unwrap()["vehicles"][0]["heard_s"].is_null());
+}
