@@ -9,13 +9,10 @@ mod bits;
 mod chunk;
 mod codec;
 mod context;
-#[cfg(test)]
-mod corpus;
 #[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod file;
 #[cfg(test)]
-#[path = "../../fuzz/map_chunk/src/check.rs"]
-mod fuzz_check;
+mod golden;
 mod grow;
 #[deny(clippy::unwrap_used, clippy::indexing_slicing)]
 mod header;

@@ -1,0 +1,56 @@
+//! A script against the surface's end.
+
+use super::link::{End, Setup, Surface, run};
+use super::peer::vehicle;
+use scenecast_protocol::directive::{Constraints, Fix, Slot, Utility};
+use scenecast_protocol::link::Transmit;
+use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+
+/// What a surface hears never harms it: the first byte is the setup, the others are the script.
+pub fn surface_link(data: &[u8]) {
+    let Some((&choice, script)) = data.split_first() else { return };
+    let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
+    let peer = setup.peer(vehicle(), Address::SURFACE);
+    run(setup, setup.surface(begin), setup.vehicle(begin), peer, script);
+}
+
+impl End for Surface {
+    fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
+        self.handle_frame(bytes, now);
+    }
+
+    fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        self.poll_transmit(now)
+    }
+
+    fn handle_transmit_outcome(&mut self, now: Instant) {
+        self.handle_transmit_outcome(now);
+    }
+
+    fn poll(&mut self, frames: u32, now: Instant) {
+        if self.poll_cycle(now).is_some_and(|cycle| cycle.from == Address::SURFACE) {
+            self.handle_poll(frames);
+        }
+    }
+
+    fn wakeup(&self, now: Instant) -> Option<Instant> {
+        self.poll_timeout(now).map(|(at, _)| at)
+    }
+
+    fn drain(&mut self, _: Instant) -> usize {
+        std::iter::from_fn(|| self.poll_event()).count()
+    }
+
+    fn act(&mut self, what: u8, with: u8, now: Instant) {
+        let weights = (1..=with % 8).map(|label| (label, with as i8 / 2)).collect();
+        let slot = match what % 4 {
+            0 => Slot::Utility(Utility { weights, ..Utility::default() }),
+            1 => Slot::Constraints(Constraints { hold: with & 1 != 0 }),
+            2 => Slot::Fix(Fix { x_m: f64::from(with), ..Fix::default() }),
+            _ => return self.set_shares(Shares([with % 20; 5])),
+        };
+        let _ = self.issue(vehicle(), slot, now);
+    }
+}
