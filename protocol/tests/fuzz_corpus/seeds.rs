@@ -1,10 +1,11 @@
 //! What the corpora begin with: what two ends say to each other, and chunks of three maps.
 
 use super::targets::base;
-use super::targets::link::{End, Setup};
+use super::targets::link::{End, Setup, Surface};
 use super::targets::raw;
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::{Cell, LabelGrid, MapSource};
 use scenecast_protocol::map_codec::{Codec, encode};
+use scenecast_protocol::object::ObjectSender;
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{AckStatement, ChunkKind, Envelope, MissionId, Seal};
@@ -15,7 +16,7 @@ type Seed = (&'static str, String, Vec<u8>);
 
 /// Every file that is made, not found.
 pub fn all() -> Vec<Seed> {
-    let mut seeds = [frames(), contents(), scripts(), golden(), map_chunks()].concat();
+    let mut seeds = [frames(), contents(), objects(), scripts(), golden(), map_chunks()].concat();
     seeds.iter_mut().for_each(|(_, _, data)| data.truncate(2000));
     seeds
 }
@@ -28,7 +29,9 @@ const SETUPS: [(&str, u8); 6] =
 fn traffic(setup: u8) -> Vec<(&'static str, Vec<u8>)> {
     let mut now = Instant::from_secs_f64(1000.0);
     let setup = Setup::new(setup);
-    let (mut vehicle, mut surface) = (setup.vehicle(now), setup.surface(now));
+    let mut vehicle = setup.vehicle(MapSource::new(Codec::Png), now);
+    let mut surface: Surface = setup.surface(now);
+    (1..3).for_each(|what| vehicle.act(what, 3, now));
     let mut said = Vec::new();
     for round in 0..12 {
         vehicle.act(0, 20 + round, now);
@@ -64,7 +67,7 @@ fn frames() -> Vec<Seed> {
     seeds
 }
 
-/// Bodies, statements, statuses, slots and parts of objects in plain frames.
+/// Bodies, statements, statuses and slots in plain frames.
 fn contents() -> Vec<Seed> {
     let mut seeds = Vec::new();
     for (i, (way, bytes)) in traffic(0x10).into_iter().enumerate().take(60) {
@@ -82,15 +85,33 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
-                ChunkKind::Object => seeds.push(("object", format!("part-{i}"), framed)),
-                ChunkKind::Map => {}
+                ChunkKind::Map | ChunkKind::Object => {}
             }
         }
         seeds.push(("chunks", format!("{way}-{i}"), body));
     }
-    let parts = seeds.iter().filter(|(target, ..)| *target == "object").flat_map(|(_, _, data)| data.clone());
-    let whole = ("object", "parts-in-order".to_owned(), parts.collect());
-    few(seeds).into_iter().chain([whole]).collect()
+    few(seeds)
+}
+
+/// Objects of several sizes in parts of several sizes: in order, backwards, and the later half with repairs.
+fn objects() -> Vec<Seed> {
+    let mut seeds = Vec::new();
+    for (len, room) in [(1, 20), (90, 24), (300, 50), (900, 200), (16_000, 250)] {
+        let mut sender = ObjectSender::default();
+        sender.set_loss(0.3);
+        sender.push((0..len).map(|i| (i * 7) as u8).collect());
+        let mut parts = Vec::new();
+        while let Some((id, run, bytes)) = sender.next_part(room).filter(|_| parts.len() < 30) {
+            sender.mark_in_flight(id, &run);
+            parts.push([&[bytes.len() as u8], &bytes[..]].concat());
+        }
+        let half = parts.split_off(parts.len() / 2);
+        let mut seed = |name: &str, data| seeds.push(("object", format!("{len}-bytes-{name}"), data));
+        seed("in-order", [parts.concat(), half.concat()].concat());
+        seed("backwards", half.iter().rev().chain(parts.iter().rev()).flatten().copied().collect());
+        seed("later-half", half.concat());
+    }
+    seeds
 }
 
 /// At most twelve seeds of each corpus.

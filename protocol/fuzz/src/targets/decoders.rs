@@ -18,7 +18,7 @@ const MISSION: MissionId = MissionId(7);
 /// A header that is read can be written and reads the same; a tag or CRC in the bytes is never taken for another.
 pub fn frame(data: &[u8]) {
     let key = MissionKey::from_bytes([9; 16]);
-    let session = key.session(MISSION.0, 1, 2, 3, data.len() % 2 == 0);
+    let session = key.session(MISSION.0, 1, 2, 3, data.len().is_multiple_of(2));
     let Ok(envelope) = Envelope::decode(data, |_| true) else { return };
     let header = &envelope.header;
     assert!((1..=MAX_WINDOW).contains(&u64::from(header.base)) && header.from != header.to);

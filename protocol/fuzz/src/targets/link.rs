@@ -4,8 +4,7 @@ use super::peer::{MISSION, Peer, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{MapSource, Replica, StateReplica, StateSource};
-use scenecast_protocol::map_codec::Codec;
+use scenecast_protocol::map::{Cell, MapSource, Replica, StateReplica, StateSource};
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -45,30 +44,75 @@ impl StateReplica for Opaque<Replica> {
     }
 }
 
-impl StateSource for Opaque<MapSource> {
-    type Carried = <MapSource as StateSource>::Carried;
-    fn next_chunk(&mut self, room: usize, now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
-        self.0.next_chunk(room, now)
+/// A state that is nothing but so many bytes, so that no time goes to coding it; any bytes are some of it.
+#[derive(Debug, Default)]
+pub struct Pile {
+    waiting: usize,
+    in_flight: usize,
+}
+
+impl StateSource for Pile {
+    type Carried = usize;
+    fn next_chunk(&mut self, room: usize, _: Instant) -> Option<(Vec<u8>, usize)> {
+        let bytes = self.waiting.min(room);
+        self.waiting -= bytes;
+        self.in_flight += bytes;
+        (bytes > 0).then(|| (vec![0; bytes], bytes))
     }
-    fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant) {
-        self.0.handle_fate(carried, delivered, now);
+    fn handle_fate(&mut self, bytes: usize, delivered: bool, _: Instant) {
+        self.in_flight = self.in_flight.checked_sub(bytes).expect("a fate of what is in flight");
+        self.waiting += if delivered { 0 } else { bytes };
     }
-    fn handle_peer_restart(&mut self, now: Instant) {
-        self.0.handle_peer_restart(now);
+    fn handle_peer_restart(&mut self, _: Instant) {
+        self.waiting += std::mem::take(&mut self.in_flight);
     }
     fn backlog_bytes(&self) -> usize {
-        self.0.backlog_bytes()
+        self.waiting
     }
     fn is_settled(&self) -> bool {
-        self.0.is_settled()
+        self.waiting + self.in_flight == 0
     }
     fn digest(&self) -> u16 {
-        self.0.digest()
+        0
     }
 }
 
-pub type Vehicle = VehicleLink<Opaque<MapSource>>;
-pub type Surface = SurfaceLink<Opaque<Replica>>;
+impl StateReplica for Pile {
+    fn apply(&mut self, _: u64, _: &[u8], _: Instant) -> bool {
+        true
+    }
+    fn advance_base(&mut self, _: u64) {}
+    fn base_digest(&self) -> u16 {
+        0
+    }
+    fn version(&self) -> u64 {
+        0
+    }
+    fn clear(&mut self) {}
+}
+
+/// A state whose host can add to it.
+pub trait Grow: StateSource {
+    /// About `amount` more bytes.
+    fn grow(&mut self, amount: u8, now: Instant);
+}
+
+impl Grow for Pile {
+    fn grow(&mut self, amount: u8, _: Instant) {
+        self.waiting = (self.waiting + usize::from(amount) * 4).min(1 << 16);
+    }
+}
+
+impl Grow for MapSource {
+    fn grow(&mut self, amount: u8, now: Instant) {
+        let label = |i: i32| (i % 3) as u8 + amount % 8;
+        let cell = |i: i32| Cell::new(i % 9, i / 9 + i32::from(amount % 4));
+        self.set((0..i32::from(amount)).map(|i| (cell(i), label(i))), now);
+    }
+}
+
+pub type Vehicle<S = Pile> = VehicleLink<S>;
+pub type Surface<R = Opaque<Replica>> = SurfaceLink<R>;
 
 /// An end as its host drives it.
 pub trait End: fmt::Debug {
@@ -114,7 +158,7 @@ impl Setup {
         Peer::new(us, end, authenticity(self.choice))
     }
 
-    pub fn vehicle(self, now: Instant) -> Vehicle {
+    pub fn vehicle<S: Grow>(self, source: S, now: Instant) -> Vehicle<S> {
         let config = VehicleConfig {
             address: vehicle(),
             mission: MISSION,
@@ -125,13 +169,10 @@ impl Setup {
             status_period: Duration::from_secs(10),
             authenticity: authenticity(self.choice),
         };
-        let source = Opaque(MapSource::new(Codec::Png));
-        let mut link = VehicleLink::with_source(config, source, 11, SlotInboxState::default(), now);
-        (0..3).for_each(|what| link.act(what, 3, now));
-        link
+        VehicleLink::with_source(config, source, 11, SlotInboxState::default(), now)
     }
 
-    pub fn surface(self, now: Instant) -> Surface {
+    pub fn surface<R: StateReplica>(self, now: Instant) -> Surface<R> {
         let config = SurfaceConfig {
             mission: MISSION,
             modem: self.modem(),
@@ -155,6 +196,8 @@ struct Host<'a, E> {
     modem: ModemProfile,
     in_modem: u32,
     audit: Audit,
+    /// Events of received frames.
+    events: usize,
 }
 
 impl<E: End> Host<'_, E> {
@@ -183,11 +226,11 @@ impl<E: End> Host<'_, E> {
     }
 }
 
-/// Lets an end meet its peer, which then is replaced by one that follows the script.
-pub fn run<E: End>(setup: Setup, mut end: E, mut partner: impl End, mut peer: Peer, script: &[u8]) {
+/// Lets an end meet its peer, which then is replaced by one that follows the script; says to how many events that led.
+pub fn run<E: End>(setup: Setup, mut end: E, mut partner: impl End, mut peer: Peer, script: &[u8]) -> usize {
     let mut now = Instant::from_secs_f64(1000.0);
-    let host = |link| Host { link, modem: setup.modem(), in_modem: 0, audit: Audit::new(WINDOW) };
-    let mut end = Host { ..host(&mut end) };
+    let host = |link| Host { link, modem: setup.modem(), in_modem: 0, audit: Audit::new(WINDOW), events: 0 };
+    let mut end = host(&mut end);
     meet(&mut end, &mut partner, &mut peer, &mut now);
     let mut script = Script(script);
     let mut past: Vec<Vec<u8>> = Vec::new();
@@ -195,6 +238,7 @@ pub fn run<E: End>(setup: Setup, mut end: E, mut partner: impl End, mut peer: Pe
         step(&mut end, &mut peer, &mut script, &mut past, &mut now);
     }
     assert!(format!("{:?}", end.link).len() < MOST_KEPT);
+    end.events
 }
 
 /// Ten exchanges over calm water: they have met, and each has said something that is not acknowledged yet.
@@ -264,6 +308,7 @@ fn receive<E: End>(end: &mut Host<'_, E>, peer: &mut Peer, bytes: &[u8], now: In
     end.link.drain(now);
     end.link.handle_frame(bytes, now);
     let events = end.link.drain(now);
+    end.events += events;
     assert!(events <= bytes.len() + 16, "{events} events of {} bytes", bytes.len());
     assert!(events == 0 || peer.may_be_believed(bytes), "an event of a frame that was not sealed");
 }

@@ -12,8 +12,8 @@ mod vehicle;
 
 pub use decoders::{ack, chunks, frame, key_text, object, slot, stamp, status};
 pub use map_chunk::{base, map_chunk};
-pub use surface::surface_link;
-pub use vehicle::vehicle_link;
+pub use surface::{surface_events, surface_link};
+pub use vehicle::{vehicle_events, vehicle_link};
 
 /// A target takes any bytes.
 pub type Target = fn(&[u8]);

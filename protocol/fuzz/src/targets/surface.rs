@@ -1,22 +1,32 @@
 //! A script against the surface's end.
 
-use super::link::{End, Setup, Surface, run};
+use super::link::{End, Pile, Setup, Surface, run};
 use super::peer::vehicle;
 use scenecast_protocol::directive::{Constraints, Fix, Slot, Utility};
 use scenecast_protocol::link::Transmit;
+use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 
 /// What a surface hears never harms it: the first byte is the setup, the others are the script.
 pub fn surface_link(data: &[u8]) {
-    let Some((&choice, script)) = data.split_first() else { return };
-    let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
-    let peer = setup.peer(vehicle(), Address::SURFACE);
-    run(setup, setup.surface(begin), setup.vehicle(begin), peer, script);
+    surface_events(data);
 }
 
-impl End for Surface {
+/// As [`surface_link`]; says how many events the script led to.
+pub fn surface_events(data: &[u8]) -> usize {
+    let Some((&choice, script)) = data.split_first() else { return 0 };
+    let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
+    let peer = setup.peer(vehicle(), Address::SURFACE);
+    // A pile says nothing before it grows: what the surface hears of a map is the script's.
+    let surface: Surface = setup.surface(begin);
+    let mut partner = setup.vehicle(Pile::default(), begin);
+    (1..3).for_each(|what| partner.act(what, 3, begin));
+    run(setup, surface, partner, peer, script)
+}
+
+impl<R: StateReplica> End for Surface<R> {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.handle_frame(bytes, now);
     }

@@ -1,23 +1,30 @@
 //! A script against the vehicle's end.
 
-use super::link::{End, Setup, Vehicle, run};
+use super::link::{End, Grow, Pile, Setup, Surface, Vehicle, run};
 use super::peer::vehicle;
 use scenecast_protocol::directive::{RefusalReason, SlotId};
 use scenecast_protocol::link::{Transmit, VehicleEvent};
-use scenecast_protocol::map::Cell;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, SlotState, VehicleStatus};
 
 /// What a vehicle hears never harms it: the first byte is the setup, the others are the script.
 pub fn vehicle_link(data: &[u8]) {
-    let Some((&choice, script)) = data.split_first() else { return };
-    let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
-    let peer = setup.peer(Address::SURFACE, vehicle());
-    run(setup, setup.vehicle(begin), setup.surface(begin), peer, script);
+    vehicle_events(data);
 }
 
-impl End for Vehicle {
+/// As [`vehicle_link`]; says how many events the script led to.
+pub fn vehicle_events(data: &[u8]) -> usize {
+    let Some((&choice, script)) = data.split_first() else { return 0 };
+    let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
+    let peer = setup.peer(Address::SURFACE, vehicle());
+    let mut vehicle = setup.vehicle(Pile::default(), begin);
+    (0..3).for_each(|what| vehicle.act(what, 30, begin));
+    let surface: Surface<Pile> = setup.surface(begin);
+    run(setup, vehicle, surface, peer, script)
+}
+
+impl<S: Grow> End for Vehicle<S> {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.handle_frame(bytes, now);
     }
@@ -53,11 +60,7 @@ impl End for Vehicle {
 
     fn act(&mut self, what: u8, with: u8, now: Instant) {
         match what % 6 {
-            0 => {
-                let label = |i: i32| (i % 3) as u8 + with % 8;
-                let cells = (0..i32::from(with)).map(|i| (Cell::new(i % 9, i / 9 + i32::from(with % 4)), label(i)));
-                self.source_mut().0.set(cells.collect::<Vec<_>>(), now);
-            }
+            0 => self.source_mut().grow(with, now),
             1 => drop(self.push_object(vec![with; 40 + usize::from(with) * 20])),
             2 => self.set_status(VehicleStatus { labels: with, ..VehicleStatus::default() }),
             3 => self.decide(SlotId::ALL[usize::from(with % 6)], SlotState::Refused(RefusalReason::TooOld), now),
