@@ -32,7 +32,8 @@ fn every_file_of_the_corpora_is_taken_or_refused() {
 
 #[test]
 fn scripts_get_behind_the_seal_in_every_setup() {
-    let ends: [(&str, fn(&[u8]) -> usize); 2] =
+    type Events = fn(&[u8]) -> usize;
+    let ends: [(&str, Events); 2] =
         [("vehicle_link", targets::vehicle_events), ("surface_link", targets::surface_events)];
     for (name, events) in ends {
         let files = corpus(name);
