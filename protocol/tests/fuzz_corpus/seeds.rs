@@ -146,6 +146,8 @@ fn scripts() -> Vec<Seed> {
                 let steps = bodies.iter().flat_map(|body| [&numbered(body), between].concat());
                 seeds.push((target, format!("{name}-{kind}"), std::iter::once(setup).chain(steps).collect()));
             }
+            let forged = bodies.iter().flat_map(|body| [&numbered(body), &forged(body), TURN].concat());
+            seeds.push((target, format!("{name}-forgery"), std::iter::once(setup).chain(forged).collect()));
         }
     }
     seeds
@@ -162,6 +164,11 @@ const STORM: &[u8] =
 /// A step with a frame that acknowledges everything, grants or wishes a turn, and carries `body`.
 fn numbered(body: &[u8]) -> Vec<u8> {
     [&[1, 0x08, 40, 0, body.len() as u8], body].concat()
+}
+
+/// The same with the CRC of a mission without a key.
+fn forged(body: &[u8]) -> Vec<u8> {
+    [&[6, 0x10, 40, 0, body.len() as u8], body].concat()
 }
 
 fn body_of(bytes: &[u8]) -> Vec<u8> {
