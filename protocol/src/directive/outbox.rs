@@ -65,7 +65,7 @@ impl SlotOutbox {
     /// Issues a new version of a slot, which supersedes the older one; returns its version.
     pub fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
         let id = slot.id();
-        let entry = &mut self.slots[id.index()];
+        let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
         let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
         *entry =
             Some(SlotProgress { id, version, slot, life: LifeLine::Queued, issued: now, changed: now, sent: None });
@@ -114,7 +114,7 @@ impl SlotOutbox {
         let mut settled = Vec::new();
         for id in SlotId::ALL {
             let report = status.slot(id);
-            let Some(slot) = &self.slots[id.index()] else { continue };
+            let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let life = match report.state {
                 SlotState::Unknown => {
                     let forgotten = |l| matches!(l, LifeLine::Heard | LifeLine::Applied);
@@ -149,8 +149,8 @@ impl SlotOutbox {
         now: Instant,
         from: impl Fn(LifeLine) -> bool,
     ) -> bool {
-        match &mut self.slots[id.index()] {
-            Some(s) if s.version == version && from(s.life) => {
+        match self.slots.get_mut(id.index()) {
+            Some(Some(s)) if s.version == version && from(s.life) => {
                 (s.life, s.changed) = (to, now);
                 true
             }

@@ -58,7 +58,7 @@ impl SlotInbox {
         if self.state.series != Some(slot.series) {
             self.begin_series(slot.series);
         }
-        let seen = &mut self.state.versions[slot.id.index()];
+        let Some(seen) = self.state.versions.get_mut(slot.id.index()) else { return false };
         let newer = seen.is_none_or(|v| (slot.version.wrapping_sub(v) as i16) > 0);
         if newer {
             *seen = Some(slot.version);
@@ -68,9 +68,12 @@ impl SlotInbox {
 
     /// The host has decided about the latest version of a slot.
     pub fn decide(&mut self, id: SlotId, state: SlotState) {
-        if let Some(version) = self.state.versions[id.index()] {
-            self.reports[id.index()] = SlotReport { version_low: version as u8, state };
-            self.state.decisions[id.index()] = state.code();
+        let i = id.index();
+        if let Some(&Some(version)) = self.state.versions.get(i)
+            && let (Some(report), Some(decision)) = (self.reports.get_mut(i), self.state.decisions.get_mut(i))
+        {
+            *report = SlotReport { version_low: version as u8, state };
+            *decision = state.code();
         }
     }
 

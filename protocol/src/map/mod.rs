@@ -1,6 +1,7 @@
 //! The label map as both ends hold it.
 
 mod digest;
+#[allow(clippy::indexing_slicing)] // A cell's place is less than the size of its tile.
 mod grid;
 mod replica;
 mod source;

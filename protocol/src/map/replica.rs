@@ -5,6 +5,9 @@ use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
+/// Most cells that a replica has heard of, and most changes that wait for the base: a few bytes can claim a whole patch.
+const MOST_CELLS: usize = 1 << 23;
+
 /// What the replica knows of a cell besides its label.
 #[derive(Debug, Clone, Copy)]
 struct Heard {
@@ -20,6 +23,8 @@ pub struct Replica {
     base: LabelGrid,
     base_digest: MapDigest,
     log: BTreeMap<u64, Vec<(Cell, u8)>>,
+    /// Changes in `log`.
+    logged: usize,
     shown: LabelGrid,
     heard: BTreeMap<Cell, Heard>,
     version: u64,
@@ -46,6 +51,9 @@ impl Replica {
 impl StateReplica for Replica {
     fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
         let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
+        if self.heard.len().max(self.logged) + changes.len() > MOST_CELLS {
+            return false;
+        }
         self.updated = Some(now);
         let mut changed = false;
         for &(cell, label) in &changes {
@@ -55,6 +63,7 @@ impl StateReplica for Replica {
             }
         }
         self.version += u64::from(changed);
+        self.logged += changes.len();
         self.log.entry(number).or_default().extend(changes);
         true
     }
@@ -62,6 +71,7 @@ impl StateReplica for Replica {
     fn advance_base(&mut self, horizon: u64) {
         let later = self.log.split_off(&(horizon + 1));
         for (cell, label) in std::mem::replace(&mut self.log, later).into_values().flatten() {
+            self.logged -= 1;
             let old = self.base.set(cell, label);
             self.base_digest.change(cell, old, label);
         }
@@ -77,5 +87,22 @@ impl StateReplica for Replica {
 
     fn clear(&mut self) {
         *self = Self { version: self.version + 1, ..Self::default() };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map_codec::{Codec, encode};
+
+    #[test]
+    fn chunks_that_claim_more_cells_than_a_map_has_are_refused() {
+        let target: LabelGrid = (0..100).map(|i| (Cell::new(i % 10, i / 10), 7)).collect();
+        let chunk = encode(Codec::Png, &LabelGrid::default(), &target, Cell::new(5, 5), 200, &|_| true).unwrap();
+        let mut replica = Replica { logged: MOST_CELLS - 150, ..Replica::default() };
+        assert!(replica.apply(1, &chunk.bytes, Instant::ZERO));
+        assert!(!replica.apply(2, &chunk.bytes, Instant::ZERO));
+        replica.advance_base(1);
+        assert_eq!((replica.logged, replica.base.explored()), (MOST_CELLS - 150, 100));
     }
 }

@@ -34,6 +34,7 @@ where
 }
 
 /// Encrypts `body` in place; the tag covers it and `data`.
+#[allow(clippy::expect_used)]
 pub(super) fn encrypt<N>(
     cipher: &TruncatedAsconAead128<N>,
     nonce: &[u8; 16],

@@ -1,0 +1,202 @@
+//! Bytes as everything that the wire and the key file have but the map.
+
+use super::raw::{self, Script};
+use scenecast_protocol::directive::VersionedSlot;
+use scenecast_protocol::link::{Flight, SlotInbox, Window};
+use scenecast_protocol::mac::ClockMap;
+use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
+use scenecast_protocol::seal::{Direction, MissionKey};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{
+    AckStatement, Address, Envelope, Frame, FrameBuilder, Header, MAX_WINDOW, MissionId, Reader, Seal, SessionId,
+    SlotState, Stamp, VehicleStatus,
+};
+use std::time::Duration;
+
+const MISSION: MissionId = MissionId(7);
+
+/// A header that is read can be written and reads the same; a tag or CRC in the bytes is never taken for another.
+pub fn frame(data: &[u8]) {
+    let key = MissionKey::from_bytes([9; 16]);
+    let session = key.session(MISSION.0, 1, 2, 3, data.len().is_multiple_of(2));
+    let Ok(envelope) = Envelope::decode(data, |_| true) else { return };
+    let header = &envelope.header;
+    assert!((1..=MAX_WINDOW).contains(&u64::from(header.base)) && header.from != header.to);
+    let plain = envelope.open(&Seal::Crc(MISSION, 0)).is_some();
+    let hello = envelope.open(&Seal::Hello(&key, MISSION, 0, 0)).is_some();
+    let tagged = envelope.open(&Seal::Session(&session, Direction::Up, u64::from(header.number))).is_some();
+    assert!(u8::from(plain) + u8::from(hello) + u8::from(tagged) <= 1);
+    assert!(!(plain && header.keyed));
+    reads_back(header);
+}
+
+fn reads_back(header: &Header) {
+    let mut bytes = raw::head(header);
+    raw::close_with_crc(&mut bytes, MISSION, 0);
+    bytes.resize(bytes.len() + 8, 0);
+    let again = Envelope::decode(&bytes, |_| true).expect("a header that was written");
+    assert_eq!(&again.header, header);
+}
+
+/// The losses of a statement ascend and read back; both ends take any statement and any window of frames.
+pub fn ack(data: &[u8]) {
+    let mut reader = Reader::new(data);
+    let Ok(statement) = AckStatement::decode(&mut reader) else { return };
+    assert!(statement.horizon_low < 4096 && statement.lost.is_sorted() && statement.lost.len() <= 8 * data.len());
+    let mut bytes = Vec::new();
+    assert!(statement.encode(usize::MAX, &mut bytes) && bytes.len() <= data.len());
+    assert_eq!(AckStatement::decode(&mut Reader::new(&bytes)), Ok(statement.clone()));
+    let mut flight = Flight::default();
+    (0..u64::from(statement.horizon_low % 2500)).for_each(|number| flight.push(number));
+    let fates = flight.handle_statement(&statement);
+    assert!(fates.iter().is_sorted_by_key(|(number, _)| number) && flight.horizon() < flight.next_number());
+    hear(Script(reader.rest()));
+}
+
+/// Any numbers may be heard, and a statement on them is made.
+fn hear(mut script: Script<'_>) {
+    let mut window = Window::default();
+    while !script.is_over() {
+        let (number, base, what) = (script.u16(), script.u16() % 2048 + 1, script.u8());
+        if let Ok(number) = window.accept(number, base)
+            && what & 1 != 0
+        {
+            window.hold_back(number);
+        }
+        if what & 2 != 0 {
+            window.handle_persisted();
+        }
+        if what & 4 != 0 {
+            let room = usize::from(what >> 3) + 2;
+            let statement = window.statement(room);
+            let mut bytes = Vec::new();
+            assert!(statement.is_none_or(|s| s.encode(room, &mut bytes) && bytes.len() <= room));
+        }
+    }
+}
+
+fn header() -> Header {
+    Header {
+        from: Address::vehicle(1).expect("a vehicle"),
+        to: Address::SURFACE,
+        session: SessionId::from_random(5),
+        number: 1,
+        base: 1,
+        remaining: 0,
+        turn: None,
+        stamp: None,
+        nonce: None,
+        ack: None,
+        hello: false,
+        keyed: false,
+    }
+}
+
+/// A body has at most as many chunks as bytes, and those of a sound one can be written into a frame again.
+pub fn chunks(data: &[u8]) {
+    let mut bytes = raw::head(&header());
+    bytes.extend_from_slice(data);
+    raw::close_with_crc(&mut bytes, MISSION, 0);
+    let envelope = Envelope::decode(&bytes, |_| true).expect("a sound header");
+    let frame = envelope.open(&Seal::Crc(MISSION, 0)).expect("a right CRC");
+    let payload: usize = frame.chunks().map(|c| c.payload.len() + 1).sum();
+    assert!(payload <= data.len());
+    if frame.chunks().are_sound() {
+        write_again(&frame);
+    }
+}
+
+fn write_again(frame: &Frame<'_>) {
+    let mut builder = FrameBuilder::new(&header(), 1 << 17);
+    let short: Vec<_> = frame.chunks().filter(|c| c.payload.len() <= 1000).collect();
+    assert!(short.iter().all(|c| builder.push(c.kind, c.payload)));
+    let bytes = builder.finish(&Seal::Crc(MISSION, 0), true);
+    let envelope = Envelope::decode(&bytes, |_| true).expect("a header that was written");
+    let again = envelope.open(&Seal::Crc(MISSION, 0)).expect("a frame that was written");
+    assert!(again.chunks().are_sound() && again.chunks().eq(short));
+}
+
+/// A stamp reads back, and any clock can be followed from any moment.
+pub fn stamp(data: &[u8]) {
+    let mut script = Script(data);
+    let (clock_ms, a, b, c) =
+        (u32::from_be_bytes([0, script.u8(), script.u8(), script.u8()]), script.u8(), script.u8(), script.u8());
+    let millis = |a, b| Duration::from_millis(u16::from_be_bytes([a, b]).into());
+    let surface = Stamp::Surface { clock_ms, one_way: Some(millis(a, b)).filter(|d| d.as_millis() < 65_535) };
+    let vehicle = Stamp::Vehicle { clock_ms, heard: a, held: millis(b, c) };
+    reads_back(&Header { stamp: Some(vehicle), ..header() });
+    reads_back(&Header { from: Address::SURFACE, to: header().from, stamp: Some(surface), ..header() });
+    let mut moment = || Instant::from_micros(u64::from(script.u16()) << 32 | u64::from(script.u16()) << 8);
+    let (now, at, ago) = (moment(), moment(), moment());
+    let map = ClockMap::measured(clock_ms, Duration::from(ago), now);
+    assert!(map.to_theirs(at) < 1 << 24);
+    let _ = map.to_ours(clock_ms, at);
+}
+
+/// A pose or report that is read can be written and reads the same.
+pub fn status(data: &[u8]) {
+    let (mut pose, mut report) = (VehicleStatus::default(), VehicleStatus::default());
+    if pose.read_pose(data).is_ok() {
+        assert_eq!(pose.encode_pose(usize::MAX), data);
+    } else {
+        assert_eq!(pose, VehicleStatus::default());
+    }
+    if report.read_report(data).is_ok() {
+        let mut again = VehicleStatus::default();
+        again.read_report(&report.encode_report()).expect("a report that was written");
+        assert_eq!(again, report);
+    } else {
+        assert_eq!(report, VehicleStatus::default());
+    }
+}
+
+/// A readable slot can be written and reads the same; no version is admitted twice.
+pub fn slot(data: &[u8]) {
+    let mut inbox = SlotInbox::default();
+    let mut script = Script(data);
+    while !script.is_over() {
+        let Ok(slot) = VersionedSlot::decode(script.bytes()) else { continue };
+        if let Some(content) = &slot.content {
+            let bytes = VersionedSlot::encode(slot.series, slot.version, content);
+            assert_eq!(VersionedSlot::decode(&bytes).as_ref(), Ok(&slot));
+        }
+        if inbox.admit(&slot) {
+            inbox.decide(slot.id, SlotState::Applied);
+        }
+        assert!(!inbox.admit(&slot));
+        inbox = SlotInbox::restore(inbox.state().clone());
+        assert!(inbox.state().retired.len() <= 16);
+    }
+}
+
+/// Any parts are taken within bounds.
+pub fn object(data: &[u8]) {
+    let mut receiver = ObjectReceiver::default();
+    let mut script = Script(data);
+    while !script.is_over() {
+        let bytes = script.bytes();
+        let Ok(part) = Part::decode(bytes) else { continue };
+        assert_eq!(part.encode(), bytes);
+        match receiver.handle_part(&part) {
+            Received::Complete(_, bytes) => assert!((1..=MAX_OBJECT).contains(&bytes.len())),
+            Received::Progress(id, held, total) => {
+                assert!(held <= total && total <= MAX_OBJECT + 64);
+                assert!(receiver.head(id, 3).is_none_or(|head| head.len() == 3));
+            }
+            Received::Nothing => {}
+        }
+    }
+    assert!(format!("{receiver:?}").len() < 4 << 20);
+}
+
+/// A key that is read can be written and reads the same; an error names a line that is there.
+pub fn key_text(data: &[u8]) {
+    let text = String::from_utf8_lossy(data);
+    match MissionKey::parse(&text) {
+        Ok(key) => {
+            let again = MissionKey::parse(&key.to_text()).expect("a key that was written");
+            assert_eq!(again.fingerprint(), key.fingerprint());
+        }
+        Err(e) => assert!(e.to_string().len() < 200),
+    }
+}

@@ -1,0 +1,321 @@
+//! An end that has met its peer, and a script of what happens to it.
+
+use super::peer::{MISSION, Peer, authenticity, vehicle};
+use super::raw::Script;
+use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
+use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::map::{Cell, MapSource, Replica, StateReplica, StateSource};
+use scenecast_protocol::schedule::{Audit, Shares};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::fmt;
+use std::time::Duration;
+
+const BUDGET_BPS: u32 = 4000;
+const WINDOW: Duration = Duration::from_secs(10);
+/// Characters of an end's `Debug` output without its map, where all that it keeps is as large as it may be.
+const MOST_KEPT: usize = 6 << 20;
+
+/// What the link is to carry but not to show: its size is not the link's.
+#[derive(Default)]
+pub struct Opaque<T>(pub T);
+
+impl<T> fmt::Debug for Opaque<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Opaque")
+    }
+}
+
+impl StateReplica for Opaque<Replica> {
+    fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
+        self.0.apply(number, chunk, now)
+    }
+    fn advance_base(&mut self, horizon: u64) {
+        self.0.advance_base(horizon);
+    }
+    fn base_digest(&self) -> u16 {
+        self.0.base_digest()
+    }
+    fn version(&self) -> u64 {
+        self.0.version()
+    }
+    fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
+/// A state that is nothing but so many bytes, so that no time goes to coding it; any bytes are some of it.
+#[derive(Debug, Default)]
+pub struct Pile {
+    waiting: usize,
+    in_flight: usize,
+}
+
+impl StateSource for Pile {
+    type Carried = usize;
+    fn next_chunk(&mut self, room: usize, _: Instant) -> Option<(Vec<u8>, usize)> {
+        let bytes = self.waiting.min(room);
+        self.waiting -= bytes;
+        self.in_flight += bytes;
+        (bytes > 0).then(|| (vec![0; bytes], bytes))
+    }
+    fn handle_fate(&mut self, bytes: usize, delivered: bool, _: Instant) {
+        self.in_flight = self.in_flight.checked_sub(bytes).expect("a fate of what is in flight");
+        self.waiting += if delivered { 0 } else { bytes };
+    }
+    fn handle_peer_restart(&mut self, _: Instant) {
+        self.waiting += std::mem::take(&mut self.in_flight);
+    }
+    fn backlog_bytes(&self) -> usize {
+        self.waiting
+    }
+    fn is_settled(&self) -> bool {
+        self.waiting + self.in_flight == 0
+    }
+    fn digest(&self) -> u16 {
+        0
+    }
+}
+
+impl StateReplica for Pile {
+    fn apply(&mut self, _: u64, _: &[u8], _: Instant) -> bool {
+        true
+    }
+    fn advance_base(&mut self, _: u64) {}
+    fn base_digest(&self) -> u16 {
+        0
+    }
+    fn version(&self) -> u64 {
+        0
+    }
+    fn clear(&mut self) {}
+}
+
+/// A state whose host can add to it.
+pub trait Grow: StateSource {
+    /// About `amount` more bytes.
+    fn grow(&mut self, amount: u8, now: Instant);
+}
+
+impl Grow for Pile {
+    fn grow(&mut self, amount: u8, _: Instant) {
+        self.waiting = (self.waiting + usize::from(amount) * 4).min(1 << 16);
+    }
+}
+
+impl Grow for MapSource {
+    fn grow(&mut self, amount: u8, now: Instant) {
+        let label = |i: i32| (i % 3) as u8 + amount % 8;
+        let cell = |i: i32| Cell::new(i % 9, i / 9 + i32::from(amount % 4));
+        self.set((0..i32::from(amount)).map(|i| (cell(i), label(i))), now);
+    }
+}
+
+pub type Vehicle<S = Pile> = VehicleLink<S>;
+pub type Surface<R = Opaque<Replica>> = SurfaceLink<R>;
+
+/// An end as its host drives it.
+pub trait End: fmt::Debug {
+    fn handle_frame(&mut self, bytes: &[u8], now: Instant);
+    fn poll_transmit(&mut self, now: Instant) -> Option<Transmit>;
+    fn handle_transmit_outcome(&mut self, now: Instant);
+    /// The modem asks for frames.
+    fn poll(&mut self, frames: u32, now: Instant);
+    fn wakeup(&self, now: Instant) -> Option<Instant>;
+    /// Takes every event, decides about what is to be decided; says how many there were.
+    fn drain(&mut self, now: Instant) -> usize;
+    /// Something that the host does by itself.
+    fn act(&mut self, what: u8, with: u8, now: Instant);
+}
+
+/// What the first byte of an input chooses.
+#[derive(Clone, Copy)]
+pub struct Setup {
+    choice: u8,
+}
+
+impl Setup {
+    pub fn new(choice: u8) -> Self {
+        Self { choice }
+    }
+
+    fn modem(self) -> ModemProfile {
+        let access = match self.choice >> 2 & 3 {
+            0 | 1 => Access::Shared,
+            2 => Access::ModemOwned { pool_frames: 4 },
+            _ => Access::Polled,
+        };
+        ModemProfile {
+            frame_bytes: if self.choice & 0x10 == 0 { 64 } else { 200 },
+            bit_rate_bps: 4000.0,
+            overhead_bits: 16,
+            turn_around: Duration::from_millis(200),
+            access,
+        }
+    }
+
+    pub fn peer(self, us: Address, end: Address) -> Peer {
+        Peer::new(us, end, authenticity(self.choice))
+    }
+
+    pub fn vehicle<S: Grow>(self, source: S, now: Instant) -> Vehicle<S> {
+        let config = VehicleConfig {
+            address: vehicle(),
+            mission: MISSION,
+            modem: self.modem(),
+            budget_bps: BUDGET_BPS,
+            budget_window: WINDOW,
+            shares: Shares::default(),
+            status_period: Duration::from_secs(10),
+            authenticity: authenticity(self.choice),
+        };
+        VehicleLink::with_source(config, source, 11, SlotInboxState::default(), now)
+    }
+
+    pub fn surface<R: StateReplica>(self, now: Instant) -> Surface<R> {
+        let config = SurfaceConfig {
+            mission: MISSION,
+            modem: self.modem(),
+            budget_bps: BUDGET_BPS,
+            budget_window: WINDOW,
+            shares: Shares::default(),
+            master: MasterConfig::default(),
+            vehicles: vec![vehicle()],
+            call_every: (self.choice & 0x20 != 0).then_some(Duration::from_secs(60)),
+            authenticity: authenticity(self.choice),
+        };
+        let mut link = SurfaceLink::new(config, 12, now);
+        (0..3).for_each(|what| link.act(what, 3, now));
+        link
+    }
+}
+
+/// One end on its modem.
+struct Host<'a, E> {
+    link: &'a mut E,
+    modem: ModemProfile,
+    in_modem: u32,
+    audit: Audit,
+    /// Events of received frames.
+    events: usize,
+}
+
+impl<E: End> Host<'_, E> {
+    /// The next frame of the end, which then is in its modem.
+    fn poll_transmit(&mut self, now: Instant) -> Option<Vec<u8>> {
+        let transmit = self.link.poll_transmit(now)?;
+        self.in_modem += 1;
+        let most = match self.modem.access {
+            Access::Shared => 1,
+            Access::ModemOwned { pool_frames } => pool_frames,
+            Access::Polled => 300,
+        };
+        assert!(self.in_modem <= most, "{} frames in the modem", self.in_modem);
+        assert!((1..=self.modem.frame_bytes).contains(&transmit.bytes.len()));
+        self.audit.record(self.modem.bits_on_air(transmit.bytes.len()), now);
+        let limit = u64::from(BUDGET_BPS) * WINDOW.as_secs() + self.audit.largest_bits();
+        assert!(self.audit.worst_window_bits() <= limit, "{} bits in a window", self.audit.worst_window_bits());
+        Some(transmit.bytes)
+    }
+
+    fn handle_outcome(&mut self, now: Instant) {
+        if self.in_modem > 0 {
+            self.in_modem -= 1;
+            self.link.handle_transmit_outcome(now);
+        }
+    }
+}
+
+/// Lets an end meet its peer, which then is replaced by one that follows the script; says to how many events that led.
+pub fn run<E: End>(setup: Setup, mut end: E, mut partner: impl End, mut peer: Peer, script: &[u8]) -> usize {
+    let mut now = Instant::from_secs_f64(1000.0);
+    let host = |link| Host { link, modem: setup.modem(), in_modem: 0, audit: Audit::new(WINDOW), events: 0 };
+    let mut end = host(&mut end);
+    meet(&mut end, &mut partner, &mut peer, &mut now);
+    let mut script = Script(script);
+    let mut past: Vec<Vec<u8>> = Vec::new();
+    while !script.is_over() {
+        step(&mut end, &mut peer, &mut script, &mut past, &mut now);
+    }
+    assert!(format!("{:?}", end.link).len() < MOST_KEPT);
+    end.events
+}
+
+/// Ten exchanges over calm water: they have met, and each has said something that is not acknowledged yet.
+fn meet<E: End>(end: &mut Host<'_, E>, partner: &mut impl End, peer: &mut Peer, now: &mut Instant) {
+    for _ in 0..10 {
+        *now = *now + Duration::from_millis(1500);
+        partner.poll(4, *now);
+        let mut sent = Vec::new();
+        while let Some(transmit) = partner.poll_transmit(*now) {
+            peer.note_sent(&transmit.bytes);
+            sent.push(transmit.bytes);
+            partner.handle_transmit_outcome(*now);
+        }
+        sent.iter().for_each(|bytes| end.link.handle_frame(bytes, *now));
+        *now = *now + Duration::from_millis(1500);
+        end.link.poll(4, *now);
+        while let Some(bytes) = end.poll_transmit(*now) {
+            peer.note_heard(&bytes);
+            partner.handle_frame(&bytes, *now);
+            end.handle_outcome(*now);
+        }
+        partner.drain(*now);
+        end.link.drain(*now);
+    }
+}
+
+fn step<E: End>(
+    end: &mut Host<'_, E>,
+    peer: &mut Peer,
+    script: &mut Script<'_>,
+    past: &mut Vec<Vec<u8>>,
+    now: &mut Instant,
+) {
+    let (what, how) = (script.u8(), script.u8());
+    let frame = match what & 15 {
+        0 => Some(script.bytes().to_vec()),
+        1..=4 => Some(peer.numbered(how, script)),
+        5 => Some(peer.hello(how, script)),
+        6 => Some(peer.misaddressed(how, script)),
+        7 => past.iter().rev().nth(how.into()).cloned(),
+        _ => None,
+    };
+    if let Some(bytes) = frame {
+        receive(end, peer, &bytes, *now);
+        past.push(bytes);
+    }
+    match what & 15 {
+        8 => *now = *now + Duration::from_millis(50) * u32::from(how),
+        9 => *now = *now + Duration::from_secs(10) * u32::from(how),
+        10 => *now = end.link.wakeup(*now).map_or(*now, |at| at.max(*now).min(*now + Duration::from_secs(3600))),
+        11 => end.handle_outcome(*now),
+        12 => end.link.poll(how.into(), *now),
+        13 => end.link.act(how, script.u8(), *now),
+        // The modem takes and sends whatever there is.
+        14 => (0..how).for_each(|_| {
+            *now = *now + Duration::from_millis(10);
+            speak(end, peer, *now);
+            end.handle_outcome(*now);
+        }),
+        15 => speak(end, peer, *now),
+        _ => {}
+    }
+    end.link.drain(*now);
+}
+
+fn receive<E: End>(end: &mut Host<'_, E>, peer: &mut Peer, bytes: &[u8], now: Instant) {
+    end.link.drain(now);
+    end.link.handle_frame(bytes, now);
+    let events = end.link.drain(now);
+    end.events += events;
+    assert!(events <= bytes.len() + 16, "{events} events of {} bytes", bytes.len());
+    assert!(events == 0 || peer.may_be_believed(bytes), "an event of a frame that was not sealed");
+}
+
+/// The end speaks until its modem is full, which must be at some time.
+fn speak<E: End>(end: &mut Host<'_, E>, peer: &mut Peer, now: Instant) {
+    while let Some(bytes) = end.poll_transmit(now) {
+        peer.note_heard(&bytes);
+    }
+}

@@ -1,0 +1,34 @@
+//! What must hold for any bytes: plain functions, run by libFuzzer and by `tests/fuzz_corpus.rs` alike.
+//!
+//! A function panics if the protocol breaks a promise.
+
+mod decoders;
+pub mod link;
+mod map_chunk;
+mod peer;
+pub mod raw;
+mod surface;
+mod vehicle;
+
+pub use decoders::{ack, chunks, frame, key_text, object, slot, stamp, status};
+pub use map_chunk::{base, map_chunk};
+pub use surface::{surface_events, surface_link};
+pub use vehicle::{vehicle_events, vehicle_link};
+
+/// A target takes any bytes.
+pub type Target = fn(&[u8]);
+
+/// Every target by the name of its corpus.
+pub const ALL: [(&str, Target); 11] = [
+    ("frame", frame),
+    ("ack", ack),
+    ("chunks", chunks),
+    ("stamp", stamp),
+    ("status", status),
+    ("slot", slot),
+    ("object", object),
+    ("map_chunk", map_chunk),
+    ("key_text", key_text),
+    ("vehicle_link", vehicle_link),
+    ("surface_link", surface_link),
+];

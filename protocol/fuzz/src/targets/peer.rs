@@ -1,0 +1,208 @@
+//! What the true peer of an end knows: it can seal anything.
+
+use super::raw::{self, Script};
+use scenecast_protocol::link::{Authenticity, Flight};
+use scenecast_protocol::seal::{Direction, MissionKey};
+use scenecast_protocol::wire::{
+    AckStatement, Address, Envelope, Header, MissionId, Reader, SessionId, Stamp, unwrap_number,
+};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Duration;
+
+pub const MISSION: MissionId = MissionId(7);
+
+/// How frames are sealed, by two bits.
+pub fn authenticity(choice: u8) -> Option<Authenticity> {
+    let key = Arc::new(MissionKey::from_bytes([9; 16]));
+    (choice & 3 != 0).then(|| Authenticity { key, all: choice & 3 > 1, encrypt: choice & 3 == 3 })
+}
+
+pub fn vehicle() -> Address {
+    Address::vehicle(1).expect("a vehicle")
+}
+
+type Run = (SessionId, u64);
+
+/// Seals frames as the peer of the end under test does.
+pub struct Peer {
+    pub us: Address,
+    pub end: Address,
+    authenticity: Option<Authenticity>,
+    own: Run,
+    theirs: Run,
+    /// The end's last call for vehicles that it does not know.
+    call: Option<Run>,
+    /// Our frames; the end's statements judge them.
+    flight: Flight<()>,
+    /// Highest number of the end's frames.
+    heard: u64,
+    /// Frames that a holder of the key has sealed.
+    sealed: BTreeSet<Vec<u8>>,
+}
+
+impl Peer {
+    pub fn new(us: Address, end: Address, authenticity: Option<Authenticity>) -> Self {
+        let nobody = (SessionId::from_random(1), 0);
+        let (flight, sealed) = (Flight::default(), BTreeSet::new());
+        Self { us, end, authenticity, own: nobody, theirs: nobody, call: None, flight, heard: 0, sealed }
+    }
+
+    /// A frame that the true peer has sent, before it was replaced by us.
+    pub fn note_sent(&mut self, bytes: &[u8]) {
+        self.sealed.insert(bytes.to_vec());
+        let Ok(envelope) = Envelope::decode(bytes, |_| true) else { return };
+        if envelope.header.to == Address::EVERYBODY {
+            return;
+        }
+        if envelope.header.hello {
+            self.begin_run((envelope.header.session, envelope.header.nonce.unwrap_or_default()));
+        } else {
+            self.flight.push(());
+        }
+    }
+
+    /// A frame that the end has sent.
+    pub fn note_heard(&mut self, bytes: &[u8]) {
+        let ours = |to| to == self.us || to == Address::EVERYBODY;
+        let envelope = Envelope::decode(bytes, ours).expect("a frame for its peer");
+        let header = &envelope.header;
+        let run = (header.session, header.nonce.unwrap_or_default());
+        if header.to == Address::EVERYBODY {
+            self.call = Some(run);
+        } else if header.hello && run != self.theirs && header.session != self.own.0 {
+            (self.theirs, self.flight, self.heard) = (run, Flight::default(), 0);
+        } else if !header.hello {
+            self.heard = self.heard.max(unwrap_number(header.number, self.heard));
+            header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack)));
+        }
+    }
+
+    fn begin_run(&mut self, run: Run) {
+        if run != self.own {
+            (self.own, self.flight, self.heard) = (run, Flight::default(), 0);
+        }
+    }
+
+    /// Whether these bytes prove that they come from a holder of the key, or nothing must prove that.
+    pub fn may_be_believed(&self, bytes: &[u8]) -> bool {
+        !self.is_keyed(false) || self.sealed.contains(bytes)
+    }
+
+    fn is_keyed(&self, hello: bool) -> bool {
+        self.authenticity.as_ref().is_some_and(|a| hello || a.all || self.us == Address::SURFACE)
+    }
+
+    /// A hello; a bit of `what` begins a new run, another one calls everybody or answers a call.
+    pub fn hello(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
+        let keyed = self.is_keyed(true);
+        if what & 1 != 0 {
+            let nonce = if keyed { u64::from(script.u8()) + 1 } else { 0 };
+            self.begin_run((SessionId::from_random(script.u16()), nonce));
+        }
+        let to = if what & 2 != 0 && self.us == Address::SURFACE { Address::EVERYBODY } else { self.end };
+        let (session, nonce) = self.own;
+        let header = Header {
+            to,
+            session,
+            number: 0,
+            base: 1,
+            nonce: keyed.then_some(nonce),
+            ack: None,
+            hello: true,
+            keyed,
+            ..self.header(what, script)
+        };
+        let theirs = self.theirs;
+        self.theirs = self.call.filter(|_| what & 2 != 0).unwrap_or(theirs);
+        let bytes = self.seal(&header, &[], 0);
+        self.theirs = theirs;
+        bytes
+    }
+
+    /// A numbered frame whose header follows `what` and the script, and whose body is the script's.
+    pub fn numbered(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
+        let mut header = self.header(what, script);
+        let mut number = self.flight.next_number();
+        if what & 0x10 != 0 {
+            let ahead = script.u16() as i16;
+            number = number.saturating_add_signed(ahead.into()).max(1);
+            (header.number, header.base) = (number as u16, script.u16() % 2048 + 1);
+        } else {
+            self.flight.push(());
+        }
+        self.seal(&header, script.bytes(), number)
+    }
+
+    /// As [`Self::numbered`], but for another run of the end, or with a CRC where a tag is due.
+    pub fn misaddressed(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
+        let header = Header { keyed: false, ..self.header(what, script) };
+        let mut bytes = raw::head(&header);
+        bytes.extend_from_slice(script.bytes());
+        let session = if what & 0x10 != 0 { self.theirs.0.get() } else { 0 };
+        raw::close_with_crc(&mut bytes, MISSION, session);
+        bytes
+    }
+
+    fn header(&self, what: u8, script: &mut Script<'_>) -> Header {
+        let from = self.us;
+        let turn = (what & 1 == 0).then(|| script.u8());
+        let remaining = script.u8();
+        let stamp = (what & 4 != 0).then(|| {
+            let (clock_ms, a) = (u32::from(script.u16()), script.u16());
+            let time = Duration::from_millis(a.into());
+            match from == Address::SURFACE {
+                true => Stamp::Surface { clock_ms, one_way: (a != u16::MAX).then_some(time) },
+                false => Stamp::Vehicle { clock_ms, heard: script.u8(), held: time },
+            }
+        });
+        let true_ack = AckStatement { horizon_low: (self.heard & 0xFFF) as u16, lost: Vec::new() };
+        let ack = match what & 0x28 {
+            0x08 => Some(true_ack),
+            0x28 => AckStatement::decode(&mut Reader::new(script.bytes())).ok(),
+            _ => None,
+        };
+        Header {
+            from,
+            to: self.end,
+            session: self.own.0,
+            number: self.flight.next_number() as u16,
+            base: self.flight.base_distance(),
+            remaining,
+            turn,
+            stamp,
+            nonce: None,
+            ack,
+            hello: false,
+            keyed: self.is_keyed(false),
+        }
+    }
+
+    fn seal(&mut self, header: &Header, body: &[u8], number: u64) -> Vec<u8> {
+        let mut bytes = raw::head(header);
+        let body_at = bytes.len();
+        bytes.extend_from_slice(body);
+        let (session, nonce) = if self.us == Address::SURFACE { (0, 0) } else { (self.theirs.0.get(), self.theirs.1) };
+        match self.authenticity.as_ref().filter(|_| header.keyed) {
+            None if header.hello => raw::close_with_crc(&mut bytes, MISSION, session),
+            None => raw::close_with_crc(&mut bytes, MISSION, self.theirs.0.get()),
+            Some(a) if header.hello => {
+                let (m, s, n) = (MISSION.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
+                let tag = a.key.hello_tag(&[&m, &s, &n, &bytes]);
+                bytes.extend_from_slice(&tag);
+            }
+            Some(a) => {
+                let is_surface = self.us == Address::SURFACE;
+                let (surface, vehicle) =
+                    if is_surface { (self.own.1, self.theirs.1) } else { (self.theirs.1, self.own.1) };
+                let direction = if is_surface { Direction::Down } else { Direction::Up };
+                let key = a.key.session(MISSION.0, self::vehicle().number(), surface, vehicle, a.encrypt);
+                let (head, body) = bytes.split_at_mut(body_at);
+                let tag = key.seal(direction, number, head, body);
+                bytes.extend_from_slice(&tag);
+            }
+        }
+        self.sealed.insert(bytes.clone());
+        bytes
+    }
+}

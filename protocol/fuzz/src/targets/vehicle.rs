@@ -1,0 +1,71 @@
+//! A script against the vehicle's end.
+
+use super::link::{End, Grow, Pile, Setup, Surface, Vehicle, run};
+use super::peer::vehicle;
+use scenecast_protocol::directive::{RefusalReason, SlotId};
+use scenecast_protocol::link::{Transmit, VehicleEvent};
+use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, SlotState, VehicleStatus};
+
+/// What a vehicle hears never harms it: the first byte is the setup, the others are the script.
+pub fn vehicle_link(data: &[u8]) {
+    vehicle_events(data);
+}
+
+/// As [`vehicle_link`]; says how many events the script led to.
+pub fn vehicle_events(data: &[u8]) -> usize {
+    let Some((&choice, script)) = data.split_first() else { return 0 };
+    let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
+    let peer = setup.peer(Address::SURFACE, vehicle());
+    let mut vehicle = setup.vehicle(Pile::default(), begin);
+    (0..3).for_each(|what| vehicle.act(what, 30, begin));
+    let surface: Surface<Pile> = setup.surface(begin);
+    run(setup, vehicle, surface, peer, script)
+}
+
+impl<S: Grow> End for Vehicle<S> {
+    fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
+        self.handle_frame(bytes, now);
+    }
+
+    fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        self.poll_transmit(now)
+    }
+
+    fn handle_transmit_outcome(&mut self, now: Instant) {
+        self.handle_transmit_outcome(now);
+    }
+
+    fn poll(&mut self, frames: u32, _: Instant) {
+        self.handle_poll(frames);
+    }
+
+    fn wakeup(&self, _: Instant) -> Option<Instant> {
+        self.poll_timeout().map(|(at, _)| at)
+    }
+
+    fn drain(&mut self, now: Instant) -> usize {
+        let mut count = 0;
+        while let Some(event) = self.poll_event() {
+            count += 1;
+            if let VehicleEvent::Slot { id, content, .. } = event {
+                let refused = SlotState::Refused(RefusalReason::Malformed);
+                self.decide(id, content.map_or(refused, |_| SlotState::Applied), now);
+                self.handle_persisted();
+            }
+        }
+        count
+    }
+
+    fn act(&mut self, what: u8, with: u8, now: Instant) {
+        match what % 6 {
+            0 => self.source_mut().grow(with, now),
+            1 => drop(self.push_object(vec![with; 40 + usize::from(with) * 20])),
+            2 => self.set_status(VehicleStatus { labels: with, ..VehicleStatus::default() }),
+            3 => self.decide(SlotId::ALL[usize::from(with % 6)], SlotState::Refused(RefusalReason::TooOld), now),
+            4 => self.renew(now),
+            _ => self.set_shares(Shares([with % 20; 5])),
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! What the corpora begin with: what two ends say to each other, and chunks of three maps.
+
+use super::targets::base;
+use super::targets::link::{End, Setup, Surface};
+use super::targets::raw;
+use scenecast_protocol::map::{Cell, LabelGrid, MapSource};
+use scenecast_protocol::map_codec::{Codec, encode};
+use scenecast_protocol::object::ObjectSender;
+use scenecast_protocol::seal::MissionKey;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{AckStatement, ChunkKind, Envelope, MissionId, Seal};
+use std::time::Duration;
+
+/// Corpus, name of the file, content.
+type Seed = (&'static str, String, Vec<u8>);
+
+/// Every file that is made, not found.
+pub fn all() -> Vec<Seed> {
+    let mut seeds = [frames(), contents(), objects(), scripts(), golden(), map_chunks()].concat();
+    seeds.iter_mut().for_each(|(_, _, data)| data.truncate(2000));
+    seeds
+}
+
+/// Names of setups: how frames are sealed, and how the medium is shared.
+const SETUPS: [(&str, u8); 6] =
+    [("plain", 0), ("surface-keyed", 1), ("keyed", 2), ("encrypted", 3), ("pool", 8), ("polled", 12)];
+
+/// What both ends say over calm water: who, and the frame.
+fn traffic(setup: u8) -> Vec<(&'static str, Vec<u8>)> {
+    let mut now = Instant::from_secs_f64(1000.0);
+    let setup = Setup::new(setup);
+    let mut vehicle = setup.vehicle(MapSource::new(Codec::Png), now);
+    let mut surface: Surface = setup.surface(now);
+    (1..3).for_each(|what| vehicle.act(what, 3, now));
+    let mut said = Vec::new();
+    for round in 0..12 {
+        vehicle.act(0, 20 + round, now);
+        surface.act(round, round + 9, now);
+        said.extend(turn(&mut surface, &mut vehicle, &mut now).into_iter().map(|bytes| ("down", bytes)));
+        said.extend(turn(&mut vehicle, &mut surface, &mut now).into_iter().map(|bytes| ("up", bytes)));
+    }
+    said
+}
+
+fn turn(from: &mut impl End, to: &mut impl End, now: &mut Instant) -> Vec<Vec<u8>> {
+    *now = *now + Duration::from_millis(1500);
+    from.poll(4, *now);
+    let mut said = Vec::new();
+    while let Some(transmit) = from.poll_transmit(*now) {
+        to.handle_frame(&transmit.bytes, *now);
+        from.handle_transmit_outcome(*now);
+        said.push(transmit.bytes);
+    }
+    to.drain(*now);
+    said
+}
+
+/// The first frames of each end in each setup.
+fn frames() -> Vec<Seed> {
+    let mut seeds = Vec::new();
+    for (name, setup) in SETUPS {
+        for way in ["down", "up"] {
+            let frames = traffic(setup).into_iter().filter(|(w, _)| *w == way).take(4).enumerate();
+            seeds.extend(frames.map(|(i, (_, bytes))| ("frame", format!("{name}-{way}-{i}"), bytes)));
+        }
+    }
+    seeds
+}
+
+/// Bodies, statements, statuses and slots in plain frames.
+fn contents() -> Vec<Seed> {
+    let mut seeds = Vec::new();
+    for (i, (way, bytes)) in traffic(0x10).into_iter().enumerate().take(60) {
+        let envelope = Envelope::decode(&bytes, |_| true).expect("a frame");
+        if let Some(ack) = &envelope.header.ack {
+            let mut statement = Vec::new();
+            ack.encode(100, &mut statement);
+            seeds.push(("ack", format!("{way}-{i}"), statement));
+        }
+        let end = Seal::bytes(false, bytes.len());
+        let body = bytes[raw::head(&envelope.header).len()..bytes.len() - end].to_vec();
+        for (kind, payload) in chunks(&body) {
+            let framed = [&[payload.len() as u8], &payload[..]].concat();
+            match kind {
+                ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),
+                ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
+                ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
+                ChunkKind::Map | ChunkKind::Object => {}
+            }
+        }
+        seeds.push(("chunks", format!("{way}-{i}"), body));
+    }
+    few(seeds)
+}
+
+/// Objects of several sizes in parts of several sizes: in order, backwards, and the later half with repairs.
+fn objects() -> Vec<Seed> {
+    let mut seeds = Vec::new();
+    for (len, room) in [(1, 20), (90, 24), (300, 50), (900, 200), (16_000, 250)] {
+        let mut sender = ObjectSender::default();
+        sender.set_loss(0.3);
+        sender.push((0..len).map(|i| (i * 7) as u8).collect());
+        let mut parts = Vec::new();
+        while let Some((id, run, bytes)) = sender.next_part(room).filter(|_| parts.len() < 30) {
+            sender.mark_in_flight(id, &run);
+            parts.push([&[bytes.len() as u8], &bytes[..]].concat());
+        }
+        let half = parts.split_off(parts.len() / 2);
+        let mut seed = |name: &str, data| seeds.push(("object", format!("{len}-bytes-{name}"), data));
+        seed("in-order", [parts.concat(), half.concat()].concat());
+        seed("backwards", half.iter().rev().chain(parts.iter().rev()).flatten().copied().collect());
+        seed("later-half", half.concat());
+    }
+    seeds
+}
+
+/// At most twelve seeds of each corpus.
+fn few(mut seeds: Vec<Seed>) -> Vec<Seed> {
+    let mut kept: Vec<&str> = Vec::new();
+    seeds.retain(|(target, _, data)| {
+        let keep = !data.is_empty() && kept.iter().filter(|t| t == &target).count() < 12;
+        kept.extend(keep.then_some(*target));
+        keep
+    });
+    seeds
+}
+
+fn chunks(body: &[u8]) -> Vec<(ChunkKind, Vec<u8>)> {
+    let mut bytes = vec![0x40, 0x10, 0, 5, 0, 1, 1, 0];
+    bytes.extend_from_slice(body);
+    raw::close_with_crc(&mut bytes, MissionId(7), 0);
+    let envelope = Envelope::decode(&bytes, |_| true).expect("a sound header");
+    let frame = envelope.open(&Seal::Crc(MissionId(7), 0)).expect("a right CRC");
+    frame.chunks().map(|c| (c.kind, c.payload.to_vec())).collect()
+}
+
+/// Scripts that say again what the true peer says, with what may happen in between.
+fn scripts() -> Vec<Seed> {
+    let mut seeds = Vec::new();
+    for (name, setup) in SETUPS {
+        for (target, way) in [("vehicle_link", "down"), ("surface_link", "up")] {
+            let said = traffic(0).into_iter().filter(|(w, _)| *w == way).skip(2);
+            let bodies: Vec<Vec<u8>> =
+                said.map(|(_, bytes)| body_of(&bytes)).filter(|b| !b.is_empty()).take(8).collect();
+            for (kind, between) in [("turns", TURN), ("restart", RESTART), ("storm", STORM)] {
+                let steps = bodies.iter().flat_map(|body| [&numbered(body), between].concat());
+                seeds.push((target, format!("{name}-{kind}"), std::iter::once(setup).chain(steps).collect()));
+            }
+            let forged = bodies.iter().flat_map(|body| [&numbered(body), &forged(body), TURN].concat());
+            seeds.push((target, format!("{name}-forgery"), std::iter::once(setup).chain(forged).collect()));
+        }
+    }
+    seeds
+}
+
+/// A quarter second, the modem polls, the end speaks.
+const TURN: &[u8] = &[8, 5, 12, 4, 14, 30];
+/// The peer greets with a new run, hears the answer, and the host changes something.
+const RESTART: &[u8] = &[5, 1, 7, 3, 20, 0, 1, 1, 14, 30, 13, 0, 9, 8, 20];
+/// Repeats, strays, noise, odd statements and numbers, a long silence.
+const STORM: &[u8] =
+    &[7, 1, 6, 0, 1, 0, 2, 0x20, 0, 0, 3, 1, 2, 3, 2, 0x3B, 0, 2, 0x10, 1, 0, 9, 0, 1, 1, 0, 9, 7, 15, 0, 11, 0];
+
+/// A step with a frame that acknowledges everything, grants or wishes a turn, and carries `body`.
+fn numbered(body: &[u8]) -> Vec<u8> {
+    [&[1, 0x08, 40, 0, body.len() as u8], body].concat()
+}
+
+/// The same with the CRC of a mission without a key.
+fn forged(body: &[u8]) -> Vec<u8> {
+    [&[6, 0x10, 40, 0, body.len() as u8], body].concat()
+}
+
+fn body_of(bytes: &[u8]) -> Vec<u8> {
+    let envelope = Envelope::decode(bytes, |_| true).expect("a frame");
+    bytes[raw::head(&envelope.header).len()..bytes.len() - Seal::bytes(false, bytes.len())].to_vec()
+}
+
+/// Bytes that the unit tests and the description of the wire name.
+fn golden() -> Vec<Seed> {
+    let losses = |lost: Vec<u16>| {
+        let mut bytes = Vec::new();
+        AckStatement { horizon_low: 2000, lost }.encode(300, &mut bytes);
+        bytes
+    };
+    let key = MissionKey::from_bytes(*b"0123456789abcdef").to_text();
+    let text = |text: &str| text.as_bytes().to_vec();
+    let seed = |target, name: &str, data| (target, name.to_owned(), data);
+    vec![
+        seed("ack", "none-lost", losses(vec![])),
+        seed("ack", "two-lost", losses(vec![1, 4])),
+        seed("ack", "a-tenth-lost", losses((0..60).map(|i| i * 10).collect())),
+        seed("ack", "a-few-far-apart", losses(vec![0, 700, 1900])),
+        seed("ack", "then-frames", [losses(vec![2]), vec![0, 1, 0, 0, 5, 0, 3, 0, 1, 6, 0, 9, 0, 4, 2]].concat()),
+        seed("stamp", "surface", vec![1, 2, 3, 0x02, 0x9B, 0]),
+        seed("stamp", "not-known", vec![0, 0, 1, 0xFF, 0xFF, 0]),
+        seed("stamp", "vehicle", vec![0xFF, 0xFF, 0xFF, 9, 1, 2, 0, 0, 1, 1, 0, 0, 2, 2]),
+        seed("stamp", "late", [0xFF; 18].to_vec()),
+        seed("status", "golden-pose", vec![0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]),
+        seed("slot", "utility", vec![12, 0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]),
+        seed("slot", "requests", vec![10, 0x80, 0xAB, 0xCD, 0, 4, 1, 3, 1, 5, 2]),
+        seed("slot", "budget", vec![13, 0x60, 0xAB, 0xCD, 0, 4, 0, 0x27, 0x10, 10, 5, 5, 50, 20]),
+        seed("slot", "settings-of-two-series", vec![9, 0x40, 0, 1, 0, 4, 0, 0, 0, 9, 9, 0x40, 0, 2, 0, 1, 0, 0, 0, 8]),
+        seed("key_text", "key", text(&key)),
+        seed("key_text", "commented", text(&format!("# reef\r\n\r\n  {}# end", *key))),
+        seed("key_text", "twice", text(&format!("{}{}", *key, *key))),
+        seed("key_text", "wrong-digit", text(&key.replace("key 1 3", "key 1 4"))),
+        seed("key_text", "other-version", text("scenecast-key 2 00 00")),
+    ]
+}
+
+/// Chunks of one change of each base, whole and broken.
+fn map_chunks() -> Vec<Seed> {
+    let mut seeds = Vec::new();
+    for choice in 0..3u8 {
+        let (base, target) = change(choice);
+        for (codec, room) in [(Codec::Png, 30), (Codec::Png, 100), (Codec::Context, 30), (Codec::Context, 100)] {
+            let chunk = encode(codec, &base, &target, Cell::new(0, 4), room, &|_| true).expect("fits");
+            let data: Vec<u8> = std::iter::once(choice).chain(chunk.bytes).collect();
+            let mut broken = data.clone();
+            broken[data.len() / 2] ^= 0x10;
+            let name = format!("{codec}-{choice}-{room}");
+            seeds.push(("map_chunk", format!("{name}-broken"), broken));
+            seeds.push(("map_chunk", name, data));
+        }
+    }
+    seeds
+}
+
+/// A base with a patch of new labels and a few lone flips.
+fn change(choice: u8) -> (LabelGrid, LabelGrid) {
+    let base = base(choice);
+    let mut target = base.clone();
+    for i in 0..60 {
+        target.set(Cell::new(i % 10 - 3, i / 10 + 2), if i % 7 == 0 { 4 } else { 9 });
+    }
+    for (x, y, label) in [(-9, -7, 2), (5, -6, 11), (14, 9, 0), (-12, 13, 254)] {
+        target.set(Cell::new(x, y), label);
+    }
+    (base, target)
+}
