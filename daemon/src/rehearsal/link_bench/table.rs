@@ -44,6 +44,8 @@ pub struct Row {
     pub budget_use: f64,
     /// Times that the two ends were found to differ.
     pub resyncs: u64,
+    /// Frames that began sooner than the modem turns around.
+    pub hasty: u64,
 }
 
 /// Where and how a row is measured.
@@ -103,6 +105,7 @@ impl Place {
             converge_within: round(convergence.within),
             budget_use: round(waters.iter().map(budget_use).fold(0.0, f64::max)),
             resyncs: waters.iter().map(resyncs).sum(),
+            hasty: waters.iter().map(|w| w.tally.hasty).sum(),
         })
     }
 }

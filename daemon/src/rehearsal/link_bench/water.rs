@@ -10,7 +10,7 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, Envelope, MissionId, SlotState, VehicleStatus};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -97,6 +97,8 @@ pub struct Water {
     channel: Channel,
     /// When each transmission ends, and whose it is.
     ending: BTreeMap<(Instant, NodeId), ()>,
+    /// When each end last took in a frame that was meant for it.
+    heard: BTreeMap<NodeId, Instant>,
 }
 
 /// The vehicle of every row that has only one.
@@ -141,6 +143,7 @@ impl Water {
             modem: setting.modem(),
             channel,
             ending: BTreeMap::new(),
+            heard: BTreeMap::new(),
         }
     }
 
@@ -203,6 +206,9 @@ impl Water {
                 _ => {}
             }
             let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
+                self.heard.insert(arrival.to, self.now);
+            }
             match arrival.to {
                 SURFACE => self.surface.handle_frame(&bytes, self.now),
                 NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_frame(&bytes, self.now),
@@ -234,7 +240,7 @@ impl Water {
     }
 
     fn note_grant(&mut self, transmit: &Transmit) {
-        let header = scenecast_protocol::wire::Envelope::decode(&transmit.bytes, |_| true).map(|e| e.header);
+        let header = Envelope::decode(&transmit.bytes, |_| true).map(|e| e.header);
         if let Some(quarters) = header.ok().filter(|h| h.to.is_vehicle() && h.remaining == 0).and_then(|h| h.turn) {
             self.grants.0 += 1;
             self.grants.1 += Duration::from_millis(250) * u32::from(quarters);
@@ -244,6 +250,8 @@ impl Water {
     fn transmit(&mut self, from: NodeId, transmit: Transmit) {
         assert!(transmit.bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
         let airtime = self.modem.airtime(transmit.bytes.len());
+        let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
+        self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
         *self.tally.airtime.entry((who, transmit.kind)).or_default() += airtime;
         self.ending.insert((self.now + airtime, from), ());
