@@ -73,16 +73,10 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
-        let mut room = room_for_payload(builder.room());
-        let Some((mut bytes, mut content)) = self.source.next_chunk(room, now) else { return };
+        let room = room_for_payload(builder.room());
+        let Some((bytes, content)) = self.source.next_chunk(room, now) else { return };
         debug_assert!(bytes.len() <= room, "a chunk that fits the room it was made for");
-        while !builder.push(ChunkKind::Map, &bytes) {
-            // A long chunk that leaves a byte or two of its room has a longer head, and just does not fit.
-            self.source.handle_fate(content, false, now);
-            room = bytes.len().saturating_sub(1);
-            let Some(smaller) = self.source.next_chunk(room, now) else { return };
-            (bytes, content) = smaller;
-        }
+        builder.push(ChunkKind::Map, &bytes);
         self.pair.stats.chunks_sent += 1;
         carried.push((Part::Map(content), bytes.len()));
     }
