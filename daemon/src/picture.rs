@@ -128,10 +128,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
         let _ = std::fs::remove_file(&part);
         return Err(failed(e));
     }
-    if let Some(dir) = path.parent().filter(|d| !d.as_os_str().is_empty()) {
-        std::fs::File::open(dir).and_then(|d| d.sync_all()).map_err(failed)?;
-    }
-    Ok(())
+    crate::runtime::sync_folder(path.parent().unwrap_or(Path::new(""))).map_err(failed)
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ fn setup() -> impl Strategy<Value = Setup> {
     (frame, budget, codec, access, 0u8..6).prop_map(|(frame_bytes, budget_bps, codec, access, keyed)| {
         let setup = Setup { access, ..Setup::new(frame_bytes, budget_bps, codec) };
         match keyed {
-            1 => setup.keyed(false, false),
+            1 if frame_bytes >= 48 => setup.keyed(false, false),
             2 if frame_bytes >= 48 => setup.keyed(true, false),
             3 if frame_bytes >= 48 => setup.keyed(true, true),
             _ => setup,

@@ -1,81 +1,131 @@
-//! The vehicle's durable state as a file.
+//! The vehicle's durable state: what is read of it at the start, and kept while it runs.
 
+use super::journal::{Damage, Journal, JournalError, Storage};
 use crate::auv::Durable;
-use crate::picture::write_whole;
 use crate::problem::Problem;
 use std::path::Path;
 
-/// Magic bytes and version of the file.
-const MAGIC: &[u8; 8] = b"scVSTA01";
+/// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.
+const JOURNAL: &str = "vehicle.journal";
+/// The file of builds before there was a journal.
+const BEFORE: &str = "vehicle.state";
+/// Length at which the journal begins anew: 64 records of a block.
+const MOST_BYTES: usize = 64 * 4096;
 
-static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
-
-/// Why a file holds no durable state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum DurableError {
-    /// Of another version, or no such file at all.
-    #[error("the file is not of this version of scenecast")]
-    Version,
-    /// The checksum does not match.
-    #[error("the file is damaged; restore it, or move it away to begin a new mission")]
-    Damaged,
+/// Keeps the durable state of a run.
+pub(super) struct Keeper<S: Storage> {
+    journal: Journal<S>,
 }
 
-/// The bytes of the file.
-///
-/// ```text
-/// bytes 0-7   "scVSTA01"
-/// then        the state in postcard
-/// last 4      CRC-32/ISCSI of everything before, big-endian
-/// ```
-fn encode(durable: &Durable) -> Vec<u8> {
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(postcard::to_allocvec(durable).unwrap_or_default());
-    let crc = CRC.checksum(&bytes);
-    bytes.extend_from_slice(&crc.to_be_bytes());
-    bytes
-}
-
-fn decode(bytes: &[u8]) -> Result<Durable, DurableError> {
-    let (covered, crc) = bytes.split_last_chunk::<4>().ok_or(DurableError::Damaged)?;
-    let body = covered.strip_prefix(MAGIC).ok_or(DurableError::Version)?;
-    if CRC.checksum(covered) != u32::from_be_bytes(*crc) {
-        return Err(DurableError::Damaged);
+impl<S: Storage> Keeper<S> {
+    /// Begins a run: what survived the last one, with an epoch that no run before has used.
+    pub(super) fn begin_run(storage: S) -> Result<(Self, Durable), Problem> {
+        let place = storage.path(JOURNAL);
+        let opened = Journal::open(storage, JOURNAL, MOST_BYTES);
+        let (journal, state) = opened.map_err(|e| for_people(&place, e))?;
+        let durable = match state {
+            Some(state) => {
+                let last = decode(&state).ok_or(JournalError::Damage(Damage::Version));
+                let last = last.map_err(|e| for_people(&place, e))?;
+                Durable { epoch: last.epoch.wrapping_add(1), ..last }
+            }
+            None => {
+                refuse_earlier_build(journal.storage())?;
+                Durable::default()
+            }
+        };
+        let mut keeper = Self { journal };
+        // Label ids of another run mean something else: the epoch is this run's own before it is told to anybody.
+        keeper.save(&durable)?;
+        Ok((keeper, durable))
     }
-    match postcard::take_from_bytes(body) {
-        Ok((durable, [])) => Ok(durable),
-        _ => Err(DurableError::Damaged),
-    }
-}
 
-/// What survived the last run; `None` before the first.
-pub fn load_durable(path: &Path) -> Result<Option<Durable>, Problem> {
-    match std::fs::read(path) {
-        Ok(bytes) => decode(&bytes).map(Some).map_err(|e| Problem::file(path, e)),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(Problem::file(path, e)),
+    /// Makes the state durable: a power cut before this has returned leaves the last one or this one.
+    pub(super) fn save(&mut self, durable: &Durable) -> Result<(), Problem> {
+        let place = self.journal.storage().path(JOURNAL);
+        let state = postcard::to_allocvec(durable).map_err(|e| Problem::Failed(e.to_string()))?;
+        self.journal.persist(&state).map_err(|e| for_people(&place, e))
     }
 }
 
-/// Makes the state durable: a power cut leaves the old or the new one.
-pub fn save_durable(path: &Path, durable: &Durable) -> Result<(), Problem> {
-    write_whole(path, &encode(durable))
+fn decode(state: &[u8]) -> Option<Durable> {
+    match postcard::take_from_bytes(state) {
+        Ok((durable, [])) => Some(durable),
+        _ => None,
+    }
+}
+
+fn refuse_earlier_build(storage: &impl Storage) -> Result<(), Problem> {
+    let place = storage.path(BEFORE);
+    match storage.read(BEFORE) {
+        Ok(None) => Ok(()),
+        Ok(Some(_)) => Err(Problem::file(
+            &place,
+            "the state of an earlier build, which this one does not read; move it away to begin a new mission",
+        )),
+        Err(e) => Err(Problem::Failed(format!("{}: {e}", place.display()))),
+    }
+}
+
+fn for_people(place: &Path, error: JournalError) -> Problem {
+    match error {
+        JournalError::Damage(damage) => Problem::file(place, damage),
+        other => Problem::Failed(format!("{}: {other}", place.display())),
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::journal::disk::Disk;
     use super::*;
+    use scenecast_protocol::link::SlotInboxState;
+
+    fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), Problem> {
+        Keeper::begin_run(disk.clone())
+    }
 
     #[test]
-    fn the_state_comes_back_and_any_damage_is_noticed() {
-        let durable = Durable { epoch: 3, hold: true, budget_bps: Some(500), ..Durable::default() };
-        let bytes = encode(&durable);
-        assert_eq!(decode(&bytes), Ok(durable));
-        for at in 0..bytes.len() {
-            let mut damaged = bytes.clone();
-            damaged[at] ^= 0x10;
-            assert!(decode(&damaged).is_err(), "byte {at}");
-            assert!(decode(&bytes[..at]).is_err(), "cut at {at}");
-        }
+    fn a_run_has_the_state_of_the_last_one_and_an_epoch_of_its_own() {
+        let disk = Disk::default();
+        let (mut keeper, durable) = begin(&disk).unwrap();
+        assert_eq!(durable, Durable::default());
+        let held = Durable { epoch: 4, hold: true, budget_bps: Some(500), ..durable };
+        keeper.save(&held).unwrap();
+        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 5, ..held.clone() });
+        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 6, ..held });
+    }
+
+    #[test]
+    fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
+        let versions = [None, Some(300), None, None, None, Some(1)];
+        let inbox = SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2] };
+        let utility = Some((3, 50, -1, [(2, -3)].into()));
+        let durable = Durable { inbox, epoch: 3, utility, hold: true, budget_bps: Some(500), refine_words_per_s: None };
+        let golden = [
+            &[1, 7, 2, 5, 6][..],
+            &[0, 1, 172, 2, 0, 0, 0, 1, 1],
+            &[0, 1, 0, 0, 0, 2],
+            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 0],
+        ];
+        assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
+        assert_eq!(decode(&golden.concat()), Some(durable));
+    }
+
+    #[test]
+    fn what_cannot_be_gone_on_from_is_refused_in_one_line() {
+        let refused = |name: &str, content: &[u8]| {
+            let disk = Disk::default();
+            disk.put(name, content);
+            begin(&disk).err().unwrap()
+        };
+        let input = |text: &str| Problem::Input(text.to_owned());
+        let other = "vehicle.journal: the file is of another version of scenecast; use that one, or move the file away to \
+                     begin a new mission";
+        assert_eq!(refused("vehicle.journal", b"scVJRN99"), input(other));
+        let damaged = "vehicle.journal: damaged at byte 0; restore the file, or move it away to begin a new mission";
+        assert_eq!(refused("vehicle.journal", b""), input(damaged));
+        let earlier = "vehicle.state: the state of an earlier build, which this one does not read; move it away to begin a \
+                       new mission";
+        assert_eq!(refused("vehicle.state", b"scVSTA01"), input(earlier));
     }
 }

@@ -3,13 +3,16 @@
 mod clock;
 mod demo;
 mod durable;
+mod journal;
 mod mapping;
+#[cfg(test)]
+mod power_cuts;
 mod surface;
 mod vehicle;
 
 pub use clock::Clock;
 pub use demo::run_demo;
-pub use durable::{DurableError, load_durable, save_durable};
+pub(crate) use journal::sync_folder;
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 

@@ -1,6 +1,7 @@
 //! `scenecast asv`
 
 use super::clock::Clock;
+use super::journal::create_folder;
 use crate::asv::{Surface, SurfaceOutput};
 use crate::config::Config;
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
@@ -18,7 +19,7 @@ use tokio::sync::oneshot;
 pub fn run_surface(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
         let dir = PathBuf::from(&config.runtime.state_dir);
-        std::fs::create_dir_all(&dir).map_err(|e| Problem::file(&dir, e))?;
+        create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
         let surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;

@@ -1,24 +1,24 @@
 //! `scenecast auv`
 
 use super::clock::Clock;
-use super::durable::{load_durable, save_durable};
+use super::durable::Keeper;
+use super::journal::Folder;
 use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
-use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
+use crate::auv::{Area, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
 use crate::rehearsal::Recording;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SessionId;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Runs the vehicle until it is interrupted.
 pub fn run_vehicle(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
-        let dir = PathBuf::from(&config.runtime.state_dir);
-        std::fs::create_dir_all(&dir).map_err(|e| Problem::file(&dir, e))?;
-        let state_file = dir.join("vehicle.state");
-        let durable = begin_run(&state_file)?;
+        let dir = Path::new(&config.runtime.state_dir);
+        let folder = Folder::hold(dir).map_err(|e| Problem::file(dir, e))?;
+        let (keeper, durable) = Keeper::begin_run(folder)?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
         let session = SessionId::from_random(super::random_bits() as u16);
@@ -33,18 +33,8 @@ pub fn run_vehicle(config: Config) -> Result<(), Problem> {
         let camera = Camera::new(recording, clock);
         let mapper = mapping::spawn(&config, epoch)?;
         let modem = modem::open(&config, profile).await?;
-        Host { vehicle, camera, mapper, modem, clock, state_file, at_end, behind: 0 }.run().await
+        Host { vehicle, camera, mapper, modem, clock, keeper, at_end, behind: 0 }.run().await
     })
-}
-
-/// Label ids of an earlier run mean something else: each run has an epoch of its own.
-fn begin_run(state_file: &Path) -> Result<Durable, Problem> {
-    let durable = match load_durable(state_file)? {
-        Some(last) => Durable { epoch: last.epoch.wrapping_add(1), ..last },
-        None => Durable::default(),
-    };
-    save_durable(state_file, &durable)?;
-    Ok(durable)
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, Problem> {
@@ -59,7 +49,7 @@ struct Host {
     mapper: MapperThread,
     modem: Modem,
     clock: Clock,
-    state_file: PathBuf,
+    keeper: Keeper<Folder>,
     /// Whether the end of the camera's frames is the end of the survey.
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
@@ -115,7 +105,7 @@ impl Host {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => {
-                    save_durable(&self.state_file, self.vehicle.durable())?;
+                    self.keeper.save(self.vehicle.durable())?;
                     self.vehicle.handle_persisted();
                 }
                 VehicleOutput::RefineRate(rate) => {

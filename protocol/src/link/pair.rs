@@ -70,6 +70,11 @@ impl<T> Pair<T> {
         self.meeting.run().is_some() && !self.meeting.is_leaving()
     }
 
+    /// Whether a numbered frame has shown that the peer means this run.
+    pub fn is_proven(&self) -> bool {
+        self.meeting.run().is_some_and(|r| r.window.highest() > 0)
+    }
+
     /// Whether frames of unknown fate fill the window.
     pub fn is_full(&self) -> bool {
         self.meeting.run().is_some_and(|r| r.flight.is_full())
@@ -112,6 +117,11 @@ impl<T> Pair<T> {
             (true, false) => TAG_BYTES + 8,
             (false, _) => 4,
         }
+    }
+
+    /// Bytes that a full frame of ours ends in.
+    pub fn full_seal_bytes(&self, frame_bytes: usize) -> usize {
+        Seal::bytes(self.is_keyed(self.direction_out()), frame_bytes)
     }
 
     fn direction_out(&self) -> Direction {

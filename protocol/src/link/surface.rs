@@ -5,12 +5,11 @@ use super::surface_peer::Peer;
 use super::surface_turn::{Ready, room_for_slot};
 use super::{Authenticity, DropReason, FrameNumber, PeerView, Transmit};
 use crate::directive::{Slot, SlotId, VersionedSlot};
-use crate::mac::{MasterConfig, ModemProfile};
+use crate::mac::{Access, MasterConfig, ModemProfile};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
-use crate::seal::TAG_BYTES;
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, MissionId};
+use crate::wire::{Address, Envelope, MissionId, Seal};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -167,7 +166,7 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// Issues a new version of a slot to a vehicle.
     pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, IssueError> {
-        let seal = if self.config.authenticity.is_some() { TAG_BYTES } else { 4 };
+        let seal = Seal::bytes(self.config.authenticity.is_some(), self.config.modem.frame_bytes);
         let room = room_for_slot(self.config.modem.frame_bytes, seal);
         let bytes = VersionedSlot::encode(0, 0, &slot).len();
         if bytes > room {
@@ -182,6 +181,11 @@ impl<R: StateReplica> SurfaceLink<R> {
             return Err(IssueError::NoVehicle);
         }
         vehicles.iter().map(|&v| self.issue(v, slot.clone(), now)).collect()
+    }
+
+    /// An earlier run of this end may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.budget.assume_spent(now);
     }
 
     /// Changes the surface's own bit budget.
@@ -227,8 +231,9 @@ impl<R: StateReplica> SurfaceLink<R> {
             peer.resync(now);
             self.events.push_back(SurfaceEvent::MapChanged(from));
         }
-        if peer.pair.unstated() > 0 {
-            peer.answer_due.get_or_insert(now + Duration::from_secs(2));
+        let wait = if peer.pair.is_proven() { Duration::from_secs(2) } else { Duration::ZERO };
+        if peer.pair.unstated() > 0 || (peer.pair.is_met() && !peer.pair.is_proven()) {
+            peer.answer_due.get_or_insert(now + wait);
         }
     }
 
@@ -251,6 +256,9 @@ impl<R: StateReplica> SurfaceLink<R> {
 
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
+        if let Access::ModemOwned { .. } = self.config.modem.access {
+            self.budget.handle_delay(self.in_modem.len(), now);
+        }
         let Some(sent) = self.in_modem.pop_front() else { return };
         let Some(peer) = self.peers.get_mut(&sent.to) else { return };
         peer.handle_sent(sent.number, now);

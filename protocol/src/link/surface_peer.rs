@@ -253,6 +253,7 @@ fn handle_object(
 ) -> bool {
     let Ok(part) = Part::decode(payload) else { return false };
     events.push_back(match objects.handle_part(&part) {
+        Received::Nothing => return true,
         Received::Complete(_, bytes) => SurfaceEvent::Object(vehicle, bytes),
         Received::Progress(id, held, total) => {
             let head = objects.head(id, SurfaceEvent::OBJECT_HEAD).map(<[u8]>::to_vec);

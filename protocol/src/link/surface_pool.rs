@@ -60,8 +60,9 @@ impl<R: StateReplica> Peer<R> {
         if self.must_greet(now) {
             return true;
         }
-        let owes = self.pair.unstated() > 0
-            && (self.pair.unstated() >= MANY_UNSTATED || self.answer_due.is_some_and(|at| now >= at));
+        let answer = self.answer_due.is_some_and(|at| now >= at);
+        let owes = (!self.pair.is_proven() && answer)
+            || (self.pair.unstated() > 0 && (self.pair.unstated() >= MANY_UNSTATED || answer));
         self.pair.is_met() && (owes || !self.outbox.pending(now, now - self.patience()).is_empty())
     }
 
@@ -74,7 +75,8 @@ impl<R: StateReplica> Peer<R> {
 
     fn note_spoken(&mut self, hello: bool, now: Instant) {
         self.master.note_begun(now);
-        self.answer_due = None;
+        // A run that was met must be proven by a numbered frame, or the vehicle will not speak.
+        self.answer_due = (self.pair.is_met() && !self.pair.is_proven()).then(|| now + self.patience());
         if hello {
             self.hello_due = now + Duration::from_secs(5 << self.hellos.min(4));
             self.hellos += 1;

@@ -11,7 +11,7 @@ use crate::time::Instant;
 use crate::wire::{ChunkKind, Stamp, room_for_payload};
 
 /// Bytes of acknowledgement that every frame of the surface has room for.
-const SHORT_ACK: usize = 4;
+const SHORT_ACK: usize = 2;
 /// Bytes of a frame that a slot can not have: header, turn, a short acknowledgement, chunk header.
 const SLOT_OVERHEAD: usize = 9 + 1 + SHORT_ACK + 1;
 /// Frames smaller than this have no room for a stamp beside a slot.
@@ -47,8 +47,11 @@ impl<R: StateReplica> Peer<R> {
         if hello || !self.pair.is_met() {
             return vec![Vec::new(); copies.min(2)];
         }
-        let groups =
-            pack(self.outbox.pending(now, now), room_for_slot(modem.frame_bytes, self.pair.seal_bytes()), shares);
+        let groups = pack(
+            self.outbox.pending(now, now),
+            room_for_slot(modem.frame_bytes, self.pair.full_seal_bytes(modem.frame_bytes)),
+            shares,
+        );
         let grants = if groups.is_empty() { copies } else { 1 };
         let mut plan = Plan::new();
         for _ in 0..copies {

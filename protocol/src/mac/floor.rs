@@ -24,6 +24,11 @@ impl Floor {
         self.polled = frames;
     }
 
+    /// Frames handed to the modem that have not left it.
+    pub fn in_modem(&self) -> u32 {
+        self.in_modem
+    }
+
     /// A frame has left the modem.
     pub fn handle_sent(&mut self) {
         self.in_modem = self.in_modem.saturating_sub(1);

@@ -1,51 +1,51 @@
 //! The sending side of objects.
 
-use super::{MAX_OBJECT, ObjectId, Part};
-use std::collections::BTreeMap;
-use std::ops::Range;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ByteState {
-    Missing,
-    InFlight,
-    Delivered,
-}
-
-#[derive(Debug)]
-struct Outgoing {
-    bytes: Vec<u8>,
-    state: Vec<ByteState>,
-}
+use super::outgoing::{Outgoing, SymbolRun};
+use super::{MAX_OBJECT, ObjectId};
+use std::collections::VecDeque;
 
 /// Objects on their way to the peer, oldest first.
 #[derive(Debug, Default)]
 pub struct ObjectSender {
-    objects: BTreeMap<u64, Outgoing>,
+    objects: VecDeque<Outgoing>,
     next: u64,
+    /// Share of frames that the link loses.
+    loss: f64,
+    /// Bytes that a part usually can have.
+    usual_room: usize,
 }
 
 impl ObjectSender {
     /// Most objects at a time; a further one replaces the oldest.
     const MAX_OBJECTS: usize = 16;
+    /// An object is replaced at the latest when so many later ones were pushed, so that its name stays unique.
+    const MAX_AGE: u64 = ObjectId::COUNT / 2 - 1;
+    /// The largest loss that is reckoned with.
+    const MAX_LOSS: f64 = 0.95;
 
     /// Takes an object to send; `None` if it is empty or larger than [`MAX_OBJECT`].
     pub fn push(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
         if bytes.is_empty() || bytes.len() > MAX_OBJECT {
             return None;
         }
-        if self.objects.len() >= Self::MAX_OBJECTS {
-            self.objects.pop_first();
-        }
         let serial = self.next;
         self.next += 1;
-        let state = vec![ByteState::Missing; bytes.len()];
-        self.objects.insert(serial, Outgoing { bytes, state });
-        Some(ObjectId(serial as u8))
+        let too_old = |o: &Outgoing| serial - o.serial > Self::MAX_AGE;
+        if self.objects.len() >= Self::MAX_OBJECTS || self.objects.front().is_some_and(too_old) {
+            self.objects.pop_front();
+        }
+        self.objects.push_back(Outgoing::new(serial, bytes));
+        Some(ObjectId::of(serial))
     }
 
     /// Stops sending an object.
     pub fn cancel(&mut self, id: ObjectId) {
-        self.objects.retain(|&serial, _| serial as u8 != id.0);
+        self.objects.retain(|o| ObjectId::of(o.serial) != id);
+    }
+
+    /// Stops sending every object; names go on, as the peer remembers them.
+    pub fn cancel_all(&mut self) {
+        self.objects.clear();
     }
 
     /// Whether the peer is known to have every object.
@@ -53,55 +53,48 @@ impl ObjectSender {
         self.objects.is_empty()
     }
 
-    /// Bytes that wait for their first or next transmission.
+    /// Bytes that wait for their first or next transmission, repair symbols included.
     pub fn backlog_bytes(&self) -> usize {
-        self.objects.values().flat_map(|o| &o.state).filter(|&&s| s == ByteState::Missing).count()
+        self.objects.iter().map(Outgoing::backlog_bytes).sum()
     }
 
-    /// The next part that fits `room` bytes, header included.
-    pub fn next_part(&self, room: usize) -> Option<(ObjectId, Range<usize>, Vec<u8>)> {
-        let most = room.checked_sub(Part::HEADER).filter(|&n| n > 0)?;
-        self.objects.iter().find_map(|(&serial, object)| {
-            let start = object.state.iter().position(|&s| s == ByteState::Missing)?;
-            let run = object.state.iter().skip(start).take(most).take_while(|&&s| s == ByteState::Missing).count();
-            let range = start..start + run;
-            let data = object.bytes.get(range.clone())?;
-            let id = ObjectId(serial as u8);
-            let part = Part { id, total: object.bytes.len() as u16, offset: start as u16, data };
-            Some((id, range, part.encode()))
-        })
+    /// Tells the share of frames that the link loses, 0..=0.95; repair symbols go ahead accordingly, none at 0.
+    pub fn set_loss(&mut self, loss: f64) {
+        let loss = if loss.is_finite() { loss.clamp(0.0, Self::MAX_LOSS) } else { 0.0 };
+        if loss != self.loss {
+            self.loss = loss;
+            self.objects.iter_mut().for_each(|o| o.set_loss(self.usual_room, loss));
+        }
+    }
+
+    /// The next part of at most `room` bytes, header included; the same again until it is marked in flight.
+    pub fn next_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
+        // Rooms at the end of a frame are small: an object that begins there is still cut for whole frames.
+        self.usual_room = room.max(self.usual_room - self.usual_room.div_ceil(128));
+        let (usual, loss) = (self.usual_room, self.loss);
+        let (run, part) = self.objects.iter_mut().find_map(|o| o.next_part(room, usual, loss))?;
+        Some((ObjectId::of(run.serial), run, part))
     }
 
     /// A frame with this part was written.
-    pub fn set_loss(&mut self, _: f64) {}
-    pub fn mark_in_flight(&mut self, id: ObjectId, range: &Range<usize>) {
-        self.mark(id, range.clone(), |_| ByteState::InFlight);
+    pub fn mark_in_flight(&mut self, _: ObjectId, run: &SymbolRun) {
+        if let Some(object) = self.objects.iter_mut().find(|o| o.serial == run.serial) {
+            object.mark_in_flight(run);
+        }
     }
 
     /// The fate of a frame with this part is known; returns whether the object is now complete at the peer.
-    pub fn handle_fate(&mut self, id: ObjectId, range: &Range<usize>, delivered: bool) -> bool {
-        self.mark(id, range.clone(), |state| match state {
-            ByteState::Delivered => ByteState::Delivered,
-            _ if delivered => ByteState::Delivered,
-            _ => ByteState::Missing,
-        });
-        let done = |o: &Outgoing| o.state.iter().all(|&s| s == ByteState::Delivered);
-        let before = self.objects.len();
-        self.objects.retain(|&serial, o| serial as u8 != id.0 || !done(o));
-        self.objects.len() < before
+    pub fn handle_fate(&mut self, _: ObjectId, run: &SymbolRun, delivered: bool) -> bool {
+        let Some(at) = self.objects.iter().position(|o| o.serial == run.serial) else { return false };
+        let complete = self.objects.get_mut(at).is_some_and(|o| o.handle_fate(run, delivered));
+        if complete {
+            self.objects.remove(at);
+        }
+        complete
     }
 
     /// The peer has lost what it had received.
     pub fn handle_peer_restart(&mut self) {
-        for object in self.objects.values_mut() {
-            object.state.fill(ByteState::Missing);
-        }
-    }
-
-    fn mark(&mut self, id: ObjectId, range: Range<usize>, to: impl Fn(ByteState) -> ByteState) {
-        let object = self.objects.iter_mut().find(|(serial, _)| **serial as u8 == id.0);
-        for state in object.and_then(|(_, o)| o.state.get_mut(range)).into_iter().flatten() {
-            *state = to(*state);
-        }
+        self.objects.iter_mut().for_each(Outgoing::handle_peer_restart);
     }
 }

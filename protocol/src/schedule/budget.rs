@@ -30,6 +30,11 @@ impl BitBudget {
         Self { bits_per_s, window, tokens, filled: now, recent: VecDeque::new(), recent_bits: 0 }
     }
 
+    /// A run that has just ended may have sent all that was allowed: nothing is left in this window.
+    pub fn assume_spent(&mut self, now: Instant) {
+        self.spend((self.capacity() / 1_000_000).max(0) as u64, now);
+    }
+
     /// Bits a second.
     pub fn bits_per_s(&self) -> u32 {
         self.bits_per_s
@@ -91,6 +96,13 @@ impl BitBudget {
         self.tokens -= millionths(bits);
         self.recent.push_back((now, bits));
         self.recent_bits += bits;
+    }
+
+    /// The last `transmissions` were still in the modem until `now`: they count from then.
+    pub fn handle_delay(&mut self, transmissions: usize, now: Instant) {
+        for (at, _) in self.recent.iter_mut().rev().take(transmissions) {
+            *at = now;
+        }
     }
 
     fn capacity(&self) -> i128 {

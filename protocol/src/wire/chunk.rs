@@ -1,7 +1,7 @@
 //! Chunks: what a frame carries.
 
 /// Most bytes that a chunk header takes.
-pub const MAX_CHUNK_HEADER: usize = 3;
+pub const MAX_CHUNK_HEADER: usize = 2;
 
 /// What a chunk is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,7 +42,7 @@ impl ChunkKind {
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
 /// kind     0 nothing more in this frame, 1 map, 2 pose, 3 slot, 4 object, 5 report; 6, 7 reserved: the frame is refused
-/// length   0..28 bytes of payload; 29: 29 + next byte; 30: next two bytes; 31: to the end of the frame
+/// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Chunk<'a> {
@@ -55,14 +55,16 @@ pub struct Chunk<'a> {
 /// Bytes that the header of a chunk takes when `payload` bytes go into `room`.
 pub fn chunk_header_len(payload: usize, room: usize) -> usize {
     match payload {
-        0..=28 => 1,
+        0..=26 => 1,
         n if n + 1 == room => 1,
-        29..=284 => 2,
-        _ => 3,
+        _ => 2,
     }
 }
 
-/// Most bytes of payload that one chunk can have in `room` bytes.
+/// Most bytes of payload that a chunk can have.
+const LONGEST: usize = 27 + 1023;
+
+/// Most bytes of payload that one chunk can have in `room` bytes; every smaller payload fits too.
 pub fn room_for_payload(room: usize) -> usize {
     room.saturating_sub(1)
 }
@@ -70,18 +72,14 @@ pub fn room_for_payload(room: usize) -> usize {
 /// Appends a chunk to a frame body that can still take `room` bytes; says whether it fitted.
 pub(super) fn push_chunk(kind: ChunkKind, payload: &[u8], room: usize, out: &mut Vec<u8>) -> bool {
     let n = payload.len();
-    if n + chunk_header_len(n, room) > room {
+    if n + chunk_header_len(n, room) > room || n > LONGEST {
         return false;
     }
     let head = kind.code() << 5;
     match n {
-        0..=28 => out.push(head | n as u8),
+        0..=26 => out.push(head | n as u8),
         n if n + 1 == room => out.push(head | 31),
-        29..=284 => out.extend_from_slice(&[head | 29, (n - 29) as u8]),
-        _ => {
-            out.push(head | 30);
-            out.extend_from_slice(&(n as u16).to_be_bytes());
-        }
+        _ => out.extend_from_slice(&[head | (27 + ((n - 27) >> 8)) as u8, (n - 27) as u8]),
     }
     out.extend_from_slice(payload);
     true
@@ -113,13 +111,9 @@ impl<'a> Chunks<'a> {
         let kind = ChunkKind::from_code(head >> 5)?;
         let (len, rest) = match head & 31 {
             31 => (rest.len(), rest),
-            30 => {
-                let (len, rest) = rest.split_first_chunk::<2>()?;
-                (usize::from(u16::from_be_bytes(*len)), rest)
-            }
-            29 => {
-                let (len, rest) = rest.split_first()?;
-                (29 + usize::from(*len), rest)
+            n @ 27..=30 => {
+                let (low, rest) = rest.split_first()?;
+                (27 + usize::from(n - 27) * 256 + usize::from(*low), rest)
             }
             n => (usize::from(n), rest),
         };
@@ -148,6 +142,18 @@ mod tests {
         let mut out = Vec::new();
         assert!(push_chunk(ChunkKind::Map, &[7; 200], 201, &mut out));
         assert_eq!((out.len(), out[0]), (201, 0b001_11111));
+    }
+
+    #[test]
+    fn every_payload_fits_that_is_not_larger_than_its_room() {
+        for room in 1..=1024 {
+            for n in 0..=room_for_payload(room) {
+                let mut out = Vec::new();
+                assert!(push_chunk(ChunkKind::Map, &vec![7; n], room, &mut out), "{n} bytes in {room}");
+                out.resize(room, 0);
+                assert_eq!(Chunks::new(&out).next().map(|c| c.payload.len()), Some(n));
+            }
+        }
     }
 
     proptest! {

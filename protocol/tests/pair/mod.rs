@@ -118,6 +118,7 @@ impl Pair {
     pub(crate) fn restart_vehicle(&mut self, map: &LabelGrid) {
         let seed = (self.draw() * 1e15) as u64;
         self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
+        self.vehicle.assume_budget_spent(self.now);
         self.vehicle.set_map(map.iter(), self.now);
         self.forget_modem(true);
     }
@@ -125,6 +126,7 @@ impl Pair {
     pub(crate) fn restart_surface(&mut self) {
         let seed = (self.draw() * 1e15) as u64;
         self.surface = surface(&self.setup, seed, self.now);
+        self.surface.assume_budget_spent(self.now);
         self.forget_modem(false);
     }
 
@@ -170,7 +172,7 @@ impl Pair {
             Event::Sent { by_vehicle } => {
                 self.modems[usize::from(by_vehicle)].1 = false;
                 match by_vehicle {
-                    true => self.vehicle.handle_transmit_outcome(),
+                    true => self.vehicle.handle_transmit_outcome(self.now),
                     false => self.surface.handle_transmit_outcome(self.now),
                 }
             }

@@ -37,7 +37,8 @@ pub struct Durable {
 /// What the vehicle asks of its host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleOutput {
-    /// Make [`Vehicle::durable`] durable, then call [`Vehicle::handle_persisted`].
+    /// Make [`Vehicle::durable`] durable, then call [`Vehicle::handle_persisted`]. If that fails, do nothing that is asked
+    /// for later, and send nothing.
     Persist,
     /// Go there, metres east and north.
     Waypoint(f64, f64),
@@ -277,13 +278,14 @@ impl Vehicle {
     }
 
     fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
+        // Before everything that the host does because of the slot, or a power cut would have it done twice.
+        self.outputs.push_back(VehicleOutput::Persist);
         let state = match content.ok_or(RefusalReason::Malformed).and_then(|slot| self.apply(slot, now)) {
             Ok(()) => SlotState::Applied,
             Err(reason) => SlotState::Refused(reason),
         };
         self.link.decide(id, state, now);
         self.durable.inbox = self.link.persistent_state().clone();
-        self.outputs.push_back(VehicleOutput::Persist);
         self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));
     }
 

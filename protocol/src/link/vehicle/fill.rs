@@ -75,8 +75,8 @@ impl<S: StateSource> VehicleLink<S> {
     fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
         let room = room_for_payload(builder.room());
         let Some((bytes, content)) = self.source.next_chunk(room, now) else { return };
-        debug_assert!(bytes.len() <= room, "a chunk that fits the room it was made for");
-        builder.push(ChunkKind::Map, &bytes);
+        let fits = builder.push(ChunkKind::Map, &bytes);
+        assert!(fits, "a chunk of {} bytes was made for {room}", bytes.len());
         self.pair.stats.chunks_sent += 1;
         carried.push((Part::Map(content), bytes.len()));
     }

@@ -6,7 +6,7 @@ mod turn;
 
 use super::{Authenticity, LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Slot, SlotId};
-use crate::mac::{ClockMap, Floor, ModemProfile};
+use crate::mac::{Access, ClockMap, Floor, ModemProfile};
 use crate::map::{Cell, LabelGrid, MapSource, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BitBudget, Class, ClassShares, Shares};
@@ -176,12 +176,17 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// Stops sending every object.
     pub fn cancel_objects(&mut self) {
-        self.objects = ObjectSender::default();
+        self.objects.cancel_all();
     }
 
     /// Stops sending an object.
     pub fn cancel_object(&mut self, id: ObjectId) {
         self.objects.cancel(id);
+    }
+
+    /// An earlier run of this end may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.budget.assume_spent(now);
     }
 
     /// Changes the bit budget; the surface learns of it by the next report.
@@ -244,7 +249,10 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// The transmission that was handed out has left the modem.
-    pub fn handle_transmit_outcome(&mut self) {
+    pub fn handle_transmit_outcome(&mut self, now: Instant) {
+        if let Access::ModemOwned { .. } = self.config.modem.access {
+            self.budget.handle_delay(self.floor.in_modem() as usize, now);
+        }
         self.floor.handle_sent();
     }
 

@@ -1,0 +1,228 @@
+//! The journal under power cuts and failing disks.
+
+use super::disk::{Chance, Disk, Step};
+use super::record::{self, BLOCK};
+use super::{Damage, Journal, JournalError, Storage};
+use proptest::prelude::*;
+
+const NAME: &str = "test.journal";
+/// Few records a file, so that new files are begun often.
+const MOST_BYTES: usize = 4 * BLOCK;
+
+fn open(disk: &Disk) -> (Journal<Disk>, Option<Vec<u8>>) {
+    Journal::open(disk.clone(), NAME, MOST_BYTES).expect("a power cut leaves a journal to go on from")
+}
+
+/// A state of its own: no mixture of two is a third.
+fn state(number: u32, length: usize) -> Vec<u8> {
+    let mut chance = Chance::new(u64::from(number) << 20 | length as u64);
+    let noise = (0..length).map(|_| chance.below(256) as u8);
+    number.to_be_bytes().into_iter().chain(noise).collect()
+}
+
+/// What a journal may hold: the last confirmed state, or one that was being written since.
+struct Expected {
+    possible: Vec<Option<Vec<u8>>>,
+    written: u32,
+}
+
+impl Expected {
+    fn persist(&mut self, journal: &mut Journal<Disk>, length: usize) -> bool {
+        self.written += 1;
+        let new = state(self.written, length);
+        let confirmed = journal.persist(&new).is_ok();
+        if confirmed {
+            self.possible.clear();
+        }
+        self.possible.push(Some(new));
+        confirmed
+    }
+}
+
+#[derive(Debug, Clone)]
+enum Action {
+    Persist(usize),
+    /// The process ends, the machine goes on.
+    Kill,
+    /// Power is cut after some steps of what follows.
+    CutAfter(usize),
+    /// A step fails once.
+    Fail(Step, usize),
+}
+
+fn actions() -> impl Strategy<Value = Vec<Action>> {
+    let length = || prop_oneof![Just(0usize), 1usize..600, 4060usize..4080, 0usize..9000];
+    let step = prop_oneof![
+        Just(Step::Create),
+        Just(Step::Append),
+        Just(Step::Sync),
+        Just(Step::Rename),
+        Just(Step::SyncFolder),
+    ];
+    let action = prop_oneof![
+        6 => length().prop_map(Action::Persist),
+        1 => Just(Action::Kill),
+        3 => (0usize..12).prop_map(Action::CutAfter),
+        1 => (step, length()).prop_map(|(step, length)| Action::Fail(step, length)),
+    ];
+    proptest::collection::vec(action, 1..60)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    #[test]
+    fn what_is_found_is_what_was_confirmed_or_was_being_written(actions in actions(), seed: u64) {
+        let disk = Disk::default();
+        let (mut journal, found) = open(&disk);
+        prop_assert_eq!(found, None);
+        let mut expected = Expected { possible: vec![None], written: 0 };
+        for (i, action) in actions.into_iter().enumerate() {
+            let confirmed = match action {
+                Action::Persist(length) => expected.persist(&mut journal, length),
+                Action::Fail(step, length) => {
+                    disk.fail(Some(step));
+                    let confirmed = expected.persist(&mut journal, length);
+                    disk.fail(None);
+                    confirmed
+                }
+                Action::CutAfter(steps) => {
+                    disk.cut_after(steps);
+                    true
+                }
+                Action::Kill => false,
+            };
+            if confirmed && !disk.is_off() {
+                continue;
+            }
+            if disk.is_off() {
+                disk.power_cut(Chance::new(seed ^ i as u64));
+                let (again, found) = open(&disk);
+                prop_assert!(expected.possible.contains(&found));
+                expected.possible = vec![found];
+                journal = again;
+            } else {
+                let (again, found) = open(&disk);
+                prop_assert!(expected.possible.contains(&found));
+                journal = again;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_record_torn_at_any_byte_leaves_the_one_before() {
+    for length in [40, 5000] {
+        let [old, new] = [1, 2].map(|number| record::encode(number.into(), &state(number, length)));
+        let whole = length + 4 + 24;
+        for torn in 0..=new.len() {
+            for zeros in [0, new.len() - torn] {
+                let disk = Disk::default();
+                disk.put(NAME, &[&old[..], &new[..torn], &vec![0; zeros]].concat());
+                let found = open(&disk).1.unwrap();
+                // The last bytes of a checksum may be zeros themselves.
+                let complete = torn >= whole || zeros > 0 && new[torn..whole].iter().all(|&b| b == 0);
+                assert_eq!(found, state(if complete { 2 } else { 1 }, length), "{torn} bytes and {zeros} zeros");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_new_file_that_is_cut_short_at_any_step_leaves_the_old_state_or_the_new_one() {
+    let mut outcomes = Vec::new();
+    for steps in 0.. {
+        let mut confirmed = false;
+        for seed in 0..200 {
+            let disk = Disk::default();
+            let mut expected = Expected { possible: vec![None], written: 0 };
+            let (mut journal, _) = open(&disk);
+            (0..4).for_each(|_| assert!(expected.persist(&mut journal, 100)));
+            disk.cut_after(steps);
+            confirmed = expected.persist(&mut journal, 100);
+            disk.power_cut(Chance::new(seed));
+            let (mut journal, found) = open(&disk);
+            assert!(expected.possible.contains(&found), "cut before step {steps}");
+            outcomes.push((steps, found == Some(state(5, 100))));
+            assert!(expected.persist(&mut journal, 100), "the journal goes on");
+            assert_eq!(open(&disk).1, Some(state(6, 100)));
+        }
+        if confirmed {
+            assert_eq!(steps, 5, "create, append, sync, rename, sync of the folder");
+            break;
+        }
+    }
+    // Between the rename and the sync of the folder both may be found, before only the old one, after only the new one.
+    for (steps, new) in (0..=5).flat_map(|s| [(s, false), (s, true)]) {
+        let possible = if new { steps >= 4 } else { steps <= 4 };
+        assert_eq!(outcomes.contains(&(steps, new)), possible, "cut before step {steps}: new {new}");
+    }
+}
+
+#[test]
+fn the_first_state_is_there_or_nothing_is() {
+    for (steps, seed) in (0..=5).flat_map(|steps| (0..100).map(move |seed| (steps, seed))) {
+        let disk = Disk::default();
+        disk.cut_after(steps);
+        let confirmed = open(&disk).0.persist(b"first").is_ok();
+        disk.power_cut(Chance::new(seed));
+        let found = open(&disk).1;
+        assert!(found.as_deref() == Some(b"first") || found.is_none() && !confirmed);
+    }
+}
+
+#[test]
+fn after_a_failed_step_nothing_is_confirmed_or_written() {
+    for records in [0, 1, 4] {
+        for failing in [Step::Create, Step::Append, Step::Sync, Step::Rename, Step::SyncFolder] {
+            let disk = Disk::default();
+            let mut expected = Expected { possible: vec![None], written: 0 };
+            let (mut journal, _) = open(&disk);
+            (0..records).for_each(|_| assert!(expected.persist(&mut journal, 10)));
+            disk.fail(Some(failing));
+            if expected.persist(&mut journal, 10) {
+                continue;
+            }
+            disk.fail(None);
+            let steps = disk.steps().len();
+            let again = journal.persist(b"later");
+            assert!(matches!(again, Err(JournalError::Broken)), "{failing:?}");
+            assert_eq!(disk.steps().len(), steps, "nothing is written behind a failure");
+            let (mut journal, found) = open(&disk);
+            assert!(expected.possible.contains(&found));
+            assert!(expected.persist(&mut journal, 10), "a new run goes on");
+        }
+    }
+}
+
+#[test]
+fn a_state_that_is_safe_already_is_not_written_again() {
+    let disk = Disk::default();
+    let (mut journal, _) = open(&disk);
+    journal.persist(b"same").unwrap();
+    let steps = disk.steps();
+    journal.persist(b"same").unwrap();
+    assert_eq!(disk.steps(), steps);
+    assert_eq!(steps, [Step::Create, Step::Append, Step::Sync, Step::Rename, Step::SyncFolder]);
+}
+
+#[test]
+fn the_file_stays_within_its_limit() {
+    let disk = Disk::default();
+    let (mut journal, _) = open(&disk);
+    for number in 0..50 {
+        journal.persist(&state(number, 10)).unwrap();
+        assert!(disk.read(NAME).unwrap().unwrap().len() <= MOST_BYTES);
+    }
+    assert_eq!(open(&disk).1, Some(state(49, 10)));
+}
+
+#[test]
+fn damage_is_an_error_that_says_where() {
+    let disk = Disk::default();
+    let mut records: Vec<u8> = (1..4).flat_map(|n| record::encode(n, b"state")).collect();
+    records[BLOCK + 21] ^= 1;
+    disk.put(NAME, &records);
+    let error = Journal::open(disk, NAME, MOST_BYTES).err().unwrap();
+    assert!(matches!(error, JournalError::Damage(Damage::At { offset: BLOCK })));
+    assert!(error.to_string().starts_with("damaged at byte 4096; restore the file"), "{error}");
+}

@@ -1,0 +1,203 @@
+//! A disk with a page cache, and power cuts.
+
+use super::storage::Storage;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io::{Error, Result};
+use std::path::PathBuf;
+use std::rc::Rc;
+
+/// What the disk writes whole or not at all; smaller than a block, so that parts of a record may come in any order.
+const SECTOR: usize = 512;
+
+/// Chooses one of so many possibilities.
+pub(crate) struct Chance(u64);
+
+impl Chance {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % n.max(1)
+    }
+}
+
+/// A step of the file system or of its host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    Create,
+    Append,
+    Sync,
+    Rename,
+    SyncFolder,
+    /// Something that the host does.
+    Host,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Content {
+    safe: usize,
+    bytes: Vec<u8>,
+}
+
+#[derive(Debug, Default)]
+struct Platter {
+    contents: Vec<Content>,
+    /// Names, as they were after each change since the folder was last synced.
+    names: Vec<BTreeMap<String, usize>>,
+    steps: Vec<Step>,
+    cut_at: Option<usize>,
+    failing: Option<Step>,
+}
+
+/// The disk; clones are the same one.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Disk(Rc<RefCell<Platter>>);
+
+impl Disk {
+    /// Cuts the power before so many further steps are done.
+    pub(crate) fn cut_after(&self, steps: usize) {
+        let mut platter = self.0.borrow_mut();
+        platter.cut_at = Some(platter.steps.len() + steps);
+    }
+
+    /// Whether the power is gone.
+    pub(crate) fn is_off(&self) -> bool {
+        let platter = self.0.borrow();
+        platter.cut_at == Some(platter.steps.len())
+    }
+
+    /// Steps so far.
+    pub(crate) fn steps(&self) -> Vec<Step> {
+        self.0.borrow().steps.clone()
+    }
+
+    /// Steps of this kind fail from now on.
+    pub(crate) fn fail(&self, step: Option<Step>) {
+        self.0.borrow_mut().failing = step;
+    }
+
+    /// Takes a step, unless the power is gone.
+    pub(crate) fn step(&self, step: Step) -> Result<()> {
+        if self.is_off() {
+            return Err(Error::other("the power is gone"));
+        }
+        let mut platter = self.0.borrow_mut();
+        platter.steps.push(step);
+        if platter.failing == Some(step) { Err(Error::other("input/output error")) } else { Ok(()) }
+    }
+
+    /// The power comes back: of what was not synced, `chance` has chosen what is there.
+    pub(crate) fn power_cut(&self, mut chance: Chance) {
+        let mut platter = self.0.borrow_mut();
+        platter.cut_at = None;
+        if !platter.names.is_empty() {
+            let kept = chance.below(platter.names.len());
+            let kept = platter.names[kept].clone();
+            platter.names = vec![kept];
+        }
+        let before = platter.contents.clone();
+        for (at, content) in platter.contents.iter_mut().enumerate() {
+            let older = at.checked_sub(1).map_or(&[][..], |i| &before[i].bytes);
+            content.survive(older, &mut chance);
+        }
+    }
+
+    /// Writes a file behind the journal's back.
+    pub(crate) fn put(&self, name: &str, bytes: &[u8]) {
+        let mut platter = self.0.borrow_mut();
+        platter.contents.push(Content { safe: bytes.len(), bytes: bytes.to_vec() });
+        let at = platter.contents.len() - 1;
+        let mut names = platter.names.last().cloned().unwrap_or_default();
+        names.insert(name.to_owned(), at);
+        platter.names = vec![names];
+    }
+}
+
+impl Content {
+    /// Each sector that was not synced is there, or half there, or holds zeros or what an older file had there.
+    fn survive(&mut self, older: &[u8], chance: &mut Chance) {
+        let unsynced = self.bytes.len() - self.safe;
+        self.bytes.truncate(self.safe + [0, chance.below(unsynced + 1), unsynced][chance.below(3)]);
+        let mut from = self.safe;
+        while from < self.bytes.len() {
+            let to = (from + 1).next_multiple_of(SECTOR).min(self.bytes.len());
+            let sector = &mut self.bytes[from..to];
+            match chance.below(6) {
+                0 => sector.fill(0),
+                1 => sector.iter_mut().enumerate().for_each(|(i, b)| *b = older.get(from + i).copied().unwrap_or(0)),
+                2 => sector[chance.below(to - from)..].fill(0),
+                _ => {}
+            }
+            from = to;
+        }
+        self.safe = self.bytes.len();
+    }
+}
+
+impl Storage for Disk {
+    type File = usize;
+
+    fn path(&self, name: &str) -> PathBuf {
+        name.into()
+    }
+
+    fn read(&self, name: &str) -> Result<Option<Vec<u8>>> {
+        let platter = self.0.borrow();
+        let at = platter.names.last().and_then(|names| names.get(name));
+        Ok(at.map(|&at| platter.contents[at].bytes.clone()))
+    }
+
+    fn create(&mut self, name: &str) -> Result<usize> {
+        self.step(Step::Create)?;
+        let mut platter = self.0.borrow_mut();
+        platter.contents.push(Content::default());
+        let at = platter.contents.len() - 1;
+        let mut names = platter.change_names();
+        names.insert(name.to_owned(), at);
+        platter.names.push(names);
+        Ok(at)
+    }
+
+    fn append(&mut self, file: &mut usize, bytes: &[u8]) -> Result<()> {
+        // A write that fails, or that the power cut meets, may have written something.
+        self.0.borrow_mut().contents[*file].bytes.extend_from_slice(bytes);
+        self.step(Step::Append)
+    }
+
+    fn sync(&mut self, file: &mut usize) -> Result<()> {
+        self.step(Step::Sync)?;
+        let content = &mut self.0.borrow_mut().contents[*file];
+        content.safe = content.bytes.len();
+        Ok(())
+    }
+
+    fn rename(&mut self, from: &str, to: &str) -> Result<()> {
+        self.step(Step::Rename)?;
+        let mut platter = self.0.borrow_mut();
+        let mut names = platter.change_names();
+        let at = names.remove(from).ok_or_else(|| Error::other("no such file"))?;
+        names.insert(to.to_owned(), at);
+        platter.names.push(names);
+        Ok(())
+    }
+
+    fn sync_folder(&mut self) -> Result<()> {
+        self.step(Step::SyncFolder)?;
+        let mut platter = self.0.borrow_mut();
+        let last = platter.names.pop();
+        platter.names = last.into_iter().collect();
+        Ok(())
+    }
+}
+
+impl Platter {
+    fn change_names(&mut self) -> BTreeMap<String, usize> {
+        if self.names.is_empty() {
+            self.names.push(BTreeMap::new());
+        }
+        self.names[self.names.len() - 1].clone()
+    }
+}

@@ -1,0 +1,217 @@
+//! How an object is cut into symbols and blocks.
+
+use super::MAX_OBJECT;
+use super::code::MAX_BLOCK;
+use crc::{CRC_32_ISCSI, Crc};
+
+static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
+
+/// Number of source symbols and bytes of a symbol.
+///
+/// The source symbols in order are the object, 0 to 63 bytes of 0, a byte that counts them, and a CRC-32/ISCSI of all
+/// that. Symbols are dealt out to the blocks in turn, like cards: a lost run of them then takes the same from each
+/// block, and many blocks do as well as one large one would.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// 1..=2048.
+    sources: u16,
+    /// 1..=64 bytes.
+    symbol: u8,
+}
+
+/// Where a symbol belongs: its block, and its place among the source or the repair symbols of the block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// A piece of the object.
+    Source(usize, u8),
+    /// A combination of all source symbols of its block.
+    Repair(usize, u8),
+}
+
+impl Place {
+    pub(super) fn block(self) -> usize {
+        match self {
+            Self::Source(block, _) | Self::Repair(block, _) => block,
+        }
+    }
+}
+
+impl Layout {
+    /// Bytes after the object: the count of padding, and the CRC.
+    pub(super) const TRAILER: usize = 5;
+    /// Most source symbols.
+    pub(super) const MAX_SOURCES: usize = 2048;
+    /// Most bytes of a symbol.
+    pub(super) const MAX_SYMBOL: usize = 64;
+    /// Most source symbols of a block; at least as many repair symbols less one are left.
+    const MAX_BLOCK_SOURCES: usize = 128;
+
+    /// A layout; `None` if it is that of no object of 1..=[`MAX_OBJECT`] bytes.
+    pub(super) fn new(sources: usize, symbol: usize) -> Option<Self> {
+        let sound = (1..=Self::MAX_SOURCES).contains(&sources)
+            && (1..=Self::MAX_SYMBOL).contains(&symbol)
+            && sources * symbol > Self::TRAILER
+            && (sources - 1) * symbol < MAX_OBJECT + Self::TRAILER;
+        sound.then_some(Self { sources: sources as u16, symbol: symbol as u8 })
+    }
+
+    /// The layout for an object of `len` bytes in parts with `room` bytes of data; `None` if the room is too small.
+    ///
+    /// Some 6 to 16 symbols a part, so that little is lost where a later frame has less room; of these sizes the one
+    /// that needs the fewest parts.
+    pub(super) fn choose(len: usize, room: usize) -> Option<Self> {
+        let total = len + Self::TRAILER;
+        let part = room.min(total);
+        let least = total.div_ceil(Self::MAX_SOURCES).max(part / 16).clamp(1, Self::MAX_SYMBOL);
+        let most = (part / 6).max(least + 4).min(Self::MAX_SYMBOL).min(room);
+        let cost = |&symbol: &usize| {
+            let sources = total.div_ceil(symbol);
+            (sources.div_ceil(room / symbol), sources * symbol, usize::MAX - symbol)
+        };
+        let symbol = (least..=most).min_by_key(cost)?;
+        Self::new(total.div_ceil(symbol), symbol)
+    }
+
+    /// Source symbols, 1..=2048.
+    pub fn sources(self) -> usize {
+        usize::from(self.sources)
+    }
+
+    /// Bytes of a symbol, 1..=64.
+    pub fn symbol(self) -> usize {
+        usize::from(self.symbol)
+    }
+
+    /// Bytes of all source symbols.
+    pub(super) fn bytes(self) -> usize {
+        self.sources() * self.symbol()
+    }
+
+    /// Blocks, 1..=16.
+    pub(super) fn blocks(self) -> usize {
+        self.sources().div_ceil(Self::MAX_BLOCK_SOURCES)
+    }
+
+    /// Source symbols of a block.
+    pub(super) fn block_sources(self, block: usize) -> usize {
+        (self.sources() + self.blocks() - 1 - block) / self.blocks()
+    }
+
+    fn block_repairs(self) -> usize {
+        MAX_BLOCK - self.block_sources(0)
+    }
+
+    /// Symbols, source and repair, 255..=4080.
+    pub fn symbols(self) -> usize {
+        self.sources() + self.blocks() * self.block_repairs()
+    }
+
+    /// Symbols of a block, source and repair.
+    pub(super) fn block_symbols(self, block: usize) -> usize {
+        self.block_sources(block) + self.block_repairs()
+    }
+
+    /// Where a symbol belongs; source symbols are counted first.
+    pub(super) fn place(self, symbol: usize) -> Place {
+        let blocks = self.blocks();
+        match symbol.checked_sub(self.sources()) {
+            None => Place::Source(symbol % blocks, (symbol / blocks) as u8),
+            Some(repair) => Place::Repair(repair % blocks, (repair / blocks) as u8),
+        }
+    }
+
+    /// The source symbols of a block within the bytes of all, each with its place in the block.
+    pub(super) fn sources_of(self, block: usize, bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> + Clone {
+        let mine = bytes.chunks_exact(self.symbol()).skip(block).step_by(self.blocks());
+        mine.enumerate().map(|(place, symbol)| (place as u8, symbol))
+    }
+
+    /// Bytes that an object with this layout has at least.
+    pub(super) fn least_len(self) -> usize {
+        (self.bytes() + 1).saturating_sub(Self::TRAILER + self.symbol()).max(1)
+    }
+
+    /// Bytes that an object with this layout has at most.
+    pub(super) fn most_len(self) -> usize {
+        (self.bytes() - Self::TRAILER).min(MAX_OBJECT)
+    }
+
+    /// Makes the bytes of all source symbols of an object.
+    pub(super) fn seal(self, object: &mut Vec<u8>) {
+        let padding = self.bytes() - Self::TRAILER - object.len();
+        object.resize(object.len() + padding, 0);
+        object.push(padding as u8);
+        let crc = CRC32.checksum(object);
+        object.extend_from_slice(&crc.to_be_bytes());
+    }
+
+    /// The object in the bytes of all source symbols; `None` if they are not of one object.
+    pub(super) fn open(self, mut bytes: Vec<u8>) -> Option<Vec<u8>> {
+        let crc = bytes.split_off(bytes.len().checked_sub(4)?);
+        if crc != CRC32.checksum(&bytes).to_be_bytes() {
+            return None;
+        }
+        let padding = usize::from(bytes.pop()?);
+        let len = bytes.len().checked_sub(padding)?;
+        bytes.truncate(len);
+        (self.least_len()..=self.most_len()).contains(&len).then_some(bytes)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::indexing_slicing, clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_small_image_fills_the_frames_it_takes() {
+        let layout = |room| Layout::choose(700, room).map(|l| (l.sources(), l.symbol())).unwrap();
+        assert_eq!(layout(9), (235, 3));
+        assert_eq!(layout(44), (235, 3));
+        assert_eq!(layout(240), (47, 15));
+        assert_eq!(layout(995), (15, 47));
+    }
+
+    #[test]
+    fn the_largest_object_fits_the_smallest_frame() {
+        let layout = Layout::choose(MAX_OBJECT, 9).unwrap();
+        assert_eq!((layout.symbol(), layout.blocks()), (9, 15));
+        assert_eq!(Layout::choose(MAX_OBJECT, 8), None);
+        assert_eq!(Layout::choose(1, 0), None);
+    }
+
+    proptest! {
+        #[test]
+        fn an_object_comes_back_from_its_symbols(object in proptest::collection::vec(any::<u8>(), 1..3000), room in 9usize..1100) {
+            let layout = Layout::choose(object.len(), room).unwrap();
+            let mut bytes = object.clone();
+            layout.seal(&mut bytes);
+            prop_assert_eq!(bytes.len(), layout.bytes());
+            prop_assert_eq!(layout.open(bytes.clone()), Some(object));
+            bytes[room % layout.bytes()] ^= 1;
+            prop_assert_eq!(layout.open(bytes), None);
+        }
+
+        #[test]
+        fn each_symbol_has_a_place_of_its_own(sources in 1usize..=2048, symbol in 8usize..=8) {
+            let layout = Layout::new(sources, symbol);
+            prop_assume!(layout.is_some());
+            let layout = layout.unwrap();
+            let mut seen = vec![0; layout.blocks()];
+            for place in (0..layout.symbols()).map(|i| layout.place(i)) {
+                let at = match place {
+                    Place::Source(block, place) => (block, usize::from(place)),
+                    Place::Repair(block, place) => (block, layout.block_sources(block) + usize::from(place)),
+                };
+                prop_assert_eq!(seen[at.0], at.1);
+                seen[at.0] += 1;
+            }
+            for (block, &n) in seen.iter().enumerate() {
+                prop_assert_eq!(n, layout.block_symbols(block));
+                prop_assert!(n <= MAX_BLOCK && layout.block_sources(block) <= 128);
+            }
+            prop_assert!(layout.symbols() <= 4080);
+        }
+    }
+}

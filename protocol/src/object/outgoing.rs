@@ -1,0 +1,259 @@
+//! One object on its way to the peer.
+
+use super::code::add_repair;
+use super::layout::Place;
+use super::supply::Supply;
+use super::{Layout, ObjectId, Part};
+use std::collections::VecDeque;
+use std::ops::Range;
+
+/// Which symbols a part carried, and in which attempt at which object: its fate is told with it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SymbolRun {
+    pub(super) serial: u64,
+    attempt: u32,
+    symbols: Range<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Symbol {
+    /// In the queue, or not sent yet.
+    Waiting,
+    InFlight,
+    Delivered,
+    /// Left out: its block did without.
+    Skipped,
+}
+
+/// Symbols of a block by their state, and how many to have in flight.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    sources: usize,
+    waiting: usize,
+    in_flight: usize,
+    delivered: usize,
+    target: usize,
+}
+
+impl Block {
+    fn wanted(&self) -> usize {
+        self.target.saturating_sub(self.in_flight).min(self.waiting)
+    }
+
+    fn missing(&self) -> usize {
+        self.sources.saturating_sub(self.delivered)
+    }
+}
+
+/// What is known of the symbols of an object since its layout is fixed.
+#[derive(Debug)]
+struct Progress {
+    layout: Layout,
+    supply: Supply,
+    symbols: Vec<Symbol>,
+    blocks: Vec<Block>,
+    /// Lost symbols, to be sent again before new ones.
+    lost: VecDeque<Range<usize>>,
+    /// First symbol that was not sent yet.
+    fresh: usize,
+}
+
+/// An object on its way to the peer.
+#[derive(Debug)]
+pub(super) struct Outgoing {
+    pub(super) serial: u64,
+    attempt: u32,
+    /// The object; the bytes of all source symbols once the layout is fixed.
+    bytes: Vec<u8>,
+    progress: Option<Progress>,
+}
+
+impl Outgoing {
+    pub(super) fn new(serial: u64, bytes: Vec<u8>) -> Self {
+        Self { serial, attempt: 0, bytes, progress: None }
+    }
+
+    /// Bytes of the symbols that wait to be sent.
+    pub(super) fn backlog_bytes(&self) -> usize {
+        let wanted = |p: &Progress| p.blocks.iter().map(Block::wanted).sum::<usize>() * p.layout.symbol();
+        self.progress.as_ref().map_or(self.bytes.len() + Layout::TRAILER, wanted)
+    }
+
+    /// The next part of at most `room` bytes; a layout is fixed for parts of `usual` bytes.
+    pub(super) fn next_part(&mut self, room: usize, usual: usize, loss: f64) -> Option<(SymbolRun, Vec<u8>)> {
+        let room = room.checked_sub(Part::HEADER)?;
+        if self.progress.is_none() {
+            let layout = Layout::choose(self.bytes.len(), usual.checked_sub(Part::HEADER)?)?;
+            layout.seal(&mut self.bytes);
+            self.progress = Some(Progress::new(layout, usual, loss));
+        }
+        let progress = self.progress.as_mut()?;
+        let layout = progress.layout;
+        let symbols = progress.next_run(room / layout.symbol())?;
+        let id = ObjectId::of(self.serial);
+        let mut part = Part::header(id, layout, symbols.start, Part::HEADER + symbols.len() * layout.symbol());
+        for symbol in symbols.clone() {
+            self.write_symbol(layout, symbol, &mut part);
+        }
+        Some((SymbolRun { serial: self.serial, attempt: self.attempt, symbols }, part))
+    }
+
+    fn write_symbol(&self, layout: Layout, symbol: usize, out: &mut Vec<u8>) {
+        match layout.place(symbol) {
+            Place::Source(..) => {
+                let at = symbol * layout.symbol();
+                out.extend_from_slice(self.bytes.get(at..at + layout.symbol()).unwrap_or_default());
+            }
+            Place::Repair(block, repair) => {
+                let at = out.len();
+                out.resize(at + layout.symbol(), 0);
+                let to = out.get_mut(at..).unwrap_or_default();
+                add_repair(to, repair, layout.sources_of(block, &self.bytes));
+            }
+        }
+    }
+
+    pub(super) fn mark_in_flight(&mut self, run: &SymbolRun) {
+        if let Some(progress) = self.of_attempt(run) {
+            progress.mark(run.symbols.clone(), Symbol::Waiting, Symbol::InFlight);
+        }
+    }
+
+    /// Returns whether the object is complete at the peer.
+    pub(super) fn handle_fate(&mut self, run: &SymbolRun, delivered: bool) -> bool {
+        let Some(progress) = self.of_attempt(run) else { return false };
+        if delivered {
+            progress.mark(run.symbols.clone(), Symbol::InFlight, Symbol::Delivered);
+            progress.aim();
+        } else {
+            progress.mark(run.symbols.clone(), Symbol::InFlight, Symbol::Waiting);
+            progress.lost.push_back(run.symbols.clone());
+        }
+        progress.blocks.iter().all(|b| b.missing() == 0)
+    }
+
+    pub(super) fn set_loss(&mut self, usual: usize, loss: f64) {
+        if let Some(progress) = &mut self.progress {
+            progress.supply = supply_of(progress.layout, usual, loss);
+            progress.aim();
+        }
+    }
+
+    /// The peer has lost what it had received.
+    pub(super) fn handle_peer_restart(&mut self) {
+        self.attempt += 1;
+        if let Some(progress) = &mut self.progress {
+            let supply = progress.supply;
+            *progress = Progress::with_supply(progress.layout, supply);
+        }
+    }
+
+    fn of_attempt(&mut self, run: &SymbolRun) -> Option<&mut Progress> {
+        self.progress.as_mut().filter(|_| run.attempt == self.attempt)
+    }
+}
+
+fn supply_of(layout: Layout, usual: usize, loss: f64) -> Supply {
+    Supply::new(loss, usual.saturating_sub(Part::HEADER) / layout.symbol(), layout.blocks())
+}
+
+impl Progress {
+    fn new(layout: Layout, usual: usize, loss: f64) -> Self {
+        Self::with_supply(layout, supply_of(layout, usual, loss))
+    }
+
+    fn with_supply(layout: Layout, supply: Supply) -> Self {
+        let block = |b| Block {
+            sources: layout.block_sources(b),
+            waiting: layout.block_symbols(b),
+            in_flight: 0,
+            delivered: 0,
+            target: 0,
+        };
+        let mut progress = Self {
+            layout,
+            supply,
+            symbols: vec![Symbol::Waiting; layout.symbols()],
+            blocks: (0..layout.blocks()).map(block).collect(),
+            lost: VecDeque::new(),
+            fresh: 0,
+        };
+        progress.aim();
+        progress
+    }
+
+    /// Decides how many symbols of each block are to be in flight.
+    fn aim(&mut self) {
+        for block in &mut self.blocks {
+            block.target = self.supply.in_flight(block.missing());
+        }
+    }
+
+    /// The next consecutive symbols to send, at most `most`.
+    fn next_run(&mut self, most: usize) -> Option<Range<usize>> {
+        if most == 0 || self.blocks.iter().all(|b| b.wanted() == 0) {
+            return None;
+        }
+        while let Some(range) = self.lost.front().cloned() {
+            let start = self.skip_unwanted(range.clone());
+            if start < range.end {
+                self.lost.front_mut()?.start = start;
+                return Some(self.wanted_run(start..range.end, most));
+            }
+            self.lost.pop_front();
+        }
+        self.fresh = self.skip_unwanted(self.fresh..self.symbols.len());
+        (self.fresh < self.symbols.len()).then(|| self.wanted_run(self.fresh..self.symbols.len(), most))
+    }
+
+    /// The first symbol of `range` that is to be sent. Those before it are given up: either they are not waiting, or
+    /// what is in flight is enough for their block, and comes back if it is lost.
+    fn skip_unwanted(&mut self, range: Range<usize>) -> usize {
+        let end = range.end;
+        for symbol in range {
+            let Some(block) = self.blocks.get_mut(self.layout.place(symbol).block()) else { return end };
+            let Some(state) = self.symbols.get_mut(symbol).filter(|s| **s == Symbol::Waiting) else { continue };
+            if block.wanted() > 0 {
+                return symbol;
+            }
+            *state = Symbol::Skipped;
+            block.waiting -= 1;
+        }
+        end
+    }
+
+    /// As much of `range` as is to be sent in one part; some symbols too many are sent where a header would cost more.
+    fn wanted_run(&self, range: Range<usize>, most: usize) -> Range<usize> {
+        let mut wanted: Vec<usize> = self.blocks.iter().map(Block::wanted).collect();
+        let mut end = range.start;
+        for symbol in range.clone().take(most) {
+            if self.symbols.get(symbol) != Some(&Symbol::Waiting)
+                || (symbol - end) * self.layout.symbol() > Part::HEADER + 1
+            {
+                break;
+            }
+            if let Some(wanted) = wanted.get_mut(self.layout.place(symbol).block()).filter(|w| **w > 0) {
+                *wanted -= 1;
+                end = symbol + 1;
+            }
+        }
+        range.start..end
+    }
+
+    fn mark(&mut self, symbols: Range<usize>, from: Symbol, to: Symbol) {
+        for symbol in symbols {
+            let Some(state) = self.symbols.get_mut(symbol).filter(|s| **s == from) else { continue };
+            *state = to;
+            let Some(block) = self.blocks.get_mut(self.layout.place(symbol).block()) else { continue };
+            for (state, sign) in [(from, -1), (to, 1)] {
+                let count = match state {
+                    Symbol::Waiting => &mut block.waiting,
+                    Symbol::InFlight => &mut block.in_flight,
+                    Symbol::Delivered => &mut block.delivered,
+                    Symbol::Skipped => continue,
+                };
+                *count = count.saturating_add_signed(sign);
+            }
+        }
+    }
+}
