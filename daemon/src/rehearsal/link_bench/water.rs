@@ -196,7 +196,7 @@ impl Water {
         while let Some(entry) = self.ending.first_entry().filter(|e| e.key().0 <= self.now) {
             match entry.remove_entry().0.1 {
                 SURFACE => self.surface.handle_transmit_outcome(self.now),
-                NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_transmit_outcome(),
+                NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_transmit_outcome(self.now),
             }
         }
         while let Some(arrival) = self.channel.poll_arrival(self.now.into()) {
