@@ -1,0 +1,48 @@
+//! What became of the time on the medium and of the frames in it.
+
+use sim_channel::{LossReason, Outcome};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Frames of one direction, counted where they were meant to arrive.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Frames {
+    /// Frames that arrived or did not.
+    pub sent: u64,
+    /// Lost by the water.
+    pub lost: u64,
+    /// Lost because two spoke at a time, or to one that spoke itself.
+    pub talked_over: u64,
+}
+
+impl Frames {
+    /// Counts what became of a frame.
+    pub fn count(&mut self, outcome: &Outcome) {
+        self.sent += 1;
+        match outcome {
+            Outcome::Lost { reason: LossReason::SelfDeaf | LossReason::Collision, .. } => self.talked_over += 1,
+            Outcome::Lost { .. } => self.lost += 1,
+            Outcome::Delivered { .. } => {}
+        }
+    }
+
+    /// Share that the water lost of those that nobody talked over.
+    pub fn loss(&self) -> f64 {
+        self.lost as f64 / (self.sent - self.talked_over).max(1) as f64
+    }
+}
+
+/// Time on air by what it was for, and frames by direction.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Time on air by sender (`surface`, `vehicle`) and kind of frame.
+    pub airtime: BTreeMap<(&'static str, &'static str), Duration>,
+    /// Frames that began sooner after a frame for the same end had come in than its modem turns around.
+    pub hasty: u64,
+    /// From the surface.
+    pub down: Frames,
+    /// Times that the surface forgot what it had of a vehicle, or met it.
+    pub restarts: u64,
+    /// From the vehicles.
+    pub up: Frames,
+}
