@@ -82,6 +82,10 @@ impl<S: StateSource> VehicleLink<S> {
         let Some(quarters) = header.turn else { return };
         self.called = None;
         self.begin_turn();
+        if header.hello {
+            // It does not tell what the surface has heard.
+            self.forget_said();
+        }
         let grant = Grant::heard(quarters, header.remaining, &self.config.modem, now);
         self.floor.handle_grant((quarters > 0).then_some(grant));
     }

@@ -1,6 +1,6 @@
 //! When the vehicle speaks, and how a turn ends.
 
-use super::{Carried, VehicleLink};
+use super::{Carried, Said, VehicleLink};
 use crate::link::Transmit;
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
@@ -12,8 +12,6 @@ use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
 const SMALL_FRAME: usize = 48;
-/// Probability that something of what a turn says may be lost with all its copies, where there is time to repeat it.
-const RISK: f64 = 0.1;
 
 /// A frame about to be filled.
 struct Plan {
@@ -21,8 +19,6 @@ struct Plan {
     remaining: u32,
     /// Whether nothing new is expected to follow it in this turn.
     is_last_new: bool,
-    /// Times that what a turn says may be said.
-    copies: u32,
 }
 
 impl<S: StateSource> VehicleLink<S> {
@@ -52,28 +48,41 @@ impl<S: StateSource> VehicleLink<S> {
             (Some(call), _) => (self.write_here(call), true),
             (None, Some(bytes)) => {
                 self.pair.stats.repeated_bytes += bytes.len() as u64;
-                (Transmit { to: Address::SURFACE, bytes, kind: "again" }, self.repeats.is_empty())
+                // What is said again at the beginning of a turn may be known by now: something new always follows it.
+                let last = self.repeats.is_empty() && self.said_frames > 0;
+                (Transmit { to: Address::SURFACE, bytes, kind: "again" }, last)
             }
             (None, None) => self.write_frame(frames, now),
         };
         self.floor.spend(last);
-        if last {
-            self.begin_turn();
-        }
         self.budget.spend(modem.bits_on_air(transmit.bytes.len()), now);
         Some(transmit)
     }
 
-    /// Nothing was said in this turn yet.
+    /// Nothing was said in this turn yet. Where turns are taken, the surface has spoken after the end of our last one: what
+    /// it has not judged of that has not reached it, and if this is little, it is said again as it was.
     pub(super) fn begin_turn(&mut self) {
-        self.said.clear();
+        const FEW: usize = 8;
+        let horizon = self.pair.horizon();
+        self.said.retain(|s| s.number > horizon);
         self.said_frames = 0;
+        let all = self.said.len() as u64 == self.pair.outstanding();
+        let repeats = self.config.modem.access == Access::Shared && !self.pair.must_greet();
+        if !repeats || self.said.len() > FEW || !all {
+            self.said.clear();
+        }
+        self.repeats = self.said.iter().map(|s| s.bytes.clone()).collect();
+    }
+
+    /// What was said is not what would be said now.
+    pub(super) fn forget_said(&mut self) {
+        self.said.clear();
         self.repeats.clear();
     }
 
     fn end_turn(&mut self) {
         self.floor.give_up();
-        self.begin_turn();
+        self.repeats.clear();
     }
 
     fn has_reason_to_speak(&self, now: Instant) -> bool {
@@ -81,8 +90,12 @@ impl<S: StateSource> VehicleLink<S> {
             return true;
         }
         let answer = self.answer_due.is_some_and(|at| now >= at) || self.called.is_some();
-        let news = self.source.backlog_bytes() > 0 || self.objects.backlog_bytes() > 0;
+        let news = self.has_news();
         answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
+    }
+
+    fn has_news(&self) -> bool {
+        self.source.backlog_bytes() > 0 || self.objects.backlog_bytes() > 0
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
@@ -103,17 +116,23 @@ impl<S: StateSource> VehicleLink<S> {
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
-    /// How often what a turn of `frames` frames says is said, so that a loss need not wait for the next one: as the loss that
-    /// was measured asks, if the budget is not what limits the link.
-    fn copies(&self, frames: u32, now: Instant) -> u32 {
+    /// How often a turn of `frames` frames, `bytes` in all, is said, where nothing else is left to say: as long as saying it once more takes
+    /// less time than the next turn would, times the chance that this makes it needless. Never where the budget is what
+    /// limits the link, or where frames of earlier turns are of unknown fate: then another turn is needed anyway.
+    fn copies(&self, frames: u32, bytes: usize, now: Instant) -> u32 {
+        const MOST: i32 = 6;
         let modem = &self.config.modem;
         let budget_binds = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
-        match modem.access {
-            Access::Shared if !budget_binds || self.budget.is_plentiful(now) => {
-                self.pair.stats.loss_out.copies(RISK / f64::from(frames.max(1)), 6)
-            }
-            _ => 1,
+        let covered = self.pair.outstanding() <= self.said.len() as u64;
+        if modem.access != Access::Shared || !covered || (budget_binds && !self.budget.is_plentiful(now)) {
+            return 1;
         }
+        let loss = self.pair.stats.loss_out.expected().clamp(0.0, 0.95);
+        let incomplete = |copies: i32| 1.0 - (1.0 - loss.powi(copies)).powi(frames.min(1000) as i32);
+        let again = modem.time_of(bytes as u64 * 8 + modem.overhead_bits * u64::from(frames)).as_secs_f64();
+        let next_turn = self.time_of_hands().as_secs_f64();
+        let worth = |copies: i32| again < (incomplete(copies) - incomplete(copies + 1)) * next_turn;
+        (1..MOST).find(|&copies| !worth(copies)).unwrap_or(MOST) as u32
     }
 
     /// Room for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and then
@@ -130,50 +149,36 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    /// Time that may go to repetitions at the end of a turn: about as long as changing hands takes.
-    fn time_to_repeat(&self) -> Duration {
+    /// Time from the end of a turn to the beginning of the next, if both ways get through.
+    fn time_of_hands(&self) -> Duration {
         let modem = &self.config.modem;
-        let hands = (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2;
-        hands.max(modem.frame_airtime() * 2)
-    }
-
-    /// How many frames to say again once all is said, with a last new one of `own` bytes; at most `most`.
-    fn count_repeats(&self, own: usize, copies: u32, most: u32) -> u32 {
-        let modem = &self.config.modem;
-        let round = std::iter::once(own).chain(self.said.iter().rev().map(Vec::len));
-        let mut time = self.time_to_repeat();
-        let mut fits = |bytes: usize| {
-            time = time.saturating_sub(modem.airtime(bytes));
-            !time.is_zero()
-        };
-        (0..copies.saturating_sub(1)).flat_map(|_| round.clone()).take(most as usize).take_while(|&n| fits(n)).count()
-            as u32
+        (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2 + modem.airtime(32)
     }
 
     /// The last `count` frames of this turn, round and round, the last one at the end: it tells what follows.
     fn again(&self, count: u32) -> VecDeque<Vec<u8>> {
-        let mut again: VecDeque<Vec<u8>> = self.said.iter().rev().cycle().take(count as usize).cloned().collect();
+        let mut again: VecDeque<Vec<u8>> =
+            self.said.iter().rev().map(|s| s.bytes.clone()).cycle().take(count as usize).collect();
         again.make_contiguous().reverse();
         again
     }
 
     fn plan(&self, frames: u32, now: Instant) -> Plan {
         if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
-            return Plan { remaining: 0, is_last_new: false, copies: 1 };
+            return Plan { remaining: 0, is_last_new: false };
         }
         let wanted = self.frames_wanted();
         let said = self.said.len() as u32 + wanted;
-        let copies = self.copies(said, now);
-        let time = self.time_to_repeat().as_secs_f64() / self.config.modem.frame_airtime().as_secs_f64();
-        let repeats = (said * (copies - 1)).min(time as u32);
-        Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1, copies }
+        let copies = self.copies(said, self.config.modem.frame_bytes * said as usize, now);
+        let repeats = said * (copies - 1);
+        Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1 }
     }
 
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
         let greets = self.pair.must_greet();
-        let plan = if greets { Plan { remaining: 0, is_last_new: true, copies: 1 } } else { self.plan(frames, now) };
+        let plan = if greets { Plan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !greets).then(|| self.wish(now));
         let stamp = self.stamp(now).filter(|_| plan.is_last_new || self.said_frames == 0);
         let ack_room = self.ack_room(plan.is_last_new);
@@ -186,7 +191,11 @@ impl<S: StateSource> VehicleLink<S> {
         let said_all = takes_turns && !greets && self.source.backlog_bytes() + self.objects.backlog_bytes() == 0;
         let remaining = match said_all {
             // What was said is said again as far as that is of use.
-            true if !carried.is_empty() => self.count_repeats(builder.len(true), plan.copies, frames - 1),
+            true if !carried.is_empty() => {
+                let said = self.said.len() as u32 + 1;
+                let bytes = self.said.iter().map(|s| s.bytes.len()).sum::<usize>() + builder.len(true);
+                (said * (self.copies(said, bytes, now) - 1)).min(frames - 1)
+            }
             true => 0,
             // Where nothing more fits, what is left waits for the next turn.
             false if carried.is_empty() => 0,
@@ -220,7 +229,8 @@ impl<S: StateSource> VehicleLink<S> {
         if self.said.len() == MOST_KEPT {
             self.said.pop_front();
         }
-        self.said.push_back(transmit.bytes.clone());
+        let number = self.pair.next_number() - 1;
+        self.said.push_back(Said { number, bytes: transmit.bytes.clone() });
         if said_all && remaining > 0 {
             self.repeats = self.again(remaining);
         }
