@@ -1,7 +1,9 @@
 //! The vehicle's end of the link.
 
+mod call;
 mod fill;
 mod receive;
+mod repeat;
 mod turn;
 
 use super::{Authenticity, LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};

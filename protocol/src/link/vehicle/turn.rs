@@ -1,13 +1,12 @@
 //! When the vehicle speaks, and how a turn ends.
 
-use super::{Carried, Said, VehicleLink};
+use super::{Carried, VehicleLink};
 use crate::link::Transmit;
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder, Header, Seal, Stamp};
-use std::collections::VecDeque;
+use crate::wire::{Address, FrameBuilder, Stamp};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -59,27 +58,6 @@ impl<S: StateSource> VehicleLink<S> {
         Some(transmit)
     }
 
-    /// Nothing was said in this turn yet. Where turns are taken, the surface has spoken after the end of our last one: what
-    /// it has not judged of that has not reached it, and if this is little, it is said again as it was.
-    pub(super) fn begin_turn(&mut self) {
-        const FEW: usize = 8;
-        let horizon = self.pair.horizon();
-        self.said.retain(|s| s.number > horizon);
-        self.said_frames = 0;
-        let all = self.said.len() as u64 == self.pair.outstanding();
-        let repeats = self.config.modem.access == Access::Shared && !self.pair.must_greet();
-        if !repeats || self.said.len() > FEW || !all {
-            self.said.clear();
-        }
-        self.repeats = self.said.iter().map(|s| s.bytes.clone()).collect();
-    }
-
-    /// What was said is not what would be said now.
-    pub(super) fn forget_said(&mut self) {
-        self.said.clear();
-        self.repeats.clear();
-    }
-
     fn end_turn(&mut self) {
         self.floor.give_up();
         self.repeats.clear();
@@ -116,25 +94,6 @@ impl<S: StateSource> VehicleLink<S> {
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
-    /// How often a turn of `frames` frames, `bytes` in all, is said, where nothing else is left to say: as long as saying it once more takes
-    /// less time than the next turn would, times the chance that this makes it needless. Never where the budget is what
-    /// limits the link, or where frames of earlier turns are of unknown fate: then another turn is needed anyway.
-    fn copies(&self, frames: u32, bytes: usize, now: Instant) -> u32 {
-        const MOST: i32 = 6;
-        let modem = &self.config.modem;
-        let budget_binds = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
-        let covered = self.pair.outstanding() <= self.said.len() as u64;
-        if modem.access != Access::Shared || !covered || (budget_binds && !self.budget.is_plentiful(now)) {
-            return 1;
-        }
-        let loss = self.pair.stats.loss_out.expected().clamp(0.0, 0.95);
-        let incomplete = |copies: i32| 1.0 - (1.0 - loss.powi(copies)).powi(frames.min(1000) as i32);
-        let again = modem.time_of(bytes as u64 * 8 + modem.overhead_bits * u64::from(frames)).as_secs_f64();
-        let next_turn = self.time_of_hands().as_secs_f64();
-        let worth = |copies: i32| again < (incomplete(copies) - incomplete(copies + 1)) * next_turn;
-        (1..MOST).find(|&copies| !worth(copies)).unwrap_or(MOST) as u32
-    }
-
     /// Room for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and then
     /// now and again.
     fn ack_room(&self, is_last_new: bool) -> usize {
@@ -147,20 +106,6 @@ impl<S: StateSource> VehicleLink<S> {
             true => size / 6,
             false => 0,
         }
-    }
-
-    /// Time from the end of a turn to the beginning of the next, if both ways get through.
-    fn time_of_hands(&self) -> Duration {
-        let modem = &self.config.modem;
-        (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2 + modem.airtime(32)
-    }
-
-    /// The last `count` frames of this turn, round and round, the last one at the end: it tells what follows.
-    fn again(&self, count: u32) -> VecDeque<Vec<u8>> {
-        let mut again: VecDeque<Vec<u8>> =
-            self.said.iter().rev().map(|s| s.bytes.clone()).cycle().take(count as usize).collect();
-        again.make_contiguous().reverse();
-        again
     }
 
     fn plan(&self, frames: u32, now: Instant) -> Plan {
@@ -222,50 +167,9 @@ impl<S: StateSource> VehicleLink<S> {
         Transmit { to: Address::SURFACE, bytes, kind }
     }
 
-    /// Keeps what was said in this turn; once all is said, the rest of the turn goes to saying it again.
-    fn remember(&mut self, transmit: &Transmit, said_all: bool, remaining: u32) {
-        const MOST_KEPT: usize = 64;
-        self.said_frames += 1;
-        if self.said.len() == MOST_KEPT {
-            self.said.pop_front();
-        }
-        let number = self.pair.next_number() - 1;
-        self.said.push_back(Said { number, bytes: transmit.bytes.clone() });
-        if said_all && remaining > 0 {
-            self.repeats = self.again(remaining);
-        }
-    }
-
     fn stamp(&self, now: Instant) -> Option<Stamp> {
         let heard = self.heard.filter(|_| self.config.modem.frame_bytes >= SMALL_FRAME)?;
         Some(Stamp::Vehicle { clock_ms: Stamp::clock(now), heard: heard.number as u8, held: now.since(heard.at) })
-    }
-
-    /// "Here": the answer to a call for vehicles that are not known.
-    fn write_here(&mut self, (session, nonce): (crate::wire::SessionId, u64)) -> Transmit {
-        let authenticity = self.config.authenticity.clone();
-        let header = Header {
-            from: self.config.address,
-            to: Address::SURFACE,
-            session,
-            number: 0,
-            base: 1,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: authenticity.as_ref().map(|_| nonce),
-            ack: None,
-            hello: true,
-            keyed: authenticity.is_some(),
-        };
-        let builder = FrameBuilder::new(&header, self.config.modem.frame_bytes);
-        let mission = self.config.mission;
-        let bytes = match &authenticity {
-            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, session.get(), nonce), true),
-            None => builder.finish(&Seal::Crc(mission, session.get()), true),
-        };
-        self.pair.stats.count(Class::Overhead, bytes.len());
-        Transmit { to: Address::SURFACE, bytes, kind: "hello" }
     }
 
     /// When another turn would be of use, as the turn byte says it.
