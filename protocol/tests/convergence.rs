@@ -58,12 +58,14 @@ proptest! {
         seed: u64,
         water in water(),
         setup in setup(),
-        restarts in proptest::collection::vec(0u8..6, 6),
+        restarts in proptest::collection::vec((0u8..6, 0u8..6), 6),
     ) {
         let budget = setup.budget_bps;
         let mut pair = Pair::new(seed, setup, water);
-        for (step, what) in restarts.into_iter().enumerate() {
+        for (step, (what, outage)) in restarts.into_iter().enumerate() {
             let map = patchy(24, step as u64);
+            // Now and then one way is cut, or both.
+            pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
             pair.vehicle.set_map(map.iter(), pair.now);
             pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
             pair.run(pair.now + Duration::from_secs(40), false);
@@ -73,6 +75,7 @@ proptest! {
                 _ => {}
             }
         }
+        pair.mute = [false; 2];
         pair.run(pair.now + Duration::from_secs(100_000), true);
         prop_assert!(pair.is_converged(), "maps differ: {:?}", pair.vehicle.stats());
         assert_budget(&pair, budget);

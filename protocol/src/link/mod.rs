@@ -3,7 +3,6 @@
 //! [`VehicleLink`] and [`SurfaceLink`] are the ends. What they share, the state of a pair of ends, is in [`Pair`], split by
 //! concern: who speaks with whom (`meeting`, `run`), [`Flight`] (frames of unknown fate), [`Window`] (frames heard).
 
-mod discovery;
 mod estimate;
 mod flight;
 mod meeting;
@@ -12,12 +11,6 @@ mod run;
 mod slots;
 mod stats;
 mod surface;
-mod surface_grant;
-mod surface_peer;
-mod surface_polled;
-mod surface_pool;
-mod surface_turn;
-mod surface_view;
 mod vehicle;
 mod window;
 
@@ -27,9 +20,7 @@ pub use pair::{Inbound, Pair};
 pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
-pub use surface::{IssueError, SurfaceConfig, SurfaceEvent, SurfaceLink};
-pub use surface_polled::Cycle;
-pub use surface_view::PeerView;
+pub use surface::{Cycle, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
 pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{Refusal, Window};
 

@@ -80,6 +80,11 @@ impl<T> Pair<T> {
         self.meeting.run().is_some_and(|r| r.flight.is_full())
     }
 
+    /// Frames of unknown fate.
+    pub fn outstanding(&self) -> u64 {
+        self.meeting.run().map_or(0, |r| r.flight.next_number() - 1 - r.flight.horizon())
+    }
+
     /// The last frame whose fate is known.
     pub fn horizon(&self) -> FrameNumber {
         self.meeting.run().map_or(0, |r| r.flight.horizon())

@@ -48,6 +48,9 @@ pub struct Master {
     round_trips: VecDeque<Duration>,
     unanswered: u32,
     granted_airtime: Duration,
+    /// When the last turn was granted, and whether the vehicle had so much to say that it took most of it.
+    granted: Option<Instant>,
+    is_saturated: bool,
     begun: Option<Instant>,
 }
 
@@ -63,6 +66,8 @@ impl Master {
             round_trips: VecDeque::new(),
             unanswered: 0,
             granted_airtime: Duration::ZERO,
+            granted: None,
+            is_saturated: true,
             begun: None,
         }
     }
@@ -149,8 +154,10 @@ impl Master {
             self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
         // A vehicle farther away than it was thought to be must not be talked over for ever.
         let patience = Duration::from_secs(1) * self.unanswered.saturating_sub(4).min(10);
-        let answer = (profile.frame_airtime() * (losable + 1)).min(self.granted_airtime.max(profile.frame_airtime()));
+        let frames = if self.is_saturated { losable + 1 } else { 1 };
+        let answer = (profile.frame_airtime() * frames).min(self.granted_airtime.max(profile.frame_airtime()));
         let until = now + patience + flight + profile.turn_around * 2 + answer;
+        self.granted = Some(now);
         self.state = State::Granted { granted: now, until };
     }
 
@@ -184,8 +191,10 @@ impl Master {
             self.handle_round_trip(both_ways);
         }
         self.unanswered = 0;
+        let rest = profile.frame_airtime() * u32::from(remaining);
+        let taken = self.granted.map_or(Duration::ZERO, |at| now.since(at)) + rest;
+        self.is_saturated = taken >= self.granted_airtime.mul_f64(0.6);
         if remaining > 0 {
-            let rest = profile.frame_airtime() * u32::from(remaining);
             let margin = profile.turn_around + profile.frame_airtime() / 2;
             let until = now + rest.min(self.granted_airtime) + margin;
             self.state = State::Listening { until };

@@ -1,5 +1,8 @@
 //! Two ends on a virtual clock with an unkind pipe between them.
 
+// Each test program uses a part of it.
+#![allow(dead_code)]
+
 use scenecast_protocol::directive::{Constraints, Slot, Utility};
 use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
@@ -30,6 +33,7 @@ pub(crate) struct Water {
 /// What the two ends have in common.
 #[derive(Debug, Clone)]
 pub(crate) struct Setup {
+    pub(crate) mission: MissionId,
     pub(crate) frame_bytes: usize,
     pub(crate) budget_bps: u32,
     pub(crate) codec: Codec,
@@ -39,7 +43,7 @@ pub(crate) struct Setup {
 
 impl Setup {
     pub(crate) fn new(frame_bytes: usize, budget_bps: u32, codec: Codec) -> Self {
-        Self { frame_bytes, budget_bps, codec, access: Access::Shared, authenticity: None }
+        Self { mission: MissionId(7), frame_bytes, budget_bps, codec, access: Access::Shared, authenticity: None }
     }
 
     pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
@@ -73,7 +77,8 @@ pub(crate) struct Pair {
     on_air: BTreeMap<(Instant, u64), Event>,
     /// What waits in each modem, and whether it is sending.
     modems: [(VecDeque<Vec<u8>>, bool); 2],
-    overheard: VecDeque<Vec<u8>>,
+    /// The last transmissions of both ends.
+    pub(crate) overheard: VecDeque<Vec<u8>>,
     serial: u64,
     durable: SlotInboxState,
 }
@@ -141,6 +146,11 @@ impl Pair {
 
     pub(crate) fn is_converged(&self) -> bool {
         self.shown() == self.vehicle.map() && self.vehicle.is_settled()
+    }
+
+    /// How much the two ends hold, as the length of what they tell a debugger.
+    pub(crate) fn size(&self) -> usize {
+        format!("{:?}{:?}", self.vehicle, self.surface).len()
     }
 
     /// Runs until `until`, or until both maps agree if that is asked for.
@@ -243,8 +253,8 @@ impl Pair {
             let at = end + self.water.propagation + Duration::from_secs_f64(late);
             self.schedule(at, Event::Arrives { at_vehicle: !by_vehicle, bytes });
         }
-        self.overheard.push_back(bytes);
-        self.overheard.truncate(200);
+        self.overheard.push_front(bytes);
+        self.overheard.truncate(400);
         if self.draw() < self.water.talker {
             self.talk(end);
         }
@@ -283,7 +293,7 @@ impl Pair {
 fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> VehicleLink {
     let config = VehicleConfig {
         address: auv(),
-        mission: MissionId(7),
+        mission: setup.mission,
         modem: setup.modem(),
         budget_bps: setup.budget_bps,
         budget_window: Duration::from_secs(10),
@@ -296,7 +306,7 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
 
 fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
     let config = SurfaceConfig {
-        mission: MissionId(7),
+        mission: setup.mission,
         modem: setup.modem(),
         budget_bps: setup.budget_bps,
         budget_window: Duration::from_secs(10),

@@ -1,7 +1,9 @@
 //! The vehicle's end of the link.
 
+mod call;
 mod fill;
 mod receive;
+mod repeat;
 mod turn;
 
 use super::{Authenticity, LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
@@ -76,6 +78,13 @@ impl<C> Part<C> {
 /// What a frame carried, each with its bytes.
 type Carried<C> = Vec<(Part<C>, usize)>;
 
+/// A frame that was sent.
+#[derive(Debug)]
+struct Said {
+    number: u64,
+    bytes: Vec<u8>,
+}
+
 /// The last frame of the surface that a stamp of ours can name.
 #[derive(Debug, Clone, Copy)]
 struct HeardLast {
@@ -97,8 +106,8 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     pose_due: Instant,
     report_due: Instant,
     floor: Floor,
-    /// Frames of this turn, to be sent again if nothing else is left to say.
-    said: VecDeque<Vec<u8>>,
+    /// Frames of this turn, to be sent again if nothing else is left to say, or if the surface has not heard the last of them.
+    said: VecDeque<Said>,
     said_frames: usize,
     repeats: VecDeque<Vec<u8>>,
     /// Where the modem decides when to speak: when the surface is to have our acknowledgement, or our hello.
@@ -153,6 +162,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// What is replicated, to change it.
     pub fn source_mut(&mut self) -> &mut S {
+        self.forget_said();
         &mut self.source
     }
 
@@ -275,7 +285,7 @@ impl<S: StateSource> VehicleLink<S> {
         self.source.handle_peer_restart(now);
         self.objects.handle_peer_restart();
         (self.pose_due, self.report_due, self.heard) = (now, now, None);
-        self.begin_turn();
+        self.forget_said();
     }
 
     /// When [`Self::poll_transmit`] next may have a frame, if the link is not waiting for the surface.
@@ -299,7 +309,11 @@ impl VehicleLink {
 
     /// Sets labels of cells; what the surface does not hold yet is sent when there is room.
     pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
-        self.source.set(cells, now)
+        let changed = self.source.set(cells, now);
+        if changed > 0 {
+            self.forget_said();
+        }
+        changed
     }
 
     /// Label ids start afresh: begins a new run toward the surface, which then forgets the map it has.

@@ -6,7 +6,7 @@ use crate::link::DropReason;
 use crate::mac::{Access, ClockMap, Grant};
 use crate::map::StateSource;
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, Envelope, Header, Seal, Stamp};
+use crate::wire::{Address, ChunkKind, Envelope, Header, Stamp};
 use std::time::Duration;
 
 impl<S: StateSource> VehicleLink<S> {
@@ -57,31 +57,14 @@ impl<S: StateSource> VehicleLink<S> {
         self.owe_answer(now);
     }
 
-    /// The surface asks who is there. One that it does not speak with answers at a time of its own choosing.
-    fn handle_call(&mut self, envelope: &Envelope<'_>, now: Instant) {
-        let sound = match &self.config.authenticity {
-            Some(a) => envelope.open(&Seal::Hello(&a.key, self.config.mission, 0, 0)).is_some(),
-            None => envelope.open(&Seal::Crc(self.config.mission, 0)).is_some(),
-        };
-        let header = &envelope.header;
-        if !sound || !header.hello {
-            return self.pair.stats.drop(DropReason::Checksum);
-        }
-        if self.pair.is_met() && self.heard.is_some_and(|h| now.since(h.at) < Duration::from_secs(60)) {
-            return;
-        }
-        self.called = Some((header.session, header.nonce.unwrap_or_default()));
-        let window = Duration::from_millis(250) * u32::from(header.turn.unwrap_or_default());
-        let share = (crate::random::next(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
-        let begins = now + self.config.modem.turn_around + window.mul_f64(share);
-        self.begin_turn();
-        self.floor.handle_grant(Some(Grant { begins, ends: begins + self.config.modem.frame_airtime() * 2 }));
-    }
-
     fn handle_turn(&mut self, header: &Header, now: Instant) {
         let Some(quarters) = header.turn else { return };
         self.called = None;
         self.begin_turn();
+        if header.hello {
+            // It does not tell what the surface has heard.
+            self.forget_said();
+        }
         let grant = Grant::heard(quarters, header.remaining, &self.config.modem, now);
         self.floor.handle_grant((quarters > 0).then_some(grant));
     }

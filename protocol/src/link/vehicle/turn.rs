@@ -6,14 +6,11 @@ use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder, Header, Seal, Stamp};
-use std::collections::VecDeque;
+use crate::wire::{Address, FrameBuilder, Stamp};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
 const SMALL_FRAME: usize = 48;
-/// Probability that something of what a turn says may be lost with all its copies, where there is time to repeat it.
-const RISK: f64 = 0.1;
 
 /// A frame about to be filled.
 struct Plan {
@@ -21,8 +18,6 @@ struct Plan {
     remaining: u32,
     /// Whether nothing new is expected to follow it in this turn.
     is_last_new: bool,
-    /// Times that what a turn says may be said.
-    copies: u32,
 }
 
 impl<S: StateSource> VehicleLink<S> {
@@ -52,28 +47,20 @@ impl<S: StateSource> VehicleLink<S> {
             (Some(call), _) => (self.write_here(call), true),
             (None, Some(bytes)) => {
                 self.pair.stats.repeated_bytes += bytes.len() as u64;
-                (Transmit { to: Address::SURFACE, bytes, kind: "again" }, self.repeats.is_empty())
+                // What is said again at the beginning of a turn may be known by now: something new always follows it.
+                let last = self.repeats.is_empty() && self.said_frames > 0;
+                (Transmit { to: Address::SURFACE, bytes, kind: "again" }, last)
             }
             (None, None) => self.write_frame(frames, now),
         };
         self.floor.spend(last);
-        if last {
-            self.begin_turn();
-        }
         self.budget.spend(modem.bits_on_air(transmit.bytes.len()), now);
         Some(transmit)
     }
 
-    /// Nothing was said in this turn yet.
-    pub(super) fn begin_turn(&mut self) {
-        self.said.clear();
-        self.said_frames = 0;
-        self.repeats.clear();
-    }
-
     fn end_turn(&mut self) {
         self.floor.give_up();
-        self.begin_turn();
+        self.repeats.clear();
     }
 
     fn has_reason_to_speak(&self, now: Instant) -> bool {
@@ -81,8 +68,12 @@ impl<S: StateSource> VehicleLink<S> {
             return true;
         }
         let answer = self.answer_due.is_some_and(|at| now >= at) || self.called.is_some();
-        let news = self.source.backlog_bytes() > 0 || self.objects.backlog_bytes() > 0;
+        let news = self.has_news();
         answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
+    }
+
+    fn has_news(&self) -> bool {
+        self.source.backlog_bytes() > 0 || self.objects.backlog_bytes() > 0
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
@@ -103,19 +94,6 @@ impl<S: StateSource> VehicleLink<S> {
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
-    /// How often what a turn of `frames` frames says is said, so that a loss need not wait for the next one: as the loss that
-    /// was measured asks, if the budget is not what limits the link.
-    fn copies(&self, frames: u32, now: Instant) -> u32 {
-        let modem = &self.config.modem;
-        let budget_binds = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
-        match modem.access {
-            Access::Shared if !budget_binds || self.budget.is_plentiful(now) => {
-                self.pair.stats.loss_out.copies(RISK / f64::from(frames.max(1)), 6)
-            }
-            _ => 1,
-        }
-    }
-
     /// Room for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and then
     /// now and again.
     fn ack_room(&self, is_last_new: bool) -> usize {
@@ -130,50 +108,22 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    /// Time that may go to repetitions at the end of a turn: about as long as changing hands takes.
-    fn time_to_repeat(&self) -> Duration {
-        let modem = &self.config.modem;
-        let hands = (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2;
-        hands.max(modem.frame_airtime() * 2)
-    }
-
-    /// How many frames to say again once all is said, with a last new one of `own` bytes; at most `most`.
-    fn count_repeats(&self, own: usize, copies: u32, most: u32) -> u32 {
-        let modem = &self.config.modem;
-        let round = std::iter::once(own).chain(self.said.iter().rev().map(Vec::len));
-        let mut time = self.time_to_repeat();
-        let mut fits = |bytes: usize| {
-            time = time.saturating_sub(modem.airtime(bytes));
-            !time.is_zero()
-        };
-        (0..copies.saturating_sub(1)).flat_map(|_| round.clone()).take(most as usize).take_while(|&n| fits(n)).count()
-            as u32
-    }
-
-    /// The last `count` frames of this turn, round and round, the last one at the end: it tells what follows.
-    fn again(&self, count: u32) -> VecDeque<Vec<u8>> {
-        let mut again: VecDeque<Vec<u8>> = self.said.iter().rev().cycle().take(count as usize).cloned().collect();
-        again.make_contiguous().reverse();
-        again
-    }
-
     fn plan(&self, frames: u32, now: Instant) -> Plan {
         if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
-            return Plan { remaining: 0, is_last_new: false, copies: 1 };
+            return Plan { remaining: 0, is_last_new: false };
         }
         let wanted = self.frames_wanted();
         let said = self.said.len() as u32 + wanted;
-        let copies = self.copies(said, now);
-        let time = self.time_to_repeat().as_secs_f64() / self.config.modem.frame_airtime().as_secs_f64();
-        let repeats = (said * (copies - 1)).min(time as u32);
-        Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1, copies }
+        let copies = self.copies(said, self.config.modem.frame_bytes * said as usize, now);
+        let repeats = said * (copies - 1);
+        Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1 }
     }
 
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
         let greets = self.pair.must_greet();
-        let plan = if greets { Plan { remaining: 0, is_last_new: true, copies: 1 } } else { self.plan(frames, now) };
+        let plan = if greets { Plan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !greets).then(|| self.wish(now));
         let stamp = self.stamp(now).filter(|_| plan.is_last_new || self.said_frames == 0);
         let ack_room = self.ack_room(plan.is_last_new);
@@ -186,7 +136,11 @@ impl<S: StateSource> VehicleLink<S> {
         let said_all = takes_turns && !greets && self.source.backlog_bytes() + self.objects.backlog_bytes() == 0;
         let remaining = match said_all {
             // What was said is said again as far as that is of use.
-            true if !carried.is_empty() => self.count_repeats(builder.len(true), plan.copies, frames - 1),
+            true if !carried.is_empty() => {
+                let said = self.said.len() as u32 + 1;
+                let bytes = self.said.iter().map(|s| s.bytes.len()).sum::<usize>() + builder.len(true);
+                (said * (self.copies(said, bytes, now) - 1)).min(frames - 1)
+            }
             true => 0,
             // Where nothing more fits, what is left waits for the next turn.
             false if carried.is_empty() => 0,
@@ -213,49 +167,9 @@ impl<S: StateSource> VehicleLink<S> {
         Transmit { to: Address::SURFACE, bytes, kind }
     }
 
-    /// Keeps what was said in this turn; once all is said, the rest of the turn goes to saying it again.
-    fn remember(&mut self, transmit: &Transmit, said_all: bool, remaining: u32) {
-        const MOST_KEPT: usize = 64;
-        self.said_frames += 1;
-        if self.said.len() == MOST_KEPT {
-            self.said.pop_front();
-        }
-        self.said.push_back(transmit.bytes.clone());
-        if said_all && remaining > 0 {
-            self.repeats = self.again(remaining);
-        }
-    }
-
     fn stamp(&self, now: Instant) -> Option<Stamp> {
         let heard = self.heard.filter(|_| self.config.modem.frame_bytes >= SMALL_FRAME)?;
         Some(Stamp::Vehicle { clock_ms: Stamp::clock(now), heard: heard.number as u8, held: now.since(heard.at) })
-    }
-
-    /// "Here": the answer to a call for vehicles that are not known.
-    fn write_here(&mut self, (session, nonce): (crate::wire::SessionId, u64)) -> Transmit {
-        let authenticity = self.config.authenticity.clone();
-        let header = Header {
-            from: self.config.address,
-            to: Address::SURFACE,
-            session,
-            number: 0,
-            base: 1,
-            remaining: 0,
-            turn: None,
-            stamp: None,
-            nonce: authenticity.as_ref().map(|_| nonce),
-            ack: None,
-            hello: true,
-            keyed: authenticity.is_some(),
-        };
-        let builder = FrameBuilder::new(&header, self.config.modem.frame_bytes);
-        let mission = self.config.mission;
-        let bytes = match &authenticity {
-            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, session.get(), nonce), true),
-            None => builder.finish(&Seal::Crc(mission, session.get()), true),
-        };
-        self.pair.stats.count(Class::Overhead, bytes.len());
-        Transmit { to: Address::SURFACE, bytes, kind: "hello" }
     }
 
     /// When another turn would be of use, as the turn byte says it.

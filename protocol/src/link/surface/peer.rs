@@ -1,8 +1,8 @@
 //! What the surface keeps for one vehicle.
 
-use super::surface_view::Contact;
-use super::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
+use super::view::Contact;
 use crate::directive::{Slot, SlotId, SlotOutbox};
+use crate::link::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
 use crate::mac::{ClockMap, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::object::{ObjectReceiver, Part, Received};

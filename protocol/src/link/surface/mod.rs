@@ -1,17 +1,28 @@
 //! The surface's end of the link.
 
-use super::discovery::Discovery;
-use super::surface_peer::Peer;
-use super::surface_turn::{Ready, room_for_slot};
-use super::{Authenticity, DropReason, FrameNumber, PeerView, Transmit};
+mod discovery;
+mod grant;
+mod peer;
+mod polled;
+mod pool;
+mod turn;
+mod view;
+
+pub use polled::Cycle;
+pub use view::PeerView;
+
 use crate::directive::{Slot, SlotId, VersionedSlot};
+use crate::link::{Authenticity, DropReason, FrameNumber, Transmit};
 use crate::mac::{Access, MasterConfig, ModemProfile};
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
 use crate::wire::{Address, Envelope, MissionId, Seal};
+use discovery::Discovery;
+use peer::Peer;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
+use turn::{Ready, room_for_slot};
 
 /// Settings of the surface's end.
 #[derive(Debug, Clone)]
@@ -87,29 +98,29 @@ impl SurfaceEvent {
 
 /// A frame that the modem has.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct OnAir {
-    pub(super) to: Address,
-    pub(super) number: Option<FrameNumber>,
+struct OnAir {
+    to: Address,
+    number: Option<FrameNumber>,
     /// Whether a turn ends with it.
-    pub(super) last: bool,
+    last: bool,
 }
 
 /// The surface's end of the link: grants turns, holds a replica a vehicle, sends each its directive.
 #[derive(Debug)]
 pub struct SurfaceLink<R: StateReplica = Replica> {
-    pub(super) config: SurfaceConfig,
-    pub(super) peers: BTreeMap<Address, Peer<R>>,
-    pub(super) budget: BitBudget,
-    pub(super) shares: ClassShares,
+    config: SurfaceConfig,
+    peers: BTreeMap<Address, Peer<R>>,
+    budget: BitBudget,
+    shares: ClassShares,
     /// Whose turn it is; the surface speaks with one vehicle at a time.
-    pub(super) current: Option<Address>,
+    current: Option<Address>,
     /// What is left of the surface's own turn.
-    pub(super) turn: VecDeque<Ready>,
-    pub(super) in_modem: VecDeque<OnAir>,
-    pub(super) discovery: Discovery,
-    pub(super) cycle: super::surface_polled::Cycles,
+    turn: VecDeque<Ready>,
+    in_modem: VecDeque<OnAir>,
+    discovery: Discovery,
+    cycle: polled::Cycles,
     series: u16,
-    pub(super) random: u64,
+    random: u64,
     events: VecDeque<SurfaceEvent>,
     /// Frames that no vehicle that we know has sent.
     strangers: u64,
@@ -129,7 +140,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             turn: VecDeque::new(),
             in_modem: VecDeque::new(),
             discovery: Discovery::new(config.call_every, known, config.master.max_propagation, now),
-            cycle: super::surface_polled::Cycles::default(),
+            cycle: polled::Cycles::default(),
             series,
             random,
             events: VecDeque::new(),
@@ -270,7 +281,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 
     /// Puts a frame into the modem.
-    pub(super) fn send(&mut self, ready: Ready, last: bool, now: Instant) -> Transmit {
+    fn send(&mut self, ready: Ready, last: bool, now: Instant) -> Transmit {
         let to = ready.transmit.to;
         self.in_modem.push_back(OnAir { to, number: ready.number, last });
         self.budget.spend(self.config.modem.bits_on_air(ready.transmit.bytes.len()), now);

@@ -1,7 +1,7 @@
 //! Turns where a cycle of the modem is the grant, as the cycle-init of a WHOI Micromodem is.
 
-use super::Transmit;
-use super::surface::SurfaceLink;
+use super::SurfaceLink;
+use crate::link::Transmit;
 use crate::map::StateReplica;
 use crate::time::Instant;
 use crate::wire::Address;

@@ -1,9 +1,9 @@
 //! When the surface speaks through a modem that does half duplex by itself: whenever there is something to say and the
 //! modem's pool has room.
 
-use super::Transmit;
-use super::surface::SurfaceLink;
-use super::surface_peer::Peer;
+use super::SurfaceLink;
+use super::peer::Peer;
+use crate::link::Transmit;
 use crate::map::StateReplica;
 use crate::time::Instant;
 use crate::wire::Address;

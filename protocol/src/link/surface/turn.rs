@@ -1,9 +1,9 @@
 //! What the surface says in a turn.
 
-use super::FrameNumber;
-use super::Transmit;
-use super::surface_peer::{Carried, Peer};
+use super::peer::{Carried, Peer};
 use crate::directive::PendingSlot;
+use crate::link::FrameNumber;
+use crate::link::Transmit;
 use crate::mac::{Grant, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::{Class, ClassShares};

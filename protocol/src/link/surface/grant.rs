@@ -1,8 +1,8 @@
 //! Whose turn it is: the surface grants it.
 
-use super::surface::SurfaceLink;
-use super::surface_turn::Ready;
-use super::{Transmit, Wakeup};
+use super::SurfaceLink;
+use super::turn::Ready;
+use crate::link::{Transmit, Wakeup};
 use crate::mac::{Access, ModemProfile};
 use crate::map::StateReplica;
 use crate::time::Instant;
@@ -40,7 +40,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             return peer.master.next_wakeup(false);
         }
         let alone = self.peers.len() == 1;
-        let due = |p: &super::surface_peer::Peer<R>| {
+        let due = |p: &super::peer::Peer<R>| {
             p.master.next_wakeup(p.outbox.has_backlog()).map(|at| if alone { at } else { at.max(p.master.retry_at()) })
         };
         self.peers.values().filter_map(due).chain(self.discovery.next_wakeup(now)).min()

@@ -1,7 +1,7 @@
 //! Calling for vehicles that are not known.
 
-use super::Transmit;
-use super::run::{Authenticity, Identity};
+use crate::link::Transmit;
+use crate::link::run::{Authenticity, Identity};
 use crate::mac::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
 use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};

@@ -1,8 +1,8 @@
 //! What the surface's host sees of a vehicle.
 
-use super::LinkStats;
-use super::surface_peer::Peer;
+use super::peer::Peer;
 use crate::directive::SlotProgress;
+use crate::link::LinkStats;
 use crate::mac::ClockMap;
 use crate::map::{Replica, StateReplica};
 use crate::time::Instant;

@@ -1,0 +1,223 @@
+//! What the link promises besides convergence, over seeds, on a virtual clock.
+
+mod pair;
+
+use pair::{Pair, Setup, Water, auv, hold, utility};
+use proptest::prelude::*;
+use scenecast_protocol::link::{DropReason, VehicleEvent};
+use scenecast_protocol::mac::Access;
+use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map_codec::Codec;
+use scenecast_protocol::wire::{Address, Envelope, MissionId, Seal};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+const ROUGH: Water = Water {
+    loss: 0.3,
+    duplication: 0.2,
+    reordering: 0.2,
+    corruption: 0.1,
+    talker: 0.2,
+    propagation: Duration::from_millis(500),
+};
+
+const STILL: Water = Water { loss: 0.0, duplication: 0.0, reordering: 0.0, corruption: 0.0, talker: 0.0, ..ROUGH };
+
+/// Every cell has the label of the phase.
+fn flat(side: i32, phase: u8) -> LabelGrid {
+    (0..side * side).map(|i| (Cell::new(i % side, i / side), phase)).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Labels are the time: a cell that goes back would be a stale map shown as new.
+    #[test]
+    fn a_picture_never_goes_back(
+        seed: u64,
+        access in prop_oneof![Just(Access::Shared), Just(Access::ModemOwned { pool_frames: 8 }), Just(Access::Polled)],
+        restarts in proptest::collection::vec(0u8..8, 40),
+    ) {
+        let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
+        let mut pair = Pair::new(seed, setup, ROUGH);
+        let mut latest: BTreeMap<Cell, u8> = BTreeMap::new();
+        for (phase, what) in restarts.into_iter().enumerate() {
+            let phase = phase as u8 + 1;
+            pair.vehicle.set_map(flat(12, phase).iter(), pair.now);
+            for _ in 0..20 {
+                pair.run(pair.now + Duration::from_millis(900), false);
+                for (cell, label) in pair.shown().iter() {
+                    let before = latest.insert(cell, label).unwrap_or(0);
+                    prop_assert!(label >= before, "{cell:?} went back from {before} to {label}");
+                    prop_assert!(label <= phase);
+                }
+            }
+            match what {
+                0 => pair.restart_vehicle(&flat(12, phase)),
+                1 => pair.restart_surface(),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn hours_without_an_answer_do_not_make_the_ends_grow() {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+        for mute in [[true, false], [false, true], [true, true], [false, false]] {
+            let mut pair = Pair::new(5, Setup { access, ..Setup::new(64, 10_000, Codec::Png) }, ROUGH);
+            let mut sizes = Vec::new();
+            for phase in 0..40u8 {
+                pair.vehicle.set_map(flat(20, phase + 1).iter(), pair.now);
+                pair.vehicle.push_object(vec![phase; 700]);
+                pair.surface.issue(auv(), utility(phase as i8), pair.now).unwrap();
+                pair.mute = if phase == 0 { [false; 2] } else { mute };
+                pair.run(pair.now + Duration::from_secs(300), false);
+                sizes.push(pair.size());
+            }
+            let (early, late) = (sizes[4..14].iter().max().unwrap(), sizes[30..].iter().max().unwrap());
+            assert!(*late < early * 2, "{access:?}, mute {mute:?}: {early} and {late} bytes");
+        }
+    }
+}
+
+#[test]
+fn nothing_of_another_mission_is_taken() {
+    for keyed in [false, true] {
+        let setup = Setup::new(64, 10_000, Codec::Png);
+        let setup = if keyed { setup.keyed(true, false) } else { setup };
+        let mut ours = Pair::new(1, setup.clone(), STILL);
+        let mut theirs = Pair::new(2, Setup { mission: MissionId(8), ..setup }, STILL);
+        for phase in 0..60u8 {
+            for pair in [&mut ours, &mut theirs] {
+                pair.vehicle.set_map(flat(9, phase + 1).iter(), pair.now);
+                pair.surface.issue(auv(), hold(phase % 2 == 0), pair.now).unwrap();
+                pair.run(pair.now + Duration::from_secs(20), false);
+            }
+            let heard = ours.vehicle.stats().frames_heard;
+            for bytes in &theirs.overheard {
+                ours.vehicle.handle_frame(bytes, ours.now);
+                ours.surface.handle_frame(bytes, ours.now);
+            }
+            assert_eq!(ours.vehicle.stats().frames_heard, heard, "a frame of another mission was taken");
+            assert_eq!(ours.vehicle.poll_event(), None);
+        }
+        assert!(ours.vehicle.stats().dropped[&DropReason::Checksum] > 1000);
+    }
+}
+
+/// A small generator, so that a million tries are cheap.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % n
+    }
+}
+
+/// What somebody without the key can do with a frame that was overheard.
+fn forge(frame: &[u8], dice: &mut Dice) -> Vec<u8> {
+    let mut bytes = frame.to_vec();
+    match dice.below(4) {
+        0 => {}
+        1 => {
+            let bit = dice.below(bytes.len() * 8);
+            bytes[bit / 8] ^= 1 << (bit % 8);
+        }
+        2 => {
+            for _ in 0..1 + dice.below(8) {
+                let at = dice.below(bytes.len());
+                bytes[at] = dice.below(256) as u8;
+            }
+        }
+        // The tag is random, the rest as it was or a little changed.
+        _ => {
+            let n = bytes.len();
+            bytes.iter_mut().skip(n - 8).for_each(|b| *b = dice.below(256) as u8);
+            let at = dice.below(n - 8);
+            bytes[at] ^= 1 << dice.below(8);
+        }
+    }
+    bytes
+}
+
+#[test]
+fn a_forged_replayed_or_flipped_directive_is_never_applied_in_a_million_tries() {
+    let mut recorded: Vec<Vec<u8>> = Vec::new();
+    let mut pair = Pair::new(11, Setup::new(64, 10_000, Codec::Png).keyed(false, false), STILL);
+    for run in 0..6 {
+        for step in 0..10 {
+            pair.surface.issue(auv(), utility(run * 10 + step), pair.now).unwrap();
+            pair.surface.issue(auv(), hold(step % 2 == 0), pair.now).unwrap();
+            pair.run(pair.now + Duration::from_secs(30), false);
+        }
+        recorded.extend(pair.overheard.iter().filter(|f| f[1] >> 4 == 0).cloned());
+        match run % 2 {
+            0 => pair.restart_vehicle(&LabelGrid::default()),
+            _ => pair.restart_surface(),
+        }
+    }
+    pair.run(pair.now + Duration::from_secs(120), false);
+    let applied = pair.applied.len();
+    assert!(applied >= 100 && recorded.len() > 200, "{applied} applied, {} recorded", recorded.len());
+    let mut dice = Dice(3);
+    for _ in 0..1_000_000 {
+        let bytes = forge(&recorded[dice.below(recorded.len())], &mut dice);
+        pair.vehicle.handle_frame(&bytes, pair.now);
+        let event = pair.vehicle.poll_event();
+        assert!(!matches!(event, Some(VehicleEvent::Slot { .. })), "{event:?} from {bytes:02x?}");
+    }
+    // Forgeries have not broken anything either.
+    pair.surface.issue(auv(), utility(99), pair.now).unwrap();
+    pair.run(pair.now + Duration::from_secs(120), false);
+    assert_eq!(pair.applied.last(), Some(&utility(99)));
+}
+
+#[test]
+fn a_vehicle_with_a_key_refuses_what_has_none_and_counts_it() {
+    let plain = Setup::new(64, 10_000, Codec::Png);
+    let mut keyless = Pair::new(1, plain.clone(), STILL);
+    keyless.surface.issue(auv(), hold(true), keyless.now).unwrap();
+    keyless.run(keyless.now + Duration::from_secs(60), false);
+    let mut keyed = Pair::new(2, plain.keyed(false, false), STILL);
+    for bytes in &keyless.overheard {
+        keyed.vehicle.handle_frame(bytes, keyed.now);
+    }
+    assert!(keyed.vehicle.poll_event().is_none());
+    // Only the greeting can be told to be of this mission; what follows is sealed to a run that is not ours.
+    let to_vehicle = |bytes: &&Vec<u8>| {
+        let envelope = Envelope::decode(bytes, |to| to == auv()).ok();
+        envelope.is_some_and(|e| e.header.from == Address::SURFACE && e.open(&Seal::Crc(MissionId(7), 0)).is_some())
+    };
+    let greetings = keyless.overheard.iter().filter(to_vehicle).count() as u64;
+    assert!(greetings > 0);
+    assert_eq!(keyed.vehicle.stats().dropped[&DropReason::Unauthenticated], greetings);
+    keyless.vehicle.handle_frame(&keyed_hello(), keyless.now);
+    assert_eq!(keyless.vehicle.stats().dropped[&DropReason::Keyed], 1);
+}
+
+fn keyed_hello() -> Vec<u8> {
+    let mut keyed = Pair::new(2, Setup::new(64, 10_000, Codec::Png).keyed(false, false), STILL);
+    keyed.run(keyed.now + Duration::from_secs(10), false);
+    keyed.overheard.back().cloned().expect("a hello")
+}
+
+#[test]
+fn each_end_knows_the_clock_of_the_other_and_the_way_between_them() {
+    let mut pair = Pair::new(4, Setup::new(64, 10_000, Codec::Png), Water { loss: 0.2, ..STILL });
+    pair.vehicle.set_map(flat(30, 1).iter(), pair.now);
+    pair.run(pair.now + Duration::from_secs(120), false);
+    let view = pair.surface.vehicle(auv()).unwrap();
+    let round_trip = view.round_trip().unwrap().as_secs_f64();
+    assert!((round_trip - 1.0).abs() < 0.01, "{round_trip} s");
+    assert!((pair.vehicle.one_way().unwrap().as_secs_f64() - 0.5).abs() < 0.01);
+    // Both ends have one clock here: a moment of the other's is the same moment of one's own.
+    let now = pair.now;
+    for clock in [view.clock().unwrap(), pair.vehicle.surface_clock().unwrap()] {
+        let shown = clock.to_theirs(now);
+        let error = (clock.to_ours(shown, now).as_secs_f64() - now.as_secs_f64()).abs();
+        let apart = (f64::from(shown) / 1000.0 - now.as_secs_f64()).abs();
+        assert!(error < 0.002 && apart < 0.01, "{error} {apart}");
+    }
+}
