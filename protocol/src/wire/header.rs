@@ -75,7 +75,7 @@ impl SessionId {
 /// number     of this frame in the pair of sessions, wraps; the first is 1. In a hello: 0
 /// base       number minus the last frame whose fate the sender knows, 1..=2048; 0..127 in one byte, else two with the
 ///            first one's top bit set (7 high bits, then 8 low bits). In a hello: 1
-/// remaining  from the surface: airtime that follows in this turn, in 1/32 s, rounded up, 255 = that or more;
+/// remaining  from the surface: bits on air that follow in this turn, divided by 32, rounded up, 255 = that or more;
 ///            from a vehicle: frames that follow in this turn, 255 = 255 or more
 /// turn       from the surface: airtime granted, in quarter seconds (0 = none), in a call: time to answer in;
 ///            from a vehicle: when it would use another turn, in quarter seconds from now (0 = at once, 255 = not known)

@@ -74,7 +74,7 @@ pub struct SlotReport {
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
 ///  7-12 48    six slot reports: version, low 8 bits
-/// 13-15 24    six slot reports: 4 bits each: 0 unknown, 1 applied, 2..15 refusal reason
+/// 13-15 24    six slot reports: 4 bits each: 0 unknown, 1 applied, 2..7 refusal reason; the rest is refused
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
@@ -223,7 +223,7 @@ impl VehicleStatus {
 }
 
 impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=15 a reason of refusal.
+    /// The number on the wire: 0 unknown, 1 applied, 2..=7 a reason of refusal.
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Unknown => 0,
