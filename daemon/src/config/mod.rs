@@ -89,7 +89,7 @@ section! {
         /// Seconds between two statuses.
         status_period_s: f64 = 10.0,
         /// Longest turn in seconds.
-        max_turn_s: f64 = 12.0,
+        max_turn_s: f64 = 14.0,
         /// Longest pause between turns in seconds.
         max_idle_s: f64 = 10.0,
         /// Longest time in seconds between two calls for vehicles that are not known; 0 = no calls.
