@@ -190,3 +190,41 @@ fn a_clean_channel_is_mostly_spent_on_the_map() {
     let efficiency = bits as f64 / (pair.now.since(start).as_secs_f64() * 10_000.0);
     assert!(efficiency > 0.7, "{efficiency}");
 }
+
+/// Found by the property test above: the hello of a run that had ended came late, after that of the living one.
+#[test]
+fn a_late_hello_of_an_ended_run_does_not_keep_the_living_one_out() {
+    let water = Water {
+        loss: 0.7785790619890249,
+        duplication: 0.16584681244600216,
+        reordering: 0.12036205488516465,
+        corruption: 0.19171269772607896,
+        talker: 0.04104968855007638,
+        propagation: Duration::from_millis(995),
+    };
+    let mut pair = Pair::new(6_265_748_222_557_995_702, Setup::new(1000, 1000, Codec::Png), water);
+    for (step, (what, mute)) in [
+        (2, [false; 2]),
+        (0, [false, true]),
+        (2, [false, true]),
+        (2, [false, true]),
+        (1, [false, true]),
+        (0, [false; 2]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let map = patchy(24, step as u64);
+        pair.mute = mute;
+        pair.vehicle.set_map(map.iter(), pair.now);
+        pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(40), false);
+        match what {
+            0 => pair.restart_vehicle(&map),
+            1 => pair.restart_surface(),
+            _ => {}
+        }
+    }
+    pair.run(pair.now + Duration::from_secs(10_000), true);
+    assert!(pair.is_converged(), "{:?}", pair.vehicle.stats());
+}

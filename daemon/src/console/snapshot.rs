@@ -125,7 +125,7 @@ fn link_of(view: &PeerView<'_>, now: Instant) -> Value {
         "down": direction(&stats.loss_out, &stats.goodput_out),
         "round_trip_s": view.round_trip().map(|d| d.as_secs_f64()),
         "one_way_s": view.round_trip().map(|d| d.as_secs_f64() / 2.0),
-        "clock_ahead_s": view.clock().map(|c| clock_ahead_s(&c, now)),
+        "clock_ahead_s": view.clock().map(|c| clock_ahead_s(c, now)),
         "dropped": dropped(stats),
     })
 }

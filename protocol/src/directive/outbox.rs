@@ -96,6 +96,12 @@ impl SlotOutbox {
             .collect()
     }
 
+    /// The chunk of a version as it would go out at `now`, if it has not been superseded.
+    pub fn encode(&self, id: SlotId, version: u16, now: Instant) -> Option<Vec<u8>> {
+        let slot = self.progress().find(|s| s.id == id && s.version == version)?;
+        Some(VersionedSlot::encode(self.series, version, &dated(slot, now)))
+    }
+
     /// A frame with this version of the slot was written.
     pub fn mark_on_air(&mut self, id: SlotId, version: u16, now: Instant) {
         self.advance(id, version, LifeLine::OnAir, now, |life| life == LifeLine::Queued);

@@ -31,7 +31,9 @@ impl<T> Flight<T> {
 
     /// Whether no further frame can be told from an old one before the peer has answered.
     pub fn is_full(&self) -> bool {
-        self.next - self.horizon >= MAX_WINDOW
+        // A turn that has begun is finished.
+        const TURN: u64 = 64;
+        self.next - self.horizon >= MAX_WINDOW - TURN
     }
 
     /// The last frame whose fate is known.

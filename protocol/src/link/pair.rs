@@ -19,10 +19,17 @@ pub struct Inbound<'a, T> {
     pub is_latest: bool,
     /// The sender bases its map chunks on every frame up to here.
     pub base: FrameNumber,
+    /// Whether it was not taken because it builds on what we never acknowledged.
+    pub lacks_base: bool,
     frame: Frame<'a>,
 }
 
-impl<T> Inbound<'_, T> {
+impl<'a, T> Inbound<'a, T> {
+    /// A frame that tells no more than its header.
+    fn empty(restarted: bool, frame: Frame<'a>) -> Self {
+        Self { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, lacks_base: false, frame }
+    }
+
     /// Its header.
     pub fn header(&self) -> &Header {
         &self.frame.header
@@ -68,6 +75,11 @@ impl<T> Pair<T> {
     /// Whether there is a run of the peer to speak with.
     pub fn is_met(&self) -> bool {
         self.meeting.run().is_some() && !self.meeting.is_leaving()
+    }
+
+    /// Whether there is anybody to speak to: a run of the peer, or a hello of one.
+    pub fn has_heard(&self) -> bool {
+        self.meeting.run().is_some() || self.meeting.offered().is_some()
     }
 
     /// Whether a numbered frame has shown that the peer means this run.
@@ -169,6 +181,8 @@ impl<T> Pair<T> {
             None => self.meeting.handle_call(peer, key),
         };
         if greeting == Greeting::Retired {
+            // A late hello can make the living run look ended; what the vehicle goes on to say tells.
+            self.strays += u32::from(own.is_some());
             return Err(DropReason::OldSession);
         }
         let is_new = greeting == Greeting::New;
@@ -176,7 +190,7 @@ impl<T> Pair<T> {
         let restarted = is_new && own.is_some();
         self.stats.peer_restarts += u64::from(restarted);
         self.strays = 0;
-        Ok(Inbound { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, frame })
+        Ok(Inbound::empty(restarted, frame))
     }
 
     fn read_numbered<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
@@ -201,7 +215,7 @@ impl<T> Pair<T> {
         }
         self.owes_hello = self.meeting.is_leaving();
         if self.owes_hello {
-            return Ok(Inbound { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, frame });
+            return Ok(Inbound::empty(restarted, frame));
         }
         self.take(frame, restarted)
     }
@@ -215,6 +229,7 @@ impl<T> Pair<T> {
         }
         // A frame that is not taken has still told us the fate of ours, so that goes up with the refusal.
         let before = run.window.highest();
+        let mut lacks_base = false;
         let number = match run.window.accept(header.number, header.base) {
             Ok(number) => {
                 self.stats.take(before, number);
@@ -222,12 +237,13 @@ impl<T> Pair<T> {
             }
             Err(refusal) if fates.is_empty() && !restarted => return Err(refusal.into()),
             Err(refusal) => {
+                lacks_base = refusal == Refusal::NoBase;
                 self.stats.drop(refusal.into());
                 None
             }
         };
         let is_latest = number.is_some_and(|n| n > before);
-        Ok(Inbound { restarted, fates, number, is_latest, base: run.window.base(), frame })
+        Ok(Inbound { restarted, fates, number, is_latest, base: run.window.base(), lacks_base, frame })
     }
 
     /// Why a frame that does not open is not ours, as far as it can be told.

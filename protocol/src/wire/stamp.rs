@@ -19,7 +19,7 @@ const CLOCK_BITS: u32 = 24;
 /// from a vehicle, 6 bytes
 ///  0-2  clock when the transmission of this frame began   milliseconds, low 24 bits
 ///  3    number of the surface's frame that was heard last, low 8 bits
-///  4-5  from the end of its reception to the beginning of this frame   milliseconds, 0..=65 535
+///  4-5  from the end of its reception to the beginning of this frame   milliseconds, 65 535 = that or more
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
@@ -44,6 +44,8 @@ pub enum Stamp {
 impl Stamp {
     /// Bytes of a surface's stamp.
     pub const SURFACE_BYTES: usize = 5;
+    /// What a vehicle says that has held a frame for so long or longer.
+    pub const LONGEST_HELD: Duration = Duration::from_millis(u16::MAX as u64);
     /// Bytes of a vehicle's stamp.
     pub const VEHICLE_BYTES: usize = 6;
 

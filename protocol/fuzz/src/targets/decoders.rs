@@ -128,7 +128,8 @@ pub fn stamp(data: &[u8]) {
     reads_back(&Header { from: Address::SURFACE, to: header().from, stamp: Some(surface), ..header() });
     let mut moment = || Instant::from_micros(u64::from(script.u16()) << 32 | u64::from(script.u16()) << 8);
     let (now, at, ago) = (moment(), moment(), moment());
-    let map = ClockMap::measured(clock_ms, Duration::from(ago), now);
+    let mut map = ClockMap::default();
+    map.measure(clock_ms, Duration::from(ago), now);
     assert!(map.to_theirs(at) < 1 << 24);
     let _ = map.to_ours(clock_ms, at);
 }

@@ -240,6 +240,14 @@ impl<R: StateReplica> SurfaceLink<R> {
         peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);
         if peer.out_of_step {
             peer.resync(now);
+            if self.current == Some(from) && !self.turn.is_empty() {
+                // What is left of the turn was written for the run that has ended.
+                self.turn.clear();
+                match self.in_modem.back_mut() {
+                    Some(sent) => sent.last = true,
+                    None => peer.master.postpone(now),
+                }
+            }
             self.events.push_back(SurfaceEvent::MapChanged(from));
         }
         let wait = if peer.pair.is_proven() { Duration::from_secs(2) } else { Duration::ZERO };

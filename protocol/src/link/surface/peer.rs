@@ -114,6 +114,7 @@ impl<R: StateReplica> Peer<R> {
                 self.outbox.mark_heard(id, version, now);
             }
         }
+        self.out_of_step |= inbound.lacks_base;
         if header.hello {
             self.contact.hear(now);
             self.handle_turn(&header, bytes, modem, now);
@@ -144,7 +145,8 @@ impl<R: StateReplica> Peer<R> {
                 self.pair.stats.drop(DropReason::Malformed);
                 self.out_of_step |= chunk.kind == ChunkKind::Map;
             }
-            if chunk.kind == ChunkKind::Report && self.status.status.base_digest != self.replica.base_digest() {
+            if sound && chunk.kind == ChunkKind::Report && self.status.status.base_digest != self.replica.base_digest()
+            {
                 self.out_of_step = true;
             }
         }
@@ -165,11 +167,12 @@ impl<R: StateReplica> Peer<R> {
         let Some(Stamp::Vehicle { clock_ms, heard, held }) = header.stamp else { return };
         let began = now - modem.airtime(bytes);
         let sent = self.sent.iter().rev().find(|(number, _)| *number as u8 == heard).map(|(_, at)| *at);
-        if let Some(sent) = sent.filter(|&at| at + held <= began) {
+        let is_told = held < Stamp::LONGEST_HELD;
+        if let Some(sent) = sent.filter(|&at| is_told && at + held <= began) {
             self.master.handle_round_trip(began.since(sent).saturating_sub(held));
         }
         let one_way = self.master.round_trip().unwrap_or_default() / 2;
-        self.clock = Some(ClockMap::measured(clock_ms, modem.airtime(bytes) + one_way, now));
+        self.clock.get_or_insert_default().measure(clock_ms, modem.airtime(bytes) + one_way, now);
     }
 
     /// A frame of ours has left the modem.
@@ -218,6 +221,7 @@ impl<R: StateReplica> Peer<R> {
         self.objects.clear();
         self.status = StatusParts::default();
         self.sent.clear();
+        self.clock = None;
         self.turn_began = 0;
         self.outbox.handle_peer_restart(now);
         self.hello_due = now;

@@ -108,14 +108,17 @@ impl<R: StateReplica> Peer<R> {
         let fixed = 9 + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
         let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
         let number = (!hello && self.pair.is_met()).then(|| self.pair.next_number());
+        let has_room = has_room && number.is_some();
         let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), hello);
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
         for slot in slots {
-            if room_for_payload(builder.room()) >= slot.bytes.len() && builder.push(ChunkKind::Slot, &slot.bytes) {
+            // As old as it is when this frame leaves.
+            let Some(bytes) = self.outbox.encode(slot.id, slot.version, at) else { continue };
+            if room_for_payload(builder.room()) >= bytes.len() && builder.push(ChunkKind::Slot, &bytes) {
                 self.outbox.mark_on_air(slot.id, slot.version, at);
-                self.pair.stats.count(slot.id.class(), slot.bytes.len());
-                carried.push((slot.id, slot.version, slot.bytes.len()));
+                self.pair.stats.count(slot.id.class(), bytes.len());
+                carried.push((slot.id, slot.version, bytes.len()));
             }
         }
         let kind = match (number, carried.first()) {

@@ -76,8 +76,8 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     }
 
     /// The vehicle's clock.
-    pub fn clock(&self) -> Option<ClockMap> {
-        self.0.clock
+    pub fn clock(&self) -> Option<&'a ClockMap> {
+        self.0.clock.as_ref()
     }
 
     /// The slots that were issued and how far they have come.

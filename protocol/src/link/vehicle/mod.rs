@@ -246,8 +246,8 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// The surface's clock, once a frame with a stamp was heard.
-    pub fn surface_clock(&self) -> Option<ClockMap> {
-        self.clock
+    pub fn surface_clock(&self) -> Option<&ClockMap> {
+        self.clock.as_ref()
     }
 
     /// One-way propagation, as the surface has measured it.

@@ -3,7 +3,7 @@
 use super::{Carried, HeardLast, Part, VehicleEvent, VehicleLink};
 use crate::directive::{Slot, VersionedSlot};
 use crate::link::DropReason;
-use crate::mac::{Access, ClockMap, Grant};
+use crate::mac::{Access, Grant};
 use crate::map::StateSource;
 use crate::time::Instant;
 use crate::wire::{Address, ChunkKind, Envelope, Header, Stamp};
@@ -41,7 +41,8 @@ impl<S: StateSource> VehicleLink<S> {
         let slots: Vec<Vec<u8>> =
             inbound.chunks().filter(|c| c.kind == ChunkKind::Slot).map(|c| c.payload.to_vec()).collect();
         let foreign = inbound.chunks().any(|c| c.kind != ChunkKind::Slot);
-        let (number, is_latest, fates) = (inbound.number, inbound.is_latest, inbound.fates);
+        let (number, is_latest, lacks_base, fates) =
+            (inbound.number, inbound.is_latest, inbound.lacks_base, inbound.fates);
         if foreign {
             self.pair.stats.drop(DropReason::Malformed);
         }
@@ -53,6 +54,9 @@ impl<S: StateSource> VehicleLink<S> {
         if is_latest {
             self.handle_stamp(&header, number, bytes.len(), now);
             self.handle_turn(&header, now);
+        }
+        if lacks_base {
+            self.renew(now);
         }
         self.owe_answer(now);
     }
@@ -70,13 +74,13 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn handle_stamp(&mut self, header: &Header, number: Option<u64>, bytes: usize, now: Instant) {
-        if let Some(number) = number {
-            self.heard = Some(HeardLast { number, at: now });
-        }
+        // A hello may be a replay: it tells no time.
+        let Some(number) = number else { return };
+        self.heard = Some(HeardLast { number, at: now });
         if let Some(Stamp::Surface { clock_ms, one_way }) = header.stamp {
             self.one_way = one_way.or(self.one_way);
             let ago = self.config.modem.airtime(bytes) + self.one_way.unwrap_or_default();
-            self.clock = Some(ClockMap::measured(clock_ms, ago, now));
+            self.clock.get_or_insert_default().measure(clock_ms, ago, now);
         }
     }
 

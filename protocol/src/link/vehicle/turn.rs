@@ -28,7 +28,8 @@ impl<S: StateSource> VehicleLink<S> {
             self.end_turn();
         }
         let open = self.floor.frames(&modem, now).min(u32::from(u8::MAX));
-        if open == 0 || !self.has_reason_to_speak(now) {
+        let nobody = !self.pair.has_heard() && self.called.is_none();
+        if open == 0 || nobody || !self.has_reason_to_speak(now) {
             return None;
         }
         let bits = modem.bits_on_air(modem.frame_bytes);
@@ -39,7 +40,7 @@ impl<S: StateSource> VehicleLink<S> {
             return None;
         }
         self.blocked_until = None;
-        if self.pair.is_full() {
+        if self.pair.is_met() && self.pair.is_full() {
             // The surface has heard nothing for so long that numbers run out.
             self.renew(now);
         }
