@@ -44,8 +44,8 @@ fn print_table(table: &LinkTable) {
     );
     println!("known at the surface; converge: last change to equal maps, within: share of stops that kept the bound.");
     println!();
-    println!("range frame         loss  effi-  directive s    known  converge         budget  re-");
-    println!("   km bytes pattern    %  ciency median   p95  p95 s     p95 s  within    used  syncs");
+    println!("range frame pattern     loss  effi-     directive  known converge          budget    re-");
+    println!("   km bytes                % ciency med. s  p95 s  p95 s    p95 s  within    used  syncs");
     table.rows.iter().for_each(print_row);
     println!();
     println!("A budget that binds: efficiency against the vehicle's budget.");
@@ -63,7 +63,7 @@ fn print_table(table: &LinkTable) {
 
 fn print_row(r: &Row) {
     println!(
-        "{:>5} {:>5} {:<11} {:>3.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
+        "{:>5} {:>5} {:<11} {:>4.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
         r.range_km,
         r.frame_bytes,
         r.pattern.name(),
