@@ -112,6 +112,7 @@ fn every_command_has_help_with_an_example() {
         &["auv"],
         &["asv"],
         &["bench", "fidelity"],
+        &["bench", "link"],
         &["config"],
         &["key", "new"],
         &["key", "show"],

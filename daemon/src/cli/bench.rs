@@ -1,5 +1,6 @@
 //! `scenecast bench`
 
+use super::bench_link::Link;
 use super::sim::WorldArguments;
 use crate::problem::Problem;
 use crate::rehearsal::{FidelityRow, fidelity};
@@ -10,6 +11,8 @@ use clap::{Args, Subcommand};
 pub(super) enum Bench {
     /// The operator's map at 100, 250, 1000 and 10 000 bit/s: our stream against whole PNGs.
     Fidelity(Fidelity),
+    /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
+    Link(Link),
 }
 
 /// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
@@ -28,6 +31,7 @@ impl Bench {
     pub(super) fn run(self) -> Result<(), Problem> {
         match self {
             Self::Fidelity(f) => f.run(),
+            Self::Link(l) => l.run(),
         }
     }
 }

@@ -3,6 +3,7 @@
 mod baseline;
 mod fidelity;
 mod frames_log;
+pub mod link_bench;
 mod meter;
 mod mission;
 mod motion;

@@ -102,9 +102,9 @@ impl OpaqueSource {
         &self.target
     }
 
-    /// Rewrites as many bytes as it takes for `bytes` to wait.
+    /// Rewrites as many bytes as it takes for `bytes` to wait, or for all that are not in frames of unknown fate.
     pub fn fill(&mut self, bytes: usize) {
-        while self.waiting < bytes {
+        while self.waiting < bytes.min(CELLS - self.flying) {
             let cell = self.pen;
             self.pen = (self.pen + 1) % CELLS;
             self.target[cell] = self.target[cell].wrapping_add(1);
@@ -380,6 +380,22 @@ mod tests {
         assert_eq!(replica.missing(source.target()), 7);
         pass(&mut source, &mut replica, &mut number);
         assert_eq!(source.target(), replica.shown());
+    }
+
+    #[test]
+    fn a_source_whose_bytes_are_all_under_way_is_as_full_as_it_gets() {
+        let mut source = OpaqueSource::default();
+        source.fill(2 * CELLS);
+        assert_eq!(source.waiting, CELLS);
+        let mut carried = Vec::new();
+        while let Some((_, runs)) = source.next_chunk(1000, NOW) {
+            carried.push(runs);
+        }
+        source.fill(CELLS);
+        assert_eq!((source.waiting, source.flying), (0, CELLS));
+        source.handle_fate(carried.remove(0), true, NOW);
+        source.fill(CELLS);
+        assert_eq!((source.waiting, source.flying), (996, CELLS - 996));
     }
 
     #[test]

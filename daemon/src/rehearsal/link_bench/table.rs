@@ -17,6 +17,16 @@ pub enum Pattern {
     Harbour,
 }
 
+impl Pattern {
+    /// As it is printed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Independent => "independent",
+            Self::Harbour => "harbour",
+        }
+    }
+}
+
 /// One line of the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {

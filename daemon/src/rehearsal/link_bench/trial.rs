@@ -4,6 +4,7 @@ use super::summary::Summary;
 use super::water::{Setting, Water, auv};
 use scenecast_protocol::directive::{Fix, LifeLine, Slot, SlotId, Utility};
 use scenecast_protocol::link::IssueError;
+use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::time::Instant;
 use sim_channel::Stream;
 use std::time::Duration;
@@ -24,6 +25,11 @@ pub struct Effort {
     pub directives: usize,
     /// Times that the source stops changing.
     pub stops: usize,
+}
+
+impl Effort {
+    /// Of the golden table.
+    pub const TABLE: Self = Self { saturated: Duration::from_secs(1200), directives: 60, stops: 40 };
 }
 
 /// How a saturated link did.
@@ -107,7 +113,7 @@ impl Water {
         let mut within = 0;
         for _ in 0..count {
             self.vehicle().load = Some(LOAD);
-            self.run(Duration::from_secs_f64(30.0 + dice.uniform() * 30.0));
+            self.run(Duration::from_secs_f64(20.0 + dice.uniform() * 30.0));
             let keep = (8.0 * 500f64.powf(dice.uniform())) as usize;
             let (time, bytes) = self.stop_and_converge(keep);
             let bound = base_s(loss) + 1.5 * bytes as f64 * 8.0 / (10_000.0 * (1.0 - loss));
@@ -124,7 +130,11 @@ impl Water {
         vehicle.load = None;
         vehicle.link.source_mut().take_back(keep);
         let bytes = self.missing();
-        self.run_until(stopped + GIVE_UP, |w| w.missing() == 0);
+        let mut seen = None;
+        self.run_until(stopped + GIVE_UP, |w| {
+            let version = w.view().map(|v| v.replica().version());
+            seen.replace(version) != Some(version) && w.missing() == 0
+        });
         (self.now.since(stopped).as_secs_f64(), bytes)
     }
 

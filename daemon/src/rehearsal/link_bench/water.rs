@@ -260,7 +260,8 @@ impl Water {
 }
 
 impl Vehicle {
-    fn new(setting: &Setting, address: Address, seed: u64, now: Instant) -> Self {
+    /// A vehicle that has met nobody.
+    pub(super) fn new(setting: &Setting, address: Address, seed: u64, now: Instant) -> Self {
         let config = VehicleConfig {
             address,
             mission: MissionId(7),
@@ -276,7 +277,7 @@ impl Vehicle {
     }
 
     /// Applies what came in, and sees to it that there is something to say.
-    fn handle_news(&mut self, now: Instant) {
+    pub(super) fn handle_news(&mut self, now: Instant) {
         while let Some(event) = self.link.poll_event() {
             if let VehicleEvent::Slot { id, version, .. } = event {
                 self.link.decide(id, SlotState::Applied, now);
@@ -291,7 +292,8 @@ impl Vehicle {
     }
 }
 
-fn surface_config(setting: &Setting) -> SurfaceConfig {
+/// The surface of a setting.
+pub(super) fn surface_config(setting: &Setting) -> SurfaceConfig {
     let known = if setting.call_every.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),

@@ -1,0 +1,52 @@
+//! A budget that binds: what the link makes of it, and whether it keeps it.
+
+use super::table::{budget_use, round};
+use super::water::{Setting, Water};
+use scenecast_protocol::link::IssueError;
+use serde::Serialize;
+use sim_channel::LossModel;
+use std::time::Duration;
+
+/// Half duplex at 10 kbit/s on air, of which each end may use a part.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BudgetRow {
+    /// Slant range.
+    pub range_km: f64,
+    /// Bytes of a full frame.
+    pub frame_bytes: usize,
+    /// Share of frames lost each way.
+    pub loss: f64,
+    /// Bit budget of each end.
+    pub budget_bps: u32,
+    /// Useful payload over what the vehicle's budget could carry of it.
+    pub efficiency: f64,
+    /// Worst window of any transmitter over what the budget allows with one transmission more.
+    pub budget_use: f64,
+}
+
+/// Measures each row over `time`.
+pub fn measure_budgets(time: Duration, seed: u64) -> Result<Vec<BudgetRow>, IssueError> {
+    let mut rows = Vec::new();
+    for budget_bps in [250, 1000] {
+        for frame_bytes in [64, 256] {
+            rows.push(measure(budget_bps, frame_bytes, time, seed)?);
+        }
+    }
+    Ok(rows)
+}
+
+fn measure(budget_bps: u32, frame_bytes: usize, time: Duration, seed: u64) -> Result<BudgetRow, IssueError> {
+    let loss = 0.1;
+    let mut setting = Setting::new(1000.0, frame_bytes, LossModel::Independent { probability: loss });
+    setting.budget_bps = budget_bps;
+    let mut water = Water::under_load(&setting, seed);
+    let flow = water.measure_flow(time, None)?;
+    Ok(BudgetRow {
+        range_km: 1.0,
+        frame_bytes,
+        loss,
+        budget_bps,
+        efficiency: round(flow.useful_bps / (f64::from(budget_bps) * (1.0 - loss))),
+        budget_use: round(budget_use(&water)),
+    })
+}
