@@ -191,6 +191,22 @@ fn a_clean_channel_is_mostly_spent_on_the_map() {
     assert!(efficiency > 0.7, "{efficiency}");
 }
 
+/// Found by the property test above: with no turns, nothing told the surface that its vehicle had gone.
+#[test]
+fn a_vehicle_that_restarts_twice_is_met_again_through_a_modem_that_takes_turns_by_itself() {
+    let water = Water { loss: 0.9, duplication: 0.03, talker: 0.11, propagation: Duration::from_millis(30), ..CALM };
+    for seed in 0..30 {
+        let setup = Setup { access: Access::ModemOwned { pool_frames: 8 }, ..Setup::new(32, 1000, Codec::Png) };
+        let mut pair = Pair::new(seed, setup, water.clone());
+        for _ in 0..3 {
+            pair.run(pair.now + Duration::from_secs(20), false);
+            pair.restart_vehicle(&patchy(2, 0));
+        }
+        pair.run(pair.now + Duration::from_secs(100_000), true);
+        assert!(pair.is_converged(), "seed {seed}: {:?}", pair.vehicle.stats());
+    }
+}
+
 /// Found by the property test above: the hello of a run that had ended came late, after that of the living one.
 #[test]
 fn a_late_hello_of_an_ended_run_does_not_keep_the_living_one_out() {

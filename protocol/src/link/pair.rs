@@ -356,3 +356,42 @@ impl From<Refusal> for DropReason {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::seal::MissionKey;
+    use std::sync::Arc;
+
+    fn carry(from: &mut Pair<u64>, to: &mut Pair<u64>, content: u64, hello: bool) -> Vec<(u64, bool)> {
+        let builder = from.begin_frame(64, 20, Some(4), None, hello);
+        let bytes = from.finish_frame(builder, content, hello, true);
+        let us = to.us;
+        let envelope = Envelope::decode(&bytes, |a| a == us).unwrap();
+        let inbound = to.handle_frame(&envelope).unwrap();
+        inbound.fates
+    }
+
+    #[test]
+    fn tags_verify_across_every_turn_of_the_frame_counter() {
+        let key = Arc::new(MissionKey::from_bytes([9; 16]));
+        let authenticity = Some(Authenticity { key, all: true, encrypt: true });
+        let auv = Address::vehicle(3).unwrap();
+        let mut surface = Pair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), 1);
+        let mut vehicle = Pair::new(MissionId(1), auv, Address::SURFACE, authenticity, 2);
+        carry(&mut surface, &mut vehicle, 0, true);
+        carry(&mut vehicle, &mut surface, 0, true);
+        carry(&mut surface, &mut vehicle, 0, false);
+        let mut delivered = 0;
+        for i in 0..140_000 {
+            carry(&mut vehicle, &mut surface, i, false);
+            if i % 500 == 0 {
+                for (content, held) in carry(&mut surface, &mut vehicle, 0, false) {
+                    assert!(held && content == delivered);
+                    delivered += 1;
+                }
+            }
+        }
+        assert!(delivered > 139_000, "{delivered}");
+    }
+}

@@ -155,6 +155,29 @@ mod tests {
     }
 
     #[test]
+    fn both_ends_agree_across_every_turn_of_the_counters() {
+        let (mut flight, mut window) = (Flight::<u64>::default(), Window::default());
+        let mut judged = 0;
+        for i in 0..200_000u64 {
+            let (number, distance) = (flight.next_number(), flight.base_distance());
+            flight.push(number);
+            let arrives = |number: u64| number % 7 != 0;
+            if arrives(number) {
+                assert_eq!(window.accept(number as u16, distance), Ok(number));
+            }
+            if i % 300 == 0
+                && let Some(statement) = window.statement(200)
+            {
+                for (number, delivered) in flight.handle_statement(&statement) {
+                    judged += 1;
+                    assert_eq!(arrives(number), delivered, "frame {number}");
+                }
+            }
+        }
+        assert!(judged > 199_000, "{judged}");
+    }
+
+    #[test]
     fn what_is_not_durable_is_not_acknowledged() {
         let mut w = Window::default();
         let first = w.accept(1, 1).unwrap();

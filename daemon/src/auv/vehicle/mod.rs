@@ -10,6 +10,7 @@ use super::steering::Steering;
 use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
 use serde::{Deserialize, Serialize};
@@ -75,7 +76,8 @@ pub struct Vehicle {
     durable: Durable,
     utility: Option<Utility>,
     requests: Requests,
-    answered: Vec<(u8, u8)>,
+    /// Requests that were answered, each with the object of the answer.
+    answered: Vec<((u8, u8), ObjectId)>,
     labels: u8,
     explored: u32,
     waypoint: Option<(f64, f64)>,
@@ -221,17 +223,30 @@ impl Vehicle {
         self.outputs.push_back(VehicleOutput::Persist);
     }
 
+    /// What is wanted from now on; answers to what is not wanted any more are not sent to their end.
+    pub(crate) fn replace_requests(&mut self, requests: Requests) {
+        let link = &mut self.link;
+        self.answered.retain(|(request, id)| {
+            let wanted = requests.wanted.contains(request);
+            if !wanted {
+                link.cancel_object(*id);
+            }
+            wanted
+        });
+        self.requests = requests;
+    }
+
     /// Answers requests for representative images; `exemplar` gives the best one of a label, if there is one by now.
     pub fn answer_requests<'a>(&mut self, exemplar: &dyn Fn(u8) -> Option<&'a image::RgbImage>) {
         for &(label, serial) in &self.requests.wanted {
-            if self.answered.contains(&(label, serial)) {
+            if self.answered.iter().any(|(request, _)| *request == (label, serial)) {
                 continue;
             }
             let Some(patch) = exemplar(label) else { continue };
             let webp = encode_webp(patch, EXEMPLAR_BYTES);
             let object = Exemplar { epoch: self.durable.epoch, label, serial, webp };
-            if self.link.push_object(object.encode()).is_some() {
-                self.answered.push((label, serial));
+            if let Some(id) = self.link.push_object(object.encode()) {
+                self.answered.push(((label, serial), id));
             }
         }
     }

@@ -32,7 +32,7 @@ impl Vehicle {
                 Err(RefusalReason::UnknownLabel)
             }
             Slot::Requests(requests) => {
-                self.requests = requests;
+                self.replace_requests(requests);
                 Ok(())
             }
             Slot::Fix(fix) => {

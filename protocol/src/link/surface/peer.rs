@@ -3,7 +3,7 @@
 use super::view::Contact;
 use crate::directive::{Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
-use crate::mac::{ClockMap, Master, MasterConfig, ModemProfile};
+use crate::mac::{Access, ClockMap, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
@@ -95,7 +95,8 @@ impl<R: StateReplica> Peer<R> {
             Ok(inbound) => inbound,
             Err(reason) => {
                 // The vehicle builds on what we never acknowledged, or means another run of ours than we do.
-                let strays = self.pair.has_lost_touch() && self.master.unanswered() >= 2;
+                let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
+                let strays = self.pair.has_lost_touch() && silent;
                 self.out_of_step |= reason == DropReason::NoBase || strays;
                 return;
             }
