@@ -1,8 +1,9 @@
-//! Bytes and time of map chunks on survey series and stills, against the best PNG.
+//! Bytes and time of map chunks on survey series, stills and a large map, against the best PNG.
 //!
-//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural]]`; zopfli takes nearly all of the time.
+//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli takes nearly all of the time.
 #![allow(clippy::disallowed_methods)]
 
+mod large;
 mod real;
 mod zopfli_bytes;
 
@@ -19,10 +20,14 @@ const STEPS: usize = 40;
 fn main() {
     let asked = |word: &str| std::env::args().any(|argument| argument == word);
     let seeds = if asked("quick") { 1 } else { 3 };
-    if !asked("real") {
+    let every = !["real", "procedural", "large"].into_iter().any(asked);
+    if every || asked("procedural") {
         procedural(seeds);
     }
-    if !asked("procedural") {
+    if every || asked("large") {
+        large::measure();
+    }
+    if every || asked("real") {
         real_stills(seeds as usize);
         real_series(seeds as usize);
     }
