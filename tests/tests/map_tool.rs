@@ -47,8 +47,7 @@ fn a_map_comes_back_exactly_from_its_chunks_with_every_codec() {
     let (chunks, back) = (dir.join("change.scmc"), dir.join("back.png"));
     for codec in ["auto", "png", "context"] {
         let common = ["--codec", codec, "--frame-bytes", "64", "--out", text(&chunks)];
-        let delta =
-            json(&[&["map", "encode", "--target", text(&target), "--base", text(&base)][..], &common].concat());
+        let delta = json(&[&["map", "encode", "--target", text(&target), "--base", text(&base)][..], &common].concat());
         let decode = ["map", "decode", "--base", text(&base), "--in", text(&chunks), "--out", text(&back)];
         assert!(run(&decode).status.success());
         assert_eq!(Plane::from_png(&std::fs::read(&back).unwrap()).unwrap(), maps[11], "{codec}");

@@ -153,7 +153,11 @@ impl ChunkFile {
             return Err(ChunkFileError::Length);
         }
         let summed = bytes.get(..bytes.len() - 4).unwrap_or_default();
-        if CRC.checksum(summed) == sum { Ok(Self { width, height, base, chunks }) } else { Err(ChunkFileError::Damaged) }
+        if CRC.checksum(summed) == sum {
+            Ok(Self { width, height, base, chunks })
+        } else {
+            Err(ChunkFileError::Damaged)
+        }
     }
 }
 
