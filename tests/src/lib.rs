@@ -46,6 +46,18 @@ pub fn run(arguments: &[&str]) -> Output {
     scenecast().args(arguments).output().expect("scenecast runs")
 }
 
+/// Runs a command that must end with exit code 2 and one clear line that holds every word.
+pub fn assert_refused(arguments: &[&str], words: &[&str]) {
+    let output = run(arguments);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.trim().lines().count(), 1, "{said}");
+    for word in words {
+        assert!(said.contains(word), "{word:?} is missing in: {said}");
+    }
+    assert!(!said.contains("panicked"));
+}
+
 /// A new folder for a test, emptied if it was there.
 pub fn scratch(name: &str) -> PathBuf {
     let dir = std::env::temp_dir().join(format!("scenecast-{}-{name}", std::process::id()));

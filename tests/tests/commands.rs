@@ -1,19 +1,7 @@
 //! The command line as its user meets it.
 
-use scenecast_tests::{run, scratch};
+use scenecast_tests::{assert_refused, run, scratch};
 use std::path::Path;
-
-/// Exit code 2, one clear line that holds every word.
-fn assert_refused(arguments: &[&str], words: &[&str]) {
-    let output = run(arguments);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert_eq!(said.trim().lines().count(), 1, "{said}");
-    for word in words {
-        assert!(said.contains(word), "{word:?} is missing in: {said}");
-    }
-    assert!(!said.contains("panicked"));
-}
 
 #[test]
 fn wrong_input_is_answered_with_one_line_that_says_what_is_allowed() {
@@ -116,6 +104,10 @@ fn every_command_has_help_with_an_example() {
         &["config"],
         &["key", "new"],
         &["key", "show"],
+        &["map", "encode"],
+        &["map", "decode"],
+        &["map", "bench"],
+        &["map", "train-prior"],
     ] {
         let output = run(&[command, &["--help"]].concat());
         assert!(output.status.success());

@@ -59,6 +59,17 @@ proptest! {
 }
 
 #[test]
+fn whole_missions_pass_with_either_codec() {
+    let sets = ["channel.loss=0.2", "link.frame_bytes=256"];
+    let [png, context] = ["png", "context"].map(|codec| {
+        let figures = fly(&[&sets[..], &[&format!("map.codec={codec}")]].concat(), 6);
+        assert_sound(&figures);
+        figures["map"]["payload_bytes"].as_u64().unwrap()
+    });
+    assert!(context < png, "{context} bytes with context, {png} with png");
+}
+
+#[test]
 fn the_same_seed_gives_the_same_report() {
     let first = fly(&["channel.loss=0.2"], 7).to_string();
     assert_eq!(first, fly(&["channel.loss=0.2"], 7).to_string());

@@ -6,6 +6,7 @@ mod bench;
 mod bench_link;
 mod demo;
 mod key;
+mod map;
 mod node;
 mod progress;
 mod sim;
@@ -37,6 +38,9 @@ enum Command {
     /// Make or show the key by which both ends know each other's frames.
     #[command(subcommand)]
     Key(key::Key),
+    /// Code label maps as the stream does, and measure it.
+    #[command(subcommand)]
+    Map(map::Map),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -50,6 +54,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Asv(node) => node.run_surface(),
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
+        Command::Map(map) => map.run(),
         Command::Config(print) => print.run(),
     }
 }

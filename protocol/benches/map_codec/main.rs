@@ -1,16 +1,17 @@
-//! Bytes and time of map chunks on survey series and stills, against the best PNG.
+//! Bytes and time of map chunks on survey series, stills and a large map, against the best PNG.
 //!
-//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural]]`; zopfli takes nearly all of the time.
+//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli takes nearly all of the time.
 #![allow(clippy::disallowed_methods)]
 
-mod png_baseline;
+mod large;
 mod real;
+mod zopfli_bytes;
 
-use png_baseline::{delta_png, full_png};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::map_codec::procedural::{Chance, Flips, Scene, Survey};
 use scenecast_protocol::map_codec::{Codec, Plane, decode, encode_all};
 use std::time::{Duration, Instant};
+use zopfli_bytes::zopfli_bytes;
 
 const ROOMS: [usize; 3] = [64, 256, 1000];
 const SIDE: usize = 192;
@@ -19,10 +20,14 @@ const STEPS: usize = 40;
 fn main() {
     let asked = |word: &str| std::env::args().any(|argument| argument == word);
     let seeds = if asked("quick") { 1 } else { 3 };
-    if !asked("real") {
+    let every = !["real", "procedural", "large"].into_iter().any(asked);
+    if every || asked("procedural") {
         procedural(seeds);
     }
-    if !asked("procedural") {
+    if every || asked("large") {
+        large::measure();
+    }
+    if every || asked("real") {
         real_stills(seeds as usize);
         real_series(seeds as usize);
     }
@@ -162,8 +167,8 @@ fn series(maps: &[Plane]) -> Totals {
         }
         totals.steps += 1;
         if !std::env::args().any(|argument| argument == "no-png") {
-            totals.full_png += full_png(after);
-            totals.best_png += delta_png(before, after);
+            totals.full_png += after.smallest_png(&mut zopfli_bytes);
+            totals.best_png += after.smallest_delta_png(before, &mut zopfli_bytes);
         }
         let (base, target) = (before.to_grid(), after.to_grid());
         for (i, &room) in ROOMS.iter().enumerate() {

@@ -161,7 +161,7 @@ mod tests {
         for i in 0..200_000u64 {
             let (number, distance) = (flight.next_number(), flight.base_distance());
             flight.push(number);
-            let arrives = |number: u64| number % 7 != 0;
+            let arrives = |number: u64| !number.is_multiple_of(7);
             if arrives(number) {
                 assert_eq!(window.accept(number as u16, distance), Ok(number));
             }

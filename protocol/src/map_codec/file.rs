@@ -2,21 +2,26 @@
 
 use super::{Codec, DecodeError, Plane, decode, encode_all};
 use crate::map::Rect;
+use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// Chunks of one change, in order, and the size of the map they are for.
 ///
 /// ```text
-///      +--------+---------+-------------+--------------+-----------+----------------------------+
-///      | "SCMC" | version | width (u32) | height (u32) | count u32 | count x (length u16, bytes) |
-///      +--------+---------+-------------+--------------+-----------+----------------------------+
+///      +--------+------------+-----------+------------+----------+-----------+------------------+---------+
+///      | "SCMC" | version u8 | width u32 | height u32 | base u32 | count u32 | count x          | sum u32 |
+///      |        |            |           |            |          |           | (length u16, ..) |         |
+///      +--------+------------+-----------+------------+----------+-----------+------------------+---------+
 /// ```
-/// Little-endian; version 1.
+/// Little-endian; version 1. base: CRC-32 (as in PNG) of the base's labels, row by row, zeros if there is no base;
+/// sum: CRC-32 of everything before. A map has 1 to 2^26 cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChunkFile {
     /// Columns of the map.
     pub width: u32,
     /// Rows of the map.
     pub height: u32,
+    /// Fingerprint of the base's labels.
+    pub base: u32,
     /// The bytes of each chunk.
     pub chunks: Vec<Vec<u8>>,
 }
@@ -33,9 +38,15 @@ pub enum ChunkFileError {
     /// The file ends early or goes on after the last chunk.
     #[error("the file of map chunks is cut off or has bytes after its end")]
     Length,
-    /// The map has more than 2^26 cells.
-    #[error("a map of {0} x {1} cells is too large")]
-    TooLarge(u32, u32),
+    /// The bytes do not give the sum at the end.
+    #[error("the file of map chunks is damaged: its sum is wrong")]
+    Damaged,
+    /// The map has no cell, or more than 2^26.
+    #[error("a map of {0} x {1} cells; 1 to {MOST_CELLS} cells are allowed")]
+    CellCount(u32, u32),
+    /// The base is another one than the encoder's.
+    #[error("the chunks need the base map that they were made with")]
+    OtherBase,
     /// Base and target, or base and file, differ in size.
     #[error("the base map is {base_width} x {base_height}, the other {width} x {height}")]
     Size {
@@ -66,6 +77,7 @@ pub enum ChunkFileError {
 
 const MAGIC: [u8; 4] = *b"SCMC";
 const VERSION: u8 = 1;
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Cells of the largest map that a file may be for.
 const MOST_CELLS: u64 = 1 << 26;
 
@@ -73,11 +85,12 @@ impl ChunkFile {
     /// The chunks of at most `room` bytes that turn `base` into `target`, and how many cells they change.
     pub fn encode(codec: Codec, base: &Plane, target: &Plane, room: usize) -> Result<(Self, usize), ChunkFileError> {
         same_size(base, target.width, target.height)?;
+        let size = allowed_size(target.width as u32, target.height as u32)?;
         let chunks = encode_all(codec, &base.to_grid(), &target.to_grid(), room.min(usize::from(u16::MAX)));
         let chunks = chunks.ok_or(ChunkFileError::Room(room))?;
         let changed = chunks.iter().map(|chunk| chunk.changes.len()).sum();
-        let (width, height) = (target.width as u32, target.height as u32);
-        Ok((Self { width, height, chunks: chunks.into_iter().map(|chunk| chunk.bytes).collect() }, changed))
+        let chunks = chunks.into_iter().map(|chunk| chunk.bytes).collect();
+        Ok((Self { width: size.0, height: size.1, base: CRC.checksum(&base.labels), chunks }, changed))
     }
 
     /// The map that `base` becomes; without a base, the one that nothing becomes.
@@ -86,7 +99,12 @@ impl ChunkFile {
         if let Some(base) = base {
             same_size(base, width, height)?;
         }
-        let base = base.map(Plane::to_grid).unwrap_or_default();
+        let nothing = Plane::uniform(width, height, 0);
+        let base = base.unwrap_or(&nothing);
+        if CRC.checksum(&base.labels) != self.base {
+            return Err(ChunkFileError::OtherBase);
+        }
+        let base = base.to_grid();
         let bounds = Rect { x: 0, y: 0, width: self.width, height: self.height };
         let mut map = base.clone();
         for (index, chunk) in self.chunks.iter().enumerate() {
@@ -105,13 +123,14 @@ impl ChunkFile {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::from(MAGIC);
         out.push(VERSION);
-        for number in [self.width, self.height, self.chunks.len() as u32] {
+        for number in [self.width, self.height, self.base, self.chunks.len() as u32] {
             out.extend(number.to_le_bytes());
         }
         for chunk in &self.chunks {
             out.extend((chunk.len() as u16).to_le_bytes());
             out.extend(chunk);
         }
+        out.extend(CRC.checksum(&out).to_le_bytes());
         out
     }
 
@@ -126,12 +145,19 @@ impl ChunkFile {
             return Err(ChunkFileError::Version(version));
         }
         let mut reader = Reader(rest);
-        let (width, height, count) = (reader.number()?, reader.number()?, reader.number()?);
-        if u64::from(width) * u64::from(height) > MOST_CELLS {
-            return Err(ChunkFileError::TooLarge(width, height));
-        }
+        let (width, height) = allowed_size(reader.number()?, reader.number()?)?;
+        let (base, count) = (reader.number()?, reader.number()?);
         let chunks = (0..count).map(|_| reader.chunk()).collect::<Result<_, _>>()?;
-        if reader.0.is_empty() { Ok(Self { width, height, chunks }) } else { Err(ChunkFileError::Length) }
+        let sum = reader.number()?;
+        if !reader.0.is_empty() {
+            return Err(ChunkFileError::Length);
+        }
+        let summed = bytes.get(..bytes.len() - 4).unwrap_or_default();
+        if CRC.checksum(summed) == sum {
+            Ok(Self { width, height, base, chunks })
+        } else {
+            Err(ChunkFileError::Damaged)
+        }
     }
 }
 
@@ -153,6 +179,11 @@ impl Reader<'_> {
     }
 }
 
+fn allowed_size(width: u32, height: u32) -> Result<(u32, u32), ChunkFileError> {
+    let cells = u64::from(width) * u64::from(height);
+    if (1..=MOST_CELLS).contains(&cells) { Ok((width, height)) } else { Err(ChunkFileError::CellCount(width, height)) }
+}
+
 fn same_size(base: &Plane, width: usize, height: usize) -> Result<(), ChunkFileError> {
     let (base_width, base_height) = (base.width, base.height);
     if (base_width, base_height) == (width, height) {
@@ -163,7 +194,7 @@ fn same_size(base: &Plane, width: usize, height: usize) -> Result<(), ChunkFileE
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
+#[allow(clippy::unwrap_used, clippy::indexing_slicing)]
 mod tests {
     use super::*;
     use crate::map_codec::procedural::{Chance, Scene, sampler_noise};
@@ -200,7 +231,13 @@ mod tests {
         assert_eq!(ChunkFile::from_bytes(&longer), Err(ChunkFileError::Length));
         let file = ChunkFile::from_bytes(&bytes).unwrap();
         assert!(matches!(file.apply(Some(&Plane::uniform(9, 9, 1))), Err(ChunkFileError::Size { .. })));
-        assert!(matches!(file.apply(Some(&Plane::uniform(60, 40, 1))), Err(ChunkFileError::Chunk { .. })));
+        assert_eq!(file.apply(Some(&Plane::uniform(60, 40, 1))), Err(ChunkFileError::OtherBase));
+        assert_eq!(file.apply(None), Err(ChunkFileError::OtherBase));
+        for i in 0..bytes.len() * 8 {
+            let mut damaged = bytes.clone();
+            damaged[i / 8] ^= 1 << (i % 8);
+            assert!(ChunkFile::from_bytes(&damaged).is_err(), "bit {i}");
+        }
         let tiny = ChunkFile::encode(Codec::Auto, &before, &after, 3);
         assert_eq!(tiny, Err(ChunkFileError::Room(3)));
     }

@@ -3,6 +3,7 @@
 //! A chunk covers one compact patch. It says the new label of the cells it changes and leaves every other cell of
 //! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
 
+mod best_png;
 mod bits;
 mod chunk;
 mod codec;
@@ -28,7 +29,7 @@ mod window;
 
 pub use chunk::{DecodeError, MapChunk, decode, encode};
 pub use codec::Codec;
-pub use context::train_prior;
+pub use context::{PRIOR_SCENES, train_prior};
 pub use file::{ChunkFile, ChunkFileError};
 pub use plane::Plane;
 pub use plane_png::MapPngError;

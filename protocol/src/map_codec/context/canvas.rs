@@ -1,6 +1,6 @@
 //! The patch and what lies around it, as the coder sees it: new labels where it has been, old ones elsewhere.
 
-use crate::map::{LabelGrid, Rect};
+use crate::map::{LabelGrid, Rect, UNEXPLORED};
 use crate::map_codec::window::Patch;
 
 /// Cells around the patch that contexts look at.
@@ -18,6 +18,8 @@ pub(super) struct Canvas {
     now: Vec<u8>,
     /// Cells by label, in the base around the patch and as coded.
     census: [u32; 256],
+    /// Labels that the census has met.
+    kinds: usize,
     /// How noisy the base is: share of cells with none like them around, in six classes.
     pub(super) noise: usize,
 }
@@ -31,10 +33,11 @@ impl Canvas {
         };
         let mut census = [0; 256];
         area(CENSUS_MARGIN).into_iter().for_each(|label| census[usize::from(label)] += 1);
+        let kinds = census.iter().skip(1).filter(|&&count| count > 0).count();
         let held = area(MARGIN as i64);
         let stride = width + 2 * MARGIN;
         let noise = noise(&held, stride);
-        Self { width, height, stride, base: held.clone(), now: held, census, noise }
+        Self { width, height, stride, base: held.clone(), now: held, census, kinds, noise }
     }
 
     /// Where the cell in `column` of `row` lies.
@@ -63,7 +66,14 @@ impl Canvas {
     /// Writes the cell's new label.
     pub(super) fn set(&mut self, at: usize, label: u8) {
         self.now[at] = label;
-        self.census[usize::from(label)] += 1;
+        let count = &mut self.census[usize::from(label)];
+        self.kinds += usize::from(*count == 0 && label != UNEXPLORED);
+        *count += 1;
+    }
+
+    /// How many labels other than `held` are in use around.
+    pub(super) fn kinds_beside(&self, held: u8) -> usize {
+        self.kinds - usize::from(held != UNEXPLORED && self.count(held) > 0)
     }
 
     /// How many cells hold `label`, nearly.

@@ -26,7 +26,7 @@ use canvas::Canvas;
 pub(super) use fit::{best_chunk, prefix_chunk};
 use model::Model;
 use prior::Prior;
-pub use train::train_prior;
+pub use train::{PRIOR_SCENES, train_prior};
 
 /// Where the last row ends.
 ///

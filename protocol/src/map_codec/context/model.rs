@@ -83,7 +83,7 @@ impl Model {
 
     fn code_label(&mut self, coder: &mut impl BitCoder, canvas: &Canvas, view: &View, wanted: u8) -> Option<u8> {
         let votes = Votes::around(view);
-        let in_use = (1..=MAX_LABEL).filter(|&l| l != view.held && canvas.count(l) > 0).count();
+        let in_use = canvas.kinds_beside(view.held);
         for (rank, &(candidate, _)) in votes.ranked().iter().enumerate() {
             let contexts = label::contexts(view, &votes, candidate, rank, in_use.saturating_sub(rank));
             if decide(&mut self.label, coder, &contexts, wanted == candidate) {

@@ -27,8 +27,8 @@ pub(super) struct Prior {
     pub(super) label: StagePrior,
 }
 
-/// Written by `cargo run --release -p scenecast-protocol --example train_prior 1 1500 prior.bin`; part of the wire
-/// format: another table is another coder.
+/// Written by `scenecast map train-prior --seed 1 --out prior.bin`; part of the wire format: another table is another
+/// coder.
 const TABLE: &[u8] = include_bytes!("prior.bin");
 
 static SHIPPED: LazyLock<Prior> = LazyLock::new(|| Prior::from_bytes(TABLE).unwrap_or_else(Prior::blank));
@@ -139,6 +139,12 @@ mod tests {
         let prior = Prior::from_bytes(TABLE).expect("a table of this layout");
         assert_eq!(prior.to_bytes().len(), TABLE.len());
         assert!(Prior::from_bytes(&TABLE[1..]).is_none());
+    }
+
+    #[test]
+    #[ignore = "takes minutes: cargo test --release -p scenecast-protocol -- --ignored shipped_table_is"]
+    fn the_shipped_table_is_what_training_gives_for_the_documented_seed() {
+        assert!(crate::map_codec::train_prior(1, crate::map_codec::PRIOR_SCENES, &mut |_| ()) == TABLE);
     }
 
     #[test]

@@ -9,6 +9,9 @@ use super::stage::{Stage, Tally};
 use super::{LastRow, order};
 use crate::map_codec::procedural::{Lesson, lessons};
 
+/// Procedural scenes that the shipped prior is trained on, with seed 1.
+pub const PRIOR_SCENES: u64 = 1500;
+
 /// The prior's table, trained on the lessons of `scenes` procedural scenes; the same seed gives the same table.
 ///
 /// `progress` hears in a thousandth how far it is. Floating point is used here and only here, for sums and quotients.
