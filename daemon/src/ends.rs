@@ -80,7 +80,8 @@ pub fn vehicle(
         authenticity: authenticity(config)?,
     };
     let codec = config.map.codec.parse().unwrap_or_default();
-    let link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
+    let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
+    link.source_mut().set_settle_time(Duration::from_secs_f64(config.map.settle_s));
     let steering = Steering::new(area, footprint(config), cell_m(config));
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);

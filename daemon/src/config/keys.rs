@@ -151,6 +151,13 @@ pub const KEYS: &[Key] = &[
         "ar",
         "whole-png sends the whole map again whenever it changed: for comparison only",
     ),
+    key(
+        "map.settle_s",
+        "s",
+        Range(0.0, 600.0),
+        "ar",
+        "time that a new label of a cell that the operator knows has to stand before it is sent; up to eight times that for a cell that flips again and again; 0: none",
+    ),
     key("camera.source", "", Text, "ar", "empty: the rehearsal's image; frames:DIR: images with DIR/poses.csv"),
     key("camera.rate_hz", "1/s", Range(0.01, 30.0), "r", "frames a second"),
     key("camera.width_px", "pixel", Range(64.0, 4096.0), "r", "columns of a frame"),

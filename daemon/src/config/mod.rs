@@ -155,6 +155,8 @@ section! {
         codec: String = "auto".into(),
         /// `delta` or `whole-png`.
         stream: String = "delta".into(),
+        /// Seconds that a new label of a cell that the operator knows has to stand; 0 = none.
+        settle_s: f64 = 4.0,
     }
 }
 section! {

@@ -148,6 +148,11 @@ impl Vehicle {
         self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
     }
 
+    /// Changes of labels that never had to be sent, for they did not last.
+    pub fn flips_suppressed(&self) -> u64 {
+        self.link.source().flips_suppressed()
+    }
+
     /// Whether the surface is known to have everything.
     pub fn is_settled(&self) -> bool {
         self.link.is_settled() && self.whole_png.as_ref().is_none_or(WholePng::is_settled)
