@@ -40,8 +40,8 @@ impl Settling {
             return Duration::ZERO;
         }
         let epoch = now.as_micros() / (self.calm.as_micros() as u64 * MEMORY).max(1);
-        let (before, flips) = self.recall(cell, epoch);
-        self.flips.set(cell, before << 3 | (flips + 1).min(MOST_FLIPS));
+        let (present, flips) = self.recall(cell, epoch);
+        self.flips.set(cell, present << 3 | (flips + 1).min(MOST_FLIPS));
         let doubt = u32::from(MOST_CONFIDENT.saturating_sub(confidence));
         self.calm * (1 + u32::from(flips)) * doubt / u32::from(MOST_CONFIDENT)
     }
