@@ -87,6 +87,7 @@ pub fn vehicle(
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let navigator = Navigator::new(x, y, depth, config.navigation.drift_percent / 100.0);
     let mut vehicle = Vehicle::new(link, navigator, steering, durable, now);
+    vehicle.set_coarse_after(config.map.coarse_after_s);
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }

@@ -33,15 +33,17 @@ fn setup() -> impl Strategy<Value = Setup> {
     let budget = prop_oneof![Just(1000u32), Just(10_000)];
     let codec = prop_oneof![Just(Codec::Png), Just(Codec::Context)];
     let settle = prop_oneof![Just(0), Just(2), Just(30)].prop_map(Duration::from_secs);
-    (frame, budget, codec, access, 0u8..6, settle).prop_map(|(frame_bytes, budget_bps, codec, access, keyed, settle)| {
-        let setup = Setup { access, settle, ..Setup::new(frame_bytes, budget_bps, codec) };
-        match keyed {
-            1 if frame_bytes >= 48 => setup.keyed(false, false),
-            2 if frame_bytes >= 48 => setup.keyed(true, false),
-            3 if frame_bytes >= 48 => setup.keyed(true, true),
-            _ => setup,
-        }
-    })
+    (frame, budget, codec, access, 0u8..6, settle).prop_map(
+        |(frame_bytes, budget_bps, codec, access, keyed, settle)| {
+            let setup = Setup { access, settle, ..Setup::new(frame_bytes, budget_bps, codec) };
+            match keyed {
+                1 if frame_bytes >= 48 => setup.keyed(false, false),
+                2 if frame_bytes >= 48 => setup.keyed(true, false),
+                3 if frame_bytes >= 48 => setup.keyed(true, true),
+                _ => setup,
+            }
+        },
+    )
 }
 
 fn assert_budget(pair: &Pair, budget_bps: u32) {

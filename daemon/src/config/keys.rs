@@ -158,6 +158,13 @@ pub const KEYS: &[Key] = &[
         "ar",
         "time that a new label of a cell that the operator knows has to stand before it is sent; up to eight times that for a cell that flips again and again; 0: none",
     ),
+    key(
+        "map.coarse_after_s",
+        "s",
+        Range(0.0, 86_400.0),
+        "ar",
+        "a backlog that the budget needs longer for goes out coarse to fine: every fourth cell in both directions first; 0: never",
+    ),
     key("camera.source", "", Text, "ar", "empty: the rehearsal's image; frames:DIR: images with DIR/poses.csv"),
     key("camera.rate_hz", "1/s", Range(0.01, 30.0), "r", "frames a second"),
     key("camera.width_px", "pixel", Range(64.0, 4096.0), "r", "columns of a frame"),

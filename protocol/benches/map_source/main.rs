@@ -30,7 +30,9 @@ fn main() {
         let later = Instant::from_secs_f64(20.0);
         time("first chunk", 1, || {
             source.handle_timeout(later);
-            source.next_chunk(room, later).map(|(bytes, carried)| println!("{} bytes, {} cells", bytes.len(), carried.len()))
+            source
+                .next_chunk(room, later)
+                .map(|(bytes, carried)| println!("{} bytes, {} cells", bytes.len(), carried.len()))
         });
         time("next chunks, each", 20, || (0..20).filter(|_| source.next_chunk(room, later).is_some()).count());
         time("backlog", 1, || source.backlog_bytes());

@@ -1,6 +1,7 @@
 //! A set of cells of one tile.
 
 use super::grid::TILE_CELLS;
+use crate::map_codec::Stride;
 
 /// Cells of a tile by their places in it, a bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,6 +36,15 @@ impl TileSet {
         left
     }
 
+    /// The cells that are on a lattice: its rows, four to a word, begin with a tile's.
+    pub(super) fn on(&self, stride: Stride) -> Self {
+        let mask = match stride {
+            Stride::One => u64::MAX,
+            Stride::Four => 0x1111,
+        };
+        Self(self.0.map(|word| word & mask))
+    }
+
     /// The cells in ascending order.
     pub(super) fn iter(&self) -> impl Iterator<Item = u8> + use<> {
         [0u8, 64, 128, 192].into_iter().zip(self.0).flat_map(|(first, word)| {
@@ -67,6 +77,7 @@ mod tests {
         assert_eq!(set.iter().collect::<Vec<_>>(), [0, 7, 63, 64, 255]);
         set.set(63, false);
         assert!(set.len() == 4 && !set.contains(63) && set.contains(64));
+        assert_eq!(set.on(Stride::Four).iter().collect::<Vec<_>>(), [0, 64]);
         assert!(set.without(&set, &TileSet::default()).is_empty());
     }
 }

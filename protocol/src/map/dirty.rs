@@ -4,6 +4,7 @@ use super::bits::TileSet;
 use super::grid::{TILE_CELLS, TileKey, TileLabels};
 use super::value::{Interest, Value, cost};
 use super::{Cell, LabelGrid, UNEXPLORED};
+use crate::map_codec::Stride;
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
@@ -89,7 +90,14 @@ impl Tile {
 
     fn counts(&self) -> Counts {
         let held = self.held.without(&self.flying, &TileSet::default()).len();
-        Counts { differing: self.differing.len(), waiting: self.waiting().len(), held, flying: self.flying.len() }
+        let waiting = self.waiting();
+        Counts {
+            differing: self.differing.len(),
+            waiting: waiting.len(),
+            waiting_coarse: waiting.on(Stride::Four).len(),
+            held,
+            flying: self.flying.len(),
+        }
     }
 }
 
@@ -98,6 +106,8 @@ impl Tile {
 pub(super) struct Counts {
     pub(super) differing: usize,
     pub(super) waiting: usize,
+    /// Of the waiting cells those on the coarse lattice.
+    pub(super) waiting_coarse: usize,
     pub(super) held: usize,
     pub(super) flying: usize,
 }
@@ -106,6 +116,7 @@ impl Counts {
     fn replace(&mut self, old: Self, new: Self) {
         self.differing = self.differing - old.differing + new.differing;
         self.waiting = self.waiting - old.waiting + new.waiting;
+        self.waiting_coarse = self.waiting_coarse - old.waiting_coarse + new.waiting_coarse;
         self.held = self.held - old.held + new.held;
         self.flying = self.flying - old.flying + new.flying;
     }
@@ -133,13 +144,15 @@ pub(super) struct Dirty {
     counts: Counts,
     /// No held cell is due earlier.
     due: Tick,
+    /// The lattice whose cells the tiles' values are of.
+    stride: Stride,
     /// Cells looked at so far to choose what to send.
     looked_at: u64,
 }
 
 impl Default for Dirty {
     fn default() -> Self {
-        Self { tiles: BTreeMap::new(), counts: Counts::default(), due: Tick::MAX, looked_at: 0 }
+        Self { tiles: BTreeMap::new(), counts: Counts::default(), due: Tick::MAX, stride: Stride::One, looked_at: 0 }
     }
 }
 
@@ -232,21 +245,25 @@ impl Dirty {
         self.tiles.values_mut().for_each(|tile| tile.value = None);
     }
 
-    /// The waiting cell to start from: the most valuable one of the tile that is worth most a bit.
+    /// The waiting cell of a lattice to start from: the most valuable one of the tile that is worth most a bit.
     pub(super) fn best(
         &mut self,
+        stride: Stride,
         acked: &LabelGrid,
         target: &LabelGrid,
         interest: &Interest,
         now: Instant,
     ) -> Option<Cell> {
+        if std::mem::replace(&mut self.stride, stride) != stride {
+            self.revalue();
+        }
         let now_s = now.as_secs_f64();
         let mut best: Option<(f64, TileKey)> = None;
         for (&key, tile) in &mut self.tiles {
             let value = match tile.value {
                 Some(value) => value,
                 None => {
-                    let value = tile.sum(acked.tile(key), target.tile(key), interest);
+                    let value = tile.sum(stride, acked.tile(key), target.tile(key), interest);
                     self.looked_at += TILE_CELLS as u64;
                     *tile.value.insert(value)
                 }
@@ -264,7 +281,7 @@ impl Dirty {
             let i = usize::from(place);
             interest.worth(old[i], new[i]) * (1.0 + now_s - moment(tile.since(place)).as_secs_f64())
         };
-        let first = tile.waiting().iter().map(|place| (value(place), place));
+        let first = tile.waiting().on(stride).iter().map(|place| (value(place), place));
         let (_, place) = first.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
         Some(Cell::at(key, place))
     }
@@ -297,10 +314,10 @@ impl Dirty {
 }
 
 impl Tile {
-    /// The value of the waiting cells.
-    fn sum(&self, acked: &TileLabels, target: &TileLabels, interest: &Interest) -> Value {
+    /// The value of the waiting cells of a lattice.
+    fn sum(&self, stride: Stride, acked: &TileLabels, target: &TileLabels, interest: &Interest) -> Value {
         let mut value = Value::default();
-        for place in self.waiting().iter() {
+        for place in self.waiting().on(stride).iter() {
             let i = usize::from(place);
             let since = moment(self.since(place)).as_secs_f64();
             value.add(interest.worth(acked[i], target[i]), cost(acked[i]), since);

@@ -1,6 +1,7 @@
 //! The label map as both ends hold it.
 
 mod bits;
+mod coarse;
 mod digest;
 #[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
 mod dirty;

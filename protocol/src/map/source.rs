@@ -1,10 +1,11 @@
 //! The vehicle's side of the map: what the surface is known to hold, what it ought to hold, what is on its way.
 
+use super::coarse::Coarse;
 use super::dirty::{Change, Dirty};
 use super::settle::Settling;
 use super::value::Interest;
 use super::{Cell, LabelGrid, MOST_CONFIDENT, MapDigest, StateSource, UNEXPLORED};
-use crate::map_codec::{self, Codec};
+use crate::map_codec::{self, Codec, Stride};
 use crate::time::Instant;
 use std::time::Duration;
 
@@ -17,6 +18,7 @@ pub struct MapSource {
     codec: Codec,
     interest: Interest,
     settling: Settling,
+    coarse: Coarse,
     /// Learned size of the stream, bytes a changed cell.
     bytes_per_cell: f64,
     target: LabelGrid,
@@ -35,6 +37,7 @@ impl MapSource {
             codec,
             interest: Interest::default(),
             settling: Settling::default(),
+            coarse: Coarse::default(),
             bytes_per_cell: 1.0,
             target: LabelGrid::default(),
             acked: LabelGrid::default(),
@@ -56,6 +59,12 @@ impl MapSource {
     /// everything is sent at once.
     pub fn set_settle_time(&mut self, calm: Duration) {
         self.settling.set_wait(calm);
+    }
+
+    /// A backlog of about more than so many bytes goes out coarse to fine: every fourth cell in both directions first, then
+    /// all. `None`: never.
+    pub fn set_coarse_limit(&mut self, after_bytes: Option<usize>) {
+        self.coarse.set_limit(after_bytes);
     }
 
     /// Changes that never had to be sent, for they were taken back or overtaken while they were held back.
@@ -123,11 +132,15 @@ impl StateSource for MapSource {
     type Carried = Vec<(Cell, u8)>;
 
     fn next_chunk(&mut self, room: usize, now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
-        let seed = self.dirty.best(&self.acked, &self.target, &self.interest, now)?;
-        let chunk =
-            map_codec::encode(self.codec, &self.acked, &self.target, seed, room, &self.dirty.waiting())?;
-        let per_cell = chunk.bytes.len() as f64 / chunk.changes.len().max(1) as f64;
-        self.bytes_per_cell += (per_cell - self.bytes_per_cell) * 0.1;
+        let stride = self.coarse.stride(&self.dirty.counts());
+        let seed = self.dirty.best(stride, &self.acked, &self.target, &self.interest, now)?;
+        let (base, waiting) = (&self.acked, self.dirty.waiting());
+        let chunk = map_codec::encode_every(stride, self.codec, base, &self.target, seed, room, &waiting)?;
+        drop(waiting);
+        if stride == Stride::One {
+            let per_cell = chunk.bytes.len() as f64 / chunk.changes.len().max(1) as f64;
+            self.bytes_per_cell += (per_cell - self.bytes_per_cell) * 0.1;
+        }
         chunk.changes.iter().for_each(|&(cell, _)| self.dirty.depart(cell));
         Some((chunk.bytes, chunk.changes))
     }
