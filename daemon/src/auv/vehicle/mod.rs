@@ -134,10 +134,10 @@ impl Vehicle {
     /// A backlog that the budget needs longer for goes out coarse to fine; 0: never.
     pub fn set_coarse_after(&mut self, seconds: f64) {
         self.coarse_after_s = seconds;
-        self.follow_budget();
+        self.limit_backlog();
     }
 
-    fn follow_budget(&mut self) {
+    pub(super) fn limit_backlog(&mut self) {
         let bytes = f64::from(self.link.budget_bps()) / 8.0 * self.coarse_after_s;
         self.link.source_mut().set_coarse_limit((bytes > 0.0).then_some(bytes as usize));
     }
