@@ -156,7 +156,7 @@ section! {
         /// `delta` or `whole-png`.
         stream: String = "delta".into(),
         /// Seconds that a new label of a cell that the operator knows has to stand; 0 = none.
-        settle_s: f64 = 4.0,
+        settle_s: f64 = 0.0,
         /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0 = never.
         coarse_after_s: f64 = 120.0,
     }
