@@ -80,12 +80,14 @@ pub fn vehicle(
         authenticity: authenticity(config)?,
     };
     let codec = config.map.codec.parse().unwrap_or_default();
-    let link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
+    let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
+    link.source_mut().set_settle_time(Duration::from_secs_f64(config.map.settle_s));
     let steering = Steering::new(area, footprint(config), cell_m(config));
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let navigator = Navigator::new(x, y, depth, config.navigation.drift_percent / 100.0);
     let mut vehicle = Vehicle::new(link, navigator, steering, durable, now);
+    vehicle.set_coarse_after(config.map.coarse_after_s);
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }

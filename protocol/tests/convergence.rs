@@ -32,15 +32,18 @@ fn setup() -> impl Strategy<Value = Setup> {
     let frame = prop_oneof![Just(32usize), Just(64), Just(256), Just(1000)];
     let budget = prop_oneof![Just(1000u32), Just(10_000)];
     let codec = prop_oneof![Just(Codec::Png), Just(Codec::Context)];
-    (frame, budget, codec, access, 0u8..6).prop_map(|(frame_bytes, budget_bps, codec, access, keyed)| {
-        let setup = Setup { access, ..Setup::new(frame_bytes, budget_bps, codec) };
-        match keyed {
-            1 if frame_bytes >= 48 => setup.keyed(false, false),
-            2 if frame_bytes >= 48 => setup.keyed(true, false),
-            3 if frame_bytes >= 48 => setup.keyed(true, true),
-            _ => setup,
-        }
-    })
+    let settle = prop_oneof![Just(0), Just(2), Just(30)].prop_map(Duration::from_secs);
+    (frame, budget, codec, access, 0u8..6, settle).prop_map(
+        |(frame_bytes, budget_bps, codec, access, keyed, settle)| {
+            let setup = Setup { access, settle, ..Setup::new(frame_bytes, budget_bps, codec) };
+            match keyed {
+                1 if frame_bytes >= 48 => setup.keyed(false, false),
+                2 if frame_bytes >= 48 => setup.keyed(true, false),
+                3 if frame_bytes >= 48 => setup.keyed(true, true),
+                _ => setup,
+            }
+        },
+    )
 }
 
 fn assert_budget(pair: &Pair, budget_bps: u32) {
@@ -136,6 +139,24 @@ fn an_end_that_was_not_heard_for_hours_is_heard_again() {
         pair.mute = [false; 2];
         pair.run(pair.now + Duration::from_secs(300), true);
         assert!(pair.is_converged(), "mute {mute:?}: {:?}", pair.vehicle.stats());
+    }
+}
+
+#[test]
+fn what_was_held_back_is_asked_for_when_it_is_due() {
+    for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
+        let setup = Setup { access, settle: Duration::from_secs(4), ..Setup::new(256, 10_000, Codec::Context) };
+        let mut pair = Pair::new(5, setup, Water { loss: 0.0, ..CALM });
+        let start = patchy(20, 0);
+        pair.vehicle.set_map(start.iter(), pair.now);
+        pair.run(pair.now + Duration::from_secs(60), false);
+        assert!(pair.is_converged());
+        let cell = Cell::new(0, 0);
+        pair.vehicle.set_map([(cell, 99)], pair.now);
+        pair.run(pair.now + Duration::from_millis(3900), false);
+        assert_eq!(pair.shown(), &start, "{access:?}");
+        pair.run(pair.now + Duration::from_secs(6), true);
+        assert_eq!(pair.shown().get(cell), 99, "{access:?}: {:?}", pair.vehicle.stats());
     }
 }
 

@@ -155,6 +155,10 @@ section! {
         codec: String = "auto".into(),
         /// `delta` or `whole-png`.
         stream: String = "delta".into(),
+        /// Seconds that a new label of a cell that the operator knows has to stand; 0 = none.
+        settle_s: f64 = 0.0,
+        /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0 = never.
+        coarse_after_s: f64 = 0.0,
     }
 }
 section! {

@@ -90,6 +90,7 @@ fn map(m: &Mission) -> Value {
         "codec": m.config.map.codec,
         "versions": m.vehicle.map_version(),
         "updates_sent": stats.chunks_sent,
+        "flips_suppressed": m.vehicle.flips_suppressed(),
         "payload_bytes": stats.bytes_by_class.get(&Class::Map).copied().unwrap_or(0),
         "png_full_bytes": m.png_full_bytes,
         "agreement_final": round(m.meter.agreement()),

@@ -4,6 +4,13 @@ use std::collections::BTreeMap;
 
 /// Edge of a storage tile in cells.
 pub const TILE: i32 = 16;
+/// Cells of a storage tile.
+pub(super) const TILE_CELLS: usize = (TILE * TILE) as usize;
+
+/// A storage tile's place: rows and columns of tiles from the origin.
+pub(super) type TileKey = (i32, i32);
+/// Labels of a tile, row by row.
+pub(super) type TileLabels = [u8; TILE_CELLS];
 
 /// A cell's place on the grid: east and north counts of cells from the session's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,12 +27,23 @@ impl Cell {
         Self { x, y }
     }
 
-    fn tile(self) -> (i32, i32) {
+    pub(super) fn tile(self) -> TileKey {
         (self.y.div_euclid(TILE), self.x.div_euclid(TILE))
     }
 
+    /// The place in its tile.
+    pub(super) fn place(self) -> u8 {
+        (self.y.rem_euclid(TILE) * TILE + self.x.rem_euclid(TILE)) as u8
+    }
+
+    /// The cell at a place of a tile.
+    pub(super) fn at((row, column): TileKey, place: u8) -> Self {
+        let place = i32::from(place);
+        Self::new(column * TILE + place % TILE, row * TILE + place / TILE)
+    }
+
     fn index(self) -> usize {
-        (self.y.rem_euclid(TILE) * TILE + self.x.rem_euclid(TILE)) as usize
+        usize::from(self.place())
     }
 }
 
@@ -80,7 +98,7 @@ impl Rect {
 /// Memory is one byte a cell in tiles of [`TILE`] x [`TILE`] that hold at least one set cell.
 #[derive(Debug, Clone, Default)]
 pub struct LabelGrid {
-    tiles: BTreeMap<(i32, i32), Box<[u8; (TILE * TILE) as usize]>>,
+    tiles: BTreeMap<TileKey, Box<TileLabels>>,
 }
 
 impl LabelGrid {
@@ -94,7 +112,7 @@ impl LabelGrid {
         if label == 0 && !self.tiles.contains_key(&cell.tile()) {
             return 0;
         }
-        let tile = self.tiles.entry(cell.tile()).or_insert_with(|| Box::new([0; (TILE * TILE) as usize]));
+        let tile = self.tiles.entry(cell.tile()).or_insert_with(|| Box::new([0; TILE_CELLS]));
         std::mem::replace(&mut tile[cell.index()], label)
     }
 
@@ -122,12 +140,19 @@ impl LabelGrid {
 
     /// Explored cells with their labels, tile by tile in a fixed order.
     pub fn iter(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
-        self.tiles.iter().flat_map(|(&(ty, tx), tile)| {
-            tile.iter().enumerate().filter(|&(_, &l)| l != 0).map(move |(i, &l)| {
-                let i = i as i32;
-                (Cell::new(tx * TILE + i % TILE, ty * TILE + i / TILE), l)
-            })
+        self.tiles().flat_map(|(key, tile)| {
+            (0..=u8::MAX).zip(tile).filter(|&(_, &l)| l != 0).map(move |(place, &l)| (Cell::at(key, place), l))
         })
+    }
+
+    /// Tiles that hold or held a set cell.
+    pub(super) fn tiles(&self) -> impl Iterator<Item = (TileKey, &TileLabels)> + '_ {
+        self.tiles.iter().map(|(&key, tile)| (key, tile.as_ref()))
+    }
+
+    /// Labels of a tile.
+    pub(super) fn tile(&self, key: TileKey) -> &TileLabels {
+        self.tiles.get(&key).map_or(&[0; TILE_CELLS], |tile| tile)
     }
 
     /// Number of explored cells.

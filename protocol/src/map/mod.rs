@@ -1,15 +1,22 @@
 //! The label map as both ends hold it.
 
+mod bits;
+mod coarse;
 mod digest;
+#[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
+mod dirty;
 #[allow(clippy::indexing_slicing)] // A cell's place is less than the size of its tile.
 mod grid;
 mod replica;
+mod settle;
 mod source;
 mod stream;
+mod value;
 
 pub use digest::MapDigest;
 pub use grid::{Cell, LabelGrid, Rect, TILE};
 pub use replica::Replica;
+pub use settle::MOST_CONFIDENT;
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};
 

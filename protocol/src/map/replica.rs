@@ -1,6 +1,6 @@
 //! The surface's side of the map: the picture, and the bases that the next chunks may refer to.
 
-use super::{Cell, LabelGrid, MapDigest, StateReplica};
+use super::{Cell, LabelGrid, MapDigest, StateReplica, UNEXPLORED};
 use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
@@ -35,6 +35,16 @@ impl Replica {
     /// The map to show.
     pub fn shown(&self) -> &LabelGrid {
         &self.shown
+    }
+
+    /// What to paint at a cell: its label, or else that of the cell that stands for the block of 4 x 4 cells around
+    /// it, and how many cells a side that label stands for. Only what was sent is in [`Self::shown`].
+    pub fn painted(&self, cell: Cell) -> Option<(u8, i32)> {
+        [1, 4].into_iter().find_map(|n| {
+            let corner = Cell::new(cell.x.div_euclid(n) * n, cell.y.div_euclid(n) * n);
+            let label = self.shown.get(corner);
+            (label != UNEXPLORED).then_some((label, n))
+        })
     }
 
     /// When [`Self::shown`] was last confirmed or changed by the vehicle.

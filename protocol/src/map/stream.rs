@@ -17,8 +17,23 @@ pub trait StateSource: Debug {
     /// The peer has lost all that it held.
     fn handle_peer_restart(&mut self, now: Instant);
 
-    /// About how many bytes wait for their first or next transmission.
+    /// Time has passed: changes that were held back may be due. Says whether any was.
+    fn handle_timeout(&mut self, _now: Instant) -> bool {
+        false
+    }
+
+    /// When changes that are held back become due, or a little earlier; `None` if none is held back.
+    fn next_due(&self) -> Option<Instant> {
+        None
+    }
+
+    /// About how many bytes wait for their first or next transmission, without what is held back.
     fn backlog_bytes(&self) -> usize;
+
+    /// Whether nothing waits or is on its way, though something may be held back.
+    fn is_quiet(&self) -> bool {
+        self.is_settled()
+    }
 
     /// Whether the peer is known to hold everything.
     fn is_settled(&self) -> bool;

@@ -3,6 +3,7 @@
 use super::bits::BitReader;
 use super::grow::Growth;
 use super::header::{Body, Header, base_check};
+use super::lattice::{Lattice, Stride};
 use super::window::Patch;
 use super::{Codec, context, png};
 use crate::map::{Cell, LabelGrid, Rect};
@@ -49,12 +50,33 @@ pub fn encode(
     room: usize,
     wanted: &dyn Fn(Cell) -> bool,
 ) -> Option<MapChunk> {
-    let growth = Growth::around(base, target, seed, room, wanted)?;
+    encode_every(Stride::One, codec, base, target, seed, room, wanted)
+}
+
+/// As [`encode`], of cells on the lattice of `stride` alone; `None` if `seed` is not on it.
+pub fn encode_every(
+    stride: Stride,
+    codec: Codec,
+    base: &LabelGrid,
+    target: &LabelGrid,
+    seed: Cell,
+    room: usize,
+    wanted: &dyn Fn(Cell) -> bool,
+) -> Option<MapChunk> {
+    let (base, target) = (Lattice::new(base, stride), Lattice::new(target, stride));
+    let wanted = |cell| wanted(stride.on_map(cell));
+    let growth = Growth::around(base, target, stride.on_lattice(seed)?, room, &wanted)?;
+    let mut chunk = best_chunk(codec, base, &growth, room)?;
+    chunk.changes.iter_mut().for_each(|(cell, _)| *cell = stride.on_map(*cell));
+    Some(chunk)
+}
+
+fn best_chunk(codec: Codec, base: Lattice<'_>, growth: &Growth, room: usize) -> Option<MapChunk> {
     match codec {
-        Codec::Png => png::best_chunk(base, &growth, room),
-        Codec::Context => context::best_chunk(base, &growth, room),
+        Codec::Png => png::best_chunk(base, growth, room),
+        Codec::Context => context::best_chunk(base, growth, room),
         Codec::Auto => {
-            let by_context = context::best_chunk(base, &growth, room);
+            let by_context = context::best_chunk(base, growth, room);
             by_context.map(|chunk| png::smaller(base, &chunk).unwrap_or(chunk))
         }
     }
@@ -69,6 +91,7 @@ pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeE
     if !header.geometry_is_sound() {
         return Err(DecodeError::BadGeometry);
     }
+    let base = Lattice::new(base, header.stride);
     if header.check != base_check(base, header.patch) ^ bytes.len() as u8 {
         return Err(DecodeError::BaseMismatch);
     }
@@ -77,12 +100,12 @@ pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeE
         Body::Png => png::read(bits, base, patch),
         Body::Context => context::read(bits, base, patch),
     }
-    .map(|patch| patch.changes())
+    .map(|patch| patch.changes().into_iter().map(|(cell, label)| (header.stride.on_map(cell), label)).collect())
 }
 
 /// Head of a chunk for `rect`.
-pub(super) fn header_for(base: &LabelGrid, body: Body, rect: Rect) -> Header {
-    Header { body, patch: rect, check: base_check(base, rect) }
+pub(super) fn header_for(base: Lattice<'_>, body: Body, rect: Rect) -> Header {
+    Header { body, stride: base.stride(), patch: rect, check: base_check(base, rect) }
 }
 
 /// The chunk that says `patch` in `bytes`.

@@ -2,7 +2,8 @@
 
 use super::window::{Area, Window};
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
-use crate::map::{Cell, LabelGrid};
+use crate::map::Cell;
+use crate::map_codec::lattice::Lattice;
 
 /// Nested areas around the middle of `window`, smallest first; each holds more changes than the one before.
 #[derive(Debug)]
@@ -29,8 +30,8 @@ impl Growth {
 
     /// Grows around `seed` until the changes surely need more than `room` bytes; `None` if `seed` is not to be sent.
     pub(super) fn around(
-        base: &LabelGrid,
-        target: &LabelGrid,
+        base: Lattice<'_>,
+        target: Lattice<'_>,
         seed: Cell,
         room: usize,
         wanted: &dyn Fn(Cell) -> bool,

@@ -14,6 +14,7 @@ mod file;
 mod golden;
 mod grow;
 mod header;
+mod lattice;
 #[allow(clippy::indexing_slicing)]
 mod plane;
 mod plane_png;
@@ -27,10 +28,11 @@ mod tests;
 #[allow(clippy::indexing_slicing)] // Columns and rows of its own square.
 mod window;
 
-pub use chunk::{DecodeError, MapChunk, decode, encode};
+pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every};
 pub use codec::Codec;
 pub use context::{PRIOR_SCENES, train_prior};
 pub use file::{ChunkFile, ChunkFileError};
+pub use lattice::Stride;
 pub use plane::Plane;
 pub use plane_png::MapPngError;
 pub use png::restored_png;

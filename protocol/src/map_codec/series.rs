@@ -1,5 +1,6 @@
 //! A whole change in as many chunks as it takes.
 
+use super::lattice::Lattice;
 use super::window::Patch;
 use super::{Codec, MAX_PATCH_CELLS, MAX_PATCH_SIDE, MapChunk, context, encode, png};
 use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
@@ -26,7 +27,7 @@ pub fn encode_all(codec: Codec, base: &LabelGrid, target: &LabelGrid, room: usiz
         }
     }
     if codec == Codec::Auto {
-        chunks = chunks.into_iter().map(|chunk| png::smaller(base, &chunk).unwrap_or(chunk)).collect();
+        chunks = chunks.into_iter().map(|chunk| png::smaller(Lattice::whole(base), &chunk).unwrap_or(chunk)).collect();
     }
     Some(chunks)
 }
@@ -114,10 +115,10 @@ fn strip_chunks(
     let most_rows = (MAX_PATCH_CELLS as u32 / strip.width).min(MAX_PATCH_SIDE as u32);
     while let Some(&(y, x)) = left.first() {
         let height = most_rows.min(strip.height - y.abs_diff(strip.y));
-        let mut patch = Patch::between(base, target, Rect { y, height, ..strip });
+        let mut patch = Patch::between(Lattice::whole(base), Lattice::whole(target), Rect { y, height, ..strip });
         let sent = x.abs_diff(strip.x) as usize;
         patch.outcome[..sent].copy_from_slice(&patch.base[..sent]);
-        let chunk = context::prefix_chunk(base, &patch.trimmed()?, room)?;
+        let chunk = context::prefix_chunk(Lattice::whole(base), &patch.trimmed()?, room)?;
         for &(cell, _) in &chunk.changes {
             left.remove(&(cell.y, cell.x));
         }

@@ -3,6 +3,7 @@
 use super::bits::BitWriter;
 use super::chunk::header_for;
 use super::header::Body;
+use super::lattice::Lattice;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
 use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
 use proptest::prelude::*;
@@ -120,7 +121,7 @@ proptest! {
         width in 1..60u32, height in 1..60u32, body in prop::collection::vec(any::<u8>(), 0..120),
     ) {
         let patch = Rect { x, y, width, height };
-        let head = header_for(&base, if context { Body::Context } else { Body::Png }, patch);
+        let head = header_for(Lattice::whole(&base), if context { Body::Context } else { Body::Png }, patch);
         let mut bits = BitWriter::default();
         head.write(&mut bits);
         body.iter().for_each(|&byte| bits.put(u64::from(byte), 8));

@@ -1,6 +1,7 @@
 //! Dense copies of a part of the two maps.
 
-use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
+use crate::map::{Cell, MAX_LABEL, Rect};
+use crate::map_codec::lattice::Lattice;
 
 /// The base and the wanted changes in a square of cells.
 #[derive(Debug)]
@@ -18,8 +19,8 @@ pub(super) struct Window {
 impl Window {
     /// The `2 * reach` square around `seed`.
     pub(super) fn around(
-        base: &LabelGrid,
-        target: &LabelGrid,
+        base: Lattice<'_>,
+        target: Lattice<'_>,
         seed: Cell,
         reach: usize,
         wanted: &dyn Fn(Cell) -> bool,
@@ -109,9 +110,9 @@ pub(super) struct Patch {
 
 impl Patch {
     /// Every change in `rect`.
-    pub(super) fn between(base: &LabelGrid, target: &LabelGrid, rect: Rect) -> Self {
+    pub(super) fn between(base: Lattice<'_>, target: Lattice<'_>, rect: Rect) -> Self {
         let (width, height) = (rect.width as usize, rect.height as usize);
-        let copy = |grid: &LabelGrid| grid.copy_area(i64::from(rect.x), i64::from(rect.y), width, height);
+        let copy = |grid: Lattice<'_>| grid.copy_area(i64::from(rect.x), i64::from(rect.y), width, height);
         let (base, mut outcome) = (copy(base), copy(target));
         // 255 is no label: such a cell stays as it is.
         outcome.iter_mut().zip(&base).filter(|(new, _)| **new > MAX_LABEL).for_each(|(new, &old)| *new = old);
@@ -119,7 +120,7 @@ impl Patch {
     }
 
     /// The smallest patch with just these changes.
-    pub(super) fn of(base: &LabelGrid, changes: &[(Cell, u8)]) -> Option<Self> {
+    pub(super) fn of(base: Lattice<'_>, changes: &[(Cell, u8)]) -> Option<Self> {
         let rect = Rect::around(changes.iter().map(|&(cell, _)| cell))?;
         let mut patch = Self::between(base, base, rect);
         for &(cell, label) in changes {

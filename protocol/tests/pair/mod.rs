@@ -39,11 +39,21 @@ pub(crate) struct Setup {
     pub(crate) codec: Codec,
     pub(crate) access: Access,
     pub(crate) authenticity: Option<Authenticity>,
+    /// How long a new label has to stand.
+    pub(crate) settle: Duration,
 }
 
 impl Setup {
     pub(crate) fn new(frame_bytes: usize, budget_bps: u32, codec: Codec) -> Self {
-        Self { mission: MissionId(7), frame_bytes, budget_bps, codec, access: Access::Shared, authenticity: None }
+        Self {
+            mission: MissionId(7),
+            frame_bytes,
+            budget_bps,
+            codec,
+            access: Access::Shared,
+            authenticity: None,
+            settle: Duration::ZERO,
+        }
     }
 
     pub(crate) fn keyed(self, all: bool, encrypt: bool) -> Self {
@@ -301,7 +311,9 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
         status_period: Duration::from_secs(10),
         authenticity: setup.authenticity.clone(),
     };
-    VehicleLink::new(config, setup.codec, seed, durable, now)
+    let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
+    link.source_mut().set_settle_time(setup.settle);
+    link
 }
 
 fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {

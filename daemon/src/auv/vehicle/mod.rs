@@ -84,6 +84,8 @@ pub struct Vehicle {
     done: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
+    /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0: never.
+    coarse_after_s: f64,
     /// Instead of the link's map, for comparison.
     whole_png: Option<WholePng>,
 }
@@ -112,6 +114,7 @@ impl Vehicle {
             done: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
+            coarse_after_s: 0.0,
             whole_png: None,
         };
         if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
@@ -128,6 +131,17 @@ impl Vehicle {
     /// Sends the whole map as a PNG whenever it has changed instead of what changed, for comparison.
     pub fn send_whole_png(&mut self) {
         self.whole_png = Some(WholePng::default());
+    }
+
+    /// A backlog that the budget needs longer for goes out coarse to fine; 0: never.
+    pub fn set_coarse_after(&mut self, seconds: f64) {
+        self.coarse_after_s = seconds;
+        self.limit_backlog();
+    }
+
+    pub(super) fn limit_backlog(&mut self) {
+        let bytes = f64::from(self.link.budget_bps()) / 8.0 * self.coarse_after_s;
+        self.link.source_mut().set_coarse_limit((bytes > 0.0).then_some(bytes as usize));
     }
 
     /// What must survive a restart.
@@ -148,6 +162,11 @@ impl Vehicle {
     /// Versions of the map so far.
     pub fn map_version(&self) -> u64 {
         self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
+    }
+
+    /// Changes of labels that never had to be sent, for they did not last.
+    pub fn flips_suppressed(&self) -> u64 {
+        self.link.source().flips_suppressed()
     }
 
     /// Whether the surface is known to have everything.

@@ -75,6 +75,7 @@ impl Vehicle {
 
     fn follow_budget(&mut self, budget: Budget, now: Instant) {
         self.link.set_budget(budget.bits_per_s, now);
+        self.limit_backlog();
         self.link.set_shares(budget.shares);
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);

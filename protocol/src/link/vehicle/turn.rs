@@ -24,6 +24,9 @@ impl<S: StateSource> VehicleLink<S> {
     /// The next frame, if it is our turn, there is a reason to speak and the budget allows it.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let modem = self.config.modem;
+        if self.source.handle_timeout(now) {
+            self.forget_said();
+        }
         if self.floor.is_over(&modem, now) {
             self.end_turn();
         }
@@ -82,7 +85,8 @@ impl<S: StateSource> VehicleLink<S> {
             return self.floor.next_wakeup();
         }
         let status = self.status.as_ref().filter(|_| self.pair.is_met()).map(|_| self.pose_due.min(self.report_due));
-        let due = [status, self.answer_due].into_iter().flatten().min();
+        let held = self.source.next_due().filter(|_| self.pair.is_met());
+        let due = [status, held, self.answer_due].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
             None => due,
@@ -177,8 +181,9 @@ impl<S: StateSource> VehicleLink<S> {
     fn wish(&self, now: Instant) -> u8 {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
-        let idle = self.is_settled();
-        let wait = if idle { affordable.max(self.idle_pause()).min(self.config.status_period) } else { affordable };
+        let idle = self.source.is_quiet() && self.objects.is_empty();
+        let pause = self.source.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
+        let wait = if idle { affordable.max(pause).min(self.config.status_period) } else { affordable };
         quarter_seconds(wait, 254)
     }
 

@@ -1,6 +1,7 @@
 //! The patch and what lies around it, as the coder sees it: new labels where it has been, old ones elsewhere.
 
-use crate::map::{LabelGrid, Rect, UNEXPLORED};
+use crate::map::{Rect, UNEXPLORED};
+use crate::map_codec::lattice::Lattice;
 use crate::map_codec::window::Patch;
 
 /// Cells around the patch that contexts look at.
@@ -25,7 +26,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    pub(super) fn new(base: &LabelGrid, rect: Rect) -> Self {
+    pub(super) fn new(base: Lattice<'_>, rect: Rect) -> Self {
         let (width, height) = (rect.width as usize, rect.height as usize);
         let area = |margin: i64| {
             let (w, h) = (width + 2 * margin as usize, height + 2 * margin as usize);

@@ -1,16 +1,16 @@
 //! The largest `context` chunk that fits.
 
 use super::{LastRow, Reach, head, write};
-use crate::map::LabelGrid;
 use crate::map_codec::MapChunk;
 use crate::map_codec::chunk::chunk;
 use crate::map_codec::grow::Growth;
+use crate::map_codec::lattice::Lattice;
 use crate::map_codec::window::Patch;
 
 /// The chunk of at most `room` bytes with the most changes found along `growth`; `None` if not even its seed fits.
 ///
 /// Each trial codes a whole patch, so there are few: up to [`TRIALS`] once something fits.
-pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: usize) -> Option<MapChunk> {
+pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room: usize) -> Option<MapChunk> {
     let (mut least, mut too_large) = (0, growth.areas.len());
     let mut best: Option<MapChunk> = None;
     let mut short: Option<(Patch, Reach)> = None;
@@ -50,18 +50,18 @@ const TRIALS: usize = 4;
 /// Per cent of the room that are full enough to look no further.
 const FULL_ENOUGH: usize = 94;
 
-fn write_whole(base: &LabelGrid, patch: &Patch, room: usize) -> (Vec<u8>, Reach) {
+fn write_whole(base: Lattice<'_>, patch: &Patch, room: usize) -> (Vec<u8>, Reach) {
     write(base, &head(base, patch.rect), patch, LastRow(patch.rect.width as usize), room * 8)
 }
 
 /// The chunk for the first cells of `patch`, row by row, as many as fit; `None` if no change fits.
-pub(in crate::map_codec) fn prefix_chunk(base: &LabelGrid, patch: &Patch, room: usize) -> Option<MapChunk> {
+pub(in crate::map_codec) fn prefix_chunk(base: Lattice<'_>, patch: &Patch, room: usize) -> Option<MapChunk> {
     let (bytes, reach) = write_whole(base, patch, room);
     if reach.all { Some(chunk(patch, bytes)) } else { cut(base, patch, reach, room) }
 }
 
 /// The chunk for the first `reach.cells` of `patch` or a few less.
-fn cut(base: &LabelGrid, patch: &Patch, reach: Reach, room: usize) -> Option<MapChunk> {
+fn cut(base: Lattice<'_>, patch: &Patch, reach: Reach, room: usize) -> Option<MapChunk> {
     let width = patch.rect.width as usize;
     let mut cells = reach.cells;
     // The head grows by the length of the last row: a few cells fewer may fit.

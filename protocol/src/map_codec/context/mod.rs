@@ -20,7 +20,8 @@ use super::DecodeError;
 use super::bits::{BitReader, BitWriter};
 use super::header::Header;
 use super::window::Patch;
-use crate::map::{LabelGrid, Rect};
+use crate::map::Rect;
+use crate::map_codec::lattice::Lattice;
 use arith::{Decoder, Encoder};
 use canvas::Canvas;
 pub(super) use fit::{best_chunk, prefix_chunk};
@@ -78,7 +79,7 @@ struct Reach {
 }
 
 /// The chunk for the first `cells` of `patch`, and how many of them fit `room_bits`; the rest was not looked at.
-fn write(base: &LabelGrid, head: &Header, patch: &Patch, last: LastRow, room_bits: usize) -> (Vec<u8>, Reach) {
+fn write(base: Lattice<'_>, head: &Header, patch: &Patch, last: LastRow, room_bits: usize) -> (Vec<u8>, Reach) {
     let (width, height) = (patch.rect.width as usize, patch.rect.height as usize);
     let mut bits = BitWriter::default();
     head.write(&mut bits);
@@ -101,7 +102,7 @@ fn write(base: &LabelGrid, head: &Header, patch: &Patch, last: LastRow, room_bit
 }
 
 /// Reads the body of a chunk for `rect`.
-pub(super) fn read(mut bits: BitReader<'_>, base: &LabelGrid, rect: Rect) -> Result<Patch, DecodeError> {
+pub(super) fn read(mut bits: BitReader<'_>, base: Lattice<'_>, rect: Rect) -> Result<Patch, DecodeError> {
     let (width, height) = (rect.width as usize, rect.height as usize);
     let last = LastRow::read(width, &mut bits)?;
     let mut decoder = Decoder::new(bits);
@@ -114,6 +115,6 @@ pub(super) fn read(mut bits: BitReader<'_>, base: &LabelGrid, rect: Rect) -> Res
 }
 
 /// Head of a `context` chunk for `rect`.
-fn head(base: &LabelGrid, rect: Rect) -> Header {
+fn head(base: Lattice<'_>, rect: Rect) -> Header {
     super::chunk::header_for(base, super::header::Body::Context, rect)
 }

@@ -7,6 +7,7 @@ use super::prior::{Prior, StagePrior};
 use super::slot::Slot;
 use super::stage::{Stage, Tally};
 use super::{LastRow, order};
+use crate::map_codec::lattice::Lattice;
 use crate::map_codec::procedural::{Lesson, lessons};
 
 /// Procedural scenes that the shipped prior is trained on, with seed 1.
@@ -74,7 +75,8 @@ impl BitCoder for Nowhere {
 
 fn run(model: &mut Model, lesson: &Lesson) {
     let rect = lesson.rect;
-    let mut canvas = Canvas::new(&lesson.base.to_grid(), rect);
+    let base = lesson.base.to_grid();
+    let mut canvas = Canvas::new(Lattice::whole(&base), rect);
     let (width, height) = (rect.width as usize, rect.height as usize);
     for (column, row) in order(width, height, LastRow(width)) {
         let wanted = lesson.target.get(column + rect.x as usize, row + rect.y as usize);

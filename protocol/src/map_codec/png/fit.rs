@@ -2,14 +2,14 @@
 
 use super::deflate::Deflater;
 use super::{Effort, head, write};
-use crate::map::LabelGrid;
 use crate::map_codec::MapChunk;
 use crate::map_codec::chunk::chunk;
 use crate::map_codec::grow::Growth;
+use crate::map_codec::lattice::Lattice;
 use crate::map_codec::window::Patch;
 
 /// The chunk of at most `room` bytes with the most changes along `growth`; `None` if not even its seed fits.
-pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: usize) -> Option<MapChunk> {
+pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room: usize) -> Option<MapChunk> {
     let mut fitter = Fitter { base, room, deflater: Deflater::new() };
     let patch_of = |i: usize| growth.window.patch(*growth.areas.get(i)?).trimmed();
     let mut best = patch_of(0)?;
@@ -32,14 +32,14 @@ pub(in crate::map_codec) fn best_chunk(base: &LabelGrid, growth: &Growth, room: 
 }
 
 /// The `png` chunk that says the same as `chunk`, if it is shorter.
-pub(in crate::map_codec) fn smaller(base: &LabelGrid, other: &MapChunk) -> Option<MapChunk> {
+pub(in crate::map_codec) fn smaller(base: Lattice<'_>, other: &MapChunk) -> Option<MapChunk> {
     let patch = Patch::of(base, &other.changes)?;
     let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, Effort::Quick);
     (bytes.len() < other.bytes.len()).then(|| chunk(&patch, bytes))
 }
 
 struct Fitter<'a> {
-    base: &'a LabelGrid,
+    base: Lattice<'a>,
     room: usize,
     deflater: Deflater,
 }

@@ -12,7 +12,8 @@ use super::DecodeError;
 use super::bits::{BitReader, BitWriter};
 use super::header::Header;
 use super::window::Patch;
-use crate::map::{LabelGrid, Rect};
+use crate::map::Rect;
+use crate::map_codec::lattice::Lattice;
 use deflate::Deflater;
 pub(super) use fit::{best_chunk, smaller};
 use pixels::{Depth, Palette};
@@ -57,7 +58,7 @@ fn read_body(mut bits: BitReader<'_>, rect: Rect) -> Result<Body, DecodeError> {
 }
 
 /// Reads the body of a chunk for `rect`.
-pub(super) fn read(bits: BitReader<'_>, base: &LabelGrid, rect: Rect) -> Result<Patch, DecodeError> {
+pub(super) fn read(bits: BitReader<'_>, base: Lattice<'_>, rect: Rect) -> Result<Patch, DecodeError> {
     let body = read_body(bits, rect)?;
     let held = base.copy_area(i64::from(rect.x), i64::from(rect.y), rect.width as usize, rect.height as usize);
     let outcome = pixels::unpack(rect, &held, &body.palette, body.depth, &body.scanlines)?;
@@ -87,6 +88,6 @@ pub fn restored_png(bytes: &[u8]) -> Result<Vec<u8>, DecodeError> {
 }
 
 /// Head of a `png` chunk for `rect`.
-fn head(base: &LabelGrid, rect: Rect) -> Header {
+fn head(base: Lattice<'_>, rect: Rect) -> Header {
     super::chunk::header_for(base, super::header::Body::Png, rect)
 }

@@ -1,0 +1,327 @@
+//! The index of what differs between what the surface is known to hold and what it ought to hold.
+
+use super::bits::TileSet;
+use super::grid::{TILE_CELLS, TileKey, TileLabels};
+use super::value::{Interest, Value, cost};
+use super::{Cell, LabelGrid, UNEXPLORED};
+use crate::map_codec::Stride;
+use crate::time::Instant;
+use std::collections::BTreeMap;
+
+/// Moments are kept in sixteenths of a second.
+type Tick = u32;
+
+fn tick(at: Instant) -> Tick {
+    (at.as_micros() / 62_500) as Tick
+}
+
+fn tick_after(at: Instant) -> Tick {
+    at.as_micros().div_ceil(62_500) as Tick
+}
+
+fn moment(tick: Tick) -> Instant {
+    Instant::from_micros(u64::from(tick) * 62_500)
+}
+
+/// When each cell of a tile began to differ, and until when it is held back.
+#[derive(Debug, Clone)]
+struct Times {
+    since: [Tick; TILE_CELLS],
+    due: [Tick; TILE_CELLS],
+}
+
+#[derive(Debug, Clone)]
+struct Tile {
+    differing: TileSet,
+    /// Cells whose label has not stood long enough.
+    held: TileSet,
+    /// Cells in frames of unknown fate.
+    flying: TileSet,
+    /// No held cell is due earlier.
+    due: Tick,
+    /// Of the waiting cells; `None` when it has to be summed up anew.
+    value: Option<Value>,
+    times: Box<Times>,
+}
+
+impl Default for Tile {
+    fn default() -> Self {
+        Self {
+            differing: TileSet::default(),
+            held: TileSet::default(),
+            flying: TileSet::default(),
+            due: Tick::MAX,
+            value: None,
+            times: Box::new(Times { since: [0; TILE_CELLS], due: [0; TILE_CELLS] }),
+        }
+    }
+}
+
+impl Tile {
+    fn waiting(&self) -> TileSet {
+        self.differing.without(&self.held, &self.flying)
+    }
+
+    fn since(&self, place: u8) -> Tick {
+        self.times.since[usize::from(place)]
+    }
+
+    fn due(&self, place: u8) -> Tick {
+        self.times.due[usize::from(place)]
+    }
+
+    /// Notes whether a cell differs; if it begins to, since `now`.
+    fn differ(&mut self, place: u8, differs: bool, afresh: bool, now: Instant) {
+        if differs && (afresh || !self.differing.contains(place)) {
+            self.times.since[usize::from(place)] = tick(now);
+        }
+        self.differing.set(place, differs);
+    }
+
+    /// Holds a cell back if it is not due yet and `may_wait`.
+    fn hold(&mut self, place: u8, may_wait: bool, now: Instant) {
+        let due = self.due(place);
+        let held = may_wait && self.differing.contains(place) && moment(due) > now;
+        self.held.set(place, held);
+        if held {
+            self.due = self.due.min(due);
+        }
+    }
+
+    fn counts(&self) -> Counts {
+        let held = self.held.without(&self.flying, &TileSet::default()).len();
+        let waiting = self.waiting();
+        Counts {
+            differing: self.differing.len(),
+            waiting: waiting.len(),
+            waiting_coarse: waiting.on(Stride::Four).len(),
+            held,
+            flying: self.flying.len(),
+        }
+    }
+}
+
+/// How many cells differ, how many of these wait to be sent or are held back, and how many are on their way.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Counts {
+    pub(super) differing: usize,
+    pub(super) waiting: usize,
+    /// Of the waiting cells those on the coarse lattice.
+    pub(super) waiting_coarse: usize,
+    pub(super) held: usize,
+    pub(super) flying: usize,
+}
+
+impl Counts {
+    fn replace(&mut self, old: Self, new: Self) {
+        self.differing = self.differing - old.differing + new.differing;
+        self.waiting = self.waiting - old.waiting + new.waiting;
+        self.waiting_coarse = self.waiting_coarse - old.waiting_coarse + new.waiting_coarse;
+        self.held = self.held - old.held + new.held;
+        self.flying = self.flying - old.flying + new.flying;
+    }
+}
+
+/// How a new label of a cell is to be treated.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Change {
+    /// Whether the new label differs from what the surface is known to hold.
+    pub(super) differs: bool,
+    /// Whether the surface is known to hold any label.
+    pub(super) known: bool,
+    /// The new label has to stand until then.
+    pub(super) due: Instant,
+    /// The longest time that a difference is held back.
+    pub(super) longest: std::time::Duration,
+}
+
+/// Cells that differ or are on their way, by tile.
+///
+/// Memory is nine bytes a cell in tiles that hold one.
+#[derive(Debug)]
+pub(super) struct Dirty {
+    tiles: BTreeMap<TileKey, Tile>,
+    counts: Counts,
+    /// No held cell is due earlier.
+    due: Tick,
+    /// The lattice whose cells the tiles' values are of.
+    stride: Stride,
+    /// Cells looked at so far to choose what to send.
+    looked_at: u64,
+}
+
+impl Default for Dirty {
+    fn default() -> Self {
+        Self { tiles: BTreeMap::new(), counts: Counts::default(), due: Tick::MAX, stride: Stride::One, looked_at: 0 }
+    }
+}
+
+impl Dirty {
+    pub(super) fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    #[cfg(test)]
+    pub(super) fn looked_at(&self) -> u64 {
+        self.looked_at
+    }
+
+    /// Everything differs and nothing is on its way.
+    pub(super) fn reset(&mut self, target: &LabelGrid, now: Instant) {
+        (self.tiles, self.counts, self.due) = (BTreeMap::new(), Counts::default(), Tick::MAX);
+        for (key, labels) in target.tiles().filter(|(_, labels)| labels.iter().any(|&l| l != UNEXPLORED)) {
+            let mut tile = Tile::default();
+            tile.times.since.fill(tick(now));
+            (0..=u8::MAX).zip(labels).for_each(|(place, &l)| tile.differing.set(place, l != UNEXPLORED));
+            self.counts.replace(Counts::default(), tile.counts());
+            self.tiles.insert(key, tile);
+        }
+    }
+
+    /// The target of a cell has changed; says how many changes will never be sent because of that.
+    pub(super) fn change(&mut self, cell: Cell, change: Change, now: Instant) -> u64 {
+        self.update(cell, |tile, place| {
+            let overtaken = tile.held.contains(place) && !tile.flying.contains(place);
+            let began = if tile.differing.contains(place) { moment(tile.since(place)) } else { now };
+            tile.times.due[usize::from(place)] = tick_after(change.due.min(began + change.longest));
+            tile.differ(place, change.differs, false, now);
+            tile.hold(place, change.known || tile.flying.contains(place), now);
+            u64::from(overtaken) + u64::from(overtaken && !change.differs)
+        })
+    }
+
+    /// The label of a cell is certain: nothing is to be waited for.
+    pub(super) fn settle(&mut self, cell: Cell) {
+        if self.tiles.contains_key(&cell.tile()) {
+            self.update(cell, |tile, place| {
+                tile.times.due[usize::from(place)] = 0;
+                tile.held.set(place, false);
+            });
+        }
+    }
+
+    /// A cell is on its way.
+    pub(super) fn depart(&mut self, cell: Cell) {
+        self.update(cell, |tile, place| tile.flying.set(place, true));
+    }
+
+    /// A cell is no longer on its way; `known` says whether the surface holds any label.
+    pub(super) fn arrive(&mut self, cell: Cell, delivered: bool, differs: bool, known: bool, now: Instant) {
+        self.update(cell, |tile, place| {
+            tile.flying.set(place, false);
+            tile.differ(place, differs, delivered, now);
+            tile.hold(place, known, now);
+        });
+    }
+
+    /// Lets go what has been held back long enough; says whether anything was.
+    pub(super) fn release(&mut self, now: Instant) -> bool {
+        if moment(self.due) > now {
+            return false;
+        }
+        let waiting = self.counts.waiting;
+        self.due = Tick::MAX;
+        for tile in self.tiles.values_mut() {
+            if moment(tile.due) <= now {
+                let before = tile.counts();
+                let held = std::mem::take(&mut tile.held);
+                tile.due = Tick::MAX;
+                held.iter().for_each(|place| tile.hold(place, true, now));
+                self.counts.replace(before, tile.counts());
+                tile.value = None;
+            }
+            self.due = self.due.min(tile.due);
+        }
+        self.counts.waiting > waiting
+    }
+
+    /// No cell that is held back is due earlier.
+    pub(super) fn next_due(&self) -> Option<Instant> {
+        (self.counts.held > 0).then(|| moment(self.due))
+    }
+
+    /// Worth has changed.
+    pub(super) fn revalue(&mut self) {
+        self.tiles.values_mut().for_each(|tile| tile.value = None);
+    }
+
+    /// The waiting cell of a lattice to start from: the most valuable one of the tile that is worth most a bit.
+    pub(super) fn best(
+        &mut self,
+        stride: Stride,
+        acked: &LabelGrid,
+        target: &LabelGrid,
+        interest: &Interest,
+        now: Instant,
+    ) -> Option<Cell> {
+        if std::mem::replace(&mut self.stride, stride) != stride {
+            self.revalue();
+        }
+        let now_s = now.as_secs_f64();
+        let mut best: Option<(f64, TileKey)> = None;
+        for (&key, tile) in &mut self.tiles {
+            let value = match tile.value {
+                Some(value) => value,
+                None => {
+                    let value = tile.sum(stride, acked.tile(key), target.tile(key), interest);
+                    self.looked_at += TILE_CELLS as u64;
+                    *tile.value.insert(value)
+                }
+            };
+            let worth = value.per_bit(now_s);
+            if worth > best.map_or(0.0, |(most, _)| most) {
+                best = Some((worth, key));
+            }
+        }
+        let (_, key) = best?;
+        self.looked_at += TILE_CELLS as u64;
+        let tile = self.tiles.get(&key)?;
+        let (old, new) = (acked.tile(key), target.tile(key));
+        let value = |place: u8| {
+            let i = usize::from(place);
+            interest.worth(old[i], new[i]) * (1.0 + now_s - moment(tile.since(place)).as_secs_f64())
+        };
+        let first = tile.waiting().on(stride).iter().map(|place| (value(place), place));
+        let (_, place) = first.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+        Some(Cell::at(key, place))
+    }
+
+    /// Asks whether cells wait to be sent; quick for cells that follow each other along a row.
+    pub(super) fn waiting(&self) -> impl Fn(Cell) -> bool + '_ {
+        let last = std::cell::Cell::new(None::<(TileKey, TileSet)>);
+        move |cell| {
+            let key = cell.tile();
+            let known = last.get().filter(|(at, _)| *at == key).map(|(_, waiting)| waiting);
+            let waiting = known.unwrap_or_else(|| self.tiles.get(&key).map(Tile::waiting).unwrap_or_default());
+            last.set(Some((key, waiting)));
+            waiting.contains(cell.place())
+        }
+    }
+
+    /// Changes what is known of a cell, and keeps counts, values and the list of tiles in step.
+    fn update<R>(&mut self, cell: Cell, change: impl FnOnce(&mut Tile, u8) -> R) -> R {
+        let tile = self.tiles.entry(cell.tile()).or_default();
+        let before = tile.counts();
+        let result = change(tile, cell.place());
+        tile.value = None;
+        self.counts.replace(before, tile.counts());
+        self.due = self.due.min(tile.due);
+        if tile.differing.is_empty() && tile.flying.is_empty() {
+            self.tiles.remove(&cell.tile());
+        }
+        result
+    }
+}
+
+impl Tile {
+    /// The value of the waiting cells of a lattice.
+    fn sum(&self, stride: Stride, acked: &TileLabels, target: &TileLabels, interest: &Interest) -> Value {
+        let mut value = Value::default();
+        for place in self.waiting().on(stride).iter() {
+            let i = usize::from(place);
+            let since = moment(self.since(place)).as_secs_f64();
+            value.add(interest.worth(acked[i], target[i]), cost(acked[i]), since);
+        }
+        value
+    }
+}
