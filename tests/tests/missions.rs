@@ -78,7 +78,7 @@ fn the_same_seed_gives_the_same_report() {
 
 #[test]
 fn directives_images_and_fixes_reach_the_vehicle_and_what_it_answers_comes_back() {
-    let figures = fly(&["survey.duration_s=400"], 3);
+    let figures = fly(&["survey.duration_s=400"], 4);
     assert_sound(&figures);
     assert_eq!(figures["directives"]["issued"], figures["directives"]["applied"], "{figures}");
     assert!(figures["directives"]["issued"].as_u64() >= Some(4));
