@@ -74,7 +74,7 @@ impl Seal<'_> {
     fn close(&self, bytes: &mut Vec<u8>, body_at: usize, len: usize) {
         match *self {
             Self::Crc(mission, session) => {
-                let crc = checksum(bytes, len, mission, session).to_be_bytes();
+                let crc = checksum(&[bytes], len, mission, session).to_be_bytes();
                 bytes.extend_from_slice(crc.get(4 - Self::bytes(false, len)..).unwrap_or_default());
             }
             Self::Hello(key, mission, session, nonce) => {
@@ -91,12 +91,13 @@ impl Seal<'_> {
     }
 }
 
-fn checksum(frame: &[u8], len: usize, mission: MissionId, to_session: u16) -> u32 {
+/// The CRC at the end of a frame of `len` bytes that is made of `parts`.
+fn checksum(parts: &[&[u8]], len: usize, mission: MissionId, to_session: u16) -> u32 {
     let crc = if len < LONG_FRAME { &CRC24 } else { &CRC32 };
     let mut digest = crc.digest();
     digest.update(&mission.0.to_be_bytes());
     digest.update(&to_session.to_be_bytes());
-    digest.update(frame);
+    parts.iter().for_each(|part| digest.update(part));
     digest.finalize()
 }
 
@@ -152,13 +153,7 @@ impl<'a> Envelope<'a> {
     fn crc_matches(&self, mission: MissionId, session: u16) -> bool {
         let len = self.head.len() + self.body.len() + self.end.len();
         let received = self.end.iter().fold(0u32, |acc, &b| acc << 8 | u32::from(b));
-        let crc = if len < LONG_FRAME { &CRC24 } else { &CRC32 };
-        let mut digest = crc.digest();
-        digest.update(&mission.0.to_be_bytes());
-        digest.update(&session.to_be_bytes());
-        digest.update(self.head);
-        digest.update(self.body);
-        digest.finalize() == received
+        checksum(&[self.head, self.body], len, mission, session) == received
     }
 }
 

@@ -239,7 +239,9 @@ impl Pair {
         }
         let Some(cycle) = self.surface.poll_cycle(self.now) else { return };
         let of_vehicle = cycle.from == auv();
-        let heard = !of_vehicle || (self.draw() >= self.water.loss && !self.mute[0]);
+        // Where bits get damaged, the surface's own modem does not begin either now and then.
+        let chance = if of_vehicle { self.water.loss } else { self.water.corruption / 2.0 };
+        let heard = self.draw() >= chance && !(of_vehicle && self.mute[0]);
         let way = if of_vehicle { self.water.propagation } else { Duration::ZERO };
         if heard {
             let at = self.now + way + Duration::from_millis(300);

@@ -26,6 +26,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let next = match self.config.modem.access {
             Access::ModemOwned { .. } => self.next_of_pool(),
             _ if !self.in_modem.is_empty() => None,
+            Access::Polled if !self.turn.is_empty() => self.gives_up_at(),
             _ => self.next_turn(now),
         };
         next.map(|at| (at, Wakeup::Grant))

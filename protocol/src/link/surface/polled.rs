@@ -5,6 +5,10 @@ use crate::link::Transmit;
 use crate::map::StateReplica;
 use crate::time::Instant;
 use crate::wire::Address;
+use std::time::Duration;
+
+/// Time in which the modem has to ask for the frames of a cycle of ours.
+const GIVE_UP: Duration = Duration::from_secs(30);
 
 /// A cycle for the modem to begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +30,8 @@ pub(super) struct Cycles {
     polled: u32,
     /// The vehicle whose cycle follows ours.
     answer_of: Option<Address>,
+    /// When our last cycle was to begin.
+    began: Instant,
 }
 
 impl Cycles {
@@ -42,12 +48,30 @@ impl<R: StateReplica> SurfaceLink<R> {
         if let Some(cycle) = self.cycle.wanted.take() {
             return Some(cycle);
         }
+        if !self.turn.is_empty() && self.in_modem.is_empty() && now.since(self.cycle.began) >= GIVE_UP {
+            self.give_up_cycle(now);
+        }
         if !self.in_modem.is_empty() || !self.turn.is_empty() || !self.begin_turn(now) {
             return None;
         }
+        self.cycle.began = now;
         let to = self.turn.front()?.transmit.to;
         self.cycle.answer_of = to.is_vehicle().then_some(to);
         Some(Cycle { from: Address::SURFACE, to, frames: self.turn.len() as u32 })
+    }
+
+    /// The modem never asked for what our cycle was to carry.
+    fn give_up_cycle(&mut self, now: Instant) {
+        self.turn.clear();
+        (self.cycle.polled, self.cycle.answer_of) = (0, None);
+        if let Some(peer) = self.current.and_then(|a| self.peers.get_mut(&a)) {
+            peer.master.postpone(now);
+        }
+    }
+
+    /// When a cycle that the modem has not begun is given up.
+    pub(super) fn gives_up_at(&self) -> Option<Instant> {
+        (!self.turn.is_empty()).then(|| self.cycle.began + GIVE_UP)
     }
 
     /// The modem asks for `frames` frames of the surface's own cycle.

@@ -34,21 +34,22 @@ pub(super) struct Ready {
 type Plan = Vec<Vec<PendingSlot>>;
 
 impl<R: StateReplica> Peer<R> {
-    /// The frames of a turn: the slots that wait, then a grant; each so often that one gets through.
+    /// The frames of a turn: the slots that wait and did not go out after `again_before`, then a grant; each so often that one
+    /// gets through.
     pub(super) fn plan_turn(
         &self,
         modem: &ModemProfile,
         hello: bool,
         copies: u32,
         shares: &ClassShares,
-        now: Instant,
+        again_before: Instant,
     ) -> Plan {
         let copies = copies as usize;
         if hello || !self.pair.is_met() {
             return vec![Vec::new(); copies.min(2)];
         }
         let groups = pack(
-            self.outbox.pending(now, now),
+            self.outbox.pending(again_before, again_before),
             room_for_slot(modem.frame_bytes, self.pair.full_seal_bytes(modem.frame_bytes)),
             shares,
         );
