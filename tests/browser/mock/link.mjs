@@ -7,7 +7,7 @@ export class Direction {
     this.frames = 0;
     this.lost = 0;
     this.worst = 0;
-    this.bytes = { map: 0, status: 0, directive: 0, exemplar: 0, overhead: 0 };
+    this.bytes = { map: 0, status: 0, directive: 0, fix: 0, exemplar: 0, overhead: 0 };
   }
 
   random() {
