@@ -265,3 +265,17 @@ fn a_late_hello_of_an_ended_run_does_not_keep_the_living_one_out() {
     pair.run(pair.now + Duration::from_secs(10_000), true);
     assert!(pair.is_converged(), "{:?}", pair.vehicle.stats());
 }
+
+/// Found by the property test above: verdicts in three bytes fell behind what was lost, until numbers ran out.
+#[test]
+fn verdicts_keep_up_with_losses_in_the_smallest_frames() {
+    let water = Water { loss: 0.896, talker: 0.056, propagation: Duration::from_millis(951), ..CALM };
+    for seed in 0..4 {
+        let setup = Setup { access: Access::Polled, ..Setup::new(32, 1000, Codec::Png) };
+        let mut pair = Pair::new(seed, setup, water.clone());
+        pair.vehicle.set_map(patchy(24, 5).iter(), pair.now);
+        pair.surface.issue(auv(), utility(5), pair.now).unwrap();
+        pair.run(pair.now + Duration::from_secs(300_000), true);
+        assert!(pair.is_converged(), "seed {seed}: {:?}", pair.vehicle.stats());
+    }
+}

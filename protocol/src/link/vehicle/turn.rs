@@ -105,10 +105,14 @@ impl<S: StateSource> VehicleLink<S> {
         const SELDOM: usize = 8;
         let size = self.config.modem.frame_bytes;
         let said = self.said_frames;
+        let usual = if size < SMALL_FRAME { 3 } else { size / 6 };
+        if said == 0 && self.pair.statement_bytes() > 4 * usual {
+            // So much was lost that the statement would fall ever further behind.
+            return size / 2;
+        }
         let early = said < self.pair.stats.loss_out.copies(0.001, 12) as usize;
         match early || is_last_new || said.is_multiple_of(SELDOM) {
-            true if size < SMALL_FRAME => 3,
-            true => size / 6,
+            true => usual,
             false => 0,
         }
     }
