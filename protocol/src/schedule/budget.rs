@@ -78,17 +78,15 @@ impl BitBudget {
         millionths(recent) * 2 < self.capacity()
     }
 
-    /// How many transmissions of `bits` may begin one after the other from `now` on, each taking `airtime`; at most `most`.
-    pub fn affordable(&self, bits: u64, airtime: Duration, most: u32, now: Instant) -> u32 {
+    /// How many of `transmissions`, each with its bits and when it would begin, may go out one after the other.
+    pub fn affordable(&self, transmissions: impl IntoIterator<Item = (u64, Instant)>) -> usize {
         let mut trial = self.clone();
-        (0..most)
-            .take_while(|&before| {
-                let at = now + airtime * before;
-                let ok = trial.earliest(bits, at) <= at;
-                trial.spend(bits, at);
-                ok
-            })
-            .count() as u32
+        let allowed = transmissions.into_iter().take_while(|&(bits, at)| {
+            let ok = trial.earliest(bits, at) <= at;
+            trial.spend(bits, at);
+            ok
+        });
+        allowed.count()
     }
 
     /// Counts a transmission that begins at `now`.

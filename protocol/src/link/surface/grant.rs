@@ -73,16 +73,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let hello = says_hello(peer.master.unanswered()) || peer.pair.is_full();
         let copies = if plentiful { peer.pair.stats.loss_out.copies(RISK, 6) } else { 1 };
         let mut plan = peer.plan_turn(&modem, hello, copies, &self.shares, now);
-        let mut trial = self.budget.clone();
-        let mut affordable = 0;
-        for slots in &plan {
-            let bits = peer.bits(slots, &modem);
-            if trial.earliest(bits, now) > now {
-                break;
-            }
-            trial.spend(bits, now);
-            affordable += 1;
-        }
+        let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem), now)));
         if affordable == 0 {
             let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem));
             peer.master.postpone(self.budget.earliest(bits, now));

@@ -1,6 +1,5 @@
 //! What the surface keeps for one vehicle.
 
-use super::view::Contact;
 use crate::directive::{Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
 use crate::mac::{Access, ClockMap, Master, MasterConfig, ModemProfile};
@@ -34,7 +33,8 @@ pub(super) struct Peer<R> {
     pub(super) replica: R,
     objects: ObjectReceiver,
     pub(super) status: StatusParts,
-    pub(super) contact: Contact,
+    /// When a frame was last taken.
+    pub(super) heard: Option<Instant>,
     pub(super) clock: Option<ClockMap>,
     /// Number of the first frame of the last turn: an answer has judged it.
     pub(super) turn_began: FrameNumber,
@@ -70,7 +70,7 @@ impl<R: StateReplica> Peer<R> {
             replica: R::default(),
             objects: ObjectReceiver::default(),
             status: StatusParts::default(),
-            contact: Contact::default(),
+            heard: None,
             clock: None,
             turn_began: 0,
             greeted: false,
@@ -117,12 +117,12 @@ impl<R: StateReplica> Peer<R> {
         }
         self.out_of_step |= inbound.lacks_base;
         if header.hello {
-            self.contact.hear(now);
+            self.heard = Some(now);
             self.handle_turn(&header, bytes, modem, now);
             return;
         }
         let Some(number) = inbound.number else { return };
-        self.contact.hear(now);
+        self.heard = Some(now);
         if inbound.is_latest {
             self.handle_stamp(&header, bytes, modem, now);
             self.handle_turn(&header, bytes, modem, now);

@@ -6,7 +6,6 @@ use super::peer::Peer;
 use crate::link::Transmit;
 use crate::map::StateReplica;
 use crate::time::Instant;
-use crate::wire::Address;
 use std::time::Duration;
 
 /// Frames heard after which an acknowledgement does not wait any longer.
@@ -43,16 +42,11 @@ impl<R: StateReplica> SurfaceLink<R> {
     pub(super) fn next_of_pool(&self) -> Option<Instant> {
         self.peers.values().filter_map(Peer::next_reason).min()
     }
-
-    /// Frames of the surface that the modem has and has not told the fate of, and to whom.
-    pub fn in_modem(&self) -> impl Iterator<Item = Address> + '_ {
-        self.in_modem.iter().map(|sent| sent.to)
-    }
 }
 
 impl<R: StateReplica> Peer<R> {
     fn must_greet(&self, now: Instant) -> bool {
-        let silent = self.contact.heard().is_none_or(|at| now.since(at) >= SILENCE);
+        let silent = self.heard.is_none_or(|at| now.since(at) >= SILENCE);
         (!self.pair.is_met() || silent || self.pair.is_full()) && now >= self.hello_due
     }
 
@@ -68,7 +62,7 @@ impl<R: StateReplica> Peer<R> {
 
     fn next_reason(&self) -> Option<Instant> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.patience());
-        let silence = self.contact.heard().map_or(self.hello_due, |at| (at + SILENCE).max(self.hello_due));
+        let silence = self.heard.map_or(self.hello_due, |at| (at + SILENCE).max(self.hello_due));
         let again = again.filter(|_| self.outbox.has_backlog());
         [Some(silence), self.answer_due, again].into_iter().flatten().min()
     }

@@ -9,29 +9,6 @@ use crate::time::Instant;
 use crate::wire::VehicleStatus;
 use std::time::Duration;
 
-/// When a vehicle was heard, and how often it is heard.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Contact {
-    heard: Option<Instant>,
-    /// Smoothed time between two frames that were taken.
-    interval: Option<Duration>,
-}
-
-impl Contact {
-    pub(super) fn hear(&mut self, now: Instant) {
-        if let Some(last) = self.heard {
-            let gap = now.since(last);
-            self.interval =
-                Some(self.interval.map_or(gap, |old| if gap > old { (old + gap) / 2 } else { (old * 15 + gap) / 16 }));
-        }
-        self.heard = Some(now);
-    }
-
-    pub(super) fn heard(&self) -> Option<Instant> {
-        self.heard
-    }
-}
-
 /// A read-only view of a vehicle for the host.
 #[derive(Debug)]
 pub struct PeerView<'a, R: StateReplica = Replica>(pub(super) &'a Peer<R>);
@@ -57,12 +34,7 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
 
     /// When a frame was last taken.
     pub fn heard(&self) -> Option<Instant> {
-        self.0.contact.heard
-    }
-
-    /// Time between two frames, smoothed.
-    pub fn expected_interval(&self) -> Option<Duration> {
-        self.0.contact.interval
+        self.0.heard
     }
 
     /// When the next turn will be granted at the latest; `now` if that is due.

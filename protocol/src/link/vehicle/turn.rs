@@ -36,7 +36,8 @@ impl<S: StateSource> VehicleLink<S> {
             return None;
         }
         let bits = modem.bits_on_air(modem.frame_bytes);
-        let frames = self.budget.affordable(bits, modem.frame_airtime(), open, now);
+        let frames = (0..open).map(|before| (bits, now + modem.frame_airtime() * before));
+        let frames = self.budget.affordable(frames) as u32;
         if frames == 0 {
             self.blocked_until = Some(self.budget.earliest(bits, now));
             self.end_turn();
