@@ -1,4 +1,4 @@
-//! Bytes and time of map chunks on survey series, stills and a large map, against the best PNG.
+//! Bytes and CPU time of map chunks on survey series, stills and a large map, against the best PNG.
 //!
 //! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli takes nearly all of the time.
 #![allow(clippy::disallowed_methods)]
@@ -7,10 +7,11 @@ mod large;
 mod real;
 mod zopfli_bytes;
 
+use cpu_time::ThreadTime;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::map_codec::procedural::{Chance, Flips, Scene, Survey};
 use scenecast_protocol::map_codec::{Codec, Plane, decode, encode_all};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use zopfli_bytes::zopfli_bytes;
 
 const ROOMS: [usize; 3] = [64, 256, 1000];
@@ -179,12 +180,12 @@ fn series(maps: &[Plane]) -> Totals {
 }
 
 fn step(totals: &mut Totals, i: usize, room: usize, base: &LabelGrid, target: &LabelGrid) {
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let chunks = encode_all(Codec::Auto, base, target, room).expect("room for a cell");
     let encoded = start.elapsed();
     totals.encode[i] += encoded;
     totals.slowest[i] = totals.slowest[i].max(encoded);
-    let start = Instant::now();
+    let start = ThreadTime::now();
     let mut replica = base.clone();
     for chunk in &chunks {
         for (cell, label) in decode(base, &chunk.bytes).expect("own chunk") {
