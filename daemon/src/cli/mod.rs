@@ -9,6 +9,7 @@ mod key;
 mod map;
 mod node;
 mod progress;
+mod scene;
 mod sim;
 
 use crate::problem::Problem;
@@ -41,6 +42,9 @@ enum Command {
     /// Code label maps as the stream does, and measure it.
     #[command(subcommand)]
     Map(map::Map),
+    /// Run the scene model over files.
+    #[command(subcommand)]
+    Scene(scene::Scene),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -55,6 +59,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
+        Command::Scene(scene) => scene.run(),
         Command::Config(print) => print.run(),
     }
 }
