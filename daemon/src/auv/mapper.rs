@@ -91,9 +91,12 @@ impl Mapper {
     }
 
     /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.
-    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, t_s: f64) -> MapUpdate {
-        let words = self.extractor.extract(image, (self.cell_m / self.camera.metres_per_pixel) as f32);
-        let observations = self.camera.project(image.width(), image.height(), pose, &words);
+    ///
+    /// Its pixels are `scale` times as large on the sea floor as the configured ones.
+    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
+        let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
+        let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
+        let observations = camera.project(image.width(), image.height(), pose, &words);
         self.model.insert(t_s, &observations);
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);

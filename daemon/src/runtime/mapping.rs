@@ -60,7 +60,7 @@ pub(super) fn spawn(config: &Config, epoch: u8) -> Result<MapperThread, Problem>
 fn see(mapper: &mut Mapper, frame: RecordedFrame) -> Result<Seen, Problem> {
     let image = frame.image()?;
     let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
-    let update = mapper.handle_frame(&image, &pose, frame.t_s);
+    let update = mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
     let best = |label| Some((label, Arc::new(mapper.exemplar(label)?.clone())));
     let exemplars = (1..=update.labels).filter_map(best).collect();
     Ok(Seen { frame, update, exemplars })

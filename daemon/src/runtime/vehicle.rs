@@ -28,7 +28,7 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let profile = crate::ends::modem_of_process(&config);
         let recording = match config.camera.source.as_str() {
             "" => None,
-            source => Some(Recording::open(Recording::folder(source)?)?),
+            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
         let epoch = durable.epoch;
