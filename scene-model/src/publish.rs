@@ -76,6 +76,11 @@ impl LabelBook {
         self.ids.get(&topic).copied()
     }
 
+    /// The labels that the last map had: x, y, label, sorted by (y, x).
+    pub fn shown(&self) -> impl Iterator<Item = (i32, i32, u8)> {
+        self.shown.iter().filter_map(|&(y, x, topic)| Some((x, y, self.label_of(topic)?)))
+    }
+
     /// All ids given in this epoch, in the order in which they were given.
     pub fn labels(&self) -> impl Iterator<Item = u8> {
         1..=self.topics.len() as u8

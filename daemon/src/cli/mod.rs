@@ -11,6 +11,7 @@ mod node;
 mod progress;
 mod scene;
 mod sim;
+mod vocabulary;
 
 use crate::problem::Problem;
 use clap::{Parser, Subcommand};
@@ -45,6 +46,9 @@ enum Command {
     /// Run the scene model over files.
     #[command(subcommand)]
     Scene(scene::Scene),
+    /// Make the vocabularies that images are put into words with.
+    #[command(subcommand)]
+    Vocabulary(vocabulary::Vocabulary),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -60,6 +64,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
         Command::Scene(scene) => scene.run(),
+        Command::Vocabulary(vocabulary) => vocabulary.run(),
         Command::Config(print) => print.run(),
     }
 }

@@ -99,7 +99,15 @@ fn parse(dir: &Path, line: &str) -> Option<RecordedFrame> {
     let (x_m, y_m) = (number(fields.next())?, number(fields.next())?);
     let (depth_m, heading_deg) = (number(fields.next())?, number(fields.next())?);
     let t_s = number(Some(t_s)).filter(|&t| t >= 0.0)?;
-    Some(RecordedFrame { t_s, file: dir.join(file), x_m, y_m, depth_m, heading_rad: heading_deg.to_radians(), scale: 1.0 })
+    Some(RecordedFrame {
+        t_s,
+        file: dir.join(file),
+        x_m,
+        y_m,
+        depth_m,
+        heading_rad: heading_deg.to_radians(),
+        scale: 1.0,
+    })
 }
 
 const DAY_S: f64 = 86_400.0;

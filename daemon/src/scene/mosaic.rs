@@ -31,11 +31,13 @@ impl Mosaic {
         let image = read_image(path)?.to_rgb8();
         let (width, height) = image.dimensions();
         if cell_px < LEAST_CELL_PX {
-            let what = format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {LEAST_CELL_PX} are needed");
+            let what =
+                format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {LEAST_CELL_PX} are needed");
             return Err(Problem::Input(what));
         }
         if f64::from(width.min(height)) < cell_px {
-            let what = format!("the image has {width} x {height} pixels; a mosaic needs at least a cell of {cell_px:.1}");
+            let what =
+                format!("the image has {width} x {height} pixels; a mosaic needs at least a cell of {cell_px:.1}");
             return Err(Problem::file(path, what));
         }
         let place = |word: &scene_model::words::Word| Observation {

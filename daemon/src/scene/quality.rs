@@ -53,7 +53,8 @@ impl Sheet {
         let classes = places.iter().map(|place| u64::from(place.1) + 1).max().unwrap_or(1);
         let cells = u64::from(bounds.width) * u64::from(bounds.height) * layers.len() as u64;
         if cells * classes > MOST_COUNTS {
-            let what = format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
+            let what =
+                format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
             return Err(Problem::Input(what));
         }
         Ok(Self { bounds, layers })

@@ -179,7 +179,8 @@ fn nearest<T>(list: &[(f64, T)], t_s: f64) -> Option<&T> {
     let after = list.partition_point(|entry| entry.0 < t_s);
     let near = list[after.saturating_sub(1)..(after + 1).min(list.len())].iter();
     let best = near.min_by(|a, b| (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs()))?;
-    ((best.0 - t_s).abs() <= APART_S).then_some(&best.1)
+    // Times have microseconds; as floating-point numbers they may lie a little further apart.
+    ((best.0 - t_s).abs() <= APART_S + 1e-6).then_some(&best.1)
 }
 
 fn read_depth(path: &Path, scale: f64) -> Result<DepthImage, String> {

@@ -37,12 +37,7 @@ struct Mark {
 
 impl WordsFile {
     /// Checks a file; with `in_time` its lines come in order of time, otherwise as they are.
-    pub(crate) fn open(
-        path: &Path,
-        vocabulary: Option<u32>,
-        cell_m: [f64; 3],
-        in_time: bool,
-    ) -> Result<Self, Problem> {
+    pub(crate) fn open(path: &Path, vocabulary: Option<u32>, cell_m: [f64; 3], in_time: bool) -> Result<Self, Problem> {
         let mut lines = Lines::open(path)?;
         let mut extent = Extent::new(cell_m);
         let (mut marks, mut largest, mut words) = (Vec::new(), 0, 0u64);

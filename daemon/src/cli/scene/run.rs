@@ -275,9 +275,11 @@ impl Run {
         };
         let Parameters { alpha, beta, gamma, max_labels, seed, .. } = self.parameters;
         let max_words_per_cell = u32::from(u16::MAX);
-        let config = SceneConfig { cell_m, alpha, beta, gamma, birth, max_labels, vocabulary, max_words_per_cell, seed };
+        let config =
+            SceneConfig { cell_m, alpha, beta, gamma, birth, max_labels, vocabulary, max_words_per_cell, seed };
         let flag = |key: &str| format!("--{}", key.replace('_', "-"));
-        let refused = |e: scene_model::topics::ConfigError| format!("{} {}: allowed is {}", flag(e.key), e.value, e.allowed);
+        let refused =
+            |e: scene_model::topics::ConfigError| format!("{} {}: allowed is {}", flag(e.key), e.value, e.allowed);
         let mut model = SceneModel::new(config).map_err(|e| Problem::Input(refused(e)))?;
         model.use_threads(usize::from(self.threads));
         Ok(model)

@@ -21,7 +21,7 @@ const PAPER: u8 = 255;
 /// than 254 labels in a world colours repeat.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example: scenecast scene sample --alpha 0.001 --gamma 0.01 --size 64x64 --grid 3x3 --seed 1 --out worlds.png"
+    after_help = "Example: scenecast scene sample --alpha 0.001 --gamma 0.3 --size 64x64 --grid 3x3 --seed 1 --out worlds.png"
 )]
 pub(crate) struct Sample {
     /// Weight of each label that exists, anywhere: 0 or above
