@@ -71,7 +71,9 @@ fn two_classes(dir: &Path) -> (String, String) {
         let (x, y) = (f64::from(i / 10) + 0.5, f64::from(i % 10) - 4.5);
         let class = u32::from(x > 10.0);
         let _ = write!(words, "{},{x},{y},0.1", f64::from(i) * 0.5);
-        (0..40).for_each(|n| drop(write!(words, ",{}", class * 20 + (n * 7 + i) % 20)));
+        for n in 0..40 {
+            let _ = write!(words, ",{}", class * 20 + (n * 7 + i) % 20);
+        }
         words.push('\n');
         let _ = writeln!(classes, "{x},{y},0.1,{}", ["sand", "rock"][class as usize]);
     }

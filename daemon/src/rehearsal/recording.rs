@@ -70,6 +70,9 @@ impl Recording {
         if frames.is_empty() {
             return Err(Problem::file(&path, "there are no frames"));
         }
+        // A time of the day says nothing of the mission's.
+        let began_s = if in_pixels { frames[0].t_s } else { 0.0 };
+        frames.iter_mut().for_each(|frame| frame.t_s -= began_s);
         Ok(Self { frames })
     }
 
@@ -210,9 +213,9 @@ mod tests {
         let text = "file,time_utc_hms,x_px,y_px,yaw_deg,scale\na.tif,235950,10,20,90,0.9\nb.tif,000010,-4,8,0,1\n";
         let frames = open("mosaic", "poses_estimated.csv", text).unwrap().frames;
         let first = &frames[0];
-        assert_eq!((first.t_s, first.x_m, first.y_m, first.scale), (86_390.0, 5.0, -10.0, 0.9));
+        assert_eq!((first.t_s, first.x_m, first.y_m, first.scale), (0.0, 5.0, -10.0, 0.9));
         assert!((first.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
-        assert_eq!((frames[1].t_s, frames[1].y_m), (86_410.0, -4.0));
+        assert_eq!((frames[1].t_s, frames[1].y_m), (20.0, -4.0));
         let bad = open("bad", "poses.csv", &text.replace("235950", "2359")).unwrap_err().to_string();
         assert!(bad.contains("poses.csv:2: expected file,time_utc_hms"), "{bad}");
     }

@@ -73,7 +73,7 @@ pub(super) struct Keep {
     pub(super) lineage: u64,
     /// Seconds of mission time from one to the next; 0: none.
     pub(super) every_s: f64,
-    /// Mission time of the last one.
+    /// Mission time of the last one, or of the first frame.
     pub(super) last_s: Option<f64>,
 }
 
@@ -92,6 +92,8 @@ impl Keep {
 
     fn keep_if_due(&mut self, mapper: &Mapper) {
         let every_s = self.every_s;
+        // From the first frame on, for there is little to keep of that one.
+        self.last_s = self.last_s.or(mapper.last_s());
         self.keep(mapper, |since_s| since_s >= every_s);
     }
 

@@ -18,7 +18,6 @@ pub(crate) use frames::Frames;
 pub(crate) use learn::{Schedule, learn};
 pub(crate) use mosaic::Mosaic;
 pub(crate) use outcome::{Outcome, write};
-pub(crate) use process::peak_rss_bytes;
 pub(crate) use quality::{Quality, quality};
 pub(crate) use tum::{Intrinsics, Tum};
 pub(crate) use vocabulary::read_vocabulary;

@@ -1,8 +1,9 @@
 //! What a run of the scene model is worth, and its labels in files.
 
+use super::Quality;
 use super::bounds::around;
 use super::learn::Effort;
-use super::{Quality, peak_rss_bytes};
+use super::process::peak_rss_bytes;
 use crate::picture::{encode_within, write_whole};
 use crate::problem::Problem;
 use scene_model::topics::{FlatCell, SceneModel, TopicId, centre_of};

@@ -24,6 +24,8 @@ pub(crate) struct WordsFile {
     order: Option<std::vec::IntoIter<Mark>>,
     marks: (usize, usize),
     in_time: bool,
+    /// Number of the first line, which may be the head of the table.
+    begun: u64,
     ahead: Option<(f64, Vec<Observation>)>,
 }
 
@@ -40,14 +42,16 @@ impl WordsFile {
     pub(crate) fn open(path: &Path, vocabulary: Option<u32>, cell_m: [f64; 3], in_time: bool) -> Result<Self, Problem> {
         let mut lines = Lines::open(path)?;
         let mut extent = Extent::new(cell_m);
-        let (mut marks, mut largest, mut words) = (Vec::new(), 0, 0u64);
+        let (mut marks, mut largest, mut words, mut begun) = (Vec::new(), 0, 0u64, 0);
         let most = vocabulary.unwrap_or(MOST_VOCABULARY);
         let mut seen = Vec::new();
         loop {
             let Some(line) = lines.next()? else { break };
             let Line { number, offset, .. } = line;
-            let first = words == 0 && marks.is_empty();
-            let parsed = parse(line.text, first, &mut seen).and_then(|t_s| {
+            if begun == 0 {
+                begun = number;
+            }
+            let parsed = parse(line.text, number == begun, &mut seen).and_then(|t_s| {
                 if let Some(word) = seen.iter().map(|o| o.word).find(|&word| word >= most) {
                     let whose = if vocabulary.is_some() { "--vocabulary-size is" } else { "ids go up to" };
                     let limit = if vocabulary.is_some() { most } else { most - 1 };
@@ -75,6 +79,7 @@ impl WordsFile {
             order: (!is_sorted).then(|| marks.into_iter()),
             marks: (0, marks_len),
             in_time,
+            begun,
             ahead: None,
         })
     }
@@ -92,7 +97,7 @@ impl WordsFile {
             }
             let Some(line) = self.lines.next()? else { return Ok(None) };
             let mut seen = Vec::new();
-            let first = line.number == 1;
+            let first = line.number == self.begun;
             match parse(line.text, first, &mut seen).map_err(|what| self.lines.problem(what))? {
                 Some(t_s) => return Ok(Some((t_s, seen))),
                 None => continue,
@@ -184,7 +189,7 @@ mod tests {
 
     #[test]
     fn words_come_in_order_of_time_whatever_the_order_of_the_lines() {
-        let text = "t,x,y,z,w1\n# later\n2,0,0,0,5,6\n\n1,0,0,0,7\r\n2,1,0,-3,8\n1,5,5,5\n";
+        let text = "# words\nt,x,y,z,w1\n# later\n2,0,0,0,5,6\n\n1,0,0,0,7\r\n2,1,0,-3,8\n1,5,5,5\n";
         let mut file = open("order", text, None, true).unwrap();
         assert_eq!(sightings(&mut file), [(1.0, vec![7]), (2.0, vec![5, 6, 8])]);
         assert_eq!((file.vocabulary, file.done()), (9, 1.0));
