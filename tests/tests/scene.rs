@@ -116,7 +116,7 @@ fn the_map_is_indexed_by_label_with_y_up_and_shows_the_fuller_of_stacked_cells()
     let words = [line(-0.5, 0.5, 0.0, 0, 60), line(0.5, 1.5, 0.0, 0, 60), line(0.5, 1.5, 5.0, 9, 40)].concat();
     let words = write(&dir, "words.csv", words);
     let out = dir.join("out");
-    let figures = scene_run(&["--words", &words, "--gamma", "1"], &out);
+    let figures = scene_run(&["--words", &words], &out);
     assert_eq!((&figures["cells"], &figures["mutual_information_nats"]), (&3.into(), &Value::Null));
     let rows = labels(&out);
     let places: Vec<[f64; 3]> = rows.iter().map(|row| row.0).collect();

@@ -153,15 +153,15 @@ impl Run {
         let effort = learn(&mut model, source.as_mut(), schedule, &mut |share| progress.show(share))?;
         drop(progress);
         let passed_over = source.skipped();
-        if let Some(what) = &passed_over {
+        if model.words() == 0 {
+            let what = passed_over.unwrap_or_else(|| "the source gave none".to_owned());
+            return Err(Problem::Input(format!("there are no words to label: {what}")));
+        }
+        if let Some(what) = passed_over {
             eprintln!("scenecast: {what}");
         }
         if effort.skipped.skipped_full > 0 {
             eprintln!("scenecast: {} words of full cells passed over", effort.skipped.skipped_full);
-        }
-        if model.words() == 0 {
-            let what = passed_over.unwrap_or_else(|| "the source gave none".to_owned());
-            return Err(Problem::Input(format!("there are no words to label: {what}")));
         }
         let quality = annotated.map(|annotated| quality(&model, &annotated, cell_px)).transpose()?;
         let outcome = Outcome::new(&model, &effort, quality.as_ref());
