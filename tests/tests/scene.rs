@@ -120,7 +120,7 @@ fn the_map_is_indexed_by_label_with_y_up_and_shows_the_fuller_of_stacked_cells()
     assert_eq!((&figures["cells"], &figures["mutual_information_nats"]), (&3.into(), &Value::Null));
     let rows = labels(&out);
     let places: Vec<[f64; 3]> = rows.iter().map(|row| row.0).collect();
-    assert_eq!(places, [[-0.5, 0.5, 0.0], [0.5, 1.5, 5.0], [0.5, 1.5, 0.0]], "by y, x, then from the top");
+    assert_eq!(places, [[-0.5, 0.5, 0.0], [0.5, 1.5, 5.0], [0.5, 1.5, 0.0]], "by y, x, then the one that shows");
     assert!(rows[0].1 == rows[2].1 && rows[0].1 != rows[1].1);
     let mut decoder = png::Decoder::new(std::io::Cursor::new(std::fs::read(out.join("labels.png")).unwrap()));
     decoder.set_transformations(png::Transformations::IDENTITY);

@@ -60,9 +60,14 @@ fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
     topics
 }
 
-/// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions.
+/// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions by y, x; of stacked cells the one
+/// that the map shows comes last.
 pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), Problem> {
-    let (map, volume) = (model.label_map(), model.label_volume());
+    let (map, mut volume) = (model.label_map(), model.label_volume());
+    // Painted in this order the rows make the flattened map.
+    let shows =
+        |cell: &FlatCell| map.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).is_ok_and(|i| map[i].z == cell.z);
+    volume.sort_by_cached_key(|cell| (cell.y, cell.x, shows(cell)));
     let topics = numbers(&volume);
     let label = |topic| topics.binary_search(&topic).map_or(0, |index| (index + 1).min(254)) as u8;
     let bounds = around(&map)?;

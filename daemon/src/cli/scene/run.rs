@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// Label words, a mosaic or a sequence of images, and print what it took as one line of JSON.
 ///
 /// Writes labels.png (indexed, pixel = label, 0 = nothing seen, x to the right, y up; where cells stack, the label with
-/// most words in the column) and labels.csv (every cell: its middle in metres, label, confidence, perplexity). Labels are
+/// most words in the column) and labels.csv (every cell: its middle in metres, label, confidence, perplexity; of stacked
+/// cells the one that the picture shows comes last). Labels are
 /// numbered from 1 by age. The same seed gives the same labels whatever the number of threads.
 ///
 /// "seconds" and "cpu_seconds" are wall and CPU time of resampling, "words_per_cpu_second" is resampled / cpu_seconds.
