@@ -43,9 +43,8 @@ impl Annotated {
     pub(crate) fn of_places(path: &Path, ignore: &[u8]) -> Result<Self, Problem> {
         let mut lines = Lines::open(path)?;
         let (mut places, mut names) = (Vec::new(), BTreeMap::new());
-        loop {
-            let Some(line) = lines.next()? else { break };
-            if line.number == 1 && line.text.starts_with('x') {
+        while let Some(line) = lines.next()? {
+            if places.is_empty() && names.is_empty() && line.text.starts_with('x') {
                 continue;
             }
             let place = parse(line.text).map(|(at, class)| (at, class.to_owned()));

@@ -146,8 +146,7 @@ impl Source for Tum {
 fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<(f64, T)>, Problem> {
     let mut lines = Lines::open(path)?;
     let mut list = Vec::new();
-    loop {
-        let Some(line) = lines.next()? else { break };
+    while let Some(line) = lines.next()? {
         let (time, rest) = line.text.split_once([' ', '\t', ',']).unwrap_or((line.text, ""));
         let entry = number(Some(time), "the time").and_then(|t_s| Ok((t_s, read(rest.trim())?)));
         list.push(entry.map_err(|what| lines.problem(what))?);

@@ -45,8 +45,7 @@ impl WordsFile {
         let (mut marks, mut largest, mut words, mut begun) = (Vec::new(), 0, 0u64, 0);
         let most = vocabulary.unwrap_or(MOST_VOCABULARY);
         let mut seen = Vec::new();
-        loop {
-            let Some(line) = lines.next()? else { break };
+        while let Some(line) = lines.next()? {
             let Line { number, offset, .. } = line;
             if begun == 0 {
                 begun = number;

@@ -10,7 +10,7 @@ use clap::Subcommand;
 #[derive(Debug, Subcommand)]
 pub(crate) enum Scene {
     /// Label words, a mosaic or a sequence of images, and print what it took as JSON.
-    Run(run::Run),
+    Run(Box<run::Run>),
     /// Draw random worlds of the model's prior.
     Sample(sample::Sample),
 }
