@@ -13,14 +13,12 @@ use std::path::{Path, PathBuf};
 /// Make the vocabularies that images are put into words with.
 #[derive(Debug, Subcommand)]
 pub(super) enum Vocabulary {
-    /// Learn a vocabulary from a folder of images.
     Train(Train),
 }
 
-/// Learn a vocabulary from a folder of images: the tones and the spread of colours and textures that words are measured
-/// against.
+/// Learn a vocabulary from a folder of images
 ///
-/// Take images of a site like the one to come, by the same camera and light. Words then mean the same in every mission,
+/// That is the tones and the spread of colours and textures that words are measured against. Take images of a site like the one to come, by the same camera and light. Words then mean the same in every mission,
 /// from its first frame on; with the vocabulary that ships, the first frames of a mission are learnt from instead. Use it as
 /// scene.vocabulary of a vehicle, or with scenecast scene run --vocabulary. Images named *_label are passed over.
 #[derive(Debug, Args)]

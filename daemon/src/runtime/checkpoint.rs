@@ -19,6 +19,11 @@ impl<S: Storage> CheckpointFile<S> {
         Self { storage }
     }
 
+    /// Where it is, for people.
+    pub(super) fn path(&self) -> std::path::PathBuf {
+        self.storage.path(NAME)
+    }
+
     /// The last checkpoint that was kept; none before the first.
     pub(super) fn read(&self) -> Result<Option<Vec<u8>>, Problem> {
         self.storage.read(NAME).map_err(|e| self.failed(e))
@@ -38,6 +43,6 @@ impl<S: Storage> CheckpointFile<S> {
     }
 
     fn failed(&self, e: io::Error) -> Problem {
-        Problem::Failed(format!("{}: {e}", self.storage.path(NAME).display()))
+        Problem::Failed(format!("{}: {e}", self.path().display()))
     }
 }

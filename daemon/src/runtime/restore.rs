@@ -56,9 +56,8 @@ fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Rest
         Ok(restored) => Ok(Some(restored)),
         Err(NoCheckpoint::Config(problem)) => Err(problem),
         Err(why) => {
-            tracing::error!(
-                "scene.checkpoint is not gone on from: {why}; the scene model begins anew, with new labels"
-            );
+            let place = file.path();
+            tracing::error!("{}: {why}; the scene model begins anew, with new labels", place.display());
             Ok(None)
         }
     }

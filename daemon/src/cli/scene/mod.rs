@@ -9,9 +9,7 @@ use clap::Subcommand;
 /// Run the scene model over files.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Scene {
-    /// Label words, a mosaic or a sequence of images, and print what it took as JSON.
     Run(Box<run::Run>),
-    /// Draw random worlds of the model's prior.
     Sample(sample::Sample),
 }
 

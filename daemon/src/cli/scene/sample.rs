@@ -15,7 +15,7 @@ const MOST_PIXELS: u64 = 1 << 24;
 /// Palette index of the space between worlds; labels have 1 to 254.
 const PAPER: u8 = 255;
 
-/// Draw random worlds of the model's prior: what maps alpha and gamma expect before anything is seen.
+/// Draw random worlds of the model's prior, to see what maps alpha and gamma expect
 ///
 /// Each world has a seed of its own. A colour is a label; the oldest label of each world has the first colour. With more
 /// than 254 labels in a world colours repeat.
