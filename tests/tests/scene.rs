@@ -99,6 +99,9 @@ fn words_are_labelled_as_their_classes_whatever_the_number_of_threads() {
     let resampled = online["resampled"].as_f64().unwrap();
     assert!((resampled / 400_000.0 - 1.0).abs() < 0.01, "100 s at 4000 words a second: {resampled}");
     assert!((online["mutual_information_nats"].as_f64().unwrap() - 2f64.ln()).abs() < 0.05, "{online}");
+    let elsewhere = write(&dir, "elsewhere.csv", "500,500,0,sand\n");
+    let apart = scene_run(&["--words", &words, "--annotations", &elsewhere, "--sweeps", "1"], &out("apart"));
+    assert_eq!(apart["mutual_information_nats"], Value::Null);
     assert!(batch["perplexity"].as_f64().unwrap() < 25.0);
     let rows = labels(&out("batch"));
     assert_eq!(rows.len(), 200);

@@ -164,7 +164,10 @@ impl Run {
         if effort.skipped.skipped_full > 0 {
             eprintln!("scenecast: {} words of full cells passed over", effort.skipped.skipped_full);
         }
-        let quality = annotated.map(|annotated| quality(&model, &annotated, cell_px)).transpose()?;
+        let mut quality = annotated.map(|annotated| quality(&model, &annotated, cell_px)).transpose()?;
+        if quality.take_if(|quality| quality.mutual_information.n == 0).is_some() {
+            eprintln!("scenecast: no cell of the map is annotated, so there is nothing to compare with");
+        }
         let outcome = Outcome::new(&model, &effort, quality.as_ref());
         let line = serde_json::to_string(&outcome).map_err(|e| Problem::Failed(e.to_string()))?;
         write(&model, &self.out)?;
