@@ -1,14 +1,18 @@
 //! The tokio shells around the roles: they move bytes, read the clock, keep files.
 
+mod checkpoint;
 mod clock;
 mod demo;
 mod durable;
 mod journal;
+#[cfg(test)]
+mod kept_labels;
 mod mapping;
 #[cfg(test)]
 mod power_cuts;
 mod refusals;
 mod reload;
+mod restore;
 mod surface;
 mod vehicle;
 
