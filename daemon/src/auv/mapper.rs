@@ -1,5 +1,6 @@
 //! Camera frames to label map.
 
+use super::relief::Relief;
 use crate::config::Config;
 use crate::problem::Problem;
 use image::RgbImage;
@@ -8,7 +9,8 @@ use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, PlaneKind};
+use std::collections::BTreeMap;
 
 /// Edge of a representative image in pixels.
 const EXEMPLAR_PX: u32 = 64;
@@ -24,6 +26,8 @@ pub struct MapUpdate {
     pub epoch: u8,
     /// Labels of every explored cell.
     pub cells: Vec<(Cell, u8)>,
+    /// How sure the model is of these labels, 0 to 1, and the depths of the sea floor there, metres.
+    pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
     /// Labels given so far.
     pub labels: u8,
 }
@@ -36,6 +40,7 @@ pub struct Mapper {
     model: SceneModel,
     book: LabelBook,
     exemplars: ExemplarStore,
+    relief: Relief,
     refine_words_per_s: f64,
     configured_words_per_s: f64,
     last_s: Option<f64>,
@@ -45,6 +50,10 @@ pub struct Mapper {
 /// Edge of a cell in metres.
 pub fn cell_m(config: &Config) -> f64 {
     if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }
+}
+
+fn cell_of(published: &PublishedCell) -> Cell {
+    Cell::new(published.x, published.y)
 }
 
 impl Mapper {
@@ -78,6 +87,7 @@ impl Mapper {
             model: SceneModel::new(scene).map_err(|e| Problem::Input(format!("scene.{e}")))?,
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
+            relief: Relief::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             configured_words_per_s: f64::from(config.scene.refine_words_per_s),
             last_s: None,
@@ -95,14 +105,24 @@ impl Mapper {
         let words = self.extractor.extract(image, (self.cell_m / self.camera.metres_per_pixel) as f32);
         let observations = self.camera.project(image.width(), image.height(), pose, &words);
         self.model.insert(t_s, &observations);
+        for seen in &observations {
+            self.relief.add(Cell::new(self.cell(seen.x), self.cell(seen.y)), -seen.z);
+        }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.model.label_map();
         let published = self.book.publish(&self.flat);
         self.offer_exemplar(image, pose, t_s);
-        let cells = published.iter().map(|c: &PublishedCell| (Cell::new(c.x, c.y), c.label)).collect();
+        let cells = published.iter().map(|c| (cell_of(c), c.label)).collect();
+        let planes = self.planes(&published);
         let labels = self.book.labels().count() as u8;
-        MapUpdate { t_s, epoch: self.book.epoch(), cells, labels }
+        MapUpdate { t_s, epoch: self.book.epoch(), cells, planes, labels }
+    }
+
+    fn planes(&self, published: &[PublishedCell]) -> BTreeMap<PlaneKind, Vec<(Cell, f64)>> {
+        let confidence = published.iter().map(|c| (cell_of(c), f64::from(c.confidence))).collect();
+        let depth = published.iter().filter_map(|c| Some((cell_of(c), self.relief.depth_m(cell_of(c))?))).collect();
+        BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)])
     }
 
     /// The middle of the frame, where the camera distorts least, may represent the label below it.

@@ -6,6 +6,7 @@
 mod exemplar;
 mod mapper;
 mod navigator;
+mod relief;
 mod steering;
 mod vehicle;
 
