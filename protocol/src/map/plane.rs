@@ -3,6 +3,7 @@
 use super::{Cell, LabelGrid, MAX_LABEL, MapSource, Replica, StateReplica, StateSource, UNEXPLORED};
 use crate::map_codec::Codec;
 use crate::time::Instant;
+use std::fmt;
 use std::time::Duration;
 
 /// Which quantity a plane holds.
@@ -273,10 +274,16 @@ impl StateSource for PlaneSource {
 }
 
 /// The surface's side of a plane.
-#[derive(Debug)]
 pub struct PlaneReplica {
     scale: PlaneScale,
     levels: Replica,
+}
+
+/// Without the cells: a peer chooses how many there are.
+impl fmt::Debug for PlaneReplica {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PlaneReplica").field("scale", &self.scale).finish_non_exhaustive()
+    }
 }
 
 impl PlaneReplica {
@@ -313,5 +320,80 @@ impl PlaneReplica {
     /// Fingerprint of what the vehicle knows us to hold.
     pub fn base_digest(&self) -> u16 {
         self.levels.base_digest()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const DEPTH: PlaneScale = PlaneScale::Depth { step_dm: 5, first: 24 };
+
+    #[test]
+    fn levels_are_quarters_of_confidence_and_steps_of_depth() {
+        let levels = |scale: PlaneScale, quantities: &[f64]| -> Vec<u8> {
+            quantities.iter().map(|&quantity| scale.level(quantity, 0)).collect()
+        };
+        assert_eq!(levels(PlaneScale::Confidence, &[0.0, 0.24, 0.25, 0.74, 0.75, 1.0]), [1, 1, 2, 3, 4, 4]);
+        assert_eq!(levels(PlaneScale::Confidence, &[-0.1, 1.1, f64::NAN]), [0, 0, 0]);
+        assert_eq!(levels(DEPTH, &[12.0, 12.49, 12.5, 138.99]), [1, 1, 2, 254]);
+        assert_eq!(levels(DEPTH, &[11.9, 139.0, f64::INFINITY]), [0, 0, 0]);
+        assert_eq!(DEPTH.bounds(2), Some((12.5, 13.0)));
+        assert_eq!((DEPTH.bounds(0), DEPTH.bounds(255), PlaneScale::Confidence.bounds(5)), (None, None, None));
+    }
+
+    #[test]
+    fn the_scale_of_depths_reaches_as_far_up_as_down_or_begins_at_the_surface() {
+        assert_eq!(PlaneScale::depth_around(1000.0, 0.5), PlaneScale::Depth { step_dm: 5, first: 1873 });
+        assert_eq!(PlaneScale::depth_around(20.0, 0.5), PlaneScale::Depth { step_dm: 5, first: 0 });
+        assert_eq!(PlaneScale::depth_around(11_000.0, 0.1), PlaneScale::Depth { step_dm: 1, first: 65_535 });
+    }
+
+    #[test]
+    fn a_quantity_at_the_edge_of_a_level_does_not_go_to_and_fro() {
+        let mut level = 0;
+        let mut changes = 0;
+        for i in 0..100 {
+            let next = PlaneScale::Confidence.level(if i % 2 == 0 { 0.73 } else { 0.77 }, level);
+            changes += u32::from(next != level);
+            level = next;
+        }
+        assert_eq!((changes, level), (1, 3));
+        assert_eq!(PlaneScale::Confidence.level(0.81, level), 4);
+    }
+
+    #[test]
+    fn chunks_of_another_scale_or_of_levels_that_are_none_are_refused() {
+        let mut labels = MapSource::new(Codec::Png);
+        labels.set([(Cell::new(3, 4), 5), (Cell::new(4, 4), 1)], Instant::ZERO);
+        let (patch, _) = labels.next_chunk(100, Instant::ZERO).unwrap();
+        let mut confidence = PlaneReplica::new(PlaneScale::Confidence);
+        assert!(!confidence.apply(1, PlaneScale::Confidence, &patch, Instant::ZERO), "there is no level 5");
+        let mut depth = PlaneReplica::new(DEPTH);
+        assert!(!depth.apply(1, PlaneScale::Depth { step_dm: 5, first: 25 }, &patch, Instant::ZERO));
+        assert!(depth.levels().shown().is_empty());
+        assert!(depth.apply(1, DEPTH, &patch, Instant::ZERO));
+        assert_eq!(depth.levels().shown().get(Cell::new(3, 4)), 5);
+    }
+
+    proptest! {
+        #[test]
+        fn a_chunk_reads_back(head in 0u8..=255, bytes in proptest::collection::vec(any::<u8>(), 0..12)) {
+            let bytes = [&[head], &bytes[..]].concat();
+            if let Some(chunk) = PlaneChunk::decode(&bytes) {
+                prop_assert_eq!(chunk.encode(), bytes);
+            }
+        }
+
+        #[test]
+        fn a_level_holds_the_quantity_or_nearly(quantity in 0.0f64..200.0, held in 0u8..=255) {
+            let level = DEPTH.level(quantity, held);
+            if let Some((low, high)) = DEPTH.bounds(level) {
+                prop_assert!((low - 0.11..high + 0.11).contains(&quantity));
+            } else {
+                prop_assert!(!(12.0..139.0).contains(&quantity));
+            }
+        }
     }
 }

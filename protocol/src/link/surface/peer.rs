@@ -1,9 +1,9 @@
 //! What the surface keeps for one vehicle.
 
+use super::planes::{Heard, Planes};
 use crate::directive::{Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
 use crate::mac::{Access, ClockMap, Master, MasterConfig, ModemProfile};
-use super::planes::{Heard, Planes};
 use crate::map::{PlaneChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;

@@ -56,3 +56,43 @@ impl Planes {
         *self = Self { version: self.version + 1, ..Self::default() };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::{Cell, PlaneScale, PlaneSource, StateSource};
+    use crate::map_codec::Codec;
+    use std::time::Duration;
+
+    fn depths(from_dm: u16) -> PlaneSource {
+        let scale = PlaneScale::Depth { step_dm: 5, first: from_dm };
+        let mut source = PlaneSource::new(scale, Codec::Png, Duration::ZERO);
+        source.set((0..20).map(|i| (Cell::new(i, -i), 20.0 + f64::from(i))), Instant::ZERO);
+        source
+    }
+
+    #[test]
+    fn a_plane_that_is_not_known_is_passed_over_and_one_on_another_scale_is_not() {
+        let mut planes = Planes::default();
+        let (chunk, carried) = depths(0).next_chunk(200, Instant::ZERO).unwrap();
+        assert_eq!(planes.handle_chunk(1, &[&[3], &chunk[1..]].concat(), Instant::ZERO), Heard::Unknown);
+        assert_eq!((planes.handle_chunk(1, &chunk, Instant::ZERO), planes.version()), (Heard::Taken, 1));
+        let shown = planes.get(PlaneKind::Depth).unwrap().levels().shown();
+        assert!(carried.iter().all(|&(cell, level)| shown.get(cell) == level));
+        let (chunk, _) = depths(1).next_chunk(200, Instant::ZERO).unwrap();
+        assert_eq!(planes.handle_chunk(2, &chunk, Instant::ZERO), Heard::OutOfStep);
+        planes.clear();
+        assert_eq!((planes.get(PlaneKind::Depth).is_none(), planes.version()), (true, 2));
+    }
+
+    #[test]
+    fn a_digest_is_held_against_the_base() {
+        let (mut planes, mut source) = (Planes::default(), depths(0));
+        let (chunk, carried) = source.next_chunk(200, Instant::ZERO).unwrap();
+        planes.handle_chunk(1, &chunk, Instant::ZERO);
+        source.handle_fate(carried, true, Instant::ZERO);
+        assert_eq!(planes.handle_chunk(2, &source.digest_chunk(), Instant::ZERO), Heard::OutOfStep);
+        planes.advance_base(1);
+        assert_eq!(planes.handle_chunk(3, &source.digest_chunk(), Instant::ZERO), Heard::Taken);
+    }
+}
