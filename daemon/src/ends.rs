@@ -100,7 +100,7 @@ pub fn vehicle(
 /// The planes of the map that are sent, and their parts of the map's share in percent.
 fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u8)> {
     let map = &config.map;
-    let settle = Duration::from_secs_f64(map.plane_settle_s);
+    let settle = Duration::from_secs_f64(map.settle_s);
     let scale = |kind| match kind {
         PlaneKind::Confidence => PlaneScale::Confidence,
         PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),

@@ -158,7 +158,7 @@ pub const KEYS: &[Key] = &[
         "s",
         Range(0.0, 600.0),
         "ar",
-        "time that a new label of a cell that the operator knows has to stand before it is sent; up to eight times that for a cell that flips again and again; 0: none",
+        "time that a new label, or level of a plane, of a cell that the operator knows has to stand before it is sent; up to eight times that for a cell that flips again and again; 0: none",
     ),
     key(
         "map.coarse_after_s",
@@ -181,7 +181,6 @@ pub const KEYS: &[Key] = &[
         "ar",
         "least shares of confidence and depth in the map's share of link.shares while labels wait too, together at most 100; 0: only what nobody else needs",
     ),
-    key("map.plane_settle_s", "s", Range(0.0, 600.0), "ar", "as map.settle_s, for the levels of planes"),
     key(
         "map.depth_step_m",
         "m",

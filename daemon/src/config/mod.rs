@@ -164,8 +164,6 @@ section! {
         planes: Vec<String> = PlaneKind::ALL.map(|p| p.name().to_owned()).to_vec(),
         /// Percent of the map's share for confidence and depth; 0 = what nobody else needs.
         plane_shares: [u8; 2] = [0; 2],
-        /// Seconds that a new level of a cell that the operator knows has to stand; 0 = none.
-        plane_settle_s: f64 = 10.0,
         /// Step of the plane of depths, metres.
         depth_step_m: f64 = 0.5,
     }
