@@ -141,3 +141,38 @@ fn plane(kind: PlaneKind, replica: &PlaneReplica, bounds: Rect, now: Instant) ->
 fn rounded(x: f64) -> f64 {
     (x * 1000.0).round() / 1000.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::map::{Cell, PlaneChunk, PlaneScale, PlaneSource, StateSource};
+    use scenecast_protocol::map_codec::Codec;
+    use std::time::Duration;
+
+    /// The plane as the surface has it after everything was said at 10 s.
+    fn heard(scale: PlaneScale, cells: &[(Cell, f64)]) -> PlaneReplica {
+        let at = Instant::from_secs_f64(10.0);
+        let mut source = PlaneSource::new(scale, Codec::Png, Duration::ZERO);
+        source.set(cells.iter().copied(), at);
+        let (chunk, _) = source.next_chunk(1000, at).unwrap();
+        let Some(PlaneChunk::Patch(scale, patch)) = PlaneChunk::decode(&chunk) else { panic!("no patch") };
+        let mut replica = PlaneReplica::new(scale);
+        assert!(replica.apply(1, scale, patch, at));
+        replica
+    }
+
+    #[test]
+    fn a_plane_is_told_by_the_middles_of_its_levels_and_what_is_not_known_is_not_told() {
+        let bounds = Rect { x: 0, y: 0, width: 3, height: 1 };
+        let cells = [(Cell::new(0, 0), 20.1), (Cell::new(2, 0), 22.9)];
+        let depth = heard(PlaneScale::depth_around(20.0, 0.5), &cells);
+        let told = plane(PlaneKind::Depth, &depth, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((&told["min"], &told["max"], &told["step"]), (&json!(20.25), &json!(22.75), &json!(0.5)));
+        assert_eq!(told["data"], base64::encode(&[0, 255, 254]));
+        assert_eq!(told["age_s"], base64::encode(&[3, 0, 255, 255, 3, 0]));
+        let confidence = heard(PlaneScale::Confidence, &[(Cell::new(0, 0), 0.6), (Cell::new(1, 0), 1.0)]);
+        let told = plane(PlaneKind::Confidence, &confidence, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((&told["min"], &told["max"], &told["unit"]), (&json!(0.125), &json!(0.875), &json!("")));
+        assert_eq!(told["data"], base64::encode(&[169, 254, 255]));
+    }
+}

@@ -50,7 +50,7 @@ pub enum PlaneScale {
 }
 
 impl PlaneScale {
-    /// A depth has to leave its level by this share of it before it is another one; so has a confidence.
+    /// A quantity has to leave its level by this share of a step before it has another one.
     const HYSTERESIS: f64 = 0.2;
 
     /// Depths in steps of about `step_m` metres with `middle_m` in the middle of the scale, or as near as it gets.
