@@ -15,10 +15,10 @@ pub enum Class {
     Map,
     /// Representative images.
     Exemplar,
+    /// Depths of the sea floor; they change seldom, and so go before confidences.
+    Depth,
     /// How sure the model is of the labels.
     Confidence,
-    /// Depths of the sea floor.
-    Depth,
     /// Headers, acknowledgements, checks, padding.
     Overhead,
 }
@@ -31,8 +31,8 @@ impl Class {
         Self::Fix,
         Self::Map,
         Self::Exemplar,
-        Self::Confidence,
         Self::Depth,
+        Self::Confidence,
         Self::Overhead,
     ];
     /// The classes that have a share of what is sent.
@@ -201,6 +201,7 @@ mod tests {
         assert_eq!(sent.get(&Class::Confidence), None);
         assert!((45..=55).contains(&sent[&Class::Depth]), "{sent:?}");
         assert_eq!(keeper.next(&[Class::Confidence]), Some(Class::Confidence));
+        assert_eq!(ClassShares::default().next(&[Class::Confidence, Class::Depth]), Some(Class::Depth));
     }
 
     #[test]
