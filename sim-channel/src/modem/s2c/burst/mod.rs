@@ -76,7 +76,7 @@ impl S2c {
         }
         self.burst.last_count = self.burst.last_count.wrapping_add(1);
         self.burst.queue.push_back(Record { count: self.burst.last_count, dst, pid, data });
-        self.agenda.add(now, super::Event::Kick);
+        self.board.plan(now, super::Event::Kick);
         true
     }
 
