@@ -92,7 +92,8 @@ impl Pty {
         to_tank: &mpsc::Sender<FromHost>,
         told: &mut mpsc::Receiver<Vec<u8>>,
     ) -> Option<()> {
-        let fd = AsyncFd::register(Arc::clone(&self.master)).ok()?;
+        #[allow(deprecated, reason = "its successor is unsafe code; an OwnedFd does keep its descriptor")]
+        let fd = AsyncFd::new(Arc::clone(&self.master)).ok()?;
         let mut piece = vec![0; speed.piece()];
         let mut waiting: Vec<u8> = Vec::new();
         let mut free_at = Instant::now();
