@@ -8,6 +8,7 @@ pub mod console;
 mod ends;
 mod figures;
 pub mod modem;
+pub mod modem_sim;
 pub mod picture;
 mod problem;
 pub mod rehearsal;

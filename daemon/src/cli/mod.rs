@@ -7,6 +7,7 @@ mod bench_link;
 mod demo;
 mod key;
 mod map;
+mod modem_sim;
 mod node;
 mod progress;
 mod scene;
@@ -34,6 +35,8 @@ enum Command {
     Auv(node::Node),
     /// Run the surface: hold the operator's map, serve his page.
     Asv(node::Node),
+    /// Emulate modems in one water, each on a serial device or a TCP port of its own.
+    ModemSim(modem_sim::ModemSim),
     /// Measure.
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -60,6 +63,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Sim(sim) => sim.run(),
         Command::Auv(node) => node.run_vehicle(),
         Command::Asv(node) => node.run_surface(),
+        Command::ModemSim(sim) => sim.run(),
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
