@@ -47,6 +47,18 @@ impl Annotations {
         Ok(Self { columns, rows, classes, of_cells })
     }
 
+    /// Annotated cells and different classes among them; nothing if no cell is annotated.
+    pub fn cells(&self) -> Option<(usize, usize)> {
+        let classes: std::collections::BTreeSet<u8> = self.of_cells.iter().copied().flatten().collect();
+        (!classes.is_empty()).then(|| (self.of_cells.iter().flatten().count(), classes.len()))
+    }
+
+    /// Class of each cell that has one with its column and row from the top left, row by row.
+    pub fn classes(&self) -> impl Iterator<Item = (usize, usize, u8)> {
+        let of_cells = self.of_cells.iter().enumerate();
+        of_cells.filter_map(|(cell, class)| Some((cell % self.columns, cell / self.columns, (*class)?)))
+    }
+
     /// Cells across and down.
     pub fn size(&self) -> (usize, usize) {
         (self.columns, self.rows)

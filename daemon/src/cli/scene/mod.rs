@@ -1,7 +1,9 @@
 //! `scenecast scene`
 
+mod pairs;
 mod run;
 mod sample;
+mod score;
 
 use crate::problem::Problem;
 use clap::Subcommand;
@@ -13,6 +15,8 @@ pub(crate) enum Scene {
     Run(run::Run),
     /// Draw random worlds of the model's prior.
     Sample(sample::Sample),
+    /// Score the scene model and two baselines on annotated images.
+    Score(score::Score),
 }
 
 impl Scene {
@@ -20,6 +24,7 @@ impl Scene {
         match self {
             Self::Run(run) => run.run(),
             Self::Sample(sample) => sample.run(),
+            Self::Score(score) => score.run(),
         }
     }
 }
