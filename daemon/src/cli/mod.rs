@@ -11,6 +11,7 @@ mod node;
 mod progress;
 mod scene;
 mod sim;
+mod tune;
 
 use crate::problem::Problem;
 use clap::{Parser, Subcommand};
@@ -45,6 +46,8 @@ enum Command {
     /// Run the scene model over files.
     #[command(subcommand)]
     Scene(scene::Scene),
+    /// Search the settings of the scene model that tell most about annotations of a similar site.
+    Tune(Box<tune::Tune>),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -60,6 +63,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
         Command::Scene(scene) => scene.run(),
+        Command::Tune(tune) => tune.run(),
         Command::Config(print) => print.run(),
     }
 }
