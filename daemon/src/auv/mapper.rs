@@ -67,6 +67,7 @@ impl Mapper {
             vocabulary: words.vocabulary_size(),
             max_words_per_cell: config.scene.max_words_per_cell,
             seed,
+            ..SceneConfig::for_images()
         };
         Ok(Self {
             extractor: WordExtractor::new(&words),

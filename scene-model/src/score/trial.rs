@@ -156,7 +156,7 @@ impl<'a> Scene<'a> {
             vocabulary: self.vocabulary,
             max_labels: self.trial.labels,
             seed,
-            ..SceneConfig::default()
+            ..SceneConfig::for_images()
         };
         let mut model = SceneModel::new(config)?;
         model.insert(0.0, &camera.project(width, height, &middle, &self.words));
@@ -202,14 +202,14 @@ mod tests {
     use crate::generate::reef;
 
     #[test]
-    fn every_method_tells_something_about_a_reef_and_the_scene_model_most() {
+    fn every_method_finds_the_classes_of_a_reef_and_the_scene_model_more_than_clusters_of_its_words() {
         let reef = reef(3, 480, 360, 60, 5);
         let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap();
         let trial = Trial { labels: 8, cells_across: 40, sweeps: 10, seeds: 1 };
         let scene = Scene::new(trial, &reef.image, &classes, &[255]).unwrap();
         let scores = Method::ALL.map(|method| scene.grade(method).unwrap());
-        assert!(scores.iter().all(|score| score.excess_nats > 0.05 && score.labels_used <= 8.0), "{scores:?}");
-        assert!(scores[2].mutual_information_nats > scores[0].mutual_information_nats, "{scores:?}");
+        assert!(scores.iter().all(|score| score.excess_nats > 0.5 && score.labels_used <= 8.0), "{scores:?}");
+        assert!(scores[2].excess_nats > scores[1].excess_nats, "{scores:?}");
     }
 
     #[test]

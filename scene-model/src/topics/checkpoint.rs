@@ -17,7 +17,7 @@ use super::model::SceneModel;
 use crate::random::Stream;
 
 const MAGIC: [u8; 8] = *b"SCNMODEL";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 20;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
@@ -144,11 +144,12 @@ impl Snapshot {
     /// Cells and labels with all that is derived.
     pub(super) fn rebuild(&self) -> (Cells, Labels) {
         let mut labels = Labels::restore(&self.config, &self.topics, self.next_topic);
-        let mut cells = Cells::new(labels.blocks);
+        let mut cells = Cells::new(labels.blocks, self.config.colour_levels);
         for (coord, words) in &self.cells {
             cells.restore(*coord, words);
             labels.count(words);
         }
+        cells.weigh(std::iter::empty());
         labels.settle();
         (cells, labels)
     }

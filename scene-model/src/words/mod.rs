@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use binary::Binary;
 use colour::Colour;
+pub use colour::LEVELS as COLOUR_LEVELS;
 use context::{Context, Spread};
 use field::Field;
 use plane::Plane;

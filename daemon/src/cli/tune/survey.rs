@@ -159,7 +159,7 @@ impl<'a> Survey<'a> {
             max_labels: scene.max_labels,
             max_words_per_cell: scene.max_words_per_cell,
             seed,
-            ..SceneConfig::default()
+            ..SceneConfig::for_images()
         }
     }
 }
