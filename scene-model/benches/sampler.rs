@@ -3,7 +3,7 @@
 //! `cargo bench -p scene-model --bench sampler`; with `-- avx2` or the like only some. After divan's table (wall time)
 //! come the figures in words per CPU-second of the sampling thread (Linux; elsewhere wall time), and how many times
 //! the plain algorithm that is.
-#![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
+#![allow(clippy::disallowed_methods, missing_docs, unreachable_pub, dead_code)]
 
 mod cpu;
 mod plain;
@@ -24,7 +24,8 @@ const LABELS: [u32; 4] = [8, 16, 32, 100];
 const PLAIN: &str = "plain";
 
 /// Words and CPU seconds by method and K.
-static SPENT: Mutex<BTreeMap<(&str, u32), (u64, f64)>> = Mutex::new(BTreeMap::new());
+type Spent = BTreeMap<(&'static str, u32), (u64, f64)>;
+static SPENT: Mutex<Spent> = Mutex::new(BTreeMap::new());
 
 fn main() {
     divan::main();
@@ -76,7 +77,7 @@ fn sampler(bencher: Bencher<'_, '_>, kernel: Kernel, labels: u32, threads: usize
         model
     };
     bencher.counter(words(SWEEPS)).with_inputs(model).bench_local_values(|mut model| {
-        let sweep = || model.sweep(SWEEPS);
+        let mut sweep = || model.sweep(SWEEPS);
         if threads == 1 { spend(kernel.name(), labels, sweep) } else { sweep() }
     });
 }
