@@ -67,7 +67,7 @@ impl Grid {
     fn read(text: &str) -> Result<Self, String> {
         let grid: Self = toml::from_str(text).map_err(|e: toml::de::Error| {
             let line =
-                e.span().and_then(|span| text.get(..span.start)).map_or(1, |before| before.lines().count().max(1));
+                e.span().and_then(|span| text.get(..span.start)).map_or(1, |before| before.matches('\n').count() + 1);
             format!(":{line}: {} (it takes lists alpha, beta, gamma, cell_m)", e.message())
         })?;
         let ranges =
