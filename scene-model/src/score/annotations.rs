@@ -53,12 +53,6 @@ impl Annotations {
         (!classes.is_empty()).then(|| (self.of_cells.iter().flatten().count(), classes.len()))
     }
 
-    /// Class of each cell that has one with its column and row from the top left, row by row.
-    pub fn classes(&self) -> impl Iterator<Item = (usize, usize, u8)> {
-        let of_cells = self.of_cells.iter().enumerate();
-        of_cells.filter_map(|(cell, class)| Some((cell % self.columns, cell / self.columns, (*class)?)))
-    }
-
     /// Cells across and down.
     pub fn size(&self) -> (usize, usize) {
         (self.columns, self.rows)
