@@ -7,6 +7,7 @@ pub mod config;
 pub mod console;
 mod ends;
 mod figures;
+mod imagery;
 pub mod modem;
 pub mod modem_sim;
 pub mod picture;

@@ -77,6 +77,7 @@ impl Mapper {
             vocabulary: extractor.vocabulary_size(),
             max_words_per_cell: config.scene.max_words_per_cell,
             seed,
+            ..SceneConfig::for_images()
         };
         Ok(Self {
             extractor,

@@ -12,6 +12,7 @@ mod node;
 mod progress;
 mod scene;
 mod sim;
+mod tune;
 mod vocabulary;
 
 use crate::problem::Problem;
@@ -52,6 +53,8 @@ enum Command {
     /// Make the vocabularies that images are put into words with.
     #[command(subcommand)]
     Vocabulary(vocabulary::Vocabulary),
+    /// Search the settings of the scene model that tell most about annotations of a similar site.
+    Tune(Box<tune::Tune>),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -69,6 +72,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Map(map) => map.run(),
         Command::Scene(scene) => scene.run(),
         Command::Vocabulary(vocabulary) => vocabulary.run(),
+        Command::Tune(tune) => tune.run(),
         Command::Config(print) => print.run(),
     }
 }
