@@ -13,8 +13,8 @@ use scenecast_protocol::wire::Address;
 
 /// Bytes of bulk that may be in an S2C modem: about a train on its way and another one that waits.
 const POOL_BYTES: usize = 16_384;
-/// Frames of the surface that may be in an S2C modem: one under way, and a command behind an acknowledgement.
-const SURFACE_POOL_FRAMES: u32 = 2;
+/// Frames of the surface that may be in an S2C modem: what waits is written when its time has come.
+const SURFACE_POOL_FRAMES: u32 = 1;
 
 /// Bytes of a full frame: the modem's unit where it has one, else what the configuration says.
 pub fn full_frame_bytes(config: &Config) -> usize {

@@ -206,6 +206,8 @@ impl Micromodem {
 
     fn handle_sentence(&mut self, sentence: &Sentence, now: Instant) {
         self.heard = now;
+        // An answer waits behind what else the modem has to say, which may take seconds on a slow line.
+        self.asked = self.asked.map(|deadline| deadline.max(now + PATIENCE));
         match sentence.name.as_str() {
             "CACFG" => self.handle_setting(sentence.text(0), sentence.text(1), now),
             "CAREV" if sentence.text(1) == "INIT" => self.start_over(SETTLE, now),

@@ -149,7 +149,7 @@ fn ties_start(bytes: &[u8]) -> usize {
             rest.starts_with(TIES)
                 || TIES.starts_with(rest)
                 || rest.starts_with(error)
-                || (rest.len() > 5 && error.starts_with(rest))
+                || error.starts_with(rest)
         })
         .unwrap_or(bytes.len())
 }

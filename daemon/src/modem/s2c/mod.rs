@@ -67,6 +67,8 @@ enum Asked {
     Beat(Step),
     Message(Job, bool),
     Piggyback(Job),
+    /// A copy of the command that goes as a message next.
+    Copy(Job),
     Record(Job),
     /// The packet counter of the record just taken.
     Count(Token),

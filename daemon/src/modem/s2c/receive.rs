@@ -1,7 +1,7 @@
 //! What an S2C modem says, and what it means.
 
 use super::notice::{Heard, Notice, Place, Position, Service};
-use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, Line, Phase, S2c};
+use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, Line, PATIENCE, Phase, S2c};
 use crate::modem::driver::{Event, ModemAddress, Reception, Token, UsblLine};
 use crate::modem::framing::Deframer;
 use bytes::Bytes;
@@ -26,6 +26,10 @@ impl S2c {
             Line::Reply(name, text) => self.handle_reply(name.as_deref(), &text, now),
             Line::Notice(notice) => {
                 self.heard = now;
+                // A reply waits behind what else the modem has to say, which may take seconds on a slow line.
+                if let Some((_, deadline)) = &mut self.asked {
+                    *deadline = (*deadline).max(now + PATIENCE);
+                }
                 self.handle_notice(notice, now);
             }
             // A port of the AT interpreter does not say whose data it is.
@@ -144,7 +148,7 @@ impl Asked {
     /// The transmission that it is about.
     pub(super) fn token(&self) -> Option<Token> {
         match self {
-            Self::Message(job, _) | Self::Piggyback(job) | Self::Record(job) => Some(job.token),
+            Self::Message(job, _) | Self::Piggyback(job) | Self::Copy(job) | Self::Record(job) => Some(job.token),
             Self::Count(token) => Some(*token),
             Self::Interpreter | Self::Mode | Self::Setup(_) | Self::Beat(_) => None,
         }
@@ -159,7 +163,7 @@ impl Asked {
                 name == plain || name == step.command
             }
             Self::Message(..) => name == "*SENDIM",
-            Self::Piggyback(_) => name == "*SENDPBM",
+            Self::Piggyback(_) | Self::Copy(_) => name == "*SENDPBM",
             Self::Record(_) => name == "*SEND",
             Self::Count(_) => name == "?PC",
         }

@@ -19,7 +19,7 @@ const TRIES: u32 = 3;
 /// A message may wait for so long for its turn in a connection.
 const TURN: Duration = Duration::from_secs(45);
 /// So long after burst data of a modem an acknowledgement to it finds a ride.
-const RIDE: Duration = Duration::from_secs(5);
+const RIDE: Duration = Duration::from_secs(15);
 /// A record that the modem says nothing of for so long is lost from sight.
 const RECORD_LIFE: Duration = Duration::from_secs(180);
 
@@ -29,16 +29,20 @@ impl S2c {
         let slot = self.jobs.message.is_none() && now >= self.message_pause;
         if slot && let Some(job) = self.jobs.commands.pop_front() {
             let fits = job.bytes.len() <= INSTANT_BYTES;
-            return if fits { self.send_message(job, now) } else { self.send_record(job, now) };
+            return match fits {
+                // Both go out in the same turn of the connection: one of them gets through where the other does not.
+                true if self.rides(&job, now) => self.send_piggyback(job, Asked::Copy, now),
+                true => self.send_message(job, self.config.mode == S2cMode::Burst, now),
+                false => self.send_record(job, now),
+            };
         }
         if let Some(job) = self.jobs.services.pop_front() {
-            let rides = self.burst_heard.get(&job.dst).is_some_and(|&at| now.since(at) < RIDE);
-            if rides && job.bytes.len() <= INSTANT_BYTES {
-                return self.send_piggyback(job, now);
+            if self.rides(&job, now) && job.bytes.len() <= INSTANT_BYTES {
+                return self.send_piggyback(job, Asked::Piggyback, now);
             }
             if slot {
                 let fits = job.bytes.len() <= INSTANT_BYTES;
-                return if fits { self.send_message(job, now) } else { self.send_record(job, now) };
+                return if fits { self.send_message(job, false, now) } else { self.send_record(job, now) };
             }
             self.jobs.services.push_front(job);
         }
@@ -54,11 +58,11 @@ impl S2c {
             return false;
         }
         let Some(job) = self.jobs.bulk.pop_front() else { return false };
-        if as_message { self.send_message(job, now) } else { self.send_record(job, now) }
+        if as_message { self.send_message(job, false, now) } else { self.send_record(job, now) }
     }
 
-    fn send_message(&mut self, job: Job, now: Instant) -> bool {
-        let acked = self.config.mode == S2cMode::Burst && job.class == Class::Command && job.dst != EVERYBODY;
+    fn send_message(&mut self, job: Job, acked: bool, now: Instant) -> bool {
+        let acked = acked && job.dst != EVERYBODY;
         let flag = if acked { "ack" } else { "noack" };
         let head = format!("*SENDIM,{},{},{flag},", job.bytes.len(), job.dst);
         let command = [head.as_bytes(), &job.bytes].concat();
@@ -66,10 +70,15 @@ impl S2c {
         true
     }
 
-    fn send_piggyback(&mut self, job: Job, now: Instant) -> bool {
+    /// Whether the modem will send something to this one soon.
+    fn rides(&self, job: &Job, now: Instant) -> bool {
+        self.burst_heard.get(&job.dst).is_some_and(|&at| now.since(at) < RIDE)
+    }
+
+    fn send_piggyback(&mut self, job: Job, asked: impl FnOnce(Job) -> Asked, now: Instant) -> bool {
         let head = format!("*SENDPBM,{},{},", job.bytes.len(), job.dst);
         let command = [head.as_bytes(), &job.bytes].concat();
-        self.ask(&command, Asked::Piggyback(job), now);
+        self.ask(&command, asked(job), now);
         true
     }
 
@@ -89,6 +98,13 @@ impl S2c {
                 self.events.push_back(Event::Accepted(job.token));
                 let until = now + instant_airtime(job.bytes.len()) + TURN;
                 self.jobs.message = Some(Message { job, acked, until });
+            }
+            Asked::Copy(job) => {
+                if taken {
+                    self.events.push_back(Event::Repeated(instant_bits(&job)));
+                }
+                // An acknowledgement that is lost would hold up the next command for as long as a train and more.
+                self.send_message(job, !taken, now);
             }
             Asked::Piggyback(job) if taken => {
                 self.events.push_back(Event::Accepted(job.token));
@@ -162,7 +178,7 @@ impl S2c {
         }
         job.tries += 1;
         if job.tries < TRIES {
-            self.events.push_back(Event::Repeated(job.bytes.len() as u64 * 8 + super::config::INSTANT_OVERHEAD_BITS));
+            self.events.push_back(Event::Repeated(instant_bits(&job)));
             self.jobs.commands.push_front(job);
         } else {
             self.events.push_back(Event::Failed(job.token));
@@ -192,4 +208,8 @@ impl S2c {
         let pause = self.message_pause.max(self.record_pause);
         (waits && free && self.is_at_work()).then_some(pause)
     }
+}
+
+fn instant_bits(job: &Job) -> u64 {
+    job.bytes.len() as u64 * 8 + super::config::INSTANT_OVERHEAD_BITS
 }
