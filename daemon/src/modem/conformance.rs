@@ -15,9 +15,14 @@ const SECOND: Duration = Duration::from_secs(1);
 /// After a fault, traffic goes on within so long.
 const RESUMES: Duration = Duration::from_secs(10);
 
-/// What a Micromodem needs for a cycle of each end: it begins anew, and nothing is heard before the end of a packet.
+/// What modems need by themselves: a Micromodem for a cycle of each end, for nothing is heard before the end of a packet;
+/// an S2C that speaks to one that has forgotten their connection, for a train and for its patience.
 fn cycle(name: &str) -> Duration {
-    if name.starts_with("micromodem") { 8 * SECOND } else { Duration::ZERO }
+    match name {
+        "s2c burst" => 9 * SECOND,
+        "s2c im" | "transparent" => Duration::ZERO,
+        _ => 8 * SECOND,
+    }
 }
 
 /// Every kind with an emulator.
@@ -253,7 +258,7 @@ fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
             "AT?AL" => "10\r\n".to_owned(),
             "AT?PC" => format!("{}\r\n", step / 50),
             t if t.starts_with("AT?") => {
-                let known = [("L", 3), ("AM", 14), ("C", 2), ("ZC", 10), ("ZP", 750), ("RC", 3), ("RT", 4000), ("RI", 0)];
+                let known = [("L", 3), ("AM", 14), ("C", 2), ("ZC", 10), ("ZP", 750), ("RC", 2), ("RT", 4000), ("RI", 0)];
                 let value = known.iter().find(|(k, _)| t == format!("AT?{k}")).map_or(0, |(_, v)| *v);
                 format!("{}\r\n", if t == "AT?ZI" { 20 } else { value })
             }

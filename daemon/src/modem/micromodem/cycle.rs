@@ -83,7 +83,7 @@ impl Cycles {
 impl Micromodem {
     /// `$CCCYC,0,<src>,<dst>,<rate>,<ack>,<nframes>`
     pub(super) fn start_cycle(&mut self, from: ModemAddress, to: ModemAddress, frames: u32, now: Instant) {
-        const TRIES: u8 = 5;
+        const TRIES: u8 = 30;
         self.start(from, to, frames.clamp(1, u32::from(self.config.rate.frames)) as u8, TRIES, now);
     }
 

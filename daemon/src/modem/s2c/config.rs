@@ -60,8 +60,9 @@ pub fn instant_airtime(bytes: usize) -> Duration {
 impl S2cConfig {
     /// Settings to write and to read back.
     ///
-    /// No retries of messages: what comes twice costs air, and the driver repeats by itself. Idle connections end soon, so
-    /// that others get to speak.
+    /// No retries of messages: what comes twice costs air, and the driver repeats by itself. Two retries of a connection:
+    /// more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so that others get
+    /// to speak.
     pub(super) fn settings(&self) -> [(&'static str, u32); 10] {
         [
             ("L", self.source_level.into()),
@@ -69,7 +70,7 @@ impl S2cConfig {
             ("C", 2),
             ("ZC", self.cluster.into()),
             ("ZP", self.packet_ms.into()),
-            ("RC", 3),
+            ("RC", 2),
             ("RT", 4000),
             ("RI", 0),
             ("ZI", 20),

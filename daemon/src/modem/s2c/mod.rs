@@ -106,6 +106,8 @@ pub struct S2c {
     local_rate: u32,
     /// Questions in a row without an answer.
     silences: u32,
+    /// Whether it ever was at work.
+    was_ready: bool,
     /// The step of the start-up that failed last.
     failed: Option<Step>,
     refusal: Option<String>,
@@ -137,6 +139,7 @@ impl S2c {
             aired_bits: 0,
             local_rate: 0,
             silences: 0,
+            was_ready: false,
             failed: None,
             refusal: None,
         }
@@ -198,10 +201,10 @@ impl S2c {
                 self.ask(b"?MODE", Asked::Interpreter, now);
             }
             Phase::Discovering => {}
-            Phase::SettingUp(index) => match setup::start_up(&self.config).into_iter().nth(index) {
+            Phase::SettingUp(index) => match setup::start_up(&self.config, !self.was_ready).into_iter().nth(index) {
                 Some(step) => self.ask(step.command.clone().as_bytes(), Asked::Setup(step), now),
                 None => {
-                    self.phase = Phase::Ready;
+                    (self.phase, self.was_ready) = (Phase::Ready, true);
                     (self.refusal, self.failed, self.silences) = (None, None, 0);
                     (self.message_pause, self.record_pause, self.beat_at) = (now, now, now + BEAT);
                     self.events.push_back(Event::Ready);

@@ -39,13 +39,14 @@ fn step(command: impl Into<String>, expect: Expect) -> Step {
     Step { command: command.into(), expect }
 }
 
-/// From discovery to work.
-pub(super) fn start_up(config: &S2cConfig) -> Vec<Step> {
-    // What waits in the modem was meant for another time.
+/// From discovery to work; the `first` time what waits in the modem is that of another run.
+pub(super) fn start_up(config: &S2cConfig, first: bool) -> Vec<Step> {
+    // Later it is still good, and throwing it away would end the connection.
+    let drop = if first { "Z4" } else { "Z3" };
     let mut steps = vec![
         step("?AL", Expect::Address),
         step("@CTRL", Expect::Tolerated),
-        step("Z4", Expect::Tolerated),
+        step(drop, Expect::Tolerated),
         step("@ZF0", Expect::Tolerated),
         step("@ZX1", Expect::Ok),
         step("@ZU1", Expect::Tolerated),
