@@ -56,7 +56,13 @@ pub const KEYS: &[Key] = &[
         "bits on air that this end may send, mean over the window",
     ),
     key("link.budget_window_s", "s", Range(1.0, 3600.0), "asr", "window over which the budget is kept"),
-    key("link.frame_bytes", "bytes", Range(32.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
+    key(
+        "link.frame_bytes",
+        "bytes",
+        Range(32.0, 1024.0),
+        "asr",
+        "size of a full frame, the same at both ends; s2c and micromodem have sizes of their own",
+    ),
     key(
         "link.shares",
         "%",
