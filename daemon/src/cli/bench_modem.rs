@@ -39,14 +39,14 @@ fn print_table(table: &ModemTable) {
     println!("S2C in burst mode, {:.0} m, {:.0} % loss, seed {}:", b.range_m, b.loss * 100.0, table.seed);
     println!("  raw pusher      {:>7.0} bit/s", b.raw_bps);
     println!("  useful at map   {:>7.0} bit/s, {:.3} of it", b.useful_bps, b.share);
-    println!("  directive       {:>7.1} s median, {:.1} s p95, issue to applied, bulk queue full", b.directive_median_s, b.directive_p95_s);
+    println!(
+        "  directive       {:>7.1} s median, {:.1} s p95, issue to applied, bulk queue full",
+        b.directive_median_s, b.directive_p95_s
+    );
     println!("  budget used     {:>7.3} in the worst window", b.budget_use);
     println!();
     println!("survey through                 agreement mean   final  drain s");
     for row in &table.surveys {
-        println!(
-            "{:<30} {:>14.4} {:>7.4} {:>8.0}",
-            row.modem, row.agreement_mean, row.agreement_final, row.drain_s
-        );
+        println!("{:<30} {:>14.4} {:>7.4} {:>8.0}", row.modem, row.agreement_mean, row.agreement_final, row.drain_s);
     }
 }

@@ -3,11 +3,13 @@
 use crate::config::{self, Config};
 use crate::modem::{self, Class, Destination, Driver, Event, Refusal, Token};
 use crate::rehearsal::modem_bench::{Dock, DockSetting};
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::Cycle;
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use sim_channel::modem::Fault;
+use sim_channel::modem::s2c::{S2c as S2cEmulator, S2cConfig as EmulatorConfig};
+use sim_channel::modem::{Emulator, Fault};
 use std::time::Duration;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -205,6 +207,27 @@ fn a_busy_modem_is_asked_again() {
     survives(|d| d.inject(d.struck, Fault::Busy(10 * SECOND)), 10 * SECOND);
 }
 
+#[test]
+fn ports_of_both_interpreters_understand_each_other() {
+    use sim_channel::modem::s2c::Interpreter::{At, Net};
+    let modem = |address, interpreter| -> Box<dyn Emulator> {
+        Box::new(S2cEmulator::new(EmulatorConfig { interpreter, ..EmulatorConfig::new(address) }))
+    };
+    for sets in [KINDS[0].1, KINDS[1].1] {
+        for (vehicle, surface) in [(At, At), (At, Net), (Net, At)] {
+            let modems = [modem(1, vehicle), modem(10, surface)];
+            let mut dock = Dock::with_modems(&setting(sets, 0.0), modems, 5).unwrap();
+            dock.load = Some(2000);
+            dock.run(120 * SECOND);
+            let version = dock.issue().unwrap();
+            dock.run(60 * SECOND);
+            let what = format!("{sets:?} {vehicle:?} {surface:?}");
+            assert!(useful(&dock) > 2000.0, "{what}: {} bytes got through", useful(&dock));
+            assert!(dock.applied.contains_key(&(SlotId::Utility, version)), "{what}: the directive was not applied");
+        }
+    }
+}
+
 /// Every token that is accepted is settled once.
 #[test]
 fn every_transmission_has_one_end() {
@@ -258,13 +281,16 @@ fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
             "AT?AL" => "10\r\n".to_owned(),
             "AT?PC" => format!("{}\r\n", step / 50),
             t if t.starts_with("AT?") => {
-                let known = [("L", 3), ("AM", 14), ("C", 2), ("ZC", 10), ("ZP", 750), ("RC", 2), ("RT", 4000), ("RI", 0)];
+                let known =
+                    [("L", 3), ("AM", 14), ("C", 2), ("ZC", 10), ("ZP", 750), ("RC", 2), ("RT", 4000), ("RI", 0)];
                 let value = known.iter().find(|(k, _)| t == format!("AT?{k}")).map_or(0, |(_, v)| *v);
                 format!("{}\r\n", if t == "AT?ZI" { 20 } else { value })
             }
             t if t.starts_with("AT") => "OK\r\n".to_owned(),
             t if t.starts_with("$CCCFQ,SRC") => line("CACFG,SRC,10"),
-            t if t.starts_with("$CCCFG") => line(t.trim_start_matches("$CC").split('*').next().map_or("", |b| b)).replace('$', "$CA"),
+            t if t.starts_with("$CCCFG") => {
+                line(t.trim_start_matches("$CC").split('*').next().map_or("", |b| b)).replace('$', "$CA")
+            }
             _ => continue,
         };
         let said = if said.starts_with("$CA") && !said.starts_with("$CACFG,SRC") { relined(&said) } else { said };

@@ -44,7 +44,9 @@ pub fn check(config: &Config) -> Result<(), Problem> {
     let vehicles = if config.link.vehicles.is_empty() { &own[..] } else { &config.link.vehicles[..] };
     if vehicles.contains(&m.surface_address) {
         let given = format!("modem.surface_address = {}", m.surface_address);
-        return Err(Problem::Input(format!("{given} is not allowed: it is a vehicle's address, and its modem has it too")));
+        return Err(Problem::Input(format!(
+            "{given} is not allowed: it is a vehicle's address, and its modem has it too"
+        )));
     }
     let highest = if m.kind == "s2c" { m.highest_address } else { 127 };
     let all = vehicles.iter().copied().chain([m.surface_address]);

@@ -61,7 +61,8 @@ impl Dice {
             }
         }
         if line.starts_with(b"$") && self.below(4) > 0 {
-            let body = String::from_utf8_lossy(&line[1..]).split(['*', '$', '\r', '\n']).next().unwrap_or("").to_owned();
+            let body =
+                String::from_utf8_lossy(&line[1..]).split(['*', '$', '\r', '\n']).next().unwrap_or("").to_owned();
             line = format_sentence(&body);
         }
         line

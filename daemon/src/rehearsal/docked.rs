@@ -41,6 +41,19 @@ impl Docked {
     /// # Errors
     /// A kind that is no modem.
     pub fn new(config: &Config, channel: Channel, seed: u64, now: Instant) -> Result<Self, Problem> {
+        let vehicle = ends::vehicle_address(config)?.number();
+        let surface = config.modem.surface_address;
+        let modems = [emulator(config, vehicle, false, seed)?, emulator(config, surface, true, seed)?];
+        Self::with_modems(config, channel, modems, now)
+    }
+
+    /// The same with these modems, the vehicle's first.
+    pub fn with_modems(
+        config: &Config,
+        channel: Channel,
+        modems: [Box<dyn Emulator>; 2],
+        now: Instant,
+    ) -> Result<Self, Problem> {
         let mut config = config.clone();
         // Emulated ports are serial ones.
         config.modem.device = "emulated".to_owned();
@@ -48,20 +61,14 @@ impl Docked {
         let vehicle = ends::vehicle_address(&config)?;
         let mut basin = Basin::new(channel);
         basin.advance(now.into());
-        let berth = |end: Address, basin: &mut Basin| {
-            let number = if end == Address::SURFACE { config.modem.surface_address } else { end.number() };
-            let profile = ends::modem_of_process(&config, end)?;
-            let driver = modem::driver(&config, end, profile)?;
-            let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
-            let station = Station::new(driver, modem::address_book(&config), audit);
-            basin.add(NodeId(number), emulator(&config, number, end == Address::SURFACE, seed)?);
-            Ok::<_, Problem>(Berth { station, node: NodeId(number), written: Vec::new(), plugged: true })
-        };
-        let mut berths = [berth(vehicle, &mut basin)?, berth(Address::SURFACE, &mut basin)?];
-        for berth in &mut berths {
-            berth.station.handle_open(now);
-        }
-        Ok(Self { basin, berths })
+        let [of_vehicle, of_surface] = modems;
+        let berths = [
+            berth(&config, vehicle, of_vehicle, &mut basin)?,
+            berth(&config, Address::SURFACE, of_surface, &mut basin)?,
+        ];
+        let mut docked = Self { basin, berths };
+        docked.berths.iter_mut().for_each(|berth| berth.station.handle_open(now));
+        Ok(docked)
     }
 
     /// Puts an end's modem somewhere.
@@ -150,6 +157,16 @@ impl Docked {
             }
         }
     }
+}
+
+/// An end's station, and its modem in the water.
+fn berth(config: &Config, end: Address, modem: Box<dyn Emulator>, basin: &mut Basin) -> Result<Berth, Problem> {
+    let number = if end == Address::SURFACE { config.modem.surface_address } else { end.number() };
+    let driver = modem::driver(config, end, ends::modem_of_process(config, end)?)?;
+    let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
+    let station = Station::new(driver, modem::address_book(config), audit);
+    basin.add(NodeId(number), modem);
+    Ok(Berth { station, node: NodeId(number), written: Vec::new(), plugged: true })
 }
 
 /// The modem of an end; the surface's has a head.

@@ -71,7 +71,8 @@ impl World {
         let config = config::load(None, &sets).unwrap();
         let disk = Disk::default();
         let mut chance = Chance::new(seed);
-        let surface = ends::surface(&config, ends::modem_profile(&config, config.modem.bit_rate), seed, Instant::ZERO).unwrap();
+        let surface =
+            ends::surface(&config, ends::modem_profile(&config, config.modem.bit_rate), seed, Instant::ZERO).unwrap();
         cuts.reverse();
         let onboard = start(&config, &disk, &mut chance, &mut cuts, 0, Instant::ZERO);
         let (on_air, acted, told) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());

@@ -72,7 +72,10 @@ impl Cycles {
     }
 
     pub(super) fn is_free(&self, now: Instant) -> bool {
-        self.begun.is_none() && self.again.is_none() && self.taken.is_empty() && self.paused.is_none_or(|until| now >= until)
+        self.begun.is_none()
+            && self.again.is_none()
+            && self.taken.is_empty()
+            && self.paused.is_none_or(|until| now >= until)
     }
 
     pub(super) fn ends_at(&self) -> Option<Instant> {
@@ -108,7 +111,9 @@ impl Micromodem {
     fn fill_time(&self) -> Duration {
         let rate = self.config.rate;
         let characters = (rate.frame_bytes * 2 + 100) * usize::from(rate.frames) * 2;
-        self.config.baud.map_or(Duration::ZERO, |baud| Duration::from_secs_f64(characters as f64 * 10.0 / f64::from(baud)))
+        self.config
+            .baud
+            .map_or(Duration::ZERO, |baud| Duration::from_secs_f64(characters as f64 * 10.0 / f64::from(baud)))
     }
 
     /// The frame that the modem has asked for, if the link has given one; else there is no more.
@@ -205,7 +210,8 @@ impl Micromodem {
         let travel = s.number::<f64>(2).filter(|t| t.is_finite() && (0.0..60.0).contains(t));
         if let (Some(remote), Some(travel)) = (s.number(0), travel) {
             let range_m = Some(travel * 1500.0);
-            let line = crate::modem::driver::UsblLine { remote, range_m, direction_rad: None, accuracy: 1.0, age_s: travel };
+            let line =
+                crate::modem::driver::UsblLine { remote, range_m, direction_rad: None, accuracy: 1.0, age_s: travel };
             self.events.push_back(Event::Usbl(line));
         }
     }

@@ -46,7 +46,8 @@ pub struct MicromodemConfig {
 
 /// Settings that it needs: statistics of all that is sent and heard, banners, no test data where the host is late, and
 /// time for the host to answer.
-const SETTINGS: [(&str, &str); 6] = [("CST", "1"), ("XST", "1"), ("RXP", "1"), ("REV", "1"), ("ASD", "0"), ("DTO", "5")];
+const SETTINGS: [(&str, &str); 6] =
+    [("CST", "1"), ("XST", "1"), ("RXP", "1"), ("REV", "1"), ("ASD", "0"), ("DTO", "5")];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {

@@ -146,10 +146,7 @@ fn ties_start(bytes: &[u8]) -> usize {
     (0..bytes.len())
         .find(|&start| {
             let rest = bytes.get(start..).unwrap_or_default();
-            rest.starts_with(TIES)
-                || TIES.starts_with(rest)
-                || rest.starts_with(error)
-                || error.starts_with(rest)
+            rest.starts_with(TIES) || TIES.starts_with(rest) || rest.starts_with(error) || error.starts_with(rest)
         })
         .unwrap_or(bytes.len())
 }

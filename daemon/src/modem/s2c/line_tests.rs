@@ -22,7 +22,8 @@ fn payload_is_counted_and_never_searched() {
     let mut bytes = b"\r\nRECVIM,14,3,2,ack,313200,-60,170,0.0300,".to_vec();
     bytes.extend_from_slice(data);
     bytes.extend_from_slice(b"\r\n[*]OK\r\n");
-    let heard = Heard { service: Service::Message, src: 3, dst: 2, integrity: 170, travel_us: None, data: data.to_vec() };
+    let heard =
+        Heard { service: Service::Message, src: 3, dst: 2, integrity: 170, travel_us: None, data: data.to_vec() };
     assert_eq!(lines(false, &bytes), [Line::Notice(Notice::Heard(heard)), reply("[*]OK")]);
 }
 

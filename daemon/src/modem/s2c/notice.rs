@@ -163,9 +163,8 @@ pub(super) fn parse_notice(line: &[u8]) -> Option<Notice> {
 
 /// Keywords that never are replies.
 fn is_notice(keyword: &str, told: bool) -> bool {
-    const ALWAYS: [&str; 12] = [
-        "RECV", "SEND", "USBL", "CANCEL", "EXPIREDIMS", "BITRATE", "SRCLEVEL", "RADDR", "STATUS", "ECLK", "RTO", "%",
-    ];
+    const ALWAYS: [&str; 12] =
+        ["RECV", "SEND", "USBL", "CANCEL", "EXPIREDIMS", "BITRATE", "SRCLEVEL", "RADDR", "STATUS", "ECLK", "RTO", "%"];
     told && (ALWAYS.iter().any(|word| keyword.starts_with(word)))
 }
 

@@ -139,7 +139,8 @@ impl S2c {
             Place::Angles(bearing, elevation) => (None, Some((bearing, elevation))),
         };
         let accuracy = position.accuracy;
-        let line = UsblLine { remote: position.remote, range_m, direction_rad, accuracy, age_s: position.age_s.max(0.0) };
+        let line =
+            UsblLine { remote: position.remote, range_m, direction_rad, accuracy, age_s: position.age_s.max(0.0) };
         self.events.push_back(Event::Usbl(line));
     }
 }

@@ -69,9 +69,9 @@ pub(super) fn beat(config: &S2cConfig, number: usize) -> Step {
         0 => step("?AL", Expect::Address),
         1 => step("@ZX1", Expect::Ok),
         2 => step("@ZU1", Expect::Tolerated),
-        i => settings.get(i - 3).map_or(step("?PC", Expect::Counter), |(key, value)| {
-            step(format!("?{key}"), Expect::Value(*value))
-        }),
+        i => settings
+            .get(i - 3)
+            .map_or(step("?PC", Expect::Counter), |(key, value)| step(format!("?{key}"), Expect::Value(*value))),
     }
 }
 

@@ -50,7 +50,11 @@ impl Mission {
             ModemEvent::Poll(frames) => self.surface.handle_poll(frames),
             ModemEvent::Repeated(bits) => {
                 self.audits[end].record(bits, now);
-                if at_vehicle { self.vehicle.handle_repeated(bits, now) } else { self.surface.handle_repeated(bits, now) }
+                if at_vehicle {
+                    self.vehicle.handle_repeated(bits, now)
+                } else {
+                    self.surface.handle_repeated(bits, now)
+                }
             }
             ModemEvent::Fix(vehicle, line) => self.surface.handle_range(vehicle, &line, now),
             ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
@@ -68,7 +72,8 @@ impl Mission {
         }
         for end in [VEHICLE, SURFACE] {
             while docked.station(end).takes_frames() {
-                let next = if end == VEHICLE { self.vehicle.poll_transmit(now) } else { self.surface.poll_transmit(now) };
+                let next =
+                    if end == VEHICLE { self.vehicle.poll_transmit(now) } else { self.surface.poll_transmit(now) };
                 let Some(transmit) = next else { break };
                 self.audits[end].record(self.modem.bits_on_air(transmit.bytes.len()), now);
                 // What a modem refuses is lost, and the link repairs it.

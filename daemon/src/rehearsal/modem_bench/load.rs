@@ -14,7 +14,7 @@ use scenecast_protocol::mac::{Access, MasterConfig};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
-use sim_channel::modem::Fault;
+use sim_channel::modem::{Emulator, Fault};
 use sim_channel::{Channel, ChannelConfig, LossModel, Position, Stream};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -70,9 +70,20 @@ pub struct Dock {
 impl Dock {
     /// Ends that have not met.
     pub fn new(setting: &DockSetting, seed: u64) -> Result<Self, Problem> {
-        let config = &setting.config;
         let now = Instant::from_secs_f64(1.0);
-        let mut docked = Docked::new(config, Channel::new(setting.water(), seed), seed, now)?;
+        let docked = Docked::new(&setting.config, Channel::new(setting.water(), seed), seed, now)?;
+        Self::at(setting, docked, seed, now)
+    }
+
+    /// The same at these modems.
+    pub fn with_modems(setting: &DockSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, Problem> {
+        let now = Instant::from_secs_f64(1.0);
+        let docked = Docked::with_modems(&setting.config, Channel::new(setting.water(), seed), modems, now)?;
+        Self::at(setting, docked, seed, now)
+    }
+
+    fn at(setting: &DockSetting, mut docked: Docked, seed: u64, now: Instant) -> Result<Self, Problem> {
+        let config = &setting.config;
         docked.place(VEHICLE, Position::new(0.0, 0.0, 10.0));
         docked.place(SURFACE, Position::new(setting.range_m, 0.0, 10.0));
         let address = ends::vehicle_address(config)?;
@@ -183,7 +194,11 @@ impl Dock {
             (ModemEvent::Sent, _) => self.surface.handle_transmit_outcome(now),
             (ModemEvent::Received(bytes), _) => {
                 self.heard[end] = now;
-                if end == VEHICLE { self.vehicle.handle_frame(&bytes, now) } else { self.surface.handle_frame(&bytes, now) }
+                if end == VEHICLE {
+                    self.vehicle.handle_frame(&bytes, now)
+                } else {
+                    self.surface.handle_frame(&bytes, now)
+                }
             }
             (ModemEvent::Poll(frames), VEHICLE) => self.vehicle.handle_poll(frames),
             (ModemEvent::Poll(frames), _) => self.surface.handle_poll(frames),
