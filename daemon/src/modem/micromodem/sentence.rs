@@ -121,7 +121,7 @@ mod tests {
         ] {
             let found = sentences(format!("{real}\r\n").as_bytes());
             let [sentence] = found.as_slice() else { panic!("{real}: {found:?}") };
-            let body = [&[sentence.name.clone()], sentence.fields.as_slice()].concat().join(",");
+            let body = format!("{},{}", sentence.name, sentence.fields.join(","));
             assert_eq!(format_sentence(&body), format!("{real}\r\n").as_bytes());
         }
     }

@@ -81,20 +81,33 @@ pub enum Place {
     Angles(f64, f64),
 }
 
-/// The services with payload: keyword, how, fields before the payload without the protocol id, and where in them the
-/// integrity and the travel time stand.
-const RECEPTIONS: [(&[u8], Service, usize, usize, Option<usize>); 4] = [
-    (b"RECVIMS,", Service::Message, 8, 6, None),
-    (b"RECVIM,", Service::Message, 8, 6, None),
-    (b"RECVPBM,", Service::Message, 7, 5, None),
-    (b"RECV,", Service::Burst, 8, 5, Some(6)),
+/// A service with payload.
+struct Row {
+    keyword: &'static [u8],
+    service: Service,
+    /// Fields before the payload, without the protocol id.
+    fields: usize,
+    /// Which of them is the integrity, and which the travel time.
+    integrity: usize,
+    travel: Option<usize>,
+}
+
+const fn row(keyword: &'static [u8], service: Service, fields: usize, integrity: usize, travel: Option<usize>) -> Row {
+    Row { keyword, service, fields, integrity, travel }
+}
+
+const RECEPTIONS: [Row; 4] = [
+    row(b"RECVIMS,", Service::Message, 8, 6, None),
+    row(b"RECVIM,", Service::Message, 8, 6, None),
+    row(b"RECVPBM,", Service::Message, 7, 5, None),
+    row(b"RECV,", Service::Burst, 8, 5, Some(6)),
 ];
 /// The longest payload.
 const MOST: usize = 1024;
 
 /// The fields in front of the payload.
 struct Head<'a> {
-    row: &'static (&'static [u8], Service, usize, usize, Option<usize>),
+    row: &'static Row,
     fields: Vec<&'a str>,
     bytes: usize,
 }
@@ -108,23 +121,23 @@ pub(super) fn payload_length(line: &[u8]) -> Option<(usize, usize)> {
 
 fn head(line: &[u8]) -> Option<Head<'_>> {
     const FIELD: usize = 16;
-    let row = RECEPTIONS.iter().find(|row| line.starts_with(row.0))?;
-    let (mut fields, mut at) = (Vec::new(), row.0.len());
-    let mut wanted = row.2;
+    let row = RECEPTIONS.iter().find(|row| line.starts_with(row.keyword))?;
+    let (mut fields, mut at) = (Vec::new(), row.keyword.len());
+    let mut wanted = row.fields;
     while fields.len() < wanted {
         let rest = line.get(at..)?;
         let comma = rest.iter().take(FIELD).position(|b| *b == b',')?;
         let field = std::str::from_utf8(rest.get(..comma)?).ok()?;
         at += comma + 1;
         // The protocol id of extended networking.
-        if fields.is_empty() && field.starts_with('p') && wanted == row.2 {
-            wanted = row.2 + 1;
+        if fields.is_empty() && field.starts_with('p') && wanted == row.fields {
+            wanted = row.fields + 1;
             fields.push("");
             continue;
         }
         fields.push(field);
     }
-    if wanted > row.2 {
+    if wanted > row.fields {
         fields.remove(0);
     }
     Some(Head { row, fields, bytes: at })
@@ -169,7 +182,7 @@ fn is_notice(keyword: &str, told: bool) -> bool {
 }
 
 fn heard(head: &Head<'_>, data: Vec<u8>) -> Option<Heard> {
-    let (_, service, _, integrity, travel) = *head.row;
+    let Row { service, integrity, travel, .. } = *head.row;
     let travel = travel.and_then(|i| head.fields.get(i)).and_then(|f| f.parse().ok());
     Some(Heard {
         service,

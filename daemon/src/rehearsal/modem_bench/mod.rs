@@ -134,3 +134,26 @@ pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<S
 fn thousandths(x: f64) -> f64 {
     (x * 1000.0).round() / 1000.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bursts_carry_most_of_what_the_modem_carries_and_directives_pass_them() {
+        let row = measure_burst(2, Duration::from_secs(1200), 60).unwrap();
+        assert!(row.share >= 0.8, "{row:?}");
+        assert!(row.directive_p95_s < 25.0, "{row:?}");
+    }
+
+    #[test]
+    fn a_survey_through_slow_modems_ends_with_equal_maps() {
+        let im = ["modem.kind=s2c", "modem.s2c_mode=im"];
+        let rate_1 = ["modem.kind=micromodem", "modem.rate=1"];
+        for sets in [im, rate_1] {
+            let row = survey("slow", &sets, 1, 1200.0).unwrap();
+            assert_eq!(row.agreement_final, 1.0, "{row:?}");
+            assert!(row.agreement_mean >= 0.9, "{row:?}");
+        }
+    }
+}
