@@ -77,7 +77,11 @@ impl Modem {
     pub fn log_audit(&self) {
         let a = self.station.audit();
         let (frames, bits, worst) = (a.transmissions(), a.total_bits(), a.worst_window_bps());
+        let repeated = self.station.repeated_bits();
         tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the worst window");
+        if repeated > 0 {
+            tracing::info!("{repeated} bits more were repeats of the modem, and charged to the budget");
+        }
     }
 
     /// Puts a frame on air. What the modem refuses is told, and the link repairs it as if it were lost.

@@ -63,6 +63,7 @@ pub struct Station {
     open: BTreeSet<Token>,
     events: VecDeque<ModemEvent>,
     audit: Audit,
+    repeated_bits: u64,
 }
 
 impl std::fmt::Debug for Station {
@@ -75,7 +76,7 @@ impl Station {
     /// A station that counts what goes on air in windows of `audit`.
     pub fn new(driver: Box<dyn Driver>, book: AddressBook, audit: Audit) -> Self {
         let profile = driver.profile();
-        Self { driver, profile, book, open: BTreeSet::new(), events: VecDeque::new(), audit }
+        Self { driver, profile, book, open: BTreeSet::new(), events: VecDeque::new(), audit, repeated_bits: 0 }
     }
 
     /// What the link must know of the modem.
@@ -83,7 +84,12 @@ impl Station {
         &self.profile
     }
 
-    /// What went on air.
+    /// Bits that the modem has put on air by itself, beside what it was given.
+    pub fn repeated_bits(&self) -> u64 {
+        self.repeated_bits
+    }
+
+    /// What the link has put on air.
     pub fn audit(&self) -> &Audit {
         &self.audit
     }
@@ -103,7 +109,7 @@ impl Station {
     pub fn begin_cycle(&mut self, cycle: Cycle, now: Instant) {
         let Destination::Modem(from) = self.book.modem_of(cycle.from) else { return };
         self.driver.begin_cycle(from, self.book.modem_of(cycle.to), cycle, now);
-        self.collect(now);
+        self.collect();
     }
 
     /// Puts a frame of the link on air.
@@ -118,7 +124,7 @@ impl Station {
             Ok(token) => {
                 self.audit.record(bits, now);
                 self.open.insert(token);
-                self.collect(now);
+                self.collect();
                 Ok(())
             }
             Err(refusal) => {
@@ -131,25 +137,25 @@ impl Station {
     /// The port was opened.
     pub fn handle_open(&mut self, now: Instant) {
         self.driver.handle_open(now);
-        self.collect(now);
+        self.collect();
     }
 
     /// The port was closed.
     pub fn handle_closed(&mut self, now: Instant) {
         self.driver.handle_closed(now);
-        self.collect(now);
+        self.collect();
     }
 
     /// Bytes came over the port.
     pub fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
         self.driver.handle_bytes(bytes, now);
-        self.collect(now);
+        self.collect();
     }
 
     /// Lets time pass.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.driver.handle_timeout(now);
-        self.collect(now);
+        self.collect();
     }
 
     /// When [`Self::handle_timeout`] has something to do.
@@ -172,7 +178,7 @@ impl Station {
         self.events.pop_front()
     }
 
-    fn collect(&mut self, now: Instant) {
+    fn collect(&mut self) {
         while let Some(event) = self.driver.poll_event() {
             let told = match event {
                 Event::Sent(t) | Event::Delivered(t) | Event::Failed(t) | Event::Unknown(t) => {
@@ -181,7 +187,7 @@ impl Station {
                 Event::Received(heard) => Some(ModemEvent::Received(heard.bytes)),
                 Event::Poll(frames) => Some(ModemEvent::Poll(frames)),
                 Event::Repeated(bits) => {
-                    self.audit.record(bits, now);
+                    self.repeated_bits += bits;
                     Some(ModemEvent::Repeated(bits))
                 }
                 Event::Usbl(line) => self.book.end_of(line.remote).map(|end| ModemEvent::Fix(end, line)),

@@ -48,14 +48,8 @@ impl Mission {
             }
             ModemEvent::Poll(frames) if at_vehicle => self.vehicle.handle_poll(frames),
             ModemEvent::Poll(frames) => self.surface.handle_poll(frames),
-            ModemEvent::Repeated(bits) => {
-                self.audits[end].record(bits, now);
-                if at_vehicle {
-                    self.vehicle.handle_repeated(bits, now)
-                } else {
-                    self.surface.handle_repeated(bits, now)
-                }
-            }
+            ModemEvent::Repeated(bits) if at_vehicle => self.vehicle.handle_repeated(bits, now),
+            ModemEvent::Repeated(bits) => self.surface.handle_repeated(bits, now),
             ModemEvent::Fix(vehicle, line) => self.surface.handle_range(vehicle, &line, now),
             ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
         }
@@ -75,6 +69,7 @@ impl Mission {
                 let next =
                     if end == VEHICLE { self.vehicle.poll_transmit(now) } else { self.surface.poll_transmit(now) };
                 let Some(transmit) = next else { break };
+                self.log.sent[end] += 1;
                 self.audits[end].record(self.modem.bits_on_air(transmit.bytes.len()), now);
                 // What a modem refuses is lost, and the link repairs it.
                 let _ = docked.station(end).send(transmit, now);

@@ -73,7 +73,7 @@ pub struct Mission {
     channel: Channel,
     /// Drivers and emulated modems with a water of their own, if the configuration names a make of modem.
     docked: Option<Docked>,
-    modem: ModemProfile,
+    pub(super) modem: ModemProfile,
     script: Script,
     recording: Option<Recording>,
     recorder: Option<Recorder>,
