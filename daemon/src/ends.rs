@@ -3,6 +3,7 @@
 use crate::asv::Surface;
 use crate::auv::{Area, Durable, Footprint, Navigator, Steering, Vehicle, cell_m};
 use crate::config::{Config, load_key};
+use crate::modem;
 use crate::problem::Problem;
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
@@ -21,19 +22,16 @@ pub fn vehicle_address(config: &Config) -> Result<Address, Problem> {
     Address::vehicle(number).ok_or_else(|| Problem::Input(format!("vehicle.address = {number}: allowed is 1 to 14")))
 }
 
-/// Bits of framing that a transparent modem puts on air with each frame: delimiters and stuffing.
-const FRAMING_BITS: u64 = 8 * 7;
-
-/// The modem of a process.
-pub fn modem_of_process(config: &Config) -> ModemProfile {
+/// The modem of an end's process.
+pub fn modem_of_process(config: &Config, end: Address) -> Result<ModemProfile, Problem> {
     let mut profile = modem_profile(config, config.modem.bit_rate);
     if config.modem.kind == "transparent" {
-        profile.overhead_bits += FRAMING_BITS;
+        profile.overhead_bits += modem::PIPE_FRAMING_BITS;
     }
-    profile
+    Ok(modem::driver(config, end, profile)?.profile())
 }
 
-/// The modem, at `bit_rate_bps` on air.
+/// A modem that only has a bit rate on air.
 pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     ModemProfile {
         frame_bytes: config.link.frame_bytes as usize,

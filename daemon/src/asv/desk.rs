@@ -2,6 +2,7 @@
 
 use super::pauses::Pauses;
 use crate::auv::Exemplar;
+use crate::modem::UsblLine;
 use scenecast_protocol::directive::{Requests, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
@@ -47,6 +48,8 @@ pub struct Desk {
     pub whole: Option<LabelGrid>,
     /// How long it is usually silent.
     pub pauses: Pauses,
+    /// Where the surface's modem found it last, and when it said so.
+    pub found: Option<(UsblLine, Instant)>,
 }
 
 impl Desk {
@@ -63,6 +66,7 @@ impl Desk {
             epoch: 0,
             whole: None,
             pauses: Pauses::default(),
+            found: None,
         }
     }
 

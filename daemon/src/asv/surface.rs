@@ -2,9 +2,10 @@
 
 use super::desk::Desk;
 use crate::auv::Exemplar;
+use crate::modem::UsblLine;
 use crate::picture;
 use scenecast_protocol::directive::{Budget, Constraints, Fix, Slot, SlotId, Utility};
-use scenecast_protocol::link::{PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
+use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
@@ -222,6 +223,29 @@ impl Surface {
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
         self.link.handle_transmit_outcome(now);
+    }
+
+    /// The modem asks for so many frames.
+    pub fn handle_poll(&mut self, frames: u32) {
+        self.link.handle_poll(frames);
+    }
+
+    /// The cycle that the modem is to begin next.
+    pub fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
+        self.link.poll_cycle(now)
+    }
+
+    /// The modem itself put so many bits on air.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.link.handle_repeated(bits, now);
+    }
+
+    /// The modem's head has found a vehicle.
+    pub fn handle_range(&mut self, vehicle: Address, line: &UsblLine, now: Instant) {
+        if let Some(desk) = self.desks.get_mut(&vehicle) {
+            desk.found = Some((*line, now));
+            self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        }
     }
 
     /// The next frame to put on air.

@@ -112,20 +112,34 @@ section! {
 section! {
     /// The modem.
     Modem {
-        /// `tcp` or `transparent`.
+        /// `s2c`, `micromodem`, `transparent`, `tcp` or `udp`.
         kind: String = "tcp".into(),
-        /// Serial device of a transparent modem.
+        /// Serial device; empty = over the network.
         device: String = String::new(),
         /// Its speed in bits a second.
-        baud: u32 = 9600,
-        /// Address to listen on (surface, `tcp`).
+        baud: u32 = 19_200,
+        /// Address to listen on.
         listen: String = String::new(),
-        /// Address to connect to (vehicle, `tcp`).
+        /// Address to connect to.
         connect: String = String::new(),
         /// Bits a second on air.
         bit_rate: f64 = 10_000.0,
         /// Bits on air that a transmission costs besides its bytes.
         overhead_bits: u32 = 0,
+        /// Address of the surface's modem; a vehicle's has the vehicle's.
+        surface_address: u8 = 10,
+        /// `burst` or `im` (S2C).
+        s2c_mode: String = "burst".into(),
+        /// Source level, 0 is the loudest (S2C).
+        source_level: u8 = 3,
+        /// Highest address of the network (S2C).
+        highest_address: u8 = 14,
+        /// Data packets a train (S2C).
+        cluster: u8 = 10,
+        /// Longest data packet in milliseconds (S2C).
+        packet_ms: u16 = 750,
+        /// Rate of packets (Micromodem).
+        rate: u8 = 1,
     }
 }
 section! {

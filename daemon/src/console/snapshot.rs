@@ -103,6 +103,13 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
         "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
         "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect::<Vec<_>>(),
         "link": link_of(&view, now),
+        "usbl": desk.found.map(|(line, at)| json!({
+            "at_s": seconds(at) - line.age_s,
+            "range_m": line.range_m,
+            "bearing_rad": line.direction_rad.map(|(bearing, _)| bearing),
+            "elevation_rad": line.direction_rad.map(|(_, elevation)| elevation),
+            "accuracy": line.accuracy,
+        })),
         "directive": { "slots": view.slots().map(slot).collect::<Vec<_>>() },
     }))
 }

@@ -1,11 +1,13 @@
 //! A whole mission in virtual time: the role code of the sea, a made-up sea floor and water around it.
 
 mod baseline;
+pub mod docked;
 mod fidelity;
 mod frames_log;
 pub mod link_bench;
 mod meter;
 mod mission;
+pub mod modem_bench;
 mod motion;
 mod outputs;
 mod panorama;

@@ -147,10 +147,10 @@ fn link(m: &Mission) -> Value {
         })
     };
     json!({
-        "capacity_bps": m.config.channel.bit_rate,
+        "capacity_bps": m.modem.bit_rate_bps,
         "budget_bps": m.config.link.budget_bps,
         "budget_window_s": m.config.link.budget_window_s,
-        "frame_bytes": m.config.link.frame_bytes,
+        "frame_bytes": m.modem.frame_bytes,
         "sent_bps": round((up_audit.total_bits() + down_audit.total_bits()) as f64 / seconds),
         "worst_window_bps": round(worst),
         "frames_sent": m.log.sent.iter().sum::<u64>(),

@@ -108,7 +108,7 @@ impl World {
         };
         self.epochs.push(durable.epoch);
         let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-        let profile = ends::modem_of_process(&self.config);
+        let profile = ends::modem_of_process(&self.config, ends::vehicle_address(&self.config).unwrap()).unwrap();
         let mut vehicle = ends::vehicle(&self.config, profile, area, durable, 1, Instant::ZERO).unwrap();
         for frame in 1..=FRAMES {
             self.disk.step(Step::Host).ok()?;

@@ -358,6 +358,16 @@ impl Vehicle {
         self.link.handle_transmit_outcome(now);
     }
 
+    /// The modem asks for so many frames.
+    pub fn handle_poll(&mut self, frames: u32) {
+        self.link.handle_poll(frames);
+    }
+
+    /// The modem itself put so many bits on air.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.link.handle_repeated(bits, now);
+    }
+
     /// The next frame to put on air.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         if self.link.wants_status(now) {

@@ -4,6 +4,7 @@ use super::{Mission, STEP_S, SURFACE, VEHICLE, pose_of};
 use crate::asv::SurfaceOutput;
 use crate::auv::VehicleOutput;
 use crate::problem::Problem;
+use crate::rehearsal::docked::{self, Docked};
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
 use scenecast_protocol::directive::Fix;
@@ -18,6 +19,7 @@ impl Mission {
             self.vehicle.poll_timeout().filter(|_| self.transmitting[0].is_none()),
             self.surface.poll_timeout(self.now).filter(|_| self.transmitting[1].is_none()),
         ];
+        let modems = self.docked.as_ref().and_then(Docked::poll_timeout);
         // A wake-up that has passed led to no frame: it waits for another event.
         let links = links.into_iter().flatten().map(|(at, _)| at).filter(|&at| at > self.now);
         let script = self.script.poll_timeout().filter(|_| self.ended.is_none());
@@ -30,6 +32,7 @@ impl Mission {
             .chain(script)
             .chain(fix)
             .chain(channel)
+            .chain(modems)
             .min()
     }
 
@@ -58,6 +61,7 @@ impl Mission {
                 }
             }
         }
+        self.handle_modems();
         if now >= self.times.step {
             self.times.step = self.times.step + Duration::from_secs_f64(STEP_S);
             self.step();
@@ -95,6 +99,9 @@ impl Mission {
             self.events.push(output);
         }
         self.note_issued();
+        if self.docked.is_some() {
+            return self.speak_through_modems();
+        }
         if self.transmitting[0].is_none()
             && let Some(t) = self.vehicle.poll_transmit(self.now)
         {
@@ -138,7 +145,11 @@ impl Mission {
 
     pub(super) fn place_vehicle(&mut self) {
         let depth = self.vehicle.navigator().depth_m();
-        self.channel.place(VEHICLE, Position::new(self.motion.x_m, self.motion.y_m, -depth));
+        let place = Position::new(self.motion.x_m, self.motion.y_m, -depth);
+        self.channel.place(VEHICLE, place);
+        if let Some(docked) = &mut self.docked {
+            docked.place(docked::VEHICLE, place);
+        }
     }
 
     fn camera(&mut self) -> Result<(), Problem> {

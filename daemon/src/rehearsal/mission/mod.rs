@@ -1,7 +1,9 @@
 //! The loop of a rehearsal: the roles, the water and the sea floor on one virtual clock.
 
+mod carrier;
 mod events;
 
+use super::docked::{self, Docked};
 use super::frames_log::FramesLog;
 use super::meter::Meter;
 use super::motion::Motion;
@@ -71,7 +73,9 @@ pub struct Mission {
     /// Where the vehicle was when it saw something, by its own belief.
     pub(super) track: Vec<(f64, f64)>,
     channel: Channel,
-    modem: ModemProfile,
+    /// Drivers and emulated modems with a water of their own, if the configuration names a make of modem.
+    docked: Option<Docked>,
+    pub(super) modem: ModemProfile,
     script: Script,
     recording: Option<Recording>,
     recorder: Option<Recorder>,
@@ -90,8 +94,10 @@ impl Mission {
     /// A mission at its start.
     pub fn new(config: Config, options: MissionOptions) -> Result<Self, Problem> {
         let MissionOptions { world, seed, record } = options;
-        let modem = ends::modem_profile(&config, config.channel.bit_rate);
         let now = Instant::ZERO;
+        let mut docked = carrier::docked(&config, seed, now)?;
+        let water = ends::modem_profile(&config, config.channel.bit_rate);
+        let [modem, surface_modem] = docked.as_mut().map_or([water; 2], carrier::profiles);
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
@@ -104,13 +110,17 @@ impl Mission {
         }
         let dice = Stream::new(seed, &[2]);
         let vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
-        let surface = ends::surface(&config, modem, seed ^ 0x5EA, now)?;
+        let surface = ends::surface(&config, surface_modem, seed ^ 0x5EA, now)?;
         let (x, y) = vehicle.navigator().position();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let mut channel = Channel::new(channel_config(&config), seed);
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
-        channel.place(SURFACE, Position::new(middle.0 + config.channel.range_m, middle.1, -1.0));
+        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, -1.0);
+        channel.place(SURFACE, surface_place);
+        if let Some(docked) = &mut docked {
+            docked.place(docked::SURFACE, surface_place);
+        }
         let script = match config.operator.script.as_str() {
             "scripted" => Script::of_survey(config.survey.duration_s),
             _ => Script::none(),
@@ -146,6 +156,7 @@ impl Mission {
             surface,
             motion,
             channel,
+            docked,
             modem,
             script,
             recording,

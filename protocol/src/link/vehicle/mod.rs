@@ -275,6 +275,11 @@ impl<S: StateSource> VehicleLink<S> {
         self.floor.handle_sent();
     }
 
+    /// The modem put `bits` on air beside what it was given, as one that repeats by itself does.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.budget.spend(bits, now);
+    }
+
     /// The modem asks for `frames` frames of a cycle that begins now ([`crate::mac::Access::Polled`]).
     pub fn handle_poll(&mut self, frames: u32) {
         self.begin_turn();
