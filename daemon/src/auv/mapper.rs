@@ -26,6 +26,8 @@ pub struct MapUpdate {
     pub cells: Vec<(Cell, u8)>,
     /// Labels given so far.
     pub labels: u8,
+    /// How badly the model explains each cell.
+    pub perplexity: Vec<(Cell, f32)>,
 }
 
 /// The scene model of one vehicle.
@@ -101,8 +103,9 @@ impl Mapper {
         let published = self.book.publish(&self.flat);
         self.offer_exemplar(image, pose, t_s);
         let cells = published.iter().map(|c: &PublishedCell| (Cell::new(c.x, c.y), c.label)).collect();
+        let perplexity = published.iter().map(|c| (Cell::new(c.x, c.y), c.perplexity)).collect();
         let labels = self.book.labels().count() as u8;
-        MapUpdate { t_s, epoch: self.book.epoch(), cells, labels }
+        MapUpdate { t_s, epoch: self.book.epoch(), cells, labels, perplexity }
     }
 
     /// The middle of the frame, where the camera distorts least, may represent the label below it.

@@ -4,13 +4,17 @@
 //! keeps the position estimate and chooses waypoints. Neither does IO.
 
 mod exemplar;
+mod guard;
 mod mapper;
 mod navigator;
+pub mod planning;
 mod steering;
 mod vehicle;
 
 pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
 pub use mapper::{MapUpdate, Mapper, cell_m};
+pub use guard::{Guard, Habits};
 pub use navigator::Navigator;
-pub use steering::{Area, Footprint, Steering};
+pub use planning::Area;
+pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, Vehicle, VehicleOutput};

@@ -6,12 +6,14 @@ mod frames_log;
 pub mod link_bench;
 mod meter;
 mod mission;
-mod motion;
+pub(crate) mod motion;
 mod outputs;
 mod panorama;
+pub mod planning_bench;
 mod recording;
 mod report;
 mod script;
+pub mod witness;
 mod world;
 
 pub use fidelity::{FidelityRow, fidelity};

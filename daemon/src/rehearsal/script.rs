@@ -66,7 +66,7 @@ fn perform(act: Act, surface: &mut Surface, vehicle: Address, now: Instant) -> b
         Act::Favour(rank) => {
             let (Some(favoured), Some(largest)) = (ranked(rank), ranked(0)) else { return false };
             let weights = BTreeMap::from([(largest, -0.3), (favoured, 0.8)]);
-            surface.set_utility(vehicle, &weights, 0.2, now).is_ok()
+            surface.set_utility(vehicle, &weights, (0.2, 0.0), now).is_ok()
         }
         Act::Show(rank) => {
             let Some(label) = ranked(rank) else { return false };

@@ -63,6 +63,11 @@ impl ModeReason {
         Self::NoWay,
     ];
 
+    /// The reason of a number on the wire; `None` for no reason and for what is no number of one.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied().filter(|r| *r != Self::Survey)
+    }
+
     /// Name for people; `None` if nothing is amiss.
     pub fn name(self) -> Option<&'static str> {
         match self {
