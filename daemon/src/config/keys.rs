@@ -228,9 +228,9 @@ pub const KEYS: &[Key] = &[
     key(
         "operator.script",
         "",
-        Choice(&["scripted", "none"]),
+        Choice(&["scripted", "fenced", "none"]),
         "r",
-        "scripted: two utilities and image requests at fixed times",
+        "scripted: two utilities and image requests at fixed times; fenced: the same within a fence and limits",
     ),
     key("console.listen", "", Text, "s", "ADDRESS:PORT of the operator's page; empty: none"),
     key("runtime.state_dir", "", Text, "as", "folder of what must survive a restart, and of the operator's map"),

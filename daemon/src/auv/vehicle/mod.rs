@@ -1,6 +1,8 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
 mod course;
+#[cfg(test)]
+mod obedience;
 mod obey;
 mod whole_png;
 

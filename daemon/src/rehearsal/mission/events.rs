@@ -6,7 +6,7 @@ use crate::auv::VehicleOutput;
 use crate::problem::Problem;
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
-use scenecast_protocol::directive::Fix;
+use scenecast_protocol::directive::{Fix, SlotId};
 use scenecast_protocol::time::Instant;
 use sim_channel::{Outcome, Position};
 use std::time::Duration;
@@ -83,11 +83,19 @@ impl Mission {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => self.vehicle.handle_persisted(),
-                VehicleOutput::Waypoint(x, y) => self.motion.set_target(Some((x, y))),
+                VehicleOutput::Waypoint(x, y) => {
+                    self.legs.push((self.vehicle.navigator().position(), (x, y)));
+                    self.motion.set_target(Some((x, y)));
+                }
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::Surface => self.motion.come_up(),
                 VehicleOutput::RefineRate(words_per_s) => self.mapper.set_refine_rate(words_per_s),
-                VehicleOutput::Applied(applied) => self.applied.push(applied),
+                VehicleOutput::Applied(applied) => {
+                    if applied.id == SlotId::Fence {
+                        self.legs_before_fence = self.legs.len();
+                    }
+                    self.applied.push(applied);
+                }
             }
         }
         while let Some(output) = self.surface.poll_output() {

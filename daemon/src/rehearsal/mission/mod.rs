@@ -68,6 +68,10 @@ pub struct Mission {
     pub(super) update: Option<MapUpdate>,
     /// Where the vehicle was when it saw something, by its own belief.
     pub(super) track: Vec<(f64, f64)>,
+    /// Each order to go somewhere: from, to, by its belief.
+    pub(super) legs: Vec<((f64, f64), (f64, f64))>,
+    /// How many legs there were when the vehicle put the last fence in force.
+    pub(super) legs_before_fence: usize,
     channel: Channel,
     modem: ModemProfile,
     script: Script,
@@ -111,6 +115,7 @@ impl Mission {
         channel.place(SURFACE, Position::new(middle.0 + config.channel.range_m, middle.1, -1.0));
         let script = match config.operator.script.as_str() {
             "scripted" => Script::of_survey(config.survey.duration_s),
+            "fenced" => Script::fenced(config.survey.duration_s, area, config.survey.speed_m_s),
             _ => Script::none(),
         };
         let fix_period = Instant::from_secs_f64(config.navigation.fix_period_s);
@@ -130,6 +135,8 @@ impl Mission {
             ended: None,
             update: None,
             track: Vec::new(),
+            legs: Vec::new(),
+            legs_before_fence: 0,
             transmitting: [None; 2],
             map_version: 0,
             picture_version: 0,
@@ -182,6 +189,16 @@ impl Mission {
     /// The vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
+    }
+
+    /// Each order to go somewhere that the vehicle gave itself: from where to where, by its belief.
+    pub fn legs(&self) -> &[((f64, f64), (f64, f64))] {
+        &self.legs
+    }
+
+    /// Metres that the vehicle really went.
+    pub fn distance_m(&self) -> f64 {
+        self.motion.distance_m
     }
 
     /// The vehicle's address.
