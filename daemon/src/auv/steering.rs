@@ -52,6 +52,8 @@ pub struct Steering {
     lattice: Lattice,
     window: Window,
     ways_home: Option<Ways>,
+    /// Metres from the end of those ways to the return point itself.
+    home_leg_m: f64,
     known: Knowledge,
     plan: VecDeque<Node>,
     /// The version of the map that the plan is for.
@@ -83,6 +85,7 @@ impl Steering {
             lattice,
             window: Window::new(area, cell_m),
             ways_home: None,
+            home_leg_m: 0.0,
             known: Knowledge::default(),
             plan: VecDeque::new(),
             planned_for: 0,
@@ -128,7 +131,9 @@ impl Steering {
         let reach = self.footprint.reach();
         let inner = self.area.shrunk(reach);
         self.lattice = Lattice::new(inner, &[self.home()], STEP * reach, &self.bounds);
-        self.ways_home = self.lattice.entry(self.home(), &self.bounds).map(|n| self.lattice.ways(n));
+        let end = self.lattice.entry(self.home(), &self.bounds);
+        self.ways_home = end.map(|n| self.lattice.ways(n));
+        self.home_leg_m = end.map_or(0.0, |n| distance(self.home(), self.lattice.place(n)));
         self.planner.handle_change();
         self.plan.clear();
     }
@@ -136,11 +141,13 @@ impl Steering {
     /// The camera saw the sea floor around `at`.
     pub fn handle_view(&mut self, at: Point) {
         let reach = self.footprint.reach();
-        let cell = |metres: f64| (metres / self.window.cell_m).floor() as i32;
-        for y in cell(at.1 - reach)..=cell(at.1 + reach) {
-            for x in cell(at.0 - reach)..=cell(at.0 + reach) {
-                self.known.look(Cell::new(x, y));
-            }
+        // Cells whose middle was in sight.
+        let cells = |middle: f64| {
+            let edge = |metres: f64| metres / self.window.cell_m - 0.5;
+            edge(middle - reach).ceil() as i32..=edge(middle + reach).floor() as i32
+        };
+        for (y, x) in cells(at.1).flat_map(|y| cells(at.0).map(move |x| (y, x))) {
+            self.known.look(Cell::new(x, y));
         }
     }
 
@@ -152,6 +159,7 @@ impl Steering {
     /// The next waypoint from `from`, of which version `version` of the map is known, with `left_m` metres to go in all.
     pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
         self.follow_choice(utility.is_some());
+        let left_m = left_m - self.home_leg_m;
         let Some(at) = self.lattice.entry(from, &self.bounds) else { return Course::NoWay };
         let approach = distance(from, self.lattice.place(at));
         let adapts = self.running != PlannerKind::Lawnmower;
@@ -255,7 +263,7 @@ impl Steering {
     pub fn way_home_m(&self, from: Point) -> f64 {
         let Some(at) = self.lattice.entry(from, &self.bounds) else { return f64::INFINITY };
         let along = self.ways_home.as_ref().map_or(f64::INFINITY, |w| w.metres[at]);
-        distance(from, self.lattice.place(at)) + along + self.lattice.step_m()
+        distance(from, self.lattice.place(at)) + along + self.home_leg_m
     }
 
     /// Metres from a waypoint at which it counts as reached.

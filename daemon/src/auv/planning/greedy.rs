@@ -11,7 +11,7 @@ impl Planner for Greedy {
     fn plan(&mut self, q: &Question<'_>) -> Vec<Node> {
         let ways = q.lattice.ways(q.from);
         let mut mark = vec![usize::MAX; q.worth.blocks()];
-        let mut best = (0.0, None);
+        let mut best = (f64::MIN, None);
         for node in (0..q.lattice.len()).filter(|&n| n != q.from && ways.metres[n].is_finite()) {
             if !q.can_return(node, ways.metres[node]) {
                 continue;

@@ -52,7 +52,7 @@ impl Sea {
     }
 
     fn see(&mut self, seed: u64) {
-        let patch = |x: i32, y: i32| ((x / 9 + 3 * (y / 7)) as u64 * (seed | 1) >> 3) as u8 % 4 + 1;
+        let patch = |x: i32, y: i32| (((x / 9 + 3 * (y / 7)) as u64).wrapping_mul(seed | 1) >> 40) as u8 % 4 + 1;
         let (x, y) = self.vehicle.navigator().position();
         let (x, y) = ((x / 0.25) as i32, (y / 0.25) as i32);
         let cells = (-6..6).flat_map(|dy| (-6..6).map(move |dx| (x + dx, y + dy)));
