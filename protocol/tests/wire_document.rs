@@ -1,16 +1,16 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
 use scenecast_protocol::directive::{
-    Band, Budget, Constraints, Fence, Fix, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Requests, SLOTS,
-    Settings, Slot, SlotId, Utility, VersionedSlot,
+    Band, Budget, Constraints, Fence, Fix, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Requests,
+    SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Reader, Seal, SessionId,
-    SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
+    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Reader, Seal,
+    SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -94,9 +94,8 @@ fn whole(what: &str, value: f64, most: u32) -> Result<u32, String> {
 }
 
 fn reaction(what: &str, name: Option<&str>) -> Result<Option<Reaction>, String> {
-    let named = |name: &str| {
-        Reaction::from_name(name).ok_or(format!("{what} {name:?}: it takes hold, return or surface"))
-    };
+    let named =
+        |name: &str| Reaction::from_name(name).ok_or(format!("{what} {name:?}: it takes hold, return or surface"));
     name.map(named).transpose()
 }
 
@@ -117,10 +116,7 @@ mod tests {
         let refused = |json: &str| fence(json).unwrap_err();
         assert_eq!(refused(r#"{"fence": [[0,0],[9,0]]}"#), "fence: 2 vertices: it takes 3 to 34");
         assert_eq!(refused(r#"{"fence": []}"#), "fence: 0 vertices: it takes 3 to 34");
-        assert_eq!(
-            refused(r#"{"fence": [[0,0],[9,9],[9,0],[0,9]]}"#),
-            "fence: edge 1 crosses or touches edge 3"
-        );
+        assert_eq!(refused(r#"{"fence": [[0,0],[9,9],[9,0],[0,9]]}"#), "fence: edge 1 crosses or touches edge 3");
         assert_eq!(refused(r#"{"fence": [[0,0],[1,1],[2,2]]}"#), "fence: it has no area");
         assert_eq!(
             refused(r#"{"fence": [[0,0],[9,0],[9,9]], "return_point": [0, 9]}"#),
@@ -128,7 +124,10 @@ mod tests {
         );
         assert!(refused(r#"{"fence": [[0,0],[1e9,0],[9,9]]}"#).contains("838 km"));
         assert!(refused(r#"{"fenze": []}"#).contains("unknown field"));
-        assert_eq!(limits(r#"{"depth_m": [30, 10]}"#).unwrap_err(), "depth_m: the lowest value must be below the highest");
+        assert_eq!(
+            limits(r#"{"depth_m": [30, 10]}"#).unwrap_err(),
+            "depth_m: the lowest value must be below the highest"
+        );
         assert_eq!(limits(r#"{"time_s": 0}"#).unwrap_err(), "time_s 0: it takes 1 to 16777215");
         assert_eq!(
             limits(r#"{"on_silence": "panic"}"#).unwrap_err(),
@@ -139,7 +138,8 @@ mod tests {
 
     #[test]
     fn what_is_typed_is_what_is_sent() {
-        let sent = fence(r#"{"fence": [[0,0],[9.04,0],[9,9]], "keep_outs": [[[4,1],[5,1],[5,2]]], "return_point": [8,1]}"#);
+        let sent =
+            fence(r#"{"fence": [[0,0],[9.04,0],[9,9]], "keep_outs": [[[4,1],[5,1],[5,2]]], "return_point": [8,1]}"#);
         let sent = sent.unwrap();
         assert_eq!(sent.fence.unwrap().0[1], Place { x_dm: 90, y_dm: 0 });
         assert_eq!((sent.keep_outs.len(), sent.return_point), (1, Some(Place { x_dm: 80, y_dm: 10 })));

@@ -177,7 +177,8 @@ mod tests {
 
     #[test]
     fn a_vehicle_that_came_up_in_silence_stays_up_until_it_is_ordered_on() {
-        let mut guard = Guard::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
+        let mut guard =
+            Guard::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
         guard.handle_time(at(61.0));
         assert_eq!(guard.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
         guard.handle_surface_heard(at(62.0));

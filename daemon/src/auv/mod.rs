@@ -12,8 +12,8 @@ mod steering;
 mod vehicle;
 
 pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
-pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use guard::{Guard, Habits};
+pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use navigator::Navigator;
 pub use planning::Area;
 pub use steering::{Course, Footprint, Steering};

@@ -240,8 +240,7 @@ impl Steering {
         if distance(from, home) <= self.arrival_m() {
             return Course::There;
         }
-        let (Some(at), Some(end)) =
-            (self.lattice.entry(from, &self.bounds), self.lattice.entry(home, &self.bounds))
+        let (Some(at), Some(end)) = (self.lattice.entry(from, &self.bounds), self.lattice.entry(home, &self.bounds))
         else {
             return Course::NoWay;
         };
@@ -311,7 +310,7 @@ mod tests {
                 map.set(Cell::new(x, y), if x > 60 && y > 30 { 2 } else { 1 });
             }
         }
-        let weights = [(2, 100), (1, -50)].into_iter().collect();
+        let weights = [(2, 100), (1, -5)].into_iter().collect();
         let utility = Utility { weights, ..Utility::default() };
         for kind in [PlannerKind::Greedy, PlannerKind::Horizon] {
             let track = drive(&mut steering(kind), &map, Some(&utility), 12);

@@ -10,7 +10,8 @@ use std::path::PathBuf;
 /// Utility collected a metre by each planner, with a fence, keep-outs and 40 % of the distance that full coverage takes.
 ///
 /// Label maps are those of the scene model, on procedural reefs and on annotated images; the operator favours one class
-/// through the labels that cover it. A map is seen bit by bit. Takes a minute or two; the same seed gives the same table.
+/// through the labels that cover it. A map is seen bit by bit. The unit is what a metre
+/// brings where all in sight is new, on the mean of the scene. Takes a minute or two; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench planning --seed 3 --out tracks")]
 pub(super) struct Planning {

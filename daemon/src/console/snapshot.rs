@@ -4,7 +4,9 @@ use super::link_meter::LinkMeter;
 use crate::asv::{Desk, ExemplarState, Surface};
 use crate::config::Config;
 use crate::figures::dropped;
-use scenecast_protocol::directive::{Band, Fence, LifeLine, Limits, PlannerKind, Polygon, Reaction, SlotId, SlotProgress};
+use scenecast_protocol::directive::{
+    Band, Fence, LifeLine, Limits, PlannerKind, Polygon, Reaction, SlotId, SlotProgress,
+};
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
 use scenecast_protocol::map::StateReplica;

@@ -43,7 +43,19 @@ impl Motion {
         let scale_error = drift * dice.normal();
         let heading_error_rad = drift * dice.normal();
         let (heading_rad, distance_m, target, rising) = (0.0, 0.0, None, false);
-        Self { x_m, y_m, heading_rad, distance_m, speed_m_s, scale_error, heading_error_rad, drift, target, rising, dice }
+        Self {
+            x_m,
+            y_m,
+            heading_rad,
+            distance_m,
+            speed_m_s,
+            scale_error,
+            heading_error_rad,
+            drift,
+            target,
+            rising,
+            dice,
+        }
     }
 
     /// Sets the waypoint (in the vehicle's own coordinates), or stops.
@@ -58,7 +70,13 @@ impl Motion {
 
     /// The depth after `dt_s` seconds, from `depth_m` and with the survey at `survey_m` below the surface.
     pub fn depth_m(&self, depth_m: f64, survey_m: f64, dt_s: f64) -> f64 {
-        let aim = if self.rising { 0.0 } else if self.target.is_some() { survey_m } else { depth_m };
+        let aim = if self.rising {
+            0.0
+        } else if self.target.is_some() {
+            survey_m
+        } else {
+            depth_m
+        };
         depth_m + (aim - depth_m).clamp(-VERTICAL_M_S * dt_s, VERTICAL_M_S * dt_s)
     }
 

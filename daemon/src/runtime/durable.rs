@@ -98,7 +98,8 @@ mod tests {
     #[test]
     fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
         let versions = [None, Some(300), None, None, None, Some(1), None, None];
-        let inbox = SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2, 0, 0] };
+        let inbox =
+            SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2, 0, 0] };
         let utility = Some((3, 50, -1, [(2, -3)].into()));
         let durable = Durable {
             inbox,

@@ -47,7 +47,7 @@ pub enum FenceFault {
     #[error("keep_outs: outline {0}: {1}")]
     KeepOut(usize, PolygonFault),
     /// More than fit the count.
-    #[error("keep_outs: {0} outlines: it takes 15 or fewer", )]
+    #[error("keep_outs: {0} outlines: it takes 15 or fewer")]
     TooMany(usize),
     /// A keep-out, counted from 1, covers the whole fence.
     #[error("keep_outs: outline {0} covers the whole fence: nothing is left")]
@@ -248,7 +248,8 @@ mod tests {
     fn eight_vertices_and_a_return_point_fit_a_frame_of_64_bytes_under_a_key() {
         let r = 8_000.0f64;
         let octagon = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
-        let vertices = octagon.map(|a| Place { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
+        let vertices =
+            octagon.map(|a| Place { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
         let fence = Polygon(vertices.collect());
         let return_point = Some(Place { x_dm: -8_000_000, y_dm: 7_000_000 });
         let fence = Fence { fence: Some(fence), keep_outs: Vec::new(), return_point };

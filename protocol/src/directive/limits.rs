@@ -201,8 +201,7 @@ mod tests {
     #[test]
     fn golden_bytes_of_limits() {
         let bytes = ALL.to_bytes();
-        let golden =
-            [0xF8, 0x9C, 0, 50, 1, 144, 0, 15, 0, 60, 0, 0x0B, 0xB8, 0, 0x1C, 0x20, 0x02, 0x58];
+        let golden = [0xF8, 0x9C, 0, 50, 1, 144, 0, 15, 0, 60, 0, 0x0B, 0xB8, 0, 0x1C, 0x20, 0x02, 0x58];
         assert_eq!(bytes, golden);
         assert_eq!(Limits::from_bytes(&bytes), Some(ALL));
         assert_eq!(Limits::default().to_bytes(), [0, 0]);

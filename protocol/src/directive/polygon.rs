@@ -177,9 +177,16 @@ mod tests {
     fn a_place_is_inside_on_the_edge_or_outside() {
         let u = polygon(&[(0, 0), (30, 0), (30, 30), (20, 30), (20, 10), (10, 10), (10, 30), (0, 30)]);
         assert_eq!(u.check(), Ok(()));
-        for (x_dm, y_dm, inside) in
-            [(5, 20, true), (15, 20, false), (25, 20, true), (15, 5, true), (15, 10, true), (30, 30, true), (31, 5, false), (-1, 30, false)]
-        {
+        for (x_dm, y_dm, inside) in [
+            (5, 20, true),
+            (15, 20, false),
+            (25, 20, true),
+            (15, 5, true),
+            (15, 10, true),
+            (30, 30, true),
+            (31, 5, false),
+            (-1, 30, false),
+        ] {
             assert_eq!(u.contains(Place { x_dm, y_dm }), inside, "{x_dm}, {y_dm}");
         }
     }

@@ -52,16 +52,8 @@ pub enum ModeReason {
 }
 
 impl ModeReason {
-    const ALL: [Self; 8] = [
-        Self::Survey,
-        Self::Order,
-        Self::Fence,
-        Self::Distance,
-        Self::Time,
-        Self::Silence,
-        Self::Band,
-        Self::NoWay,
-    ];
+    const ALL: [Self; 8] =
+        [Self::Survey, Self::Order, Self::Fence, Self::Distance, Self::Time, Self::Silence, Self::Band, Self::NoWay];
 
     /// The reason of a number on the wire; `None` for no reason and for what is no number of one.
     pub fn from_code(code: u8) -> Option<Self> {

@@ -80,10 +80,7 @@ impl Bounds {
     }
 
     fn edges(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
-        self.fence
-            .iter()
-            .chain(&self.keep_outs)
-            .flat_map(|o| o.iter().copied().zip(o.iter().copied().cycle().skip(1)))
+        self.fence.iter().chain(&self.keep_outs).flat_map(|o| o.iter().copied().zip(o.iter().copied().cycle().skip(1)))
     }
 }
 

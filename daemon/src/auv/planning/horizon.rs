@@ -97,7 +97,8 @@ impl Horizon {
 
 /// The way's places from its end to the one after the start.
 fn back_to_start(ways: &[Way], end: usize) -> impl Iterator<Item = Way> + '_ {
-    std::iter::successors(Some(end).filter(|&e| e > 0), |&at| Some(ways[at].before).filter(|&b| b > 0)).map(|at| ways[at])
+    std::iter::successors(Some(end).filter(|&e| e > 0), |&at| Some(ways[at].before).filter(|&b| b > 0))
+        .map(|at| ways[at])
 }
 
 /// Worth of the blocks that a place shows and no place of the way before it has shown.

@@ -42,8 +42,7 @@ impl Lattice {
         let step_m = step_m.max((east - west).max(north - south) / (MOST_SIDE - 2) as f64).max(1e-3);
         // Places beyond the area lie a whole number of steps from its corner.
         let before = |from: f64, to: f64| ((to - from) / step_m - 1e-9).ceil().max(0.0);
-        let origin =
-            (area.west - before(west, area.west) * step_m, area.south - before(south, area.south) * step_m);
+        let origin = (area.west - before(west, area.west) * step_m, area.south - before(south, area.south) * step_m);
         let count = |from: f64, to: f64| ((to - from) / step_m + 1e-9).floor() as usize + 1;
         let (columns, rows) = (count(origin.0, east), count(origin.1, north));
         let mut lattice = Self { origin, step_m, columns, rows, moves: vec![0; columns * rows] };
@@ -109,7 +108,8 @@ impl Lattice {
         if !bounds.holds(from) {
             return nearest(&mut open());
         }
-        let mut by_distance: Vec<Node> = open().filter(|&n| distance(from, self.place(n)) <= 6.0 * self.step_m).collect();
+        let mut by_distance: Vec<Node> =
+            open().filter(|&n| distance(from, self.place(n)) <= 6.0 * self.step_m).collect();
         by_distance.sort_by(|&a, &b| distance(from, self.place(a)).total_cmp(&distance(from, self.place(b))));
         by_distance.into_iter().find(|&n| bounds.allows_exit(from, self.place(n)))
     }

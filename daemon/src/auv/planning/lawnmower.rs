@@ -56,9 +56,8 @@ fn legs(q: &Question<'_>) -> Vec<Node> {
             stretch.reverse();
         }
         let inner = |i: usize| {
-            let joined = |j: Option<usize>| {
-                j.and_then(|j| stretch.get(j)).is_some_and(|&n| stretch[i].abs_diff(n) == 1)
-            };
+            let joined =
+                |j: Option<usize>| j.and_then(|j| stretch.get(j)).is_some_and(|&n| stretch[i].abs_diff(n) == 1);
             joined(i.checked_sub(1)) && joined(Some(i + 1))
         };
         legs.extend((0..stretch.len()).filter(|&i| !inner(i)).map(|i| stretch[i]));

@@ -106,7 +106,8 @@ impl Window {
     pub fn new(area: super::bounds::Area, cell_m: f64) -> Self {
         let cell = |metres: f64| (metres / cell_m + 1e-9).floor().clamp(-1e9, 1e9) as i32;
         let (x, y) = (cell(area.west), cell(area.south));
-        let count = |from: i32, to: f64| f64::from((((to / cell_m - 1e-9).ceil().clamp(-1e9, 1e9) as i32) - from).max(1));
+        let count =
+            |from: i32, to: f64| f64::from((((to / cell_m - 1e-9).ceil().clamp(-1e9, 1e9) as i32) - from).max(1));
         let (width, height) = (count(x, area.east), count(y, area.north));
         let height = height.min((MOST_CELLS / width).max(1.0));
         Self { x, y, width: width.min(MOST_CELLS) as usize, height: height as usize, cell_m }

@@ -12,6 +12,7 @@ use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::planning::distance;
 use super::steering::Steering;
+use course::Doing;
 use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -20,7 +21,6 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SlotState;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
-use course::Doing;
 use whole_png::WholePng;
 
 /// Most bytes of a representative image.

@@ -99,8 +99,10 @@ impl Sea {
 }
 
 fn fence() -> impl Strategy<Value = Slot> {
-    let corner = |x: std::ops::Range<i32>, y: std::ops::Range<i32>| (x, y).prop_map(|(x_dm, y_dm)| Place { x_dm, y_dm });
-    let outline = (corner(-20..8, -20..8), corner(150..410, -20..8), corner(150..410, 120..310), corner(-20..8, 120..310));
+    let corner =
+        |x: std::ops::Range<i32>, y: std::ops::Range<i32>| (x, y).prop_map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+    let outline =
+        (corner(-20..8, -20..8), corner(150..410, -20..8), corner(150..410, 120..310), corner(-20..8, 120..310));
     let keep_out = (0i32..350, 0i32..250, 10i32..120).prop_map(|(x, y, r)| {
         let at = |dx: i32, dy: i32| Place { x_dm: x + dx, y_dm: y + dy };
         Polygon(vec![at(-r, -r), at(r, -r / 2), at(r / 3, r)])
@@ -112,8 +114,15 @@ fn fence() -> impl Strategy<Value = Slot> {
 }
 
 fn order() -> impl Strategy<Value = Slot> {
-    let reaction = || proptest::sample::select(vec![None, Some(Reaction::Hold), Some(Reaction::Return), Some(Reaction::Surface)]);
-    let limits = (proptest::option::of(10u32..300), proptest::option::of(60u32..2000), proptest::option::of(5u16..400), reaction(), reaction());
+    let reaction =
+        || proptest::sample::select(vec![None, Some(Reaction::Hold), Some(Reaction::Return), Some(Reaction::Surface)]);
+    let limits = (
+        proptest::option::of(10u32..300),
+        proptest::option::of(60u32..2000),
+        proptest::option::of(5u16..400),
+        reaction(),
+        reaction(),
+    );
     prop_oneof![
         4 => fence(),
         2 => limits.prop_map(|(distance_m, time_s, silence_s, on_silence, on_breach)| {
@@ -196,7 +205,10 @@ fn silence_and_abort_bring_the_vehicle_home_or_up() {
 fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
     let mut sea = Sea::new(0.0, 1);
     sea.tell(Slot::Fence(small_fence()));
-    let far = Fence { fence: small_fence().fence.map(|p| Polygon(p.0.iter().map(|v| Place { x_dm: v.x_dm + 900, ..*v }).collect())), ..Fence::default() };
+    let far = Fence {
+        fence: small_fence().fence.map(|p| Polygon(p.0.iter().map(|v| Place { x_dm: v.x_dm + 900, ..*v }).collect())),
+        ..Fence::default()
+    };
     sea.tell(Slot::Fence(far));
     assert_eq!(sea.fence, small_fence(), "a fence that the vehicle is outside of is refused");
     let config = Config::default();

@@ -23,6 +23,8 @@ pub(crate) struct Task {
     pub start: (f64, f64),
     /// Metres that may be gone, the way back to the start included.
     pub limit_m: f64,
+    /// Utility of a metre on which everything in sight is new, on the mean of the scene.
+    pub mean_per_m: f64,
 }
 
 /// What came of it.
@@ -41,7 +43,16 @@ impl Task {
         let place = |x: f64, y: f64| Place::from_metres(x, y).unwrap_or_default();
         let cut = |dice: &mut Stream| (0.03 + 0.12 * dice.uniform()) * east.min(north);
         let [a, b, c, d] = [cut(&mut dice), cut(&mut dice), cut(&mut dice), cut(&mut dice)];
-        let fence = [(a, 0.0), (east - b, 0.0), (east, b), (east, north - c), (east - c, north), (d, north), (0.0, north - d), (0.0, a)];
+        let fence = [
+            (a, 0.0),
+            (east - b, 0.0),
+            (east, b),
+            (east, north - c),
+            (east - c, north),
+            (d, north),
+            (0.0, north - d),
+            (0.0, a),
+        ];
         let fence = Polygon(fence.iter().map(|&(x, y)| place(x, y)).collect());
         let keep_outs: Vec<Polygon> = (0..=dice.below(2))
             .map(|_| {
@@ -59,10 +70,12 @@ impl Task {
                 break;
             }
         }
-        let inside = cells(scene.area).filter(|&c| crate::auv::planning::Bounds::new(&fence, 0.0).holds(middle(c)));
-        let area = inside.count() as f64 * CELL_M * CELL_M;
+        let bounds = crate::auv::planning::Bounds::new(&fence, 0.0);
+        let inside: Vec<Cell> = cells(scene.area).filter(|&c| bounds.holds(middle(c))).collect();
+        let area = inside.len() as f64 * CELL_M * CELL_M;
+        let utility: f64 = inside.iter().map(|&c| scene.utility.weight(scene.labels.get(c))).sum();
         let fence = Fence { return_point: Place::from_metres(start.0, start.1), ..fence };
-        Self { fence, start, limit_m: SHARE * area / SIGHT_M }
+        Self { fence, start, limit_m: SHARE * area / SIGHT_M, mean_per_m: utility * SIGHT_M / area.max(1e-9) }
     }
 }
 

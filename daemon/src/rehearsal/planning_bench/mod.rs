@@ -20,7 +20,7 @@ pub const SEEDS: u64 = 16;
 pub struct Trial {
     /// Name of the scene.
     pub name: String,
-    /// Utility a metre, by planner in the order of [`PlannerKind::ALL`].
+    /// Utility a metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
     pub utility_per_m: [f64; 3],
     /// Breaches of fence, keep-outs and limit, by the witness.
     pub violations: usize,
@@ -43,7 +43,8 @@ pub struct Medians {
 /// What the bench found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlanningTable {
-    /// Utility collected a metre.
+    /// Utility collected a metre, in units of what a metre brings where all is new, on the mean of the scene: so rare and
+    /// common classes weigh alike.
     pub median: Medians,
     /// Breaches of any constraint.
     pub violations: usize,
@@ -90,7 +91,8 @@ pub fn drive_all(
 fn trial(scene: Scene, seed: u64) -> Trial {
     let task = Task::draw(&scene, seed);
     let drives: Vec<Drive> = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind)).into();
-    let rate = |i: usize| drives.get(i).map_or(0.0, |d: &Drive| d.utility / d.metres().max(1e-9));
+    let rate =
+        |i: usize| drives.get(i).map_or(0.0, |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9));
     let utility_per_m = [rate(0), rate(1), rate(2)];
     let violations = drives.iter().map(|d| d.violations(&task)).sum();
     Trial { name: scene.name.clone(), utility_per_m, violations, scene, task, drives }

@@ -1,7 +1,7 @@
 //! The tracks of a trial over its label map, a panel for each planner.
 
-use super::scene::CELL_M;
 use super::Trial;
+use super::scene::CELL_M;
 use crate::picture::colour;
 use image::{ImageFormat, Rgb, RgbImage};
 use scenecast_protocol::map::Cell;
