@@ -199,7 +199,7 @@ impl Mission {
     /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out.
     pub fn legs_outside_fence(&self) -> usize {
         let Some(fence) = self.surface.desk(self.address).and_then(|d| d.fence.as_ref()) else { return 0 };
-        let is_out = |leg: &&((f64, f64), (f64, f64))| super::witness::stretches_outside(&[leg.0, leg.1], fence) > 0;
+        let is_out = |leg: &&super::mission::Leg| super::witness::stretches_outside(&[leg.0, leg.1], fence) > 0;
         self.legs.iter().skip(self.legs_before_fence).filter(is_out).count()
     }
 

@@ -12,7 +12,7 @@ impl Planner for Greedy {
         let ways = q.lattice.ways(q.from);
         let mut mark = vec![usize::MAX; q.worth.blocks()];
         let mut best = (f64::MIN, None);
-        for node in (0..q.lattice.len()).filter(|&n| n != q.from && ways.metres[n].is_finite()) {
+        for node in (0..q.lattice.places()).filter(|&n| n != q.from && ways.metres[n].is_finite()) {
             if !q.can_return(node, ways.metres[node]) {
                 continue;
             }

@@ -68,7 +68,7 @@ impl Lattice {
     }
 
     /// Number of places.
-    pub fn len(&self) -> usize {
+    pub fn places(&self) -> usize {
         self.moves.len()
     }
 
@@ -101,7 +101,7 @@ impl Lattice {
 
     /// The place to begin at from anywhere: the nearest that can be reached straight. From outside of the bounds, the nearest.
     pub fn entry(&self, from: Point, bounds: &Bounds) -> Option<Node> {
-        let open = || (0..self.len()).filter(|&n| self.is_open(n));
+        let open = || (0..self.places()).filter(|&n| self.is_open(n));
         let nearest = |nodes: &mut dyn Iterator<Item = Node>| {
             nodes.min_by(|&a, &b| distance(from, self.place(a)).total_cmp(&distance(from, self.place(b))))
         };
@@ -116,7 +116,7 @@ impl Lattice {
 
     /// Shortest ways from a place to all others.
     pub fn ways(&self, from: Node) -> Ways {
-        let mut ways = Ways { metres: vec![f64::INFINITY; self.len()], before: vec![from; self.len()] };
+        let mut ways = Ways { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
         ways.metres[from] = 0.0;
         // Lengths in micrometres order like numbers and tie by place, so the tree is the same everywhere.
         let key = |metres: f64| (metres * 1e6) as u64;
@@ -183,6 +183,6 @@ mod tests {
         let home = lattice.entry((-35.0, 5.0), &Bounds::default()).unwrap();
         assert!(distance(lattice.place(home), (-35.0, 5.0)) < 1.0);
         let huge = Lattice::new(AREA, &[(-35_000.0, 5.0)], 1.0, &Bounds::default());
-        assert!(huge.len() <= MOST_SIDE * MOST_SIDE);
+        assert!(huge.places() <= MOST_SIDE * MOST_SIDE);
     }
 }

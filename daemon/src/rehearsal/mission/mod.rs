@@ -47,6 +47,9 @@ struct Timetable {
     look: Instant,
 }
 
+/// From where to where, metres east and north.
+pub type Leg = ((f64, f64), (f64, f64));
+
 /// A mission under way.
 pub struct Mission {
     pub(super) config: Config,
@@ -69,7 +72,7 @@ pub struct Mission {
     /// Where the vehicle was when it saw something, by its own belief.
     pub(super) track: Vec<(f64, f64)>,
     /// Each order to go somewhere: from, to, by its belief.
-    pub(super) legs: Vec<((f64, f64), (f64, f64))>,
+    pub(super) legs: Vec<Leg>,
     /// How many legs there were when the vehicle put the last fence in force.
     pub(super) legs_before_fence: usize,
     channel: Channel,
@@ -192,7 +195,7 @@ impl Mission {
     }
 
     /// Each order to go somewhere that the vehicle gave itself: from where to where, by its belief.
-    pub fn legs(&self) -> &[((f64, f64), (f64, f64))] {
+    pub fn legs(&self) -> &[Leg] {
         &self.legs
     }
 
