@@ -63,7 +63,7 @@ pub struct Steering {
 /// Steps between two places of the lattice, in reaches of the camera: looks overlap by a tenth.
 const STEP: f64 = 0.9;
 /// Straight steps to one waypoint while the way may change with the map.
-const STRAIGHT: usize = 4;
+const STRAIGHT: usize = 2;
 
 impl Steering {
     /// Steers within `area`; cells have edges of `cell_m` metres. The vehicle stays `clearance_m` clear of every outline.

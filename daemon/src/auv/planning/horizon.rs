@@ -1,7 +1,7 @@
 //! The best way over a horizon.
 
 use super::lattice::Node;
-use super::{Planner, Question};
+use super::{Planner, Question, greedy};
 
 /// A beam search over ways of many steps: orienteering with a gain that each block gives once.
 ///
@@ -39,15 +39,18 @@ impl Planner for Horizon {
         let horizon_m = self.steps as f64 * q.lattice.step_m();
         let mut rate = 0.0;
         let mut best = Vec::new();
+        let mut own = f64::MIN;
         for _ in 0..self.rounds {
             let (way, found) = self.search(q, rate);
-            best = way;
+            (best, own) = (way, found);
             if q.left_m <= horizon_m || found <= rate {
                 break;
             }
             rate = found;
         }
-        best
+        // Where all around is seen, every way of the beam turns on the spot: the greedy one leads out.
+        let (way, found) = greedy::best(q);
+        if found > own { way } else { best }
     }
 }
 
