@@ -3,7 +3,7 @@
 use super::pauses::Pauses;
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
-use scenecast_protocol::directive::{Requests, Utility};
+use scenecast_protocol::directive::{Fence, Limits, Requests, Settings, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -38,6 +38,12 @@ pub struct Desk {
     pub name: String,
     /// The utility that was sent last.
     pub utility: Utility,
+    /// The fence that was sent last.
+    pub fence: Option<Fence>,
+    /// The limits that were sent last.
+    pub limits: Option<Limits>,
+    /// The settings that were sent last.
+    pub settings: Settings,
     /// Images by label.
     pub exemplars: BTreeMap<u8, ExemplarDesk>,
     /// Where the vehicle said it was: time, east, north.
@@ -61,6 +67,9 @@ impl Desk {
         Self {
             name,
             utility: Utility::default(),
+            fence: None,
+            limits: None,
+            settings: Settings::default(),
             exemplars: BTreeMap::new(),
             track: VecDeque::new(),
             epoch: 0,

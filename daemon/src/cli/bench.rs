@@ -2,6 +2,7 @@
 
 use super::bench_link::Link;
 use super::bench_modem::Modem;
+use super::bench_planning::Planning;
 use super::sim::WorldArguments;
 use crate::problem::Problem;
 use crate::rehearsal::{FidelityRow, fidelity};
@@ -16,6 +17,8 @@ pub(super) enum Bench {
     Link(Link),
     /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
     Modem(Modem),
+    /// Planners against each other: utility collected a metre.
+    Planning(Planning),
 }
 
 /// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
@@ -36,6 +39,7 @@ impl Bench {
             Self::Fidelity(f) => f.run(),
             Self::Link(l) => l.run(),
             Self::Modem(m) => m.run(),
+            Self::Planning(p) => p.run(),
         }
     }
 }

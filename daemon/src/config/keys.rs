@@ -38,6 +38,9 @@ const fn key(name: &'static str, unit: &'static str, allowed: Allowed, roles: &'
 
 use Allowed::{Choice, Flag, List, Range, Text, Words};
 
+/// What a vehicle may do of its own accord.
+const REACTIONS: Allowed = Choice(&["hold", "return", "surface"]);
+
 /// Every key, in the order of the files.
 pub const KEYS: &[Key] = &[
     key("mission.name", "", Text, "asr", "name of the mission for people"),
@@ -281,15 +284,45 @@ pub const KEYS: &[Key] = &[
         "ar",
         "west, south, east and north limits; all 0: the rehearsal's image",
     ),
+    key(
+        "survey.planner",
+        "",
+        Choice(&["lawnmower", "greedy", "horizon"]),
+        "ar",
+        "how the vehicle chooses its way once the operator has said what matters; the operator may choose another",
+    ),
+    key(
+        "survey.clearance_m",
+        "m",
+        Range(0.0, 1000.0),
+        "ar",
+        "distance that the vehicle plans to keep from fence and keep-outs, for its size, its turns and its drift",
+    ),
+    key(
+        "survey.max_silence_s",
+        "s",
+        Range(0.0, 1e6),
+        "ar",
+        "longest silence of the surface before the vehicle acts by itself, unless the operator sets another; 0: any",
+    ),
+    key("survey.on_silence", "", REACTIONS, "ar", "what it then does, unless the operator says otherwise"),
+    key(
+        "survey.on_breach",
+        "",
+        REACTIONS,
+        "ar",
+        "what it does outside the fence, in a keep-out or outside a depth band, unless the operator says otherwise",
+    ),
+    key("survey.on_abort", "", REACTIONS, "ar", "what it does on an abort, unless the operator says otherwise"),
     key("navigation.drift_percent", "%", Range(0.0, 50.0), "ar", "drift of dead reckoning in percent of the distance"),
     key("navigation.fix_period_s", "s", Range(0.0, 3600.0), "r", "time between two position fixes; 0: none"),
     key("navigation.fix_sigma_m", "m", Range(0.0, 100.0), "r", "standard deviation of a fix"),
     key(
         "operator.script",
         "",
-        Choice(&["scripted", "none"]),
+        Choice(&["scripted", "fenced", "none"]),
         "r",
-        "scripted: two utilities and image requests at fixed times",
+        "scripted: two utilities and image requests at fixed times; fenced: the same within a fence and limits",
     ),
     key("console.listen", "", Text, "s", "ADDRESS:PORT of the operator's page; empty: none"),
     key("runtime.state_dir", "", Text, "as", "folder of what must survive a restart, and of the operator's map"),

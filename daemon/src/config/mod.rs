@@ -235,6 +235,18 @@ section! {
         depth_m: f64 = 20.0,
         /// West, south, east, north limits in metres from the origin; all 0 = the rehearsal's image.
         area_m: [f64; 4] = [0.0; 4],
+        /// `lawnmower`, `greedy` or `horizon`.
+        planner: String = "horizon".into(),
+        /// Metres that the vehicle plans to stay away from fence and keep-outs.
+        clearance_m: f64 = 1.0,
+        /// Seconds that the surface may be silent; 0 = any.
+        max_silence_s: f64 = 0.0,
+        /// `hold`, `return` or `surface`.
+        on_silence: String = "return".into(),
+        /// `hold`, `return` or `surface`.
+        on_breach: String = "return".into(),
+        /// `hold`, `return` or `surface`.
+        on_abort: String = "surface".into(),
     }
 }
 section! {

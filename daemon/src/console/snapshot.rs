@@ -4,7 +4,9 @@ use super::link_meter::LinkMeter;
 use crate::asv::{Desk, ExemplarState, Surface};
 use crate::config::Config;
 use crate::figures::dropped;
-use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
+use scenecast_protocol::directive::{
+    Band, Fence, LifeLine, Limits, PlannerKind, Polygon, Reaction, SlotId, SlotProgress,
+};
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
 use scenecast_protocol::schedule::Class;
@@ -100,7 +102,13 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
             "updated_s": view.replica().updated().map(seconds),
             "epoch": desk.epoch,
         },
-        "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
+        "utility": {
+            "exploration": f64::from(desk.utility.exploration) / 100.0,
+            "curiosity": f64::from(desk.utility.curiosity) / 100.0,
+        },
+        "fence": desk.fence.as_ref().map(fence),
+        "limits": desk.limits.as_ref().map(limits),
+        "planner": desk.settings.planner.map(PlannerKind::name),
         "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect::<Vec<_>>(),
         "link": link_of(&view, now),
         "usbl": desk.found.map(|(line, at)| json!({
@@ -159,12 +167,50 @@ fn status(s: &VehicleStatus, at: Instant) -> Value {
         "heading_deg": s.heading_deg,
         "sigma_m": s.sigma_m,
         "mode": mode,
+        "reason": s.reason.name(),
+        "doing": doing(s),
         "waypoint": s.waypoint.map(|(x, y)| json!([x, y])),
         "cells": s.explored_cells,
         "labels": s.labels,
         "fix_age_s": s.fix_age_s,
         "budget_bps": s.budget_bps,
         "refused_frames": s.refused_frames,
+    })
+}
+
+/// Mode and reason as people say it.
+fn doing(s: &VehicleStatus) -> String {
+    let mode = match s.mode {
+        VehicleMode::Survey => "surveying",
+        VehicleMode::Hold => "holding",
+        VehicleMode::Return => "returning",
+        VehicleMode::Surface => "surfacing",
+        VehicleMode::Abort => "aborted",
+        VehicleMode::Done => "done",
+    };
+    s.reason.name().map_or(mode.to_owned(), |why| format!("{mode}: {why}"))
+}
+
+fn fence(f: &Fence) -> Value {
+    let outline = |p: &Polygon| p.0.iter().map(|v| json!([v.metres().0, v.metres().1])).collect::<Vec<_>>();
+    json!({
+        "fence": f.fence.as_ref().map(outline),
+        "keep_outs": f.keep_outs.iter().map(outline).collect::<Vec<_>>(),
+        "return_point": f.return_point.map(|p| json!([p.metres().0, p.metres().1])),
+    })
+}
+
+fn limits(l: &Limits) -> Value {
+    let band = |b: Band| json!([f64::from(b.low_dm) / 10.0, f64::from(b.high_dm) / 10.0]);
+    json!({
+        "depth_m": l.depth.map(band),
+        "altitude_m": l.altitude.map(band),
+        "distance_m": l.distance_m,
+        "time_s": l.time_s,
+        "silence_s": l.silence_s,
+        "on_silence": l.on_silence.map(Reaction::name),
+        "on_breach": l.on_breach.map(Reaction::name),
+        "on_abort": l.on_abort.map(Reaction::name),
     })
 }
 

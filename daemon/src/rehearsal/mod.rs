@@ -8,12 +8,14 @@ pub mod link_bench;
 mod meter;
 mod mission;
 pub mod modem_bench;
-mod motion;
+pub(crate) mod motion;
 mod outputs;
 mod panorama;
+pub mod planning_bench;
 mod recording;
 mod report;
 mod script;
+pub mod witness;
 mod world;
 
 pub use fidelity::{FidelityRow, fidelity};

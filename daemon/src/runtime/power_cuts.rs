@@ -152,7 +152,7 @@ impl World {
             }
             60 => drop(self.surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
             90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
-            120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), 0.5, now).unwrap()),
+            120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
             150 => self.surface.set_budget(9000, None, now).unwrap(),
             _ => {}
         }
@@ -182,7 +182,7 @@ impl World {
             self.host_step()?;
             self.see();
         }
-        self.onboard.vehicle.steer();
+        self.onboard.vehicle.steer(now);
         while let Some(output) = self.onboard.vehicle.poll_output() {
             self.host_step()?;
             self.carry_out(output)?;
@@ -219,8 +219,8 @@ impl World {
         }
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
-        let planes = BTreeMap::new();
-        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, planes, labels: LABELS };
+        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, planes, perplexity, labels: LABELS };
         onboard.vehicle.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 

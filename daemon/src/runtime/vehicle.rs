@@ -178,7 +178,7 @@ impl Host {
 
     fn pump(&mut self) -> Result<(), Problem> {
         let now: Instant = self.clock.now();
-        self.vehicle.steer();
+        self.vehicle.steer(now);
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => {
@@ -191,6 +191,7 @@ impl Host {
                 VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
                 VehicleOutput::Waypoint(x, y) => tracing::info!("waypoint {x:.1} m east, {y:.1} m north"),
                 VehicleOutput::Hold => tracing::info!("hold"),
+                VehicleOutput::Surface => tracing::info!("come up"),
             }
         }
         self.modem.set_budget(self.vehicle.budget_bps());

@@ -7,7 +7,7 @@ use crate::problem::Problem;
 use crate::rehearsal::docked::{self, Docked};
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
-use scenecast_protocol::directive::Fix;
+use scenecast_protocol::directive::{Fix, SlotId};
 use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use sim_channel::{Outcome, Position};
@@ -88,10 +88,19 @@ impl Mission {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => self.vehicle.handle_persisted(),
-                VehicleOutput::Waypoint(x, y) => self.motion.set_target(Some((x, y))),
+                VehicleOutput::Waypoint(x, y) => {
+                    self.legs.push((self.vehicle.navigator().position(), (x, y)));
+                    self.motion.set_target(Some((x, y)));
+                }
                 VehicleOutput::Hold => self.motion.set_target(None),
+                VehicleOutput::Surface => self.motion.come_up(),
                 VehicleOutput::RefineRate(words_per_s) => self.mapper.set_refine_rate(words_per_s),
-                VehicleOutput::Applied(applied) => self.applied.push(applied),
+                VehicleOutput::Applied(applied) => {
+                    if applied.id == SlotId::Fence {
+                        self.legs_before_fence = self.legs.len();
+                    }
+                    self.applied.push(applied);
+                }
             }
         }
         while let Some(output) = self.surface.poll_output() {
@@ -135,10 +144,10 @@ impl Mission {
         if self.recording.is_some() || self.ended.is_some() {
             return;
         }
-        self.vehicle.steer();
+        self.vehicle.steer(self.now);
         self.pump();
         let o = self.motion.step(self.vehicle.navigator().position(), STEP_S);
-        let depth = self.vehicle.navigator().depth_m();
+        let depth = self.motion.depth_m(self.vehicle.navigator().depth_m(), self.survey_depth_m(), STEP_S);
         self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, depth, self.now);
         self.place_vehicle();
     }
@@ -152,9 +161,22 @@ impl Mission {
         }
     }
 
+    fn survey_depth_m(&self) -> f64 {
+        (self.config.survey.depth_m - self.config.survey.altitude_m).max(0.0)
+    }
+
+    /// Whether the sea floor is out of the camera's sight.
+    fn is_high(&self) -> bool {
+        self.recording.is_none() && self.vehicle.navigator().depth_m() < self.survey_depth_m() - 1.0
+    }
+
     fn camera(&mut self) -> Result<(), Problem> {
         if self.ended.is_some() {
             self.times.frame = self.now + Duration::from_secs(3600);
+            return Ok(());
+        }
+        if self.is_high() {
+            self.times.frame = self.times.frame + Duration::from_secs_f64(1.0 / self.config.camera.rate_hz);
             return Ok(());
         }
         let (image, scale) = match &self.recording {

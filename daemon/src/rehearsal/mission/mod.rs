@@ -50,6 +50,9 @@ struct Timetable {
     look: Instant,
 }
 
+/// From where to where, metres east and north.
+pub type Leg = ((f64, f64), (f64, f64));
+
 /// A mission under way.
 pub struct Mission {
     pub(super) config: Config,
@@ -72,6 +75,10 @@ pub struct Mission {
     pub(super) update: Option<MapUpdate>,
     /// Where the vehicle was when it saw something, by its own belief.
     pub(super) track: Vec<(f64, f64)>,
+    /// Each order to go somewhere: from, to, by its belief.
+    pub(super) legs: Vec<Leg>,
+    /// How many legs there were when the vehicle put the last fence in force.
+    pub(super) legs_before_fence: usize,
     channel: Channel,
     /// Drivers and emulated modems with a water of their own, if the configuration names a make of modem.
     docked: Option<Docked>,
@@ -123,6 +130,7 @@ impl Mission {
         }
         let script = match config.operator.script.as_str() {
             "scripted" => Script::of_survey(config.survey.duration_s),
+            "fenced" => Script::fenced(config.survey.duration_s, area, config.survey.speed_m_s),
             _ => Script::none(),
         };
         let fix_period = Instant::from_secs_f64(config.navigation.fix_period_s);
@@ -143,6 +151,8 @@ impl Mission {
             ended: None,
             update: None,
             track: Vec::new(),
+            legs: Vec::new(),
+            legs_before_fence: 0,
             transmitting: [None; 2],
             map_version: 0,
             picture_version: 0,
@@ -196,6 +206,16 @@ impl Mission {
     /// The vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
+    }
+
+    /// Each order to go somewhere that the vehicle gave itself: from where to where, by its belief.
+    pub fn legs(&self) -> &[Leg] {
+        &self.legs
+    }
+
+    /// Metres that the vehicle really went.
+    pub fn distance_m(&self) -> f64 {
+        self.motion.distance_m
     }
 
     /// The vehicle's address.

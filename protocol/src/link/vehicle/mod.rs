@@ -257,6 +257,11 @@ impl<S: StateSource> VehicleLink<S> {
         self.clock.as_ref()
     }
 
+    /// When a frame of the surface was last taken, in this pair of runs.
+    pub fn last_heard(&self) -> Option<Instant> {
+        self.heard.map(|h| h.at)
+    }
+
     /// One-way propagation, as the surface has measured it.
     pub fn one_way(&self) -> Option<Duration> {
         self.one_way
