@@ -151,7 +151,7 @@ fn answered() -> [(ChunkKind, Vec<u8>); 2] {
     let mut slots = [SlotReport::default(); SLOTS];
     slots[SlotId::Constraints.index()] = SlotReport { version_low: 1, state: SlotState::Applied };
     let status = VehicleStatus { base_digest: 0, slots, refused_frames: 0, ..status() };
-    [(ChunkKind::Report, status.encode_report()), (ChunkKind::Pose, status.encode_pose(99))]
+    [(ChunkKind::Report, status.encode_report(99, 0).unwrap().0), (ChunkKind::Pose, status.encode_pose(99))]
 }
 
 fn map_payload() -> Vec<u8> {
@@ -340,7 +340,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
         (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, utility \
              version 7 applied, fix version 2 refused (2)",
-            status().encode_report(),
+            status().encode_report(99, 0).unwrap().0,
         ),
         (
             "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",

@@ -170,7 +170,8 @@ fn a_folder_of_annotated_images_is_scored_and_wrong_ones_are_named() {
     assert_eq!(report["scenes"][0]["cells"], 20 * 15);
     for method in ["scene_model", "kmeans_lab", "kmeans_pooled_words"] {
         let excess = report["median"][method]["excess_nats"].as_f64().unwrap();
-        assert!(excess > 0.4, "{method}: {excess} of 0.69");
+        // The classes themselves have 0.45 on so small a ground: 0.69 less what a shifted copy tells.
+        assert!(excess > 0.3, "{method}: {excess} of 0.45");
     }
     image::GrayImage::new(9, 9).save(dir.join("reef_label.png")).unwrap();
     assert_refused(&["scene", "score", "--dir", folder], &["reef_label.png", "9 x 9", "160 x 120"]);

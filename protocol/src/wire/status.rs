@@ -120,8 +120,9 @@ pub struct SlotReport {
 ///  2-3  16    digest of the map that the surface is known to hold (the base of this frame)
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
-///  7-14 64    eight slot reports: version, low 8 bits
-/// 15-18 32    eight slot reports: 4 bits each: 0 unknown, 1 applied, 2..9 refusal reason; the rest is refused
+///  7    8     slots that are reported of, a bit each, the first slot in the highest bit
+///  8..  8     version of each of them, low 8 bits
+/// then  4     what became of each of them: 1 applied, 2..9 refusal reason; the rest is refused; 4 bits 0 after an odd number
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
@@ -195,6 +196,9 @@ fn decode_rate(code: u16) -> u32 {
 }
 
 impl VehicleStatus {
+    /// Bytes of a report without slots.
+    const REPORT_HEAD: usize = 8;
+
     /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
         let waypoint = self.waypoint.filter(|_| room >= 21);
@@ -213,15 +217,26 @@ impl VehicleStatus {
         out
     }
 
-    /// The report chunk.
-    pub fn encode_report(&self) -> Vec<u8> {
+    /// A report chunk of at most `room` bytes about the slots from `first` on, and the slot that the next one has to begin
+    /// with, 0 after the last; `None` if not one slot fits that was decided about.
+    pub fn encode_report(&self, room: usize, first: usize) -> Option<(Vec<u8>, usize)> {
+        let known = |&(_, s): &(usize, &SlotReport)| s.state != SlotState::Unknown;
+        let decided: Vec<(usize, &SlotReport)> = self.slots.iter().enumerate().skip(first).filter(known).collect();
+        // A slot takes a byte and a half.
+        let fitting = room.saturating_sub(Self::REPORT_HEAD) * 2 / 3;
+        let (told, left) = decided.split_at(fitting.min(decided.len()));
+        if told.is_empty() && !left.is_empty() {
+            return None;
+        }
         let mut out = vec![self.epoch, self.labels];
         out.extend_from_slice(&self.base_digest.to_be_bytes());
         out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
         out.push(self.refused_frames);
-        out.extend(self.slots.iter().map(|s| s.version_low));
-        out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | s.state.code())));
-        out
+        out.push(told.iter().fold(0, |bits, (slot, _)| bits | 0x80 >> slot));
+        out.extend(told.iter().map(|(_, s)| s.version_low));
+        let codes: Vec<u8> = told.iter().map(|(_, s)| s.state.code()).collect();
+        out.extend(codes.chunks(2).map(|pair| pair[0] << 4 | pair.get(1).copied().unwrap_or(0)));
+        Some((out, left.first().map_or(0, |&(slot, _)| slot)))
     }
 
     /// Reads a pose; the rest stays as it is.
@@ -248,16 +263,23 @@ impl VehicleStatus {
         Ok(())
     }
 
-    /// Reads a report; the rest stays as it is.
+    /// Reads a report; the rest stays as it is, and so do slots that it says nothing of.
     pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
         read.budget_bps = decode_rate(r.u16()?);
         read.refused_frames = r.u8()?;
-        let versions = r.take(SLOTS)?;
-        let states = r.take(SLOTS.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
-        for ((slot, &version_low), code) in read.slots.iter_mut().zip(versions).zip(states) {
-            *slot = SlotReport { version_low, state: SlotState::from_code(code).ok_or(StatusError::BadField)? };
+        let told = r.u8()?;
+        let count = told.count_ones() as usize;
+        let versions = r.take(count)?;
+        let mut codes = r.take(count.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
+        let slots = read.slots.iter_mut().enumerate().filter(|(slot, _)| told & 0x80 >> slot != 0);
+        for ((_, slot), &version_low) in slots.zip(versions) {
+            let state = codes.next().and_then(SlotState::from_code).filter(|&s| s != SlotState::Unknown);
+            *slot = SlotReport { version_low, state: state.ok_or(StatusError::BadField)? };
+        }
+        if codes.next().is_some_and(|padding| padding != 0) {
+            return Err(StatusError::BadField);
         }
         if !r.rest().is_empty() {
             return Err(StatusError::Length);
@@ -319,9 +341,9 @@ mod tests {
             refused_frames: 3,
             slots,
         };
-        let (pose, report) = (status.encode_pose(99), status.encode_report());
+        let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
         assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
-        assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 7, 0, 0, 0, 0, 2, 0, 0, 0x10, 0, 0x02, 0]);
+        assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0b1000_0100, 7, 2, 0x12]);
         let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
         back.read_pose(&pose).unwrap();
         back.read_report(&report).unwrap();
@@ -336,6 +358,33 @@ mod tests {
                 prop_assert_eq!(status.encode_pose(99), bytes.clone());
             }
             let _ = status.read_report(&bytes);
+        }
+
+        #[test]
+        fn reports_of_any_size_tell_of_every_slot_that_was_decided_about(
+            decided in proptest::collection::vec((any::<u8>(), 0u8..10), SLOTS),
+            room in 0usize..25,
+        ) {
+            let mut status = VehicleStatus { budget_bps: 100, ..VehicleStatus::default() };
+            for (slot, (version_low, code)) in status.slots.iter_mut().zip(decided) {
+                let state = SlotState::from_code(code).unwrap();
+                let version_low = if state == SlotState::Unknown { 0 } else { version_low };
+                *slot = SlotReport { version_low, state };
+            }
+            let (mut heard, mut first) = (VehicleStatus::default(), 0);
+            for _ in 0..SLOTS {
+                let Some((bytes, next)) = status.encode_report(room, first) else {
+                    prop_assert!(room < 10);
+                    return Ok(());
+                };
+                prop_assert!(bytes.len() <= room.max(8));
+                heard.read_report(&bytes).unwrap();
+                first = next;
+                if first == 0 {
+                    break;
+                }
+            }
+            prop_assert_eq!((first, heard), (0, status));
         }
 
         #[test]
