@@ -4,6 +4,7 @@
 mod calls;
 mod desk;
 mod pauses;
+pub mod position;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};
