@@ -11,6 +11,6 @@ mod vehicle;
 
 pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
 pub use mapper::{MapUpdate, Mapper, cell_m};
-pub use navigator::Navigator;
+pub use navigator::{FixVerdict, Navigator};
 pub use steering::{Area, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, Vehicle, VehicleOutput};

@@ -1,6 +1,7 @@
 //! `scenecast bench`
 
 use super::bench_link::Link;
+use super::bench_localisation::LocalisationBench;
 use super::sim::WorldArguments;
 use crate::problem::Problem;
 use crate::rehearsal::{FidelityRow, fidelity};
@@ -13,6 +14,8 @@ pub(super) enum Bench {
     Fidelity(Fidelity),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(Link),
+    /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
+    Localisation(LocalisationBench),
 }
 
 /// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
@@ -32,6 +35,7 @@ impl Bench {
         match self {
             Self::Fidelity(f) => f.run(),
             Self::Link(l) => l.run(),
+            Self::Localisation(l) => l.run(),
         }
     }
 }

@@ -4,6 +4,7 @@
 
 mod bench;
 mod bench_link;
+mod bench_localisation;
 mod demo;
 mod key;
 mod map;

@@ -5,6 +5,9 @@ mod demo;
 mod durable;
 mod journal;
 mod mapping;
+mod pilot;
+mod port;
+mod position;
 #[cfg(test)]
 mod power_cuts;
 mod refusals;

@@ -4,8 +4,11 @@ use super::clock::Clock;
 use super::durable::Keeper;
 use super::journal::Folder;
 use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
+use super::pilot::{Pilot, depth_m, next_of, origin};
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
+use crate::asv::position::TangentPlane;
+use crate::autopilot::Goal;
 use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
@@ -42,7 +45,12 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let mapper = mapping::spawn(&config, epoch)?;
         let modem = modem::open(&config, profile).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, at_end, behind: 0 }.run().await
+        let flight = Flight {
+            pilot: Pilot::open(&config, clock)?,
+            plane: origin(&config)?.map(TangentPlane::new),
+            depth_m: depth_m(&config),
+        };
+        Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind: 0 }.run().await
     })
 }
 
@@ -50,6 +58,14 @@ fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, P
     let area = crate::ends::configured_area(config).or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
     area.ok_or_else(|| Problem::Input(missing.to_owned()))
+}
+
+/// What flies the vehicle, and where its world is.
+struct Flight {
+    pilot: Option<Pilot>,
+    plane: Option<TangentPlane>,
+    /// Of the survey, metres.
+    depth_m: f64,
 }
 
 struct Host {
@@ -61,6 +77,7 @@ struct Host {
     keeper: Keeper<Folder>,
     reload: Reload,
     refusals: Refusals,
+    flight: Flight,
     /// Whether the end of the camera's frames is the end of the survey.
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
@@ -87,8 +104,15 @@ impl Host {
                     }
                 },
                 config = self.reload.next() => self.follow(&config),
-                frame = self.camera.next() => {
+                () = next_of(&mut self.flight.pilot) => self.handle_pilot(),
+                mut frame = self.camera.next() => {
                     self.behind += 1;
+                    if self.flight.pilot.is_some() {
+                        // The autopilot says where the camera is, not the recording.
+                        let n = self.vehicle.navigator();
+                        (frame.x_m, frame.y_m) = n.position();
+                        (frame.heading_rad, frame.depth_m) = (n.heading_rad(), n.depth_m());
+                    }
                     let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
                 }
                 seen = self.mapper.seen.recv() => match seen {
@@ -106,11 +130,38 @@ impl Host {
         self.vehicle.set_budget(budget, self.clock.now());
     }
 
+    /// Takes the way that the autopilot tells, and tells it where to go.
+    fn handle_pilot(&mut self) {
+        /// Fixes that are older do not tell the autopilot where it is, seconds.
+        const OLDEST_FIX_S: f64 = 60.0;
+        let now = self.clock.now();
+        let Some(pilot) = &mut self.flight.pilot else { return };
+        while let Some(step) = pilot.poll_step() {
+            self.vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
+        }
+        self.vehicle.set_autopilot_silent(pilot.health().is_silent());
+        let navigator = self.vehicle.navigator();
+        let (x, y) = navigator.position();
+        let (world_x, world_y) = navigator.world();
+        let goal = self.vehicle.waypoint().map(|(to_x, to_y)| {
+            let (east_m, north_m) = (to_x - x, to_y - y);
+            let place = self.flight.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
+            Goal { east_m, north_m, depth_m: Some(self.flight.depth_m), place }
+        });
+        pilot.set_goal(goal);
+        let is_fixed = navigator.last_fix().is_some_and(|at| now.since(at).as_secs_f64() < OLDEST_FIX_S);
+        if let (true, Some(plane)) = (is_fixed, &self.flight.plane) {
+            pilot.handle_place(plane.to_place(world_x, world_y), navigator.sigma_m());
+        }
+    }
+
     fn handle_seen(&mut self, seen: Seen) {
         let now = self.clock.now();
         self.behind -= 1;
         let f = &seen.frame;
-        self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+        if self.flight.pilot.is_none() {
+            self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+        }
         self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
         if self.at_end && self.behind == 0 && self.camera.is_over() {
@@ -135,6 +186,9 @@ impl Host {
                 VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
                 VehicleOutput::Waypoint(x, y) => tracing::info!("waypoint {x:.1} m east, {y:.1} m north"),
                 VehicleOutput::Hold => tracing::info!("hold"),
+                VehicleOutput::Fixed(fix, _) => {
+                    tracing::debug!("fix: {:.1} m east, {:.1} m north, +-{:.1} m", fix.x_m, fix.y_m, fix.sigma_m);
+                }
             }
         }
         self.modem.set_budget(self.vehicle.budget_bps());

@@ -8,6 +8,7 @@ mod cursor;
 mod frame;
 mod header;
 mod number;
+mod placement;
 mod stamp;
 mod status;
 
@@ -18,6 +19,7 @@ pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, Header, MissionId, SessionId};
 pub use number::unwrap_number;
 pub use stamp::Stamp;
+pub use placement::Placement;
 pub use status::{SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
 
 /// Version of the wire; a frame of another version is counted and dropped.

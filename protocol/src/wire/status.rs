@@ -1,6 +1,7 @@
 //! The vehicle's status.
 
 use super::cursor::{Reader, Truncated};
+use super::placement::Placement;
 use crate::directive::{RefusalReason, SLOTS, SlotId};
 
 /// What the vehicle is doing.
@@ -57,7 +58,8 @@ pub struct SlotReport {
 /// byte  bits  field                 unit, range
 ///  0    3     mode                  0 survey, 1 hold, 2 return, 3 surface, 4 abort, 5 done
 ///  0    1     a waypoint follows
-///  0    4     reserved, 0
+///  0    1     the autopilot does not answer: nobody carries out what the mode says
+///  0    3     reserved, 0
 ///  1-3  24    x east                decimetres, signed, +-838 km
 ///  4-6  24    y north               decimetres, signed
 ///  7-8  16    depth                 decimetres below the surface, 0..6553.5 m
@@ -75,11 +77,14 @@ pub struct SlotReport {
 ///  6    8     frames refused for want of authenticity, 255 = that or more
 ///  7-12 48    six slot reports: version, low 8 bits
 /// 13-15 24    six slot reports: 4 bits each: 0 unknown, 1 applied, 2..7 refusal reason; the rest is refused
+/// 7 more      [where the map lies in the world, see `Placement`]; left out while it has not moved
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
     /// What it is doing.
     pub mode: VehicleMode,
+    /// Whether its autopilot does not answer, so that nobody carries out what the mode says.
+    pub autopilot_silent: bool,
     /// East of the origin, metres.
     pub x_m: f64,
     /// North of the origin, metres.
@@ -108,6 +113,8 @@ pub struct VehicleStatus {
     pub refused_frames: u8,
     /// Decisions about the slots of the directive, by slot.
     pub slots: [SlotReport; SLOTS],
+    /// Where the map lies in the world; `None` while no fix has moved it.
+    pub placement: Option<Placement>,
 }
 
 /// Why bytes are no status.
@@ -127,11 +134,11 @@ impl From<Truncated> for StatusError {
     }
 }
 
-fn decimetres(metres: f64) -> i32 {
+pub(super) fn decimetres(metres: f64) -> i32 {
     (metres * 10.0).round().clamp(-8_388_608.0, 8_388_607.0) as i32
 }
 
-fn put24(out: &mut Vec<u8>, value: u32) {
+pub(super) fn put24(out: &mut Vec<u8>, value: u32) {
     out.extend_from_slice(value.to_be_bytes().get(1..).unwrap_or_default());
 }
 
@@ -149,7 +156,8 @@ impl VehicleStatus {
     /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
         let waypoint = self.waypoint.filter(|_| room >= 21);
-        let mut out = vec![self.mode.code() << 5 | u8::from(waypoint.is_some()) << 4];
+        let flags = u8::from(waypoint.is_some()) << 4 | u8::from(self.autopilot_silent) << 3;
+        let mut out = vec![self.mode.code() << 5 | flags];
         put24(&mut out, decimetres(self.x_m) as u32);
         put24(&mut out, decimetres(self.y_m) as u32);
         out.extend_from_slice(&((self.depth_m * 10.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
@@ -166,12 +174,20 @@ impl VehicleStatus {
 
     /// The report chunk.
     pub fn encode_report(&self) -> Vec<u8> {
+        self.encode_report_within(usize::MAX)
+    }
+
+    /// The report chunk. The placement is left out if `room` is too small for it.
+    pub fn encode_report_within(&self, room: usize) -> Vec<u8> {
         let mut out = vec![self.epoch, self.labels];
         out.extend_from_slice(&self.base_digest.to_be_bytes());
         out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
         out.push(self.refused_frames);
         out.extend(self.slots.iter().map(|s| s.version_low));
         out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | s.state.code())));
+        if let Some(placement) = self.placement.filter(|_| room >= out.len() + Placement::BYTES) {
+            placement.encode(&mut out);
+        }
         out
     }
 
@@ -191,14 +207,15 @@ impl VehicleStatus {
         if head & 0b1_0000 != 0 {
             read.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
         }
-        if head & 15 != 0 || !r.rest().is_empty() {
+        read.autopilot_silent = head & 0b1000 != 0;
+        if head & 0b111 != 0 || !r.rest().is_empty() {
             return Err(StatusError::Length);
         }
         *self = read;
         Ok(())
     }
 
-    /// Reads a report; the rest stays as it is.
+    /// Reads a report; the rest stays as it is, and so does the placement if there is none in it.
     pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
@@ -208,6 +225,9 @@ impl VehicleStatus {
         let states = r.take(SLOTS.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
         for ((slot, &version_low), code) in read.slots.iter_mut().zip(versions).zip(states) {
             *slot = SlotReport { version_low, state: SlotState::from_code(code).ok_or(StatusError::BadField)? };
+        }
+        if !r.rest().is_empty() {
+            read.placement = Some(Placement::decode(&mut r)?.ok_or(StatusError::BadField)?);
         }
         if !r.rest().is_empty() {
             return Err(StatusError::Length);
@@ -253,6 +273,7 @@ mod tests {
         slots[5] = SlotReport { version_low: 2, state: SlotState::Refused(RefusalReason::Malformed) };
         let status = VehicleStatus {
             mode: VehicleMode::Hold,
+            autopilot_silent: false,
             x_m: 1.5,
             y_m: -0.1,
             depth_m: 18.0,
@@ -267,6 +288,7 @@ mod tests {
             budget_bps: 10_000,
             refused_frames: 3,
             slots,
+            placement: None,
         };
         let (pose, report) = (status.encode_pose(99), status.encode_report());
         assert_eq!(pose, [0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
@@ -275,6 +297,19 @@ mod tests {
         back.read_pose(&pose).unwrap();
         back.read_report(&report).unwrap();
         assert_eq!(back, status);
+        let helpless = VehicleStatus { autopilot_silent: true, ..status.clone() }.encode_pose(99);
+        assert_eq!((helpless[0], &helpless[1..]), (0x28, &pose[1..]));
+        back.read_pose(&helpless).unwrap();
+        assert!(std::mem::take(&mut back.autopilot_silent));
+        let placement = Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 });
+        let placed = VehicleStatus { placement, ..status.clone() };
+        let long = placed.encode_report();
+        assert_eq!(long, [&report[..], &[2, 0, 0, 125, 0xFF, 0xFF, 0xFF]].concat());
+        back.read_report(&long).unwrap();
+        assert_eq!(back, placed);
+        assert_eq!(placed.encode_report_within(long.len() - 1), report, "no room for it");
+        back.read_report(&report).unwrap();
+        assert_eq!(back.placement, placement, "it has not moved back");
     }
 
     proptest! {

@@ -13,6 +13,7 @@ mod line;
 pub mod nmea;
 mod relay;
 mod usbl;
+mod world_file;
 
 pub use filter::{Estimate, PlaneFilter, Verdict};
 pub use follow::Follow;
@@ -21,3 +22,4 @@ pub use gps::{Gps, GpsFault, GpsFix, GpsLanguage};
 pub use line::Lines;
 pub use relay::{Relay, RelayConfig, RelayFault};
 pub use usbl::{Mounting, UsblFault, UsblSighting};
+pub use world_file::world_file;

@@ -7,7 +7,7 @@ use super::exemplar::{Exemplar, encode_webp};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::steering::Steering;
-use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Fix, RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::object::ObjectId;
@@ -53,6 +53,8 @@ pub enum VehicleOutput {
     RefineRate(u32),
     /// A slot was decided about.
     Applied(AppliedSlot),
+    /// A fix in the world that was used, and when it was taken: an autopilot may want it too.
+    Fixed(Fix, Instant),
 }
 
 /// A decision about a slot.
@@ -84,6 +86,7 @@ pub struct Vehicle {
     done: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
+    autopilot_silent: bool,
     /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0: never.
     coarse_after_s: f64,
     /// Instead of the link's map, for comparison.
@@ -114,6 +117,7 @@ impl Vehicle {
             done: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
+            autopilot_silent: false,
             coarse_after_s: 0.0,
             whole_png: None,
         };
@@ -270,6 +274,16 @@ impl Vehicle {
         }
     }
 
+    /// Where it is going, east and north in the map's frame, metres.
+    pub fn waypoint(&self) -> Option<(f64, f64)> {
+        self.waypoint
+    }
+
+    /// Whether the autopilot does not answer; the status tells it.
+    pub fn set_autopilot_silent(&mut self, is_silent: bool) {
+        self.autopilot_silent = is_silent;
+    }
+
     /// Chooses a waypoint if there is none or the last one is reached.
     pub fn steer(&mut self) {
         if self.durable.hold || self.done {
@@ -365,6 +379,7 @@ impl Vehicle {
         };
         VehicleStatus {
             mode,
+            autopilot_silent: self.autopilot_silent,
             x_m,
             y_m,
             depth_m: self.navigator.depth_m(),
@@ -375,6 +390,7 @@ impl Vehicle {
             epoch: self.durable.epoch,
             labels: self.labels,
             explored_cells: self.explored,
+            placement: self.navigator.placement(),
             ..VehicleStatus::default()
         }
     }

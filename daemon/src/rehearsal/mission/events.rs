@@ -87,6 +87,7 @@ impl Mission {
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::RefineRate(words_per_s) => self.mapper.set_refine_rate(words_per_s),
                 VehicleOutput::Applied(applied) => self.applied.push(applied),
+                VehicleOutput::Fixed(..) => {}
             }
         }
         while let Some(output) = self.surface.poll_output() {

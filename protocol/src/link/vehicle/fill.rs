@@ -49,7 +49,7 @@ impl<S: StateSource> VehicleLink<S> {
         status.refused_frames = self.pair.stats.refused().min(255) as u8;
         let share = |bytes: usize| Duration::from_secs_f64(bytes as f64 * 160.0 / f64::from(status.budget_bps.max(1)));
         if now >= self.report_due {
-            let bytes = status.encode_report();
+            let bytes = status.encode_report_within(room_for_payload(builder.room()));
             if builder.push(ChunkKind::Report, &bytes) {
                 self.report_due = now + self.config.status_period.max(share(bytes.len()));
                 carried.push((Part::Report, bytes.len()));
