@@ -208,7 +208,7 @@ mod tests {
         pilot.set_goal(Some(Goal { east_m: 30.0, north_m: 40.0, depth_m: Some(12.0), place }), at(1.0));
         pilot.handle_timeout(at(1.0));
         let lines = said(&mut pilot);
-        assert_eq!(lines[0], "$SCWPL,2930.00000,N,03455.20000,E,SC*22\r\n");
+        assert_eq!(lines[0], "$SCWPL,2930.00000,N,03455.20000,E,SC*51\r\n");
         assert!(lines[1].starts_with("$SCRMB,A,0.00,L,,SC,2930.00000,N,03455.20000,E,0.027,36.9,,V*"), "{}", lines[1]);
         assert!(lines[2].starts_with("$PSCWP,30.0,40.0,12.0*"));
         assert!(lines.iter().all(|l| nmea::fields(l.as_bytes()).is_ok() && l.len() <= 82), "{lines:?}");

@@ -8,8 +8,8 @@ use clap::Args;
 use std::path::PathBuf;
 
 /// How far off the vehicle's position is over 3 km, with a drift of 1 % of the way: by dead reckoning alone, with a fix
-/// each 10 s of which 10 % are lost, and with 10 % of the fixes outliers (echoes at the USBL head, a GPS led astray).
-/// Takes some seconds; the same seed gives the same figures.
+/// each 10 s of which 10 % are lost, and with 10 % of the fixes outliers: echoes at the USBL head, a GPS led astray, fixes
+/// that nothing at the surface shows to be wrong. Takes some seconds; the same seed gives the same figures.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench localisation --seed 3 --out tracks")]
 pub(super) struct LocalisationBench {
@@ -54,7 +54,7 @@ fn print(found: &Localisation) {
     println!(" seed  without    with  ratio  with outliers  ratio   sent  used  refused by relay  by vehicle");
     for r in &found.runs {
         let count = |name| r.outliers.get(name).copied().unwrap_or(0);
-        let at_relay: u64 = ["depth", "outlier", "range_only", "too_vague", "gps"].into_iter().map(count).sum();
+        let at_relay: u64 = ["depth", "outlier", "range_only", "too_vague", "unreadable", "no_gps"].into_iter().map(count).sum();
         println!(
             "{:>5} {:>8.2} {:>7.2} {:>6.3} {:>14.2} {:>6.3} {:>6} {:>5} {:>17} {:>11}",
             r.seed,

@@ -130,7 +130,8 @@ fn run(seed: u64) -> LocalisationRun {
     }
 }
 
-/// A way of 3 km in which a share of the fixes are outliers, half of them echoes and half a GPS that is led astray.
+/// A way of 3 km in which a share of the fixes are outliers: in equal parts echoes at the head, a GPS that is led astray,
+/// and fixes that are off although neither was noticed.
 pub fn fly_with_outliers(seed: u64, outliers: f64) -> (Tracks, BTreeMap<&'static str, u64>) {
     Way::new(seed, outliers).fly()
 }
@@ -142,6 +143,8 @@ enum Outlier {
     Echo(f64, f64),
     /// The GPS is led astray: direction and distance, each 0..1.
     Astray(f64, f64),
+    /// The relay was fooled: what it sends is off by so much east and north, metres.
+    Fooled(f64, f64),
 }
 
 /// What chance does to a fix.
@@ -156,10 +159,11 @@ impl Lot {
     /// As many draws whatever comes out, so that runs with and without outliers meet the same noise.
     fn draw(dice: &mut Stream, outliers: f64) -> Self {
         let [lot, kind, a, b, loss, wait] = [(); 6].map(|()| dice.uniform());
-        let outlier = if kind < 0.5 {
-            Outlier::Astray(a, b)
-        } else {
-            Outlier::Echo(a * std::f64::consts::TAU, (1.0 - 2.0 * b).asin())
+        let turn = a * std::f64::consts::TAU;
+        let outlier = match (kind * 3.0) as u32 {
+            0 => Outlier::Astray(a, b),
+            1 => Outlier::Echo(turn, (1.0 - 2.0 * b).asin()),
+            _ => Outlier::Fooled((15.0 + 185.0 * b) * turn.sin(), (15.0 + 185.0 * b) * turn.cos()),
         };
         Self { outlier: (lot < outliers).then_some(outlier), is_lost: loss < LOSS, wait_s: wait * LONGEST_WAIT_S }
     }
@@ -251,7 +255,10 @@ impl Way {
             (sighting.bearing_rad, sighting.elevation_rad) = (bearing_rad, elevation_rad);
         }
         let told = now + UsblConfig::default().latency;
-        let Some(fix) = self.ship.sight(&sighting, DEPTH_M, told) else { return };
+        let Some(mut fix) = self.ship.sight(&sighting, DEPTH_M, told) else { return };
+        if let Some(Outlier::Fooled(east, north)) = lot.outlier {
+            (fix.x_m, fix.y_m) = (fix.x_m + east, fix.y_m + north);
+        }
         *self.counts.entry("sent").or_default() += 1;
         if lot.is_lost {
             return;

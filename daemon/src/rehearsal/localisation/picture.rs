@@ -29,8 +29,8 @@ pub fn picture(tracks: &Tracks, title: &str) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {total:.0}\" font-family=\"sans-serif\" \
          font-size=\"15\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
     );
-    svg += &line(&tracks.ship, "#c8c8c8", "stroke-width=\"1.5\"");
-    svg += &line(&tracks.truth, "#222", "stroke-width=\"5\" stroke-opacity=\"0.35\"");
+    svg += &line(&tracks.ship, "#b7a3d9", "stroke-width=\"1.5\"");
+    svg += &line(&tracks.truth, "#b0b0b0", "stroke-width=\"5\"");
     svg += &line(&tracks.reckoned, "#d1495b", "stroke-width=\"2\" stroke-dasharray=\"7 4\"");
     svg += &line(&tracks.relayed, "#00798c", "stroke-width=\"2\"");
     for (place, used) in &tracks.fixes {
@@ -50,14 +50,14 @@ fn legend(tracks: &Tracks, title: &str, scale: f64, top: f64) -> String {
     let bar = 100.0 * scale;
     let mut text = format!("<text x=\"{MARGIN}\" y=\"{:.0}\" font-weight=\"bold\">{title}</text>\n", top + 8.0);
     let entries = [
-        ("#222", "where it was".to_owned()),
+        ("#b0b0b0", "where it was".to_owned()),
         ("#d1495b", format!("dead reckoning, mean error {}", error(&tracks.reckoned))),
         ("#00798c", format!("with the relay and its fixes, mean error {}", error(&tracks.relayed))),
-        ("#c8c8c8", "the surface vehicle".to_owned()),
+        ("#b7a3d9", "the surface vehicle".to_owned()),
         ("#edae49", "fix that the vehicle refused".to_owned()),
     ];
     for (i, (colour, what)) in entries.iter().enumerate() {
-        let (x, y) = (MARGIN + (i % 2) as f64 * 300.0, top + 32.0 + (i / 2) as f64 * 22.0);
+        let (x, y) = (MARGIN + (i % 2) as f64 * 400.0, top + 32.0 + (i / 2) as f64 * 22.0);
         let _ = write!(
             text,
             "<rect x=\"{x:.0}\" y=\"{:.0}\" width=\"18\" height=\"5\" fill=\"{colour}\"/>\
