@@ -13,5 +13,6 @@ pub mod picture;
 mod problem;
 pub mod rehearsal;
 pub mod runtime;
+mod scene;
 
 pub use problem::Problem;

@@ -108,6 +108,9 @@ fn every_command_has_help_with_an_example() {
         &["map", "decode"],
         &["map", "bench"],
         &["map", "train-prior"],
+        &["scene", "run"],
+        &["scene", "sample"],
+        &["vocabulary", "train"],
     ] {
         let output = run(&[command, &["--help"]].concat());
         assert!(output.status.success());

@@ -10,7 +10,9 @@ mod key;
 mod map;
 mod node;
 mod progress;
+mod scene;
 mod sim;
+mod vocabulary;
 
 use crate::problem::Problem;
 use clap::{Parser, Subcommand};
@@ -42,6 +44,12 @@ enum Command {
     /// Code label maps as the stream does, and measure it.
     #[command(subcommand)]
     Map(map::Map),
+    /// Run the scene model over files.
+    #[command(subcommand)]
+    Scene(scene::Scene),
+    /// Make the vocabularies that images are put into words with.
+    #[command(subcommand)]
+    Vocabulary(vocabulary::Vocabulary),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -56,6 +64,8 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
+        Command::Scene(scene) => scene.run(),
+        Command::Vocabulary(vocabulary) => vocabulary.run(),
         Command::Config(print) => print.run(),
     }
 }

@@ -201,6 +201,10 @@ section! {
         refine_words_per_s: u32 = 50_000,
         /// Words kept a cell.
         max_words_per_cell: u32 = 200,
+        /// File of a trained vocabulary; empty = the one that ships.
+        vocabulary: String = String::new(),
+        /// Seconds of mission time between two checkpoints; 0 = none.
+        checkpoint_s: f64 = 60.0,
     }
 }
 section! {

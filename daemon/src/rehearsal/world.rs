@@ -102,7 +102,7 @@ fn mirror(at: f64, size: u32) -> u32 {
     (if p < i64::from(size) { p } else { period - 1 - p }) as u32
 }
 
-fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
+pub(crate) fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
     let bytes = std::fs::read(path).map_err(|e| Problem::file(path, e))?;
     // The decoder fills the missing part of a cut JPEG with grey, which would be surveyed as sea floor.
     let cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
@@ -118,7 +118,7 @@ fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
 }
 
 /// Classes from a grey or indexed image: the pixel value is the class.
-fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, Problem> {
+pub(crate) fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, Problem> {
     let bytes = std::fs::read(path).map_err(|e| Problem::file(path, e))?;
     let unreadable = |e| Problem::file(path, format!("not an image that can be read: {e}"));
     let indices = read_indices(&bytes, u64::from(u32::MAX)).map_err(unreadable)?;

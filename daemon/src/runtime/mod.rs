@@ -1,9 +1,13 @@
 //! The tokio shells around the roles: they move bytes, read the clock, keep files.
 
+mod checkpoint;
 mod clock;
 mod demo;
 mod durable;
+mod flight;
 mod journal;
+#[cfg(test)]
+mod kept_labels;
 mod mapping;
 mod pilot;
 mod port;
@@ -12,6 +16,7 @@ mod position;
 mod power_cuts;
 mod refusals;
 mod reload;
+mod restore;
 mod surface;
 mod vehicle;
 

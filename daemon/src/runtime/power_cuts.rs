@@ -1,6 +1,6 @@
 //! A vehicle whose power is cut at any step, and the surface that speaks to it.
 
-use super::durable::Keeper;
+use super::durable::{Keeper, Run};
 use super::journal::disk::{Chance, Disk, Step};
 use crate::asv::Surface;
 use crate::auv::{Area, Durable, MapUpdate, Vehicle, VehicleOutput};
@@ -264,8 +264,8 @@ fn start(
         if let Some(steps) = cuts.pop() {
             disk.cut_after(steps);
         }
-        match Keeper::begin_run(disk.clone()) {
-            Ok((keeper, durable)) => {
+        match Keeper::begin_run(disk.clone(), 1, None) {
+            Ok(Run { keeper, durable, .. }) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
                 let profile = ends::modem_of_process(config);
                 let seed = chance.below(1 << 30) as u64;

@@ -1,15 +1,14 @@
 //! `scenecast auv`
 
 use super::clock::Clock;
-use super::durable::Keeper;
+use super::durable::{Keeper, Run};
+use super::flight::Flight;
 use super::journal::Folder;
-use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
-use super::pilot::{Pilot, depth_m, next_of, origin};
+use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
-use crate::asv::position::TangentPlane;
-use crate::autopilot::Goal;
-use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
+use super::restore::{Start, start};
+use crate::auv::{Area, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
@@ -25,32 +24,29 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let config = load()?;
         warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
-        let folder = Folder::hold(dir).map_err(|e| Problem::file(dir, e))?;
-        let (keeper, durable) = Keeper::begin_run(folder)?;
+        let Start { run, mapper, keep } = start(&config, dir)?;
+        let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
         let recording = match config.camera.source.as_str() {
             "" => None,
-            source => Some(Recording::open(Recording::folder(source)?)?),
+            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
-        let epoch = durable.epoch;
-        let is_again = durable != Durable::default();
         let mut vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
         if is_again {
             vehicle.assume_budget_spent(clock.now());
         }
         let at_end = recording.is_some();
-        let camera = Camera::new(recording, clock);
-        let mapper = mapping::spawn(&config, epoch)?;
+        let camera = Camera::new(recording, clock, mapper.last_s());
+        let mapper = MapperThread::start(mapper, keep)?;
         let modem = modem::open(&config, profile).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        let flight = Flight {
-            pilot: Pilot::open(&config, clock)?,
-            plane: origin(&config)?.map(TangentPlane::new),
-            depth_m: depth_m(&config),
-        };
-        Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind: 0 }.run().await
+        let (stop, flight) = (Stop::new()?, Flight::open(&config, clock)?);
+        let (behind, missed) = (0, 0);
+        let host =
+            Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind, missed };
+        host.run(stop).await
     })
 }
 
@@ -60,12 +56,31 @@ fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, P
     area.ok_or_else(|| Problem::Input(missing.to_owned()))
 }
 
-/// What flies the vehicle, and where its world is.
-struct Flight {
-    pilot: Option<Pilot>,
-    plane: Option<TangentPlane>,
-    /// Of the survey, metres.
-    depth_m: f64,
+/// Who asks the process to end: a person or the system.
+struct Stop {
+    #[cfg(unix)]
+    terminate: tokio::signal::unix::Signal,
+}
+
+impl Stop {
+    fn new() -> Result<Self, Problem> {
+        Ok(Self {
+            #[cfg(unix)]
+            terminate: tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())
+                .map_err(|e| Problem::Failed(format!("SIGTERM: {e}")))?,
+        })
+    }
+
+    /// Returns when the process is to end.
+    async fn asked(&mut self) {
+        #[cfg(unix)]
+        tokio::select! {
+            _ = tokio::signal::ctrl_c() => {}
+            _ = self.terminate.recv() => {}
+        }
+        #[cfg(not(unix))]
+        let _ = tokio::signal::ctrl_c().await;
+    }
 }
 
 struct Host {
@@ -82,17 +97,20 @@ struct Host {
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
     behind: u32,
+    /// Camera frames that could not be read.
+    missed: u64,
 }
 
 impl Host {
-    async fn run(mut self) -> Result<(), Problem> {
+    async fn run(mut self, mut stop: Stop) -> Result<(), Problem> {
         loop {
             self.pump()?;
             let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
             let wake = wake.unwrap_or_else(|| self.clock.now() + std::time::Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => {
+                () = stop.asked() => {
                     self.modem.log_audit();
+                    self.mapper.finish();
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -104,19 +122,15 @@ impl Host {
                     }
                 },
                 config = self.reload.next() => self.follow(&config),
-                () = next_of(&mut self.flight.pilot) => self.handle_pilot(),
+                () = self.flight.next() => self.flight.steer(&mut self.vehicle),
                 mut frame = self.camera.next() => {
                     self.behind += 1;
-                    if self.flight.pilot.is_some() {
-                        // The autopilot says where the camera is, not the recording.
-                        let n = self.vehicle.navigator();
-                        (frame.x_m, frame.y_m) = n.position();
-                        (frame.heading_rad, frame.depth_m) = (n.heading_rad(), n.depth_m());
-                    }
+                    self.flight.place_camera(&self.vehicle, &mut frame);
                     let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
                 }
                 seen = self.mapper.seen.recv() => match seen {
-                    Some(seen) => self.handle_seen(seen?),
+                    Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
+                    Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
                     None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
                 },
             }
@@ -130,44 +144,33 @@ impl Host {
         self.vehicle.set_budget(budget, self.clock.now());
     }
 
-    /// Takes the way that the autopilot tells, and tells it where to go.
-    fn handle_pilot(&mut self) {
-        /// Fixes that are older do not tell the autopilot where it is, seconds.
-        const OLDEST_FIX_S: f64 = 60.0;
-        let now = self.clock.now();
-        let Some(pilot) = &mut self.flight.pilot else { return };
-        while let Some(step) = pilot.poll_step() {
-            self.vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
-        }
-        self.vehicle.set_autopilot_silent(pilot.health().is_silent());
-        let navigator = self.vehicle.navigator();
-        let (x, y) = navigator.position();
-        let (world_x, world_y) = navigator.world();
-        let goal = self.vehicle.waypoint().map(|(to_x, to_y)| {
-            let (east_m, north_m) = (to_x - x, to_y - y);
-            let place = self.flight.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
-            Goal { east_m, north_m, depth_m: Some(self.flight.depth_m), place }
-        });
-        pilot.set_goal(goal);
-        let is_fixed = navigator.last_fix().is_some_and(|at| now.since(at).as_secs_f64() < OLDEST_FIX_S);
-        if let (true, Some(plane)) = (is_fixed, &self.flight.plane) {
-            pilot.handle_place(plane.to_place(world_x, world_y), navigator.sigma_m());
-        }
-    }
-
     fn handle_seen(&mut self, seen: Seen) {
         let now = self.clock.now();
-        self.behind -= 1;
-        let f = &seen.frame;
-        if self.flight.pilot.is_none() {
-            self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+        if let Some(f) = &seen.frame {
+            self.behind -= 1;
+            if !self.flight.is_piloted() {
+                self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+            }
         }
         self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
+        self.finish_at_end();
+    }
+
+    /// One bad frame does not end a mission.
+    fn handle_missed(&mut self, problem: &Problem) {
+        self.behind -= 1;
+        self.missed += 1;
+        tracing::error!("a camera frame was passed over, {} so far: {problem}", self.missed);
+        self.finish_at_end();
+    }
+
+    fn finish_at_end(&mut self) {
         if self.at_end && self.behind == 0 && self.camera.is_over() {
             self.at_end = false;
             tracing::info!("the recorded mission has ended");
             self.vehicle.finish_survey();
+            let _ = self.mapper.orders.send(ToMapper::Keep);
         }
     }
 

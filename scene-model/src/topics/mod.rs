@@ -24,6 +24,7 @@ mod schedule;
 
 pub use checkpoint::CheckpointError;
 pub use config::{Birth, ConfigError, SceneConfig};
+pub use grid::{centre_of, coord_of};
 pub use kernel::Kernel;
 pub use label_map::FlatCell;
 pub use labels::TopicId;

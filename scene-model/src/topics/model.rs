@@ -272,6 +272,11 @@ impl SceneModel {
         self.fresh_map().flatten(&self.cells)
     }
 
+    /// The label of every cell in three dimensions, sorted by (y, x), then from top to bottom.
+    pub fn label_volume(&self) -> Vec<FlatCell> {
+        self.fresh_map().volume(&self.cells)
+    }
+
     #[cfg(test)]
     pub(crate) fn parts(&self) -> (&Cells, &Labels) {
         (&self.cells, &self.labels)

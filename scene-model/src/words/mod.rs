@@ -79,6 +79,13 @@ pub struct Measures {
     texture: [Moments; 3],
 }
 
+impl Measures {
+    /// How many words of each kind a cell gets.
+    pub fn config(&self) -> &WordConfig {
+        &self.config
+    }
+}
+
 /// First id of the `kind`-th vocabulary: colour, context, spread, texture, binary, none.
 fn first_id(kind: usize) -> u32 {
     let sizes = [colour::SIZE, context::SIZE, context::SPREAD_SIZE, texture::SIZE, binary::SIZE];
@@ -129,14 +136,14 @@ impl WordExtractor {
 
     /// Measures learnt from a set of images before a mission, frozen: tones from all of them first, then the rest.
     ///
-    /// Each image comes with the edge of a cell in its pixels; those that [`WordExtractor::extract`] would refuse are
-    /// passed over.
-    pub fn train(config: &WordConfig, images: &[(RgbImage, f32)]) -> Measures {
+    /// `images` is called twice and gives the same images each time, so that not all of them are held at once. Each
+    /// comes with the edge of a cell in its pixels; those that [`WordExtractor::extract`] would refuse are passed over.
+    pub fn train<I: Iterator<Item = (RgbImage, f32)>>(config: &WordConfig, images: impl Fn() -> I) -> Measures {
         let mut extractor = Self::new(config);
-        let usable = || images.iter().filter(|(image, cell_px)| is_usable(image, *cell_px));
-        usable().for_each(|(image, _)| extractor.stretch.learn(image));
+        let usable = || images().filter(|(image, cell_px)| is_usable(image, *cell_px));
+        usable().for_each(|(image, _)| extractor.stretch.learn(&image));
         for (image, cell_px) in usable() {
-            extractor.words(image, *cell_px, true);
+            extractor.words(&image, cell_px, true);
         }
         extractor.frames = u32::MAX;
         extractor.measures()
@@ -320,7 +327,7 @@ mod tests {
     #[test]
     fn trained_measures_stand_still() {
         let images = [(speckle(100, 80), 20.0), (RgbImage::from_pixel(50, 50, Rgb([200, 9, 9])), 20.0)];
-        let measures = WordExtractor::train(&WordConfig::default(), &images);
+        let measures = WordExtractor::train(&WordConfig::default(), || images.iter().cloned());
         let mut extractor = WordExtractor::from_measures(measures);
         let first = extractor.extract(&images[0].0, 20.0);
         extractor.extract(&images[1].0, 20.0);

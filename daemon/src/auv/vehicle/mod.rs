@@ -27,6 +27,10 @@ pub struct Durable {
     pub inbox: SlotInboxState,
     /// Epoch of the label ids in use.
     pub epoch: u8,
+    /// Label ids of the epoch that may have been told: 1 to this.
+    pub labels: u8,
+    /// Random number of the mission, by which its checkpoints are known.
+    pub lineage: u64,
     /// Utility in force: epoch, exploration, curiosity, weights.
     pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
     /// Whether the vehicle is told to hold.
@@ -223,6 +227,11 @@ impl Vehicle {
         if update.epoch != self.durable.epoch {
             self.begin_epoch(update.epoch, now);
         }
+        if update.labels > self.durable.labels {
+            // Before the surface can hear of them: after a restart they keep their meaning or have none.
+            self.durable.labels = update.labels;
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
         self.labels = update.labels;
         self.explored = update.cells.len() as u32;
         let cells = update.cells.iter().copied();
@@ -238,7 +247,7 @@ impl Vehicle {
     fn begin_epoch(&mut self, epoch: u8, now: Instant) {
         self.link.begin_epoch(now);
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
-        self.durable.epoch = epoch;
+        (self.durable.epoch, self.durable.labels) = (epoch, 0);
         self.utility = None;
         self.requests = Requests::default();
         self.forget_answers();

@@ -92,7 +92,7 @@ impl Mission {
         let now = Instant::ZERO;
         let recording = match config.camera.source.as_str() {
             "" => None,
-            source => Some(Recording::open(Recording::folder(source)?)?),
+            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref(), &world);
         if recording.is_none() && !overlap(&area, &world.area()) {
