@@ -7,8 +7,8 @@ use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, Reader, Seal, SessionId,
-    Placement, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
+    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, Placement, Reader, Seal,
+    SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -316,11 +316,8 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         (
             "the same with a placement: version 2, 12.5 m east, -0.1 m north",
-            VehicleStatus {
-                placement: Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 }),
-                ..status()
-            }
-            .encode_report(),
+            VehicleStatus { placement: Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 }), ..status() }
+                .encode_report(),
         ),
         (
             "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",

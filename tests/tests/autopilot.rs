@@ -1,8 +1,8 @@
 //! The vehicle and an autopilot built on pymavlink that behaves as ArduSub does.
 
+use scenecast::asv::position::LatLon;
 use scenecast::autopilot::mavlink::MavlinkConfig;
 use scenecast::autopilot::{Autopilot, Goal, Health, Mavlink};
-use scenecast::asv::position::LatLon;
 use scenecast_protocol::time::Instant;
 use scenecast_tests::{Process, free_port, http, scratch, wait_until, workspace};
 use serde_json::Value;
@@ -196,7 +196,9 @@ fn a_vehicle_flies_its_survey_on_ardusub_and_says_so_when_it_goes_silent() {
         status().is_some_and(|s| s["x_m"].as_f64() > Some(8.0) && s["autopilot_silent"] == false)
     });
     peer.order("silent");
-    wait_until("the operator sees that it is silent", limit, || status().is_some_and(|s| s["autopilot_silent"] == true));
+    wait_until("the operator sees that it is silent", limit, || {
+        status().is_some_and(|s| s["autopilot_silent"] == true)
+    });
     let at = status().unwrap()["at_s"].as_f64();
     wait_until("the link goes on", limit, || status().is_some_and(|s| s["at_s"].as_f64() > at));
     peer.order("speak");

@@ -10,7 +10,7 @@ use std::time::Duration;
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// A surface with a GPS at `gps`, its page, and what the page says of the position.
-fn surface(name: &str, gps: &str) -> (Process, impl Fn() -> Value) {
+fn surface(name: &str, gps: &str) -> (Process, impl Fn() -> Value + use<>) {
     let dir = scratch(name);
     let page = free_port();
     let text = format!(

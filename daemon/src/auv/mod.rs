@@ -15,4 +15,4 @@ pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
 pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use navigator::{FixVerdict, Navigator};
 pub use steering::{Area, Footprint, Steering};
-pub use vehicle::{AppliedSlot, Durable, Vehicle, VehicleOutput};
+pub use vehicle::{AppliedSlot, Durable, LastPlace, Vehicle, VehicleOutput};

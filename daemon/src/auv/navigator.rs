@@ -3,6 +3,7 @@
 mod filter;
 mod odometer;
 
+use super::vehicle::LastPlace;
 use filter::Filter;
 use odometer::Odometer;
 use scenecast_protocol::time::Instant;
@@ -24,6 +25,8 @@ pub struct Navigator {
     odometer: Odometer,
     placement: Option<Placement>,
     last_fix: Option<Instant>,
+    /// Whether it has been elsewhere than it knows: the first fix tells where on its map it is.
+    is_lost: bool,
     /// Fixes that were refused though each agreed with the one before, and by how much the last one was off.
     refused: (u32, (f64, f64)),
 }
@@ -57,6 +60,8 @@ impl Navigator {
     const AGREEING: u32 = 4;
     /// The placement is told anew when it has moved by so much, metres.
     const WORTH_TELLING_M: f64 = 0.2;
+    /// How far it may have drifted while it was off, metres.
+    const RESUMED_SIGMA_M: f64 = 50.0;
     /// Farther from the origin is no mission, metres.
     const FARTHEST_M: f64 = 800_000.0;
 
@@ -70,8 +75,19 @@ impl Navigator {
             odometer: Odometer::default(),
             placement: None,
             last_fix: None,
+            is_lost: false,
             refused: (0, (0.0, 0.0)),
         }
+    }
+
+    /// On a map of an earlier run, about where that was at its last fix; the first fix moves the vehicle, not the map.
+    pub fn resume(last: LastPlace, depth_m: f64, drift: f64) -> Self {
+        let (x, y) = last.at();
+        let mut navigator = Self::new(x, y, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
+        let (world_x, world_y) = last.placement().map_or((x, y), |p| p.to_world((x, y)));
+        navigator.filter.shift(world_x - x, world_y - y);
+        (navigator.placement, navigator.is_lost) = (last.placement(), true);
+        navigator
     }
 
     /// At its start within a standard deviation, metres.
@@ -128,6 +144,7 @@ impl Navigator {
 
     /// The position in the map's frame is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        self.is_lost = false;
         let (dx, dy) = (x_m - self.at.0, y_m - self.at.1);
         (self.at, self.heading_rad, self.depth_m) = ((x_m, y_m), heading_rad, depth_m);
         self.filter.shift(dx, dy);
@@ -150,6 +167,10 @@ impl Navigator {
         self.refused = (0, (0.0, 0.0));
         self.filter.correct(&since, (x_m, y_m), sigma);
         self.last_fix = Some(now);
+        if std::mem::take(&mut self.is_lost) {
+            let world = self.filter.position();
+            self.at = self.placement.map_or(world, |p| p.to_map(world));
+        }
         self.place();
         FixVerdict::Used
     }
@@ -263,7 +284,8 @@ mod tests {
     #[test]
     fn fixes_that_agree_with_each_other_are_believed_in_the_end() {
         let mut nav = under_way();
-        let verdicts: Vec<_> = (0..6).map(|i| nav.handle_fix(60.0, 200.0, 1.0, at(60.0), at(61.0 + f64::from(i)))).collect();
+        let verdicts: Vec<_> =
+            (0..6).map(|i| nav.handle_fix(60.0, 200.0, 1.0, at(60.0), at(61.0 + f64::from(i)))).collect();
         assert_eq!(verdicts[..4], [FixVerdict::Outlier, FixVerdict::Outlier, FixVerdict::Outlier, FixVerdict::Used]);
         assert!((nav.world().1 - 200.0).abs() < 2.0, "{:?}", nav.world());
     }

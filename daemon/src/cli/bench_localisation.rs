@@ -35,7 +35,8 @@ impl LocalisationBench {
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, e))?;
             let (tracks, _) = fly_with_outliers(self.seed, 0.1);
-            let title = format!("3 km, drift 1 % of the way, a fix each 10 s, 10 % lost, 10 % outliers; seed {}", self.seed);
+            let title =
+                format!("3 km, drift 1 % of the way, a fix each 10 s, 10 % lost, 10 % outliers; seed {}", self.seed);
             write_whole(&dir.join("localisation.svg"), picture(&tracks, &title).as_bytes())?;
         }
         if self.json {
@@ -54,7 +55,8 @@ fn print(found: &Localisation) {
     println!(" seed  without    with  ratio  with outliers  ratio   sent  used  refused by relay  by vehicle");
     for r in &found.runs {
         let count = |name| r.outliers.get(name).copied().unwrap_or(0);
-        let at_relay: u64 = ["depth", "outlier", "range_only", "too_vague", "unreadable", "no_gps"].into_iter().map(count).sum();
+        let at_relay: u64 =
+            ["depth", "outlier", "range_only", "too_vague", "unreadable", "no_gps"].into_iter().map(count).sum();
         println!(
             "{:>5} {:>8.2} {:>7.2} {:>6.3} {:>14.2} {:>6.3} {:>6} {:>5} {:>17} {:>11}",
             r.seed,

@@ -3,11 +3,13 @@
 mod key_file;
 mod keys;
 mod load;
+mod place;
 mod print;
 
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
+pub use place::{Place, autopilot_place, origin, position_places};
 pub use print::print;
 
 use scenecast_protocol::schedule::Shares;

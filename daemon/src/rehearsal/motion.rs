@@ -107,7 +107,8 @@ impl Motion {
             let most = self.turn_rate.map_or(f64::MAX, |rate| rate * dt_s);
             // On a target that lies within its turning circle it would go round for ever: there it turns on the spot.
             let is_near = self.turn_rate.is_some_and(|rate| to_x.hypot(to_y) < 2.0 * self.speed_m_s / rate);
-            self.heading_rad = if is_near || off.abs() <= most { to_x.atan2(to_y) } else { self.heading_rad + off.signum() * most };
+            self.heading_rad =
+                if is_near || off.abs() <= most { to_x.atan2(to_y) } else { self.heading_rad + off.signum() * most };
         }
         let (sin, cos) = self.heading_rad.sin_cos();
         // It believes to go straight at the target; the compass error turns the true way.

@@ -1,11 +1,11 @@
 //! The vehicle and what flies it.
 
 use super::clock::Clock;
-use super::pilot::{Pilot, depth_m, next_of, origin};
+use super::pilot::{Pilot, depth_m, next_of};
 use crate::asv::position::TangentPlane;
 use crate::autopilot::Goal;
 use crate::auv::Vehicle;
-use crate::config::Config;
+use crate::config::{Config, origin};
 use crate::problem::Problem;
 use crate::rehearsal::RecordedFrame;
 

@@ -1,11 +1,11 @@
 //! An autopilot at its port.
 
 use super::clock::Clock;
-use super::port::{FromPort, Place, Port};
+use super::port::{FromPort, Port};
 use crate::asv::position::LatLon;
 use crate::autopilot::mavlink::MavlinkConfig;
 use crate::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Rehearsed, Step};
-use crate::config::Config;
+use crate::config::{Config, autopilot_place};
 use crate::problem::Problem;
 use crate::rehearsal::Motion;
 use std::time::Duration;
@@ -18,39 +18,23 @@ pub(super) struct Pilot {
     health: Health,
 }
 
-/// The origin of the world that is configured, if any.
-pub(super) fn origin(config: &Config) -> Result<Option<LatLon>, Problem> {
-    let [lat_deg, lon_deg] = config.mission.origin_deg;
-    if [lat_deg, lon_deg] == [0.0; 2] {
-        return Ok(None);
-    }
-    let given = format!("mission.origin_deg = {:?}", config.mission.origin_deg);
-    let rule = "latitude from -90 to 90, longitude from -180 to 180 degrees, or both 0";
-    let place = LatLon::new(lat_deg, lon_deg);
-    place.map(Some).ok_or_else(|| Problem::Input(format!("{given} is not allowed: it takes {rule}")))
-}
-
 impl Pilot {
     /// The autopilot that is configured, if any.
     pub(super) fn open(config: &Config, clock: Clock) -> Result<Option<Self>, Problem> {
         let a = &config.autopilot;
         let now = clock.now();
         let silence = Duration::from_secs_f64(a.silence_s);
-        let place = |kinds: &[&str]| Place::parse("autopilot.port", &a.port, kinds);
-        let (autopilot, place): (Box<dyn Autopilot>, _) = match a.kind.as_str() {
+        let autopilot: Box<dyn Autopilot> = match a.kind.as_str() {
             "mavlink" => {
-                let place = place(&["serial", "udp", "udp-to", "tcp"])?;
                 let config = MavlinkConfig { system: a.system, arms: a.arm, silence };
-                (Box::new(Mavlink::new(config, now)), Some(place))
+                Box::new(Mavlink::new(config, now))
             }
-            "nmea" => {
-                let place = place(&["serial", "udp", "udp-to", "tcp"])?;
-                (Box::new(Nmea::new(true, silence, now)), Some(place))
-            }
-            "log" => (Box::new(Nmea::new(false, silence, now)), Some(place(&["file"])?)),
-            "rehearsal" => (Box::new(Rehearsed::new(motion(config), depth_m(config), now)), None),
+            "nmea" => Box::new(Nmea::new(true, silence, now)),
+            "log" => Box::new(Nmea::new(false, silence, now)),
+            "rehearsal" => Box::new(Rehearsed::new(motion(config), depth_m(config), now)),
             _ => return Ok(None),
         };
+        let place = autopilot_place(config)?;
         let port = place.map(|place| Port::open("autopilot", place, None));
         let health = autopilot.health(now);
         Ok(Some(Self { autopilot, port, clock, health }))

@@ -1,68 +1,14 @@
 //! Ports to instruments: serial devices, TCP, UDP and files, opened again whenever they fail.
 
-use crate::problem::Problem;
+use crate::config::Place;
 use bytes::Bytes;
 use std::io;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpStream, UdpSocket};
 use tokio::sync::mpsc;
 use tokio_serial::SerialPortBuilderExt;
-
-/// Where an instrument is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Place {
-    /// Device and speed.
-    Serial(String, u32),
-    /// HOST:PORT.
-    Tcp(String),
-    /// gpsd at HOST:PORT.
-    Gpsd(String),
-    /// Own ADDRESS:PORT; answers go to whoever spoke last.
-    Udp(String),
-    /// HOST:PORT.
-    UdpTo(String),
-    /// Lines are appended.
-    File(PathBuf),
-}
-
-impl Place {
-    /// Reads `kind:what`; `kinds` are the allowed ones. The error names the key.
-    pub(super) fn parse(key: &str, text: &str, kinds: &[&str]) -> Result<Self, Problem> {
-        let shown: Vec<String> = kinds.iter().map(|k| Self::form(k)).collect();
-        let wrong = || Problem::Input(format!("{key} = \"{text}\" is not allowed: it takes {}", shown.join(", ")));
-        let (kind, what) = text.split_once(':').filter(|(k, w)| kinds.contains(k) && !w.is_empty()).ok_or_else(wrong)?;
-        let address = || {
-            let port = what.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, p)| p.parse::<u16>().ok());
-            port.filter(|p| *p > 0).map(|_| what.to_owned()).ok_or_else(wrong)
-        };
-        Ok(match kind {
-            "serial" => match what.rsplit_once(':') {
-                Some((device, baud)) => {
-                    let baud = baud.parse().ok().filter(|b| (300..=4_000_000).contains(b)).ok_or_else(wrong)?;
-                    Self::Serial(device.to_owned(), baud)
-                }
-                None => return Err(wrong()),
-            },
-            "tcp" => Self::Tcp(address()?),
-            "gpsd" => Self::Gpsd(address()?),
-            "udp" => Self::Udp(address()?),
-            "udp-to" => Self::UdpTo(address()?),
-            _ => Self::File(PathBuf::from(what)),
-        })
-    }
-
-    fn form(kind: &str) -> String {
-        match kind {
-            "serial" => "serial:DEVICE:BAUD".to_owned(),
-            "file" => "file:PATH".to_owned(),
-            "udp" => "udp:ADDRESS:PORT".to_owned(),
-            kind => format!("{kind}:HOST:PORT"),
-        }
-    }
-}
 
 /// What a port tells.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -247,21 +193,4 @@ impl Keeper {
 
 fn timed_out() -> io::Error {
     io::ErrorKind::TimedOut.into()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_are_read_and_what_is_none_is_refused_with_what_is_allowed() {
-        let kinds = ["serial", "tcp", "gpsd"];
-        let parse = |text| Place::parse("position.gps", text, &kinds);
-        assert_eq!(parse("serial:/dev/ttyUSB0:4800").unwrap(), Place::Serial("/dev/ttyUSB0".to_owned(), 4800));
-        assert_eq!(parse("gpsd:localhost:2947").unwrap(), Place::Gpsd("localhost:2947".to_owned()));
-        for wrong in ["", "gpsd", "tcp:", "tcp:host", "tcp:host:99999", "serial:/dev/x", "serial:/dev/x:1", "udp:a:1"] {
-            let said = parse(wrong).unwrap_err().to_string();
-            assert!(said.contains("position.gps") && said.contains("serial:DEVICE:BAUD, tcp:HOST:PORT"), "{said}");
-        }
-    }
 }

@@ -1,12 +1,12 @@
 //! GPS, compass and autopilot of the surface vehicle.
 
 use super::clock::Clock;
-use super::pilot::{Pilot, next_of, origin};
-use super::port::{FromPort, Place, Port};
+use super::pilot::{Pilot, next_of};
+use super::port::{FromPort, Port};
 use crate::asv::Surface;
 use crate::asv::position::{Follow, GpsLanguage, Mounting, Relay, RelayConfig};
 use crate::autopilot::Goal;
-use crate::config::Config;
+use crate::config::{Config, Place, origin, position_places};
 use crate::problem::Problem;
 use scenecast_protocol::wire::Address;
 use std::time::Duration;
@@ -37,15 +37,7 @@ impl Position {
     /// Opens what is configured, and gives the surface its relay.
     pub(super) fn open(config: &Config, surface: &mut Surface, clock: Clock) -> Result<Self, Problem> {
         let p = &config.position;
-        let place = |key, text: &String, kinds: &[&str]| {
-            (!text.is_empty()).then(|| Place::parse(key, text, kinds)).transpose()
-        };
-        let gps = place("position.gps", &p.gps, &["serial", "tcp", "gpsd"])?;
-        let compass = place("position.compass", &p.compass, &["serial", "tcp"])?;
-        if p.follow && (gps.is_none() || config.autopilot.kind == "none") {
-            let what = "position.follow = true is not allowed without position.gps and an autopilot.kind";
-            return Err(Problem::Input(what.to_owned()));
-        }
+        let [gps, compass] = position_places(config)?;
         let language = if matches!(gps, Some(Place::Gpsd(_))) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
         if gps.is_some() {
             surface.set_relay(Relay::new(relay_config(config, language)?));

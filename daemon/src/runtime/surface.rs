@@ -45,7 +45,9 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         let position = Position::open(&config, &mut surface, clock)?;
         let vehicle = crate::ends::vehicle_address(&config)?;
         let refusals = Refusals::default();
-        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }.run().await
+        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }
+            .run()
+            .await
     })
 }
 

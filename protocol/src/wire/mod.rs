@@ -18,8 +18,8 @@ pub use cursor::{Reader, Truncated};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, Header, MissionId, SessionId};
 pub use number::unwrap_number;
-pub use stamp::Stamp;
 pub use placement::Placement;
+pub use stamp::Stamp;
 pub use status::{SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
 
 /// Version of the wire; a frame of another version is counted and dropped.

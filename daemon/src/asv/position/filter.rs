@@ -162,7 +162,9 @@ impl State {
     }
 
     fn correct(&mut self, seen: &Estimate) {
-        for (axis, (value, variance)) in [(seen.x_m, seen.cov_m2[0]), (seen.y_m, seen.cov_m2[2])].into_iter().enumerate() {
+        for (axis, (value, variance)) in
+            [(seen.x_m, seen.cov_m2[0]), (seen.y_m, seen.cov_m2[2])].into_iter().enumerate()
+        {
             let [place, both, velocity] = self.p[axis];
             let s = (place + variance).max(1e-9);
             let (k, kv) = (place / s, both / s);
@@ -207,7 +209,8 @@ mod tests {
         assert_eq!(filter.update(&Estimate::round(40.0, 0.0, 1.0), 20.0), Verdict::Outlier);
         assert_eq!(filter.update(&Estimate::round(-300.0, 0.0, 1.0), 21.0), Verdict::Outlier);
         assert_eq!(filter.update(&Estimate::round(0.5, 0.0, 1.0), 22.0), Verdict::Used);
-        let verdicts: Vec<_> = (23..28).map(|s| filter.update(&Estimate::round(40.0, 0.0, 1.0), f64::from(s))).collect();
+        let verdicts: Vec<_> =
+            (23..28).map(|s| filter.update(&Estimate::round(40.0, 0.0, 1.0), f64::from(s))).collect();
         assert_eq!(verdicts[3], Verdict::BeganAnew, "{verdicts:?}");
         assert!((filter.predict(28.0).unwrap().x_m - 40.0).abs() < 1.0);
     }

@@ -110,7 +110,10 @@ impl Gps {
 
     /// What was not used so far, by reason.
     pub fn faults(&self) -> impl Iterator<Item = (GpsFault, u64)> + '_ {
-        self.faults.iter().map(|(&f, &n)| (f, n)).chain((self.lines.overlong() > 0).then_some((GpsFault::Overlong, self.lines.overlong())))
+        self.faults
+            .iter()
+            .map(|(&f, &n)| (f, n))
+            .chain((self.lines.overlong() > 0).then_some((GpsFault::Overlong, self.lines.overlong())))
     }
 
     /// The last good position.
@@ -311,7 +314,8 @@ mod tests {
     fn gpsd_is_asked_to_watch_and_its_errors_count() {
         let mut gps = Gps::new(GpsLanguage::Gpsd);
         assert_eq!(gps.handle_open(), gpsd::WATCH);
-        let tpv = b"{\"class\":\"TPV\",\"mode\":3,\"lat\":29.5,\"lon\":34.92,\"eph\":3.92,\"track\":180.0,\"speed\":1.0}\r\n";
+        let tpv =
+            b"{\"class\":\"TPV\",\"mode\":3,\"lat\":29.5,\"lon\":34.92,\"eph\":3.92,\"track\":180.0,\"speed\":1.0}\r\n";
         let found = gps.handle_bytes(tpv, at(0.0));
         assert!((found[0].sigma_m - 2.0).abs() < 1e-9);
         assert_eq!(gps.heading_rad(at(0.0)), Some(std::f64::consts::PI));

@@ -103,7 +103,10 @@ mod tests {
         assert_eq!(parse(br#"{"class":"VERSION","release":"3.25","proto_major":3}"#), Some(Said::default()));
         let none = parse(br#"{"class":"TPV","mode":1}"#).unwrap();
         assert_eq!(none.sentences, [Sentence::NoPosition]);
-        assert_eq!(parse(br#"{"class":"ATT","heading":90.0}"#).unwrap().sentences, [Sentence::Heading(90f64.to_radians())]);
+        assert_eq!(
+            parse(br#"{"class":"ATT","heading":90.0}"#).unwrap().sentences,
+            [Sentence::Heading(90f64.to_radians())]
+        );
     }
 
     #[test]

@@ -111,7 +111,8 @@ fn rmc<'a>(f: &impl Fn(usize) -> &'a str) -> Result<Vec<Sentence>, NmeaError> {
         return Ok(vec![Sentence::NoPosition]);
     }
     let place = place(f(3), f(4), f(5), f(6))?.ok_or(NmeaError::Field)?;
-    let at = Sentence::Position { place, utc_s: time(f(1))?, hdop: None, is_corrected: matches!(f(12), "D" | "R" | "F") };
+    let at =
+        Sentence::Position { place, utc_s: time(f(1))?, hdop: None, is_corrected: matches!(f(12), "D" | "R" | "F") };
     let motion = motion(number(f(7))?.map(|knots| knots * KNOT_M_S), number(f(8))?)?;
     Ok(std::iter::once(at).chain(motion).collect())
 }
@@ -194,9 +195,13 @@ mod tests {
         assert_eq!((utc_s, hdop, is_corrected), (Some(34_045.0), Some(1.01), false));
         let rmc = b"$GPRMC,083559.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A*57";
         let said = parse(rmc).unwrap();
-        assert!(matches!(said[..], [Sentence::Position { .. }, Sentence::Motion { speed_m_s, .. }] if speed_m_s < 0.01));
+        assert!(
+            matches!(said[..], [Sentence::Position { .. }, Sentence::Motion { speed_m_s, .. }] if speed_m_s < 0.01)
+        );
         let vtg = b"$GPVTG,77.52,T,,M,0.004,N,0.008,K,A*06";
-        assert!(matches!(parse(vtg).unwrap()[..], [Sentence::Motion { course_rad: Some(c), .. }] if (c - 1.353).abs() < 1e-3));
+        assert!(
+            matches!(parse(vtg).unwrap()[..], [Sentence::Motion { course_rad: Some(c), .. }] if (c - 1.353).abs() < 1e-3)
+        );
         assert_eq!(parse(b"$GPZDA,082710.00,16,09,2002,00,00*64"), Ok(vec![Sentence::Time(30_430.0)]));
         let hdt = line("HEHDT,180.0,T");
         assert_eq!(parse(hdt.as_bytes()), Ok(vec![Sentence::Heading(std::f64::consts::PI)]));

@@ -185,7 +185,12 @@ impl Relay {
     ///
     /// It is the one measurement, not the filter's estimate: the vehicle filters too, with odometry that is better than
     /// any guess from here.
-    pub fn handle_usbl(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) -> Result<Option<Fix>, RelayFault> {
+    pub fn handle_usbl(
+        &mut self,
+        vehicle: Address,
+        sighting: &UsblSighting,
+        now: Instant,
+    ) -> Result<Option<Fix>, RelayFault> {
         let fix = self.fuse(vehicle, sighting, now);
         match fix {
             Err(fault) => *self.faults.entry(fault).or_default() += 1,

@@ -10,7 +10,8 @@ use scenecast_protocol::wire::Placement;
 /// pixel.
 pub fn world_file(plane: &TangentPlane, placement: Option<Placement>, bounds: Rect, cell_m: f64) -> String {
     let world = |column: f64, row: f64| {
-        let at = ((f64::from(bounds.x) + column) * cell_m, (f64::from(bounds.y) + f64::from(bounds.height) - row) * cell_m);
+        let at =
+            ((f64::from(bounds.x) + column) * cell_m, (f64::from(bounds.y) + f64::from(bounds.height) - row) * cell_m);
         let (x, y) = placement.map_or(at, |p| p.to_world(at));
         plane.to_place(x, y)
     };

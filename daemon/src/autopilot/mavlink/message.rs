@@ -159,7 +159,14 @@ impl Heard {
                 let (time_boot_ms, lat, lon) = (f.u32(), f.i32(), f.i32());
                 f.i32();
                 let relative_alt = f.i32();
-                Self::Global { time_boot_ms, lat, lon, relative_alt, velocity: [f.i16(), f.i16(), f.i16()], heading: f.u16() }
+                Self::Global {
+                    time_boot_ms,
+                    lat,
+                    lon,
+                    relative_alt,
+                    velocity: [f.i16(), f.i16(), f.i16()],
+                    heading: f.u16(),
+                }
             }
             77 => Self::Ack { command: f.u16(), result: f.u8() },
             253 => {

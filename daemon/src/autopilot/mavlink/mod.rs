@@ -214,7 +214,9 @@ impl Mavlink {
             self.ask_for_streams(now);
         }
         if was_in_command && !peer.is_in_command() {
-            self.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back".to_owned());
+            self.note(
+                "the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back".to_owned(),
+            );
         }
         self.was_in_command |= peer.is_in_command();
     }
@@ -365,7 +367,8 @@ impl Autopilot for Mavlink {
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
-        self.goal = goal.filter(|g| g.east_m.is_finite() && g.north_m.is_finite() && g.depth_m.is_none_or(f64::is_finite));
+        self.goal =
+            goal.filter(|g| g.east_m.is_finite() && g.north_m.is_finite() && g.depth_m.is_none_or(f64::is_finite));
     }
 
     fn handle_place(&mut self, place: LatLon, sigma_m: f64, now: Instant) {
@@ -384,7 +387,11 @@ impl Autopilot for Mavlink {
     fn counters(&self) -> Counters {
         let refused = self.deframer.refused();
         let mut counters = self.counters.clone();
-        let more = [("checksum", refused.checksum), ("incompatible", refused.incompatible), ("garbage_bytes", refused.garbage)];
+        let more = [
+            ("checksum", refused.checksum),
+            ("incompatible", refused.incompatible),
+            ("garbage_bytes", refused.garbage),
+        ];
         counters.extend(more.into_iter().filter(|(_, n)| *n > 0));
         counters
     }

@@ -74,9 +74,12 @@ fn a_target_is_said_anew_each_second_as_way_from_where_it_is() {
         pilot.handle_bytes(&heartbeat(4, true), at(f64::from(s)));
         pilot.handle_bytes(&local(1000 * s as u32, [jump, s as f32 + jump, 4.0], [0.0, 1.0, 0.0]), at(f64::from(s)));
         pilot.handle_timeout(at(f64::from(s)));
-        targets.extend(sent(&mut pilot).into_iter().filter(|(id, _)| *id == 84).map(|(_, p)| {
-            [4, 8, 12].map(|i| f32::from_le_bytes(p[i..i + 4].try_into().unwrap()))
-        }));
+        targets.extend(
+            sent(&mut pilot)
+                .into_iter()
+                .filter(|(id, _)| *id == 84)
+                .map(|(_, p)| [4, 8, 12].map(|i| f32::from_le_bytes(p[i..i + 4].try_into().unwrap()))),
+        );
     }
     assert_eq!(targets, [[0.0, 10.0, 5.0], [0.0, 10.0, 5.0], [100.0, 110.0, 5.0], [100.0, 110.0, 5.0]]);
     let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();

@@ -31,11 +31,7 @@ impl Odometer {
 
     pub(super) fn handle_way(&mut self, dx_m: f64, dy_m: f64, now: Instant, memory_s: f64) {
         let last = self.last();
-        let way = Way {
-            dx_m: last.dx_m + dx_m,
-            dy_m: last.dy_m + dy_m,
-            length_m: last.length_m + dx_m.hypot(dy_m),
-        };
+        let way = Way { dx_m: last.dx_m + dx_m, dy_m: last.dy_m + dy_m, length_m: last.length_m + dx_m.hypot(dy_m) };
         self.track.push_back((now, way));
         let is_old = |at: Instant| now.since(at).as_secs_f64() > memory_s;
         // One entry that is older stays: what is younger lies between it and the next.
@@ -69,11 +65,7 @@ impl Odometer {
             (None, None) => Way::default(),
         };
         let last = self.last();
-        Some(Way {
-            dx_m: last.dx_m - then.dx_m,
-            dy_m: last.dy_m - then.dy_m,
-            length_m: last.length_m - then.length_m,
-        })
+        Some(Way { dx_m: last.dx_m - then.dx_m, dy_m: last.dy_m - then.dy_m, length_m: last.length_m - then.length_m })
     }
 }
 

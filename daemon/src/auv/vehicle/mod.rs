@@ -1,6 +1,7 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
 mod obey;
+mod place;
 mod whole_png;
 
 use super::exemplar::{Exemplar, encode_webp};
@@ -16,6 +17,8 @@ use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use whole_png::WholePng;
+
+pub use place::LastPlace;
 
 /// Most bytes of a representative image.
 const EXEMPLAR_BYTES: usize = 700;
@@ -41,6 +44,8 @@ pub struct Durable {
     pub shares: Option<[u8; 5]>,
     /// Words to resample a second, if the operator has said so.
     pub refine_words_per_s: Option<u32>,
+    /// Where it was at its last fix.
+    pub place: Option<LastPlace>,
 }
 
 /// What the vehicle asks of its host.
@@ -157,11 +162,6 @@ impl Vehicle {
         &self.durable
     }
 
-    /// The position estimate.
-    pub fn navigator(&self) -> &Navigator {
-        &self.navigator
-    }
-
     /// The map as the vehicle sees it.
     pub fn map(&self) -> &LabelGrid {
         self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
@@ -195,11 +195,6 @@ impl Vehicle {
     /// An earlier run may have sent until `now`: the budget counts as spent.
     pub fn assume_budget_spent(&mut self, now: Instant) {
         self.link.assume_budget_spent(now);
-    }
-
-    /// Fixes that corrected the estimate.
-    pub fn fixes_applied(&self) -> u64 {
-        self.fixes_applied
     }
 
     /// The utility in force.
@@ -281,16 +276,6 @@ impl Vehicle {
                 self.answered.push(((label, serial), id));
             }
         }
-    }
-
-    /// Where it is going, east and north in the map's frame, metres.
-    pub fn waypoint(&self) -> Option<(f64, f64)> {
-        self.waypoint
-    }
-
-    /// Whether the autopilot does not answer; the status tells it.
-    pub fn set_autopilot_silent(&mut self, is_silent: bool) {
-        self.autopilot_silent = is_silent;
     }
 
     /// Chooses a waypoint if there is none or the last one is reached.

@@ -1,6 +1,6 @@
 //! What the vehicle does with a slot of the directive.
 
-use super::{Vehicle, VehicleOutput};
+use super::{LastPlace, Vehicle, VehicleOutput};
 use crate::auv::FixVerdict;
 use scenecast_protocol::directive::{Budget, RefusalReason, Slot, Utility};
 use scenecast_protocol::time::Instant;
@@ -41,6 +41,7 @@ impl Vehicle {
                 match self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now) {
                     FixVerdict::Used => {
                         self.fixes_applied += 1;
+                        self.durable.place = Some(LastPlace::of(&self.navigator));
                         self.outputs.push_back(VehicleOutput::Fixed(fix, taken));
                         Ok(())
                     }

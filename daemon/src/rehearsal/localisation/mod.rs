@@ -272,7 +272,9 @@ impl Way {
 
     fn deliver(&mut self, now: Instant) {
         for UnderWay { slot, arrives, travel } in self.under_way.extract_if(.., |u| u.arrives <= now) {
-            let Ok(VersionedSlot { content: Some(Slot::Fix(fix)), .. }) = VersionedSlot::decode(&slot) else { continue };
+            let Ok(VersionedSlot { content: Some(Slot::Fix(fix)), .. }) = VersionedSlot::decode(&slot) else {
+                continue;
+            };
             let taken = arrives - travel - Duration::from_secs_f64(fix.age_s);
             let verdict = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
             let name = if verdict == FixVerdict::Used { "used" } else { "refused_by_vehicle" };

@@ -18,7 +18,7 @@ pub fn picture(tracks: &Tracks, title: &str) -> String {
     let height = (north - south).max(1.0) * scale + 2.0 * MARGIN;
     let at = |&(x, y): &(f64, f64)| ((x - west) * scale + MARGIN, (north - y) * scale + MARGIN);
     let line = |way: &[(f64, f64)], colour: &str, style: &str| {
-        let points = way.iter().step_by(5).map(|p| at(p)).fold(String::new(), |mut all, (x, y)| {
+        let points = way.iter().step_by(5).map(&at).fold(String::new(), |mut all, (x, y)| {
             let _ = write!(all, "{x:.1},{y:.1} ");
             all
         });
@@ -58,19 +58,19 @@ fn legend(tracks: &Tracks, title: &str, scale: f64, top: f64) -> String {
     ];
     for (i, (colour, what)) in entries.iter().enumerate() {
         let (x, y) = (MARGIN + (i % 2) as f64 * 400.0, top + 32.0 + (i / 2) as f64 * 22.0);
-        let _ = write!(
+        let _ = writeln!(
             text,
             "<rect x=\"{x:.0}\" y=\"{:.0}\" width=\"18\" height=\"5\" fill=\"{colour}\"/>\
-             <text x=\"{:.0}\" y=\"{y:.0}\">{what}</text>\n",
+             <text x=\"{:.0}\" y=\"{y:.0}\">{what}</text>",
             y - 8.0,
             x + 24.0
         );
     }
     let (x, y) = (WIDTH - MARGIN - bar, top + 76.0);
-    let _ = write!(
+    let _ = writeln!(
         text,
         "<path d=\"M{x:.1} {y:.0}h{bar:.1}\" stroke=\"#222\" stroke-width=\"3\"/>\
-         <text x=\"{x:.1}\" y=\"{:.0}\">100 m, north up</text>\n",
+         <text x=\"{x:.1}\" y=\"{:.0}\">100 m, north up</text>",
         y - 8.0
     );
     text

@@ -1,6 +1,8 @@
 //! The surface vehicle of a rehearsed localisation: its GPS, its compass, its relay, and its way above the vehicle.
 
-use crate::asv::position::{Follow, GpsLanguage, LatLon, Mounting, Relay, RelayConfig, TangentPlane, UsblSighting, nmea};
+use crate::asv::position::{
+    Follow, GpsLanguage, LatLon, Mounting, Relay, RelayConfig, TangentPlane, UsblSighting, nmea,
+};
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
