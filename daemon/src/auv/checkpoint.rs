@@ -1,6 +1,7 @@
 //! A mapper as bytes: the model with all that its labels and words mean.
 
 use super::mapper::Mapper;
+use super::relief::Relief;
 use crate::config::Config;
 use crate::problem::Problem;
 use scene_model::envelope::{Envelope, EnvelopeError};
@@ -34,13 +35,14 @@ pub enum NoCheckpoint {
 
 /// What is kept.
 #[derive(Serialize, Deserialize)]
-struct Kept<M, B, W, E> {
+struct Kept<M, B, W, E, R> {
     lineage: u64,
     last_s: Option<f64>,
     model: M,
     book: B,
     words: W,
     exemplars: E,
+    relief: R,
 }
 
 /// A mapper that goes on where a checkpoint left it, and the mission that it belongs to.
@@ -61,6 +63,7 @@ impl Mapper {
             book: &self.book,
             words: self.extractor.measures(),
             exemplars: &self.exemplars,
+            relief: &self.relief,
         };
         ENVELOPE.seal(&postcard::to_allocvec(&kept).unwrap_or_default())
     }
@@ -68,7 +71,7 @@ impl Mapper {
     /// Goes on from a checkpoint, if it was made with the parameters that are configured.
     pub fn restore(config: &Config, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
         let content = ENVELOPE.open(bytes)?;
-        let kept: Kept<Vec<u8>, LabelBook, Measures, ExemplarStore> =
+        let kept: Kept<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
             postcard::from_bytes(content).map_err(|_| NoCheckpoint::Inconsistent)?;
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, kept.book.epoch(), config.runtime.seed)?;
@@ -83,7 +86,7 @@ impl Mapper {
         let mut mapper = fresh;
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
-        (mapper.exemplars, mapper.last_s) = (kept.exemplars, kept.last_s);
+        (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
         mapper.flat = mapper.model.label_map();
         Ok(Restored { mapper, lineage: kept.lineage })
     }

@@ -1,5 +1,6 @@
 //! Camera frames to label map.
 
+use super::relief::Relief;
 use crate::config::Config;
 use crate::problem::Problem;
 use crate::scene::read_vocabulary;
@@ -9,7 +10,8 @@ use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, PlaneKind};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Edge of a representative image in pixels.
@@ -26,6 +28,8 @@ pub struct MapUpdate {
     pub epoch: u8,
     /// Labels of every explored cell.
     pub cells: Vec<(Cell, u8)>,
+    /// How sure the model is of these labels, 0 to 1, and the depths of the sea floor there, metres.
+    pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
     /// Labels given so far.
     pub labels: u8,
 }
@@ -38,6 +42,7 @@ pub struct Mapper {
     pub(super) model: SceneModel,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
+    pub(super) relief: Relief,
     refine_words_per_s: f64,
     configured_words_per_s: f64,
     pub(super) last_s: Option<f64>,
@@ -72,6 +77,7 @@ impl Mapper {
             vocabulary: extractor.vocabulary_size(),
             max_words_per_cell: config.scene.max_words_per_cell,
             seed,
+            ..SceneConfig::for_images()
         };
         Ok(Self {
             extractor,
@@ -83,6 +89,7 @@ impl Mapper {
             model: SceneModel::new(scene).map_err(|e| Problem::Input(format!("scene.{e}")))?,
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
+            relief: Relief::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             configured_words_per_s: f64::from(config.scene.refine_words_per_s),
             last_s: None,
@@ -103,6 +110,9 @@ impl Mapper {
         let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
         let observations = camera.project(image.width(), image.height(), pose, &words);
         self.model.insert(t_s, &observations);
+        for seen in &observations {
+            self.relief.add(Cell::new(self.cell(seen.x), self.cell(seen.y)), -seen.z);
+        }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.model.label_map();
@@ -113,9 +123,25 @@ impl Mapper {
 
     /// The map as it was published last.
     pub fn current(&self) -> MapUpdate {
-        let cells = self.book.shown().map(|(x, y, label)| (Cell::new(x, y), label)).collect();
+        let cells: Vec<_> = self.book.shown().map(|(x, y, label)| (Cell::new(x, y), label)).collect();
+        let planes = self.planes(&cells);
         let labels = self.book.labels().count() as u8;
-        MapUpdate { t_s: self.last_s.unwrap_or(0.0), epoch: self.book.epoch(), cells, labels }
+        MapUpdate { t_s: self.last_s.unwrap_or(0.0), epoch: self.book.epoch(), cells, planes, labels }
+    }
+
+    fn planes(&self, shown: &[(Cell, u8)]) -> BTreeMap<PlaneKind, Vec<(Cell, f64)>> {
+        let confidence =
+            shown.iter().filter_map(|&(cell, label)| Some((cell, self.confidence(cell, label)?))).collect();
+        let depth = shown.iter().filter_map(|&(cell, _)| Some((cell, self.relief.depth_m(cell)?))).collect();
+        BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)])
+    }
+
+    /// How sure the model is of the label that a cell shows; nothing while it holds the cell for another one.
+    fn confidence(&self, cell: Cell, label: u8) -> Option<f64> {
+        let at = self.flat.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).ok()?;
+        let flat = self.flat.get(at)?;
+        let is_shown = self.book.topic_of(label) == Some(flat.topic);
+        Some(if is_shown { f64::from(flat.confidence) } else { 0.0 })
     }
 
     /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.

@@ -7,6 +7,7 @@ mod checkpoint;
 mod exemplar;
 mod mapper;
 mod navigator;
+mod relief;
 mod steering;
 mod vehicle;
 

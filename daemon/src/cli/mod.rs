@@ -8,10 +8,12 @@ mod bench_localisation;
 mod demo;
 mod key;
 mod map;
+mod modem_sim;
 mod node;
 mod progress;
 mod scene;
 mod sim;
+mod tune;
 mod vocabulary;
 
 use crate::problem::Problem;
@@ -35,6 +37,8 @@ enum Command {
     Auv(node::Node),
     /// Run the surface: hold the operator's map, serve his page.
     Asv(node::Node),
+    /// Emulate modems in one water, each on a serial device or a TCP port of its own.
+    ModemSim(modem_sim::ModemSim),
     /// Measure.
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -50,6 +54,8 @@ enum Command {
     /// Make the vocabularies that images are put into words with.
     #[command(subcommand)]
     Vocabulary(vocabulary::Vocabulary),
+    /// Search the settings of the scene model that tell most about annotations of a similar site.
+    Tune(Box<tune::Tune>),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -61,11 +67,13 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Sim(sim) => sim.run(),
         Command::Auv(node) => node.run_vehicle(),
         Command::Asv(node) => node.run_surface(),
+        Command::ModemSim(sim) => sim.run(),
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
         Command::Scene(scene) => scene.run(),
         Command::Vocabulary(vocabulary) => vocabulary.run(),
+        Command::Tune(tune) => tune.run(),
         Command::Config(print) => print.run(),
     }
 }

@@ -1,9 +1,9 @@
 //! `scenecast vocabulary`
 
 use super::progress::Progress;
+use crate::imagery::read_image;
 use crate::picture::write_whole;
 use crate::problem::Problem;
-use crate::rehearsal::read_image;
 use clap::{Args, Subcommand};
 use image::RgbImage;
 use scene_model::words::{WordConfig, WordExtractor};

@@ -12,6 +12,7 @@ pub use load::load;
 pub use place::{Place, autopilot_place, origin, position_places};
 pub use print::print;
 
+use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Shares;
 use serde::{Deserialize, Serialize};
 
@@ -167,6 +168,12 @@ section! {
         settle_s: f64 = 0.0,
         /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0 = never.
         coarse_after_s: f64 = 0.0,
+        /// Planes that are sent beside the labels.
+        planes: Vec<String> = PlaneKind::ALL.map(|p| p.name().to_owned()).to_vec(),
+        /// Percent of the map's share for confidence and depth; 0 = what nobody else needs.
+        plane_shares: [u8; 2] = [0; 2],
+        /// Step of the plane of depths, metres.
+        depth_step_m: f64 = 0.5,
     }
 }
 section! {

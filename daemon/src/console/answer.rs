@@ -4,7 +4,7 @@ use super::base64;
 use crate::asv::{ExemplarState, Surface};
 use crate::picture;
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::{Rect, StateReplica};
+use scenecast_protocol::map::{PlaneKind, PlaneReplica, Rect, Replica};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -86,24 +86,93 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
 
 fn map(surface: &Surface, address: Address, cell_m: f64, now: Instant) -> Option<Value> {
     let grid = surface.map(address)?;
-    let replica = surface.view(address)?.replica();
+    let view = surface.view(address)?;
     let empty = Rect { x: 0, y: 0, width: 0, height: 0 };
     let bounds = grid.bounds().unwrap_or(empty);
-    let mut labels = Vec::with_capacity(bounds.area() as usize);
-    let mut ages = Vec::with_capacity(bounds.area() as usize * 2);
-    for cell in bounds.cells() {
-        labels.push(grid.get(cell));
-        let age = replica.heard(cell).map_or(u16::MAX, |at| now.since(at).as_secs().min(65_534) as u16);
-        ages.extend_from_slice(&age.to_le_bytes());
-    }
+    let labels: Vec<u8> = bounds.cells().map(|cell| grid.get(cell)).collect();
+    let planes = PlaneKind::ALL.into_iter().filter_map(|kind| Some(plane(kind, view.plane(kind)?, bounds, now)));
     Some(json!({
-        "version": replica.version(),
+        "version": view.map_version(),
         "x0": bounds.x,
         "y0": bounds.y,
         "width": bounds.width,
         "height": bounds.height,
         "cell_m": cell_m,
         "labels": base64::encode(&labels),
-        "age_s": base64::encode(&ages),
+        "age_s": base64::encode(&ages(view.replica(), bounds, now)),
+        "planes": planes.collect::<Vec<_>>(),
     }))
+}
+
+/// Seconds since each cell was heard of, two bytes each.
+fn ages(replica: &Replica, bounds: Rect, now: Instant) -> Vec<u8> {
+    let age = |cell| replica.heard(cell).map_or(u16::MAX, |at| now.since(at).as_secs().min(65_534) as u16);
+    bounds.cells().flat_map(|cell| age(cell).to_le_bytes()).collect()
+}
+
+/// A plane: the middle of each cell's level, 0 to 254 between those of the lowest and of the highest level, 255 not known.
+fn plane(kind: PlaneKind, replica: &PlaneReplica, bounds: Rect, now: Instant) -> Value {
+    let (scale, shown) = (replica.scale(), replica.levels().shown());
+    let levels: Vec<u8> = bounds.cells().map(|cell| shown.get(cell)).collect();
+    let known = || levels.iter().copied().filter(|&level| level > 0);
+    // A depth is shown on the scale of what there is, a confidence on its own.
+    let (lowest, highest) = match kind {
+        PlaneKind::Confidence => (1, scale.levels()),
+        PlaneKind::Depth => (known().min().unwrap_or(1), known().max().unwrap_or(1)),
+    };
+    let middle = |level: u8| scale.bounds(level).map_or(0.0, |(low, high)| (low + high) / 2.0);
+    let shade = |level: u8| match u32::from(level).checked_sub(u32::from(lowest)).filter(|_| level > 0) {
+        Some(above) => ((above * 254) as f64 / f64::from((highest - lowest).max(1))).round() as u8,
+        None => 255,
+    };
+    let step = scale.bounds(1).map_or(0.0, |(low, high)| high - low);
+    json!({
+        "name": kind.name(),
+        "unit": if kind == PlaneKind::Depth { "m" } else { "" },
+        "min": rounded(middle(lowest)),
+        "max": rounded(middle(highest)),
+        "step": rounded(step),
+        "data": base64::encode(&levels.iter().map(|&level| shade(level)).collect::<Vec<_>>()),
+        "age_s": base64::encode(&ages(replica.levels(), bounds, now)),
+    })
+}
+
+/// Without the noise of binary fractions.
+fn rounded(x: f64) -> f64 {
+    (x * 1000.0).round() / 1000.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::map::{Cell, PlaneChunk, PlaneScale, PlaneSource, StateSource};
+    use scenecast_protocol::map_codec::Codec;
+    use std::time::Duration;
+
+    /// The plane as the surface has it after everything was said at 10 s.
+    fn heard(scale: PlaneScale, cells: &[(Cell, f64)]) -> PlaneReplica {
+        let at = Instant::from_secs_f64(10.0);
+        let mut source = PlaneSource::new(scale, Codec::Png, Duration::ZERO);
+        source.set(cells.iter().copied(), at);
+        let (chunk, _) = source.next_chunk(1000, at).unwrap();
+        let Some(PlaneChunk::Patch(scale, patch)) = PlaneChunk::decode(&chunk) else { panic!("no patch") };
+        let mut replica = PlaneReplica::new(scale);
+        assert!(replica.apply(1, scale, patch, at));
+        replica
+    }
+
+    #[test]
+    fn a_plane_is_told_by_the_middles_of_its_levels_and_what_is_not_known_is_not_told() {
+        let bounds = Rect { x: 0, y: 0, width: 3, height: 1 };
+        let cells = [(Cell::new(0, 0), 20.1), (Cell::new(2, 0), 22.9)];
+        let depth = heard(PlaneScale::depth_around(20.0, 0.5), &cells);
+        let told = plane(PlaneKind::Depth, &depth, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((&told["min"], &told["max"], &told["step"]), (&json!(20.25), &json!(22.75), &json!(0.5)));
+        assert_eq!(told["data"], base64::encode(&[0, 255, 254]));
+        assert_eq!(told["age_s"], base64::encode(&[3, 0, 255, 255, 3, 0]));
+        let confidence = heard(PlaneScale::Confidence, &[(Cell::new(0, 0), 0.6), (Cell::new(1, 0), 1.0)]);
+        let told = plane(PlaneKind::Confidence, &confidence, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((&told["min"], &told["max"], &told["unit"]), (&json!(0.125), &json!(0.875), &json!("")));
+        assert_eq!(told["data"], base64::encode(&[169, 254, 255]));
+    }
 }

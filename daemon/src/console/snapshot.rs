@@ -8,7 +8,6 @@ use crate::figures::dropped;
 use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
-use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Stamp, VehicleMode, VehicleStatus};
@@ -78,7 +77,7 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         "position": place::position(surface, now),
         "link": link(surface, meter, now),
     });
-    let maps = surface.vehicles().filter_map(|(a, _)| Some((a.number(), surface.view(a)?.replica().version())));
+    let maps = surface.vehicles().filter_map(|(a, _)| Some((a.number(), surface.view(a)?.map_version())));
     Snapshot { state: state.to_string(), maps: maps.collect() }
 }
 
@@ -99,7 +98,7 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
         "status": view.status().map(|(s, at)| status(s, *at)),
         "track": desk.track.iter().map(|(at, x, y)| json!([seconds(*at), x, y])).collect::<Vec<_>>(),
         "map": {
-            "version": view.replica().version(),
+            "version": view.map_version(),
             "cell_m": facts.cell_m,
             "x0": bounds.map_or(0, |b| b.x),
             "y0": bounds.map_or(0, |b| b.y),

@@ -25,4 +25,3 @@ pub use outputs::write_outputs;
 pub use recording::{RecordedFrame, Recording};
 pub use report::{Report, report};
 pub use world::World;
-pub(crate) use world::{read_classes, read_image};

@@ -28,7 +28,7 @@ pub struct RecordedFrame {
 impl RecordedFrame {
     /// Reads the image.
     pub fn image(&self) -> Result<RgbImage, Problem> {
-        Ok(super::world::read_image(&self.file)?.to_rgb8())
+        Ok(crate::imagery::read_image(&self.file)?.to_rgb8())
     }
 }
 

@@ -62,7 +62,8 @@ impl Scene {
         let flat: Vec<FlatCell> = self.topics.iter().enumerate().map(cell).collect();
         let published = self.book.publish(&flat);
         let cells = published.iter().map(|c| (Cell::new(c.x, c.y), c.label)).collect();
-        MapUpdate { t_s: 0.0, epoch: self.book.epoch(), cells, labels: self.book.labels().count() as u8 }
+        let planes = BTreeMap::new();
+        MapUpdate { t_s: 0.0, epoch: self.book.epoch(), cells, planes, labels: self.book.labels().count() as u8 }
     }
 
     fn meaning(&self, label: u8) -> Option<u64> {

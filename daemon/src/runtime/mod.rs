@@ -36,7 +36,7 @@ fn random_bits() -> u64 {
 }
 
 /// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
-fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
+pub(crate) fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     // A second command in the same process (as in tests) keeps the first one's log.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();

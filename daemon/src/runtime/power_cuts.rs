@@ -218,7 +218,8 @@ impl World {
         }
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
-        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, labels: LABELS };
+        let planes = BTreeMap::new();
+        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, planes, labels: LABELS };
         onboard.vehicle.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 

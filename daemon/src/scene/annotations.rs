@@ -1,8 +1,8 @@
 //! Classes that somebody has given to places or pixels.
 
 use super::lines::{Lines, number};
+use crate::imagery::read_classes;
 use crate::problem::Problem;
-use crate::rehearsal::read_classes;
 use image::GrayImage;
 use std::collections::BTreeMap;
 use std::path::Path;

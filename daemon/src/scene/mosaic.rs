@@ -1,8 +1,8 @@
 //! Words of a mosaic: one image of the ground from above.
 
 use super::{Sighting, Source};
+use crate::imagery::read_image;
 use crate::problem::Problem;
-use crate::rehearsal::read_image;
 use scene_model::project::Observation;
 use scene_model::words::WordExtractor;
 use std::path::Path;

@@ -5,8 +5,8 @@
 
 use super::lines::{Lines, number};
 use super::{Sighting, Source};
+use crate::imagery::read_image;
 use crate::problem::Problem;
-use crate::rehearsal::read_image;
 use image::{DynamicImage, RgbImage};
 use scene_model::project::{CameraPose, DepthImage, PinholeCamera};
 use scene_model::words::WordExtractor;

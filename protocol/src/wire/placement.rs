@@ -37,10 +37,11 @@ impl Placement {
         (x_m - self.east_m, y_m - self.north_m)
     }
 
-    /// What the next move makes of it.
+    /// What the next move makes of it, in whole decimetres: both ends place the map at the same spot.
     pub fn moved_to(before: Option<Self>, east_m: f64, north_m: f64) -> Self {
         let version = before.map_or(0, |p| p.version).wrapping_add(1).max(1);
-        Self { version, east_m, north_m }
+        let whole = |metres: f64| (metres * 10.0).round() / 10.0;
+        Self { version, east_m: whole(east_m), north_m: whole(north_m) }
     }
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {

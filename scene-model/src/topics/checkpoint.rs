@@ -12,7 +12,7 @@ use super::model::SceneModel;
 use crate::envelope::{Envelope, EnvelopeError};
 use crate::random::Stream;
 
-const ENVELOPE: Envelope = Envelope { magic: *b"SCNMODEL", version: 1 };
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNMODEL", version: 2 };
 
 /// Why bytes are no checkpoint that this program can go on from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -105,11 +105,12 @@ impl Snapshot {
     /// Cells and labels with all that is derived.
     pub(super) fn rebuild(&self) -> (Cells, Labels) {
         let mut labels = Labels::restore(&self.config, &self.topics, self.next_topic);
-        let mut cells = Cells::new(labels.blocks);
+        let mut cells = Cells::new(labels.blocks, self.config.colour_levels);
         for (coord, words) in &self.cells {
             cells.restore(*coord, words);
             labels.count(words);
         }
+        cells.weigh(std::iter::empty());
         labels.settle();
         (cells, labels)
     }

@@ -10,7 +10,7 @@ use super::navigator::Navigator;
 use super::steering::Steering;
 use scenecast_protocol::directive::{Fix, RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::{Cell, LabelGrid, PlaneSource};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
@@ -167,6 +167,11 @@ impl Vehicle {
         self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
     }
 
+    /// The planes of the map that are sent.
+    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
+        self.link.planes()
+    }
+
     /// Versions of the map so far.
     pub fn map_version(&self) -> u64 {
         self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
@@ -232,7 +237,12 @@ impl Vehicle {
         let cells = update.cells.iter().copied();
         match &mut self.whole_png {
             Some(whole) => whole.set(cells),
-            None => drop(self.link.set_map(cells, now)),
+            None => {
+                self.link.set_map(cells, now);
+                for (&kind, cells) in &update.planes {
+                    self.link.set_plane(kind, cells.iter().copied(), now);
+                }
+            }
         }
         let at = self.navigator.position();
         self.steering.handle_view(at);

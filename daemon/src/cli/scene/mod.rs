@@ -1,7 +1,9 @@
 //! `scenecast scene`
 
+mod pairs;
 mod run;
 mod sample;
+mod score;
 
 use crate::problem::Problem;
 use clap::Subcommand;
@@ -11,6 +13,8 @@ use clap::Subcommand;
 pub(crate) enum Scene {
     Run(Box<run::Run>),
     Sample(sample::Sample),
+    /// Score the scene model and two baselines on annotated images.
+    Score(score::Score),
 }
 
 impl Scene {
@@ -18,6 +22,7 @@ impl Scene {
         match self {
             Self::Run(run) => run.run(),
             Self::Sample(sample) => sample.run(),
+            Self::Score(score) => score.run(),
         }
     }
 }

@@ -279,8 +279,19 @@ impl Run {
         };
         let Parameters { alpha, beta, gamma, max_labels, seed, .. } = self.parameters;
         let max_words_per_cell = u32::from(u16::MAX);
-        let config =
-            SceneConfig { cell_m, alpha, beta, gamma, birth, max_labels, vocabulary, max_words_per_cell, seed };
+        let usual = if self.input.which.words.is_some() { SceneConfig::default() } else { SceneConfig::for_images() };
+        let config = SceneConfig {
+            cell_m,
+            alpha,
+            beta,
+            gamma,
+            birth,
+            max_labels,
+            vocabulary,
+            max_words_per_cell,
+            seed,
+            ..usual
+        };
         let flag = |key: &str| format!("--{}", key.replace('_', "-"));
         let refused =
             |e: scene_model::topics::ConfigError| format!("{} {}: allowed is {}", flag(e.key), e.value, e.allowed);

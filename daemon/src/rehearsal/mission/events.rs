@@ -7,6 +7,7 @@ use crate::problem::Problem;
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
 use scenecast_protocol::directive::Fix;
+use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use sim_channel::{Outcome, Position};
 use std::time::Duration;
@@ -209,5 +210,13 @@ impl Mission {
         let Some(operator) = self.surface.map(self.address) else { return };
         let versions = (self.vehicle.map_version(), self.picture_version);
         self.meter.look(self.vehicle.map(), operator, versions, self.now);
+        let (view, nothing) = (self.surface.view(self.address), LabelGrid::default());
+        for plane in self.vehicle.planes() {
+            let kind = plane.scale().kind();
+            let heard = view.and_then(|v| v.plane(kind));
+            let versions = (plane.version(), heard.map_or(0, PlaneReplica::version));
+            let meter = self.plane_meters.entry(kind).or_default();
+            meter.look(plane.target(), heard.map_or(&nothing, |h| h.levels().shown()), versions, self.now);
+        }
     }
 }
