@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// A Python that has pymavlink: `SCENECAST_PYTHON`, or `python3`. Without one the test is skipped, loudly; where `CI` is
-/// set it fails.
+/// true it fails.
 fn python() -> Option<PathBuf> {
     let python = std::env::var_os("SCENECAST_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let imports = Command::new(&python).args(["-c", "import pymavlink"]).stderr(Stdio::null()).status();
@@ -22,8 +22,9 @@ fn python() -> Option<PathBuf> {
         return Some(python);
     }
     let what = format!("{} has no pymavlink (pip install pymavlink; SCENECAST_PYTHON)", python.display());
-    assert!(std::env::var("CI").is_err(), "{what}, and CI is set");
-    eprintln!("SKIPPED: {what}: nothing was tested against ArduSub");
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "{what}, and CI is true");
+    // Past the capture of the test harness, which would keep it to itself.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {what}: nothing was tested against ArduSub");
     None
 }
 
