@@ -3,9 +3,11 @@
 #[cfg(test)]
 mod calls;
 mod desk;
+mod orders;
 mod pauses;
 pub mod position;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};
+pub use orders::{FenceOrder, LimitsOrder};
 pub use surface::{Surface, SurfaceOutput};

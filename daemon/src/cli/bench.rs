@@ -2,6 +2,8 @@
 
 use super::bench_link::Link;
 use super::bench_localisation::LocalisationBench;
+use super::bench_modem::Modem;
+use super::bench_planning::Planning;
 use super::sim::WorldArguments;
 use crate::problem::Problem;
 use crate::rehearsal::{FidelityRow, fidelity};
@@ -16,6 +18,10 @@ pub(super) enum Bench {
     Link(Link),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
     Localisation(LocalisationBench),
+    /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
+    Modem(Modem),
+    /// Planners against each other: utility collected a metre.
+    Planning(Planning),
 }
 
 /// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
@@ -36,6 +42,8 @@ impl Bench {
             Self::Fidelity(f) => f.run(),
             Self::Link(l) => l.run(),
             Self::Localisation(l) => l.run(),
+            Self::Modem(m) => m.run(),
+            Self::Planning(p) => p.run(),
         }
     }
 }

@@ -5,6 +5,8 @@
 mod bench;
 mod bench_link;
 mod bench_localisation;
+mod bench_modem;
+mod bench_planning;
 mod demo;
 mod key;
 mod map;

@@ -3,6 +3,7 @@
 use super::answer::{Ask, Reply};
 use super::snapshot::Snapshot;
 use super::{assets, guard};
+use crate::asv::{FenceOrder, LimitsOrder};
 use crate::problem::Problem;
 use axum::extract::{DefaultBodyLimit, Path, State};
 use axum::http::{StatusCode, Uri, header};
@@ -11,6 +12,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use futures_util::Stream;
+use scenecast_protocol::directive::Constraints;
 use scenecast_protocol::schedule::Shares;
 use serde::Deserialize;
 use serde_json::json;
@@ -78,6 +80,9 @@ fn router(shared: Shared) -> Router {
         .route("/api/v1/vehicles/{id}/utility", post(utility))
         .route("/api/v1/vehicles/{id}/exemplars", post(request))
         .route("/api/v1/vehicles/{id}/constraints", post(constraints))
+        .route("/api/v1/vehicles/{id}/fence", post(fence))
+        .route("/api/v1/vehicles/{id}/limits", post(limits))
+        .route("/api/v1/vehicles/{id}/settings", post(settings))
         .route("/api/v1/budget", post(budget))
         .fallback(page)
         .layer(DefaultBodyLimit::max(16 * 1024))
@@ -166,6 +171,8 @@ struct UtilityBody {
     weights: BTreeMap<String, f64>,
     #[serde(default)]
     exploration: f64,
+    #[serde(default)]
+    curiosity: f64,
 }
 
 async fn utility(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<UtilityBody>) -> Response {
@@ -175,7 +182,7 @@ async fn utility(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): J
         .map(|(label, w)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is no label")))
         .collect();
     match weights {
-        Ok(weights) => shared.ask(Ask::Utility(id, weights, body.exploration)).await,
+        Ok(weights) => shared.ask(Ask::Utility(id, weights, (body.exploration, body.curiosity))).await,
         Err(why) => refused(&why),
     }
 }
@@ -194,10 +201,31 @@ async fn request(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): J
 #[serde(deny_unknown_fields)]
 struct ConstraintsBody {
     hold: bool,
+    #[serde(default)]
+    abort: bool,
 }
 
 async fn constraints(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<ConstraintsBody>) -> Response {
-    shared.ask(Ask::Hold(id, body.hold)).await
+    shared.ask(Ask::Order(id, Constraints { hold: body.hold, abort: body.abort })).await
+}
+
+async fn fence(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<FenceOrder>) -> Response {
+    shared.ask(Ask::Fence(id, body)).await
+}
+
+async fn limits(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<LimitsOrder>) -> Response {
+    shared.ask(Ask::Limits(id, body)).await
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SettingsBody {
+    planner: Option<String>,
+    refine_words_per_s: Option<u32>,
+}
+
+async fn settings(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<SettingsBody>) -> Response {
+    shared.ask(Ask::Settings(id, body.planner, body.refine_words_per_s)).await
 }
 
 #[derive(Debug, Deserialize)]

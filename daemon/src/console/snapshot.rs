@@ -5,7 +5,9 @@ use super::place;
 use crate::asv::{Desk, ExemplarState, Surface};
 use crate::config::Config;
 use crate::figures::dropped;
-use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
+use scenecast_protocol::directive::{
+    Band, Fence, LifeLine, Limits, PlannerKind, Polygon, Reaction, SlotId, SlotProgress,
+};
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
 use scenecast_protocol::schedule::Class;
@@ -109,9 +111,22 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
             "epoch": desk.epoch,
             "placement": place::placement(view.status().and_then(|(s, _)| s.placement)),
         },
-        "utility": { "exploration": f64::from(desk.utility.exploration) / 100.0 },
+        "utility": {
+            "exploration": f64::from(desk.utility.exploration) / 100.0,
+            "curiosity": f64::from(desk.utility.curiosity) / 100.0,
+        },
+        "fence": desk.fence.as_ref().map(fence),
+        "limits": desk.limits.as_ref().map(limits),
+        "planner": desk.settings.planner.map(PlannerKind::name),
         "labels": labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect::<Vec<_>>(),
         "link": link_of(&view, now),
+        "usbl": desk.found.map(|(line, at)| json!({
+            "at_s": seconds(at) - line.age_s,
+            "range_m": line.range_m,
+            "bearing_rad": line.direction_rad.map(|(bearing, _)| bearing),
+            "elevation_rad": line.direction_rad.map(|(_, elevation)| elevation),
+            "accuracy": line.accuracy,
+        })),
         "directive": { "slots": view.slots().map(slot).collect::<Vec<_>>() },
     }))
 }
@@ -162,12 +177,50 @@ fn status(s: &VehicleStatus, at: Instant) -> Value {
         "sigma_m": s.sigma_m,
         "mode": mode,
         "autopilot_silent": s.autopilot_silent,
+        "reason": s.reason.name(),
+        "doing": doing(s),
         "waypoint": s.waypoint.map(|(x, y)| json!([x, y])),
         "cells": s.explored_cells,
         "labels": s.labels,
         "fix_age_s": s.fix_age_s,
         "budget_bps": s.budget_bps,
         "refused_frames": s.refused_frames,
+    })
+}
+
+/// Mode and reason as people say it.
+fn doing(s: &VehicleStatus) -> String {
+    let mode = match s.mode {
+        VehicleMode::Survey => "surveying",
+        VehicleMode::Hold => "holding",
+        VehicleMode::Return => "returning",
+        VehicleMode::Surface => "surfacing",
+        VehicleMode::Abort => "aborted",
+        VehicleMode::Done => "done",
+    };
+    s.reason.name().map_or(mode.to_owned(), |why| format!("{mode}: {why}"))
+}
+
+fn fence(f: &Fence) -> Value {
+    let outline = |p: &Polygon| p.0.iter().map(|v| json!([v.metres().0, v.metres().1])).collect::<Vec<_>>();
+    json!({
+        "fence": f.fence.as_ref().map(outline),
+        "keep_outs": f.keep_outs.iter().map(outline).collect::<Vec<_>>(),
+        "return_point": f.return_point.map(|p| json!([p.metres().0, p.metres().1])),
+    })
+}
+
+fn limits(l: &Limits) -> Value {
+    let band = |b: Band| json!([f64::from(b.low_dm) / 10.0, f64::from(b.high_dm) / 10.0]);
+    json!({
+        "depth_m": l.depth.map(band),
+        "altitude_m": l.altitude.map(band),
+        "distance_m": l.distance_m,
+        "time_s": l.time_s,
+        "silence_s": l.silence_s,
+        "on_silence": l.on_silence.map(Reaction::name),
+        "on_breach": l.on_breach.map(Reaction::name),
+        "on_abort": l.on_abort.map(Reaction::name),
     })
 }
 

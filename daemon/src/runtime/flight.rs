@@ -16,6 +16,8 @@ pub(super) struct Flight {
     /// Of the survey, metres.
     depth_m: f64,
     clock: Clock,
+    /// Whether it is to come up where it is.
+    is_rising: bool,
 }
 
 impl Flight {
@@ -25,7 +27,12 @@ impl Flight {
     /// Opens the way to the autopilot that is configured.
     pub(super) fn open(config: &Config, clock: Clock) -> Result<Self, Problem> {
         let plane = origin(config)?.map(TangentPlane::new);
-        Ok(Self { pilot: Pilot::open(config, clock)?, plane, depth_m: depth_m(config), clock })
+        Ok(Self { pilot: Pilot::open(config, clock)?, plane, depth_m: depth_m(config), clock, is_rising: false })
+    }
+
+    /// Come up where it is, or no longer.
+    pub(super) fn set_rising(&mut self, is_rising: bool) {
+        self.is_rising = is_rising;
     }
 
     /// Whether an autopilot says where the vehicle is.
@@ -63,7 +70,8 @@ impl Flight {
             let place = self.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
             Goal { east_m, north_m, depth_m: Some(self.depth_m), place }
         });
-        pilot.set_goal(goal);
+        let up = Goal { east_m: 0.0, north_m: 0.0, depth_m: Some(0.0), place: None };
+        pilot.set_goal(if self.is_rising { Some(up) } else { goal });
         let is_fixed = navigator.last_fix().is_some_and(|at| now.since(at).as_secs_f64() < Self::OLDEST_FIX_S);
         if let (true, Some(plane)) = (is_fixed, &self.plane) {
             pilot.handle_place(plane.to_place(world_x, world_y), navigator.sigma_m());

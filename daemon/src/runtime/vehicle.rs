@@ -27,7 +27,8 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let Start { run, mapper, keep } = start(&config, dir)?;
         let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
-        let profile = crate::ends::modem_of_process(&config);
+        let address = crate::ends::vehicle_address(&config)?;
+        let profile = crate::ends::modem_of_process(&config, address)?;
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
@@ -40,7 +41,7 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let at_end = recording.is_some();
         let camera = Camera::new(recording, clock, mapper.last_s());
         let mapper = MapperThread::start(mapper, keep)?;
-        let modem = modem::open(&config, profile).await?;
+        let modem = modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
         let (stop, flight) = (Stop::new()?, Flight::open(&config, clock)?);
         let (behind, missed) = (0, 0);
@@ -114,13 +115,7 @@ impl Host {
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
-                event = self.modem.next() => match event {
-                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(self.clock.now()),
-                    ModemEvent::Received(bytes) => {
-                        self.vehicle.handle_frame(&bytes, self.clock.now());
-                        self.refusals.note(self.vehicle.stats());
-                    }
-                },
+                event = self.modem.next() => self.handle_modem(event?),
                 config = self.reload.next() => self.follow(&config),
                 () = self.flight.next() => self.flight.steer(&mut self.vehicle),
                 mut frame = self.camera.next() => {
@@ -134,6 +129,20 @@ impl Host {
                     None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
                 },
             }
+        }
+    }
+
+    fn handle_modem(&mut self, event: ModemEvent) {
+        let now = self.clock.now();
+        match event {
+            ModemEvent::Sent => self.vehicle.handle_transmit_outcome(now),
+            ModemEvent::Received(bytes) => {
+                self.vehicle.handle_frame(&bytes, now);
+                self.refusals.note(self.vehicle.stats());
+            }
+            ModemEvent::Poll(frames) => self.vehicle.handle_poll(frames),
+            ModemEvent::Repeated(bits) => self.vehicle.handle_repeated(bits, now),
+            ModemEvent::Fix(..) | ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
         }
     }
 
@@ -176,7 +185,7 @@ impl Host {
 
     fn pump(&mut self) -> Result<(), Problem> {
         let now: Instant = self.clock.now();
-        self.vehicle.steer();
+        self.vehicle.steer(now);
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => {
@@ -187,18 +196,28 @@ impl Host {
                     let _ = self.mapper.orders.send(ToMapper::RefineRate(rate));
                 }
                 VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
-                VehicleOutput::Waypoint(x, y) => tracing::info!("waypoint {x:.1} m east, {y:.1} m north"),
-                VehicleOutput::Hold => tracing::info!("hold"),
+                VehicleOutput::Waypoint(x, y) => {
+                    self.flight.set_rising(false);
+                    tracing::info!("waypoint {x:.1} m east, {y:.1} m north");
+                }
+                VehicleOutput::Hold => {
+                    self.flight.set_rising(false);
+                    tracing::info!("hold");
+                }
                 VehicleOutput::Fixed(fix, _) => {
                     tracing::debug!("fix: {:.1} m east, {:.1} m north, +-{:.1} m", fix.x_m, fix.y_m, fix.sigma_m);
+                }
+                VehicleOutput::Surface => {
+                    self.flight.set_rising(true);
+                    tracing::info!("come up");
                 }
             }
         }
         self.modem.set_budget(self.vehicle.budget_bps());
-        if !self.modem.is_busy()
-            && let Some(t) = self.vehicle.poll_transmit(now)
+        while self.modem.takes_frames()
+            && let Some(transmit) = self.vehicle.poll_transmit(now)
         {
-            self.modem.send(t.bytes, self.clock)?;
+            self.modem.send(transmit);
         }
         Ok(())
     }

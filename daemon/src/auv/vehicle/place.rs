@@ -2,6 +2,9 @@
 
 use super::Vehicle;
 use crate::auv::Navigator;
+use crate::auv::planning::distance;
+use scenecast_protocol::map::Cell;
+use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +52,18 @@ impl LastPlace {
 }
 
 impl Vehicle {
+    /// The position is known from elsewhere, as in a recorded mission.
+    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        let before = self.navigator.position();
+        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
+        self.guard.handle_way(distance(before, (x_m, y_m)));
+    }
+
+    /// Labels of cells as the vehicle sees them.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
+        self.map().iter()
+    }
+
     /// The position estimate.
     pub fn navigator(&self) -> &Navigator {
         &self.navigator
@@ -73,7 +88,6 @@ impl Vehicle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::time::Instant;
 
     #[test]
     fn golden_bytes_of_a_place() {
