@@ -1,6 +1,7 @@
 //! The scenecast daemon: the roles at sea, their drivers and runtime, the operator's console, the rehearsal and the tools.
 
 pub mod asv;
+pub mod autopilot;
 pub mod auv;
 pub mod cli;
 pub mod config;

@@ -4,6 +4,7 @@
 
 mod bench;
 mod bench_link;
+mod bench_localisation;
 mod bench_modem;
 mod bench_planning;
 mod demo;

@@ -8,6 +8,7 @@ mod assets;
 mod base64;
 mod guard;
 mod link_meter;
+mod place;
 mod server;
 mod snapshot;
 

@@ -1,6 +1,7 @@
 //! What every page shows.
 
 use super::link_meter::LinkMeter;
+use super::place;
 use crate::asv::{Desk, ExemplarState, Surface};
 use crate::config::Config;
 use crate::figures::dropped;
@@ -67,8 +68,15 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         surface.vehicles().filter_map(|(a, desk)| vehicle(surface, a, desk, facts, now)).collect();
     let state = json!({
         "now_s": seconds(now),
-        "mission": { "name": facts.name, "id": facts.run, "speed": facts.speed, "ended": facts.ended },
+        "mission": {
+            "name": facts.name,
+            "id": facts.run,
+            "speed": facts.speed,
+            "ended": facts.ended,
+            "origin": place::origin(surface),
+        },
         "vehicles": vehicles,
+        "position": place::position(surface, now),
         "link": link(surface, meter, now),
     });
     let maps = surface.vehicles().filter_map(|(a, _)| Some((a.number(), surface.view(a)?.map_version())));
@@ -101,6 +109,7 @@ fn vehicle(surface: &Surface, address: Address, desk: &Desk, facts: &MissionFact
             "explored_cells": labels.values().sum::<u32>(),
             "updated_s": view.replica().updated().map(seconds),
             "epoch": desk.epoch,
+            "placement": place::placement(view.status().and_then(|(s, _)| s.placement)),
         },
         "utility": {
             "exploration": f64::from(desk.utility.exploration) / 100.0,
@@ -167,6 +176,7 @@ fn status(s: &VehicleStatus, at: Instant) -> Value {
         "heading_deg": s.heading_deg,
         "sigma_m": s.sigma_m,
         "mode": mode,
+        "autopilot_silent": s.autopilot_silent,
         "reason": s.reason.name(),
         "doing": doing(s),
         "waypoint": s.waypoint.map(|(x, y)| json!([x, y])),

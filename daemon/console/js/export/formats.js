@@ -2,7 +2,7 @@
 
 import { colourOf, nameOf, shownAs } from "../book.js";
 import { depthPlane } from "../cloud/points.js";
-import { toLatLon } from "../map/readout.js";
+import { inWorld, toLatLon } from "../map/readout.js";
 import { rgb } from "../palette.js";
 import { regions } from "./regions.js";
 
@@ -35,7 +35,7 @@ export function toCsv(map, sinceFetchS) {
 export function toGeoJson(map, vehicle, origin, nowS) {
   const shown = map.labels.map((label) => (label === 0 ? 0 : shownAs(label)));
   const place = ([cx, cy]) => {
-    const [x, y] = [(map.x0 + cx) * map.cell_m, (map.y0 + cy) * map.cell_m];
+    const [x, y] = inWorld(vehicle, (map.x0 + cx) * map.cell_m, (map.y0 + cy) * map.cell_m);
     return origin ? toLatLon(origin, x, y).reverse().map((v) => Number(v.toFixed(8))) : [x, y];
   };
   const features = [...regions(shown, map.width, map.height)].sort((a, b) => a[0] - b[0]).map(([label, polygons]) => ({

@@ -27,7 +27,7 @@ export function showReadout(world) {
   const cell = store.map ? cellAt(store.map, ...world) : null;
   const parts = [`E ${metres(world[0])}  N ${metres(world[1])}`];
   const origin = store.snapshot?.mission.origin;
-  if (origin) parts.push(latLon(origin, ...world));
+  if (origin) parts.push(latLon(origin, ...inWorld(store.vehicle, ...world)));
   if (cell) {
     parts.push(nameOf(shownAs(cell.label)));
     parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
@@ -49,11 +49,19 @@ function levelOf(p) {
 /** A quantity without a unit is a share. */
 export const planeText = (p, value) => (p.unit === "" ? percent(value) : `${minus(String(Number(value.toFixed(1))))} ${p.unit}`);
 
-/** Latitude and longitude of a place near `origin`, on a tangent plane. */
+/** Latitude and longitude of a place near `origin`, on a tangent plane, by the radii of WGS 84 there. */
 export function toLatLon(origin, x, y) {
-  const lat = origin.lat_deg + y / 111132.95;
-  const lon = origin.lon_deg + x / (111412.84 * Math.cos((origin.lat_deg * Math.PI) / 180));
-  return [lat, lon];
+  const lat = (origin.lat_deg * Math.PI) / 180;
+  const w2 = 1 - 0.00669437999014 * Math.sin(lat) ** 2;
+  const north = (6378137 * (1 - 0.00669437999014)) / w2 ** 1.5;
+  const east = (6378137 / Math.sqrt(w2)) * Math.cos(lat);
+  return [origin.lat_deg + ((y / north) * 180) / Math.PI, origin.lon_deg + ((x / east) * 180) / Math.PI];
+}
+
+/** A place of a vehicle's map in the world: east and north of the mission's origin, metres. */
+export function inWorld(vehicle, x, y) {
+  const by = vehicle?.map?.placement;
+  return by ? [x + by.east_m, y + by.north_m] : [x, y];
 }
 
 function latLon(origin, x, y) {
