@@ -1,13 +1,8 @@
 //! The operator's page and API of a running demo.
 
-use scenecast_tests::{Process, free_port, http, wait_until};
+use scenecast_tests::{Process, free_port, http, state, wait_until};
 use serde_json::Value;
 use std::time::Duration;
-
-fn state(port: u16) -> Option<Value> {
-    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
-    (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
-}
 
 fn slot(state: &Value, name: &str) -> Option<String> {
     let slots = state["vehicles"][0]["directive"]["slots"].as_array()?;

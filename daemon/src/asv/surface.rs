@@ -5,7 +5,7 @@ use crate::auv::Exemplar;
 use crate::picture;
 use scenecast_protocol::directive::{Budget, Constraints, Fix, Slot, SlotId, Utility};
 use scenecast_protocol::link::{PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::map::{LabelGrid, StateReplica};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -64,6 +64,12 @@ impl Surface {
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
         let whole = self.desks.get(&vehicle).and_then(|d| d.whole.as_ref());
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+    }
+
+    /// Counts up whenever the operator's map of a vehicle changes.
+    pub fn map_version(&self, vehicle: Address) -> u64 {
+        let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
+        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.replica().version())
     }
 
     /// Bits a second that the surface may use.
@@ -212,6 +218,7 @@ impl Surface {
                     }
                     None => {
                         desk.whole = Some(picture::read_whole(&bytes)?);
+                        desk.wholes += 1;
                         Some(SurfaceOutput::MapChanged(vehicle))
                     }
                 }

@@ -4,6 +4,7 @@
 
 mod bench;
 mod bench_link;
+mod ctl;
 mod demo;
 mod key;
 mod map;
@@ -32,10 +33,12 @@ enum Command {
     Auv(node::Node),
     /// Run the surface: hold the operator's map, serve his page.
     Asv(node::Node),
+    /// Speak with a running surface: see what it has, give orders.
+    Ctl(ctl::Ctl),
     /// Measure.
     #[command(subcommand)]
     Bench(bench::Bench),
-    /// Make or show the key by which both ends know each other's frames.
+    /// Make or show the key by which both ends know each other's frames, or a token of the operator's page.
     #[command(subcommand)]
     Key(key::Key),
     /// Code label maps as the stream does, and measure it.
@@ -52,6 +55,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Sim(sim) => sim.run(),
         Command::Auv(node) => node.run_vehicle(),
         Command::Asv(node) => node.run_surface(),
+        Command::Ctl(ctl) => ctl.run(),
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),

@@ -46,6 +46,13 @@ pub const KEYS: &[Key] = &[
         "asr",
         "number that both ends share: frames of another mission are dropped",
     ),
+    key(
+        "mission.origin_deg",
+        "deg",
+        Range(-180.0, 180.0),
+        "asr",
+        "latitude north and longitude east where x = y = 0 of the world, the same at both ends; both 0: not known",
+    ),
     key("vehicle.address", "", Range(1.0, 14.0), "asr", "acoustic address of the vehicle (0 is the surface)"),
     key("vehicle.name", "", Text, "asr", "name of the vehicle for people"),
     key(
@@ -200,6 +207,20 @@ pub const KEYS: &[Key] = &[
         "scripted: two utilities and image requests at fixed times",
     ),
     key("console.listen", "", Text, "s", "ADDRESS:PORT of the operator's page; empty: none"),
+    key(
+        "console.token_file",
+        "",
+        Text,
+        "s",
+        "file of the token that the page and scripts must show (scenecast key token); needed for any address but loopback",
+    ),
+    key(
+        "console.host",
+        "",
+        Text,
+        "s",
+        "name by which others on the network ask for the page; empty: only by the address",
+    ),
     key("runtime.state_dir", "", Text, "as", "folder of what must survive a restart, and of the operator's map"),
     key("runtime.seed", "", Range(0.0, 9e15), "a", "seed of the scene model: the same recording gives the same map"),
     key(

@@ -4,11 +4,13 @@ mod key_file;
 mod keys;
 mod load;
 mod print;
+mod token_file;
 
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
 pub use print::print;
+pub use token_file::{load_token, read_token};
 
 use scenecast_protocol::schedule::Shares;
 use serde::{Deserialize, Serialize};
@@ -64,6 +66,8 @@ section! {
         name: String = "rehearsal".into(),
         /// Number that both ends share; frames of another mission are dropped.
         id: u32 = 1,
+        /// Latitude and longitude of the world's origin in degrees; both 0 = not known.
+        origin_deg: [f64; 2] = [0.0, 0.0],
     }
 }
 section! {
@@ -235,6 +239,10 @@ section! {
     Console {
         /// Address to listen on; empty = no page.
         listen: String = "127.0.0.1:8460".into(),
+        /// File of the token that others must show; empty = none, and only loopback addresses are listened on.
+        token_file: String = String::new(),
+        /// Name of this machine for others; empty = they ask for its address.
+        host: String = String::new(),
     }
 }
 section! {

@@ -1,23 +1,25 @@
 //! What a browser may ask of the surface.
 
-use super::base64;
+use super::export::Cells;
+use super::orders::BudgetOrder;
+use super::snapshot::seconds;
+use super::state::Accepted;
 use crate::asv::{ExemplarState, Surface};
-use crate::picture;
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::{Rect, StateReplica};
+use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use serde_json::{Value, json};
 use std::collections::BTreeMap;
+
+/// A few frames can claim two cells at the ends of the world.
+const MOST_CELLS: u64 = 1 << 23;
 
 /// A question or an order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ask {
     /// A vehicle's map with the age of its cells.
     Map(u8),
-    /// A vehicle's map as an indexed PNG.
-    MapPng(u8),
     /// The image of a label.
     Exemplar(u8, u8),
     /// Send weights.
@@ -27,18 +29,18 @@ pub enum Ask {
     /// Tell the vehicle to stay, or to go on.
     Hold(u8, bool),
     /// Change the bit budget, and the least shares if there are any.
-    Budget(u32, Option<Shares>),
+    Budget(BudgetOrder),
 }
 
 /// An answer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reply {
-    /// Found.
-    Json(Value),
+    /// The cells of a map.
+    Map(Cells),
     /// A file with its content type.
     File(&'static str, Vec<u8>),
     /// Taken; on its way.
-    Accepted(Value),
+    Accepted(Accepted),
     /// There is no such thing.
     NotFound,
     /// Not allowed, and why.
@@ -47,17 +49,15 @@ pub enum Reply {
 
 /// Answers an ask.
 pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Reply {
-    let accepted = |slot: SlotId, result: Result<u16, String>| match result {
-        Ok(version) => Reply::Accepted(json!({ "slot": slot.name(), "version": version })),
-        Err(why) => Reply::Refused(why),
-    };
     let address = |id: u8| Address::vehicle(id).filter(|&a| surface.desk(a).is_some());
     match ask {
-        Ask::Map(id) => address(id).and_then(|a| map(surface, a, cell_m, now)).map_or(Reply::NotFound, Reply::Json),
-        Ask::MapPng(id) => {
-            let png = address(id).and_then(|a| surface.map(a)).and_then(|m| picture::encode(m).ok());
-            png.map_or(Reply::NotFound, |png| Reply::File("image/png", png))
-        }
+        Ask::Map(id) => match address(id).and_then(|a| cells(surface, a, cell_m, now)) {
+            Some(cells) if cells.bounds.area() != cells.labels.len() as u64 => {
+                let Rect { width, height, .. } = cells.bounds;
+                Reply::Refused(format!("the map spans {width} x {height} cells: at most {MOST_CELLS} are told"))
+            }
+            found => found.map_or(Reply::NotFound, Reply::Map),
+        },
         Ask::Exemplar(id, label) => {
             let desk = address(id).and_then(|a| surface.desk(a)).and_then(|d| d.exemplars.get(&label));
             match desk.map(|e| &e.state) {
@@ -65,45 +65,56 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
                 _ => Reply::NotFound,
             }
         }
-        Ask::Budget(bps, shares) => match surface.set_budget(bps, shares, now) {
-            Ok(()) => Reply::Accepted(json!({ "slot": SlotId::Budget.name() })),
-            Err(why) => Reply::Refused(why),
-        },
+        Ask::Budget(order) => budget(surface, order, now),
         Ask::Utility(id, weights, exploration) => match address(id) {
-            Some(a) => accepted(SlotId::Utility, surface.set_utility(a, &weights, exploration, now)),
+            Some(a) => accepted(a, SlotId::Utility, surface.set_utility(a, &weights, exploration, now)),
             None => Reply::NotFound,
         },
         Ask::Request(id, label) => match address(id) {
-            Some(a) => accepted(SlotId::Requests, surface.request_exemplar(a, label, now)),
+            Some(a) => accepted(a, SlotId::Requests, surface.request_exemplar(a, label, now)),
             None => Reply::NotFound,
         },
         Ask::Hold(id, hold) => match address(id) {
-            Some(a) => accepted(SlotId::Constraints, surface.set_hold(a, hold, now)),
+            Some(a) => accepted(a, SlotId::Constraints, surface.set_hold(a, hold, now)),
             None => Reply::NotFound,
         },
     }
 }
 
-fn map(surface: &Surface, address: Address, cell_m: f64, now: Instant) -> Option<Value> {
+fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
+    match issued {
+        Ok(version) => Reply::Accepted(Accepted {
+            slot: slot.name().to_owned(),
+            version: Some(version),
+            versions: BTreeMap::from([(vehicle.number(), version)]),
+        }),
+        Err(why) => Reply::Refused(why),
+    }
+}
+
+fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
+    let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
+    if let Err(why) = surface.set_budget(order.budget_bps, shares, now) {
+        return Reply::Refused(why);
+    }
+    let issued = |a: Address| surface.view(a)?.slots().find(|s| s.id == SlotId::Budget).map(|s| s.version);
+    let versions = surface.vehicles().filter_map(|(a, _)| Some((a.number(), issued(a)?))).collect();
+    Reply::Accepted(Accepted { slot: SlotId::Budget.name().to_owned(), version: None, versions })
+}
+
+/// The cells of a map; none where it spans more than can be told.
+fn cells(surface: &Surface, address: Address, cell_m: f64, now: Instant) -> Option<Cells> {
     let grid = surface.map(address)?;
     let replica = surface.view(address)?.replica();
-    let empty = Rect { x: 0, y: 0, width: 0, height: 0 };
-    let bounds = grid.bounds().unwrap_or(empty);
-    let mut labels = Vec::with_capacity(bounds.area() as usize);
-    let mut ages = Vec::with_capacity(bounds.area() as usize * 2);
-    for cell in bounds.cells() {
-        labels.push(grid.get(cell));
-        let age = replica.heard(cell).map_or(u16::MAX, |at| now.since(at).as_secs().min(65_534) as u16);
-        ages.extend_from_slice(&age.to_le_bytes());
-    }
-    Some(json!({
-        "version": replica.version(),
-        "x0": bounds.x,
-        "y0": bounds.y,
-        "width": bounds.width,
-        "height": bounds.height,
-        "cell_m": cell_m,
-        "labels": base64::encode(&labels),
-        "age_s": base64::encode(&ages),
-    }))
+    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
+    let told = if bounds.area() <= MOST_CELLS { bounds } else { Rect { width: 0, ..bounds } };
+    let age = |at: Instant| now.since(at).as_secs().min(65_534) as u16;
+    Some(Cells {
+        version: surface.map_version(address),
+        at_s: seconds(now),
+        bounds,
+        cell_m,
+        labels: told.cells().map(|cell| grid.get(cell)).collect(),
+        age_s: told.cells().map(|cell| replica.heard(cell).map_or(u16::MAX, age)).collect(),
+    })
 }

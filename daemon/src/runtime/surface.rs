@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::journal::create_folder;
 use super::refusals::{Refusals, warn_without_key};
 use crate::asv::{Surface, SurfaceOutput};
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use crate::modem::{self, Modem, ModemEvent};
 use crate::picture;
@@ -32,7 +32,9 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         let console = match config.console.listen.as_str() {
             "" => None,
             address => {
-                let console = start(bind(address, "console.listen").await?);
+                let token = config::load_token(&config)?;
+                let entrance = bind(address, "console.listen", token, &config.console.host).await?;
+                let console = start(entrance);
                 println!("the operator's page is at http://{address} (end with Ctrl-C)");
                 Some(console)
             }
