@@ -3,6 +3,7 @@
 use scenecast_tests::{Process, free_port, http, state, wait_until};
 use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 const SPEED: f64 = 5.0;
@@ -14,16 +15,27 @@ fn connect(port: u16, said: &str) -> Option<TcpStream> {
     Some(stream)
 }
 
+/// Ends the operator's work.
+struct End<'a>(&'a AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Does `attack` while an operator goes on working; his answers come soon, mission and link run at their pace, and the
 /// surface does not grow.
 fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) {
     let before = state(port).unwrap();
     let (held, _) = demo.cost().unwrap_or_default();
     let began = Instant::now();
+    let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        let done = &std::sync::atomic::AtomicBool::new(false);
-        scope.spawn(move || {
-            while !done.load(std::sync::atomic::Ordering::Relaxed) {
+        // Also when the attack fails.
+        let _end = End(&done);
+        scope.spawn(|| {
+            while !done.load(Ordering::Relaxed) {
                 let asked = Instant::now();
                 let answer = state(port);
                 assert!(answer.is_some(), "{what}: the operator gets no answer");
@@ -33,7 +45,6 @@ fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) 
         });
         attack();
         std::thread::sleep(Duration::from_secs(2).saturating_sub(began.elapsed()));
-        done.store(true, std::sync::atomic::Ordering::Relaxed);
     });
     let after = state(port).unwrap();
     let passed = after["now_s"].as_f64().unwrap() - before["now_s"].as_f64().unwrap();
