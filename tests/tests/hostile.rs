@@ -78,6 +78,16 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
         assert_eq!(http(port, "GET", "/api/v1/events", "", "").unwrap().0, 503, "there are only so many streams");
         drop(deaf);
     });
+    assert_unmoved(&demo, port, "a thousand bodies that do not come", || {
+        let head =
+            format!("POST /api/v1/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
+        for _ in 0..3 {
+            let ask = format!("{head}Content-Length: 100\r\n\r\n{{");
+            let held: Vec<_> = (0..350).filter_map(|_| connect(port, &ask)).collect();
+            assert!(held.len() > 200, "the surface takes connections");
+            std::thread::sleep(Duration::from_millis(500));
+        }
+    });
     assert_unmoved(&demo, port, "bodies without end", || {
         for length in ["Content-Length: 99999999999", "Transfer-Encoding: chunked"] {
             let head =

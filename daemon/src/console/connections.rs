@@ -2,13 +2,14 @@
 
 use axum::Router;
 use axum::body::Body;
+use axum::http::header::CONTENT_TYPE;
 use http_body_util::BodyExt;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::pin::Pin;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
@@ -18,7 +19,8 @@ use tokio::task::AbortHandle;
 use tokio::time::Sleep;
 use tower_service::Service;
 
-/// Most connections at a time. The oldest one that waits for nothing gives way to a new one.
+/// Most connections at a time. A new one takes the place of the oldest that asks for nothing, or else of the oldest that is
+/// no stream of events; of streams there are fewer than seats.
 const MOST: usize = 256;
 /// Longest time for the head of a request, also of the next one on a connection.
 const HEAD: Duration = Duration::from_secs(10);
@@ -26,6 +28,8 @@ const HEAD: Duration = Duration::from_secs(10);
 const HEAD_BYTES: usize = 16 * 1024;
 /// Most headers in it.
 const HEADERS: usize = 64;
+/// The type of a stream of events.
+pub(super) const EVENTS: &str = "text/event-stream";
 /// How long a client may leave what it is sent unread.
 const UNREAD: Duration = Duration::from_secs(20);
 
@@ -42,24 +46,27 @@ pub(super) async fn serve(listener: TcpListener, router: Router) {
                 continue;
             }
         };
-        let Some(asks) = seats.make_room(number) else { continue };
+        let work = seats.make_room(number);
         let (seats_then, router) = (seats.clone(), router.clone());
         let task = tokio::spawn(async move {
             // A client that breaks off or says nonsense is its own affair.
-            let _ = converse(stream, router, asks).await;
+            let _ = converse(stream, router, work).await;
             seats_then.leave(number);
         });
         seats.take(number, task.abort_handle());
     }
 }
 
-async fn converse(stream: TcpStream, router: Router, asks: Arc<AtomicUsize>) -> Result<(), hyper::Error> {
+async fn converse(stream: TcpStream, router: Router, work: Arc<Work>) -> Result<(), hyper::Error> {
     let _ = stream.set_nodelay(true);
     let service = hyper::service::service_fn(move |request: hyper::Request<hyper::body::Incoming>| {
-        let asking = Asking::new(&asks);
+        let asking = Asking::new(&work);
         let mut router = router.clone();
         async move {
             let answer = router.call(request.map(Body::new)).await?;
+            if answer.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == EVENTS) {
+                asking.0.is_stream.store(true, Ordering::Relaxed);
+            }
             // The client waits for us until the last byte is out.
             Ok::<_, Infallible>(answer.map(move |body| {
                 Body::new(body.map_frame(move |frame| {
@@ -74,19 +81,27 @@ async fn converse(stream: TcpStream, router: Router, asks: Arc<AtomicUsize>) -> 
     http.serve_connection(TokioIo::new(Impatient { stream, unread: None }), service).await
 }
 
+/// What a connection is there for.
+#[derive(Debug, Default)]
+struct Work {
+    /// Requests that are being answered.
+    asks: AtomicUsize,
+    is_stream: AtomicBool,
+}
+
 /// A request that is being answered.
-struct Asking(Arc<AtomicUsize>);
+struct Asking(Arc<Work>);
 
 impl Asking {
-    fn new(asks: &Arc<AtomicUsize>) -> Self {
-        asks.fetch_add(1, Ordering::Relaxed);
-        Self(asks.clone())
+    fn new(work: &Arc<Work>) -> Self {
+        work.asks.fetch_add(1, Ordering::Relaxed);
+        Self(work.clone())
     }
 }
 
 impl Drop for Asking {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
+        self.0.asks.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -95,10 +110,17 @@ impl Drop for Asking {
 struct Seats(Arc<Mutex<BTreeMap<u64, Seat>>>);
 
 struct Seat {
-    /// Requests that are being answered.
-    asks: Arc<AtomicUsize>,
+    work: Arc<Work>,
     /// Ends the connection; none while it is being set up.
     end: Option<AbortHandle>,
+}
+
+impl Seat {
+    /// Whether it may be taken away, and how hard that is.
+    fn hardness(&self) -> Option<usize> {
+        let may_end = self.end.is_some() && !self.work.is_stream.load(Ordering::Relaxed);
+        may_end.then(|| self.work.asks.load(Ordering::Relaxed))
+    }
 }
 
 impl Seats {
@@ -106,17 +128,18 @@ impl Seats {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Reserves a seat, if need be that of the oldest connection that waits for no answer; `None` if all wait for one.
-    fn make_room(&self, number: u64) -> Option<Arc<AtomicUsize>> {
+    /// Reserves a seat, if need be that of another connection.
+    fn make_room(&self, number: u64) -> Arc<Work> {
         let mut seats = self.lock();
         if seats.len() >= MOST {
-            let idle = seats.iter().find(|(_, s)| s.end.is_some() && s.asks.load(Ordering::Relaxed) == 0);
-            let oldest = *idle?.0;
-            seats.remove(&oldest).and_then(|s| s.end).inspect(AbortHandle::abort);
+            let weakest = seats.iter().filter_map(|(&n, s)| Some((s.hardness()?, n))).min();
+            if let Some(end) = weakest.and_then(|(_, n)| seats.remove(&n)).and_then(|s| s.end) {
+                end.abort();
+            }
         }
-        let asks = Arc::new(AtomicUsize::new(0));
-        seats.insert(number, Seat { asks: asks.clone(), end: None });
-        Some(asks)
+        let work = Arc::<Work>::default();
+        seats.insert(number, Seat { work: work.clone(), end: None });
+        work
     }
 
     fn take(&self, number: u64, end: AbortHandle) {

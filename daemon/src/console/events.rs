@@ -1,5 +1,6 @@
 //! Changes as server-sent events.
 
+use super::connections::EVENTS;
 use super::server::{Shared, refusal};
 use super::snapshot::Snapshot;
 use super::state::MapEvent;
@@ -37,7 +38,7 @@ pub(super) async fn events(State(shared): State<Shared>) -> Response {
         }
         feed.queue.pop_front().map(|bytes| (Ok::<_, Infallible>(bytes), feed))
     });
-    ([(header::CONTENT_TYPE, "text/event-stream")], Body::from_stream(stream)).into_response()
+    ([(header::CONTENT_TYPE, EVENTS)], Body::from_stream(stream)).into_response()
 }
 
 impl Feed {
