@@ -6,6 +6,8 @@ use crate::config::{Config, load_key};
 use crate::problem::Problem;
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
+use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, MissionId};
@@ -81,6 +83,7 @@ pub fn vehicle(
     };
     let codec = config.map.codec.parse().unwrap_or_default();
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
+    link.set_planes(planes(config, codec));
     link.source_mut().set_settle_time(Duration::from_secs_f64(config.map.settle_s));
     let steering = Steering::new(area, footprint(config), cell_m(config));
     let (x, y) = steering.start();
@@ -92,6 +95,19 @@ pub fn vehicle(
         vehicle.send_whole_png();
     }
     Ok(vehicle)
+}
+
+/// The planes of the map that are sent, and their parts of the map's share in percent.
+fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u8)> {
+    let map = &config.map;
+    let settle = Duration::from_secs_f64(map.settle_s);
+    let scale = |kind| match kind {
+        PlaneKind::Confidence => PlaneScale::Confidence,
+        PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),
+    };
+    let planes = PlaneKind::ALL.into_iter().zip(map.plane_shares);
+    let wanted = planes.filter(|(kind, _)| map.stream == "delta" && map.planes.iter().any(|name| name == kind.name()));
+    wanted.map(move |(kind, share)| (PlaneSource::new(scale(kind), codec, settle), share))
 }
 
 /// The vehicles that the surface speaks with from the beginning, by address and name.

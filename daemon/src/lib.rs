@@ -8,10 +8,13 @@ pub mod console;
 pub mod ctl;
 mod ends;
 mod figures;
+mod imagery;
 pub mod modem;
+pub mod modem_sim;
 pub mod picture;
 mod problem;
 pub mod rehearsal;
 pub mod runtime;
+mod scene;
 
 pub use problem::Problem;

@@ -6,8 +6,9 @@ use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{LifeLine, Slot, Utility};
 use scenecast_protocol::mac::Access;
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, PlaneKind};
 use scenecast_protocol::map_codec::Codec;
+use scenecast_protocol::schedule::Class;
 use std::time::Duration;
 
 fn water() -> impl Strategy<Value = Water> {
@@ -33,9 +34,10 @@ fn setup() -> impl Strategy<Value = Setup> {
     let budget = prop_oneof![Just(1000u32), Just(10_000)];
     let codec = prop_oneof![Just(Codec::Png), Just(Codec::Context)];
     let settle = prop_oneof![Just(0), Just(2), Just(30)].prop_map(Duration::from_secs);
-    (frame, budget, codec, access, 0u8..6, settle).prop_map(
-        |(frame_bytes, budget_bps, codec, access, keyed, settle)| {
-            let setup = Setup { access, settle, ..Setup::new(frame_bytes, budget_bps, codec) };
+    let planes = prop_oneof![Just(None), Just(Some([0, 0])), Just(Some([10, 5]))];
+    (frame, budget, codec, access, 0u8..6, settle, planes).prop_map(
+        |(frame_bytes, budget_bps, codec, access, keyed, settle, planes)| {
+            let setup = Setup { access, settle, planes, ..Setup::new(frame_bytes, budget_bps, codec) };
             match keyed {
                 1 if frame_bytes >= 48 => setup.keyed(false, false),
                 2 if frame_bytes >= 48 => setup.keyed(true, false),
@@ -70,6 +72,7 @@ proptest! {
             // Now and then one way is cut, or both.
             pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
             pair.vehicle.set_map(map.iter(), pair.now);
+            pair.set_planes(24, step as u64);
             pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
             pair.run(pair.now + Duration::from_secs(40), false);
             match what {
@@ -123,6 +126,52 @@ const CALM: Water = Water {
     talker: 0.0,
     propagation: Duration::from_millis(100),
 };
+
+#[test]
+fn planes_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() {
+    let sent = |planes: [u8; 2]| {
+        let setup = Setup { planes: Some(planes), ..Setup::new(256, 4_000, Codec::Png) };
+        let mut pair = Pair::new(1, setup, Water { loss: 0.0, ..CALM });
+        for phase in 0..20 {
+            pair.vehicle.set_map(speckled(120, phase), pair.now);
+            pair.set_planes(120, phase);
+            pair.run(pair.now + Duration::from_secs(10), false);
+        }
+        assert_budget(&pair, 4_000);
+        [Class::Map, Class::Confidence, Class::Depth]
+            .map(|c| *pair.vehicle.stats().bytes_by_class.get(&c).unwrap_or(&0))
+    };
+    let [labels, confidence, depth] = sent([0, 0]);
+    assert!(labels > 50_000 && confidence + depth < 100, "{labels} {confidence} {depth}");
+    // A half of what is sent is the map's share.
+    let [labels, confidence, depth] = sent([20, 10]);
+    let part = |bytes: u64| bytes as f64 / (labels + confidence + depth) as f64;
+    assert!((0.08..0.13).contains(&part(confidence)), "{labels} {confidence} {depth}");
+    assert!((0.03..0.08).contains(&part(depth)), "{labels} {confidence} {depth}");
+}
+
+#[test]
+fn a_new_epoch_takes_the_planes_away_before_the_first_new_label() {
+    let setup = Setup { planes: Some([0, 0]), ..Setup::new(256, 10_000, Codec::Context) };
+    let mut pair = Pair::new(2, setup, Water { loss: 0.2, ..CALM });
+    pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
+    pair.set_planes(20, 0);
+    pair.run(pair.now + Duration::from_secs(200), true);
+    let level = |pair: &Pair, cell: Cell| {
+        let plane = pair.surface.vehicle(auv()).unwrap().plane(PlaneKind::Confidence);
+        plane.map_or(0, |p| p.levels().shown().get(cell))
+    };
+    assert!(pair.is_converged() && level(&pair, Cell::new(0, 0)) > 0);
+    pair.vehicle.begin_epoch(pair.now);
+    pair.vehicle.set_map([(Cell::new(5, 5), 9)], pair.now);
+    for _ in 0..600 {
+        pair.run(pair.now + Duration::from_millis(100), false);
+        if pair.shown().get(Cell::new(5, 5)) == 9 {
+            break;
+        }
+    }
+    assert_eq!((pair.shown().get(Cell::new(5, 5)), level(&pair, Cell::new(0, 0))), (9, 0));
+}
 
 #[test]
 fn an_end_that_was_not_heard_for_hours_is_heard_again() {
@@ -207,7 +256,7 @@ fn a_clean_channel_is_mostly_spent_on_the_map() {
         pair.vehicle.set_map(speckled(200, phase), pair.now);
         pair.run(pair.now + Duration::from_secs(10), false);
     }
-    let bits = pair.vehicle.stats().delivered_by_class[&scenecast_protocol::schedule::Class::Map] * 8;
+    let bits = pair.vehicle.stats().delivered_by_class[&Class::Map] * 8;
     let efficiency = bits as f64 / (pair.now.since(start).as_secs_f64() * 10_000.0);
     assert!(efficiency > 0.7, "{efficiency}");
 }

@@ -2,7 +2,7 @@
 
 use scenecast_protocol::directive::{Budget, Constraints, Fix, RefusalReason, Requests, Settings, Slot, SlotId};
 use scenecast_protocol::directive::{Utility, VersionedSlot};
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
@@ -272,6 +272,13 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]) };
     let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
     let requests = Requests { epoch: 1, wanted: vec![(3, 2)] };
+    let plane = |chunk: PlaneChunk<'_>| {
+        let bytes = chunk.encode();
+        assert_eq!(PlaneChunk::decode(&bytes), Some(chunk));
+        bytes
+    };
+    let depth = PlaneScale::Depth { step_dm: 5, first: 24 };
+    assert_eq!((depth.bounds(1), PlaneScale::Confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
     let expected = vec![
         ("base 127", base(127, 1)),
         ("base 128", base(128, 2)),
@@ -298,6 +305,12 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ("head of a map chunk of 26 bytes", head(26, 1, false)),
         ("head of a map chunk of 27 bytes", head(27, 2, false)),
         ("head of a map chunk of 300 bytes", head(300, 2, false)),
+        ("head of a plane chunk: a patch of confidence", plane(PlaneChunk::Patch(PlaneScale::Confidence, &[]))),
+        (
+            "head of a plane chunk: a patch of depth, steps of 0.5 m, level 1 from 12 m on",
+            plane(PlaneChunk::Patch(depth, &[])),
+        ),
+        ("plane chunk: the digest of confidence is 27A6", plane(PlaneChunk::Digest(PlaneKind::Confidence, 0x27A6))),
         (
             "pose: hold, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
             pose(None),

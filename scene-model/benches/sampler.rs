@@ -1,95 +1,118 @@
-//! Words resampled per CPU-second on the synthetic workload, for each kernel, beside a plain re-implementation.
+//! Words resampled a second on the synthetic workload: each kernel beside a plain re-implementation, in one run.
 //!
-//! `cargo bench -p scene-model --bench sampler`. It is its own harness because the figure of interest is a ratio within
-//! one run. CPU time is of the sampling thread (Linux; elsewhere wall time).
-#![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
+//! `cargo bench -p scene-model --bench sampler`; with `-- avx2` or the like only some. After divan's table (wall time)
+//! come the figures in words per CPU-second of the sampling thread (Linux; elsewhere wall time), and how many times
+//! the plain algorithm that is.
+#![allow(clippy::disallowed_methods, missing_docs, unreachable_pub, dead_code)]
 
 mod cpu;
 mod plain;
 mod workload;
 
-use std::time::Instant;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, OnceLock};
 
 use cpu::cpu_seconds;
+use divan::Bencher;
+use divan::counter::ItemsCount;
 use plain::Plain;
 use scene_model::topics::{Kernel, SceneConfig, SceneModel};
-use scene_model::tuning::mutual_information_nats;
-use workload::{Chance, Workload};
+use workload::Workload;
 
 const SWEEPS: u32 = 30;
-const KERNELS: [Kernel; 3] = [Kernel::Portable, Kernel::Avx2, Kernel::Avx512];
+const LABELS: [u32; 4] = [8, 16, 32, 100];
+const PLAIN: &str = "plain";
+
+/// Words and CPU seconds by method and K.
+type Spent = BTreeMap<(&'static str, u32), (u64, f64)>;
+static SPENT: Mutex<Spent> = Mutex::new(BTreeMap::new());
 
 fn main() {
-    let work = workload::workload(1, 100, 100, 1000);
-    println!("{} words in {} cells, V = {}", work.observations.len(), work.truth.len(), work.vocabulary);
-    println!("M words per CPU-second, {SWEEPS} sweeps, births on (in brackets: times the plain algorithm)");
-    for max_labels in [8, 16, 32, 100] {
-        let plain = plain_rate(&work, max_labels);
-        print!("K {max_labels:3}: plain {plain:4.1}");
-        for kernel in KERNELS.into_iter().filter(|kernel| kernel.is_available()) {
-            let (rate, _) = sampled(&work, max_labels, kernel, 1);
-            print!(", {} {rate:.1} ({:.0} x)", kernel.name(), rate / plain);
+    divan::main();
+    print_cpu_figures();
+}
+
+/// The published algorithm: f64, a division a label, a cumulative distribution a word; one sweep.
+#[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
+fn plain_algorithm(bencher: Bencher<'_, '_>, labels: u32) {
+    let work = work();
+    let inputs = bencher.counter(words(1)).with_inputs(|| Plain::new(work, labels as usize));
+    inputs.bench_local_values(|mut plain| spend(PLAIN, labels, || plain.sweep()));
+}
+
+#[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
+fn portable(bencher: Bencher<'_, '_>, labels: u32) {
+    sampler(bencher, Kernel::Portable, labels, 1);
+}
+
+#[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
+fn avx2(bencher: Bencher<'_, '_>, labels: u32) {
+    sampler(bencher, Kernel::Avx2, labels, 1);
+}
+
+#[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
+fn avx512(bencher: Bencher<'_, '_>, labels: u32) {
+    sampler(bencher, Kernel::Avx512, labels, 1);
+}
+
+/// The widest kernel with two threads: wall time alone tells.
+#[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
+fn two_threads(bencher: Bencher<'_, '_>, labels: u32) {
+    sampler(bencher, Kernel::detect(), labels, 2);
+}
+
+/// 30 sweeps of a new model, births on.
+fn sampler(bencher: Bencher<'_, '_>, kernel: Kernel, labels: u32, threads: usize) {
+    if !kernel.is_available() {
+        return;
+    }
+    let model = || {
+        let work = work();
+        let config =
+            SceneConfig { cell_m: [1.0; 3], vocabulary: work.vocabulary, max_labels: labels, ..SceneConfig::default() };
+        let mut model = SceneModel::new(config).unwrap();
+        model.use_kernel(kernel);
+        model.use_threads(threads);
+        model.insert(0.0, &work.observations);
+        model
+    };
+    bencher.counter(words(SWEEPS)).with_inputs(model).bench_local_values(|mut model| {
+        let mut sweep = || model.sweep(SWEEPS);
+        if threads == 1 { spend(kernel.name(), labels, sweep) } else { sweep() }
+    });
+}
+
+fn spend(method: &'static str, labels: u32, mut work: impl FnMut() -> u64) -> u64 {
+    let start = cpu_seconds();
+    let words = work();
+    let seconds = cpu_seconds() - start;
+    let mut spent = SPENT.lock().unwrap();
+    let entry = spent.entry((method, labels)).or_default();
+    *entry = (entry.0 + words, entry.1 + seconds);
+    words
+}
+
+fn print_cpu_figures() {
+    let spent = SPENT.lock().unwrap();
+    let rate = |method, labels| spent.get(&(method, labels)).map(|(words, seconds)| *words as f64 / seconds / 1e6);
+    println!("\nM words per CPU-second (times the plain algorithm), births on");
+    for labels in LABELS {
+        let plain = rate(PLAIN, labels);
+        print!("K {labels:3}:");
+        for method in [PLAIN, "portable", "avx2", "avx512"] {
+            let Some(found) = rate(method, labels) else { continue };
+            let times = plain.map_or("-".to_owned(), |plain| format!("{:.1}", found / plain));
+            print!("  {method} {found:.1} ({times})");
         }
         println!();
     }
-    for max_labels in [16, 100] {
-        let wall = |threads| {
-            let start = Instant::now();
-            sampled(&work, max_labels, Kernel::detect(), threads);
-            start.elapsed().as_secs_f64()
-        };
-        println!(
-            "wall time at K {max_labels}, insertion included: 1 thread {:.2} s, 2 threads {:.2} s",
-            wall(1),
-            wall(2)
-        );
-    }
-    quality();
 }
 
-/// Mutual information with the true labels over 8 seeds, with true positions and with noisy ones.
-fn quality() {
-    for (name, sigma) in [("true positions", 0.0), ("positions off by half a cell (Gaussian)", 0.5)] {
-        let mut shares: Vec<f64> = (1..=8).map(|seed| share_found(seed, sigma)).collect();
-        shares.sort_by(f64::total_cmp);
-        println!("MI / entropy of the truth over 8 seeds, {name}: median {:.3}, worst {:.3}", shares[4], shares[0]);
-    }
+fn work() -> &'static Workload {
+    static WORK: OnceLock<Workload> = OnceLock::new();
+    WORK.get_or_init(|| workload::workload(1, 100, 100, 1000))
 }
 
-fn share_found(seed: u64, sigma: f64) -> f64 {
-    let mut work = workload::workload(seed, 100, 100, 1000);
-    let mut chance = Chance(seed + 77);
-    for seen in &mut work.observations {
-        let radius = sigma * (-2.0 * (1.0 - chance.unit()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * chance.unit()).sin_cos();
-        (seen.x, seen.y) = (seen.x + radius * cos, seen.y + radius * sin);
-    }
-    let (_, model) = sampled(&work, 16, Kernel::detect(), 1);
-    let pairs = model.label_map().into_iter().filter_map(|cell| {
-        let inside = (0..work.side).contains(&cell.x) && (0..work.side).contains(&cell.y);
-        inside.then(|| (cell.topic.0, work.truth[(cell.y * work.side + cell.x) as usize]))
-    });
-    mutual_information_nats(pairs).nats / entropy(&work.truth)
-}
-
-fn entropy(labels: &[u32]) -> f64 {
-    mutual_information_nats(labels.iter().map(|&label| (label, label))).nats
-}
-
-fn sampled(work: &Workload, max_labels: u32, kernel: Kernel, threads: usize) -> (f64, SceneModel) {
-    let config = SceneConfig { cell_m: [1.0; 3], vocabulary: work.vocabulary, max_labels, ..SceneConfig::default() };
-    let mut model = SceneModel::new(config).unwrap();
-    model.use_kernel(kernel);
-    model.use_threads(threads);
-    model.insert(0.0, &work.observations);
-    let start = cpu_seconds();
-    let words = model.sweep(SWEEPS);
-    (words as f64 / (cpu_seconds() - start) / 1e6, model)
-}
-
-fn plain_rate(work: &Workload, labels: u32) -> f64 {
-    let mut plain = Plain::new(work, labels as usize);
-    let start = cpu_seconds();
-    let words = plain.sweep();
-    words as f64 / (cpu_seconds() - start) / 1e6
+fn words(sweeps: u32) -> ItemsCount {
+    ItemsCount::new(work().observations.len() * sweeps as usize)
 }

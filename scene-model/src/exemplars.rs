@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 
 use image::{RgbImage, imageops};
+use serde::{Deserialize, Serialize};
 
 use crate::topics::TopicId;
 
 /// A patch of a camera frame that represents a topic.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Exemplar {
     /// Square patch of the store's edge length.
+    #[serde(with = "pixels")]
     pub patch: RgbImage,
     /// How well it represents the topic, higher is better (the daemon offers the cell's confidence).
     pub score: f32,
@@ -20,7 +22,7 @@ pub struct Exemplar {
 }
 
 /// Keeps the best few patches of each topic.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ExemplarStore {
     per_label: usize,
     edge_px: u32,
@@ -96,6 +98,24 @@ impl ExemplarStore {
     }
 }
 
+/// An image as width, height and bytes.
+mod pixels {
+    use image::RgbImage;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(image: &RgbImage, serializer: S) -> Result<S::Ok, S::Error> {
+        (image.width(), image.height(), image.as_raw()).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RgbImage, D::Error> {
+        let (width, height, raw): (u32, u32, Vec<u8>) = Deserialize::deserialize(deserializer)?;
+        let is_whole = u64::from(width) * u64::from(height) * 3 == raw.len() as u64;
+        let image = RgbImage::from_raw(width, height, raw).filter(|_| is_whole);
+        image.ok_or_else(|| D::Error::custom("an image of another size than its bytes"))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,6 +144,20 @@ mod tests {
         assert_eq!(scores, [0.9, 0.5]);
         assert_eq!(store.best(TopicId(4)).unwrap().patch.dimensions(), (16, 16));
         assert!(store.best(TopicId(5)).is_none());
+    }
+
+    #[test]
+    fn a_store_comes_back_from_its_bytes() {
+        let mut store = ExemplarStore::new(2, 4);
+        offer(&mut store, 4, 0.5);
+        let mut bytes = postcard::to_allocvec(&store).unwrap();
+        let back: ExemplarStore = postcard::from_bytes(&bytes).unwrap();
+        assert_eq!(back.all(TopicId(4)), store.all(TopicId(4)));
+        let width = bytes.iter().position(|&byte| byte == 4).unwrap();
+        for at in width..bytes.len() {
+            bytes[at] ^= 1;
+            drop(postcard::from_bytes::<ExemplarStore>(&bytes));
+        }
     }
 
     #[test]

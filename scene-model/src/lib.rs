@@ -7,6 +7,7 @@
 //! Nothing here does input or output, reads a clock, or draws from a global random source: the same calls with the same
 //! seed give the same labels.
 
+pub mod envelope;
 pub mod exemplars;
 pub mod generate;
 pub mod project;
@@ -15,4 +16,5 @@ mod random;
 pub mod score;
 pub mod topics;
 pub mod tuning;
+pub mod vocabulary;
 pub mod words;

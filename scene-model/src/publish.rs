@@ -37,8 +37,8 @@ pub fn label_areas(cells: &[PublishedCell]) -> BTreeMap<u8, u32> {
 pub struct LabelBook {
     epoch: u8,
     min_cells: u32,
-    /// The topic of id 1, 2, ...
-    topics: Vec<TopicId>,
+    /// The topic of id 1, 2, ...; nothing where an earlier run may have given the id to a topic that is not known here.
+    topics: Vec<Option<TopicId>>,
     ids: BTreeMap<TopicId, u8>,
     /// Topics that held enough cells in the last call.
     held: Vec<TopicId>,
@@ -68,7 +68,7 @@ impl LabelBook {
 
     /// The topic that an id stands for in this epoch.
     pub fn topic_of(&self, label: u8) -> Option<TopicId> {
-        self.topics.get(usize::from(label).checked_sub(1)?).copied()
+        self.topics.get(usize::from(label).checked_sub(1)?).copied().flatten()
     }
 
     /// The id of a topic in this epoch.
@@ -76,9 +76,28 @@ impl LabelBook {
         self.ids.get(&topic).copied()
     }
 
+    /// The labels that the last map had: x, y, label, sorted by (y, x).
+    pub fn shown(&self) -> impl Iterator<Item = (i32, i32, u8)> {
+        self.shown.iter().filter_map(|&(y, x, topic)| Some((x, y, self.label_of(topic)?)))
+    }
+
     /// All ids given in this epoch, in the order in which they were given.
     pub fn labels(&self) -> impl Iterator<Item = u8> {
         1..=self.topics.len() as u8
+    }
+
+    /// Goes on in the same epoch after a restart: ids up to `told` may have been published by then, and those that this
+    /// book has no topic for are never given again.
+    pub fn resume(&mut self, told: u8) {
+        let told = usize::from(told).min(Self::CAPACITY);
+        self.topics.resize(self.topics.len().max(told), None);
+    }
+
+    /// Starts the ids afresh in another epoch; what was held counts on.
+    pub fn begin_epoch(&mut self, epoch: u8) {
+        self.epoch = epoch;
+        self.topics.clear();
+        self.ids.clear();
     }
 
     /// Turns a flattened map (sorted by (y, x)) into published labels, sorted alike.
@@ -114,13 +133,11 @@ impl LabelBook {
         self.held = holding;
         let wanted = lasting.iter().filter(|topic| !self.ids.contains_key(topic)).count();
         if self.topics.len() + wanted > Self::CAPACITY {
-            self.epoch = self.epoch.wrapping_add(1);
-            self.topics.clear();
-            self.ids.clear();
+            self.begin_epoch(self.epoch.wrapping_add(1));
         }
         for topic in lasting {
             if !self.ids.contains_key(&topic) && self.topics.len() < Self::CAPACITY {
-                self.topics.push(topic);
+                self.topics.push(Some(topic));
                 self.ids.insert(topic, self.topics.len() as u8);
             }
         }
@@ -205,6 +222,21 @@ mod tests {
         let published = book.publish(&row(&[0, 0, 0, 0, 9]));
         assert_eq!(labels(&published), [1; 5]);
         assert_eq!(published[4].confidence, 0.0);
+    }
+
+    #[test]
+    fn after_a_restart_no_id_that_may_have_been_told_gets_another_meaning() {
+        let mut book = LabelBook::new(4);
+        book.publish(&row(&[7, 7, 7]));
+        book.publish(&row(&[7, 7, 7]));
+        book.resume(3);
+        book.publish(&row(&[7, 7, 7, 9, 9, 9]));
+        assert_eq!(labels(&book.publish(&row(&[7, 7, 7, 9, 9, 9]))), [1, 1, 1, 4, 4, 4]);
+        assert_eq!((book.topic_of(1), book.topic_of(2), book.epoch()), (Some(TopicId(7)), None, 4));
+        book.resume(2);
+        assert_eq!(book.labels().count(), 4, "nothing is taken back");
+        book.begin_epoch(5);
+        assert_eq!(labels(&book.publish(&row(&[9, 9, 9, 7, 7, 7]))), [2, 2, 2, 1, 1, 1], "at once: both were held");
     }
 
     #[test]

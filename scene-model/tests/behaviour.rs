@@ -143,3 +143,21 @@ fn the_edge_of_the_seen_predicts_what_comes_next() {
     assert!(model.expected_at([3.5, 0.5, 0.0]).is_empty());
     assert!(model.expected_at([f64::NAN, 0.5, 0.0]).is_empty());
 }
+
+#[test]
+fn stacked_cells_have_labels_of_their_own_and_the_map_keeps_the_height_of_the_one_that_shows() {
+    let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 1.0, ..config(1) };
+    let mut model = SceneModel::new(config).unwrap();
+    let at = |word, x, z| Observation { word, x, y: -7.5, z };
+    for _ in 0..2 {
+        // The second time these are words for cells that were seen before.
+        model.insert(0.0, &[vec![at(0, 0.5, 9.0); 40], vec![at(3, 0.5, -2.0); 30], vec![at(3, 5.5, 1.0); 30]].concat());
+        model.sweep(30);
+    }
+    let volume = model.label_volume();
+    let places: Vec<(i32, i32, i32, u32)> = volume.iter().map(|cell| (cell.x, cell.y, cell.z, cell.words)).collect();
+    assert_eq!(places, [(0, -8, 9, 80), (0, -8, -2, 60), (5, -8, 1, 60)]);
+    assert!(volume[0].topic != volume[1].topic);
+    let map = model.label_map();
+    assert_eq!((map.len(), map[0].z, map[0].topic, map[0].words), (2, 9, volume[0].topic, 140));
+}

@@ -117,6 +117,11 @@ fn every_command_has_help_with_an_example() {
         &["map", "decode"],
         &["map", "bench"],
         &["map", "train-prior"],
+        &["scene", "run"],
+        &["scene", "sample"],
+        &["vocabulary", "train"],
+        &["scene", "score"],
+        &["tune"],
     ] {
         let output = run(&[command, &["--help"]].concat());
         assert!(output.status.success());
@@ -149,4 +154,77 @@ fn the_configuration_files_that_ship_are_accepted() {
     for file in files {
         scenecast::config::load(Some(&root.join(file)), &[]).unwrap_or_else(|e| panic!("{e}"));
     }
+}
+
+/// A mosaic of 160 x 120 with two kinds of ground, and their classes.
+fn two_grounds(dir: &Path, name: &str) -> (String, String) {
+    let (mosaic, labels) = (dir.join(format!("{name}.png")), dir.join(format!("{name}_label.png")));
+    let speckle = |x: u32, y: u32| ((x * 31 + y * 17) % 40) as u8;
+    let ground = |x: u32, y: u32| (x / 40 + y / 60) % 2 == 0;
+    let colour = |x, y| if ground(x, y) { [60, 90 + speckle(x, y), 140] } else { [150 + speckle(y, x), 110, 60] };
+    image::RgbImage::from_fn(160, 120, |x, y| image::Rgb(colour(x, y))).save(&mosaic).unwrap();
+    image::GrayImage::from_fn(160, 120, |x, y| image::Luma([u8::from(ground(x, y))])).save(&labels).unwrap();
+    (mosaic.to_str().unwrap().to_owned(), labels.to_str().unwrap().to_owned())
+}
+
+#[test]
+fn a_folder_of_annotated_images_is_scored_and_wrong_ones_are_named() {
+    let dir = scratch("score");
+    let folder = dir.to_str().unwrap();
+    assert_refused(&["scene", "score", "--dir", folder], &["no NAME_label.png"]);
+    two_grounds(&dir, "reef");
+    let output = run(&["scene", "score", "--dir", folder, "--seeds", "1", "--cells-across", "20", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["scenes"][0]["cells"], 20 * 15);
+    for method in ["scene_model", "kmeans_lab", "kmeans_pooled_words"] {
+        let excess = report["median"][method]["excess_nats"].as_f64().unwrap();
+        assert!(excess > 0.4, "{method}: {excess} of 0.69");
+    }
+    image::GrayImage::new(9, 9).save(dir.join("reef_label.png")).unwrap();
+    assert_refused(&["scene", "score", "--dir", folder], &["reef_label.png", "9 x 9", "160 x 120"]);
+    image::GrayImage::new(1, 1).save(dir.join("reef_label.png")).unwrap();
+    image::RgbImage::new(1, 1).save(dir.join("reef.png")).unwrap();
+    assert_refused(&["scene", "score", "--dir", folder], &["reef.png", "1 x 1", "16 x 16"]);
+}
+
+#[test]
+fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
+    let dir = scratch("tune");
+    let (mosaic, labels) = two_grounds(&dir, "reef");
+    let (grid, out) = (dir.join("grid.toml"), dir.join("out"));
+    std::fs::write(&grid, "alpha = [0.1, 0.01]\nbeta = [0.1]\ngamma = [1e-4]\ncell_m = [0.08]\n").unwrap();
+    let tune = |more: &[&str]| {
+        let common = ["tune", "--mosaic", &mosaic, "--annotations", &labels, "--metres-per-pixel", "0.01"];
+        let rest = ["--grid", grid.to_str().unwrap(), "--sweeps", "5", "--out", out.to_str().unwrap()];
+        [&common[..], &rest, more].concat().into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let run_with = |more: &[&str]| run(&tune(more).iter().map(String::as_str).collect::<Vec<_>>());
+    let first = run_with(&[]);
+    assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
+    let csv = std::fs::read_to_string(out.join("tuning.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 3);
+    let shorter: Vec<&str> = csv.lines().take(2).collect();
+    std::fs::write(out.join("tuning.csv"), shorter.join("\n") + "\n").unwrap();
+    let again = run_with(&[]);
+    assert!(String::from_utf8_lossy(&again.stderr).contains("1 of 2 settings are in tuning.csv already"));
+    assert_eq!(std::fs::read_to_string(out.join("tuning.csv")).unwrap(), csv, "the same figures again");
+    let best = out.join("best.toml");
+    let other = tune(&["--seed", "2"]);
+    assert_refused(&other.iter().map(String::as_str).collect::<Vec<_>>(), &["tuning.csv:2", "another"]);
+    let sim = run(&[
+        "sim",
+        "--scenario",
+        best.to_str().unwrap(),
+        "--duration",
+        "20",
+        "--out",
+        dir.join("s").to_str().unwrap(),
+    ]);
+    assert!(sim.status.success(), "{}", String::from_utf8_lossy(&sim.stderr));
+    for picture in ["tuning.svg", "tuning.png"] {
+        assert!(out.join(picture).is_file());
+    }
+    assert_eq!(run_with(&["--budget", "0.001"]).status.code(), Some(1));
+    assert!(!best.exists(), "what does not fit the budget is not left to pass for the answer");
 }

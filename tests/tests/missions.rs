@@ -70,6 +70,24 @@ fn whole_missions_pass_with_either_codec() {
 }
 
 #[test]
+fn planes_arrive_and_labels_do_not_wait_for_them() {
+    let without = fly(&["map.planes=[]"], 8);
+    assert_eq!(without["map"]["planes"], serde_json::json!({}));
+    for sets in [&["map.plane_shares=[0, 0]"], &["map.plane_shares=[10, 5]"]] {
+        let with = fly(sets, 8);
+        assert_sound(&with);
+        for plane in ["confidence", "depth"] {
+            let plane = &with["map"]["planes"][plane];
+            assert_eq!(plane["agreement_final"], 1.0, "{plane}");
+            assert!(plane["agreement_mean"].as_f64().unwrap() > 0.8, "{plane}");
+            assert_eq!(plane["cells"], with["survey"]["explored_cells"]);
+        }
+        let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
+        assert!(mean(&with) > mean(&without) - 0.02, "{} with planes, {} without", mean(&with), mean(&without));
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_report() {
     let first = fly(&["channel.loss=0.2"], 7).to_string();
     assert_eq!(first, fly(&["channel.loss=0.2"], 7).to_string());

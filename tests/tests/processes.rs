@@ -140,3 +140,47 @@ fn a_vehicle_that_is_killed_and_comes_back_is_heard_again() {
         std::fs::read(&map).is_ok_and(|png| png == *expected)
     });
 }
+
+#[test]
+fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_labels() {
+    let (recording, expected) = recorded();
+    let dir = scratch("checkpoint");
+    let (port, page) = (free_port(), free_port());
+    let file = |name: &str, text: String| {
+        let path = dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let state = |who: &str| format!("[runtime]\ntime_scale = 10\nstate_dir = \"{}\"\n", dir.join(who).display());
+    let link = |key: &str| format!("[modem]\n{key} = \"127.0.0.1:{port}\"\n");
+    let camera = format!("[camera]\nsource = \"frames:{}\"\n", recording.display());
+    let vehicle =
+        file("auv.toml", [state("auv"), link("connect"), camera, "[scene]\ncheckpoint_s = 1\n".into()].concat());
+    let console = format!("[console]\nlisten = \"127.0.0.1:{page}\"\n");
+    let surface = file("asv.toml", [state("asv"), link("listen"), console].concat());
+    let _surface = Process::start(&["asv", "--config", &surface]);
+    let checkpoint = dir.join("auv/scene.checkpoint");
+    let kept = || std::fs::read(&checkpoint).unwrap_or_default();
+    for kill in 0..4 {
+        let before = kept();
+        let mut process = Process::start(&["auv", "--config", &vehicle]);
+        wait_until("a further checkpoint", Duration::from_secs(60), || kept() != before);
+        std::thread::sleep(Duration::from_millis(70 * kill));
+        process.kill();
+    }
+    let arrived = || std::fs::read(dir.join("asv/operator-map-1.png")).is_ok_and(|png| png == *expected);
+    let epoch = || {
+        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        let state: serde_json::Value = serde_json::from_slice(&body).ok()?;
+        state["vehicles"][0]["map"]["epoch"].as_u64()
+    };
+    let mut last = Process::start(&["auv", "--config", &vehicle]);
+    wait_until("the map of a run that was never killed", Duration::from_secs(120), arrived);
+    assert_eq!(epoch(), Some(0), "the labels have gone on in their epoch");
+    last.kill();
+    let whole = kept();
+    std::fs::write(&checkpoint, &whole[..whole.len() / 2]).unwrap();
+    let _anew = Process::start(&["auv", "--config", &vehicle]);
+    wait_until("labels in a new epoch", Duration::from_secs(60), || epoch().is_some_and(|epoch| epoch > 0));
+    wait_until("the map learnt anew", Duration::from_secs(120), arrived);
+}

@@ -43,14 +43,20 @@ export async function logInIfAsked() {
 export async function readMap(id) {
   const m = await read(`/vehicles/${id}/map`);
   const labels = decode(m.labels);
-  const raw = decode(m.age_s);
-  const age = new Uint16Array(raw.length / 2);
-  for (let i = 0; i < age.length; i += 1) age[i] = raw[2 * i] | (raw[2 * i + 1] << 8);
+  const age = ages(m.age_s);
   if (labels.length !== m.width * m.height || age.length !== labels.length) {
     throw new Refused("the map's planes do not fit its size");
   }
-  const planes = (m.planes ?? []).map((p) => ({ ...p, data: decode(p.data) }));
+  const planes = (m.planes ?? []).map((p) => ({ ...p, data: decode(p.data), age: p.age_s ? ages(p.age_s) : null }));
   return { ...m, labels, age, planes };
+}
+
+/** Seconds, two bytes each, the low one first; 65535 = never. */
+function ages(base64) {
+  const raw = decode(base64);
+  const age = new Uint16Array(raw.length / 2);
+  for (let i = 0; i < age.length; i += 1) age[i] = raw[2 * i] | (raw[2 * i + 1] << 8);
+  return age;
 }
 
 function decode(base64) {

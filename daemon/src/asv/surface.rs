@@ -5,7 +5,7 @@ use crate::auv::Exemplar;
 use crate::picture;
 use scenecast_protocol::directive::{Budget, Constraints, Fix, Slot, SlotId, Utility};
 use scenecast_protocol::link::{PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::{LabelGrid, StateReplica};
+use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -66,10 +66,10 @@ impl Surface {
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
-    /// Counts up whenever the operator's map of a vehicle changes.
+    /// Counts up whenever the operator's map of a vehicle or a plane of it changes.
     pub fn map_version(&self, vehicle: Address) -> u64 {
         let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
-        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.replica().version())
+        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
     }
 
     /// Bits a second that the surface may use.

@@ -1,14 +1,18 @@
 //! Camera frames to label map.
 
+use super::relief::Relief;
 use crate::config::Config;
 use crate::problem::Problem;
+use crate::scene::read_vocabulary;
 use image::RgbImage;
 use scene_model::exemplars::ExemplarStore;
 use scene_model::project::{DownCamera, Pose};
-use scene_model::publish::{LabelBook, PublishedCell};
+use scene_model::publish::LabelBook;
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
-use scenecast_protocol::map::Cell;
+use scenecast_protocol::map::{Cell, PlaneKind};
+use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Edge of a representative image in pixels.
 const EXEMPLAR_PX: u32 = 64;
@@ -24,22 +28,25 @@ pub struct MapUpdate {
     pub epoch: u8,
     /// Labels of every explored cell.
     pub cells: Vec<(Cell, u8)>,
+    /// How sure the model is of these labels, 0 to 1, and the depths of the sea floor there, metres.
+    pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
     /// Labels given so far.
     pub labels: u8,
 }
 
 /// The scene model of one vehicle.
 pub struct Mapper {
-    extractor: WordExtractor,
+    pub(super) extractor: WordExtractor,
     camera: DownCamera,
     cell_m: f64,
-    model: SceneModel,
-    book: LabelBook,
-    exemplars: ExemplarStore,
+    pub(super) model: SceneModel,
+    pub(super) book: LabelBook,
+    pub(super) exemplars: ExemplarStore,
+    pub(super) relief: Relief,
     refine_words_per_s: f64,
     configured_words_per_s: f64,
-    last_s: Option<f64>,
-    flat: Vec<FlatCell>,
+    pub(super) last_s: Option<f64>,
+    pub(super) flat: Vec<FlatCell>,
 }
 
 /// Edge of a cell in metres.
@@ -50,7 +57,10 @@ pub fn cell_m(config: &Config) -> f64 {
 impl Mapper {
     /// A mapper that has seen nothing; its label ids begin at `epoch`.
     pub fn new(config: &Config, epoch: u8, seed: u64) -> Result<Self, Problem> {
-        let words = WordConfig::default();
+        let extractor = match config.scene.vocabulary.as_str() {
+            "" => WordExtractor::new(&WordConfig::default()),
+            file => WordExtractor::from_measures(read_vocabulary(Path::new(file))?),
+        };
         let cell_m = cell_m(config);
         let birth = match config.scene.birth.as_str() {
             "collapsed" => Birth::Collapsed,
@@ -64,12 +74,13 @@ impl Mapper {
             gamma: config.scene.gamma,
             birth,
             max_labels: config.scene.max_labels,
-            vocabulary: words.vocabulary_size(),
+            vocabulary: extractor.vocabulary_size(),
             max_words_per_cell: config.scene.max_words_per_cell,
             seed,
+            ..SceneConfig::for_images()
         };
         Ok(Self {
-            extractor: WordExtractor::new(&words),
+            extractor,
             camera: DownCamera {
                 metres_per_pixel: config.camera.metres_per_pixel,
                 altitude_m: config.survey.altitude_m,
@@ -78,6 +89,7 @@ impl Mapper {
             model: SceneModel::new(scene).map_err(|e| Problem::Input(format!("scene.{e}")))?,
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
+            relief: Relief::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             configured_words_per_s: f64::from(config.scene.refine_words_per_s),
             last_s: None,
@@ -91,18 +103,59 @@ impl Mapper {
     }
 
     /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.
-    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, t_s: f64) -> MapUpdate {
-        let words = self.extractor.extract(image, (self.cell_m / self.camera.metres_per_pixel) as f32);
-        let observations = self.camera.project(image.width(), image.height(), pose, &words);
+    ///
+    /// Its pixels are `scale` times as large on the sea floor as the configured ones.
+    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
+        let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
+        let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
+        let observations = camera.project(image.width(), image.height(), pose, &words);
         self.model.insert(t_s, &observations);
+        for seen in &observations {
+            self.relief.add(Cell::new(self.cell(seen.x), self.cell(seen.y)), -seen.z);
+        }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.model.label_map();
-        let published = self.book.publish(&self.flat);
+        self.book.publish(&self.flat);
         self.offer_exemplar(image, pose, t_s);
-        let cells = published.iter().map(|c: &PublishedCell| (Cell::new(c.x, c.y), c.label)).collect();
+        self.current()
+    }
+
+    /// The map as it was published last.
+    pub fn current(&self) -> MapUpdate {
+        let cells: Vec<_> = self.book.shown().map(|(x, y, label)| (Cell::new(x, y), label)).collect();
+        let planes = self.planes(&cells);
         let labels = self.book.labels().count() as u8;
-        MapUpdate { t_s, epoch: self.book.epoch(), cells, labels }
+        MapUpdate { t_s: self.last_s.unwrap_or(0.0), epoch: self.book.epoch(), cells, planes, labels }
+    }
+
+    fn planes(&self, shown: &[(Cell, u8)]) -> BTreeMap<PlaneKind, Vec<(Cell, f64)>> {
+        let confidence =
+            shown.iter().filter_map(|&(cell, label)| Some((cell, self.confidence(cell, label)?))).collect();
+        let depth = shown.iter().filter_map(|&(cell, _)| Some((cell, self.relief.depth_m(cell)?))).collect();
+        BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)])
+    }
+
+    /// How sure the model is of the label that a cell shows; nothing while it holds the cell for another one.
+    fn confidence(&self, cell: Cell, label: u8) -> Option<f64> {
+        let at = self.flat.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).ok()?;
+        let flat = self.flat.get(at)?;
+        let is_shown = self.book.topic_of(label) == Some(flat.topic);
+        Some(if is_shown { f64::from(flat.confidence) } else { 0.0 })
+    }
+
+    /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.
+    pub fn resume(&mut self, epoch: u8, told: u8) {
+        if self.book.epoch() == epoch {
+            self.book.resume(told);
+        } else {
+            self.book.begin_epoch(epoch);
+        }
+    }
+
+    /// Mission time of the last frame, seconds.
+    pub fn last_s(&self) -> Option<f64> {
+        self.last_s
     }
 
     /// The middle of the frame, where the camera distorts least, may represent the label below it.

@@ -3,12 +3,15 @@
 //! [`Mapper`] turns camera frames into labels and may live on a thread of its own; [`Vehicle`] speaks with the surface,
 //! keeps the position estimate and chooses waypoints. Neither does IO.
 
+mod checkpoint;
 mod exemplar;
 mod mapper;
 mod navigator;
+mod relief;
 mod steering;
 mod vehicle;
 
+pub use checkpoint::{NoCheckpoint, Restored};
 pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
 pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use navigator::Navigator;

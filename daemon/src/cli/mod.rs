@@ -8,9 +8,13 @@ mod ctl;
 mod demo;
 mod key;
 mod map;
+mod modem_sim;
 mod node;
 mod progress;
+mod scene;
 mod sim;
+mod tune;
+mod vocabulary;
 
 use crate::problem::Problem;
 use clap::{Parser, Subcommand};
@@ -35,6 +39,8 @@ enum Command {
     Asv(node::Node),
     /// Speak with a running surface: see what it has, give orders.
     Ctl(ctl::Ctl),
+    /// Emulate modems in one water, each on a serial device or a TCP port of its own.
+    ModemSim(modem_sim::ModemSim),
     /// Measure.
     #[command(subcommand)]
     Bench(bench::Bench),
@@ -44,6 +50,14 @@ enum Command {
     /// Code label maps as the stream does, and measure it.
     #[command(subcommand)]
     Map(map::Map),
+    /// Run the scene model over files.
+    #[command(subcommand)]
+    Scene(scene::Scene),
+    /// Make the vocabularies that images are put into words with.
+    #[command(subcommand)]
+    Vocabulary(vocabulary::Vocabulary),
+    /// Search the settings of the scene model that tell most about annotations of a similar site.
+    Tune(Box<tune::Tune>),
     /// Print a configuration file with every key explained.
     Config(node::PrintConfig),
 }
@@ -56,9 +70,13 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Auv(node) => node.run_vehicle(),
         Command::Asv(node) => node.run_surface(),
         Command::Ctl(ctl) => ctl.run(),
+        Command::ModemSim(sim) => sim.run(),
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),
         Command::Map(map) => map.run(),
+        Command::Scene(scene) => scene.run(),
+        Command::Vocabulary(vocabulary) => vocabulary.run(),
+        Command::Tune(tune) => tune.run(),
         Command::Config(print) => print.run(),
     }
 }

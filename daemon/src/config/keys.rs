@@ -9,6 +9,8 @@ pub enum Allowed {
     Choice(&'static [&'static str]),
     /// Any number of whole numbers from the first to the second, all different.
     List(f64, f64),
+    /// Any number of these words, all different.
+    Words(&'static [&'static str]),
     /// Any text.
     Text,
     /// `true` or `false`.
@@ -34,7 +36,7 @@ const fn key(name: &'static str, unit: &'static str, allowed: Allowed, roles: &'
     Key { name, unit, allowed, roles, doc }
 }
 
-use Allowed::{Choice, Flag, List, Range, Text};
+use Allowed::{Choice, Flag, List, Range, Text, Words};
 
 /// Every key, in the order of the files.
 pub const KEYS: &[Key] = &[
@@ -163,7 +165,7 @@ pub const KEYS: &[Key] = &[
         "s",
         Range(0.0, 600.0),
         "ar",
-        "time that a new label of a cell that the operator knows has to stand before it is sent; up to eight times that for a cell that flips again and again; 0: none",
+        "time that a new label, or level of a plane, of a cell that the operator knows has to stand before it is sent; up to eight times that for a cell that flips again and again; 0: none",
     ),
     key(
         "map.coarse_after_s",
@@ -171,6 +173,27 @@ pub const KEYS: &[Key] = &[
         Range(0.0, 86_400.0),
         "ar",
         "a backlog that the budget needs longer for goes out coarse to fine: every fourth cell in both directions first; 0: never",
+    ),
+    key(
+        "map.planes",
+        "",
+        Words(&["confidence", "depth"]),
+        "ar",
+        "planes that are sent beside the labels: how sure the model is of a label in quarters, and the depth of the sea floor",
+    ),
+    key(
+        "map.plane_shares",
+        "%",
+        Range(0.0, 100.0),
+        "ar",
+        "least shares of confidence and depth in the map's share of link.shares while labels wait too, together at most 100; 0: only what nobody else needs",
+    ),
+    key(
+        "map.depth_step_m",
+        "m",
+        Range(0.1, 25.5),
+        "ar",
+        "step of the plane of depths, in tenths of a metre; 254 steps about survey.depth_m are told apart",
     ),
     key("camera.source", "", Text, "ar", "empty: the rehearsal's image; frames:DIR: images with DIR/poses.csv"),
     key("camera.rate_hz", "1/s", Range(0.01, 30.0), "r", "frames a second"),
@@ -185,6 +208,20 @@ pub const KEYS: &[Key] = &[
     key("scene.max_labels", "", Range(2.0, 254.0), "ar", "most labels at a time"),
     key("scene.refine_words_per_s", "1/s", Range(0.0, 1e8), "ar", "words resampled a second of mission time"),
     key("scene.max_words_per_cell", "", Range(8.0, 60_000.0), "ar", "words kept a cell"),
+    key(
+        "scene.vocabulary",
+        "",
+        Text,
+        "ar",
+        "file of a vocabulary (scenecast vocabulary train); empty: the one that ships",
+    ),
+    key(
+        "scene.checkpoint_s",
+        "s",
+        Range(0.0, 86_400.0),
+        "a",
+        "mission time between two checkpoints of the scene model, from which a restarted vehicle goes on; 0: none",
+    ),
     key("survey.duration_s", "s", Range(0.0, 1e7), "ar", "when the survey ends; 0: never"),
     key("survey.speed_m_s", "m/s", Range(0.01, 10.0), "ar", "speed over ground"),
     key("survey.altitude_m", "m", Range(0.1, 100.0), "ar", "height of the camera above the sea floor"),

@@ -48,7 +48,8 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         return Err(Problem::Input(format!("{given} is not allowed: it takes {rule}")));
     }
     let link = &config.link;
-    check_shares(link)?;
+    check_shares("link.shares", &link.shares)?;
+    check_shares("map.plane_shares", &config.map.plane_shares)?;
     if link.key_file.is_empty() && (link.encrypt || link.authenticate == "all") {
         let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
         let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
@@ -83,12 +84,12 @@ fn check_frame(link: &Link) -> Result<(), Problem> {
     Err(Problem::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
 }
 
-fn check_shares(link: &Link) -> Result<(), Problem> {
-    let sum: u32 = link.shares.iter().map(|&s| u32::from(s)).sum();
+fn check_shares(key: &str, shares: &[u8]) -> Result<(), Problem> {
+    let sum: u32 = shares.iter().map(|&s| u32::from(s)).sum();
     if sum <= 100 {
         return Ok(());
     }
-    let given = format!("link.shares = {:?}", link.shares);
+    let given = format!("{key} = {shares:?}");
     Err(Problem::Input(format!("{given} is not allowed: they add up to {sum} %, and together they take 100 or less")))
 }
 
@@ -163,10 +164,13 @@ fn fit(value: &Value, default: &Value, key: &Key) -> Option<Value> {
             Allowed::Choice(words) => words.contains(&s.as_str()).then(|| value.clone()),
             _ => Some(value.clone()),
         },
-        (Value::Array(_), Value::Array(v)) if matches!(key.allowed, Allowed::List(..)) => {
-            let is_number = |x: &Value| x.as_integer().is_some_and(|i| in_range(i as f64));
+        (Value::Array(_), Value::Array(v)) if matches!(key.allowed, Allowed::List(..) | Allowed::Words(_)) => {
+            let is_allowed = |x: &Value| match key.allowed {
+                Allowed::Words(words) => x.as_str().is_some_and(|word| words.contains(&word)),
+                _ => x.as_integer().is_some_and(|i| in_range(i as f64)),
+            };
             let differ = (1..v.len()).all(|i| !v[..i].contains(&v[i]));
-            (v.iter().all(is_number) && differ).then(|| value.clone())
+            (v.iter().all(is_allowed) && differ).then(|| value.clone())
         }
         (Value::Array(d), Value::Array(v)) if d.len() == v.len() => {
             d.iter().zip(v).map(|(d, v)| fit(v, d, key)).collect::<Option<Vec<_>>>().map(Value::Array)
@@ -194,6 +198,7 @@ impl Key {
             (Allowed::List(low, high), _) => format!("a list of different whole numbers from {low} to {high}{unit}"),
             (Allowed::Range(low, high), _) => format!("a number from {low} to {high}{unit}"),
             (Allowed::Choice(words), _) => format!("one of {}", words.join(", ")),
+            (Allowed::Words(words), _) => format!("a list of different ones of {}", words.join(", ")),
             (Allowed::Text, _) => "text in quotes".to_owned(),
             (Allowed::Flag, _) => "true or false".to_owned(),
         }
@@ -285,6 +290,18 @@ mod tests {
         let said = message(&["link.vehicles=[2, 2]"]);
         assert!(said.ends_with("it takes a list of different whole numbers from 1 to 14"), "{said}");
         assert_eq!(load(None, &["link.vehicles=[1, 3]".into()]).unwrap().link.vehicles, [1, 3]);
+    }
+
+    #[test]
+    fn planes_are_named_each_once_and_their_shares_leave_something_to_labels() {
+        let said = message(&["map.planes=[\"colour\"]"]);
+        assert!(said.ends_with("it takes a list of different ones of confidence, depth"), "{said}");
+        assert!(message(&["map.planes=[\"depth\", \"depth\"]"]).contains("different ones"));
+        assert!(message(&["map.planes=depth"]).contains("a list"));
+        let said = message(&["map.plane_shares=[60, 50]"]);
+        assert!(said.contains("map.plane_shares = [60, 50]") && said.contains("110 %"), "{said}");
+        let config = load(None, &["map.planes=[]".into(), "map.plane_shares=[20, 10]".into()]).unwrap();
+        assert_eq!((config.map.planes.len(), config.map.plane_shares), (0, [20, 10]));
     }
 
     #[test]

@@ -12,6 +12,7 @@ pub use load::load;
 pub use print::print;
 pub use token_file::{load_token, read_token};
 
+use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Shares;
 use serde::{Deserialize, Serialize};
 
@@ -163,6 +164,12 @@ section! {
         settle_s: f64 = 0.0,
         /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0 = never.
         coarse_after_s: f64 = 0.0,
+        /// Planes that are sent beside the labels.
+        planes: Vec<String> = PlaneKind::ALL.map(|p| p.name().to_owned()).to_vec(),
+        /// Percent of the map's share for confidence and depth; 0 = what nobody else needs.
+        plane_shares: [u8; 2] = [0; 2],
+        /// Step of the plane of depths, metres.
+        depth_step_m: f64 = 0.5,
     }
 }
 section! {
@@ -199,6 +206,10 @@ section! {
         refine_words_per_s: u32 = 50_000,
         /// Words kept a cell.
         max_words_per_cell: u32 = 200,
+        /// File of a trained vocabulary; empty = the one that ships.
+        vocabulary: String = String::new(),
+        /// Seconds of mission time between two checkpoints; 0 = none.
+        checkpoint_s: f64 = 60.0,
     }
 }
 section! {

@@ -2,6 +2,7 @@
 
 use super::export::Cells;
 use super::orders::BudgetOrder;
+use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
 use crate::asv::{ExemplarState, Surface};
@@ -105,16 +106,16 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
 /// The cells of a map; none where it spans more than can be told.
 fn cells(surface: &Surface, address: Address, cell_m: f64, now: Instant) -> Option<Cells> {
     let grid = surface.map(address)?;
-    let replica = surface.view(address)?.replica();
+    let view = surface.view(address)?;
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
     let told = if bounds.area() <= MOST_CELLS { bounds } else { Rect { width: 0, ..bounds } };
-    let age = |at: Instant| now.since(at).as_secs().min(65_534) as u16;
     Some(Cells {
         version: surface.map_version(address),
         at_s: seconds(now),
         bounds,
         cell_m,
         labels: told.cells().map(|cell| grid.get(cell)).collect(),
-        age_s: told.cells().map(|cell| replica.heard(cell).map_or(u16::MAX, age)).collect(),
+        age_s: planes::ages(view.replica(), told, now),
+        planes: planes::planes(&view, told, now),
     })
 }

@@ -17,13 +17,14 @@ mod metrics;
 mod openapi;
 mod operations;
 pub mod orders;
+mod planes;
 mod server;
 mod snapshot;
 pub mod state;
 mod token;
 
 pub use answer::{Ask, Reply, answer};
-pub use export::Cells;
+pub use export::{Cells, Plane};
 pub use link_meter::LinkMeter;
 pub use server::{Console, Entrance, Request, bind, start};
 pub use snapshot::{MissionFacts, Snapshot, snapshot};

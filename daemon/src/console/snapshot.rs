@@ -264,7 +264,7 @@ fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> state::Link {
     let elapsed = now.as_secs_f64().max(1.0);
     let direction = |i: usize, frames: u64, lost: u64, class: &dyn Fn(&LinkStats, Class) -> u64| {
         let bytes = |c: Class| sum(&|s| class(s, c));
-        let useful: u64 = Class::SHARED.into_iter().map(bytes).sum();
+        let useful: u64 = Class::ALL.into_iter().filter(|&c| c != Class::Overhead).map(bytes).sum();
         state::Direction {
             bps_1min: meter.bps_1min(i, now).round(),
             worst_window_bps: meter.worst_window_bps(i),

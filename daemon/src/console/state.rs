@@ -123,7 +123,7 @@ pub enum Mode {
 /// A map without its cells.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MapSummary {
-    /// Counts up whenever a cell changes.
+    /// Counts up whenever a label or a plane changes.
     pub version: u64,
     /// Edge of a cell, metres.
     pub cell_m: f64,
@@ -305,7 +305,7 @@ pub struct Direction {
     pub lost: u64,
     /// Useful bits a second.
     pub goodput_bps: f64,
-    /// Bytes by class: directive, status, fix, map, exemplar, overhead.
+    /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, overhead.
     pub bytes_by_class: BTreeMap<String, u64>,
 }
 
@@ -323,7 +323,7 @@ pub struct Rates {
 /// A map with its cells, row by row from the south-west.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Map {
-    /// Counts up whenever a cell changes.
+    /// Counts up whenever a label or a plane changes.
     pub version: u64,
     /// When the ages were true.
     pub at_s: f64,
@@ -341,9 +341,32 @@ pub struct Map {
     pub labels: String,
     /// Base64: two bytes a cell, little-endian: seconds since the cell was heard of, 65535 = never.
     pub age_s: String,
+    /// What else was heard of the cells.
+    pub planes: Vec<Plane>,
 }
 
-/// A map has changed.
+/// A quantity of each cell that a vehicle tells of where labels leave room. It may be older than the label of its cell, and
+/// then speaks of an earlier one; where a cell has no label it does not count.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Plane {
+    /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor.
+    pub name: String,
+    /// `m`, or empty.
+    pub unit: String,
+    /// The middle of the lowest level.
+    pub min: f64,
+    /// The middle of the highest level.
+    pub max: f64,
+    /// What a level spans: the true value lies half of it at most from the one in `data`, and a fifth of it more where a
+    /// cell stays in its level at the edge.
+    pub step: f64,
+    /// Base64: one byte a cell in the order of `labels`, 0 to 254 for `min` to `max`, in between linear; 255 = not known.
+    pub data: String,
+    /// Base64, as of the labels: seconds since the level of the cell was heard of.
+    pub age_s: String,
+}
+
+/// A map, or a plane of it, has changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MapEvent {
     /// Address of the vehicle.

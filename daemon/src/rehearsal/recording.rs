@@ -21,19 +21,22 @@ pub struct RecordedFrame {
     pub depth_m: f64,
     /// Heading clockwise from north, radians.
     pub heading_rad: f64,
+    /// Size of the image's pixels on the sea floor, in those of the camera's usual ones.
+    pub scale: f64,
 }
 
 impl RecordedFrame {
     /// Reads the image.
     pub fn image(&self) -> Result<RgbImage, Problem> {
-        let image = image::open(&self.file).map_err(|e| Problem::file(&self.file, e))?;
-        Ok(image.to_rgb8())
+        Ok(crate::imagery::read_image(&self.file)?.to_rgb8())
     }
 }
 
-/// A folder with images and `poses.csv`.
+/// A folder with images and a table of their poses, in order of time: `poses.csv`, or the only `poses*.csv`.
 ///
-/// `poses.csv` has a header line, then `t_s,file,x_m,y_m,depth_m,heading_deg` for each frame, in order of time.
+/// The first line names the columns. Either they are `t_s,file,x_m,y_m,depth_m,heading_deg`; or
+/// `file,time_utc_hms,x_px,y_px,yaw_deg,scale`, the place of the frame's middle in a mosaic whose rows grow downwards, in
+/// its pixels, and how large the frame's pixels are in those.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The frames, in order of time.
@@ -41,16 +44,24 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads `DIR/poses.csv`; complaints name the line.
-    pub fn open(dir: &Path) -> Result<Self, Problem> {
-        let path = dir.join("poses.csv");
+    /// Reads the table of a folder; complaints name the line. A pixel of a mosaic is `metres_per_pixel` wide.
+    pub fn open(dir: &Path, metres_per_pixel: f64) -> Result<Self, Problem> {
+        let path = table(dir)?;
         let text = std::fs::read_to_string(&path).map_err(|e| Problem::file(&path, e))?;
+        let in_pixels = text.lines().next().is_some_and(|head| head.split(',').any(|name| name.trim() == "x_px"));
         let mut frames: Vec<RecordedFrame> = Vec::new();
         for (i, line) in text.lines().enumerate().skip(1).filter(|(_, l)| !l.trim().is_empty()) {
             let place = format!("{}:{}", path.display(), i + 1);
-            let frame = parse(dir, line).ok_or_else(|| {
-                Problem::Input(format!("{place}: expected t_s,file,x_m,y_m,depth_m,heading_deg with finite numbers"))
-            })?;
+            let (frame, columns) = match in_pixels {
+                true => {
+                    let midnight = frames.last().map_or(0.0, |last| (last.t_s / DAY_S).floor() * DAY_S);
+                    let frame = of_mosaic(dir, line, metres_per_pixel).map(|f| after(f, midnight, frames.last()));
+                    (frame, "file,time_utc_hms,x_px,y_px,yaw_deg,scale")
+                }
+                false => (parse(dir, line), "t_s,file,x_m,y_m,depth_m,heading_deg"),
+            };
+            let what = format!("{place}: expected {columns} with finite numbers");
+            let frame = frame.ok_or(Problem::Input(what))?;
             if frames.last().is_some_and(|last| last.t_s > frame.t_s) {
                 return Err(Problem::Input(format!("{place}: the time goes back")));
             }
@@ -59,6 +70,9 @@ impl Recording {
         if frames.is_empty() {
             return Err(Problem::file(&path, "there are no frames"));
         }
+        // A time of the day says nothing of the mission's.
+        let began_s = if in_pixels { frames[0].t_s } else { 0.0 };
+        frames.iter_mut().for_each(|frame| frame.t_s -= began_s);
         Ok(Self { frames })
     }
 
@@ -88,7 +102,64 @@ fn parse(dir: &Path, line: &str) -> Option<RecordedFrame> {
     let (x_m, y_m) = (number(fields.next())?, number(fields.next())?);
     let (depth_m, heading_deg) = (number(fields.next())?, number(fields.next())?);
     let t_s = number(Some(t_s)).filter(|&t| t >= 0.0)?;
-    Some(RecordedFrame { t_s, file: dir.join(file), x_m, y_m, depth_m, heading_rad: heading_deg.to_radians() })
+    Some(RecordedFrame {
+        t_s,
+        file: dir.join(file),
+        x_m,
+        y_m,
+        depth_m,
+        heading_rad: heading_deg.to_radians(),
+        scale: 1.0,
+    })
+}
+
+const DAY_S: f64 = 86_400.0;
+
+/// A frame placed in a mosaic, at its time of the day.
+fn of_mosaic(dir: &Path, line: &str, metres_per_pixel: f64) -> Option<RecordedFrame> {
+    let mut fields = line.split(',').map(str::trim);
+    let file = fields.next().filter(|name| !name.is_empty())?;
+    let t_s = time_of_day(fields.next()?)?;
+    let mut number = || fields.next()?.parse::<f64>().ok().filter(|v| v.is_finite());
+    let (x_px, y_px, yaw_deg) = (number()?, number()?, number()?);
+    let scale = number().filter(|&scale| scale > 0.0)?;
+    let (x_m, y_m) = (x_px * metres_per_pixel, -y_px * metres_per_pixel);
+    Some(RecordedFrame { t_s, file: dir.join(file), x_m, y_m, depth_m: 0.0, heading_rad: yaw_deg.to_radians(), scale })
+}
+
+/// Seconds of `hhmmss`.
+fn time_of_day(text: &str) -> Option<f64> {
+    let number: u32 = text.parse().ok().filter(|_| text.len() == 6)?;
+    let (hours, minutes, seconds) = (number / 10_000, number / 100 % 100, number % 100);
+    (hours < 24 && minutes < 60 && seconds < 61).then(|| f64::from(hours * 3600 + minutes * 60 + seconds))
+}
+
+/// The frame on the day of the one before it, or on the next if it is more than half a day earlier.
+fn after(frame: RecordedFrame, midnight: f64, last: Option<&RecordedFrame>) -> RecordedFrame {
+    let t_s = frame.t_s + midnight;
+    let is_next_day = last.is_some_and(|last| t_s < last.t_s - DAY_S / 2.0);
+    RecordedFrame { t_s: if is_next_day { t_s + DAY_S } else { t_s }, ..frame }
+}
+
+/// The table of a folder's poses.
+fn table(dir: &Path) -> Result<PathBuf, Problem> {
+    let usual = dir.join("poses.csv");
+    if usual.is_file() {
+        return Ok(usual);
+    }
+    let mut tables = Vec::new();
+    for entry in std::fs::read_dir(dir).map_err(|e| Problem::file(dir, e))? {
+        let name = entry.map_err(|e| Problem::file(dir, e))?.file_name();
+        let name = name.to_string_lossy().into_owned();
+        if name.starts_with("poses") && name.ends_with(".csv") {
+            tables.push(name);
+        }
+    }
+    match tables.as_slice() {
+        [] => Err(Problem::file(&usual, "there is no such file; it tells where the images were taken")),
+        [only] => Ok(dir.join(only)),
+        _ => Err(Problem::file(dir, format!("which of {} counts? name it poses.csv", tables.join(", ")))),
+    }
 }
 
 /// Writes a recording while a mission runs.
@@ -122,5 +193,36 @@ impl Recorder {
     /// Writes `poses.csv`.
     pub fn finish(&self) -> Result<(), Problem> {
         crate::picture::write_whole(&self.dir.join("poses.csv"), self.poses.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(name: &str, table: &str, text: &str) -> Result<Recording, Problem> {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-recording-{name}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        std::fs::write(dir.join(table), text).unwrap();
+        Recording::open(&dir, 0.5)
+    }
+
+    #[test]
+    fn places_in_a_mosaic_become_metres_with_north_up_and_time_goes_on_over_midnight() {
+        let text = "file,time_utc_hms,x_px,y_px,yaw_deg,scale\na.tif,235950,10,20,90,0.9\nb.tif,000010,-4,8,0,1\n";
+        let frames = open("mosaic", "poses_estimated.csv", text).unwrap().frames;
+        let first = &frames[0];
+        assert_eq!((first.t_s, first.x_m, first.y_m, first.scale), (0.0, 5.0, -10.0, 0.9));
+        assert!((first.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        assert_eq!((frames[1].t_s, frames[1].y_m), (20.0, -4.0));
+        let bad = open("bad", "poses.csv", &text.replace("235950", "2359")).unwrap_err().to_string();
+        assert!(bad.contains("poses.csv:2: expected file,time_utc_hms"), "{bad}");
+    }
+
+    #[test]
+    fn a_folder_without_poses_is_named() {
+        let said = open("none", "other.csv", "").unwrap_err().to_string();
+        assert!(said.contains("poses.csv: there is no such file"), "{said}");
     }
 }

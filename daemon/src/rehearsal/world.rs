@@ -1,7 +1,7 @@
 //! The sea floor of a rehearsal.
 
 use crate::auv::Area;
-use crate::picture::{Indices, read_indices};
+use crate::imagery::{read_classes, read_image};
 use crate::problem::Problem;
 use image::RgbImage;
 use scenecast_protocol::map::Cell;
@@ -100,44 +100,6 @@ fn mirror(at: f64, size: u32) -> u32 {
     let period = 2 * i64::from(size);
     let p = (at.floor() as i64).rem_euclid(period);
     (if p < i64::from(size) { p } else { period - 1 - p }) as u32
-}
-
-fn read_image(path: &Path) -> Result<image::DynamicImage, Problem> {
-    let bytes = std::fs::read(path).map_err(|e| Problem::file(path, e))?;
-    // The decoder fills the missing part of a cut JPEG with grey, which would be surveyed as sea floor.
-    let cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
-    if cut {
-        return Err(Problem::file(
-            path,
-            "not an image that can be read: the JPEG has no end, so a part of it is missing",
-        ));
-    }
-    let reader = image::ImageReader::new(std::io::Cursor::new(bytes));
-    let reader = reader.with_guessed_format().map_err(|e| Problem::file(path, e))?;
-    reader.decode().map_err(|e| Problem::file(path, format!("not an image that can be read: {e}")))
-}
-
-/// Classes from a grey or indexed image: the pixel value is the class.
-fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, Problem> {
-    let bytes = std::fs::read(path).map_err(|e| Problem::file(path, e))?;
-    let unreadable = |e| Problem::file(path, format!("not an image that can be read: {e}"));
-    let indices = read_indices(&bytes, u64::from(u32::MAX)).map_err(unreadable)?;
-    let (classes, width, height) = match indices {
-        Some(Indices { pixels, width, height }) => (pixels, width, height),
-        None => {
-            let grey = match read_image(path)? {
-                image::DynamicImage::ImageLuma8(grey) => grey,
-                _ => return Err(Problem::file(path, "annotations need a grey or indexed image: pixel value = class")),
-            };
-            let (w, h) = grey.dimensions();
-            (grey.into_raw(), w, h)
-        }
-    };
-    if (width, height) != size {
-        let what = format!("the annotations have {width} x {height} pixels, the mosaic has {} x {}", size.0, size.1);
-        return Err(Problem::file(path, what));
-    }
-    Ok(classes)
 }
 
 #[cfg(test)]

@@ -17,27 +17,42 @@ pub(super) struct Keeper<S: Storage> {
     journal: Journal<S>,
 }
 
+/// A run that has begun.
+pub(super) struct Run<S: Storage> {
+    pub(super) keeper: Keeper<S>,
+    pub(super) durable: Durable,
+    /// Whether there was a run before it.
+    pub(super) is_again: bool,
+}
+
 impl<S: Storage> Keeper<S> {
-    /// Begins a run: what survived the last one, with an epoch that no run before has used.
-    pub(super) fn begin_run(storage: S) -> Result<(Self, Durable), Problem> {
+    /// Begins a run: what survived the last one. `checkpoint` is the lineage and the epoch of a scene model that goes on;
+    /// if they are those of the last run the epoch goes on too, otherwise it is one that no run before has used.
+    ///
+    /// The first run of a mission has the given `lineage`, which is random.
+    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> Result<Run<S>, Problem> {
         let place = storage.path(JOURNAL);
         let opened = Journal::open(storage, JOURNAL, MOST_BYTES);
         let (journal, state) = opened.map_err(|e| for_people(&place, e))?;
+        let is_again = state.is_some();
         let durable = match state {
             Some(state) => {
                 let last = decode(&state).ok_or(JournalError::Damage(Damage::Version));
                 let last = last.map_err(|e| for_people(&place, e))?;
-                Durable { epoch: last.epoch.wrapping_add(1), ..last }
+                match checkpoint == Some((last.lineage, last.epoch)) {
+                    true => last,
+                    false => Durable { epoch: last.epoch.wrapping_add(1), labels: 0, ..last },
+                }
             }
             None => {
                 refuse_earlier_build(journal.storage())?;
-                Durable::default()
+                Durable { lineage, ..Durable::default() }
             }
         };
         let mut keeper = Self { journal };
-        // Label ids of another run mean something else: the epoch is this run's own before it is told to anybody.
+        // Label ids of another model mean something else: an epoch is safe before it is told to anybody.
         keeper.save(&durable)?;
-        Ok((keeper, durable))
+        Ok(Run { keeper, durable, is_again })
     }
 
     /// Makes the state durable: a power cut before this has returned leaves the last one or this one.
@@ -81,18 +96,37 @@ mod tests {
     use scenecast_protocol::link::SlotInboxState;
 
     fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), Problem> {
-        Keeper::begin_run(disk.clone())
+        Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))
     }
 
     #[test]
     fn a_run_has_the_state_of_the_last_one_and_an_epoch_of_its_own() {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk).unwrap();
-        assert_eq!(durable, Durable::default());
-        let held = Durable { epoch: 4, hold: true, budget_bps: Some(500), ..durable };
+        assert_eq!(durable, Durable { lineage: 9, ..Durable::default() });
+        let held = Durable { epoch: 4, labels: 7, hold: true, budget_bps: Some(500), ..durable };
         keeper.save(&held).unwrap();
-        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 5, ..held.clone() });
-        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 6, ..held });
+        let later = |epoch| Durable { epoch, labels: 0, ..held.clone() };
+        assert_eq!(begin(&disk).unwrap().1, later(5));
+        assert_eq!(begin(&disk).unwrap().1, later(6));
+    }
+
+    #[test]
+    fn the_epoch_goes_on_with_a_checkpoint_of_the_same_mission_and_epoch_alone() {
+        let disk = Disk::default();
+        let (mut keeper, durable) = begin(&disk).unwrap();
+        let last = Durable { epoch: 4, labels: 7, ..durable };
+        keeper.save(&last).unwrap();
+        let run = |checkpoint| {
+            let run = Keeper::begin_run(disk.clone(), 1, Some(checkpoint)).unwrap();
+            assert!(run.is_again);
+            run.durable
+        };
+        assert_eq!(run((9, 4)), last);
+        assert_eq!(run((9, 3)), Durable { epoch: 5, labels: 0, ..last.clone() });
+        assert_eq!(run((8, 5)).epoch, 6, "another mission");
+        let fresh = Keeper::begin_run(Disk::default(), 2, Some((9, 4))).unwrap();
+        assert_eq!((fresh.durable.lineage, fresh.durable.epoch, fresh.is_again), (2, 0, false));
     }
 
     #[test]
@@ -103,6 +137,8 @@ mod tests {
         let durable = Durable {
             inbox,
             epoch: 3,
+            labels: 12,
+            lineage: 300,
             utility,
             hold: true,
             budget_bps: Some(500),
@@ -113,7 +149,8 @@ mod tests {
             &[1, 7, 2, 5, 6][..],
             &[0, 1, 172, 2, 0, 0, 0, 1, 1],
             &[0, 1, 0, 0, 0, 2],
-            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
+            &[3, 12, 172, 2],
+            &[1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));

@@ -1,14 +1,18 @@
 //! The tokio shells around the roles: they move bytes, read the clock, keep files.
 
+mod checkpoint;
 mod clock;
 mod demo;
 mod durable;
 mod journal;
+#[cfg(test)]
+mod kept_labels;
 mod mapping;
 #[cfg(test)]
 mod power_cuts;
 mod refusals;
 mod reload;
+mod restore;
 mod surface;
 mod vehicle;
 
@@ -28,7 +32,7 @@ fn random_bits() -> u64 {
 }
 
 /// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
-fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
+pub(crate) fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     // A second command in the same process (as in tests) keeps the first one's log.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();

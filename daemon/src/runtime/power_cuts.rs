@@ -1,6 +1,6 @@
 //! A vehicle whose power is cut at any step, and the surface that speaks to it.
 
-use super::durable::Keeper;
+use super::durable::{Keeper, Run};
 use super::journal::disk::{Chance, Disk, Step};
 use crate::asv::Surface;
 use crate::auv::{Area, Durable, MapUpdate, Vehicle, VehicleOutput};
@@ -218,7 +218,8 @@ impl World {
         }
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
-        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, labels: LABELS };
+        let planes = BTreeMap::new();
+        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, planes, labels: LABELS };
         onboard.vehicle.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 
@@ -264,8 +265,8 @@ fn start(
         if let Some(steps) = cuts.pop() {
             disk.cut_after(steps);
         }
-        match Keeper::begin_run(disk.clone()) {
-            Ok((keeper, durable)) => {
+        match Keeper::begin_run(disk.clone(), 1, None) {
+            Ok(Run { keeper, durable, .. }) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
                 let profile = ends::modem_of_process(config);
                 let seed = chance.below(1 << 30) as u64;

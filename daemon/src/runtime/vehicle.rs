@@ -1,12 +1,13 @@
 //! `scenecast auv`
 
 use super::clock::Clock;
-use super::durable::Keeper;
+use super::durable::{Keeper, Run};
 use super::journal::Folder;
-use super::mapping::{self, Camera, MapperThread, Seen, ToMapper};
+use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
-use crate::auv::{Area, Durable, Vehicle, VehicleOutput};
+use super::restore::{Start, start};
+use crate::auv::{Area, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
@@ -22,27 +23,28 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let config = load()?;
         warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
-        let folder = Folder::hold(dir).map_err(|e| Problem::file(dir, e))?;
-        let (keeper, durable) = Keeper::begin_run(folder)?;
+        let Start { run, mapper, keep } = start(&config, dir)?;
+        let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config);
         let recording = match config.camera.source.as_str() {
             "" => None,
-            source => Some(Recording::open(Recording::folder(source)?)?),
+            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
-        let epoch = durable.epoch;
-        let is_again = durable != Durable::default();
         let mut vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
         if is_again {
             vehicle.assume_budget_spent(clock.now());
         }
         let at_end = recording.is_some();
-        let camera = Camera::new(recording, clock);
-        let mapper = mapping::spawn(&config, epoch)?;
+        let camera = Camera::new(recording, clock, mapper.last_s());
+        let mapper = MapperThread::start(mapper, keep)?;
         let modem = modem::open(&config, profile).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, at_end, behind: 0 }.run().await
+        let stop = Stop::new()?;
+        let (behind, missed) = (0, 0);
+        let host = Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, at_end, behind, missed };
+        host.run(stop).await
     })
 }
 
@@ -50,6 +52,33 @@ fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, P
     let area = crate::ends::configured_area(config).or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
     area.ok_or_else(|| Problem::Input(missing.to_owned()))
+}
+
+/// Who asks the process to end: a person or the system.
+struct Stop {
+    #[cfg(unix)]
+    terminate: tokio::signal::unix::Signal,
+}
+
+impl Stop {
+    fn new() -> Result<Self, Problem> {
+        Ok(Self {
+            #[cfg(unix)]
+            terminate: tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())
+                .map_err(|e| Problem::Failed(format!("SIGTERM: {e}")))?,
+        })
+    }
+
+    /// Returns when the process is to end.
+    async fn asked(&mut self) {
+        #[cfg(unix)]
+        tokio::select! {
+            _ = tokio::signal::ctrl_c() => {}
+            _ = self.terminate.recv() => {}
+        }
+        #[cfg(not(unix))]
+        let _ = tokio::signal::ctrl_c().await;
+    }
 }
 
 struct Host {
@@ -65,17 +94,20 @@ struct Host {
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
     behind: u32,
+    /// Camera frames that could not be read.
+    missed: u64,
 }
 
 impl Host {
-    async fn run(mut self) -> Result<(), Problem> {
+    async fn run(mut self, mut stop: Stop) -> Result<(), Problem> {
         loop {
             self.pump()?;
             let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
             let wake = wake.unwrap_or_else(|| self.clock.now() + std::time::Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => {
+                () = stop.asked() => {
                     self.modem.log_audit();
+                    self.mapper.finish();
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -92,7 +124,8 @@ impl Host {
                     let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
                 }
                 seen = self.mapper.seen.recv() => match seen {
-                    Some(seen) => self.handle_seen(seen?),
+                    Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
+                    Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
                     None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
                 },
             }
@@ -108,15 +141,29 @@ impl Host {
 
     fn handle_seen(&mut self, seen: Seen) {
         let now = self.clock.now();
-        self.behind -= 1;
-        let f = &seen.frame;
-        self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+        if let Some(f) = &seen.frame {
+            self.behind -= 1;
+            self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+        }
         self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
+        self.finish_at_end();
+    }
+
+    /// One bad frame does not end a mission.
+    fn handle_missed(&mut self, problem: &Problem) {
+        self.behind -= 1;
+        self.missed += 1;
+        tracing::error!("a camera frame was passed over, {} so far: {problem}", self.missed);
+        self.finish_at_end();
+    }
+
+    fn finish_at_end(&mut self) {
         if self.at_end && self.behind == 0 && self.camera.is_over() {
             self.at_end = false;
             tracing::info!("the recorded mission has ended");
             self.vehicle.finish_survey();
+            let _ = self.mapper.orders.send(ToMapper::Keep);
         }
     }
 

@@ -7,6 +7,7 @@ mod digest;
 mod dirty;
 #[allow(clippy::indexing_slicing)] // A cell's place is less than the size of its tile.
 mod grid;
+mod plane;
 mod replica;
 mod settle;
 mod source;
@@ -15,6 +16,7 @@ mod value;
 
 pub use digest::MapDigest;
 pub use grid::{Cell, LabelGrid, Rect, TILE};
+pub use plane::{PlaneChunk, PlaneKind, PlaneReplica, PlaneScale, PlaneSource};
 pub use replica::Replica;
 pub use settle::MOST_CONFIDENT;
 pub use source::MapSource;

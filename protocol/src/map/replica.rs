@@ -1,6 +1,6 @@
 //! The surface's side of the map: the picture, and the bases that the next chunks may refer to.
 
-use super::{Cell, LabelGrid, MapDigest, StateReplica, UNEXPLORED};
+use super::{Cell, LabelGrid, MAX_LABEL, MapDigest, StateReplica, UNEXPLORED};
 use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
@@ -58,10 +58,12 @@ impl Replica {
     }
 }
 
-impl StateReplica for Replica {
-    fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
+impl Replica {
+    /// Applies a chunk of frame `number` unless it makes no sense here or has a label above `most`.
+    pub(super) fn apply_up_to(&mut self, most: u8, number: u64, chunk: &[u8], now: Instant) -> bool {
         let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
-        if self.heard.len().max(self.logged) + changes.len() > MOST_CELLS {
+        let is_large = self.heard.len().max(self.logged) + changes.len() > MOST_CELLS;
+        if is_large || changes.iter().any(|&(_, label)| label > most) {
             return false;
         }
         self.updated = Some(now);
@@ -76,6 +78,12 @@ impl StateReplica for Replica {
         self.logged += changes.len();
         self.log.entry(number).or_default().extend(changes);
         true
+    }
+}
+
+impl StateReplica for Replica {
+    fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
+        self.apply_up_to(MAX_LABEL, number, chunk, now)
     }
 
     fn advance_base(&mut self, horizon: u64) {

@@ -1,5 +1,7 @@
 //! Shares of the classes in what is sent.
 
+use crate::map::PlaneKind;
+
 /// What bits are spent on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
@@ -13,15 +15,30 @@ pub enum Class {
     Map,
     /// Representative images.
     Exemplar,
+    /// Depths of the sea floor; they change seldom, and so go before confidences.
+    Depth,
+    /// How sure the model is of the labels.
+    Confidence,
     /// Headers, acknowledgements, checks, padding.
     Overhead,
 }
 
 impl Class {
     /// Every class; what comes first goes first where no share says otherwise.
-    pub const ALL: [Self; 6] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar, Self::Overhead];
-    /// The classes that have a share.
+    pub const ALL: [Self; 8] = [
+        Self::Directive,
+        Self::Status,
+        Self::Fix,
+        Self::Map,
+        Self::Exemplar,
+        Self::Depth,
+        Self::Confidence,
+        Self::Overhead,
+    ];
+    /// The classes that have a share of what is sent.
     pub const SHARED: [Self; 5] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar];
+    /// The classes that have a share of the map's share: its planes.
+    pub const PLANES: [Self; 2] = [Self::Confidence, Self::Depth];
 
     /// Name for people and reports.
     pub fn name(self) -> &'static str {
@@ -31,7 +48,18 @@ impl Class {
             Self::Fix => "fix",
             Self::Map => "map",
             Self::Exemplar => "exemplar",
+            Self::Confidence => "confidence",
+            Self::Depth => "depth",
             Self::Overhead => "overhead",
+        }
+    }
+}
+
+impl From<PlaneKind> for Class {
+    fn from(plane: PlaneKind) -> Self {
+        match plane {
+            PlaneKind::Confidence => Self::Confidence,
+            PlaneKind::Depth => Self::Depth,
         }
     }
 }
@@ -64,8 +92,10 @@ impl Shares {
 #[derive(Debug, Clone, Default)]
 pub struct ClassShares {
     shares: Shares,
+    /// Percent of the map's share for each of [`Class::PLANES`].
+    planes: [u8; 2],
     /// Bytes that a class was owed and did not get while it waited.
-    owed: [f64; 5],
+    owed: [f64; 7],
 }
 
 impl ClassShares {
@@ -74,7 +104,24 @@ impl ClassShares {
 
     /// Nothing is owed yet.
     pub fn new(shares: Shares) -> Self {
-        Self { shares, owed: [0.0; 5] }
+        Self { shares, planes: [0; 2], owed: [0.0; 7] }
+    }
+
+    /// Gives planes of the map a part of its share, percent; together 100 at most. A plane without one takes what nobody
+    /// else needs.
+    pub fn set_planes(&mut self, planes: [u8; 2]) {
+        self.planes = planes;
+    }
+
+    /// The share of a class in 0..=1, planes taken from the map.
+    fn of(&self, class: Class) -> f64 {
+        let map = self.shares.of(Class::Map);
+        let part = |percent: &u8| map * f64::from(*percent) / 100.0;
+        match Class::PLANES.iter().position(|&c| c == class) {
+            Some(plane) => self.planes.get(plane).map_or(0.0, part),
+            None if class == Class::Map => map - self.planes.iter().map(part).sum::<f64>(),
+            None => self.shares.of(class),
+        }
     }
 
     /// The shares in force.
@@ -101,7 +148,7 @@ impl ClassShares {
         }
         let bytes = bytes as f64;
         for &c in waiting {
-            let earned = self.shares.of(c) * bytes - if c == class { bytes } else { 0.0 };
+            let earned = self.of(c) * bytes - if c == class { bytes } else { 0.0 };
             if let Some(owed) = self.slot(c).and_then(|i| self.owed.get_mut(i)) {
                 *owed = (*owed + earned).clamp(-Self::MEMORY, Self::MEMORY);
             }
@@ -109,7 +156,7 @@ impl ClassShares {
     }
 
     fn slot(&self, class: Class) -> Option<usize> {
-        Class::SHARED.iter().position(|&c| c == class)
+        Class::SHARED.iter().chain(&Class::PLANES).position(|&c| c == class)
     }
 }
 
@@ -117,6 +164,7 @@ impl ClassShares {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::collections::BTreeMap;
 
     proptest! {
         #[test]
@@ -137,6 +185,23 @@ mod tests {
                 prop_assert!(bytes as f64 >= least, "class {}: {:?} of {:?}", i, sent, shares);
             }
         }
+    }
+
+    #[test]
+    fn a_plane_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
+        let waiting = [Class::Map, Class::Confidence, Class::Depth];
+        let mut keeper = ClassShares::new(Shares::default());
+        keeper.set_planes([0, 10]);
+        let mut sent = BTreeMap::<Class, usize>::new();
+        for _ in 0..1000 {
+            let class = keeper.next(&waiting).unwrap();
+            keeper.spend(class, 50, &waiting);
+            *sent.entry(class).or_default() += 1;
+        }
+        assert_eq!(sent.get(&Class::Confidence), None);
+        assert!((45..=55).contains(&sent[&Class::Depth]), "{sent:?}");
+        assert_eq!(keeper.next(&[Class::Confidence]), Some(Class::Confidence));
+        assert_eq!(ClassShares::default().next(&[Class::Confidence, Class::Depth]), Some(Class::Depth));
     }
 
     #[test]

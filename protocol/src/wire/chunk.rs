@@ -16,6 +16,8 @@ pub enum ChunkKind {
     Object,
     /// What the vehicle says of its map and of the directive.
     Report,
+    /// A patch of a plane of the map, or what the surface is known to hold of one.
+    Plane,
 }
 
 impl ChunkKind {
@@ -26,11 +28,13 @@ impl ChunkKind {
             Self::Slot => 3,
             Self::Object => 4,
             Self::Report => 5,
+            Self::Plane => 6,
         }
     }
 
     fn from_code(code: u8) -> Option<Self> {
-        [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report].into_iter().find(|k| k.code() == code)
+        let all = [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report, Self::Plane];
+        all.into_iter().find(|k| k.code() == code)
     }
 }
 
@@ -41,7 +45,7 @@ impl ChunkKind {
 /// +-----+---------+----------------+-----------+
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
-/// kind     0 nothing more in this frame, 1 map, 2 pose, 3 slot, 4 object, 5 report; 6, 7 reserved: the frame is refused
+/// kind     0 nothing more in this frame, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 plane; 7 reserved: the frame is refused
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::{Cell, LabelGrid, PlaneKind, PlaneScale, PlaneSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
@@ -41,6 +41,8 @@ pub(crate) struct Setup {
     pub(crate) authenticity: Option<Authenticity>,
     /// How long a new label has to stand.
     pub(crate) settle: Duration,
+    /// The share of each plane in percent of the map's; `None`: no planes are sent.
+    pub(crate) planes: Option<[u8; 2]>,
 }
 
 impl Setup {
@@ -53,6 +55,7 @@ impl Setup {
             access: Access::Shared,
             authenticity: None,
             settle: Duration::ZERO,
+            planes: None,
         }
     }
 
@@ -91,6 +94,8 @@ pub(crate) struct Pair {
     pub(crate) overheard: VecDeque<Vec<u8>>,
     serial: u64,
     durable: SlotInboxState,
+    /// What the planes were last set to.
+    quantities: Vec<(PlaneKind, Vec<(Cell, f64)>)>,
 }
 
 enum Event {
@@ -122,6 +127,7 @@ impl Pair {
             overheard: VecDeque::new(),
             serial: 0,
             durable: SlotInboxState::default(),
+            quantities: Vec::new(),
         }
     }
 
@@ -135,7 +141,28 @@ impl Pair {
         self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
         self.vehicle.set_map(map.iter(), self.now);
+        self.tell_planes();
         self.forget_modem(true);
+    }
+
+    /// Sets confidences and depths of a `side` x `side` map that differ with `phase`.
+    pub(crate) fn set_planes(&mut self, side: i32, phase: u64) {
+        let cells = |of: fn(f64, f64, f64) -> f64| {
+            let cell = |i: i32| Cell::new(i % side - side / 2, i / side - 3);
+            let quantity = |at: Cell| (at, of(f64::from(at.x), f64::from(at.y), phase as f64));
+            (0..side * side).map(cell).map(quantity).collect::<Vec<_>>()
+        };
+        self.quantities = vec![
+            (PlaneKind::Confidence, cells(|x, y, p| ((x * 0.7 + y * 1.3 + p).sin() + 1.0) / 2.0)),
+            (PlaneKind::Depth, cells(|x, y, p| 20.0 + (x * 0.11 + p).sin() * 4.0 + y * 0.2)),
+        ];
+        self.tell_planes();
+    }
+
+    fn tell_planes(&mut self) {
+        for (kind, cells) in &self.quantities {
+            self.vehicle.set_plane(*kind, cells.iter().copied(), self.now);
+        }
     }
 
     pub(crate) fn restart_surface(&mut self) {
@@ -155,7 +182,15 @@ impl Pair {
     }
 
     pub(crate) fn is_converged(&self) -> bool {
-        self.shown() == self.vehicle.map() && self.vehicle.is_settled()
+        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_settled()
+    }
+
+    fn planes_agree(&self) -> bool {
+        let view = self.surface.vehicle(auv()).unwrap();
+        self.vehicle.planes().all(|plane| match view.plane(plane.scale().kind()) {
+            Some(heard) => heard.levels().shown() == plane.target(),
+            None => plane.target().is_empty(),
+        })
     }
 
     /// How much the two ends hold, as the length of what they tell a debugger.
@@ -315,6 +350,9 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
     link.source_mut().set_settle_time(setup.settle);
+    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
+    let source = |scale| PlaneSource::new(scale, setup.codec, setup.settle);
+    link.set_planes(setup.planes.into_iter().flat_map(|shares| scales.map(source).into_iter().zip(shares)));
     link
 }
 

@@ -47,6 +47,12 @@ impl Annotations {
         Ok(Self { columns, rows, classes, of_cells })
     }
 
+    /// Annotated cells and different classes among them; nothing if no cell is annotated.
+    pub fn cells(&self) -> Option<(usize, usize)> {
+        let classes: std::collections::BTreeSet<u8> = self.of_cells.iter().copied().flatten().collect();
+        (!classes.is_empty()).then(|| (self.of_cells.iter().flatten().count(), classes.len()))
+    }
+
     /// Cells across and down.
     pub fn size(&self) -> (usize, usize) {
         (self.columns, self.rows)

@@ -4,10 +4,12 @@ mod annotations;
 mod baselines;
 mod cluster;
 mod null;
+mod trial;
 
 pub use annotations::{AnnotationError, Annotations};
-pub use baselines::{mean_lab_labels, pooled_word_labels};
+pub use baselines::{mean_lab_labels, mosaic_classes, pooled_word_labels};
 pub use null::{SceneScore, score};
+pub use trial::{MeanScore, Method, Scene, Trial, TrialError};
 
 use crate::topics::FlatCell;
 

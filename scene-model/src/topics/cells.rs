@@ -1,7 +1,8 @@
 //! The cells of the world, by dense id: words with their labels, label counts, neighbours.
 
 use super::grid::{Coord, NONE, SpatialHash, colour_of, neighbours_of};
-use super::labels::{LANES, Lanes, UNLABELLED, label_of, pack};
+use super::kinship::Kinship;
+use super::labels::{LANES, Lanes, UNLABELLED, label_of, pack, word_of};
 
 /// All cells seen so far, in the order of their first observation.
 #[derive(Clone, Debug)]
@@ -12,12 +13,13 @@ pub(crate) struct Cells {
     words: Vec<Vec<u32>>,
     counts: Vec<u16>,
     neighbours: Vec<[u32; 6]>,
+    kinship: Kinship,
     total: u64,
 }
 
 impl Cells {
-    /// Room for `blocks` x 16 label slots in each cell.
-    pub(crate) fn new(blocks: usize) -> Self {
+    /// Room for `blocks` x 16 label slots in each cell; `colour_levels` as in the configuration.
+    pub(crate) fn new(blocks: usize, colour_levels: u32) -> Self {
         Self {
             blocks,
             hash: SpatialHash::default(),
@@ -25,6 +27,7 @@ impl Cells {
             words: Vec::new(),
             counts: Vec::new(),
             neighbours: Vec::new(),
+            kinship: Kinship::new(colour_levels),
             total: 0,
         }
     }
@@ -92,6 +95,7 @@ impl Cells {
         self.words.push(Vec::new());
         self.counts.resize(self.counts.len() + self.width(), 0);
         self.neighbours.push(neighbours);
+        self.kinship.add_cell();
         cell
     }
 
@@ -100,6 +104,8 @@ impl Cells {
         let cell = self.find_or_add(coord);
         self.total += words.len() as u64;
         self.words[cell as usize] = words.to_vec();
+        words.iter().for_each(|&packed| self.kinship.see(cell, word_of(packed)));
+        self.kinship.relink(cell, &self.neighbours[cell as usize]);
         let counts = self.counts_mut(cell);
         words.iter().for_each(|&packed| counts[label_of(packed) as usize] += 1);
     }
@@ -118,26 +124,35 @@ impl Cells {
     /// Adds a word without a label.
     pub(crate) fn push(&mut self, cell: u32, word: u32) {
         self.words[cell as usize].push(pack(word, UNLABELLED));
+        self.kinship.see(cell, word);
         self.total += 1;
     }
 
-    /// Label counts of a cell's neighbours into `around`, with its own into `near` (one number per slot).
+    /// Weighs the neighbours anew of cells that got words.
+    pub(crate) fn weigh(&mut self, changed: impl Iterator<Item = u32>) {
+        for cell in changed {
+            self.kinship.relink(cell, &self.neighbours[cell as usize]);
+        }
+        self.kinship.settle();
+    }
+
+    /// Label counts of a cell's neighbours, weighed, into `around`, with its own into `near` (one number per slot).
     pub(crate) fn gather(&self, cell: u32, near: &mut [Lanes], around: &mut [Lanes]) {
         around.fill(Lanes([0.0; LANES]));
-        for &other in self.neighbours(cell) {
+        for (direction, &other) in self.neighbours(cell).iter().enumerate() {
             if other != NONE {
-                add_counts(around, self.counts(other));
+                add_counts(around, self.counts(other), self.kinship.weight(cell, direction));
             }
         }
         near.copy_from_slice(around);
-        add_counts(near, self.counts(cell));
+        add_counts(near, self.counts(cell), 1.0);
     }
 }
 
-fn add_counts(sum: &mut [Lanes], counts: &[u16]) {
+fn add_counts(sum: &mut [Lanes], counts: &[u16], weight: f32) {
     for (lanes, counts) in sum.iter_mut().zip(counts.as_chunks::<LANES>().0) {
         for (lane, &count) in lanes.0.iter_mut().zip(counts) {
-            *lane += f32::from(count);
+            *lane += weight * f32::from(count);
         }
     }
 }
@@ -148,7 +163,7 @@ mod tests {
 
     #[test]
     fn neighbours_are_linked_both_ways_in_any_order() {
-        let mut cells = Cells::new(1);
+        let mut cells = Cells::new(1, 0);
         let middle = cells.find_or_add([0, 0, 0]);
         let north = cells.find_or_add([0, 1, 0]);
         let below = cells.find_or_add([0, 0, -1]);

@@ -1,11 +1,6 @@
 //! A model as bytes: everything that cannot be derived, with a version and a CRC.
 //!
-//! ```text
-//!  0        8         12         20                     20 + n    24 + n
-//!  | magic  | version | length n | snapshot (postcard)  | CRC-32  |
-//! ```
-//! All numbers are little-endian; the CRC (ISO HDLC) covers everything before it. Counts, neighbours and the kernel's
-//! vectors are derived on loading.
+//! An [`Envelope`] around the snapshot in postcard. Counts, neighbours and the kernel's vectors are derived on loading.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,28 +9,17 @@ use super::config::{ConfigError, SceneConfig};
 use super::grid::Coord;
 use super::labels::{Labels, TopicId, label_of, word_of};
 use super::model::SceneModel;
+use crate::envelope::{Envelope, EnvelopeError};
 use crate::random::Stream;
 
-const MAGIC: [u8; 8] = *b"SCNMODEL";
-const VERSION: u32 = 1;
-const HEADER: usize = 20;
-const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNMODEL", version: 2 };
 
 /// Why bytes are no checkpoint that this program can go on from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CheckpointError {
-    /// The bytes do not begin as a checkpoint does.
-    #[error("not a scene model checkpoint")]
-    Foreign,
-    /// The checkpoint is of another version.
-    #[error("checkpoint version {found}, this program reads version {VERSION}")]
-    Version {
-        /// Version of the checkpoint.
-        found: u32,
-    },
-    /// The length or the checksum is wrong: cut off or damaged.
-    #[error("checkpoint is cut off or damaged")]
-    Damaged,
+    /// No checkpoint, of another version, or damaged.
+    #[error("not a checkpoint to go on from: {0}")]
+    Envelope(#[from] EnvelopeError),
     /// The checksum is right but the content cannot be.
     #[error("checkpoint content is inconsistent: {0}")]
     Inconsistent(&'static str),
@@ -62,41 +46,18 @@ pub(super) struct Snapshot {
 impl SceneModel {
     /// The whole state as bytes, for [`SceneModel::load`].
     pub fn save(&self) -> Vec<u8> {
-        let content = postcard::to_allocvec(&self.snapshot()).unwrap_or_default();
-        let mut bytes = Vec::with_capacity(HEADER + content.len() + 4);
-        bytes.extend(MAGIC);
-        bytes.extend(VERSION.to_le_bytes());
-        bytes.extend((content.len() as u64).to_le_bytes());
-        bytes.extend(content);
-        bytes.extend(CRC.checksum(&bytes).to_le_bytes());
-        bytes
+        ENVELOPE.seal(&postcard::to_allocvec(&self.snapshot()).unwrap_or_default())
     }
 
     /// A model that goes on exactly where the saved one was: same labels, same topics, same random numbers.
     pub fn load(bytes: &[u8]) -> Result<Self, CheckpointError> {
-        let content = unwrap(bytes)?;
+        let content = ENVELOPE.open(bytes)?;
         let snapshot: Snapshot =
             postcard::from_bytes(content).map_err(|_| CheckpointError::Inconsistent("fields do not parse"))?;
         snapshot.config.check()?;
         snapshot.check()?;
         Ok(Self::restore(snapshot))
     }
-}
-
-fn unwrap(bytes: &[u8]) -> Result<&[u8], CheckpointError> {
-    let rest = bytes.strip_prefix(&MAGIC).ok_or(CheckpointError::Foreign)?;
-    let (version, rest) = rest.split_first_chunk::<4>().ok_or(CheckpointError::Damaged)?;
-    let found = u32::from_le_bytes(*version);
-    if found != VERSION {
-        return Err(CheckpointError::Version { found });
-    }
-    let (length, rest) = rest.split_first_chunk::<8>().ok_or(CheckpointError::Damaged)?;
-    let (content, sum) = rest.split_last_chunk::<4>().ok_or(CheckpointError::Damaged)?;
-    let covered = &bytes[..bytes.len() - sum.len()];
-    if u64::from_le_bytes(*length) != content.len() as u64 || u32::from_le_bytes(*sum) != CRC.checksum(covered) {
-        return Err(CheckpointError::Damaged);
-    }
-    Ok(content)
 }
 
 impl Snapshot {
@@ -144,11 +105,12 @@ impl Snapshot {
     /// Cells and labels with all that is derived.
     pub(super) fn rebuild(&self) -> (Cells, Labels) {
         let mut labels = Labels::restore(&self.config, &self.topics, self.next_topic);
-        let mut cells = Cells::new(labels.blocks);
+        let mut cells = Cells::new(labels.blocks, self.config.colour_levels);
         for (coord, words) in &self.cells {
             cells.restore(*coord, words);
             labels.count(words);
         }
+        cells.weigh(std::iter::empty());
         labels.settle();
         (cells, labels)
     }
@@ -205,11 +167,12 @@ mod tests {
     #[test]
     fn other_bytes_are_refused_by_name() {
         let bytes = model(1).save();
-        assert_eq!(SceneModel::load(b"PNG").unwrap_err(), CheckpointError::Foreign);
-        assert_eq!(SceneModel::load(&bytes[..bytes.len() - 1]).unwrap_err(), CheckpointError::Damaged);
+        let refused = |bytes: &[u8]| SceneModel::load(bytes).unwrap_err();
+        assert_eq!(refused(b"PNG"), EnvelopeError::Foreign.into());
+        assert_eq!(refused(&bytes[..bytes.len() - 1]), EnvelopeError::Damaged.into());
         let mut newer = bytes.clone();
         newer[8] = 9;
-        assert_eq!(SceneModel::load(&newer).unwrap_err(), CheckpointError::Version { found: 9 });
+        assert_eq!(refused(&newer), EnvelopeError::Version { found: 9, wanted: 1 }.into());
     }
 
     proptest! {
@@ -223,12 +186,7 @@ mod tests {
 
         #[test]
         fn content_under_a_right_checksum_never_panics(content in prop::collection::vec(any::<u8>(), 0..200)) {
-            let mut bytes = MAGIC.to_vec();
-            bytes.extend(VERSION.to_le_bytes());
-            bytes.extend((content.len() as u64).to_le_bytes());
-            bytes.extend(content);
-            bytes.extend(CRC.checksum(&bytes).to_le_bytes());
-            drop(SceneModel::load(&bytes));
+            drop(SceneModel::load(&ENVELOPE.seal(&content)));
         }
     }
 }

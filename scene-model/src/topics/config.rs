@@ -33,6 +33,9 @@ pub struct SceneConfig {
     pub max_labels: u32,
     /// Number of different words: 1 to 2^20.
     pub vocabulary: u32,
+    /// Words below the cube of this are points of a lattice of colours, and neighbours that look alike count more, as
+    /// [`crate::words::COLOUR_LEVELS`] says of the words of images; 0: all neighbours count alike, as in the paper.
+    pub colour_levels: u32,
     /// Words kept in one cell, later ones are skipped: 1 to 65535.
     pub max_words_per_cell: u32,
     /// Seed of every random choice.
@@ -49,6 +52,7 @@ impl Default for SceneConfig {
             birth: Birth::Literal,
             max_labels: 16,
             vocabulary: crate::words::WordConfig::default().vocabulary_size(),
+            colour_levels: 0,
             max_words_per_cell: 256,
             seed: 1,
         }
@@ -72,6 +76,11 @@ pub(crate) const MAX_VOCABULARY: u32 = 1 << 20;
 const MAX_TABLE: u64 = 1 << 28;
 
 impl SceneConfig {
+    /// The defaults for words of images, in which neighbours that look alike count more.
+    pub fn for_images() -> Self {
+        Self { colour_levels: crate::words::COLOUR_LEVELS, ..Self::default() }
+    }
+
     /// Says which parameter is out of range, if any.
     pub fn check(&self) -> Result<(), ConfigError> {
         for edge in self.cell_m {
@@ -86,6 +95,10 @@ impl SceneConfig {
         within("vocabulary", self.vocabulary, MAX_VOCABULARY, "1 to 1048576")?;
         if u64::from(self.vocabulary) * u64::from(self.max_labels) > MAX_TABLE {
             return Err(refuse("max_labels", self.max_labels, "at most 2^28 / vocabulary (a table of 1 GB)"));
+        }
+        let levels = u64::from(self.colour_levels);
+        if levels > 64 || levels.pow(3) > u64::from(self.vocabulary) {
+            return Err(refuse("colour_levels", levels, "0 to 64, and its cube at most vocabulary"));
         }
         within("max_words_per_cell", self.max_words_per_cell, 65_535, "1 to 65535")
     }

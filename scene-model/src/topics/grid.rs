@@ -12,7 +12,7 @@ pub(crate) type Coord = [i32; 3];
 ///
 /// Cells lie on the origin's corner in x and y; in z the origin is in the middle of its cell, so that a flat bottom
 /// near z = 0 does not flicker between two layers.
-pub(crate) fn coord_of(position: [f64; 3], edges: [f64; 3]) -> Option<Coord> {
+pub fn coord_of(position: [f64; 3], edges: [f64; 3]) -> Option<[i32; 3]> {
     const REACH: f64 = (1 << 30) as f64;
     let mut coord = [0; 3];
     for axis in 0..3 {
@@ -24,6 +24,11 @@ pub(crate) fn coord_of(position: [f64; 3], edges: [f64; 3]) -> Option<Coord> {
         coord[axis] = index as i32;
     }
     Some(coord)
+}
+
+/// The middle of a cell, metres.
+pub fn centre_of(coord: [i32; 3], edges: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|axis| (f64::from(coord[axis]) + if axis == 2 { 0.0 } else { 0.5 }) * edges[axis])
 }
 
 /// The six Von Neumann neighbours; opposite directions differ in the last bit.
@@ -95,6 +100,13 @@ mod tests {
         let edges = [0.5, 0.5, 2.0];
         assert_eq!(coord_of([-0.1, 0.1, -0.9], edges), Some([-1, 0, 0]));
         assert_eq!(coord_of([-0.5, -0.51, -1.1], edges), Some([-1, -2, -1]));
+    }
+
+    #[test]
+    fn the_middle_of_a_cell_lies_in_it() {
+        for coord in [[-3, 0, 2], [4, -1, -7], [0, 0, 0]] {
+            assert_eq!(coord_of(centre_of(coord, [0.3, 2.0, 0.7]), [0.3, 2.0, 0.7]), Some(coord));
+        }
     }
 
     #[test]

@@ -84,6 +84,11 @@ impl MapCache {
         map
     }
 
+    /// Every cell by itself, by y, x, then from top to bottom.
+    pub(crate) fn volume(&self, cells: &Cells) -> Vec<FlatCell> {
+        self.order.iter().filter_map(|&cell| self.flatten_column(cells, &[cell])).collect()
+    }
+
     /// The label with most words in a column from top to bottom; ties to the upper cell.
     fn flatten_column(&self, cells: &Cells, stack: &[u32]) -> Option<FlatCell> {
         let views = || stack.iter().filter_map(|&cell| self.views[cell as usize].map(|view| (cell, view)));

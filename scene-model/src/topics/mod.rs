@@ -1,7 +1,8 @@
 //! The spatially correlated Chinese Restaurant Process topic model of Girdhar et al. (ICRA 2019).
 //!
 //! The world is cut into cells; a word in a cell takes label k with weight
-//! (n_k + alpha) (n_kw + beta) / (n_k. + V beta), where n_k counts label k in the cell and its Von Neumann neighbours,
+//! (n_k + alpha) (n_kw + beta) / (n_k. + V beta), where n_k counts label k in the cell and its Von Neumann neighbours
+//! (those that look alike may count more, see [`SceneConfig::colour_levels`]),
 //! or a new label with the weight that [`Birth`] says; the word's own label is taken out exactly.
 //!
 //! Sampling goes in phases of cells that are no neighbours of each other: within a phase the global counts stand still
@@ -17,6 +18,7 @@ mod evaluate;
 mod gibbs;
 mod grid;
 mod kernel;
+mod kinship;
 mod label_map;
 mod labels;
 mod model;
@@ -24,6 +26,7 @@ mod schedule;
 
 pub use checkpoint::CheckpointError;
 pub use config::{Birth, ConfigError, SceneConfig};
+pub use grid::{centre_of, coord_of};
 pub use kernel::Kernel;
 pub use label_map::FlatCell;
 pub use labels::TopicId;

@@ -56,7 +56,7 @@ impl SceneModel {
         let labels = Labels::new(&config);
         let kernel = Kernel::detect();
         Ok(Self {
-            cells: Cells::new(labels.blocks),
+            cells: Cells::new(labels.blocks, config.colour_levels),
             workshop: Workshop::new(labels.blocks, kernel, 1),
             kernel,
             schedule: Mixed::default(),
@@ -166,6 +166,7 @@ impl SceneModel {
     fn label_new(&mut self, touched: &mut Vec<(u32, usize)>) {
         touched.sort_unstable();
         touched.dedup_by_key(|entry| entry.0);
+        self.cells.weigh(touched.iter().map(|entry| entry.0));
         for &(cell, first) in touched.iter() {
             let phase = self.next_phase();
             self.workshop.phase(&mut self.cells, &mut self.labels, [(cell, first)].into_iter(), phase);
@@ -270,6 +271,11 @@ impl SceneModel {
     /// column wins, ties to the upper cell. Only cells that changed since the last call are evaluated.
     pub fn label_map(&self) -> Vec<FlatCell> {
         self.fresh_map().flatten(&self.cells)
+    }
+
+    /// The label of every cell in three dimensions, sorted by (y, x), then from top to bottom.
+    pub fn label_volume(&self) -> Vec<FlatCell> {
+        self.fresh_map().volume(&self.cells)
     }
 
     #[cfg(test)]

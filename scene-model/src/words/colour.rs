@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::field::Field;
 use super::{Moments, Word};
 
-const LEVELS: u32 = 8;
+/// The first words are points of a lattice of this many levels each of L, a and b: id = (L x levels + a) x levels + b.
+pub const LEVELS: u32 = 8;
 /// The lattice spans this many standard deviations either side of the mean.
 const REACH: f32 = 2.0;
 

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use binary::Binary;
 use colour::Colour;
+pub use colour::LEVELS as COLOUR_LEVELS;
 use context::{Context, Spread};
 use field::Field;
 use plane::Plane;
@@ -79,6 +80,13 @@ pub struct Measures {
     texture: [Moments; 3],
 }
 
+impl Measures {
+    /// How many words of each kind a cell gets.
+    pub fn config(&self) -> &WordConfig {
+        &self.config
+    }
+}
+
 /// First id of the `kind`-th vocabulary: colour, context, spread, texture, binary, none.
 fn first_id(kind: usize) -> u32 {
     let sizes = [colour::SIZE, context::SIZE, context::SPREAD_SIZE, texture::SIZE, binary::SIZE];
@@ -129,14 +137,14 @@ impl WordExtractor {
 
     /// Measures learnt from a set of images before a mission, frozen: tones from all of them first, then the rest.
     ///
-    /// Each image comes with the edge of a cell in its pixels; those that [`WordExtractor::extract`] would refuse are
-    /// passed over.
-    pub fn train(config: &WordConfig, images: &[(RgbImage, f32)]) -> Measures {
+    /// `images` is called twice and gives the same images each time, so that not all of them are held at once. Each
+    /// comes with the edge of a cell in its pixels; those that [`WordExtractor::extract`] would refuse are passed over.
+    pub fn train<I: Iterator<Item = (RgbImage, f32)>>(config: &WordConfig, images: impl Fn() -> I) -> Measures {
         let mut extractor = Self::new(config);
-        let usable = || images.iter().filter(|(image, cell_px)| is_usable(image, *cell_px));
-        usable().for_each(|(image, _)| extractor.stretch.learn(image));
+        let usable = || images().filter(|(image, cell_px)| is_usable(image, *cell_px));
+        usable().for_each(|(image, _)| extractor.stretch.learn(&image));
         for (image, cell_px) in usable() {
-            extractor.words(image, *cell_px, true);
+            extractor.words(&image, cell_px, true);
         }
         extractor.frames = u32::MAX;
         extractor.measures()
@@ -224,13 +232,23 @@ fn spacing(cell_px: f32, per_cell: u32) -> f32 {
     cell_px / (per_cell as f32).sqrt()
 }
 
-/// Mean CIE Lab colour of each cell of a regular grid, unstretched: cells across, cells down, colours row by row.
-pub(crate) fn mean_lab(image: &RgbImage, cell_px: f32) -> (usize, usize, Vec<[f32; 3]>) {
-    let columns = grid::centres(image.width(), cell_px).len();
-    let rows = grid::centres(image.height(), cell_px).len();
-    let share = |colour: [f32; 3]| colour.map(|value| value / 255.0);
-    let colours = field::box_means(image, cell_px).into_iter().map(|c| field::lab(share(c))).collect();
-    (columns, rows, colours)
+/// Mean CIE Lab colour of each cell, unstretched: cells across, cells down, colours row by row from the top left corner.
+pub(crate) fn cell_lab(image: &RgbImage, cell_px: f32) -> (usize, usize, Vec<[f32; 3]>) {
+    let cells = |length: u32| (length as f32 / cell_px).ceil().max(1.0) as usize;
+    let (columns, rows) = (cells(image.width()), cells(image.height()));
+    let place = |at: u32, count: usize| ((at as f32 / cell_px) as usize).min(count - 1);
+    let across: Vec<usize> = (0..image.width()).map(|x| place(x, columns)).collect();
+    let mut sums = vec![[0u64; 4]; columns * rows];
+    for (y, row) in image.rows().enumerate() {
+        let cells = &mut sums[place(y as u32, rows) * columns..][..columns];
+        for (pixel, &column) in row.zip(&across) {
+            let [red, green, blue] = pixel.0.map(u64::from);
+            let sum = &mut cells[column];
+            *sum = [sum[0] + red, sum[1] + green, sum[2] + blue, sum[3] + 1];
+        }
+    }
+    let share = |sum: &[u64; 4]| [0, 1, 2].map(|i| sum[i] as f32 / (sum[3].max(1) as f32 * 255.0));
+    (columns, rows, sums.iter().map(|sum| field::lab(share(sum))).collect())
 }
 
 /// Running mean and variance of one measure.
@@ -320,7 +338,7 @@ mod tests {
     #[test]
     fn trained_measures_stand_still() {
         let images = [(speckle(100, 80), 20.0), (RgbImage::from_pixel(50, 50, Rgb([200, 9, 9])), 20.0)];
-        let measures = WordExtractor::train(&WordConfig::default(), &images);
+        let measures = WordExtractor::train(&WordConfig::default(), || images.iter().cloned());
         let mut extractor = WordExtractor::from_measures(measures);
         let first = extractor.extract(&images[0].0, 20.0);
         extractor.extract(&images[1].0, 20.0);

@@ -58,7 +58,8 @@ impl Trace {
     /// Reads our own `frames.log`, one line a frame: `time_s direction bytes kind lost`, by blanks, commas or tabs.
     ///
     /// Keeps the lines of one `direction` if one is named. Lines that are no such record are skipped, so that a log cut
-    /// off in mid-line still serves. `lost` counts as lost unless it is empty, 0, `false`, `no`, `ok`, `-` or `delivered`.
+    /// off in mid-line still serves. `lost` counts as lost unless it is empty, 0, `false`, `no`, `ok`, `-` or `delivered`; `open` is
+    /// no record.
     pub fn from_frames_log(text: &str, direction: Option<&str>) -> Result<Self, TraceError> {
         Self::from_records(text.lines().filter_map(|line| log_record(line, direction)).collect())
     }
@@ -124,6 +125,10 @@ fn log_record(line: &str, wanted: Option<&str>) -> Option<(f64, bool)> {
     let _bytes: u64 = fields.next()?.parse().ok()?;
     let _kind = fields.next()?;
     let lost = fields.next().unwrap_or_default().to_ascii_lowercase();
+    // The fate of a frame that was under way when the log ended is not known.
+    if lost == "open" {
+        return None;
+    }
     let delivered = matches!(lost.as_str(), "" | "0" | "false" | "no" | "ok" | "-" | "delivered");
     wanted.is_none_or(|wanted| wanted == direction).then_some((at, delivered))
 }
@@ -161,6 +166,13 @@ mod tests {
         assert_eq!(Trace::from_frames_log(log, Some("down")).expect("record").loss_rate(), 1.0);
         assert_eq!(Trace::from_frames_log(log, None).expect("records").records.len(), 3);
         assert_eq!(Trace::from_frames_log("", None), Err(TraceError::Empty));
+    }
+
+    #[test]
+    fn frames_of_unknown_fate_are_no_record() {
+        let log = "# time_s direction bytes kind fate [reason]\n1.000 up 256 map ok\n2.000 up 256 map lost noise\n3.000 up 64 status ok\n4.000 up 256 map open\n";
+        let trace = Trace::from_frames_log(log, Some("up")).expect("records");
+        assert_eq!((trace.records.len(), trace.loss_rate()), (3, 1.0 / 3.0));
     }
 
     #[test]

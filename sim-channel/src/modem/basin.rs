@@ -1,6 +1,6 @@
 //! Modems in one water: moves bytes between emulators and channel in order of time.
 
-use super::{Emulator, Fault, ModemEvent};
+use super::{Emulator, Fault, Host, ModemEvent};
 use crate::{Channel, Duration, NodeId, Talker};
 use std::collections::BTreeMap;
 
@@ -48,27 +48,49 @@ impl Basin {
         self.now
     }
 
-    /// What the host of `node` wrote at `now`; nothing happens if it has no modem.
+    /// Another host at the modem of `node`; the first if it has no modem.
+    pub fn attach(&mut self, node: NodeId) -> Host {
+        self.modems.get_mut(&node).map_or(Host::FIRST, |modem| modem.attach())
+    }
+
+    /// A host is gone.
+    pub fn detach(&mut self, node: NodeId, host: Host) {
+        if let Some(modem) = self.modems.get_mut(&node) {
+            modem.detach(host);
+        }
+    }
+
+    /// What the first host of `node` wrote at `now`; nothing happens if it has no modem.
     pub fn handle_host_bytes(&mut self, node: NodeId, bytes: &[u8], now: Duration) {
+        self.handle_bytes_of(node, Host::FIRST, bytes, now);
+    }
+
+    /// What a host of `node` wrote at `now`; nothing happens if it has no modem.
+    pub fn handle_bytes_of(&mut self, node: NodeId, host: Host, bytes: &[u8], now: Duration) {
         self.advance(now);
         if let Some(modem) = self.modems.get_mut(&node) {
-            modem.handle_host_bytes(bytes, now);
+            modem.handle_host_bytes(host, bytes, now);
         }
         self.settle(now);
     }
 
-    /// How many bytes the host of `node` may write.
+    /// How many bytes the first host of `node` may write.
     pub fn host_room(&self, node: NodeId) -> usize {
-        self.modems.get(&node).map_or(0, |modem| modem.host_room())
+        self.modems.get(&node).map_or(0, |modem| modem.host_room(Host::FIRST))
     }
 
-    /// What has reached the host of `node` by the present.
+    /// What has reached the first host of `node` by the present.
     pub fn poll_host_bytes(&mut self, node: NodeId) -> Vec<u8> {
-        let now = self.now;
-        self.modems.get_mut(&node).map(|modem| modem.poll_host_bytes(now)).unwrap_or_default()
+        self.poll_bytes_for(node, Host::FIRST)
     }
 
-    /// A host whose TCP connection its modem closed.
+    /// What has reached a host of `node` by the present.
+    pub fn poll_bytes_for(&mut self, node: NodeId, host: Host) -> Vec<u8> {
+        let now = self.now;
+        self.modems.get_mut(&node).map(|modem| modem.poll_host_bytes(host, now)).unwrap_or_default()
+    }
+
+    /// A node whose modem closes the TCP connections of its hosts.
     pub fn poll_hang_up(&mut self) -> Option<NodeId> {
         self.hung_up.pop()
     }

@@ -1,8 +1,8 @@
 //! Ten million random and mutated lines, for a night or before a release: `cargo test -p sim-channel -- --ignored`.
 
-use super::Emulator;
 use super::micromodem::{Micromodem, MicromodemConfig};
 use super::s2c::{Interpreter, S2c, S2cConfig};
+use super::{Emulator, Host};
 use crate::{Duration, Stream};
 
 const LINES: u32 = 10_000_000;
@@ -59,10 +59,10 @@ fn flood(mut modem: impl Emulator, lines: &[&[u8]], seed: u64, count: u32) -> us
     let mut told = 0;
     for _ in 0..count {
         now += Duration::from_micros(chance.below(20_000) as u64);
-        modem.handle_host_bytes(&mutated(lines, &mut chance), now);
+        modem.handle_host_bytes(Host::FIRST, &mutated(lines, &mut chance), now);
         while modem.poll_transmit(now).is_some() {}
         while modem.poll_event().is_some() {}
-        told += modem.poll_host_bytes(now).len();
+        told += modem.poll_host_bytes(Host::FIRST, now).len();
     }
     told
 }

@@ -9,6 +9,7 @@ mod agenda;
 mod basin;
 #[cfg(test)]
 mod bench;
+mod board;
 mod crc;
 mod fault;
 #[cfg(test)]
@@ -20,38 +21,37 @@ pub mod transparent;
 
 pub use basin::Basin;
 pub use fault::Fault;
-pub use port::Port;
 
 use crate::{Arrival, Duration, Onset};
 
+/// One of the hosts at a modem: a TCP port takes several, a serial line has the first alone.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
+pub struct Host(u32);
+
+impl Host {
+    /// The host that is always there.
+    pub const FIRST: Host = Host(0);
+}
+
 /// An emulated modem.
 pub trait Emulator: Send {
-    /// The line to the host.
-    fn port(&self) -> &Port;
+    /// Another host at the same port: it gets every notification, and the answers to what it asks itself.
+    fn attach(&mut self) -> Host;
 
-    /// The line to the host.
-    fn port_mut(&mut self) -> &mut Port;
+    /// The host is gone.
+    fn detach(&mut self, host: Host);
 
-    /// Takes what the host wrote. What does not fit into `host_room` is lost, as on a line without flow control.
-    fn handle_host_bytes(&mut self, bytes: &[u8], now: Duration) {
-        self.port_mut().accept(bytes, now);
-        self.handle_timeout(now);
-    }
+    /// Takes what a host wrote. What does not fit into `host_room` is lost, as on a line without flow control.
+    fn handle_host_bytes(&mut self, host: Host, bytes: &[u8], now: Duration);
 
-    /// How many bytes the host may write now.
-    fn host_room(&self) -> usize {
-        self.port().room()
-    }
+    /// How many bytes a host may write now.
+    fn host_room(&self, host: Host) -> usize;
 
-    /// What has reached the host by `now`, paced by the baud rate.
-    fn poll_host_bytes(&mut self, now: Duration) -> Vec<u8> {
-        self.port_mut().poll_output(now)
-    }
+    /// What has reached a host by `now`, paced by the baud rate.
+    fn poll_host_bytes(&mut self, host: Host, now: Duration) -> Vec<u8>;
 
-    /// When `poll_host_bytes` has something to give.
-    fn poll_host_timeout(&self) -> Option<Duration> {
-        self.port().next_output()
-    }
+    /// When `poll_host_bytes` has something to give for any host.
+    fn poll_host_timeout(&self) -> Option<Duration>;
 
     /// Takes the beginning of a signal at this modem. Without it the beginning is told together with the end.
     fn handle_onset(&mut self, onset: &Onset, now: Duration);

@@ -13,7 +13,7 @@ const BURST: u32 = 16;
 
 /// A serial line or TCP connection as the modem has it: paced, bounded, and breakable.
 #[derive(Debug)]
-pub struct Port {
+pub(super) struct Port {
     byte_time: Duration,
     output: VecDeque<u8>,
     output_from: Duration,

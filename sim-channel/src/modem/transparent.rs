@@ -3,10 +3,9 @@
 //! No frames, no addresses, no acknowledgement, no word of what was lost. Bytes are sent when enough of them wait or when
 //! the host pauses. The pipe may eat `+++AT` up to the end of its line, as modems that listen for an escape do.
 
-use super::agenda::Agenda;
-use super::port::Port;
-use super::{Emulator, Fault, ModemEvent, Transmission};
-use crate::{Arrival, Duration, Onset, Outcome, Stream};
+use super::board::{Board, Machine};
+use super::{Fault, Host, Transmission};
+use crate::{Arrival, Duration, Outcome, Stream};
 use std::collections::VecDeque;
 
 /// The make of a pipe.
@@ -50,19 +49,17 @@ impl Default for TransparentConfig {
 #[derive(Debug)]
 pub struct Transparent {
     config: TransparentConfig,
-    port: Port,
+    board: Board<Event>,
     waiting: VecDeque<u8>,
     last_byte: Duration,
     eating: bool,
     quiet_until: Duration,
-    agenda: Agenda<Event>,
     on_air_until: Duration,
-    chance: Stream,
-    events: VecDeque<ModemEvent>,
 }
 
+/// What the pipe plans.
 #[derive(Debug)]
-enum Event {
+pub(super) enum Event {
     /// Look whether a packet can go.
     Look,
 }
@@ -76,33 +73,14 @@ impl Transparent {
     pub fn new(config: TransparentConfig) -> Self {
         const PURPOSE: u64 = 0x7a9e;
         Self {
-            port: Port::new(config.baud),
+            board: Board::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
             waiting: VecDeque::new(),
             last_byte: Duration::ZERO,
             eating: false,
             quiet_until: Duration::ZERO,
-            agenda: Agenda::new(),
             on_air_until: Duration::ZERO,
-            chance: Stream::new(config.seed, &[PURPOSE]),
-            events: VecDeque::new(),
             config,
         }
-    }
-
-    fn read_host(&mut self, bytes: &[u8], at: Duration) {
-        self.last_byte = at;
-        for byte in bytes {
-            if self.eating {
-                self.eating = !matches!(byte, b'\r' | b'\n');
-                if !self.eating {
-                    self.port.write(b"OK\r\n", at);
-                }
-            } else if self.waiting.len() < self.config.buffer_bytes {
-                self.waiting.push_back(*byte);
-                self.look_for_escape();
-            }
-        }
-        self.agenda.add(at + self.config.gap, Event::Look);
     }
 
     fn look_for_escape(&mut self) {
@@ -115,7 +93,7 @@ impl Transparent {
 
     fn reboot(&mut self, now: Duration) {
         if now < self.on_air_until {
-            self.events.push_back(ModemEvent::CutShort);
+            self.board.cut_short();
         }
         self.waiting.clear();
         self.eating = false;
@@ -125,29 +103,47 @@ impl Transparent {
 
     fn be_quiet(&mut self, length: Duration, now: Duration) {
         self.quiet_until = now + length;
-        self.agenda.add(self.quiet_until, Event::Look);
+        self.board.plan(self.quiet_until, Event::Look);
     }
 }
 
-impl Emulator for Transparent {
-    fn port(&self) -> &Port {
-        &self.port
+impl Machine for Transparent {
+    type Event = Event;
+
+    fn board(&self) -> &Board<Event> {
+        &self.board
     }
 
-    fn port_mut(&mut self) -> &mut Port {
-        &mut self.port
+    fn board_mut(&mut self) -> &mut Board<Event> {
+        &mut self.board
     }
 
-    fn handle_onset(&mut self, _onset: &Onset, _now: Duration) {}
+    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration) {
+        self.last_byte = at;
+        for byte in bytes {
+            if self.eating {
+                self.eating = !matches!(byte, b'\r' | b'\n');
+                if !self.eating {
+                    self.board.tell(host, b"OK\r\n", at);
+                }
+            } else if self.waiting.len() < self.config.buffer_bytes {
+                self.waiting.push_back(*byte);
+                self.look_for_escape();
+            }
+        }
+        self.board.plan(at + self.config.gap, Event::Look);
+    }
 
-    fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {
-        self.handle_timeout(now);
+    /// `next_transmission`, which is asked after every call, does what there is to do.
+    fn on_event(&mut self, _event: Event, _at: Duration) {}
+
+    fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
         if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
-            self.port.write(bytes, now);
+            self.board.tell_all(bytes, now);
         }
     }
 
-    fn poll_transmit(&mut self, now: Duration) -> Option<Transmission> {
+    fn next_transmission(&mut self, now: Duration) -> Option<Transmission> {
         let full = self.waiting.len() >= self.config.packet_bytes;
         let paused = now >= self.last_byte + self.config.gap;
         let free = now >= self.on_air_until && now >= self.quiet_until;
@@ -158,40 +154,17 @@ impl Emulator for Transparent {
         let bytes: Vec<u8> = self.waiting.drain(..count).collect();
         let airtime = self.config.preamble + Duration::from_secs(1) * (8 * count as u32) / self.config.bit_rate.max(1);
         self.on_air_until = now + airtime;
-        self.agenda.add(self.on_air_until, Event::Look);
+        self.board.plan(self.on_air_until, Event::Look);
         Some(Transmission { bytes, airtime })
     }
 
-    fn poll_event(&mut self) -> Option<ModemEvent> {
-        self.events.pop_front()
-    }
-
-    fn poll_timeout(&self) -> Option<Duration> {
-        [self.agenda.next(), self.port.next_input()].into_iter().flatten().min()
-    }
-
-    fn handle_timeout(&mut self, now: Duration) {
-        while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
-            if let Some((_, Event::Look)) = self.agenda.pop(due) {
-                // `poll_transmit`, which comes after every call, does what there is to do.
-                continue;
-            }
-            if let Some((at, bytes)) = self.port.take_input(due) {
-                self.read_host(&bytes, at);
-            }
-        }
-    }
-
-    fn inject(&mut self, fault: Fault, now: Duration) {
-        if self.port.inject(fault, &mut self.chance, now) {
-            return;
-        }
+    fn break_down(&mut self, fault: Fault, now: Duration) {
         match fault {
             Fault::Busy(length) => self.be_quiet(length, now),
             Fault::Reboot | Fault::BrownOut => self.reboot(now),
             // It has no address.
             Fault::WrongAddress(_) => {}
-            // Done by the port.
+            // Done by the line.
             Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             Fault::BigBuffer => self.config.buffer_bytes = 1024 * 1024,
         }
@@ -202,6 +175,7 @@ impl Emulator for Transparent {
 mod tests {
     use super::*;
     use crate::ChannelConfig;
+    use crate::modem::Emulator;
     use crate::modem::bench::{Bench, SECOND};
 
     fn bench(config: ChannelConfig) -> Bench {

@@ -29,7 +29,7 @@ export class Grid {
     return counts;
   }
 
-  /** The body of GET /vehicles/{id}/map; `planes` adds what a later API may offer. */
+  /** The body of GET /vehicles/{id}/map; `planes` are those that the vehicle tells of. */
   json(nowS, planes) {
     const { x0, y0, width, height } = this.bounds();
     const labels = Buffer.alloc(width * height);
@@ -41,7 +41,7 @@ export class Grid {
       ages.writeUInt16LE(Math.min(65534, Math.max(0, Math.round(nowS - c.atS))), at * 2);
       for (const p of extra) {
         const value = p.at((c.x + 0.5) * this.cellM, (c.y + 0.5) * this.cellM);
-        p.bytes[at] = Math.round(((value - p.min) / (p.max - p.min)) * 254);
+        p.bytes[at] = Math.min(254, Math.max(0, Math.round(((value - p.min) / (p.max - p.min)) * 254)));
       }
     }
     const map = { version: this.version, x0, y0, width, height, cell_m: this.cellM };
@@ -49,7 +49,8 @@ export class Grid {
     map.age_s = ages.toString("base64");
     if (extra.length > 0) {
       map.planes = extra.map((p) => ({
-        name: p.name, unit: p.unit, min: p.min, max: p.max, data: p.bytes.toString("base64"),
+        name: p.name, unit: p.unit, min: p.min, max: p.max, step: p.step,
+        data: p.bytes.toString("base64"), age_s: map.age_s,
       }));
     }
     return map;

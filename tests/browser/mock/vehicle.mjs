@@ -6,7 +6,7 @@ import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
 
 const PLANES = [
-  { name: "confidence", unit: "", min: 0, max: 1, at: confidence },
+  { name: "confidence", unit: "", min: 0.125, max: 0.875, step: 0.25, at: confidence },
   { name: "curiosity", unit: "nats", min: 0, max: 3, at: (x, y) => 3 * (1.2 - confidence(x, y)) },
   { name: "depth", unit: "m", min: 10, max: 25, at: floorDepth },
 ];

@@ -153,6 +153,38 @@ export default [
       await s.until("more layers", async () => (await names()).join() === "label,age,confidence,curiosity,depth");
       await s.page.selectOption("#layer", "depth");
       await s.shows("#legend", /depth.*10 m.*25 m/s);
+      await s.page.selectOption("#layer", "confidence");
+      await s.shows("#legend", /confidence.*0.%.*100.%/s);
+    },
+  },
+  {
+    name: "hovering tells from where to where a level of a plane goes, and its own age",
+    scenario: "start",
+    async run(s) {
+      await s.steer({ planes: true, advance: 30 });
+      await s.until("planes", () => s.inPage(({ store }) => store.map?.planes.length > 0));
+      const cell = await someCell(s);
+      await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
+      await s.shows("#readout", /confidence \d+.% to \d+.%, heard .* ago/s);
+    },
+  },
+  {
+    name: "a plane of a vehicle that fell silent goes grey",
+    scenario: "start",
+    async run(s) {
+      await s.steer({ planes: true, advance: 30 });
+      await s.until("planes", () => s.inPage(({ store }) => store.map?.planes.length > 0));
+      await s.page.selectOption("#layer", "depth");
+      const tones = () =>
+        s.page.locator("#chart").evaluate((c) => {
+          const { data } = c.getContext("2d").getImageData(0, 0, c.width, c.height);
+          let most = 0;
+          for (let i = 0; i < data.length; i += 4) most = Math.max(most, Math.abs(data[i] - data[i + 2]));
+          return most;
+        });
+      const live = await tones();
+      await s.steer({ mute: true, advance: 400 });
+      await s.until("pale tones", async () => (await tones()) < live * 0.7);
     },
   },
   {

@@ -3,10 +3,11 @@
 import { $, h, show } from "../dom.js";
 import { shownAs, tintOf } from "../book.js";
 import { isStale, store } from "../store.js";
-import { minus, nice, span } from "../format.js";
+import { nice, span } from "../format.js";
 import { ramp } from "../palette.js";
 import { current as theme, onTheme } from "../theme.js";
 import { paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
+import { planeText } from "./readout.js";
 
 const AGE_REPAINT_S = 5;
 export const layer = { name: "label", highlight: null };
@@ -42,7 +43,7 @@ export function canvasOf(vehicle, map) {
   const canvas = !chosen
     ? paintFootprint(map)
     : plane
-      ? paintPlane(map, plane)
+      ? paintPlane(map, plane, isStale(vehicle))
       : layer.name === "age"
         ? paintAge(map, age, ageTop(map))
         : paintLabels(map, { tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
@@ -68,8 +69,9 @@ export function drawLegend() {
   const box = $("legend");
   show(box, Boolean(map) && layer.name !== "label");
   if (box.hidden) return;
+  const half = (plane?.step ?? 0) / 2;
   const [title, low, high, flip] = plane
-    ? [plane.name, `${minus(String(plane.min))} ${plane.unit}`, `${minus(String(plane.max))} ${plane.unit}`, false]
+    ? [plane.name, planeText(plane, plane.min - half), planeText(plane, plane.max + half), false]
     : ["age of cells", "now", span(top), true];
   const bar = h("canvas", { width: 120, height: 8, "aria-hidden": "true" });
   const c = bar.getContext("2d");

@@ -74,11 +74,13 @@ export function paintAge(map, sinceFetchS, top) {
   });
 }
 
-/** A plane the server offers: bytes 0..254 between its least and greatest value, 255 unknown. */
-export function paintPlane(map, plane) {
+/** A plane the server offers: bytes 0..254 between its least and greatest value, 255 unknown; faint when stale. */
+export function paintPlane(map, plane, stale) {
   return paint(map, (at) => {
     const v = plane.data[at];
-    return v === 255 ? [128, 128, 128, 90] : [...shade(v / 254), 255];
+    if (v === 255) return [128, 128, 128, 90];
+    const full = shade(v / 254);
+    return [...(stale ? mix(full, [128, 128, 128], 0.7) : full), 255];
   });
 }
 

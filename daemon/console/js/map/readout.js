@@ -5,18 +5,19 @@ import { metres, minus, none, percent, span } from "../format.js";
 import { nameOf, shownAs } from "../book.js";
 import { ageOf, store } from "../store.js";
 
-/** The cell under (x, y) metres: {label, ageS, planes} or null when outside the map. */
+/** The cell under (x, y) metres: {label, ageS, planes} or null when outside the map; each plane with its own age. */
 export function cellAt(map, x, y) {
   const cx = Math.floor(x / map.cell_m) - map.x0;
   const cy = Math.floor(y / map.cell_m) - map.y0;
   if (cx < 0 || cy < 0 || cx >= map.width || cy >= map.height) return null;
   const at = cy * map.width + cx;
   if (map.labels[at] === 0) return null;
-  const age = map.age[at] === 65535 ? null : map.age[at] + (ageOf(map.fetchedS) ?? 0);
+  const since = ageOf(map.fetchedS) ?? 0;
+  const seconds = (ages) => (!ages || ages[at] === 65535 ? null : ages[at] + since);
   const planes = map.planes
     .filter((p) => p.data[at] !== 255)
-    .map((p) => ({ ...p, value: p.min + ((p.max - p.min) * p.data[at]) / 254 }));
-  return { label: map.labels[at], ageS: age, planes };
+    .map((p) => ({ ...p, value: p.min + ((p.max - p.min) * p.data[at]) / 254, ageS: seconds(p.age) }));
+  return { label: map.labels[at], ageS: seconds(map.age), planes };
 }
 
 export function showReadout(world) {
@@ -30,7 +31,7 @@ export function showReadout(world) {
   if (cell) {
     parts.push(nameOf(shownAs(cell.label)));
     parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
-    for (const p of cell.planes) parts.push(`${p.name} ${planeValue(p)}`);
+    for (const p of cell.planes) parts.push(`${p.name} ${levelOf(p)}${p.ageS === null ? "" : `, heard ${span(p.ageS)} ago`}`);
   } else {
     parts.push("unexplored");
   }
@@ -38,8 +39,15 @@ export function showReadout(world) {
   return cell;
 }
 
-const planeValue = (p) =>
-  p.unit === "" && p.max === 1 ? percent(p.value) : `${minus(p.value.toFixed(1))} ${p.unit}`;
+/** A value of a plane, or from where to where its level goes if the server tells the step. */
+function levelOf(p) {
+  const half = (p.step ?? 0) / 2;
+  const low = planeText(p, p.value - half);
+  return half > 0 ? `${low} to ${planeText(p, p.value + half)}` : low;
+}
+
+/** A quantity without a unit is a share. */
+export const planeText = (p, value) => (p.unit === "" ? percent(value) : `${minus(String(Number(value.toFixed(1))))} ${p.unit}`);
 
 const A = 6378137;
 const E2 = (2 - 1 / 298.257223563) / 298.257223563;

@@ -7,7 +7,7 @@ import { ageOf, store } from "../store.js";
 import { drawHistory } from "./history.js";
 import { lifeline, slotOf } from "./lifeline.js";
 
-const CLASSES = ["map", "status", "directive", "fix", "exemplar", "overhead"];
+const CLASSES = ["map", "confidence", "depth", "status", "directive", "fix", "exemplar", "overhead"];
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};

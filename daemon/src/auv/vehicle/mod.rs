@@ -9,7 +9,7 @@ use super::navigator::Navigator;
 use super::steering::Steering;
 use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::{Cell, LabelGrid, PlaneSource};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
@@ -27,6 +27,10 @@ pub struct Durable {
     pub inbox: SlotInboxState,
     /// Epoch of the label ids in use.
     pub epoch: u8,
+    /// Label ids of the epoch that may have been told: 1 to this.
+    pub labels: u8,
+    /// Random number of the mission, by which its checkpoints are known.
+    pub lineage: u64,
     /// Utility in force: epoch, exploration, curiosity, weights.
     pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
     /// Whether the vehicle is told to hold.
@@ -159,6 +163,11 @@ impl Vehicle {
         self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
     }
 
+    /// The planes of the map that are sent.
+    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
+        self.link.planes()
+    }
+
     /// Versions of the map so far.
     pub fn map_version(&self) -> u64 {
         self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
@@ -219,12 +228,22 @@ impl Vehicle {
         if update.epoch != self.durable.epoch {
             self.begin_epoch(update.epoch, now);
         }
+        if update.labels > self.durable.labels {
+            // Before the surface can hear of them: after a restart they keep their meaning or have none.
+            self.durable.labels = update.labels;
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
         self.labels = update.labels;
         self.explored = update.cells.len() as u32;
         let cells = update.cells.iter().copied();
         match &mut self.whole_png {
             Some(whole) => whole.set(cells),
-            None => drop(self.link.set_map(cells, now)),
+            None => {
+                self.link.set_map(cells, now);
+                for (&kind, cells) in &update.planes {
+                    self.link.set_plane(kind, cells.iter().copied(), now);
+                }
+            }
         }
         let at = self.navigator.position();
         self.steering.handle_view(at);
@@ -234,7 +253,7 @@ impl Vehicle {
     fn begin_epoch(&mut self, epoch: u8, now: Instant) {
         self.link.begin_epoch(now);
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
-        self.durable.epoch = epoch;
+        (self.durable.epoch, self.durable.labels) = (epoch, 0);
         self.utility = None;
         self.requests = Requests::default();
         self.forget_answers();

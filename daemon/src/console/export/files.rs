@@ -1,11 +1,11 @@
 //! The formats: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
-use super::Cells;
 use super::place::{lon_lat, well_known_text};
 use super::regions::regions;
+use super::{Cells, Explored};
 use crate::console::state::Origin;
 use crate::picture;
-use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -70,19 +70,27 @@ pub(in crate::console) fn ply(cells: &Cells) -> String {
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );
-    for (x, y, label, _) in cells.explored() {
+    let depth = cells.planes.iter().find(|p| p.name == PlaneKind::Depth.name());
+    for Explored { at, x, y, label, .. } in cells.explored() {
         let [red, green, blue] = picture::colour(label);
-        let _ = writeln!(out, "{x:.3} {y:.3} 0 {red} {green} {blue} {label}");
+        let up = depth.and_then(|plane| plane.value(at)).map_or(0.0, |depth| -depth);
+        let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
     }
     out
 }
 
-/// A line for each explored cell: the middle in metres, label, age in seconds.
+/// A line for each explored cell: the middle in metres, label, age in seconds, what is known of each plane.
 pub(in crate::console) fn csv(cells: &Cells) -> String {
-    let mut out = String::from("east_m,north_m,label,age_s\n");
-    for (x, y, label, age) in cells.explored() {
-        let age = if age == u16::MAX { String::new() } else { age.to_string() };
-        let _ = writeln!(out, "{x:.3},{y:.3},{label},{age}");
+    let mut out = String::from("east_m,north_m,label,age_s");
+    cells.planes.iter().for_each(|plane| out.extend([",", plane.name]));
+    for Explored { at, x, y, label, age_s } in cells.explored() {
+        let age = if age_s == u16::MAX { String::new() } else { age_s.to_string() };
+        let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");
+        for plane in &cells.planes {
+            let value = plane.value(at).map_or(String::new(), |value| format!("{value:.3}"));
+            let _ = write!(out, ",{value}");
+        }
     }
+    out.push('\n');
     out
 }

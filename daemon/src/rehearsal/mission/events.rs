@@ -7,6 +7,7 @@ use crate::problem::Problem;
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
 use scenecast_protocol::directive::Fix;
+use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use sim_channel::{Outcome, Position};
 use std::time::Duration;
@@ -145,7 +146,7 @@ impl Mission {
             self.times.frame = self.now + Duration::from_secs(3600);
             return Ok(());
         }
-        let image = match &self.recording {
+        let (image, scale) = match &self.recording {
             Some(recording) => {
                 let Some(frame) = recording.frames.get(self.next_recorded) else {
                     self.end_survey();
@@ -157,29 +158,30 @@ impl Mission {
                 }
                 self.next_recorded += 1;
                 self.vehicle.set_pose(frame.x_m, frame.y_m, frame.heading_rad, frame.depth_m, self.now);
-                frame.image()?
+                (frame.image()?, frame.scale)
             }
             None => {
                 self.times.frame = self.times.frame + Duration::from_secs_f64(1.0 / self.config.camera.rate_hz);
                 let Motion { x_m, y_m, heading_rad, .. } = self.motion;
                 let camera = &self.config.camera;
-                self.world.view(x_m, y_m, heading_rad, camera.width_px, camera.height_px)
+                (self.world.view(x_m, y_m, heading_rad, camera.width_px, camera.height_px), 1.0)
             }
         };
-        self.see(&image)
+        self.see(&image, scale)
     }
 
-    fn see(&mut self, image: &image::RgbImage) -> Result<(), Problem> {
+    fn see(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), Problem> {
         let t_s = self.now.as_secs_f64();
         let pose = pose_of(&self.vehicle);
         if let Some(recorder) = &mut self.recorder {
             let heading_rad = self.vehicle.navigator().heading_rad();
             let depth_m = self.vehicle.navigator().depth_m();
-            let frame = RecordedFrame { t_s, file: Default::default(), x_m: pose.x, y_m: pose.y, depth_m, heading_rad };
+            let (x_m, y_m, file) = (pose.x, pose.y, Default::default());
+            let frame = RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale };
             recorder.push(image, &frame)?;
         }
         self.track.push((pose.x, pose.y));
-        let update = self.mapper.handle_frame(image, &pose, t_s);
+        let update = self.mapper.handle_frame(image, &pose, scale, t_s);
         self.vehicle.handle_map(&update, self.now);
         self.vehicle.answer_requests(&|label| self.mapper.exemplar(label));
         if self.vehicle.map_version() != self.map_version {
@@ -207,5 +209,13 @@ impl Mission {
         let Some(operator) = self.surface.map(self.address) else { return };
         let versions = (self.vehicle.map_version(), self.picture_version);
         self.meter.look(self.vehicle.map(), operator, versions, self.now);
+        let (view, nothing) = (self.surface.view(self.address), LabelGrid::default());
+        for plane in self.vehicle.planes() {
+            let kind = plane.scale().kind();
+            let heard = view.and_then(|v| v.plane(kind));
+            let versions = (plane.version(), heard.map_or(0, PlaneReplica::version));
+            let meter = self.plane_meters.entry(kind).or_default();
+            meter.look(plane.target(), heard.map_or(&nothing, |h| h.levels().shown()), versions, self.now);
+        }
     }
 }

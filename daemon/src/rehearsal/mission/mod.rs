@@ -16,6 +16,7 @@ use crate::problem::Problem;
 use scene_model::project::Pose;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -59,6 +60,7 @@ pub struct Mission {
     pub(super) motion: Motion,
     pub(super) log: FramesLog,
     pub(super) meter: Meter,
+    pub(super) plane_meters: BTreeMap<PlaneKind, Meter>,
     pub(super) audits: [Audit; 2],
     pub(super) applied: Vec<AppliedSlot>,
     pub(super) issued: BTreeMap<(SlotId, u16), Instant>,
@@ -92,7 +94,7 @@ impl Mission {
         let now = Instant::ZERO;
         let recording = match config.camera.source.as_str() {
             "" => None,
-            source => Some(Recording::open(Recording::folder(source)?)?),
+            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref(), &world);
         if recording.is_none() && !overlap(&area, &world.area()) {
@@ -123,6 +125,7 @@ impl Mission {
             audits: [Audit::new(window), Audit::new(window)],
             log: FramesLog::default(),
             meter: Meter::default(),
+            plane_meters: BTreeMap::new(),
             applied: Vec::new(),
             issued: BTreeMap::new(),
             fixes_sent: 0,
@@ -244,6 +247,7 @@ impl Mission {
         if self.ended.is_none() {
             self.look();
             self.meter.end_survey();
+            self.plane_meters.values_mut().for_each(Meter::end_survey);
             self.ended = Some(self.now);
             self.vehicle.finish_survey();
             self.pump();

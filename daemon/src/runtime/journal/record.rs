@@ -3,7 +3,7 @@
 /// Kind of file, without its version.
 const KIND: &[u8; 6] = b"scVJRN";
 /// Magic bytes and version of a record.
-const MAGIC: &[u8; 8] = b"scVJRN01";
+const MAGIC: &[u8; 8] = b"scVJRN02";
 const HEAD: usize = 20;
 const TAIL: usize = 4;
 
@@ -48,7 +48,7 @@ pub(super) struct Scan<'a> {
 /// The bytes of a record, in whole blocks.
 ///
 /// ```text
-/// bytes 0-7     "scVJRN01"
+/// bytes 0-7     "scVJRN02"
 /// bytes 8-15    sequence number, one more than that of the record before, big-endian
 /// bytes 16-19   n, length of the body, big-endian
 /// then n        body
@@ -109,7 +109,7 @@ mod tests {
     fn the_layout_is_as_documented() {
         let bytes = encode(0x0102, b"abc");
         assert_eq!(bytes.len(), BLOCK);
-        assert_eq!(bytes[..23], *b"scVJRN01\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
+        assert_eq!(bytes[..23], *b"scVJRN02\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
         assert_eq!(bytes[23..27], CRC.checksum(&bytes[..23]).to_be_bytes());
         assert!(bytes[27..].iter().all(|&b| b == 0));
     }

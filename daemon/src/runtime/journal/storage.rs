@@ -51,6 +51,13 @@ impl Folder {
     }
 }
 
+impl Folder {
+    /// The same folder for another owner; it is held until both are gone.
+    pub(crate) fn share(&self) -> io::Result<Self> {
+        Ok(Self { path: self.path.clone(), handle: self.handle.try_clone()? })
+    }
+}
+
 const HELD: &str = "another process keeps its state there; stop it, or set another runtime.state_dir";
 
 /// Creates a folder and those above it; a new one is as safe as its name in the one above.

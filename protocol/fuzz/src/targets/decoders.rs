@@ -4,6 +4,7 @@ use super::raw::{self, Script};
 use scenecast_protocol::directive::VersionedSlot;
 use scenecast_protocol::link::{Flight, SlotInbox, Window};
 use scenecast_protocol::mac::ClockMap;
+use scenecast_protocol::map::{PlaneChunk, PlaneReplica};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
@@ -148,6 +149,18 @@ pub fn status(data: &[u8]) {
         assert_eq!(again, report);
     } else {
         assert_eq!(report, VehicleStatus::default());
+    }
+}
+
+/// A plane chunk that is read can be written and reads the same; what it says is taken or refused, levels in bounds.
+pub fn plane_chunk(data: &[u8]) {
+    let Some(chunk) = PlaneChunk::decode(data) else { return };
+    assert_eq!(chunk.encode(), data);
+    if let PlaneChunk::Patch(scale, patch) = chunk {
+        let mut replica = PlaneReplica::new(scale);
+        let taken = replica.apply(1, scale, patch, Instant::ZERO);
+        assert!(taken || replica.levels().shown().is_empty());
+        assert!(replica.levels().shown().iter().all(|(_, level)| scale.bounds(level).is_some()));
     }
 }
 

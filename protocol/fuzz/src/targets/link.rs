@@ -4,7 +4,8 @@ use super::peer::{MISSION, Peer, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, MapSource, Replica, StateReplica, StateSource};
+use scenecast_protocol::map::{Cell, MapSource, PlaneScale, PlaneSource, Replica, StateReplica, StateSource};
+use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -109,6 +110,12 @@ impl Grow for MapSource {
         let cell = |i: i32| Cell::new(i % 9, i / 9 + i32::from(amount % 4));
         self.set((0..i32::from(amount)).map(|i| (cell(i), label(i))), now);
     }
+}
+
+/// The planes of a vehicle that has any.
+pub fn planes() -> impl Iterator<Item = (PlaneSource, u8)> {
+    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
+    scales.into_iter().map(|scale| (PlaneSource::new(scale, Codec::Png, Duration::from_secs(2)), 20))
 }
 
 pub type Vehicle<S = Pile> = VehicleLink<S>;

@@ -1,9 +1,10 @@
 //! A script against the vehicle's end.
 
-use super::link::{End, Grow, Pile, Setup, Surface, Vehicle, run};
+use super::link::{End, Grow, Pile, Setup, Surface, Vehicle, planes, run};
 use super::peer::vehicle;
 use scenecast_protocol::directive::{RefusalReason, SlotId};
 use scenecast_protocol::link::{Transmit, VehicleEvent};
+use scenecast_protocol::map::{Cell, PlaneKind};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, SlotState, VehicleStatus};
@@ -19,6 +20,7 @@ pub fn vehicle_events(data: &[u8]) -> usize {
     let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
     let peer = setup.peer(Address::SURFACE, vehicle());
     let mut vehicle = setup.vehicle(Pile::default(), begin);
+    vehicle.set_planes(planes());
     (0..3).for_each(|what| vehicle.act(what, 30, begin));
     let surface: Surface<Pile> = setup.surface(begin);
     run(setup, vehicle, surface, peer, script)
@@ -59,12 +61,17 @@ impl<S: Grow> End for Vehicle<S> {
     }
 
     fn act(&mut self, what: u8, with: u8, now: Instant) {
-        match what % 6 {
+        match what % 7 {
             0 => self.source_mut().grow(with, now),
             1 => drop(self.push_object(vec![with; 40 + usize::from(with) * 20])),
             2 => self.set_status(VehicleStatus { labels: with, ..VehicleStatus::default() }),
             3 => self.decide(SlotId::ALL[usize::from(with % 6)], SlotState::Refused(RefusalReason::TooOld), now),
             4 => self.renew(now),
+            6 => {
+                let cells = (0..i32::from(with)).map(|i| (Cell::new(i % 9, i / 9), f64::from(i * 7 % 100) / 100.0));
+                self.set_plane(PlaneKind::Confidence, cells.clone(), now);
+                self.set_plane(PlaneKind::Depth, cells.map(|(cell, x)| (cell, 20.0 + 5.0 * x)), now);
+            }
             _ => self.set_shares(Shares([with % 20; 5])),
         }
     }

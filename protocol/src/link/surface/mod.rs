@@ -3,6 +3,7 @@
 mod discovery;
 mod grant;
 mod peer;
+mod planes;
 mod polled;
 mod pool;
 mod turn;

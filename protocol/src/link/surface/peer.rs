@@ -1,13 +1,14 @@
 //! What the surface keeps for one vehicle.
 
+use super::planes::{Heard, Planes};
 use crate::directive::{Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
 use crate::mac::{Access, ClockMap, Master, MasterConfig, ModemProfile};
-use crate::map::StateReplica;
+use crate::map::{PlaneChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, Envelope, Header, MissionId, Stamp, VehicleStatus};
+use crate::wire::{Address, Chunk, ChunkKind, Envelope, Header, MissionId, Stamp, VehicleStatus};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -31,6 +32,7 @@ pub(super) struct Peer<R> {
     pub(super) master: Master,
     pub(super) outbox: SlotOutbox,
     pub(super) replica: R,
+    pub(super) planes: Planes,
     objects: ObjectReceiver,
     pub(super) status: StatusParts,
     /// When a frame was last taken.
@@ -68,6 +70,7 @@ impl<R: StateReplica> Peer<R> {
             master: Master::new(config, now),
             outbox: SlotOutbox::new(series),
             replica: R::default(),
+            planes: Planes::default(),
             objects: ObjectReceiver::default(),
             status: StatusParts::default(),
             heard: None,
@@ -128,11 +131,12 @@ impl<R: StateReplica> Peer<R> {
             self.handle_turn(&header, bytes, modem, now);
         }
         self.replica.advance_base(inbound.base);
-        let version = self.replica.version();
+        self.planes.advance_base(inbound.base);
+        let version = self.map_version();
         let mut overhead = bytes;
         for chunk in inbound.chunks() {
             overhead = overhead.saturating_sub(chunk.payload.len());
-            self.pair.stats.hear(class_of(chunk.kind), chunk.payload.len(), now);
+            self.pair.stats.hear(class_of(&chunk), chunk.payload.len(), now);
             let sound = match chunk.kind {
                 ChunkKind::Map => self.replica.apply(number, chunk.payload, now),
                 ChunkKind::Pose | ChunkKind::Report => {
@@ -140,6 +144,11 @@ impl<R: StateReplica> Peer<R> {
                         && Self::settle(&mut self.status, &mut self.outbox, vehicle, chunk.kind, now, events)
                 }
                 ChunkKind::Object => handle_object(&mut self.objects, vehicle, chunk.payload, events),
+                ChunkKind::Plane => {
+                    let heard = self.planes.handle_chunk(number, chunk.payload, now);
+                    self.out_of_step |= heard == Heard::OutOfStep;
+                    heard == Heard::Taken
+                }
                 ChunkKind::Slot => false,
             };
             if !sound {
@@ -152,9 +161,14 @@ impl<R: StateReplica> Peer<R> {
             }
         }
         self.pair.stats.hear(Class::Overhead, overhead, now);
-        if self.replica.version() != version {
+        if self.map_version() != version {
             events.push_back(SurfaceEvent::MapChanged(vehicle));
         }
+    }
+
+    /// Counts changes of the map and its planes.
+    pub(super) fn map_version(&self) -> u64 {
+        self.replica.version() + self.planes.version()
     }
 
     fn handle_turn(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
@@ -219,6 +233,7 @@ impl<R: StateReplica> Peer<R> {
     /// Nothing is known of what the vehicle has or had.
     fn forget_peer(&mut self, now: Instant) {
         self.replica.clear();
+        self.planes.clear();
         self.objects.clear();
         self.status = StatusParts::default();
         self.sent.clear();
@@ -268,11 +283,12 @@ fn handle_object(
     true
 }
 
-fn class_of(kind: ChunkKind) -> Class {
-    match kind {
+fn class_of(chunk: &Chunk<'_>) -> Class {
+    match chunk.kind {
         ChunkKind::Map => Class::Map,
         ChunkKind::Pose | ChunkKind::Report => Class::Status,
         ChunkKind::Slot => Class::Directive,
         ChunkKind::Object => Class::Exemplar,
+        ChunkKind::Plane => PlaneChunk::decode(chunk.payload).map_or(Class::Overhead, |c| c.kind().into()),
     }
 }

@@ -4,7 +4,7 @@ use super::peer::Peer;
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
-use crate::map::{Replica, StateReplica};
+use crate::map::{PlaneKind, PlaneReplica, Replica, StateReplica};
 use crate::time::Instant;
 use crate::wire::VehicleStatus;
 use std::time::Duration;
@@ -25,6 +25,16 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The operator's copy of what the vehicle replicates.
     pub fn replica(&self) -> &'a R {
         &self.0.replica
+    }
+
+    /// The operator's copy of a plane of the map; `None` while nothing of it was heard.
+    pub fn plane(&self, kind: PlaneKind) -> Option<&'a PlaneReplica> {
+        self.0.planes.get(kind)
+    }
+
+    /// Counts changes of what the vehicle replicates, planes included.
+    pub fn map_version(&self) -> u64 {
+        self.0.map_version()
     }
 
     /// The last status and when its position came in.

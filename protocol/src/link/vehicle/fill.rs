@@ -14,11 +14,12 @@ impl<S: StateSource> VehicleLink<S> {
         loop {
             let waiting = self.waiting(now);
             let candidates: Vec<Class> = waiting.iter().copied().filter(|c| !unfit.contains(c)).collect();
-            let Some(class) = self.shares.next(&candidates) else { return };
+            let Some(class) = self.shares.next(&candidates) else { break };
             let before = carried.len();
             match class {
                 Class::Status => self.fill_status(builder, carried, now),
                 Class::Exemplar => self.fill_object(builder, carried),
+                Class::Confidence | Class::Depth => self.fill_plane(class, builder, carried, now),
                 _ => self.fill_map(builder, carried, now),
             }
             let bytes: usize = carried.iter().skip(before).map(|(_, n)| n).sum();
@@ -27,6 +28,7 @@ impl<S: StateSource> VehicleLink<S> {
             }
             self.shares.spend(class, bytes, &waiting);
         }
+        self.fill_digests(builder, carried);
     }
 
     fn waiting(&self, now: Instant) -> Vec<Class> {
@@ -38,6 +40,7 @@ impl<S: StateSource> VehicleLink<S> {
         ]
         .into_iter()
         .filter_map(|(waits, class)| waits.then_some(class))
+        .chain(self.waiting_planes(now))
         .collect()
     }
 
@@ -53,6 +56,7 @@ impl<S: StateSource> VehicleLink<S> {
             if builder.push(ChunkKind::Report, &bytes) {
                 self.report_due = now + self.config.status_period.max(share(bytes.len()));
                 carried.push((Part::Report, bytes.len()));
+                self.planes.iter_mut().for_each(|p| p.owes_digest = p.source.is_begun());
             }
         }
         if now >= self.pose_due {

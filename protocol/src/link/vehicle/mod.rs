@@ -2,6 +2,7 @@
 
 mod call;
 mod fill;
+mod planes;
 mod receive;
 mod repeat;
 mod turn;
@@ -9,11 +10,12 @@ mod turn;
 use super::{Authenticity, LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{Slot, SlotId};
 use crate::mac::{Access, ClockMap, Floor, ModemProfile};
-use crate::map::{Cell, LabelGrid, MapSource, StateSource};
+use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
 use crate::wire::{Address, MissionId, SessionId, SlotState, VehicleStatus};
+use planes::PlaneOut;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -60,6 +62,8 @@ pub enum VehicleEvent {
 #[derive(Debug)]
 enum Part<C> {
     Map(C),
+    Plane(PlaneKind, Vec<(Cell, u8)>),
+    PlaneDigest(PlaneKind),
     Object(ObjectId, SymbolRun),
     Pose,
     Report,
@@ -69,6 +73,7 @@ impl<C> Part<C> {
     fn class(&self) -> Class {
         match self {
             Self::Map(_) => Class::Map,
+            Self::Plane(kind, _) | Self::PlaneDigest(kind) => (*kind).into(),
             Self::Object(..) => Class::Exemplar,
             Self::Pose | Self::Report => Class::Status,
         }
@@ -99,6 +104,7 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     pair: Pair<Carried<S::Carried>>,
     budget: BitBudget,
     source: S,
+    planes: Vec<PlaneOut>,
     objects: ObjectSender,
     shares: ClassShares,
     inbox: SlotInbox,
@@ -135,6 +141,7 @@ impl<S: StateSource> VehicleLink<S> {
             shares: ClassShares::new(config.shares),
             config,
             source,
+            planes: Vec::new(),
             objects: ObjectSender::default(),
             inbox: SlotInbox::restore(restored),
             status: None,
@@ -166,9 +173,9 @@ impl<S: StateSource> VehicleLink<S> {
         &mut self.source
     }
 
-    /// Whether the surface is known to hold the replicated state, and every object.
+    /// Whether the surface is known to hold the replicated state, its planes, and every object.
     pub fn is_settled(&self) -> bool {
-        self.source.is_settled() && self.objects.is_empty()
+        self.source.is_settled() && self.planes().all(StateSource::is_settled) && self.objects.is_empty()
     }
 
     /// The status to tell next; position and time are the host's at the moment of the call.
@@ -283,6 +290,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// The surface holds nothing of ours any more.
     fn forget_peer(&mut self, now: Instant) {
         self.source.handle_peer_restart(now);
+        self.planes.iter_mut().for_each(|p| p.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
         (self.pose_due, self.report_due, self.heard) = (now, now, None);
         self.forget_said();
@@ -319,6 +327,7 @@ impl VehicleLink {
     /// Label ids start afresh: begins a new run toward the surface, which then forgets the map it has.
     pub fn begin_epoch(&mut self, now: Instant) {
         self.source.clear(now);
+        self.planes.iter_mut().for_each(|p| p.source.clear(now));
         self.renew(now);
         self.cancel_objects();
     }

@@ -92,6 +92,11 @@ impl<S: StateSource> VehicleLink<S> {
             }
             match part {
                 Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
+                Part::Plane(kind, carried) => {
+                    if let Some(plane) = self.plane_mut(kind) {
+                        plane.source.handle_fate(carried, delivered, now);
+                    }
+                }
                 Part::Object(id, run) => {
                     if self.objects.handle_fate(id, &run, delivered) {
                         self.events.push_back(VehicleEvent::ObjectDelivered(id));
@@ -99,7 +104,7 @@ impl<S: StateSource> VehicleLink<S> {
                 }
                 Part::Pose if !delivered => self.pose_due = now,
                 Part::Report if !delivered => self.report_due = now,
-                Part::Pose | Part::Report => {}
+                Part::Pose | Part::Report | Part::PlaneDigest(_) => {}
             }
         }
     }

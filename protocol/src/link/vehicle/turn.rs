@@ -24,7 +24,9 @@ impl<S: StateSource> VehicleLink<S> {
     /// The next frame, if it is our turn, there is a reason to speak and the budget allows it.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let modem = self.config.modem;
-        if self.source.handle_timeout(now) {
+        let mut released = self.source.handle_timeout(now);
+        self.planes.iter_mut().for_each(|p| released |= p.source.handle_timeout(now));
+        if released {
             self.forget_said();
         }
         if self.floor.is_over(&modem, now) {
@@ -73,12 +75,19 @@ impl<S: StateSource> VehicleLink<S> {
             return true;
         }
         let answer = self.answer_due.is_some_and(|at| now >= at) || self.called.is_some();
-        let news = self.has_news();
+        let news = self.backlog_bytes(now) > 0;
         answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
     }
 
-    fn has_news(&self) -> bool {
-        self.source.backlog_bytes() > 0 || self.objects.backlog_bytes() > 0
+    /// About how many bytes wait and may be sent.
+    fn backlog_bytes(&self, now: Instant) -> usize {
+        self.source.backlog_bytes() + self.plane_backlog(now) + self.objects.backlog_bytes()
+    }
+
+    /// When something that is held back becomes due.
+    fn next_due(&self) -> Option<Instant> {
+        let planes = self.planes().filter_map(StateSource::next_due);
+        self.source.next_due().into_iter().chain(planes).min()
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
@@ -86,7 +95,7 @@ impl<S: StateSource> VehicleLink<S> {
             return self.floor.next_wakeup();
         }
         let status = self.status.as_ref().filter(|_| self.pair.is_met()).map(|_| self.pose_due.min(self.report_due));
-        let held = self.source.next_due().filter(|_| self.pair.is_met());
+        let held = self.next_due().filter(|_| self.pair.is_met());
         let due = [status, held, self.answer_due].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
@@ -94,9 +103,9 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    fn frames_wanted(&self) -> u32 {
+    fn frames_wanted(&self, now: Instant) -> u32 {
         let room = self.config.modem.frame_bytes.saturating_sub(14).max(1);
-        let bytes = self.source.backlog_bytes() + self.objects.backlog_bytes();
+        let bytes = self.backlog_bytes(now);
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
@@ -122,7 +131,7 @@ impl<S: StateSource> VehicleLink<S> {
         if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return Plan { remaining: 0, is_last_new: false };
         }
-        let wanted = self.frames_wanted();
+        let wanted = self.frames_wanted(now);
         let said = self.said.len() as u32 + wanted;
         let copies = self.copies(said, self.config.modem.frame_bytes * said as usize, now);
         let repeats = said * (copies - 1);
@@ -143,7 +152,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.fill(&mut builder, &mut carried, now);
         }
         let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
-        let said_all = takes_turns && !greets && self.source.backlog_bytes() + self.objects.backlog_bytes() == 0;
+        let said_all = takes_turns && !greets && self.backlog_bytes(now) == 0;
         let remaining = match said_all {
             // What was said is said again as far as that is of use.
             true if !carried.is_empty() => {
@@ -186,8 +195,8 @@ impl<S: StateSource> VehicleLink<S> {
     fn wish(&self, now: Instant) -> u8 {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
-        let idle = self.source.is_quiet() && self.objects.is_empty();
-        let pause = self.source.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
+        let idle = self.source.is_quiet() && self.planes_are_quiet(now) && self.objects.is_empty();
+        let pause = self.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
         let wait = if idle { affordable.max(pause).min(self.config.status_period) } else { affordable };
         quarter_seconds(wait, 254)
     }

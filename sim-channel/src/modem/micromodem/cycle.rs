@@ -73,7 +73,7 @@ impl Micromodem {
             format!("CADRQ,{time},{src},{dst},{ack},{},{}", cycle.rate.frame_bytes, cycle.packet.frames.len() + 1);
         self.tell(&request, now);
         let patience = Duration::from_secs(u64::from(self.nvram.number("DTO").max(1)));
-        self.agenda.add(now + patience, Event::DataTimeout { request: self.requests });
+        self.board.plan(now + patience, Event::DataTimeout { request: self.requests });
     }
 
     /// `$CCTXD,<src>,<dst>,<ack>,<hex>`, or `$CCTXA` with text.

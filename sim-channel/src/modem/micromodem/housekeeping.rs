@@ -16,7 +16,7 @@ impl Micromodem {
             "CCTMQ" => {
                 // It takes half a second to answer, with the time of the question.
                 let reply = format!("CATMQ,{},USER_CMD,RTC", self.clock.iso(now));
-                self.agenda.add(now + Duration::from_millis(500), Event::Tell(reply));
+                self.board.plan(now + Duration::from_millis(500), Event::Tell(reply));
             }
             "CCALQ" => self.tell("CAALQ,MICROMODEM2,16", now),
             "CCMEC" | "CCRSP" | "CCPDT" | "CCPNT" | "CCPGT" | "CCSWP" | "CCMSQ" | "CCCFR" => {
@@ -66,11 +66,11 @@ impl Micromodem {
             return;
         }
         if minutes == 0 {
-            return self.agenda.add(now, Event::Reboot);
+            return self.board.plan(now, Event::Reboot);
         }
         self.fall_silent(now);
         match u64::try_from(minutes) {
-            Ok(minutes) => self.agenda.add(now + Duration::from_secs(60 * minutes), Event::Reboot),
+            Ok(minutes) => self.board.plan(now + Duration::from_secs(60 * minutes), Event::Reboot),
             Err(_) => self.wakes_on_host = true,
         }
     }

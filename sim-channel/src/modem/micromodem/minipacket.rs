@@ -48,7 +48,7 @@ impl Micromodem {
         self.tell(&format!("CAMPA,{},{}", packet.src, packet.dst), now);
         self.tell_statistics(packet, signal, 2, now);
         let reply = Packet::new(Kind::PingReply, packet.dst, packet.src);
-        self.agenda.add(now + TURN_ROUND, Event::Reply(Box::new(reply)));
+        self.board.plan(now + TURN_ROUND, Event::Reply(Box::new(reply)));
     }
 
     /// `$CAMPR,<src>,<dst>,<one-way travel time, s>`

@@ -15,9 +15,8 @@ mod receive;
 mod sentence;
 mod transmit;
 
-use super::agenda::Agenda;
-use super::port::Port;
-use super::{Emulator, Fault, ModemEvent, Transmission};
+use super::board::{Board, Machine};
+use super::{Fault, Host, Transmission};
 use crate::{Arrival, Duration, Onset, Stream};
 use clock::Clock;
 use cycle::Cycle;
@@ -26,7 +25,7 @@ use packet::Packet;
 use rates::Rate;
 use receive::Signal;
 use sentence::{Collector, Line, Sentence, line};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use transmit::{Air, Sent};
 
 /// Which of the two Micromodems.
@@ -86,11 +85,10 @@ pub fn packet_airtime(rate: u8, frames: u8) -> Option<Duration> {
 #[derive(Debug)]
 pub struct Micromodem {
     config: MicromodemConfig,
-    port: Port,
-    collector: Collector,
+    board: Board<Plan>,
+    collectors: BTreeMap<Host, Collector>,
     nvram: Nvram,
     clock: Clock,
-    agenda: Agenda<Event>,
     air: Air,
     cycle: Option<Cycle>,
     requests: u32,
@@ -100,8 +98,16 @@ pub struct Micromodem {
     busy_until: Duration,
     /// Transmissions whose detection was told.
     detected: BTreeSet<u64>,
-    chance: Stream,
-    events: VecDeque<ModemEvent>,
+}
+
+/// Something to do later.
+#[derive(Debug)]
+pub(super) struct Plan(Event);
+
+impl From<Event> for Plan {
+    fn from(event: Event) -> Self {
+        Self(event)
+    }
 }
 
 #[derive(Debug)]
@@ -128,14 +134,13 @@ impl Micromodem {
     /// A modem that has just been switched on and is ready.
     pub fn new(config: MicromodemConfig) -> Self {
         const PURPOSE: u64 = 0x3d3;
-        let mut agenda = Agenda::new();
-        agenda.add(REVISION_EVERY, Event::Revision);
+        let mut board = Board::new(config.baud, Stream::new(config.seed, &[PURPOSE]));
+        board.plan(REVISION_EVERY, Event::Revision);
         Self {
-            port: Port::new(config.baud),
-            collector: Collector::default(),
+            board,
+            collectors: BTreeMap::new(),
             nvram: Nvram::factory(config.address),
             clock: Clock::new(config.unix_s),
-            agenda,
             air: Air::default(),
             cycle: None,
             requests: 0,
@@ -144,8 +149,6 @@ impl Micromodem {
             wakes_on_host: false,
             busy_until: Duration::ZERO,
             detected: BTreeSet::new(),
-            chance: Stream::new(config.seed, &[PURPOSE]),
-            events: VecDeque::new(),
             config,
         }
     }
@@ -157,7 +160,7 @@ impl Micromodem {
 
     /// Tells the host a sentence, given without `$` and checksum.
     fn tell(&mut self, body: &str, now: Duration) {
-        self.port.write(line(body).as_bytes(), now);
+        self.board.tell_all(line(body).as_bytes(), now);
     }
 
     /// `CAERR`: a sentence was not understood, or cannot be done.
@@ -172,15 +175,15 @@ impl Micromodem {
         self.tell(&format!("CAREV,{time},{ident},{version}"), now);
     }
 
-    fn read_host(&mut self, bytes: &[u8], at: Duration) {
+    fn read_bytes(&mut self, host: Host, bytes: &[u8], at: Duration) {
         if std::mem::take(&mut self.wakes_on_host) && !self.awake {
             self.reboot(at);
         }
         if !self.awake {
             return;
         }
-        self.collector.push(bytes);
-        while let Some(line) = self.collector.next() {
+        self.collectors.entry(host).or_default().push(bytes);
+        while let Some(line) = self.collectors.get_mut(&host).and_then(Collector::next) {
             match line {
                 Line::Sentence(sentence) => self.on_sentence(&sentence, at),
                 Line::BadChecksum => self.complain("NMEA", 2, "Bad checksum", at),
@@ -207,7 +210,7 @@ impl Micromodem {
         }
     }
 
-    fn on_event(&mut self, event: Event, at: Duration) {
+    fn carry_out(&mut self, event: Event, at: Duration) {
         match event {
             Event::Sent(sent) => self.on_sent(&sent, at),
             Event::Received(received) => self.on_received(&received.0, &received.1, at),
@@ -218,7 +221,7 @@ impl Micromodem {
                 if self.awake && self.nvram.is_on("REV") {
                     self.tell_revision("AUV", at);
                 }
-                self.agenda.add(at + REVISION_EVERY, Event::Revision);
+                self.board.plan(at + REVISION_EVERY, Event::Revision);
             }
             Event::Reboot => self.reboot(at),
             Event::Init => self.tell_revision("INIT", at),
@@ -232,69 +235,60 @@ impl Micromodem {
     /// Restarts; the configuration and the clock stay, everything under way is gone.
     fn reboot(&mut self, now: Duration) {
         self.fall_silent(now);
-        self.agenda.add(now + BOOT_STEP, Event::Init);
-        self.agenda.add(now + 2 * BOOT_STEP, Event::Awake);
+        self.board.plan(now + BOOT_STEP, Event::Init);
+        self.board.plan(now + 2 * BOOT_STEP, Event::Awake);
     }
 
     fn fall_silent(&mut self, now: Duration) {
         if now < self.air.busy_until {
-            self.events.push_back(ModemEvent::CutShort);
+            self.board.cut_short();
         }
         self.awake = false;
         self.cycle = None;
         self.detected.clear();
         self.air = Air::default();
-        self.collector = Collector::default();
-        self.agenda = Agenda::new();
-        self.agenda.add(now + REVISION_EVERY, Event::Revision);
+        self.collectors.clear();
+        self.board.restart();
+        self.board.plan(now + REVISION_EVERY, Event::Revision);
     }
 }
 
-impl Emulator for Micromodem {
-    fn port(&self) -> &Port {
-        &self.port
+impl Machine for Micromodem {
+    type Event = Plan;
+
+    fn board(&self) -> &Board<Plan> {
+        &self.board
     }
 
-    fn port_mut(&mut self) -> &mut Port {
-        &mut self.port
+    fn board_mut(&mut self) -> &mut Board<Plan> {
+        &mut self.board
     }
 
-    fn handle_onset(&mut self, onset: &Onset, now: Duration) {
-        self.handle_timeout(now);
-        self.on_onset(onset, now);
+    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration) {
+        self.read_bytes(host, bytes, at);
     }
 
-    fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {
-        self.handle_timeout(now);
-        self.on_arrival(arrival, now);
+    fn forget_host(&mut self, host: Host) {
+        self.collectors.remove(&host);
     }
 
-    fn poll_transmit(&mut self, now: Duration) -> Option<Transmission> {
-        self.next_transmission(now)
+    fn on_event(&mut self, Plan(event): Plan, at: Duration) {
+        self.carry_out(event, at);
     }
 
-    fn poll_event(&mut self) -> Option<ModemEvent> {
-        self.events.pop_front()
+    fn on_onset(&mut self, onset: &Onset, now: Duration) {
+        self.hear_beginning(onset, now);
     }
 
-    fn poll_timeout(&self) -> Option<Duration> {
-        [self.agenda.next(), self.port.next_input()].into_iter().flatten().min()
+    fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
+        self.hear(arrival, now);
     }
 
-    fn handle_timeout(&mut self, now: Duration) {
-        while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
-            if let Some((at, event)) = self.agenda.pop(due) {
-                self.on_event(event, at);
-            } else if let Some((at, bytes)) = self.port.take_input(due) {
-                self.read_host(&bytes, at);
-            }
-        }
+    fn next_transmission(&mut self, now: Duration) -> Option<Transmission> {
+        self.begin_transmission(now)
     }
 
-    fn inject(&mut self, fault: Fault, now: Duration) {
-        if self.port.inject(fault, &mut self.chance, now) {
-            return;
-        }
+    fn break_down(&mut self, fault: Fault, now: Duration) {
         match fault {
             Fault::Busy(length) => self.busy_until = now + length,
             Fault::Reboot => {
@@ -303,7 +297,7 @@ impl Emulator for Micromodem {
             }
             Fault::BrownOut => self.reboot(now),
             Fault::WrongAddress(address) => self.nvram.set("SRC", &address.to_string()),
-            // Done by the port.
+            // Done by the line.
             Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             // It asks for each frame and has no buffer that could be too big.
             Fault::BigBuffer => {}

@@ -32,7 +32,7 @@ impl Signal {
 
 impl Micromodem {
     /// The beginning of a packet.
-    pub(super) fn on_onset(&mut self, onset: &Onset, now: Duration) {
+    pub(super) fn hear_beginning(&mut self, onset: &Onset, now: Duration) {
         let packet = Packet::decode(&onset.bytes);
         if self.awake && packet.as_ref().is_none_or(|packet| self.notices(packet)) {
             self.tell_detection(onset.transmission, packet.is_none_or(|packet| packet.is_psk()), now);
@@ -47,7 +47,7 @@ impl Micromodem {
         !foreign && !private
     }
 
-    pub(super) fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
+    pub(super) fn hear(&mut self, arrival: &Arrival, now: Duration) {
         if self.awake {
             self.hear_end(arrival, now);
             self.detected.remove(&arrival.transmission);
@@ -65,7 +65,7 @@ impl Micromodem {
             None => self.tell_timeout(arrival.transmission, &signal, now),
             Some(packet) if self.notices(&packet) => {
                 self.tell_detection(arrival.transmission, packet.is_psk(), now);
-                self.agenda.add(now + DECODING, Event::Received(Box::new((packet, signal))));
+                self.board.plan(now + DECODING, Event::Received(Box::new((packet, signal))));
             }
             Some(_) => {}
         }
@@ -137,7 +137,7 @@ impl Micromodem {
             let mut ack = Packet::new(Kind::Ack, own, packet.src);
             ack.rate = packet.rate;
             ack.frames.push(Some(good));
-            self.agenda.add(now + TURN_ROUND, Event::Reply(Box::new(ack)));
+            self.board.plan(now + TURN_ROUND, Event::Reply(Box::new(ack)));
         }
     }
 

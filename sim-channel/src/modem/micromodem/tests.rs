@@ -2,6 +2,7 @@
 
 use super::super::bench::{Bench, SECOND, keywords};
 use super::*;
+use crate::modem::Emulator;
 use crate::{ChannelConfig, LossModel, NodeId, Outage};
 use proptest::prelude::*;
 

@@ -38,7 +38,7 @@ pub(super) struct Air {
 }
 
 impl Micromodem {
-    pub(super) fn next_transmission(&mut self, now: Duration) -> Option<Transmission> {
+    pub(super) fn begin_transmission(&mut self, now: Duration) -> Option<Transmission> {
         if now < self.air.busy_until || !self.awake {
             return None;
         }
@@ -51,7 +51,7 @@ impl Micromodem {
             self.tell(&format!("CATXP,{}", out.bytes), now);
         }
         let transmission = Transmission { bytes: out.packet.encode(), airtime: out.airtime };
-        self.agenda.add(self.air.busy_until, Event::Sent(Box::new(Sent { out, began: now })));
+        self.board.plan(self.air.busy_until, Event::Sent(Box::new(Sent { out, began: now })));
         Some(transmission)
     }
 

@@ -79,7 +79,7 @@ impl S2c {
     }
 
     /// The next frame, if the transducer is free and the modem awake.
-    pub(super) fn next_transmission(&mut self, now: Duration) -> Option<Transmission> {
+    pub(super) fn begin_transmission(&mut self, now: Duration) -> Option<Transmission> {
         if now < self.air.busy_until || self.booting {
             return None;
         }
@@ -89,8 +89,8 @@ impl S2c {
         self.notify_extended(format!("SENDSTART,{},{},{us},0", out.frame.dst, out.label), now);
         let bytes = out.frame.encode();
         let airtime = out.airtime;
-        self.agenda
-            .add(self.air.busy_until, Event::Sent { dst: out.frame.dst, label: out.label, airtime, then: out.then });
+        self.board
+            .plan(self.air.busy_until, Event::Sent { dst: out.frame.dst, label: out.label, airtime, then: out.then });
         Some(Transmission { bytes, airtime })
     }
 

@@ -194,16 +194,16 @@ impl S2c {
             ("I1", "") => "phy:S2C PHY 0.9, mac:D-MAC v1.8".into(),
             ("I7", "") => "EvoLogics GmbH (emulated)".into(),
             ("Z0", "") => {
-                self.agenda.add(now, Event::Reboot);
+                self.board.plan(now, Event::Reboot);
                 Answer::Silence
             }
             ("Z1", "") => self.drop_and_tell(now),
             ("Z3", "") => {
-                self.agenda.add(now, Event::CancelMessages);
+                self.board.plan(now, Event::CancelMessages);
                 "OK".into()
             }
             ("Z4", "") => {
-                self.agenda.add(now, Event::CancelMessages);
+                self.board.plan(now, Event::CancelMessages);
                 self.drop_and_tell(now)
             }
             ("H", "0" | "1" | "") => {
@@ -227,7 +227,7 @@ impl S2c {
     fn drop_and_tell(&mut self, now: Duration) -> Answer {
         let bytes = self.drop_bursts(now);
         if bytes > 0 {
-            self.agenda.add(now, Event::Notify(format!("DROPCNT,{bytes}")));
+            self.board.plan(now, Event::Notify(format!("DROPCNT,{bytes}")));
         }
         "OK".into()
     }

@@ -132,13 +132,8 @@ impl InputParser {
     }
 
     fn take_plain(&mut self, prefix: usize) -> Option<Option<Input>> {
-        let Some(line) = self.take_line() else {
-            if self.buffer.len() <= LINE_LIMIT {
-                return None;
-            }
-            self.skip_line = true;
-            return Some(Some(Input::WrongFormat));
-        };
+        let too_long = self.buffer.len() > LINE_LIMIT;
+        let Some(line) = self.take_line() else { return too_long.then_some(Some(Input::WrongFormat)) };
         let text = line.get(prefix..).unwrap_or_default();
         if line.is_empty() {
             return Some(None);

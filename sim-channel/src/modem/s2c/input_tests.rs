@@ -121,6 +121,17 @@ fn plus_signs_without_silence_before_are_data() {
 }
 
 #[test]
+fn a_line_too_long_is_refused_once_in_whatever_pieces_it_comes() {
+    for piece in [7, 600, 2000] {
+        let mut parser = InputParser::default();
+        let inputs: Vec<_> =
+            [b'X'; 2000].chunks(piece).flat_map(|bytes| read_all(&mut parser, bytes, Reading::Commands)).collect();
+        assert_eq!(inputs, [Input::WrongFormat], "{piece}");
+        assert_eq!(read_all(&mut parser, b"\rAT?T\r", Reading::Commands), [command("?T")]);
+    }
+}
+
+#[test]
 fn a_flood_without_terminator_is_not_kept() {
     let mut parser = InputParser::default();
     for reading in [Reading::Commands, Reading::Data] {

@@ -68,7 +68,7 @@ impl S2c {
             data: command.data,
             retries_left: self.settings.get("RI"),
         });
-        self.agenda.add(now, Event::Instant);
+        self.board.plan(now, Event::Instant);
         "OK"
     }
 
@@ -109,7 +109,7 @@ impl S2c {
         self.instant.attempt += 1;
         let travel = Duration::from_micros(u64::from(self.config.max_propagation_us)) * 2;
         let deadline = now + travel + timing::ACK + Duration::from_millis(200) + self.turn_allowance();
-        self.agenda.add(deadline, Event::InstantTimeout { attempt: self.instant.attempt });
+        self.board.plan(deadline, Event::InstantTimeout { attempt: self.instant.attempt });
     }
 
     pub(super) fn on_instant_timeout(&mut self, attempt: u32, now: Duration) {
@@ -172,7 +172,7 @@ impl S2c {
         let pid = command.pid.unwrap_or_else(|| self.settings.byte("ZS"));
         let new = Piggyback { dst: command.dst, pid, data: command.data };
         if let Some(old) = self.piggyback.replace(new) {
-            self.agenda.add(now, Event::Notify(format!("CANCELEDPBM,{}", old.dst)));
+            self.board.plan(now, Event::Notify(format!("CANCELEDPBM,{}", old.dst)));
         }
         "OK"
     }
@@ -187,7 +187,7 @@ impl S2c {
         let pid = command.pid.unwrap_or_else(|| self.settings.byte("ZS"));
         let new = Synchronous { dst: command.dst, pid, data: command.data };
         if let Some(old) = self.synchronous.replace(new) {
-            self.agenda.add(now, Event::Notify(format!("CANCELEDIMS,{}", old.dst)));
+            self.board.plan(now, Event::Notify(format!("CANCELEDIMS,{}", old.dst)));
         }
         self.synchronous_number += 1;
         // Half of the clock's range ahead is the future, the other half the past.
@@ -195,7 +195,7 @@ impl S2c {
         let number = self.synchronous_number;
         let late = wait > u32::MAX / 2;
         let at = if late { now } else { now + Duration::from_micros(u64::from(wait)) };
-        self.agenda.add(at, Event::Synchronous { number, late });
+        self.board.plan(at, Event::Synchronous { number, late });
         "OK"
     }
 

@@ -20,9 +20,8 @@ mod usbl_lines;
 
 pub use config::{Interpreter, S2cConfig};
 
-use super::agenda::Agenda;
-use super::port::Port;
-use super::{Emulator, Fault, ModemEvent, Transmission};
+use super::board::{Board, Machine};
+use super::{Fault, Host, ModemEvent, Transmission};
 use crate::usbl::UsblHead;
 use crate::{Arrival, Duration, Onset, Stream};
 use air::{After, Air};
@@ -33,7 +32,7 @@ use instant::{InstantSlot, Piggyback, Synchronous};
 use reception::{LastHeard, Signal};
 use reply::Mode;
 use settings::Settings;
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use usbl_lines::Measured;
 
 /// Air time of an instant message of `bytes` (1..=64), for schedules and budgets.
@@ -43,12 +42,14 @@ pub fn instant_airtime(bytes: usize) -> Duration {
     timing::instant(bytes)
 }
 
-/// An emulated S2C modem with one port.
+/// An emulated S2C modem with one port, at which there may be several hosts.
 #[derive(Debug)]
 pub struct S2c {
     config: S2cConfig,
-    port: Port,
-    parser: InputParser,
+    board: Board<Plan>,
+    parsers: BTreeMap<Host, InputParser>,
+    /// Whose command is being answered.
+    asking: Host,
     mode: Mode,
     settings: Settings,
     stored: Settings,
@@ -58,7 +59,6 @@ pub struct S2c {
     booting: bool,
     busy_until: Duration,
     clock_offset: Duration,
-    agenda: Agenda<Event>,
     air: Air,
     instant: InstantSlot,
     synchronous: Option<Synchronous>,
@@ -70,8 +70,6 @@ pub struct S2c {
     last: LastHeard,
     head: Option<UsblHead>,
     last_fix: Option<Measured>,
-    chance: Stream,
-    events: VecDeque<ModemEvent>,
 }
 
 /// What the port asked for by `@Z..`.
@@ -91,22 +89,55 @@ enum Physical {
     Deaf,
 }
 
+/// Something to do later.
+#[derive(Debug)]
+pub(super) struct Plan(Event);
+
+impl From<Event> for Plan {
+    fn from(event: Event) -> Self {
+        Self(event)
+    }
+}
+
 #[derive(Debug)]
 enum Event {
-    Sent { dst: u8, label: &'static str, airtime: Duration, then: After },
+    Sent {
+        dst: u8,
+        label: &'static str,
+        airtime: Duration,
+        then: After,
+    },
     Heard(Box<(Frame, Signal)>),
     Notify(String),
     Instant,
-    InstantTimeout { attempt: u32 },
-    Synchronous { number: u64, late: bool },
+    InstantTimeout {
+        attempt: u32,
+    },
+    Synchronous {
+        number: u64,
+        late: bool,
+    },
     CancelMessages,
     Kick,
-    RequestTimeout { epoch: u32 },
-    Turn { number: u64, owes: bool },
-    AnswerTimeout { number: u64 },
-    Rest { number: u64 },
-    Idle { number: u64 },
+    RequestTimeout {
+        epoch: u32,
+    },
+    Turn {
+        number: u64,
+        owes: bool,
+    },
+    AnswerTimeout {
+        number: u64,
+    },
+    Rest {
+        number: u64,
+    },
+    Idle {
+        number: u64,
+    },
     Usbl(Box<Measured>),
+    /// A host may have been silent for the guard time of an escape.
+    Silence(Host),
     Reboot,
     Booted,
 }
@@ -117,8 +148,9 @@ impl S2c {
         const PURPOSE: u64 = 0x52c;
         let settings = Settings::factory(config.address, config.remote);
         Self {
-            port: Port::new(config.baud),
-            parser: InputParser::default(),
+            board: Board::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
+            parsers: BTreeMap::new(),
+            asking: Host::FIRST,
             mode: Mode::Data,
             stored: settings.clone(),
             settings,
@@ -128,7 +160,6 @@ impl S2c {
             booting: false,
             busy_until: Duration::ZERO,
             clock_offset: Duration::ZERO,
-            agenda: Agenda::new(),
             air: Air::default(),
             instant: InstantSlot::default(),
             synchronous: None,
@@ -139,8 +170,6 @@ impl S2c {
             last: LastHeard::default(),
             head: config.usbl.map(|usbl| UsblHead::new(usbl, config.seed)),
             last_fix: None,
-            chance: Stream::new(config.seed, &[PURPOSE]),
-            events: VecDeque::new(),
             config,
         }
     }
@@ -159,7 +188,7 @@ impl S2c {
         if self.in_data_mode() { Reading::Data } else { Reading::Commands }
     }
 
-    fn on_event(&mut self, event: Event, at: Duration) {
+    fn carry_out(&mut self, event: Event, at: Duration) {
         match event {
             Event::Sent { dst, label, airtime, then } => self.on_sent(dst, label, airtime, then, at),
             Event::Heard(heard) => self.on_heard(heard.0, &heard.1, at),
@@ -175,18 +204,37 @@ impl S2c {
             Event::Rest { number } => self.on_rest(number, at),
             Event::Idle { number } => self.on_idle(number),
             Event::Usbl(measured) => self.on_measured(&measured, at),
+            Event::Silence(host) => self.on_silence(host, at),
             Event::Reboot => self.reboot(at),
             Event::Booted => self.booting = false,
         }
     }
 
-    /// Reads what the host wrote up to a time.
-    fn read_host(&mut self, bytes: &[u8], at: Duration) {
+    /// Reads what a host wrote up to a time.
+    fn read_bytes(&mut self, host: Host, bytes: &[u8], at: Duration) {
         if self.booting {
             return;
         }
-        self.parser.push(bytes, at);
-        while let Some(input) = self.parser.next(self.reading()) {
+        self.asking = host;
+        self.parsers.entry(host).or_default().push(bytes, at);
+        while let Some(input) = self.next_input(host) {
+            self.on_input(input, at);
+        }
+        if let Some(end) = self.parsers.get(&host).and_then(|parser| parser.timeout(self.reading())) {
+            self.board.plan(end, Event::Silence(host));
+        }
+    }
+
+    fn next_input(&mut self, host: Host) -> Option<input::Input> {
+        let reading = self.reading();
+        self.parsers.get_mut(&host)?.next(reading)
+    }
+
+    /// What a host has left unfinished has another meaning after a silence.
+    fn on_silence(&mut self, host: Host, at: Duration) {
+        let reading = self.reading();
+        self.asking = host;
+        if let Some(input) = self.parsers.get_mut(&host).and_then(|parser| parser.handle_timeout(at, reading)) {
             self.on_input(input, at);
         }
     }
@@ -194,69 +242,57 @@ impl S2c {
     /// Restarts with the stored settings; the host's connection ends, messages and data are gone.
     fn reboot(&mut self, now: Duration) {
         if now < self.air.busy_until {
-            self.events.push_back(ModemEvent::CutShort);
+            self.board.cut_short();
         }
         let mut fresh = Self::new(self.config.clone());
+        std::mem::swap(&mut fresh.board, &mut self.board);
+        fresh.board.restart();
         fresh.settings = self.stored.clone();
         fresh.stored = self.stored.clone();
-        fresh.chance = self.chance.clone();
         fresh.head = self.head.take();
-        fresh.events = std::mem::take(&mut self.events);
         fresh.booting = true;
-        fresh.events.push_back(ModemEvent::HangUp);
-        fresh.agenda.add(now + Duration::from_millis(u64::from(self.config.boot_ms)), Event::Booted);
+        fresh.board.events.push_back(ModemEvent::HangUp);
+        fresh.board.plan(now + Duration::from_millis(u64::from(self.config.boot_ms)), Event::Booted);
         *self = fresh;
     }
 }
 
-impl Emulator for S2c {
-    fn port(&self) -> &Port {
-        &self.port
+impl Machine for S2c {
+    type Event = Plan;
+
+    fn board(&self) -> &Board<Plan> {
+        &self.board
     }
 
-    fn port_mut(&mut self) -> &mut Port {
-        &mut self.port
+    fn board_mut(&mut self) -> &mut Board<Plan> {
+        &mut self.board
     }
 
-    fn handle_onset(&mut self, onset: &Onset, now: Duration) {
-        self.handle_timeout(now);
-        self.on_onset(onset, now);
+    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration) {
+        self.read_bytes(host, bytes, at);
     }
 
-    fn handle_arrival(&mut self, arrival: &Arrival, now: Duration) {
-        self.handle_timeout(now);
-        self.on_arrival(arrival, now);
+    fn forget_host(&mut self, host: Host) {
+        self.parsers.remove(&host);
     }
 
-    fn poll_transmit(&mut self, now: Duration) -> Option<Transmission> {
-        self.next_transmission(now)
+    fn on_event(&mut self, Plan(event): Plan, at: Duration) {
+        self.carry_out(event, at);
     }
 
-    fn poll_event(&mut self) -> Option<ModemEvent> {
-        self.events.pop_front()
+    fn on_onset(&mut self, onset: &Onset, now: Duration) {
+        self.hear_beginning(onset, now);
     }
 
-    fn poll_timeout(&self) -> Option<Duration> {
-        let silence = self.parser.timeout(self.reading());
-        [self.agenda.next(), self.port.next_input(), silence].into_iter().flatten().min()
+    fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
+        self.hear(arrival, now);
     }
 
-    fn handle_timeout(&mut self, now: Duration) {
-        while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
-            if let Some((at, event)) = self.agenda.pop(due) {
-                self.on_event(event, at);
-            } else if let Some((at, bytes)) = self.port.take_input(due) {
-                self.read_host(&bytes, at);
-            } else if let Some(input) = self.parser.handle_timeout(due, self.reading()) {
-                self.on_input(input, due);
-            }
-        }
+    fn next_transmission(&mut self, now: Duration) -> Option<Transmission> {
+        self.begin_transmission(now)
     }
 
-    fn inject(&mut self, fault: Fault, now: Duration) {
-        if self.port.inject(fault, &mut self.chance, now) {
-            return;
-        }
+    fn break_down(&mut self, fault: Fault, now: Duration) {
         match fault {
             Fault::Busy(length) => self.busy_until = now + length,
             Fault::Reboot | Fault::BrownOut => self.reboot(now),
@@ -266,7 +302,7 @@ impl Emulator for S2c {
                     let _ = settings.set("AL", &address.to_string(), false);
                 }
             }
-            // Done by the port.
+            // Done by the line.
             Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             Fault::BigBuffer => self.settings.pool = 1024 * 1024,
         }

@@ -54,7 +54,7 @@ impl Signal {
 
 impl S2c {
     /// The beginning of a signal; one of another network is not noticed.
-    pub(super) fn on_onset(&mut self, onset: &Onset, now: Duration) {
+    pub(super) fn hear_beginning(&mut self, onset: &Onset, now: Duration) {
         let foreign = Frame::decode(&onset.bytes).is_some_and(|frame| !self.network().hears(&frame.network));
         if !self.booting && self.physical == Physical::Listen && !foreign {
             self.tell_start(onset.transmission, now);
@@ -69,7 +69,7 @@ impl S2c {
     }
 
     /// The end of a reception at this modem.
-    pub(super) fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
+    pub(super) fn hear(&mut self, arrival: &Arrival, now: Duration) {
         if !self.booting && self.physical == Physical::Listen {
             self.hear_end(arrival, now);
         }
@@ -88,7 +88,7 @@ impl S2c {
                 Some(frame) if !self.network().hears(&frame.network) => {}
                 Some(frame) => {
                     self.tell_end(arrival.transmission, &signal, now);
-                    self.agenda.add(now + timing::PROCESSING, Event::Heard(Box::new((frame, signal))));
+                    self.board.plan(now + timing::PROCESSING, Event::Heard(Box::new((frame, signal))));
                 }
             },
         }
@@ -211,7 +211,7 @@ impl S2c {
     /// `RECV`, or raw bytes on a port of the AT interpreter.
     pub(super) fn deliver_record(&mut self, src: u8, pid: u8, data: &[u8], signal: &Signal, now: Duration) {
         if self.config.interpreter == Interpreter::At {
-            self.port.write(data, now);
+            self.board.tell_all(data, now);
             return;
         }
         let len = self.length_field(pid, data.len());

@@ -73,7 +73,7 @@ impl S2c {
     pub(super) fn noise(&mut self) -> Vec<u8> {
         const SAMPLES: usize = 64;
         let mut out = format!("NOISE,{SAMPLES},1,0,0,").into_bytes();
-        out.extend((0..SAMPLES).map(|_| self.chance.below(256) as u8));
+        out.extend((0..SAMPLES).map(|_| self.board.chance.below(256) as u8));
         out
     }
 

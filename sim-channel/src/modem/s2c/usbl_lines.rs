@@ -25,7 +25,7 @@ impl S2c {
         let Some(head) = self.head.as_mut().filter(|_| self.options.usbl) else { return };
         let fix = head.measure(&signal.receiver, &signal.sender, signal.heard_at);
         let measured = Measured { remote, fix, travel: signal.travel, rssi: signal.rssi, integrity: signal.integrity };
-        self.agenda.add(fix.ready_at.max(now), Event::Usbl(Box::new(measured)));
+        self.board.plan(fix.ready_at.max(now), Event::Usbl(Box::new(measured)));
     }
 
     pub(super) fn on_measured(&mut self, measured: &Measured, now: Duration) {

@@ -15,9 +15,9 @@ impl S2c {
     pub(in super::super) fn kick(&mut self, now: Duration) {
         let Some(next) = self.burst.queue.front().map(|record| record.dst) else { return };
         match &self.burst.link {
-            Link::Listen if now < self.burst.backoff_until => self.agenda.add(self.burst.backoff_until, Event::Kick),
+            Link::Listen if now < self.burst.backoff_until => self.board.plan(self.burst.backoff_until, Event::Kick),
             Link::Listen if self.physical == Physical::Listen => {
-                let session = (self.chance.uniform() * 256.0) as u8;
+                let session = (self.board.chance.uniform() * 256.0) as u8;
                 self.burst.link = Link::Establishing { peer: next, session, attempts: 0 };
                 self.request();
             }
@@ -46,7 +46,7 @@ impl S2c {
     /// `!RT` is the wait for an answer to begin; it then takes its own time.
     pub(in super::super) fn on_request_sent(&mut self, epoch: u32, now: Duration) {
         let wait = Duration::from_millis(u64::from(self.settings.get("RT")));
-        self.agenda.add(now + wait + timing::HEADER + timing::PROCESSING, Event::RequestTimeout { epoch });
+        self.board.plan(now + wait + timing::HEADER + timing::PROCESSING, Event::RequestTimeout { epoch });
     }
 
     pub(in super::super) fn on_request_timeout(&mut self, epoch: u32, now: Duration) {
@@ -178,6 +178,6 @@ impl S2c {
         if self.instant.waits_for_turn {
             self.try_instant(now);
         }
-        self.agenda.add(now, Event::Kick);
+        self.board.plan(now, Event::Kick);
     }
 }

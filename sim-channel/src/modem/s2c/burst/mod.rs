@@ -19,8 +19,13 @@ pub(super) struct Record {
     pub count: u16,
     pub dst: u8,
     pub pid: u8,
+    /// Of the data mode: more may join it while it waits.
+    pub raw: bool,
     pub data: Vec<u8>,
 }
+
+/// Most bytes of a record.
+const RECORD_BYTES: usize = 1024;
 
 /// The pool and the connection.
 #[derive(Debug, Default)]
@@ -53,30 +58,43 @@ impl S2c {
             return "ERROR WRONG DESTINATION ADDRESS";
         }
         let pid = command.pid.unwrap_or_else(|| self.settings.byte("ZS"));
-        if self.enqueue(command.dst, pid, command.data, now) { "OK" } else { "ERROR BUFFER FULL" }
+        let record = Record { count: 0, dst: command.dst, pid, raw: false, data: command.data };
+        if self.enqueue(record, now) { "OK" } else { "ERROR BUFFER FULL" }
     }
 
     /// Raw bytes of the data mode, to the remote address; dropped and counted if that is 0 or the pool is full.
     pub(super) fn send_raw(&mut self, data: &[u8], now: Duration) {
         let dst = self.settings.byte("AR");
         let pid = self.settings.byte("ZS");
-        for piece in data.chunks(1024) {
+        for piece in data.chunks(RECORD_BYTES) {
             if dst == 0 || !self.may_address(dst, false) {
                 self.burst.dropped += piece.len() as u64;
                 self.notify(format!("DROPCNT,{}", piece.len()), now);
-            } else if !self.enqueue(dst, pid, piece.to_vec(), now) {
+            } else if !self.join(dst, pid, piece)
+                && !self.enqueue(Record { count: 0, dst, pid, raw: true, data: piece.to_vec() }, now)
+            {
                 self.burst.overflowed += piece.len() as u64;
             }
         }
     }
 
-    fn enqueue(&mut self, dst: u8, pid: u8, data: Vec<u8>, now: Duration) -> bool {
-        if self.burst.waiting() + data.len() > self.settings.pool {
+    /// Adds raw bytes to the last record, if that still waits and has room: a host's line is one record, however it comes.
+    fn join(&mut self, dst: u8, pid: u8, piece: &[u8]) -> bool {
+        let room = self.settings.pool.saturating_sub(self.burst.waiting());
+        let joins = |last: &&mut Record| {
+            last.raw && (last.dst, last.pid) == (dst, pid) && last.data.len() + piece.len() <= RECORD_BYTES
+        };
+        let last = self.burst.queue.back_mut().filter(joins).filter(|_| piece.len() <= room);
+        last.map(|last| last.data.extend_from_slice(piece)).is_some()
+    }
+
+    fn enqueue(&mut self, record: Record, now: Duration) -> bool {
+        if self.burst.waiting() + record.data.len() > self.settings.pool {
             return false;
         }
         self.burst.last_count = self.burst.last_count.wrapping_add(1);
-        self.burst.queue.push_back(Record { count: self.burst.last_count, dst, pid, data });
-        self.agenda.add(now, super::Event::Kick);
+        self.burst.queue.push_back(Record { count: self.burst.last_count, ..record });
+        self.board.plan(now, super::Event::Kick);
         true
     }
 

@@ -58,7 +58,13 @@ mod tests {
     use std::collections::VecDeque;
 
     fn records() -> VecDeque<Record> {
-        let record = |count: u16| Record { count, dst: 2, pid: 0, data: vec![count as u8; 100 * usize::from(count)] };
+        let record = |count: u16| Record {
+            count,
+            dst: 2,
+            pid: 0,
+            raw: false,
+            data: vec![count as u8; 100 * usize::from(count)],
+        };
         (1..=30).map(record).collect()
     }
 
@@ -85,7 +91,7 @@ mod tests {
     #[test]
     fn packets_are_full_and_keep_to_their_peer() {
         let mut queue = records();
-        queue.push_front(Record { count: 0, dst: 9, pid: 0, data: vec![0; 10] });
+        queue.push_front(Record { count: 0, dst: 9, pid: 0, raw: false, data: vec![0; 10] });
         let train = Sender::default().train(&mut queue, 2, 700, 3);
         assert!(train.iter().all(|(_, bytes)| bytes.len() > 690 && bytes.len() <= 700));
         assert_eq!(queue.front().map(|record| record.dst), Some(9));

@@ -16,7 +16,7 @@ impl S2c {
         if let Some(connection) = self.burst.link.connection_mut() {
             connection.turn = Turn::Talking;
             connection.number += 1;
-            self.agenda.add(now + delay, Event::Turn { number: connection.number, owes });
+            self.board.plan(now + delay, Event::Turn { number: connection.number, owes });
         }
     }
 
@@ -73,7 +73,7 @@ impl S2c {
             connection.turn = Turn::Listening;
             connection.number += 1;
             let patience = 2 * connection.travel + Duration::from_secs(1);
-            self.agenda.add(now + patience, Event::Rest { number: connection.number });
+            self.board.plan(now + patience, Event::Rest { number: connection.number });
         }
     }
 
@@ -95,9 +95,9 @@ impl S2c {
             connection.turn = Turn::Idle;
             connection.number += 1;
             let patience = if connection.initiator { Duration::ZERO } else { Duration::from_secs(10) };
-            self.agenda.add(now + idle + patience, Event::Idle { number: connection.number });
+            self.board.plan(now + idle + patience, Event::Idle { number: connection.number });
         }
-        self.agenda.add(now, Event::Kick);
+        self.board.plan(now, Event::Kick);
     }
 
     /// The idle time has passed without a turn.
@@ -116,7 +116,7 @@ impl S2c {
         connection.turn = Turn::Waiting;
         connection.number += 1;
         let deadline = now + 2 * connection.travel + ANSWER_ALLOWANCE;
-        self.agenda.add(deadline, Event::AnswerTimeout { number: connection.number });
+        self.board.plan(deadline, Event::AnswerTimeout { number: connection.number });
     }
 
     /// The peer did not acknowledge: probe with one packet, or give the connection up.
@@ -194,7 +194,7 @@ impl S2c {
         if let Some(connection) = self.burst.link.connection_mut() {
             connection.turn = Turn::Listening;
             connection.number += 1;
-            self.agenda.add(now + patience, Event::Turn { number: connection.number, owes: true });
+            self.board.plan(now + patience, Event::Turn { number: connection.number, owes: true });
         }
     }
 

@@ -1,0 +1,28 @@
+//! `scenecast scene`
+
+mod pairs;
+mod run;
+mod sample;
+mod score;
+
+use crate::problem::Problem;
+use clap::Subcommand;
+
+/// Run the scene model over files.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Scene {
+    Run(Box<run::Run>),
+    Sample(sample::Sample),
+    /// Score the scene model and two baselines on annotated images.
+    Score(score::Score),
+}
+
+impl Scene {
+    pub(crate) fn run(self) -> Result<(), Problem> {
+        match self {
+            Self::Run(run) => run.run(),
+            Self::Sample(sample) => sample.run(),
+            Self::Score(score) => score.run(),
+        }
+    }
+}

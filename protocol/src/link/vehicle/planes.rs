@@ -1,0 +1,102 @@
+//! Planes of the map: what of them goes into a frame, and when they are worth a turn.
+
+use super::{Carried, Part, VehicleLink};
+use crate::map::{Cell, PlaneKind, PlaneSource, StateSource};
+use crate::schedule::Class;
+use crate::time::Instant;
+use crate::wire::{ChunkKind, FrameBuilder, room_for_payload};
+
+/// A plane that the link replicates.
+#[derive(Debug)]
+pub(super) struct PlaneOut {
+    pub(super) source: PlaneSource,
+    /// Whether it has a share; one without takes what nobody else needs.
+    has_share: bool,
+    /// Whether its digest is to be told.
+    pub(super) owes_digest: bool,
+}
+
+impl PlaneOut {
+    fn class(&self) -> Class {
+        self.source.scale().kind().into()
+    }
+}
+
+impl<S: StateSource> VehicleLink<S> {
+    /// Replicates these planes beside the state, each with its part of the map's share in percent.
+    pub fn set_planes(&mut self, planes: impl IntoIterator<Item = (PlaneSource, u8)>) {
+        let mut shares = [0; Class::PLANES.len()];
+        self.planes.clear();
+        for (source, share) in planes {
+            let plane = PlaneOut { source, has_share: share > 0, owes_digest: false };
+            Class::PLANES.iter().zip(&mut shares).filter(|(c, _)| **c == plane.class()).for_each(|(_, s)| *s = share);
+            self.planes.push(plane);
+        }
+        self.shares.set_planes(shares);
+    }
+
+    /// The planes that are replicated.
+    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
+        self.planes.iter().map(|p| &p.source)
+    }
+
+    /// Sets quantities of cells of a plane; nothing happens if it is not replicated.
+    pub fn set_plane(&mut self, kind: PlaneKind, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
+        let Some(plane) = self.plane_mut(kind) else { return };
+        if plane.source.set(cells, now) > 0 {
+            self.forget_said();
+        }
+    }
+
+    pub(super) fn plane_mut(&mut self, kind: PlaneKind) -> Option<&mut PlaneOut> {
+        self.planes.iter_mut().find(|p| p.source.scale().kind() == kind)
+    }
+
+    /// Classes of the planes that have something to send and may: those without a share leave half of the budget alone, so
+    /// that what comes up next does not have to wait for it.
+    pub(super) fn waiting_planes(&self, now: Instant) -> impl Iterator<Item = Class> {
+        self.going(now).map(PlaneOut::class)
+    }
+
+    /// About how many bytes of planes wait and may be sent.
+    pub(super) fn plane_backlog(&self, now: Instant) -> usize {
+        self.going(now).map(|p| p.source.backlog_bytes()).sum()
+    }
+
+    /// Whether no plane waits that may be sent, and none is on its way.
+    pub(super) fn planes_are_quiet(&self, now: Instant) -> bool {
+        self.planes().all(|p| p.is_quiet() || p.backlog_bytes() > 0) && self.plane_backlog(now) == 0
+    }
+
+    fn going(&self, now: Instant) -> impl Iterator<Item = &PlaneOut> {
+        let spare = self.budget.is_plentiful(now);
+        self.planes.iter().filter(move |p| (p.has_share || spare) && p.source.backlog_bytes() > 0)
+    }
+
+    pub(super) fn fill_plane(
+        &mut self,
+        class: Class,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        now: Instant,
+    ) {
+        let room = room_for_payload(builder.room());
+        let plane = self.planes.iter_mut().find(|p| p.class() == class);
+        let Some(source) = plane.map(|p| &mut p.source) else { return };
+        let Some((bytes, content)) = source.next_chunk(room, now) else { return };
+        let fits = builder.push(ChunkKind::Plane, &bytes);
+        assert!(fits, "a chunk of {} bytes was made for {room}", bytes.len());
+        carried.push((Part::Plane(source.scale().kind(), content), bytes.len()));
+    }
+
+    /// The digests that are owed, as far as there is room for them.
+    pub(super) fn fill_digests(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
+        for plane in self.planes.iter_mut().filter(|p| p.owes_digest) {
+            let bytes = plane.source.digest_chunk();
+            if builder.push(ChunkKind::Plane, &bytes) {
+                plane.owes_digest = false;
+                carried.push((Part::PlaneDigest(plane.source.scale().kind()), bytes.len()));
+            }
+        }
+    }
+}

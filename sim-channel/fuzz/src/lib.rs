@@ -1,0 +1,46 @@
+//! Fuzz targets of sim-channel: emulators take any bytes, from hosts and from the water.
+
+use sim_channel::modem::{Emulator, Host};
+use sim_channel::{Arrival, Duration, NodeId, Outcome, Position};
+
+/// Pieces of bytes from a host, their lengths and the pauses between them taken from the data too.
+pub fn host(mut modem: impl Emulator, data: &[u8]) {
+    let mut now = Duration::ZERO;
+    let mut rest = data;
+    while let Some((control, tail)) = rest.split_first() {
+        let (piece, tail) = tail.split_at(tail.len().min(usize::from(control & 63) + 1));
+        now += Duration::from_millis(u64::from(control >> 6) * 400);
+        modem.handle_host_bytes(Host::FIRST, piece, now);
+        settle(&mut modem, now);
+        rest = tail;
+    }
+    settle(&mut modem, now + Duration::from_secs(60));
+}
+
+/// A frame from the water.
+pub fn water(mut modem: impl Emulator, data: &[u8]) {
+    let now = Duration::from_secs(5);
+    let place = Position::default();
+    let outcome = Outcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };
+    let arrival = Arrival {
+        transmission: 1,
+        from: NodeId(1),
+        to: NodeId(2),
+        at: now,
+        sent_at: now - Duration::from_secs(2),
+        range_m: 100.0,
+        sender: place,
+        receiver: place,
+        airtime: Duration::from_secs(1),
+        outcome,
+    };
+    modem.handle_arrival(&arrival, now);
+    settle(&mut modem, now + Duration::from_secs(60));
+}
+
+fn settle(modem: &mut impl Emulator, now: Duration) {
+    modem.handle_timeout(now);
+    while modem.poll_transmit(now).is_some() {}
+    while modem.poll_event().is_some() {}
+    modem.poll_host_bytes(Host::FIRST, now);
+}
