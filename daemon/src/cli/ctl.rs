@@ -35,7 +35,7 @@ pub(super) struct Ctl {
     #[arg(long, global = true, value_name = "N")]
     vehicle: Option<u8>,
     /// Wait so long for an order to be applied; for an image 600 unless it is given
-    #[arg(long, global = true, value_name = "SECONDS")]
+    #[arg(long, global = true, value_name = "SECONDS", allow_negative_numbers = true)]
     wait: Option<f64>,
     #[command(subcommand)]
     command: Command,
