@@ -1,7 +1,7 @@
 //! The formats: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
 use super::place::{lon_lat, well_known_text};
-use super::regions::regions;
+use super::regions::{Polygon, regions};
 use super::{Cells, Explored};
 use crate::console::state::Origin;
 use crate::picture;
@@ -37,10 +37,9 @@ pub(in crate::console) fn geojson(cells: &Cells, origin: Option<Origin>) -> Stri
         let (lon, lat) = lon_lat(origin, x, y);
         json!([tidy(lon), tidy(lat)])
     };
-    let feature = |(label, polygons): (u8, Vec<Vec<Vec<(u32, u32)>>>)| {
+    let feature = |(label, polygons): (u8, Vec<Polygon>)| {
         let count = cells.labels.iter().filter(|l| **l == label).count();
-        let rings =
-            |polygon: &Vec<Vec<_>>| polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>();
+        let rings = |polygon: &Polygon| polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>();
         json!({
             "type": "Feature",
             "id": label,
