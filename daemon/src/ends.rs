@@ -1,9 +1,11 @@
 //! From configuration to the two ends of the link.
 
 use crate::asv::Surface;
-use crate::auv::{Area, Durable, Footprint, Navigator, Steering, Vehicle, cell_m};
+use crate::auv::{Area, Durable, Footprint, Habits, Navigator, Steering, Vehicle, cell_m};
 use crate::config::{Config, load_key};
+use crate::modem;
 use crate::problem::Problem;
+use scenecast_protocol::directive::{PlannerKind, Reaction};
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
@@ -21,19 +23,16 @@ pub fn vehicle_address(config: &Config) -> Result<Address, Problem> {
     Address::vehicle(number).ok_or_else(|| Problem::Input(format!("vehicle.address = {number}: allowed is 1 to 14")))
 }
 
-/// Bits of framing that a transparent modem puts on air with each frame: delimiters and stuffing.
-const FRAMING_BITS: u64 = 8 * 7;
-
-/// The modem of a process.
-pub fn modem_of_process(config: &Config) -> ModemProfile {
+/// The modem of an end's process.
+pub fn modem_of_process(config: &Config, end: Address) -> Result<ModemProfile, Problem> {
     let mut profile = modem_profile(config, config.modem.bit_rate);
     if config.modem.kind == "transparent" {
-        profile.overhead_bits += FRAMING_BITS;
+        profile.overhead_bits += modem::PIPE_FRAMING_BITS;
     }
-    profile
+    Ok(modem::driver(config, end, profile)?.profile())
 }
 
-/// The modem, at `bit_rate_bps` on air.
+/// A modem that only has a bit rate on air.
 pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     ModemProfile {
         frame_bytes: config.link.frame_bytes as usize,
@@ -62,6 +61,20 @@ fn authenticity(config: &Config) -> Result<Option<Authenticity>, Problem> {
     Ok(load_key(config)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
 }
 
+/// What the vehicle does of its own accord.
+fn habits(config: &Config) -> Habits {
+    let survey = &config.survey;
+    let reaction = |name: &str| Reaction::from_name(name).unwrap_or(Reaction::Return);
+    Habits {
+        on_silence: reaction(&survey.on_silence),
+        on_breach: reaction(&survey.on_breach),
+        on_abort: reaction(&survey.on_abort),
+        silence_s: if survey.max_silence_s > 0.0 { survey.max_silence_s } else { f64::INFINITY },
+        speed_m_s: survey.speed_m_s,
+        altitude_m: survey.altitude_m,
+    }
+}
+
 /// A vehicle that surveys `area`; `seed` is random for each run.
 pub fn vehicle(
     config: &Config,
@@ -85,11 +98,12 @@ pub fn vehicle(
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     link.set_planes(planes(config, codec));
     link.source_mut().set_settle_time(Duration::from_secs_f64(config.map.settle_s));
-    let steering = Steering::new(area, footprint(config), cell_m(config));
+    let planner = PlannerKind::from_name(&config.survey.planner).unwrap_or(PlannerKind::Horizon);
+    let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
     let navigator = Navigator::new(x, y, depth, config.navigation.drift_percent / 100.0);
-    let mut vehicle = Vehicle::new(link, navigator, steering, durable, now);
+    let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
     vehicle.set_coarse_after(config.map.coarse_after_s);
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();

@@ -1,14 +1,16 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
-use scenecast_protocol::directive::{Budget, Constraints, Fix, RefusalReason, Requests, Settings, Slot, SlotId};
-use scenecast_protocol::directive::{Utility, VersionedSlot};
+use scenecast_protocol::directive::{
+    Band, Budget, Constraints, Fence, Fix, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Requests,
+    SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+};
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, Reader, Seal, SessionId,
-    SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
+    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Reader, Seal,
+    SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -112,15 +114,16 @@ fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement> {
 }
 
 fn hold() -> Vec<u8> {
-    VersionedSlot::encode(0xABCD, 1, &Slot::Constraints(Constraints { hold: true }))
+    VersionedSlot::encode(0xABCD, 1, &Slot::Constraints(Constraints { hold: true, abort: false }))
 }
 
 fn status() -> VehicleStatus {
-    let mut slots = [SlotReport::default(); 6];
+    let mut slots = [SlotReport::default(); SLOTS];
     slots[SlotId::Utility.index()] = SlotReport { version_low: 7, state: SlotState::Applied };
     slots[SlotId::Fix.index()] = SlotReport { version_low: 2, state: SlotState::Refused(RefusalReason::Malformed) };
     VehicleStatus {
         mode: VehicleMode::Hold,
+        reason: ModeReason::Order,
         x_m: 1.5,
         y_m: -0.1,
         depth_m: 18.0,
@@ -138,9 +141,14 @@ fn status() -> VehicleStatus {
     }
 }
 
+/// A place in metres.
+fn place(x_m: i32, y_m: i32) -> Place {
+    Place { x_dm: 10 * x_m, y_dm: 10 * y_m }
+}
+
 /// The report and the pose of the vehicle's answer.
 fn answered() -> [(ChunkKind, Vec<u8>); 2] {
-    let mut slots = [SlotReport::default(); 6];
+    let mut slots = [SlotReport::default(); SLOTS];
     slots[SlotId::Constraints.index()] = SlotReport { version_low: 1, state: SlotState::Applied };
     let status = VehicleStatus { base_digest: 0, slots, refused_frames: 0, ..status() };
     [(ChunkKind::Report, status.encode_report()), (ChunkKind::Pose, status.encode_pose(99))]
@@ -279,6 +287,19 @@ fn parts_of_a_frame_are_those_of_the_document() {
     };
     let depth = PlaneScale::Depth { step_dm: 5, first: 24 };
     assert_eq!((depth.bounds(1), PlaneScale::Confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
+    let limits = Limits {
+        depth: Some(Band { low_dm: 50, high_dm: 400 }),
+        distance_m: Some(3000),
+        silence_s: Some(600),
+        on_silence: Some(Reaction::Return),
+        ..Limits::default()
+    };
+    let outline = |vertices: &[(i32, i32)]| Polygon(vertices.iter().map(|&(x, y)| place(x, y)).collect());
+    let fence = Fence {
+        fence: Some(outline(&[(0, 0), (40, 0), (40, 30), (0, 30)])),
+        keep_outs: vec![outline(&[(10, 10), (15, 10), (10, 18)])],
+        return_point: Some(place(2, 3)),
+    };
     let expected = vec![
         ("base 127", base(127, 1)),
         ("base 128", base(128, 2)),
@@ -312,7 +333,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         ("plane chunk: the digest of confidence is 27A6", plane(PlaneChunk::Digest(PlaneKind::Confidence, 0x27A6))),
         (
-            "pose: hold, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
+            "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
             pose(None),
         ),
         ("the same with a waypoint at (1, -2) m", pose(Some((1.0, -2.0)))),
@@ -327,8 +348,21 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         ("slot: series ABCD, version 1, constraints: hold", hold()),
         (
-            "slot: series ABCD, version 2, settings: 5000 words a second",
-            slot(2, Slot::Settings(Settings { refine_words_per_s: 5000 })),
+            "slot: series ABCD, version 2, settings: 5000 words a second, planner horizon",
+            slot(2, Slot::Settings(Settings { refine_words_per_s: 5000, planner: Some(PlannerKind::Horizon) })),
+        ),
+        (
+            "slot: series ABCD, version 2, constraints: abort",
+            slot(2, Slot::Constraints(Constraints { hold: false, abort: true })),
+        ),
+        (
+            "slot: series ABCD, version 6, limits: depth 5 to 40 m, 3000 m, silence 600 s, on silence return",
+            slot(6, Slot::Limits(limits)),
+        ),
+        (
+            "slot: series ABCD, version 7, fence: (0, 0), (40, 0), (40, 30), (0, 30) m, keep-out (10, 10), (15, 10), \
+             (10, 18) m, return point (2, 3) m",
+            slot(7, Slot::Fence(fence)),
         ),
         ("slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20", slot(3, Slot::Budget(budget))),
         ("slot: series ABCD, version 1, requests: epoch 1, label 3, request 2", slot(1, Slot::Requests(requests))),

@@ -19,6 +19,9 @@ ORDERS = {
     "set_utility": {"weights": {}, "exploration": 0.1},
     "ask_exemplar": None,
     "set_constraints": {"hold": False},
+    "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
+    "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
+    "set_settings": {"planner": "greedy"},
     "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
 }
 

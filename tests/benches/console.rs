@@ -93,7 +93,8 @@ fn console(port: u16, ends: Instant) -> Vec<f64> {
 
 fn request(port: u16, path: &str) -> TcpStream {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
-    let head = format!("GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAccept-Encoding: gzip\r\n\r\n");
+    // HTTP/1.0: no lengths of chunks between the events.
+    let head = format!("GET {path} HTTP/1.0\r\nHost: 127.0.0.1:{port}\r\nAccept-Encoding: gzip\r\n\r\n");
     stream.write_all(head.as_bytes()).unwrap();
     stream
 }

@@ -143,3 +143,20 @@ fn a_real_reef_is_surveyed_into_more_than_one_label() {
     assert!(figures["scene"]["labels"].as_u64() > Some(1));
     assert!(figures["scene"]["mutual_information_nats"].as_f64() > Some(0.02), "{figures}");
 }
+
+#[test]
+fn a_fenced_vehicle_stays_inside_keeps_to_its_limit_and_says_so() {
+    for planner in ["lawnmower", "greedy", "horizon"] {
+        let planner = format!("survey.planner={planner}");
+        let sets = ["operator.script=fenced", "survey.duration_s=300", "channel.loss=0.2", &planner];
+        let mut mission = Mission::new(config(&sets), MissionOptions { world: reef(), seed: 5, record: None }).unwrap();
+        mission.advance(scenecast_protocol::time::Instant::from_secs_f64(299.0)).unwrap();
+        let figures = report(&mission, "test").figures;
+        assert_eq!(figures["survey"]["waypoints_outside_fence"], 0, "{figures}");
+        assert!(figures["survey"]["waypoints"].as_u64() > Some(4), "{figures}");
+        // Half of what it could go, of which the first orders took a little to arrive.
+        assert!(mission.distance_m() < 0.5 * 300.0 * 0.5 + 15.0, "{} m", mission.distance_m());
+        let (mode, reason) = mission.vehicle().mode();
+        assert!(reason == scenecast_protocol::wire::ModeReason::Distance, "{mode:?}: {reason:?}");
+    }
+}

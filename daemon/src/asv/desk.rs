@@ -2,7 +2,8 @@
 
 use super::pauses::Pauses;
 use crate::auv::Exemplar;
-use scenecast_protocol::directive::{Requests, Utility};
+use crate::modem::UsblLine;
+use scenecast_protocol::directive::{Fence, Limits, Requests, Settings, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -37,6 +38,12 @@ pub struct Desk {
     pub name: String,
     /// The utility that was sent last.
     pub utility: Utility,
+    /// The fence that was sent last.
+    pub fence: Option<Fence>,
+    /// The limits that were sent last.
+    pub limits: Option<Limits>,
+    /// The settings that were sent last.
+    pub settings: Settings,
     /// Images by label.
     pub exemplars: BTreeMap<u8, ExemplarDesk>,
     /// Where the vehicle said it was: time, east, north.
@@ -49,6 +56,8 @@ pub struct Desk {
     pub wholes: u64,
     /// How long it is usually silent.
     pub pauses: Pauses,
+    /// Where the surface's modem found it last, and when it said so.
+    pub found: Option<(UsblLine, Instant)>,
 }
 
 impl Desk {
@@ -60,12 +69,16 @@ impl Desk {
         Self {
             name,
             utility: Utility::default(),
+            fence: None,
+            limits: None,
+            settings: Settings::default(),
             exemplars: BTreeMap::new(),
             track: VecDeque::new(),
             epoch: 0,
             whole: None,
             wholes: 0,
             pauses: Pauses::default(),
+            found: None,
         }
     }
 

@@ -3,8 +3,10 @@
 #[cfg(test)]
 mod calls;
 mod desk;
+mod orders;
 mod pauses;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};
+pub use orders::{FenceOrder, LimitsOrder};
 pub use surface::{Surface, SurfaceOutput};

@@ -1,10 +1,12 @@
 //! The surface's role: link and operator in one sans-IO whole.
 
 use super::desk::Desk;
+use super::orders::{FenceOrder, LimitsOrder};
 use crate::auv::Exemplar;
+use crate::modem::UsblLine;
 use crate::picture;
-use scenecast_protocol::directive::{Budget, Constraints, Fix, Slot, SlotId, Utility};
-use scenecast_protocol::link::{PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
+use scenecast_protocol::directive::{Budget, Constraints, Fix, PlannerKind, Slot, SlotId, Utility};
+use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
@@ -97,12 +99,12 @@ impl Surface {
         self.outputs.pop_front()
     }
 
-    /// Sends weights (-1..=1) of labels and of unseen cells. The error is one line for the operator.
+    /// Sends weights (-1..=1) of labels, of unseen cells and of perplexity. The error is one line for the operator.
     pub fn set_utility(
         &mut self,
         vehicle: Address,
         weights: &BTreeMap<u8, f64>,
-        exploration: f64,
+        (exploration, curiosity): (f64, f64),
         now: Instant,
     ) -> Result<u16, String> {
         let known = self.labels(vehicle).ok_or("no such vehicle")?;
@@ -110,7 +112,11 @@ impl Surface {
             let ok = w.is_finite() && (-1.0..=1.0).contains(&w);
             ok.then_some((w * 100.0).round() as i8).ok_or(format!("{what} {w} is not within -1 to 1"))
         };
-        let mut utility = Utility { exploration: hundredths("exploration", exploration)?, ..Utility::default() };
+        let mut utility = Utility {
+            exploration: hundredths("exploration", exploration)?,
+            curiosity: hundredths("curiosity", curiosity)?,
+            ..Utility::default()
+        };
         for (&label, &weight) in weights {
             if !known.contains_key(&label) {
                 return Err(format!("label {label} is not on the map"));
@@ -137,7 +143,50 @@ impl Surface {
 
     /// Tells a vehicle to stay, or to go on.
     pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
-        self.issue(vehicle, Slot::Constraints(Constraints { hold }), now)
+        self.set_order(vehicle, Constraints { hold, abort: false }, now)
+    }
+
+    /// Tells a vehicle to stay, to abort, or to go on.
+    pub fn set_order(&mut self, vehicle: Address, order: Constraints, now: Instant) -> Result<u16, String> {
+        self.issue(vehicle, Slot::Constraints(order), now)
+    }
+
+    /// Sends a fence, keep-outs and a return point in place of the last ones.
+    pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
+        let fence = order.read()?;
+        let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
+        Ok(version)
+    }
+
+    /// Sends limits in place of the last ones.
+    pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
+        let limits = order.read()?;
+        let version = self.issue(vehicle, Slot::Limits(limits), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
+        Ok(version)
+    }
+
+    /// Changes how a vehicle chooses its way (`""`: as configured there) and how many words it resamples a second (0: as
+    /// configured there); what is not given stays as it was sent last.
+    pub fn set_settings(
+        &mut self,
+        vehicle: Address,
+        planner: Option<&str>,
+        refine_words_per_s: Option<u32>,
+        now: Instant,
+    ) -> Result<u16, String> {
+        let mut settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings;
+        if let Some(name) = planner {
+            settings.planner = PlannerKind::from_name(name);
+            if settings.planner.is_none() && !name.is_empty() {
+                return Err(format!("planner {name:?}: it takes lawnmower, greedy or horizon, or \"\" as configured"));
+            }
+        }
+        settings.refine_words_per_s = refine_words_per_s.unwrap_or(settings.refine_words_per_s);
+        let version = self.issue(vehicle, Slot::Settings(settings), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings = settings;
+        Ok(version)
     }
 
     /// Changes the bit budget of the surface and of every vehicle, and the least shares of the classes if there are any.
@@ -229,6 +278,29 @@ impl Surface {
     /// The transmission that was handed out has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
         self.link.handle_transmit_outcome(now);
+    }
+
+    /// The modem asks for so many frames.
+    pub fn handle_poll(&mut self, frames: u32) {
+        self.link.handle_poll(frames);
+    }
+
+    /// The cycle that the modem is to begin next.
+    pub fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
+        self.link.poll_cycle(now)
+    }
+
+    /// The modem itself put so many bits on air.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.link.handle_repeated(bits, now);
+    }
+
+    /// The modem's head has found a vehicle.
+    pub fn handle_range(&mut self, vehicle: Address, line: &UsblLine, now: Instant) {
+        if let Some(desk) = self.desks.get_mut(&vehicle) {
+            desk.found = Some((*line, now));
+            self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        }
     }
 
     /// The next frame to put on air.

@@ -32,6 +32,8 @@ pub struct MapUpdate {
     pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
     /// Labels given so far.
     pub labels: u8,
+    /// How badly the model explains each cell.
+    pub perplexity: Vec<(Cell, f32)>,
 }
 
 /// The scene model of one vehicle.
@@ -125,8 +127,9 @@ impl Mapper {
     pub fn current(&self) -> MapUpdate {
         let cells: Vec<_> = self.book.shown().map(|(x, y, label)| (Cell::new(x, y), label)).collect();
         let planes = self.planes(&cells);
+        let perplexity = cells.iter().filter_map(|&(cell, _)| Some((cell, self.flat_at(cell)?.perplexity))).collect();
         let labels = self.book.labels().count() as u8;
-        MapUpdate { t_s: self.last_s.unwrap_or(0.0), epoch: self.book.epoch(), cells, planes, labels }
+        MapUpdate { t_s: self.last_s.unwrap_or(0.0), epoch: self.book.epoch(), cells, planes, perplexity, labels }
     }
 
     fn planes(&self, shown: &[(Cell, u8)]) -> BTreeMap<PlaneKind, Vec<(Cell, f64)>> {
@@ -136,10 +139,14 @@ impl Mapper {
         BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)])
     }
 
+    fn flat_at(&self, cell: Cell) -> Option<&FlatCell> {
+        let at = self.flat.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).ok()?;
+        self.flat.get(at)
+    }
+
     /// How sure the model is of the label that a cell shows; nothing while it holds the cell for another one.
     fn confidence(&self, cell: Cell, label: u8) -> Option<f64> {
-        let at = self.flat.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).ok()?;
-        let flat = self.flat.get(at)?;
+        let flat = self.flat_at(cell)?;
         let is_shown = self.book.topic_of(label) == Some(flat.topic);
         Some(if is_shown { f64::from(flat.confidence) } else { 0.0 })
     }

@@ -5,15 +5,19 @@
 
 mod checkpoint;
 mod exemplar;
+mod guard;
 mod mapper;
 mod navigator;
+pub mod planning;
 mod relief;
 mod steering;
 mod vehicle;
 
 pub use checkpoint::{NoCheckpoint, Restored};
 pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
+pub use guard::{Guard, Habits};
 pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use navigator::Navigator;
-pub use steering::{Area, Footprint, Steering};
+pub use planning::Area;
+pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, Vehicle, VehicleOutput};

@@ -1,34 +1,11 @@
 //! Where to go next.
 
-use scenecast_protocol::directive::Utility;
-use scenecast_protocol::map::LabelGrid;
-use std::collections::{BTreeMap, BTreeSet};
-
-/// Limits of the survey, metres from the origin.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Area {
-    /// West limit.
-    pub west: f64,
-    /// South limit.
-    pub south: f64,
-    /// East limit.
-    pub east: f64,
-    /// North limit.
-    pub north: f64,
-}
-
-impl Area {
-    /// The area without a border of `margin` metres, at least its middle.
-    pub fn shrunk(&self, margin: f64) -> Self {
-        let (cx, cy) = ((self.west + self.east) / 2.0, (self.south + self.north) / 2.0);
-        Self {
-            west: (self.west + margin).min(cx),
-            south: (self.south + margin).min(cy),
-            east: (self.east - margin).max(cx),
-            north: (self.north - margin).max(cy),
-        }
-    }
-}
+use super::planning::{
+    Area, Bounds, Knowledge, Lattice, Node, Planner, Point, Question, Ways, Window, Worth, distance, planner,
+};
+use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
+use scenecast_protocol::map::{Cell, LabelGrid};
+use std::collections::VecDeque;
 
 /// What the camera sees, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,168 +16,290 @@ pub struct Footprint {
     pub along: f64,
 }
 
-/// Chooses waypoints: a lawnmower until the operator has said what matters, then greedily by utility.
+impl Footprint {
+    /// Metres from the middle that are seen at any heading.
+    fn reach(&self) -> f64 {
+        self.across.min(self.along) / 2.0
+    }
+}
+
+/// What the vehicle is to do next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Course {
+    /// Go there, straight.
+    Go(Point),
+    /// What is left of distance or time is the way home.
+    UsedUp,
+    /// It is where it was to go.
+    There,
+    /// There is nowhere that it may go.
+    NoWay,
+}
+
+/// Chooses waypoints: a lawnmower until the operator has said what matters, then by the planner that is set.
 #[derive(Debug)]
 pub struct Steering {
     area: Area,
     footprint: Footprint,
-    cell_m: f64,
-    legs: Vec<(f64, f64)>,
-    next_leg: usize,
-    /// How often the camera saw each block of cells.
-    visits: BTreeMap<(i32, i32), u32>,
+    clearance_m: f64,
+    configured: PlannerKind,
+    chosen: Option<PlannerKind>,
+    planner: Box<dyn Planner>,
+    running: PlannerKind,
+    bounds: Bounds,
+    home: Point,
+    return_point: Option<Point>,
+    lattice: Lattice,
+    window: Window,
+    ways_home: Option<Ways>,
+    /// Metres from the end of those ways to the return point itself.
+    home_leg_m: f64,
+    known: Knowledge,
+    plan: VecDeque<Node>,
+    /// The version of the map that the plan is for.
+    planned_for: u64,
 }
 
-/// Cells a side of a block, the grain of planning.
-const BLOCK: i32 = 4;
+/// Steps between two places of the lattice, in reaches of the camera: looks overlap by a tenth.
+const STEP: f64 = 0.9;
+/// Straight steps to one waypoint while the way may change with the map.
+const STRAIGHT: usize = 2;
 
 impl Steering {
-    /// Steers within `area`; cells have edges of `cell_m` metres.
-    pub fn new(area: Area, footprint: Footprint, cell_m: f64) -> Self {
-        let legs = lawnmower(&area.shrunk(footprint.across.min(footprint.along) / 2.0), footprint.across * 0.8);
-        Self { area, footprint, cell_m, legs, next_leg: 0, visits: BTreeMap::new() }
+    /// Steers within `area`; cells have edges of `cell_m` metres. The vehicle stays `clearance_m` clear of every outline.
+    pub fn new(area: Area, footprint: Footprint, cell_m: f64, configured: PlannerKind, clearance_m: f64) -> Self {
+        let bounds = Bounds::default();
+        let lattice = Lattice::new(area.shrunk(footprint.reach()), &[], STEP * footprint.reach(), &bounds);
+        let home = lattice.place(0);
+        let mut steering = Self {
+            area,
+            footprint,
+            clearance_m,
+            configured,
+            chosen: None,
+            planner: planner(PlannerKind::Lawnmower),
+            running: PlannerKind::Lawnmower,
+            bounds,
+            home,
+            return_point: None,
+            lattice,
+            window: Window::new(area, cell_m),
+            ways_home: None,
+            home_leg_m: 0.0,
+            known: Knowledge::default(),
+            plan: VecDeque::new(),
+            planned_for: 0,
+        };
+        steering.lay_out();
+        steering
     }
 
     /// Where the survey begins, metres.
-    pub fn start(&self) -> (f64, f64) {
-        self.legs.first().copied().unwrap_or_default()
+    pub fn start(&self) -> Point {
+        self.lattice.place(0)
+    }
+
+    /// Where the vehicle goes on its return.
+    pub fn home(&self) -> Point {
+        self.return_point.unwrap_or(self.home)
+    }
+
+    /// The bounds in force.
+    pub fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    /// Puts a fence that was checked in force.
+    pub fn set_fence(&mut self, fence: &Fence) {
+        self.bounds = Bounds::new(fence, self.clearance_m);
+        self.return_point = fence.return_point.map(|p| p.metres());
+        self.lay_out();
+    }
+
+    /// The operator's choice of a planner; `None`: as configured.
+    pub fn set_planner(&mut self, chosen: Option<PlannerKind>) {
+        self.chosen = chosen;
+        self.plan.clear();
+    }
+
+    /// Forgets the way that was planned.
+    pub fn replan(&mut self) {
+        self.plan.clear();
+    }
+
+    fn lay_out(&mut self) {
+        let reach = self.footprint.reach();
+        let inner = self.area.shrunk(reach);
+        self.lattice = Lattice::new(inner, &[self.home()], STEP * reach, &self.bounds);
+        let end = self.lattice.entry(self.home(), &self.bounds);
+        self.ways_home = end.map(|n| self.lattice.ways(n));
+        self.home_leg_m = end.map_or(0.0, |n| distance(self.home(), self.lattice.place(n)));
+        self.planner.handle_change();
+        self.plan.clear();
     }
 
     /// The camera saw the sea floor around `at`.
-    pub fn handle_view(&mut self, at: (f64, f64)) {
-        for block in self.blocks_around(at) {
-            *self.visits.entry(block).or_default() += 1;
-        }
-    }
-
-    /// The next waypoint from `from`.
-    pub fn next_waypoint(&mut self, from: (f64, f64), map: &LabelGrid, utility: Option<&Utility>) -> (f64, f64) {
-        match utility {
-            Some(utility) => self.greedy(from, map, utility),
-            None => self.next_of_lawnmower(),
-        }
-    }
-
-    fn next_of_lawnmower(&mut self) -> (f64, f64) {
-        if self.next_leg >= self.legs.len() {
-            self.legs.reverse();
-            self.next_leg = 1;
-        }
-        let waypoint = self.legs.get(self.next_leg).copied().unwrap_or_default();
-        self.next_leg += 1;
-        waypoint
-    }
-
-    /// The candidate with the greatest gain of utility a metre of way, what is seen on the way included.
-    fn greedy(&self, from: (f64, f64), map: &LabelGrid, utility: &Utility) -> (f64, f64) {
-        let worth = self.worth_of_blocks(map, utility);
-        let inner = self.area.shrunk(self.footprint.across.min(self.footprint.along) / 2.0);
-        let step = self.footprint.across.min(self.footprint.along) / 2.0;
-        let mut best = (f64::MIN, self.start());
-        let columns = ((inner.east - inner.west) / step) as i32;
-        let rows = ((inner.north - inner.south) / step) as i32;
-        for row in 0..=rows {
-            for column in 0..=columns {
-                let at = (inner.west + f64::from(column) * step, inner.south + f64::from(row) * step);
-                let distance = (at.0 - from.0).hypot(at.1 - from.1);
-                if distance < step / 2.0 {
-                    continue;
-                }
-                let gain: f64 = self.blocks_on_way(from, at, step).iter().filter_map(|b| worth.get(b)).sum();
-                // The way to turn and settle counts as half a footprint.
-                let rate = gain / (distance + step);
-                if rate > best.0 {
-                    best = (rate, at);
-                }
-            }
-        }
-        best.1
-    }
-
-    /// Utility of seeing each block once more: what is there, or what the seen blocks around let expect, less with each view.
-    fn worth_of_blocks(&self, map: &LabelGrid, utility: &Utility) -> BTreeMap<(i32, i32), f64> {
-        let mut seen: BTreeMap<(i32, i32), (f64, f64)> = BTreeMap::new();
-        for (cell, label) in map.iter() {
-            let entry = seen.entry((cell.x.div_euclid(BLOCK), cell.y.div_euclid(BLOCK))).or_default();
-            entry.0 += utility.weight(label);
-            entry.1 += 1.0;
-        }
-        let exploration = f64::from(utility.exploration) / 100.0;
-        let block = |metres: f64| block_of(metres, self.cell_m);
-        let mut worth = BTreeMap::new();
-        for by in block(self.area.south)..=block(self.area.north) {
-            for bx in block(self.area.west)..=block(self.area.east) {
-                let views = self.visits.get(&(bx, by)).copied().unwrap_or(0);
-                let value = match seen.get(&(bx, by)) {
-                    Some((sum, n)) => sum / n,
-                    None => exploration + expected(&seen, bx, by),
-                };
-                worth.insert((bx, by), value * 0.5f64.powi(views as i32));
-            }
-        }
-        worth
-    }
-
-    /// Blocks that the camera sees on the straight way from one place to another, looking every `step` metres.
-    fn blocks_on_way(&self, from: (f64, f64), to: (f64, f64), step: f64) -> BTreeSet<(i32, i32)> {
-        let looks = ((to.0 - from.0).hypot(to.1 - from.1) / step).ceil().max(1.0);
-        let at = |i: u32| {
-            let share = f64::from(i) / looks;
-            (from.0 + (to.0 - from.0) * share, from.1 + (to.1 - from.1) * share)
+    pub fn handle_view(&mut self, at: Point) {
+        let reach = self.footprint.reach();
+        // Cells whose middle was in sight.
+        let cells = |middle: f64| {
+            let edge = |metres: f64| metres / self.window.cell_m - 0.5;
+            edge(middle - reach).ceil() as i32..=edge(middle + reach).floor() as i32
         };
-        (1..=looks as u32).flat_map(|i| self.blocks_around(at(i))).collect()
+        for (y, x) in cells(at.1).flat_map(|y| cells(at.0).map(move |x| (y, x))) {
+            self.known.look(Cell::new(x, y));
+        }
     }
 
-    /// Blocks within half a footprint of a place, in metres.
-    fn blocks_around(&self, at: (f64, f64)) -> impl Iterator<Item = (i32, i32)> + use<> {
-        let reach = self.footprint.across.min(self.footprint.along) / 2.0;
-        let block = |metres: f64| block_of(metres, self.cell_m);
-        let (x0, x1, y0, y1) = (block(at.0 - reach), block(at.0 + reach), block(at.1 - reach), block(at.1 + reach));
-        (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (x, y)))
+    /// How badly the scene model explains a cell.
+    pub fn handle_perplexity(&mut self, cell: Cell, perplexity: f32) {
+        self.known.set_perplexity(cell, perplexity);
     }
-}
 
-fn block_of(metres: f64, cell_m: f64) -> i32 {
-    ((metres / cell_m).floor() as i32).div_euclid(BLOCK)
-}
+    /// The next waypoint from `from`, of which version `version` of the map is known, with `left_m` metres to go in all.
+    pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
+        self.follow_choice(utility.is_some());
+        let left_m = left_m - self.home_leg_m;
+        let Some(at) = self.lattice.entry(from, &self.bounds) else { return Course::NoWay };
+        let approach = distance(from, self.lattice.place(at));
+        let adapts = self.running != PlannerKind::Lawnmower;
+        let changed = adapts && self.planned_for != map.1;
+        if self.plan.front() == Some(&at) {
+            self.plan.pop_front();
+        }
+        let is_next = |n: &Node| self.lattice.around(at).any(|(to, _)| to == *n);
+        let follows = self.plan.front().is_some_and(is_next);
+        if changed || !follows || !self.can_go(at, &self.plan, left_m - approach) {
+            self.planned_for = map.1;
+            self.plan = self.ask(at, map.0, utility, left_m - approach).into();
+        }
+        self.waypoint(from, at, if adapts { STRAIGHT } else { usize::MAX }, left_m)
+    }
 
-/// Mean worth of the seen blocks within two blocks.
-fn expected(seen: &BTreeMap<(i32, i32), (f64, f64)>, bx: i32, by: i32) -> f64 {
-    let near = (-2..=2).flat_map(|dy| (-2..=2).filter_map(move |dx| seen.get(&(bx + dx, by + dy))));
-    let (sum, n) = near.fold((0.0, 0.0), |(s, n), (sum, cells)| (s + sum / cells, n + 1.0));
-    if n > 0.0 { sum / n } else { 0.0 }
-}
+    fn follow_choice(&mut self, has_utility: bool) {
+        let wanted = if has_utility { self.chosen.unwrap_or(self.configured) } else { PlannerKind::Lawnmower };
+        if wanted != self.running {
+            (self.planner, self.running) = (planner(wanted), wanted);
+            self.plan.clear();
+        }
+    }
 
-/// East-west legs from the south-west corner, `spacing` metres apart.
-fn lawnmower(area: &Area, spacing: f64) -> Vec<(f64, f64)> {
-    let lines = ((area.north - area.south) / spacing.max(1e-3)).ceil().clamp(0.0, 10_000.0) as u32;
-    (0..=lines)
-        .flat_map(|line| {
-            let y = if lines == 0 {
-                area.south
-            } else {
-                area.south + (area.north - area.south) * f64::from(line) / f64::from(lines)
-            };
-            let (first, last) = if line % 2 == 0 { (area.west, area.east) } else { (area.east, area.west) };
-            [(first, y), (last, y)]
-        })
-        .collect()
+    fn ask(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
+        let Some(home) = &self.ways_home else { return Vec::new() };
+        let none = Utility::default();
+        let worth = Worth::new(&self.lattice, &self.window, map, &self.known, utility.unwrap_or(&none));
+        let question = Question { lattice: &self.lattice, worth: &worth, from, home, left_m };
+        self.planner.plan(&question)
+    }
+
+    /// Whether the first place of a plan still leaves the way home.
+    fn can_go(&self, from: Node, plan: &VecDeque<Node>, left_m: f64) -> bool {
+        let Some(home) = &self.ways_home else { return false };
+        let first = plan.front().and_then(|&to| self.lattice.around(from).find(|(n, _)| *n == to));
+        first.is_some_and(|(n, step)| !left_m.is_finite() || step + home.metres[n] <= left_m)
+    }
+
+    /// The last place that lies straight ahead, at most `most` steps away.
+    fn waypoint(&mut self, from: Point, at: Node, most: usize, left_m: f64) -> Course {
+        let Some(&first) = self.plan.front() else {
+            return if left_m.is_finite() { Course::UsedUp } else { Course::There };
+        };
+        let entry = self.lattice.place(at);
+        if distance(from, entry) > self.lattice.step_m() || !self.bounds.allows_leg(from, self.lattice.place(first)) {
+            return Course::Go(entry);
+        }
+        let step = first as isize - at as isize;
+        let mut ahead = at;
+        let mut count = 0;
+        while let Some(&next) = self.plan.front() {
+            let is_straight = next as isize - ahead as isize == step;
+            let far = (self.lattice.place(next), from);
+            if count >= most || !is_straight || (count > 0 && !self.bounds.allows_leg(far.1, far.0)) {
+                break;
+            }
+            if count > 0 && !self.leaves_way_home(next, distance(far.0, far.1), left_m) {
+                break;
+            }
+            ahead = next;
+            count += 1;
+            self.plan.pop_front();
+        }
+        // It is popped when it is reached, so that the rest of the plan follows it.
+        self.plan.push_front(ahead);
+        Course::Go(self.lattice.place(ahead))
+    }
+
+    fn leaves_way_home(&self, node: Node, gone_m: f64, left_m: f64) -> bool {
+        !left_m.is_finite() || self.ways_home.as_ref().is_some_and(|w| gone_m + w.metres[node] <= left_m)
+    }
+
+    /// The next waypoint on the way home.
+    pub fn next_home(&mut self, from: Point) -> Course {
+        self.plan.clear();
+        let home = self.home();
+        if distance(from, home) <= self.arrival_m() {
+            return Course::There;
+        }
+        let (Some(at), Some(end)) = (self.lattice.entry(from, &self.bounds), self.lattice.entry(home, &self.bounds))
+        else {
+            return Course::NoWay;
+        };
+        let way = self.lattice.ways(at).to(end);
+        if at != end && way.is_empty() {
+            return Course::NoWay;
+        }
+        let entry = self.lattice.place(at);
+        match way.first().map(|&n| self.lattice.place(n)) {
+            None if distance(from, entry) > self.arrival_m() => Course::Go(entry),
+            None if self.bounds.allows_exit(home, entry) => Course::Go(home),
+            None => Course::There,
+            Some(next) if self.bounds.allows_leg(from, next) => Course::Go(next),
+            Some(_) => Course::Go(entry),
+        }
+    }
+
+    /// Metres of the way home from a place, infinite if there is none.
+    pub fn way_home_m(&self, from: Point) -> f64 {
+        let Some(at) = self.lattice.entry(from, &self.bounds) else { return f64::INFINITY };
+        let along = self.ways_home.as_ref().map_or(f64::INFINITY, |w| w.metres[at]);
+        distance(from, self.lattice.place(at)) + along + self.home_leg_m
+    }
+
+    /// Metres from a waypoint at which it counts as reached.
+    pub fn arrival_m(&self) -> f64 {
+        0.5f64.min(self.clearance_m.max(0.1) / 2.0)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::map::Cell;
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
     const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 3.0 };
 
+    fn steering(kind: PlannerKind) -> Steering {
+        Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
+    }
+
+    /// Drives to waypoint after waypoint; the places that it came to.
+    fn drive(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, legs: usize) -> Vec<Point> {
+        let mut at = steering.start();
+        let mut track = vec![at];
+        for version in 0..legs {
+            let Course::Go(to) = steering.next(at, (map, version as u64), utility, f64::INFINITY) else { break };
+            at = to;
+            track.push(at);
+            steering.handle_view(at);
+        }
+        track
+    }
+
     #[test]
     fn the_lawnmower_covers_the_area_and_stays_inside_it() {
-        let mut steering = Steering::new(AREA, FOOTPRINT, 0.25);
-        let legs: Vec<_> = (0..20).map(|_| steering.next_waypoint((0.0, 0.0), &LabelGrid::default(), None)).collect();
-        assert!(legs.iter().all(|&(x, y)| (0.0..=20.0).contains(&x) && (0.0..=12.0).contains(&y)));
-        assert!(legs.iter().any(|l| l.1 > 10.0) && legs.iter().any(|l| l.1 < 2.0));
+        let legs = drive(&mut steering(PlannerKind::Horizon), &LabelGrid::default(), None, 20);
+        assert!(legs.iter().all(|&(x, y)| (0.0..=20.0).contains(&x) && (0.0..=12.0).contains(&y)), "{legs:?}");
+        assert!(legs.iter().any(|l| l.1 > 9.0) && legs.iter().any(|l| l.1 < 2.0), "{legs:?}");
     }
 
     #[test]
@@ -211,10 +310,11 @@ mod tests {
                 map.set(Cell::new(x, y), if x > 60 && y > 30 { 2 } else { 1 });
             }
         }
-        let weights = [(2, 100), (1, -50)].into_iter().collect();
+        let weights = [(2, 100), (1, -5)].into_iter().collect();
         let utility = Utility { weights, ..Utility::default() };
-        let mut steering = Steering::new(AREA, FOOTPRINT, 0.25);
-        let to = steering.next_waypoint((1.0, 1.0), &map, Some(&utility));
-        assert!(to.0 > 14.0 && to.1 > 7.0, "{to:?}");
+        for kind in [PlannerKind::Greedy, PlannerKind::Horizon] {
+            let track = drive(&mut steering(kind), &map, Some(&utility), 12);
+            assert!(track.iter().any(|to| to.0 > 14.0 && to.1 > 7.0), "{kind:?}: {track:?}");
+        }
     }
 }

@@ -1,6 +1,8 @@
 //! `scenecast bench`
 
 use super::bench_link::Link;
+use super::bench_modem::Modem;
+use super::bench_planning::Planning;
 use super::sim::WorldArguments;
 use crate::problem::Problem;
 use crate::rehearsal::{FidelityRow, fidelity};
@@ -13,6 +15,10 @@ pub(super) enum Bench {
     Fidelity(Fidelity),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(Link),
+    /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
+    Modem(Modem),
+    /// Planners against each other: utility collected a metre.
+    Planning(Planning),
 }
 
 /// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
@@ -32,6 +38,8 @@ impl Bench {
         match self {
             Self::Fidelity(f) => f.run(),
             Self::Link(l) => l.run(),
+            Self::Modem(m) => m.run(),
+            Self::Planning(p) => p.run(),
         }
     }
 }

@@ -4,6 +4,8 @@
 
 mod bench;
 mod bench_link;
+mod bench_modem;
+mod bench_planning;
 mod ctl;
 mod demo;
 mod key;

@@ -38,6 +38,9 @@ const fn key(name: &'static str, unit: &'static str, allowed: Allowed, roles: &'
 
 use Allowed::{Choice, Flag, List, Range, Text, Words};
 
+/// What a vehicle may do of its own accord.
+const REACTIONS: Allowed = Choice(&["hold", "return", "surface"]);
+
 /// Every key, in the order of the files.
 pub const KEYS: &[Key] = &[
     key("mission.name", "", Text, "asr", "name of the mission for people"),
@@ -65,7 +68,13 @@ pub const KEYS: &[Key] = &[
         "bits on air that this end may send, mean over the window",
     ),
     key("link.budget_window_s", "s", Range(1.0, 3600.0), "asr", "window over which the budget is kept"),
-    key("link.frame_bytes", "bytes", Range(32.0, 1024.0), "asr", "size of a full frame, the same at both ends"),
+    key(
+        "link.frame_bytes",
+        "bytes",
+        Range(32.0, 1024.0),
+        "asr",
+        "size of a full frame, the same at both ends; s2c and micromodem have sizes of their own",
+    ),
     key(
         "link.shares",
         "%",
@@ -116,22 +125,71 @@ pub const KEYS: &[Key] = &[
     key(
         "modem.kind",
         "",
-        Choice(&["tcp", "transparent"]),
-        "as",
-        "tcp: frames over a TCP link; transparent: a byte pipe on a serial device",
+        Choice(&["s2c", "micromodem", "transparent", "tcp", "udp"]),
+        "asr",
+        "s2c: EvoLogics; micromodem: WHOI; transparent: a byte pipe; tcp, udp: frames to the other end over a network, in a rehearsal the simulated water without modems",
     ),
-    key("modem.device", "", Text, "as", "serial device of a transparent modem, best from /dev/serial/by-id"),
-    key("modem.baud", "bit/s", Range(300.0, 4_000_000.0), "as", "speed of the serial device"),
-    key("modem.listen", "", Text, "as", "ADDRESS:PORT to listen on, modem kind tcp"),
-    key("modem.connect", "", Text, "as", "ADDRESS:PORT to connect to, modem kind tcp"),
-    key("modem.bit_rate", "bit/s", Range(10.0, 1e7), "as", "bit rate of the modem on air"),
+    key(
+        "modem.device",
+        "",
+        Text,
+        "as",
+        "serial device of the modem, best from /dev/serial/by-id; empty: over the network by modem.connect or modem.listen",
+    ),
+    key("modem.baud", "bit/s", Range(300.0, 4_000_000.0), "asr", "speed of the serial device"),
+    key("modem.listen", "", Text, "as", "ADDRESS:PORT to listen on, or to receive datagrams at"),
+    key("modem.connect", "", Text, "as", "ADDRESS:PORT to connect to, or to send datagrams to"),
+    key(
+        "modem.bit_rate",
+        "bit/s",
+        Range(10.0, 1e7),
+        "as",
+        "bit rate of the modem on air; that of instant messages and of a micromodem's packets is known",
+    ),
     key(
         "modem.overhead_bits",
         "bit",
         Range(0.0, 100_000.0),
         "asr",
-        "bits on air that a transmission costs besides its bytes",
+        "bits on air that a transmission costs besides its bytes; what s2c and micromodem cost is known",
     ),
+    key(
+        "modem.surface_address",
+        "",
+        Range(1.0, 127.0),
+        "asr",
+        "address of the surface's modem (s2c, micromodem), the same at both ends; a vehicle's modem has vehicle.address; a modem with another address is refused",
+    ),
+    key(
+        "modem.s2c_mode",
+        "",
+        Choice(&["burst", "im"]),
+        "asr",
+        "burst: bulk in bursts, commands in instant messages; im: everything in instant messages, about 500 bit/s; the same at both ends",
+    ),
+    key(
+        "modem.source_level",
+        "",
+        Range(0.0, 3.0),
+        "as",
+        "source level of an s2c: 0 the loudest, 3 the least and the only one that does no harm in air",
+    ),
+    key(
+        "modem.highest_address",
+        "",
+        Range(2.0, 254.0),
+        "as",
+        "highest address of an s2c network, the same on all modems: 2, 6, 14, 30, 62, 126 or 254",
+    ),
+    key(
+        "modem.cluster",
+        "",
+        Range(1.0, 32.0),
+        "asr",
+        "data packets a train of an s2c; fewer let commands through sooner and carry less",
+    ),
+    key("modem.packet_ms", "ms", Range(50.0, 1000.0), "asr", "longest data packet of an s2c, the same on all modems"),
+    key("modem.rate", "", Range(0.0, 5.0), "asr", "rate of a micromodem's packets, the same at both ends"),
     key("channel.bit_rate", "bit/s", Range(10.0, 1e7), "r", "bit rate of the simulated modems on air"),
     key(
         "channel.range_m",
@@ -233,15 +291,45 @@ pub const KEYS: &[Key] = &[
         "ar",
         "west, south, east and north limits; all 0: the rehearsal's image",
     ),
+    key(
+        "survey.planner",
+        "",
+        Choice(&["lawnmower", "greedy", "horizon"]),
+        "ar",
+        "how the vehicle chooses its way once the operator has said what matters; the operator may choose another",
+    ),
+    key(
+        "survey.clearance_m",
+        "m",
+        Range(0.0, 1000.0),
+        "ar",
+        "distance that the vehicle plans to keep from fence and keep-outs, for its size, its turns and its drift",
+    ),
+    key(
+        "survey.max_silence_s",
+        "s",
+        Range(0.0, 1e6),
+        "ar",
+        "longest silence of the surface before the vehicle acts by itself, unless the operator sets another; 0: any",
+    ),
+    key("survey.on_silence", "", REACTIONS, "ar", "what it then does, unless the operator says otherwise"),
+    key(
+        "survey.on_breach",
+        "",
+        REACTIONS,
+        "ar",
+        "what it does outside the fence, in a keep-out or outside a depth band, unless the operator says otherwise",
+    ),
+    key("survey.on_abort", "", REACTIONS, "ar", "what it does on an abort, unless the operator says otherwise"),
     key("navigation.drift_percent", "%", Range(0.0, 50.0), "ar", "drift of dead reckoning in percent of the distance"),
     key("navigation.fix_period_s", "s", Range(0.0, 3600.0), "r", "time between two position fixes; 0: none"),
     key("navigation.fix_sigma_m", "m", Range(0.0, 100.0), "r", "standard deviation of a fix"),
     key(
         "operator.script",
         "",
-        Choice(&["scripted", "none"]),
+        Choice(&["scripted", "fenced", "none"]),
         "r",
-        "scripted: two utilities and image requests at fixed times",
+        "scripted: two utilities and image requests at fixed times; fenced: the same within a fence and limits",
     ),
     key("console.listen", "", Text, "s", "ADDRESS:PORT of the operator's page; empty: none"),
     key(

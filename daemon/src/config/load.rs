@@ -1,6 +1,6 @@
 //! Reading of configuration files and `--set` options.
 
-use super::{Allowed, Config, KEYS, Key, Link};
+use super::{Allowed, Config, KEYS, Key};
 use crate::problem::Problem;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
@@ -55,7 +55,8 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
         return Err(Problem::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
     }
-    check_frame(link)?;
+    crate::modem::check(config)?;
+    check_frame(config)?;
     let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
     for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
         if bits / rate > LONGEST_FRAME_S {
@@ -70,16 +71,21 @@ fn check_together(config: &Config) -> Result<(), Problem> {
 }
 
 /// Under a key a frame ends in a tag, beside which the longest thing that cannot be cut must fit.
-fn check_frame(link: &Link) -> Result<(), Problem> {
+fn check_frame(config: &Config) -> Result<(), Problem> {
+    let link = &config.link;
     let (least, with, what) = match (link.key_file.as_str(), link.authenticate.as_str()) {
         ("", _) => return Ok(()),
         (_, "all") => (48, "link.authenticate = \"all\"", "the vehicle's report"),
         _ => (36, "a link.key_file", "a position fix"),
     };
-    if link.frame_bytes >= least {
+    let frame_bytes = crate::modem::full_frame_bytes(config);
+    if frame_bytes >= least {
         return Ok(());
     }
-    let given = format!("link.frame_bytes = {}", link.frame_bytes);
+    let given = match config.modem.kind.as_str() {
+        "micromodem" => format!("modem.rate = {} with frames of {frame_bytes} bytes", config.modem.rate),
+        _ => format!("link.frame_bytes = {frame_bytes}"),
+    };
     let why = format!("{what} does not fit a smaller frame beside the tag");
     Err(Problem::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
 }

@@ -116,20 +116,34 @@ section! {
 section! {
     /// The modem.
     Modem {
-        /// `tcp` or `transparent`.
+        /// `s2c`, `micromodem`, `transparent`, `tcp` or `udp`.
         kind: String = "tcp".into(),
-        /// Serial device of a transparent modem.
+        /// Serial device; empty = over the network.
         device: String = String::new(),
         /// Its speed in bits a second.
-        baud: u32 = 9600,
-        /// Address to listen on (surface, `tcp`).
+        baud: u32 = 19_200,
+        /// Address to listen on.
         listen: String = String::new(),
-        /// Address to connect to (vehicle, `tcp`).
+        /// Address to connect to.
         connect: String = String::new(),
         /// Bits a second on air.
         bit_rate: f64 = 10_000.0,
         /// Bits on air that a transmission costs besides its bytes.
         overhead_bits: u32 = 0,
+        /// Address of the surface's modem; a vehicle's has the vehicle's.
+        surface_address: u8 = 10,
+        /// `burst` or `im` (S2C).
+        s2c_mode: String = "burst".into(),
+        /// Source level, 0 is the loudest (S2C).
+        source_level: u8 = 3,
+        /// Highest address of the network (S2C).
+        highest_address: u8 = 14,
+        /// Data packets a train (S2C).
+        cluster: u8 = 10,
+        /// Longest data packet in milliseconds (S2C).
+        packet_ms: u16 = 750,
+        /// Rate of packets (Micromodem).
+        rate: u8 = 1,
     }
 }
 section! {
@@ -225,6 +239,18 @@ section! {
         depth_m: f64 = 20.0,
         /// West, south, east, north limits in metres from the origin; all 0 = the rehearsal's image.
         area_m: [f64; 4] = [0.0; 4],
+        /// `lawnmower`, `greedy` or `horizon`.
+        planner: String = "horizon".into(),
+        /// Metres that the vehicle plans to stay away from fence and keep-outs.
+        clearance_m: f64 = 1.0,
+        /// Seconds that the surface may be silent; 0 = any.
+        max_silence_s: f64 = 0.0,
+        /// `hold`, `return` or `surface`.
+        on_silence: String = "return".into(),
+        /// `hold`, `return` or `surface`.
+        on_breach: String = "return".into(),
+        /// `hold`, `return` or `surface`.
+        on_abort: String = "surface".into(),
     }
 }
 section! {

@@ -1,12 +1,12 @@
 //! What a browser may ask of the surface.
 
 use super::export::Cells;
-use super::orders::BudgetOrder;
+use super::orders::{BudgetOrder, SettingsOrder};
 use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
-use crate::asv::{ExemplarState, Surface};
-use scenecast_protocol::directive::SlotId;
+use crate::asv::{ExemplarState, FenceOrder, LimitsOrder, Surface};
+use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
@@ -23,12 +23,18 @@ pub enum Ask {
     Map(u8),
     /// The image of a label.
     Exemplar(u8, u8),
-    /// Send weights.
-    Utility(u8, BTreeMap<u8, f64>, f64),
+    /// Send weights of labels, and of unseen cells and perplexity.
+    Utility(u8, BTreeMap<u8, f64>, (f64, f64)),
     /// Ask the vehicle for an image of a label.
     Request(u8, u8),
-    /// Tell the vehicle to stay, or to go on.
-    Hold(u8, bool),
+    /// Tell the vehicle to stay, to abort, or to go on.
+    Order(u8, Constraints),
+    /// Send a fence.
+    Fence(u8, FenceOrder),
+    /// Send limits.
+    Limits(u8, LimitsOrder),
+    /// Change planner and refinement.
+    Settings(u8, SettingsOrder),
     /// Change the bit budget, and the least shares if there are any.
     Budget(BudgetOrder),
 }
@@ -67,16 +73,30 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
             }
         }
         Ask::Budget(order) => budget(surface, order, now),
-        Ask::Utility(id, weights, exploration) => match address(id) {
-            Some(a) => accepted(a, SlotId::Utility, surface.set_utility(a, &weights, exploration, now)),
+        Ask::Utility(id, weights, others) => match address(id) {
+            Some(a) => accepted(a, SlotId::Utility, surface.set_utility(a, &weights, others, now)),
             None => Reply::NotFound,
         },
         Ask::Request(id, label) => match address(id) {
             Some(a) => accepted(a, SlotId::Requests, surface.request_exemplar(a, label, now)),
             None => Reply::NotFound,
         },
-        Ask::Hold(id, hold) => match address(id) {
-            Some(a) => accepted(a, SlotId::Constraints, surface.set_hold(a, hold, now)),
+        Ask::Order(id, order) => match address(id) {
+            Some(a) => accepted(a, SlotId::Constraints, surface.set_order(a, order, now)),
+            None => Reply::NotFound,
+        },
+        Ask::Fence(id, fence) => match address(id) {
+            Some(a) => accepted(a, SlotId::Fence, surface.set_fence(a, &fence, now)),
+            None => Reply::NotFound,
+        },
+        Ask::Limits(id, limits) => match address(id) {
+            Some(a) => accepted(a, SlotId::Limits, surface.set_limits(a, &limits, now)),
+            None => Reply::NotFound,
+        },
+        Ask::Settings(id, SettingsOrder { planner, refine_words_per_s }) => match address(id) {
+            Some(a) => {
+                accepted(a, SlotId::Settings, surface.set_settings(a, planner.as_deref(), refine_words_per_s, now))
+            }
             None => Reply::NotFound,
         },
     }

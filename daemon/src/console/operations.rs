@@ -1,10 +1,11 @@
 //! Every path and method of the server, in one table that makes both the router and the OpenAPI document.
 
 use super::maps::{self, Format};
-use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, SettingsOrder, UtilityOrder};
 use super::server::{self, Shared, VehicleId};
 use super::state::{Accepted, Map, State as Everything};
 use super::{events, metrics, openapi, token};
+use crate::asv::{FenceOrder, LimitsOrder};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -174,9 +175,33 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v1/vehicles/{id}/constraints",
             "set_constraints",
-            "Tells the vehicle to stay, or to go on",
+            "Tells the vehicle to stay, to abort, or to go on",
             schema::<ConstraintsOrder>,
             || post(server::constraints),
+        ),
+        order(
+            "/api/v1/vehicles/{id}/fence",
+            "set_fence",
+            "Sends a fence in place of the last. Vertices in metres east and north, 3 to 34 an outline, at most 15 keep-outs. \
+             Refused: edges that cross or touch, no area, a keep-out around the whole fence, a return point where the \
+             vehicle may not be, more than fits a frame. The vehicle refuses a fence outside of which it is.",
+            schema::<FenceOrder>,
+            || post(server::fence),
+        ),
+        order(
+            "/api/v1/vehicles/{id}/limits",
+            "set_limits",
+            "Sends limits in place of the last. Reactions are hold, return or surface. The vehicle refuses a band in which it \
+             does not fly.",
+            schema::<LimitsOrder>,
+            || post(server::limits),
+        ),
+        order(
+            "/api/v1/vehicles/{id}/settings",
+            "set_settings",
+            "Changes planner and refinement",
+            schema::<SettingsOrder>,
+            || post(server::settings),
         ),
         order(
             "/api/v1/budget",

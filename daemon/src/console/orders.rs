@@ -14,6 +14,10 @@ pub struct UtilityOrder {
     #[serde(default)]
     #[schemars(range(min = -1.0, max = 1.0))]
     pub exploration: f64,
+    /// -1 to 1 for cells that the scene model explains badly.
+    #[serde(default)]
+    #[schemars(range(min = -1.0, max = 1.0))]
+    pub curiosity: f64,
 }
 
 /// Asks for an image of a label, or for a further one.
@@ -25,12 +29,27 @@ pub struct ExemplarOrder {
     pub label: u8,
 }
 
-/// Tells the vehicle to stay, or to go on.
+/// Tells the vehicle to stay, to abort, or with both false to go on, also after a breach.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstraintsOrder {
     /// Whether it stays.
     pub hold: bool,
+    /// Whether it aborts; goes before `hold`.
+    #[serde(default)]
+    pub abort: bool,
+}
+
+/// Changes planner and refinement; what is left out stays as it was sent last.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SettingsOrder {
+    /// lawnmower, greedy, horizon, or empty: as configured on the vehicle.
+    #[serde(default)]
+    pub planner: Option<String>,
+    /// Words resampled a second; 0: as configured on the vehicle.
+    #[serde(default)]
+    pub refine_words_per_s: Option<u32>,
 }
 
 /// Budget of the surface, at once, and of each vehicle, by the directive.

@@ -4,17 +4,19 @@ use super::answer::{Ask, Reply};
 use super::guard::{self, Names};
 use super::maps::Maps;
 use super::operations::operations;
-use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, SettingsOrder, UtilityOrder};
 use super::snapshot::Snapshot;
 use super::state::Refusal;
 use super::token::Access;
 use super::{assets, compress, connections, events};
+use crate::asv::{FenceOrder, LimitsOrder};
 use crate::problem::Problem;
 use axum::extract::{DefaultBodyLimit, FromRequest, FromRequestParts, Path, Request as HttpRequest, State};
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
+use scenecast_protocol::directive::Constraints;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -188,7 +190,7 @@ pub(super) async fn utility(
     let weight =
         |(label, w): (String, f64)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is no label"));
     match order.weights.into_iter().map(weight).collect::<Result<BTreeMap<u8, f64>, String>>() {
-        Ok(weights) => shared.ask(Ask::Utility(id, weights, order.exploration)).await,
+        Ok(weights) => shared.ask(Ask::Utility(id, weights, (order.exploration, order.curiosity))).await,
         Err(why) => refusal(StatusCode::UNPROCESSABLE_ENTITY, &why),
     }
 }
@@ -206,7 +208,31 @@ pub(super) async fn constraints(
     VehicleId(id): VehicleId,
     Order(order): Order<ConstraintsOrder>,
 ) -> Response {
-    shared.ask(Ask::Hold(id, order.hold)).await
+    shared.ask(Ask::Order(id, Constraints { hold: order.hold, abort: order.abort })).await
+}
+
+pub(super) async fn fence(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<FenceOrder>,
+) -> Response {
+    shared.ask(Ask::Fence(id, order)).await
+}
+
+pub(super) async fn limits(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<LimitsOrder>,
+) -> Response {
+    shared.ask(Ask::Limits(id, order)).await
+}
+
+pub(super) async fn settings(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<SettingsOrder>,
+) -> Response {
+    shared.ask(Ask::Settings(id, order)).await
 }
 
 pub(super) async fn budget(State(shared): State<Shared>, Order(order): Order<BudgetOrder>) -> Response {

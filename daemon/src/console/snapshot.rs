@@ -6,7 +6,7 @@ use crate::asv::{Desk, ExemplarState, Surface};
 use crate::config::Config;
 use crate::figures::dropped;
 use axum::body::Bytes;
-use scenecast_protocol::directive::{LifeLine, SlotId, SlotProgress};
+use scenecast_protocol::directive::{LifeLine, PlannerKind, SlotId, SlotProgress};
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
 use scenecast_protocol::schedule::Class;
@@ -121,9 +121,22 @@ fn vehicle(
         status: view.status().map(|(s, at)| status(s, *at)),
         track: desk.track.iter().map(|&(at, x, y)| (seconds(at), x, y)).collect(),
         map: map(surface, address, desk, &view, labels.values().sum(), facts),
-        utility: state::Utility { exploration: f64::from(desk.utility.exploration) / 100.0 },
+        utility: state::Utility {
+            exploration: f64::from(desk.utility.exploration) / 100.0,
+            curiosity: f64::from(desk.utility.curiosity) / 100.0,
+        },
+        fence: desk.fence.as_ref().map(Into::into),
+        limits: desk.limits.as_ref().map(Into::into),
+        planner: desk.settings.planner.map(|p| PlannerKind::name(p).to_owned()),
         labels: labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect(),
         link: link_of(&view, now),
+        usbl: desk.found.as_ref().map(|(line, at)| state::Usbl {
+            at_s: seconds(*at) - line.age_s,
+            range_m: line.range_m,
+            bearing_rad: line.direction_rad.map(|(bearing, _)| bearing),
+            elevation_rad: line.direction_rad.map(|(_, elevation)| elevation),
+            accuracy: line.accuracy,
+        }),
         directive: state::Directive { slots: view.slots().map(slot).collect() },
     })
 }
@@ -197,6 +210,8 @@ fn status(s: &VehicleStatus, at: Instant) -> state::Status {
             VehicleMode::Abort => state::Mode::Abort,
             VehicleMode::Done => state::Mode::Done,
         },
+        reason: s.reason.name().map(str::to_owned),
+        doing: doing(s),
         waypoint: s.waypoint,
         cells: s.explored_cells,
         labels: u32::from(s.labels),
@@ -204,6 +219,19 @@ fn status(s: &VehicleStatus, at: Instant) -> state::Status {
         budget_bps: s.budget_bps,
         refused_frames: u32::from(s.refused_frames),
     }
+}
+
+/// Mode and reason as people say it.
+fn doing(s: &VehicleStatus) -> String {
+    let mode = match s.mode {
+        VehicleMode::Survey => "surveying",
+        VehicleMode::Hold => "holding",
+        VehicleMode::Return => "returning",
+        VehicleMode::Surface => "surfacing",
+        VehicleMode::Abort => "aborted",
+        VehicleMode::Done => "done",
+    };
+    s.reason.name().map_or(mode.to_owned(), |why| format!("{mode}: {why}"))
 }
 
 fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address, facts: &MissionFacts) -> state::Label {

@@ -1,5 +1,6 @@
 //! What the API tells: the answers as types, from which the OpenAPI document is made.
 
+use crate::asv::{FenceOrder, LimitsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -63,12 +64,35 @@ pub struct Vehicle {
     pub map: MapSummary,
     /// The utility that was sent last, besides the weights of the labels.
     pub utility: Utility,
+    /// The fence that was sent last; null before.
+    pub fence: Option<FenceOrder>,
+    /// The limits that were sent last; null before.
+    pub limits: Option<LimitsOrder>,
+    /// The planner that was sent last; null: as configured on the vehicle.
+    pub planner: Option<String>,
     /// The labels on the map.
     pub labels: Vec<Label>,
     /// What was measured of the water to this vehicle.
     pub link: VehicleLink,
+    /// Where the surface's modem found the vehicle last; null before the first.
+    pub usbl: Option<Usbl>,
     /// What was ordered and how far that has come.
     pub directive: Directive,
+}
+
+/// Where the surface's modem found a vehicle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Usbl {
+    /// When.
+    pub at_s: f64,
+    /// Slant range; null if only directions are known.
+    pub range_m: Option<f64>,
+    /// Clockwise from north; null if only the range is good.
+    pub bearing_rad: Option<f64>,
+    /// Above the horizontal; null if only the range is good.
+    pub elevation_rad: Option<f64>,
+    /// Metres, of directions alone radians.
+    pub accuracy: f64,
 }
 
 /// What a vehicle said of itself.
@@ -88,6 +112,10 @@ pub struct Status {
     pub sigma_m: f64,
     /// What it does.
     pub mode: Mode,
+    /// Why, if not because the survey asks for it: order, fence, distance, time, silence, depth or altitude, no way.
+    pub reason: Option<String>,
+    /// Mode and reason in words, as in "holding: fence".
+    pub doing: String,
     /// Where it is going, metres east and north.
     pub waypoint: Option<(f64, f64)>,
     /// Cells that it has explored.
@@ -148,6 +176,8 @@ pub struct MapSummary {
 pub struct Utility {
     /// Weight of unseen cells, -1 to 1.
     pub exploration: f64,
+    /// Weight of cells that the scene model explains badly, -1 to 1.
+    pub curiosity: f64,
 }
 
 /// A label on the map.

@@ -33,7 +33,8 @@ impl Ctl {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?;
         let weights = vehicle.labels.iter().filter(|l| l.weight != 0.0).map(|l| (l.id.to_string(), l.weight)).collect();
-        let order = UtilityOrder { weights, exploration: vehicle.utility.exploration };
+        let order =
+            UtilityOrder { weights, exploration: vehicle.utility.exploration, curiosity: vehicle.utility.curiosity };
         self.tell(&order, || {
             let weights = order.weights.iter().map(|(label, w)| format!("label {label}: {w:.2}\n"));
             format!("{}unseen cells: {:.2}\n", weights.collect::<String>(), order.exploration)
@@ -49,11 +50,13 @@ impl Ctl {
     ) -> Result<(), Problem> {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?;
-        let mut order = UtilityOrder { weights: BTreeMap::new(), exploration: exploration.unwrap_or(0.0) };
+        let mut order =
+            UtilityOrder { weights: BTreeMap::new(), exploration: exploration.unwrap_or(0.0), curiosity: 0.0 };
         if keep {
             let sent = vehicle.labels.iter().filter(|l| l.weight != 0.0).map(|l| (l.id.to_string(), l.weight));
             order.weights.extend(sent);
             order.exploration = exploration.unwrap_or(vehicle.utility.exploration);
+            order.curiosity = vehicle.utility.curiosity;
         }
         order.weights.extend(weights.into_iter().map(|(label, w)| (label.to_string(), w)));
         let accepted = self.client.post(&format!("/api/v1/vehicles/{}/utility", vehicle.id), &order).await?;

@@ -4,6 +4,9 @@
 //! occurs nowhere else. One delimiter stands on each side of a frame: `+++AT`, which a modem would take for a command,
 //! never occurs.
 
+/// Bytes that framing adds at most to a frame of up to 1016 bytes: two delimiters, a code for each 254 bytes.
+pub const OVERHEAD_BYTES: u64 = 7;
+
 /// The byte between frames.
 pub const DELIMITER: u8 = b'+';
 

@@ -1,129 +1,177 @@
-//! Ways to a modem.
+//! Modems: drivers without IO, the ports to them, and the account of what goes on air.
 //!
-//! `tcp`: frames over a TCP link, each with its length; `transparent`: a byte pipe on a serial device, framed by
-//! [`framing`]. Both keep the pace of the modem on air, so that the host knows when a transmission has ended.
+//! | module | is |
+//! |---|---|
+//! | [`Driver`] | what every driver is: bytes in, bytes out |
+//! | [`s2c`], [`micromodem`], [`paced`] | the drivers; `paced` is for pipes, TCP and UDP |
+//! | [`framing`] | frames in a stream of bytes |
+//! | [`Station`] | a driver as the link sees it; what rehearsals and processes share |
+//! | [`port`] | serial, TCP, UDP |
 
+mod driver;
 pub mod framing;
-mod pipe;
-mod tcp;
-mod transparent;
+mod kinds;
+pub mod micromodem;
+pub mod paced;
+pub mod port;
+pub mod s2c;
+mod station;
+
+#[cfg(test)]
+mod conformance;
+#[cfg(test)]
+mod storm;
+
+pub use driver::{Class, Destination, Driver, Event, ModemAddress, Reception, Refusal, Token, UsblLine};
+pub use kinds::{address_book, check, driver, full_frame_bytes};
+pub use station::{AddressBook, ModemEvent, PIPE_FRAMING_BITS, Station};
 
 use crate::config::Config;
 use crate::problem::Problem;
 use crate::runtime::Clock;
-use bytes::Bytes;
+use port::{FromPort, Port, ToPort};
+use scenecast_protocol::link::{Cycle, Transmit};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
 use std::time::Duration;
-use tokio::sync::mpsc;
-use tokio::time::Instant;
 
-/// What a modem tells.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ModemEvent {
-    /// The transmission has ended; the next one may begin.
-    Sent,
-    /// Bytes were heard.
-    Received(Bytes),
-}
-
-/// A modem: takes one transmission at a time, and gives what it hears.
+/// A modem of a process: a station at a port.
 #[derive(Debug)]
 pub struct Modem {
-    outgoing: mpsc::Sender<Bytes>,
-    incoming: mpsc::Receiver<Bytes>,
-    profile: ModemProfile,
-    /// The slowest of the ways to the water: bits a second.
-    pace_bps: f64,
-    busy_until: Option<Instant>,
-    /// What went on air, counted at the door, and what the configuration allows in a window.
-    audit: Audit,
+    station: Station,
+    port: Port,
+    clock: Clock,
+    /// What the configuration allows in a window, bits.
     window_bits: f64,
+    /// Whether the budget was found exceeded.
+    exceeded: bool,
+    was_ready: bool,
+    reopened: Instant,
 }
 
 impl Modem {
-    /// Whether a transmission is under way.
-    pub fn is_busy(&self) -> bool {
-        self.busy_until.is_some()
+    /// Whether the link may be asked for a frame.
+    pub fn takes_frames(&self) -> bool {
+        self.station.takes_frames()
+    }
+
+    /// Whether the link may be asked for a cycle.
+    pub fn takes_cycles(&self) -> bool {
+        self.station.takes_cycles(self.clock.now())
+    }
+
+    /// Begins a cycle of the modem.
+    pub fn begin_cycle(&mut self, cycle: Cycle) {
+        self.station.begin_cycle(cycle, self.clock.now());
     }
 
     /// The budget has changed.
     pub fn set_budget(&mut self, bits_per_s: u32) {
-        self.window_bits = self.window_bits.max(f64::from(bits_per_s) * self.window_s());
-    }
-
-    fn window_s(&self) -> f64 {
-        self.audit.window().as_secs_f64()
+        let window_s = self.station.audit().window().as_secs_f64();
+        self.window_bits = self.window_bits.max(f64::from(bits_per_s) * window_s);
     }
 
     /// Writes what went on air to the log.
     pub fn log_audit(&self) {
-        let a = &self.audit;
+        let a = self.station.audit();
         let (frames, bits, worst) = (a.transmissions(), a.total_bits(), a.worst_window_bps());
+        let repeated = self.station.repeated_bits();
         tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the worst window");
+        if repeated > 0 {
+            tracing::info!("{repeated} bits more were repeats of the modem, and charged to the budget");
+        }
     }
 
-    /// Puts a frame on air. A frame that the modem cannot take is lost like one on the way, and the link repairs it.
-    pub fn send(&mut self, bytes: Vec<u8>, clock: Clock) -> Result<(), Problem> {
-        if bytes.len() > self.profile.frame_bytes {
-            return Err(Problem::Failed(format!(
-                "a frame of {} bytes is larger than the modem's {}",
-                bytes.len(),
-                self.profile.frame_bytes
-            )));
+    /// Puts a frame on air. What the modem refuses is told, and the link repairs it as if it were lost.
+    pub fn send(&mut self, transmit: Transmit) {
+        if let Err(refusal) = self.station.send(transmit, self.clock.now()) {
+            tracing::error!("modem: a frame is not sent: {refusal}");
         }
-        let bits_on_air = self.profile.bits_on_air(bytes.len());
-        self.audit.record(bits_on_air, clock.now());
-        if self.audit.worst_window_bits() as f64 > self.window_bits + self.audit.largest_bits() as f64 {
-            tracing::error!(
-                "the bit budget was exceeded: {:.0} bit/s in the worst window",
-                self.audit.worst_window_bps()
-            );
+        let audit = self.station.audit();
+        let exceeded = audit.worst_window_bits() as f64 > self.window_bits + audit.largest_bits() as f64;
+        if exceeded && !std::mem::replace(&mut self.exceeded, true) {
+            tracing::error!("the bit budget was exceeded: {:.0} bit/s in the worst window", audit.worst_window_bps());
         }
-        let bits = bits_on_air as f64;
-        self.busy_until = Some(clock.wall(clock.now() + Duration::from_secs_f64(bits / self.pace_bps)));
-        if self.outgoing.try_send(bytes.into()).is_err() {
-            tracing::warn!("the modem is not connected: a frame is lost");
+    }
+
+    /// The next thing that happens; safe to abandon and to ask again.
+    pub async fn next(&mut self) -> Result<ModemEvent, Problem> {
+        loop {
+            if let Some(event) = self.station.poll_event() {
+                self.note(&event)?;
+                return Ok(event);
+            }
+            self.write().await;
+            let wake = self.station.poll_timeout();
+            let timeout = async {
+                match wake {
+                    Some(at) => tokio::time::sleep_until(self.clock.wall(at)).await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                () = timeout => self.station.handle_timeout(self.clock.now()),
+                told = self.port.from.recv() => self.handle_port(told)?,
+            }
+        }
+    }
+
+    fn handle_port(&mut self, told: Option<FromPort>) -> Result<(), Problem> {
+        let now = self.clock.now();
+        match told {
+            Some(FromPort::Open) => self.station.handle_open(now),
+            Some(FromPort::Closed) => self.station.handle_closed(now),
+            Some(FromPort::Bytes(bytes)) => self.station.handle_bytes(&bytes, now),
+            None => return Err(Problem::Failed("the modem's port has ended".to_owned())),
         }
         Ok(())
     }
 
-    /// The next thing that happens; safe to abandon and to ask again.
-    pub async fn next(&mut self) -> ModemEvent {
-        let ended = async {
-            match self.busy_until {
-                Some(at) => tokio::time::sleep_until(at).await,
-                None => std::future::pending().await,
-            }
-        };
-        tokio::select! {
-            () = ended => {
-                self.busy_until = None;
-                ModemEvent::Sent
-            }
-            Some(bytes) = self.incoming.recv() => ModemEvent::Received(bytes),
+    /// Writes what the driver has for the port, once the link has had its say.
+    async fn write(&mut self) {
+        let now = self.clock.now();
+        if self.station.wants_reopening(now) && now.since(self.reopened) > Duration::from_secs(10) {
+            self.reopened = now;
+            let _ = self.port.to.try_send(ToPort::Reopen);
         }
+        // A port that takes nothing is a dead one: the driver notices, and what it has to say is stale by then.
+        while let Some(bytes) = self.station.poll_output(now) {
+            if self.port.to.try_send(ToPort::Bytes(bytes.into())).is_err() {
+                tracing::debug!("modem: the port takes no more");
+            }
+        }
+    }
+
+    /// Says what a person should know. A modem that refuses before it ever worked ends the run: somebody is still there.
+    fn note(&mut self, event: &ModemEvent) -> Result<(), Problem> {
+        match event {
+            ModemEvent::Ready => {
+                self.was_ready = true;
+                tracing::info!("modem: ready");
+            }
+            ModemEvent::Lost => tracing::warn!("modem: lost; it is set up again when it answers"),
+            ModemEvent::Refused(what) if !self.was_ready => return Err(Problem::Failed(format!("modem: {what}"))),
+            ModemEvent::Refused(what) => tracing::error!("modem: {what}"),
+            _ => {}
+        }
+        Ok(())
     }
 }
 
-/// Opens the modem that the configuration names.
-pub async fn open(config: &Config, profile: ModemProfile) -> Result<Modem, Problem> {
-    let (outgoing, to_modem) = mpsc::channel(4);
-    let (from_modem, incoming) = mpsc::channel(64);
-    let m = &config.modem;
-    let mut pace_bps = m.bit_rate;
-    match m.kind.as_str() {
-        "transparent" => {
-            if m.device.is_empty() {
-                return Err(Problem::Input("modem.device: a transparent modem needs its serial device".to_owned()));
-            }
-            // A serial byte takes ten bits; the time scale of a rehearsal speeds up the water, not the cable.
-            pace_bps = pace_bps.min(f64::from(m.baud) * 0.8 / config.runtime.time_scale);
-            transparent::open(m.device.clone(), m.baud, profile.frame_bytes, to_modem, from_modem)?;
-        }
-        _ => tcp::open(&m.listen, &m.connect, profile.frame_bytes, to_modem, from_modem).await?,
-    }
+/// Opens the modem that the configuration names, for this end.
+pub async fn open(config: &Config, end: Address, profile: ModemProfile, clock: Clock) -> Result<Modem, Problem> {
+    let driver = driver(config, end, profile)?;
     let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
     let window_bits = f64::from(config.link.budget_bps) * config.link.budget_window_s;
-    Ok(Modem { outgoing, incoming, profile, pace_bps, busy_until: None, audit, window_bits })
+    Ok(Modem {
+        station: Station::new(driver, address_book(config), audit),
+        port: port::open(kinds::place(config)?).await?,
+        clock,
+        window_bits,
+        exceeded: false,
+        was_ready: false,
+        reopened: clock.now(),
+    })
 }

@@ -1,17 +1,21 @@
 //! A whole mission in virtual time: the role code of the sea, a made-up sea floor and water around it.
 
 mod baseline;
+pub mod docked;
 mod fidelity;
 mod frames_log;
 pub mod link_bench;
 mod meter;
 mod mission;
-mod motion;
+pub mod modem_bench;
+pub(crate) mod motion;
 mod outputs;
 mod panorama;
+pub mod planning_bench;
 mod recording;
 mod report;
 mod script;
+pub mod witness;
 mod world;
 
 pub use fidelity::{FidelityRow, fidelity};

@@ -29,8 +29,12 @@ pub struct Motion {
     heading_error_rad: f64,
     drift: f64,
     target: Option<(f64, f64)>,
+    rising: bool,
     dice: Stream,
 }
+
+/// Speed up and down, metres a second: that of a small vehicle.
+const VERTICAL_M_S: f64 = 0.3;
 
 impl Motion {
     /// At rest at a place; `drift` is the error of dead reckoning a metre of way.
@@ -38,13 +42,42 @@ impl Motion {
         let mut dice = Stream::new(seed, &[1]);
         let scale_error = drift * dice.normal();
         let heading_error_rad = drift * dice.normal();
-        let (heading_rad, distance_m, target) = (0.0, 0.0, None);
-        Self { x_m, y_m, heading_rad, distance_m, speed_m_s, scale_error, heading_error_rad, drift, target, dice }
+        let (heading_rad, distance_m, target, rising) = (0.0, 0.0, None, false);
+        Self {
+            x_m,
+            y_m,
+            heading_rad,
+            distance_m,
+            speed_m_s,
+            scale_error,
+            heading_error_rad,
+            drift,
+            target,
+            rising,
+            dice,
+        }
     }
 
     /// Sets the waypoint (in the vehicle's own coordinates), or stops.
     pub fn set_target(&mut self, target: Option<(f64, f64)>) {
-        self.target = target;
+        (self.target, self.rising) = (target, false);
+    }
+
+    /// Goes up where it is.
+    pub fn come_up(&mut self) {
+        (self.target, self.rising) = (None, true);
+    }
+
+    /// The depth after `dt_s` seconds, from `depth_m` and with the survey at `survey_m` below the surface.
+    pub fn depth_m(&self, depth_m: f64, survey_m: f64, dt_s: f64) -> f64 {
+        let aim = if self.rising {
+            0.0
+        } else if self.target.is_some() {
+            survey_m
+        } else {
+            depth_m
+        };
+        depth_m + (aim - depth_m).clamp(-VERTICAL_M_S * dt_s, VERTICAL_M_S * dt_s)
     }
 
     /// Moves for `dt_s` seconds; `believed` is where the vehicle believes to be, which is what it steers by.

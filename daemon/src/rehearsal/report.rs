@@ -147,10 +147,10 @@ fn link(m: &Mission) -> Value {
         })
     };
     json!({
-        "capacity_bps": m.config.channel.bit_rate,
+        "capacity_bps": m.modem.bit_rate_bps,
         "budget_bps": m.config.link.budget_bps,
         "budget_window_s": m.config.link.budget_window_s,
-        "frame_bytes": m.config.link.frame_bytes,
+        "frame_bytes": m.modem.frame_bytes,
         "sent_bps": round((up_audit.total_bits() + down_audit.total_bits()) as f64 / seconds),
         "worst_window_bps": round(worst),
         "frames_sent": m.log.sent.iter().sum::<u64>(),
@@ -192,6 +192,9 @@ fn exemplars(m: &Mission) -> Value {
 fn survey(m: &Mission) -> Value {
     json!({
         "distance_m": round(m.motion.distance_m),
+        "planner": m.config.survey.planner,
+        "waypoints": m.legs.len(),
+        "waypoints_outside_fence": m.legs_outside_fence(),
         "explored_cells": m.vehicle.map().explored(),
         "utility_collected": round(m.utility_collected()),
     })
@@ -205,6 +208,13 @@ impl Mission {
             crate::asv::ExemplarState::Here(webp) => Some((label, webp.as_slice())),
             _ => None,
         })
+    }
+
+    /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out.
+    pub fn legs_outside_fence(&self) -> usize {
+        let Some(fence) = self.surface.desk(self.address).and_then(|d| d.fence.as_ref()) else { return 0 };
+        let is_out = |leg: &&super::mission::Leg| super::witness::stretches_outside(&[leg.0, leg.1], fence) > 0;
+        self.legs.iter().skip(self.legs_before_fence).filter(is_out).count()
     }
 
     /// Explored cells, each weighted by what the operator's last utility says its label is worth.

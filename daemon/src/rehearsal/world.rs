@@ -25,6 +25,11 @@ impl World {
         Self { image: reef.image, metres_per_pixel, classes: Some(reef.truth) }
     }
 
+    /// A reef that was drawn before.
+    pub(crate) fn from_reef(reef: &scene_model::generate::Reef, metres_per_pixel: f64) -> Self {
+        Self { image: reef.image.clone(), metres_per_pixel, classes: Some(reef.truth.clone()) }
+    }
+
     /// A mosaic from a file, and its annotation from another of the same size.
     pub fn from_files(mosaic: &Path, annotations: Option<&Path>, metres_per_pixel: f64) -> Result<Self, Problem> {
         let image = read_image(mosaic)?.to_rgb8();

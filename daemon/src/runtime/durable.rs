@@ -131,8 +131,9 @@ mod tests {
 
     #[test]
     fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
-        let versions = [None, Some(300), None, None, None, Some(1)];
-        let inbox = SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2] };
+        let versions = [None, Some(300), None, None, None, Some(1), None, None];
+        let inbox =
+            SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2, 0, 0] };
         let utility = Some((3, 50, -1, [(2, -3)].into()));
         let durable = Durable {
             inbox,
@@ -144,6 +145,12 @@ mod tests {
             budget_bps: Some(500),
             shares: Some([10, 5, 5, 50, 20]),
             refine_words_per_s: None,
+            abort: false,
+            planner: 3,
+            limits: vec![0, 4],
+            used: (130, 2),
+            breach: 2,
+            fence: vec![0],
         };
         let golden = [
             &[1, 7, 2, 5, 6][..],
@@ -151,6 +158,10 @@ mod tests {
             &[0, 1, 0, 0, 0, 2],
             &[3, 12, 172, 2],
             &[1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
+            &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0],
+            &[0, 1, 0, 0, 0, 2, 0, 0],
+            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
+            &[3, 2, 0, 4, 130, 1, 2, 2, 1, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));

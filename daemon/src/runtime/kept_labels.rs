@@ -62,8 +62,15 @@ impl Scene {
         let flat: Vec<FlatCell> = self.topics.iter().enumerate().map(cell).collect();
         let published = self.book.publish(&flat);
         let cells = published.iter().map(|c| (Cell::new(c.x, c.y), c.label)).collect();
-        let planes = BTreeMap::new();
-        MapUpdate { t_s: 0.0, epoch: self.book.epoch(), cells, planes, labels: self.book.labels().count() as u8 }
+        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
+        MapUpdate {
+            t_s: 0.0,
+            epoch: self.book.epoch(),
+            cells,
+            planes,
+            perplexity,
+            labels: self.book.labels().count() as u8,
+        }
     }
 
     fn meaning(&self, label: u8) -> Option<u64> {
@@ -108,7 +115,7 @@ impl World {
         };
         self.epochs.push(durable.epoch);
         let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-        let profile = ends::modem_of_process(&self.config);
+        let profile = ends::modem_of_process(&self.config, ends::vehicle_address(&self.config).unwrap()).unwrap();
         let mut vehicle = ends::vehicle(&self.config, profile, area, durable, 1, Instant::ZERO).unwrap();
         for frame in 1..=FRAMES {
             self.disk.step(Step::Host).ok()?;

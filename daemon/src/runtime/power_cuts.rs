@@ -71,7 +71,8 @@ impl World {
         let config = config::load(None, &sets).unwrap();
         let disk = Disk::default();
         let mut chance = Chance::new(seed);
-        let surface = ends::surface(&config, ends::modem_of_process(&config), seed, Instant::ZERO).unwrap();
+        let surface =
+            ends::surface(&config, ends::modem_profile(&config, config.modem.bit_rate), seed, Instant::ZERO).unwrap();
         cuts.reverse();
         let onboard = start(&config, &disk, &mut chance, &mut cuts, 0, Instant::ZERO);
         let (on_air, acted, told) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
@@ -151,7 +152,7 @@ impl World {
             }
             60 => drop(self.surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
             90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
-            120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), 0.5, now).unwrap()),
+            120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
             150 => self.surface.set_budget(9000, None, now).unwrap(),
             _ => {}
         }
@@ -181,7 +182,7 @@ impl World {
             self.host_step()?;
             self.see();
         }
-        self.onboard.vehicle.steer();
+        self.onboard.vehicle.steer(now);
         while let Some(output) = self.onboard.vehicle.poll_output() {
             self.host_step()?;
             self.carry_out(output)?;
@@ -218,8 +219,8 @@ impl World {
         }
         let label = onboard.book_epoch % LABELS + 1;
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
-        let planes = BTreeMap::new();
-        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, planes, labels: LABELS };
+        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, planes, perplexity, labels: LABELS };
         onboard.vehicle.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 
@@ -236,7 +237,7 @@ impl World {
     }
 
     fn transmit(&mut self, bytes: Vec<u8>, by_vehicle: bool) {
-        let end = self.now() + ends::modem_of_process(&self.config).airtime(bytes.len());
+        let end = self.now() + ends::modem_profile(&self.config, self.config.modem.bit_rate).airtime(bytes.len());
         self.schedule(end, Event::Sent { by_vehicle });
         if self.chance.below(100) >= self.loss {
             self.schedule(end + PROPAGATION, Event::Arrives { at_vehicle: !by_vehicle, bytes });
@@ -268,7 +269,7 @@ fn start(
         match Keeper::begin_run(disk.clone(), 1, None) {
             Ok(Run { keeper, durable, .. }) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-                let profile = ends::modem_of_process(config);
+                let profile = ends::modem_profile(config, config.modem.bit_rate);
                 let seed = chance.below(1 << 30) as u64;
                 let vehicle = ends::vehicle(config, profile, area, durable.clone(), seed, now).unwrap();
                 let book_epoch = durable.epoch;

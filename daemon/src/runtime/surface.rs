@@ -30,7 +30,7 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
-        let profile = crate::ends::modem_of_process(&config);
+        let profile = crate::ends::modem_of_process(&config, Address::SURFACE)?;
         warn_without_key(&config);
         let mut surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
         if is_again {
@@ -42,7 +42,7 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
-        let modem = modem::open(&config, profile).await?;
+        let modem = modem::open(&config, Address::SURFACE, profile, clock).await?;
         Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals: Refusals::default() }
             .run()
             .await
@@ -80,12 +80,21 @@ impl Host {
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 _ = second.tick() => self.publish(),
-                event = self.modem.next() => match event {
-                    ModemEvent::Sent => self.surface.handle_transmit_outcome(self.clock.now()),
-                    ModemEvent::Received(bytes) => self.handle_frame(&bytes),
-                },
+                event = self.modem.next() => self.handle_modem(event?),
                 (ask, reply) = next_request(&mut self.console) => self.answer(ask, reply),
             }
+        }
+    }
+
+    fn handle_modem(&mut self, event: ModemEvent) {
+        let now = self.clock.now();
+        match event {
+            ModemEvent::Sent => self.surface.handle_transmit_outcome(now),
+            ModemEvent::Received(bytes) => self.handle_frame(&bytes),
+            ModemEvent::Poll(frames) => self.surface.handle_poll(frames),
+            ModemEvent::Repeated(bits) => self.surface.handle_repeated(bits, now),
+            ModemEvent::Fix(end, line) => self.surface.handle_range(end, &line, now),
+            ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
         }
     }
 
@@ -127,11 +136,16 @@ impl Host {
             }
         }
         self.modem.set_budget(self.surface.budget_bps());
-        if !self.modem.is_busy()
-            && let Some(t) = self.surface.poll_transmit(now)
+        if self.modem.takes_cycles()
+            && let Some(cycle) = self.surface.poll_cycle(now)
         {
-            self.meter.sent(self.bits.bits_on_air(t.bytes.len()), now);
-            self.modem.send(t.bytes, self.clock)?;
+            self.modem.begin_cycle(cycle);
+        }
+        while self.modem.takes_frames()
+            && let Some(transmit) = self.surface.poll_transmit(now)
+        {
+            self.meter.sent(self.bits.bits_on_air(transmit.bytes.len()), now);
+            self.modem.send(transmit);
         }
         Ok(changed)
     }

@@ -26,7 +26,8 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let Start { run, mapper, keep } = start(&config, dir)?;
         let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
-        let profile = crate::ends::modem_of_process(&config);
+        let address = crate::ends::vehicle_address(&config)?;
+        let profile = crate::ends::modem_of_process(&config, address)?;
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
@@ -39,7 +40,7 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let at_end = recording.is_some();
         let camera = Camera::new(recording, clock, mapper.last_s());
         let mapper = MapperThread::start(mapper, keep)?;
-        let modem = modem::open(&config, profile).await?;
+        let modem = modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
         let stop = Stop::new()?;
         let (behind, missed) = (0, 0);
@@ -111,13 +112,7 @@ impl Host {
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
-                event = self.modem.next() => match event {
-                    ModemEvent::Sent => self.vehicle.handle_transmit_outcome(self.clock.now()),
-                    ModemEvent::Received(bytes) => {
-                        self.vehicle.handle_frame(&bytes, self.clock.now());
-                        self.refusals.note(self.vehicle.stats());
-                    }
-                },
+                event = self.modem.next() => self.handle_modem(event?),
                 config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => {
                     self.behind += 1;
@@ -129,6 +124,20 @@ impl Host {
                     None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
                 },
             }
+        }
+    }
+
+    fn handle_modem(&mut self, event: ModemEvent) {
+        let now = self.clock.now();
+        match event {
+            ModemEvent::Sent => self.vehicle.handle_transmit_outcome(now),
+            ModemEvent::Received(bytes) => {
+                self.vehicle.handle_frame(&bytes, now);
+                self.refusals.note(self.vehicle.stats());
+            }
+            ModemEvent::Poll(frames) => self.vehicle.handle_poll(frames),
+            ModemEvent::Repeated(bits) => self.vehicle.handle_repeated(bits, now),
+            ModemEvent::Fix(..) | ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
         }
     }
 
@@ -169,7 +178,7 @@ impl Host {
 
     fn pump(&mut self) -> Result<(), Problem> {
         let now: Instant = self.clock.now();
-        self.vehicle.steer();
+        self.vehicle.steer(now);
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => {
@@ -182,13 +191,14 @@ impl Host {
                 VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
                 VehicleOutput::Waypoint(x, y) => tracing::info!("waypoint {x:.1} m east, {y:.1} m north"),
                 VehicleOutput::Hold => tracing::info!("hold"),
+                VehicleOutput::Surface => tracing::info!("come up"),
             }
         }
         self.modem.set_budget(self.vehicle.budget_bps());
-        if !self.modem.is_busy()
-            && let Some(t) = self.vehicle.poll_transmit(now)
+        while self.modem.takes_frames()
+            && let Some(transmit) = self.vehicle.poll_transmit(now)
         {
-            self.modem.send(t.bytes, self.clock)?;
+            self.modem.send(transmit);
         }
         Ok(())
     }

@@ -1,27 +1,33 @@
 //! What the surface tells a vehicle: independent versioned slots.
 
+mod fence;
 mod fix;
+mod limits;
 mod outbox;
+mod polygon;
 mod settings;
 mod utility;
 
+pub use fence::{Fence, FenceFault};
 pub use fix::Fix;
+pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
-pub use settings::{Budget, Constraints, Requests, Settings};
+pub use polygon::{Place, Polygon, PolygonFault};
+pub use settings::{Budget, Constraints, PlannerKind, Requests, Settings};
 pub use utility::Utility;
 
 use crate::schedule::Class;
 use crate::wire::{Reader, Truncated};
 
 /// Number of slots.
-pub const SLOTS: usize = 6;
+pub const SLOTS: usize = 8;
 
 /// A slot of the directive; a newer version supersedes the older one of the same slot only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SlotId {
     /// What each label is worth.
     Utility,
-    /// Where and how the vehicle may move.
+    /// Orders that never wait for anything longer: hold and abort.
     Constraints,
     /// How the vehicle builds its map.
     Settings,
@@ -31,12 +37,24 @@ pub enum SlotId {
     Requests,
     /// Where the vehicle is, seen from the surface.
     Fix,
+    /// How deep, how far and how long the vehicle may go, and what it does when something is amiss.
+    Limits,
+    /// Where the vehicle may be.
+    Fence,
 }
 
 impl SlotId {
     /// Every slot, in wire order.
-    pub const ALL: [Self; SLOTS] =
-        [Self::Utility, Self::Constraints, Self::Settings, Self::Budget, Self::Requests, Self::Fix];
+    pub const ALL: [Self; SLOTS] = [
+        Self::Utility,
+        Self::Constraints,
+        Self::Settings,
+        Self::Budget,
+        Self::Requests,
+        Self::Fix,
+        Self::Limits,
+        Self::Fence,
+    ];
 
     /// Place in [`Self::ALL`] and number on the wire.
     pub fn index(self) -> usize {
@@ -57,6 +75,8 @@ impl SlotId {
             Self::Budget => "budget",
             Self::Requests => "requests",
             Self::Fix => "fix",
+            Self::Limits => "limits",
+            Self::Fence => "fence",
         }
     }
 }
@@ -76,11 +96,23 @@ pub enum RefusalReason {
     Contradiction,
     /// It came too late to be of use.
     TooOld,
+    /// The vehicle is outside of what it allows.
+    Outside,
+    /// The vehicle cannot do it.
+    Unable,
 }
 
 impl RefusalReason {
-    const ALL: [Self; 6] =
-        [Self::Malformed, Self::OtherEpoch, Self::UnknownLabel, Self::OutOfRange, Self::Contradiction, Self::TooOld];
+    const ALL: [Self; 8] = [
+        Self::Malformed,
+        Self::OtherEpoch,
+        Self::UnknownLabel,
+        Self::OutOfRange,
+        Self::Contradiction,
+        Self::TooOld,
+        Self::Outside,
+        Self::Unable,
+    ];
 
     pub(crate) fn code(self) -> u8 {
         self as u8 + 2
@@ -97,8 +129,10 @@ impl RefusalReason {
             Self::OtherEpoch => "the vehicle has renumbered its labels since: set the weights again",
             Self::UnknownLabel => "it names a label that is not on the vehicle's map",
             Self::OutOfRange => "a value is outside what the vehicle accepts",
-            Self::Contradiction => "it contradicts a constraint in force",
+            Self::Contradiction => "it contradicts itself or a constraint in force",
             Self::TooOld => "it came too late to be of use",
+            Self::Outside => "the vehicle is outside of it: it keeps the last one",
+            Self::Unable => "the vehicle flies at an altitude or depth that it does not allow",
         }
     }
 }
@@ -118,6 +152,10 @@ pub enum Slot {
     Requests(Requests),
     /// See [`Fix`].
     Fix(Fix),
+    /// See [`Limits`].
+    Limits(Limits),
+    /// See [`Fence`].
+    Fence(Fence),
 }
 
 impl Slot {
@@ -130,6 +168,8 @@ impl Slot {
             Self::Budget(_) => SlotId::Budget,
             Self::Requests(_) => SlotId::Requests,
             Self::Fix(_) => SlotId::Fix,
+            Self::Limits(_) => SlotId::Limits,
+            Self::Fence(_) => SlotId::Fence,
         }
     }
 
@@ -141,6 +181,8 @@ impl Slot {
             Self::Budget(v) => v.encode(out),
             Self::Requests(v) => v.encode(out),
             Self::Fix(v) => v.encode(out),
+            Self::Limits(v) => out.extend(v.to_bytes()),
+            Self::Fence(v) => out.extend(v.to_bytes()),
         }
     }
 
@@ -152,6 +194,8 @@ impl Slot {
             SlotId::Budget => Self::Budget(Budget::decode(r)?),
             SlotId::Requests => Self::Requests(Requests::decode(r)?),
             SlotId::Fix => Self::Fix(Fix::decode(r)?),
+            SlotId::Limits => Self::Limits(Limits::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
+            SlotId::Fence => Self::Fence(Fence::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
         })
     }
 }

@@ -3,45 +3,93 @@
 use crate::schedule::Shares;
 use crate::wire::{Reader, Truncated};
 
-/// Where and how the vehicle may move.
+/// Orders that never wait for anything longer.
 ///
 /// ```text
-/// byte 0: bit 7 hold; the rest reserved, 0
+/// byte 0: bit 7 hold, bit 6 abort; the rest reserved, 0, not read
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Constraints {
-    /// Stay where you are.
+    /// Stay where you are, until told to go on.
     pub hold: bool,
+    /// Stop the survey and do what is set for an abort ([`super::Limits::on_abort`]); goes before `hold`.
+    pub abort: bool,
 }
 
 impl Constraints {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.push(u8::from(self.hold) << 7);
+        out.push(u8::from(self.hold) << 7 | u8::from(self.abort) << 6);
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        Ok(Self { hold: r.u8()? & 0x80 != 0 })
+        let flags = r.u8()?;
+        Ok(Self { hold: flags & 0x80 != 0, abort: flags & 0x40 != 0 })
     }
 }
 
-/// How the vehicle builds its map.
+/// How the vehicle chooses its way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlannerKind {
+    /// Parallel legs over the whole survey.
+    Lawnmower,
+    /// The place of the best gain a metre, again and again.
+    Greedy,
+    /// The best way over all that is left of distance and time.
+    Horizon,
+}
+
+impl PlannerKind {
+    /// Every planner, in wire order from 1.
+    pub const ALL: [Self; 3] = [Self::Lawnmower, Self::Greedy, Self::Horizon];
+
+    /// Name in files and in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lawnmower => "lawnmower",
+            Self::Greedy => "greedy",
+            Self::Horizon => "horizon",
+        }
+    }
+
+    /// The planner of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|p| p.name() == name)
+    }
+
+    /// Number on the wire; 0 = as configured on the vehicle.
+    pub fn code(planner: Option<Self>) -> u8 {
+        planner.map_or(0, |p| p as u8 + 1)
+    }
+
+    /// The planner of that number.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|&p| p as u8 + 1 == code)
+    }
+}
+
+/// How the vehicle builds its map and chooses its way.
 ///
 /// ```text
 /// bytes 0-3: word refinements a second of mission time, 0 = as configured on the vehicle
+/// byte 4:    bits 7-6 planner: 0 as configured on the vehicle, 1 lawnmower, 2 greedy, 3 horizon; the rest reserved, 0,
+///            not read
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
     /// Words resampled a second of mission time.
     pub refine_words_per_s: u32,
+    /// How it chooses its way; `None`: as configured.
+    pub planner: Option<PlannerKind>,
 }
 
 impl Settings {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(&self.refine_words_per_s.to_be_bytes());
+        out.push(PlannerKind::code(self.planner) << 6);
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        Ok(Self { refine_words_per_s: r.u32()? })
+        Ok(Self { refine_words_per_s: r.u32()?, planner: PlannerKind::from_code(r.u8()? >> 6) })
     }
 }
 

@@ -46,8 +46,9 @@ pub struct ModemProfile {
 }
 
 impl ModemProfile {
-    /// Bits on air of a transmission of `bytes`.
+    /// Bits on air of a transmission of `bytes`; the frames of a cycle are on air as whole ones, however full they are.
     pub fn bits_on_air(&self, bytes: usize) -> u64 {
+        let bytes = if self.access == Access::Polled { bytes.max(self.frame_bytes) } else { bytes };
         bytes as u64 * 8 + self.overhead_bits
     }
 

@@ -2,7 +2,7 @@
 
 /// Grows a byte string bit by bit.
 #[derive(Debug, Clone, Default)]
-pub(super) struct BitWriter {
+pub(crate) struct BitWriter {
     bytes: Vec<u8>,
     /// Bits used of the last byte; 0 if it is full.
     partial: u32,
@@ -10,14 +10,14 @@ pub(super) struct BitWriter {
 
 impl BitWriter {
     /// Appends the `count` low bits of `value`, highest first.
-    pub(super) fn put(&mut self, value: u64, count: u32) {
+    pub(crate) fn put(&mut self, value: u64, count: u32) {
         for i in (0..count).rev() {
             self.bit(value >> i & 1 == 1);
         }
     }
 
     /// Appends one bit.
-    pub(super) fn bit(&mut self, bit: bool) {
+    pub(crate) fn bit(&mut self, bit: bool) {
         if self.partial == 0 {
             self.bytes.push(0);
         }
@@ -28,12 +28,12 @@ impl BitWriter {
     }
 
     /// Bits written.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.bytes.len() * 8 - (8 - self.partial as usize) % 8
     }
 
     /// Adds one to the number that the bits written make; a carry out of the first bit is lost.
-    pub(super) fn increment(&mut self) {
+    pub(crate) fn increment(&mut self) {
         let mut carry = 1u8 << ((8 - self.partial) % 8);
         for byte in self.bytes.iter_mut().rev() {
             let (sum, over) = byte.overflowing_add(carry);
@@ -43,35 +43,35 @@ impl BitWriter {
     }
 
     /// The bytes written; unused bits of the last one are zero.
-    pub(super) fn into_bytes(self) -> Vec<u8> {
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }
 }
 
 /// Reads a byte string bit by bit.
 #[derive(Debug, Clone)]
-pub(super) struct BitReader<'a> {
+pub(crate) struct BitReader<'a> {
     bytes: &'a [u8],
     position: usize,
 }
 
 impl<'a> BitReader<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, position: 0 }
     }
 
     /// Bits read.
-    pub(super) fn position(&self) -> usize {
+    pub(crate) fn position(&self) -> usize {
         self.position
     }
 
     /// Length of the whole string, bytes.
-    pub(super) fn total_bytes(&self) -> usize {
+    pub(crate) fn total_bytes(&self) -> usize {
         self.bytes.len()
     }
 
     /// The next bit; `None` past the end.
-    pub(super) fn bit(&mut self) -> Option<bool> {
+    pub(crate) fn bit(&mut self) -> Option<bool> {
         let byte = *self.bytes.get(self.position / 8)?;
         let bit = byte >> (7 - self.position % 8) & 1 == 1;
         self.position += 1;
@@ -79,12 +79,12 @@ impl<'a> BitReader<'a> {
     }
 
     /// The next `count` bits as a number, highest first.
-    pub(super) fn take(&mut self, count: u32) -> Option<u64> {
+    pub(crate) fn take(&mut self, count: u32) -> Option<u64> {
         (0..count).try_fold(0, |value, _| Some(value << 1 | u64::from(self.bit()?)))
     }
 
     /// The bytes after the one being read, if its unread bits are all zero.
-    pub(super) fn rest_of_bytes(mut self) -> Option<&'a [u8]> {
+    pub(crate) fn rest_of_bytes(mut self) -> Option<&'a [u8]> {
         while !self.position.is_multiple_of(8) {
             if self.bit()? {
                 return None;

@@ -4,7 +4,7 @@
 //! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
 
 mod best_png;
-mod bits;
+pub(crate) mod bits;
 mod chunk;
 mod codec;
 #[allow(clippy::indexing_slicing)] // Tables whose sizes the layouts of its contexts give.

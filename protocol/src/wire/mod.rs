@@ -18,7 +18,7 @@ pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, Header, MissionId, SessionId};
 pub use number::unwrap_number;
 pub use stamp::Stamp;
-pub use status::{SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
+pub use status::{ModeReason, SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
 
 /// Version of the wire; a frame of another version is counted and dropped.
 pub const WIRE_VERSION: u8 = 2;

@@ -29,6 +29,52 @@ impl VehicleMode {
     }
 }
 
+/// Why the vehicle does what it does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ModeReason {
+    /// Nothing is amiss.
+    #[default]
+    Survey,
+    /// The operator ordered it.
+    Order,
+    /// It is outside the fence or in a keep-out.
+    Fence,
+    /// The distance that it may go is used up but for the way back.
+    Distance,
+    /// The time that it may take is used up but for the way back.
+    Time,
+    /// The surface was silent for longer than allowed.
+    Silence,
+    /// It is outside the depth band or the altitude band.
+    Band,
+    /// There is nowhere that it may go.
+    NoWay,
+}
+
+impl ModeReason {
+    const ALL: [Self; 8] =
+        [Self::Survey, Self::Order, Self::Fence, Self::Distance, Self::Time, Self::Silence, Self::Band, Self::NoWay];
+
+    /// The reason of a number on the wire; `None` for no reason and for what is no number of one.
+    pub fn from_code(code: u8) -> Option<Self> {
+        Self::ALL.get(usize::from(code)).copied().filter(|r| *r != Self::Survey)
+    }
+
+    /// Name for people; `None` if nothing is amiss.
+    pub fn name(self) -> Option<&'static str> {
+        match self {
+            Self::Survey => None,
+            Self::Order => Some("order"),
+            Self::Fence => Some("fence"),
+            Self::Distance => Some("distance"),
+            Self::Time => Some("time"),
+            Self::Silence => Some("silence"),
+            Self::Band => Some("depth or altitude"),
+            Self::NoWay => Some("no way"),
+        }
+    }
+}
+
 /// What became of a slot of the directive at the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SlotState {
@@ -57,7 +103,8 @@ pub struct SlotReport {
 /// byte  bits  field                 unit, range
 ///  0    3     mode                  0 survey, 1 hold, 2 return, 3 surface, 4 abort, 5 done
 ///  0    1     a waypoint follows
-///  0    4     reserved, 0
+///  0    4     why                   0 by the survey, 1 order, 2 fence, 3 distance, 4 time, 5 silence, 6 depth or
+///                                   altitude, 7 no way; the rest is refused
 ///  1-3  24    x east                decimetres, signed, +-838 km
 ///  4-6  24    y north               decimetres, signed
 ///  7-8  16    depth                 decimetres below the surface, 0..6553.5 m
@@ -73,13 +120,15 @@ pub struct SlotReport {
 ///  2-3  16    digest of the map that the surface is known to hold (the base of this frame)
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
-///  7-12 48    six slot reports: version, low 8 bits
-/// 13-15 24    six slot reports: 4 bits each: 0 unknown, 1 applied, 2..7 refusal reason; the rest is refused
+///  7-14 64    eight slot reports: version, low 8 bits
+/// 15-18 32    eight slot reports: 4 bits each: 0 unknown, 1 applied, 2..9 refusal reason; the rest is refused
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
     /// What it is doing.
     pub mode: VehicleMode,
+    /// And why.
+    pub reason: ModeReason,
     /// East of the origin, metres.
     pub x_m: f64,
     /// North of the origin, metres.
@@ -149,7 +198,7 @@ impl VehicleStatus {
     /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
         let waypoint = self.waypoint.filter(|_| room >= 21);
-        let mut out = vec![self.mode.code() << 5 | u8::from(waypoint.is_some()) << 4];
+        let mut out = vec![self.mode.code() << 5 | u8::from(waypoint.is_some()) << 4 | self.reason as u8];
         put24(&mut out, decimetres(self.x_m) as u32);
         put24(&mut out, decimetres(self.y_m) as u32);
         out.extend_from_slice(&((self.depth_m * 10.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
@@ -180,8 +229,9 @@ impl VehicleStatus {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
         let mode = VehicleMode::ALL.get(usize::from(head >> 5)).copied().ok_or(StatusError::BadField)?;
+        let reason = ModeReason::ALL.get(usize::from(head & 15)).copied().ok_or(StatusError::BadField)?;
         let metres = |dm: i32| f64::from(dm) / 10.0;
-        let mut read = Self { mode, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..self.clone() };
+        let mut read = Self { mode, reason, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..self.clone() };
         read.depth_m = f64::from(r.u16()?) / 10.0;
         read.heading_deg = f64::from(r.u8()?) / 256.0 * 360.0;
         read.sigma_m = f64::from(r.u8()?) / 4.0;
@@ -191,7 +241,7 @@ impl VehicleStatus {
         if head & 0b1_0000 != 0 {
             read.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
         }
-        if head & 15 != 0 || !r.rest().is_empty() {
+        if !r.rest().is_empty() {
             return Err(StatusError::Length);
         }
         *self = read;
@@ -223,7 +273,7 @@ impl VehicleStatus {
 }
 
 impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=7 a reason of refusal.
+    /// The number on the wire: 0 unknown, 1 applied, 2..=9 a reason of refusal.
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Unknown => 0,
@@ -253,6 +303,7 @@ mod tests {
         slots[5] = SlotReport { version_low: 2, state: SlotState::Refused(RefusalReason::Malformed) };
         let status = VehicleStatus {
             mode: VehicleMode::Hold,
+            reason: ModeReason::Fence,
             x_m: 1.5,
             y_m: -0.1,
             depth_m: 18.0,
@@ -269,8 +320,8 @@ mod tests {
             slots,
         };
         let (pose, report) = (status.encode_pose(99), status.encode_report());
-        assert_eq!(pose, [0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
-        assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 7, 0, 0, 0, 0, 2, 0x10, 0, 0x02]);
+        assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
+        assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 7, 0, 0, 0, 0, 2, 0, 0, 0x10, 0, 0x02, 0]);
         let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
         back.read_pose(&pose).unwrap();
         back.read_report(&report).unwrap();

@@ -385,5 +385,5 @@ pub(crate) fn utility(weight: i8) -> Slot {
 }
 
 pub(crate) fn hold(hold: bool) -> Slot {
-    Slot::Constraints(Constraints { hold })
+    Slot::Constraints(Constraints { hold, abort: false })
 }

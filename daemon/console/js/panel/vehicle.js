@@ -8,7 +8,7 @@ import { ageOf, isStale, store } from "../store.js";
 import { contact } from "./banners.js";
 import { describe, lifeline, slotOf, word } from "./lifeline.js";
 
-const NAMES = { utility: "Weights", constraints: "Constraints", budget: "Budget", requests: "Pictures", fix: "Position fix" };
+const NAMES = { utility: "Weights", constraints: "Constraints", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Pictures", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
 const age = h("p.age");
@@ -40,7 +40,7 @@ function update() {
   if (!v) return;
   const s = v.status;
   text(title, v.name);
-  text(mode, s?.mode ?? "unknown");
+  text(mode, s?.doing ?? s?.mode ?? "unknown");
   mode.dataset.mode = s?.mode ?? "none";
   $("vehicle").classList.toggle("stale", isStale(v));
   text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 heard ${ago(ageOf(v.heard_s))}, due every ${span(v.expected_interval_s)}` : "No status heard yet.");

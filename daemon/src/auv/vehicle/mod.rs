@@ -1,18 +1,24 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
+mod course;
+#[cfg(test)]
+mod obedience;
 mod obey;
 mod whole_png;
 
 use super::exemplar::{Exemplar, encode_webp};
+use super::guard::{Guard, Habits};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
+use super::planning::distance;
 use super::steering::Steering;
+use course::Doing;
 use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneSource};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{SlotState, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::SlotState;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use whole_png::WholePng;
@@ -35,12 +41,24 @@ pub struct Durable {
     pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
     /// Whether the vehicle is told to hold.
     pub hold: bool,
+    /// Whether it is told to abort.
+    pub abort: bool,
     /// Budget in force, bits a second, if somebody has changed it.
     pub budget_bps: Option<u32>,
     /// Least shares in force in percent, if somebody has changed them.
     pub shares: Option<[u8; 5]>,
     /// Words to resample a second, if the operator has said so.
     pub refine_words_per_s: Option<u32>,
+    /// Planner in force, as on the wire.
+    pub planner: u8,
+    /// Limits in force, as on the wire; empty: none.
+    pub limits: Vec<u8>,
+    /// Metres and seconds of them that are used up, nearly.
+    pub used: (u32, u32),
+    /// A breach that the operator has not answered yet: the reason's number on the wire.
+    pub breach: u8,
+    /// Fence in force, as on the wire; empty: none.
+    pub fence: Vec<u8>,
 }
 
 /// What the vehicle asks of its host.
@@ -53,6 +71,8 @@ pub enum VehicleOutput {
     Waypoint(f64, f64),
     /// Stay where you are.
     Hold,
+    /// Come up.
+    Surface,
     /// Resample so many words a second; 0: as configured.
     RefineRate(u32),
     /// A slot was decided about.
@@ -84,6 +104,8 @@ pub struct Vehicle {
     answered: Vec<((u8, u8), ObjectId)>,
     labels: u8,
     explored: u32,
+    guard: Guard,
+    course: Doing,
     waypoint: Option<(f64, f64)>,
     done: bool,
     outputs: VecDeque<VehicleOutput>,
@@ -96,7 +118,14 @@ pub struct Vehicle {
 
 impl Vehicle {
     /// A vehicle at its start; `durable` is what survived the last run, with the epoch this run begins.
-    pub fn new(link: VehicleLink, navigator: Navigator, steering: Steering, durable: Durable, now: Instant) -> Self {
+    pub fn new(
+        link: VehicleLink,
+        navigator: Navigator,
+        steering: Steering,
+        habits: Habits,
+        durable: Durable,
+        now: Instant,
+    ) -> Self {
         let utility = durable.utility.clone().map(|(epoch, exploration, curiosity, weights)| Utility {
             epoch,
             exploration,
@@ -114,6 +143,8 @@ impl Vehicle {
             answered: Vec::new(),
             labels: 0,
             explored: 0,
+            guard: Guard::new(habits, now),
+            course: Doing::default(),
             waypoint: None,
             done: false,
             outputs: VecDeque::new(),
@@ -129,6 +160,7 @@ impl Vehicle {
         }
         vehicle.outputs.extend(vehicle.durable.refine_words_per_s.map(VehicleOutput::RefineRate));
         vehicle.follow_utility();
+        vehicle.restore_course();
         vehicle
     }
 
@@ -216,11 +248,14 @@ impl Vehicle {
     /// The vehicle's own sensors say that it moved.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
+        self.guard.handle_way(dx_m.hypot(dy_m));
     }
 
     /// The position is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        let before = self.navigator.position();
         self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
+        self.guard.handle_way(distance(before, (x_m, y_m)));
     }
 
     /// The scene model has a new map.
@@ -247,6 +282,7 @@ impl Vehicle {
         }
         let at = self.navigator.position();
         self.steering.handle_view(at);
+        update.perplexity.iter().for_each(|&(cell, p)| self.steering.handle_perplexity(cell, p));
     }
 
     /// Label ids start afresh: the surface learns it by a new run, before any of the new ids.
@@ -289,31 +325,12 @@ impl Vehicle {
         }
     }
 
-    /// Chooses a waypoint if there is none or the last one is reached.
-    pub fn steer(&mut self) {
-        if self.durable.hold || self.done {
-            return;
-        }
-        let at = self.navigator.position();
-        let reached = self.waypoint.is_none_or(|w| (w.0 - at.0).hypot(w.1 - at.1) < 0.5);
-        if reached {
-            let map = self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map);
-            let next = self.steering.next_waypoint(at, map, self.utility.as_ref());
-            self.waypoint = Some(next);
-            self.outputs.push_back(VehicleOutput::Waypoint(next.0, next.1));
-        }
-    }
-
-    /// The survey is over: stay, and keep telling.
-    pub fn finish_survey(&mut self) {
-        self.done = true;
-        self.waypoint = None;
-        self.outputs.push_back(VehicleOutput::Hold);
-    }
-
     /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
+        if let Some(at) = self.link.last_heard() {
+            self.guard.handle_surface_heard(at);
+        }
         while let Some(event) = self.link.poll_event() {
             match event {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
@@ -358,6 +375,16 @@ impl Vehicle {
         self.link.handle_transmit_outcome(now);
     }
 
+    /// The modem asks for so many frames.
+    pub fn handle_poll(&mut self, frames: u32) {
+        self.link.handle_poll(frames);
+    }
+
+    /// The modem itself put so many bits on air.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.link.handle_repeated(bits, now);
+    }
+
     /// The next frame to put on air.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         if self.link.wants_status(now) {
@@ -373,29 +400,6 @@ impl Vehicle {
     /// When to ask for the next frame.
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
         self.link.poll_timeout()
-    }
-
-    fn status(&self, now: Instant) -> VehicleStatus {
-        let (x_m, y_m) = self.navigator.position();
-        let mode = match (self.durable.hold, self.done) {
-            (true, _) => VehicleMode::Hold,
-            (_, true) => VehicleMode::Done,
-            _ => VehicleMode::Survey,
-        };
-        VehicleStatus {
-            mode,
-            x_m,
-            y_m,
-            depth_m: self.navigator.depth_m(),
-            heading_deg: self.navigator.heading_rad().to_degrees().rem_euclid(360.0),
-            sigma_m: self.navigator.sigma_m(),
-            fix_age_s: self.navigator.last_fix().map(|at| now.since(at).as_secs_f64()),
-            waypoint: self.waypoint,
-            epoch: self.durable.epoch,
-            labels: self.labels,
-            explored_cells: self.explored,
-            ..VehicleStatus::default()
-        }
     }
 
     /// Labels of cells as the vehicle sees them.

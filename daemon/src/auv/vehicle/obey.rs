@@ -1,7 +1,9 @@
 //! What the vehicle does with a slot of the directive.
 
 use super::{Vehicle, VehicleOutput};
-use scenecast_protocol::directive::{Budget, RefusalReason, Slot, Utility};
+use scenecast_protocol::directive::{
+    Budget, Constraints, Fence, Limits, LimitsFault, Place, PlannerKind, RefusalReason, Slot, Utility,
+};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -10,15 +12,14 @@ impl Vehicle {
         match slot {
             Slot::Utility(utility) => self.apply_utility(utility),
             Slot::Constraints(constraints) => {
-                self.durable.hold = constraints.hold;
-                self.waypoint = None;
-                if constraints.hold {
-                    self.outputs.push_back(VehicleOutput::Hold);
-                }
+                self.follow_order(constraints);
                 Ok(())
             }
             Slot::Settings(settings) => {
                 self.durable.refine_words_per_s = Some(settings.refine_words_per_s);
+                self.durable.planner = PlannerKind::code(settings.planner);
+                self.steering.set_planner(settings.planner);
+                self.reconsider();
                 self.outputs.push_back(VehicleOutput::RefineRate(settings.refine_words_per_s));
                 Ok(())
             }
@@ -35,6 +36,8 @@ impl Vehicle {
                 self.replace_requests(requests);
                 Ok(())
             }
+            Slot::Limits(limits) => self.apply_limits(limits),
+            Slot::Fence(fence) => self.apply_fence(&fence),
             Slot::Fix(fix) => {
                 let taken = now - Duration::from_secs_f64(fix.age_s);
                 let used = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
@@ -42,6 +45,49 @@ impl Vehicle {
                 if used { Ok(()) } else { Err(RefusalReason::TooOld) }
             }
         }
+    }
+
+    fn follow_order(&mut self, order: Constraints) {
+        (self.durable.hold, self.durable.abort) = (order.hold, order.abort);
+        self.guard.order = order;
+        self.forgive();
+    }
+
+    fn apply_limits(&mut self, limits: Limits) -> Result<(), RefusalReason> {
+        limits.check().map_err(|fault| match fault {
+            LimitsFault::EmptyBand(_) => RefusalReason::Contradiction,
+            LimitsFault::OutOfRange(..) => RefusalReason::OutOfRange,
+        })?;
+        if !self.guard.is_able(&limits, self.navigator.depth_m()) {
+            return Err(RefusalReason::Unable);
+        }
+        self.durable.limits = limits.to_bytes();
+        self.durable.used = (0, 0);
+        self.guard.set_limits(limits);
+        self.reconsider();
+        Ok(())
+    }
+
+    /// A fence outside of which the vehicle is would be broken at once: more likely it is mistyped than meant, and the last
+    /// one, and hold and abort, stay at hand.
+    fn apply_fence(&mut self, fence: &Fence) -> Result<(), RefusalReason> {
+        fence.check().map_err(|_| RefusalReason::Contradiction)?;
+        let (x, y) = self.navigator.position();
+        let is_inside = Place::from_metres(x, y).is_some_and(|at| fence.allows(at));
+        if fence.outlines().next().is_some() && !is_inside {
+            return Err(RefusalReason::Outside);
+        }
+        self.durable.fence = fence.to_bytes();
+        self.steering.set_fence(fence);
+        self.forgive();
+        Ok(())
+    }
+
+    /// The operator has answered a breach.
+    fn forgive(&mut self) {
+        self.guard.forgive();
+        self.durable.breach = 0;
+        self.reconsider();
     }
 
     fn apply_utility(&mut self, utility: Utility) -> Result<(), RefusalReason> {
@@ -57,7 +103,7 @@ impl Vehicle {
         let u = &utility;
         self.durable.utility = Some((u.epoch, u.exploration, u.curiosity, u.weights.clone()));
         self.utility = Some(utility);
-        self.waypoint = None;
+        self.reconsider();
         self.follow_utility();
         Ok(())
     }

@@ -18,6 +18,7 @@ pub use golden::{LinkTable, link_table};
 pub use opaque::{OpaqueReplica, OpaqueSource};
 pub use ranging::{RangingRow, measure_ranging};
 pub use speed::{Speed, measure_speed};
+pub use summary::Summary;
 pub use table::{Pattern, Place, Row, places};
 pub use trial::Effort;
 pub use water::{Setting, Water};

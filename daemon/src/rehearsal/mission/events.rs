@@ -4,9 +4,10 @@ use super::{Mission, STEP_S, SURFACE, VEHICLE, pose_of};
 use crate::asv::SurfaceOutput;
 use crate::auv::VehicleOutput;
 use crate::problem::Problem;
+use crate::rehearsal::docked::{self, Docked};
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
-use scenecast_protocol::directive::Fix;
+use scenecast_protocol::directive::{Fix, SlotId};
 use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use sim_channel::{Outcome, Position};
@@ -18,6 +19,7 @@ impl Mission {
             self.vehicle.poll_timeout().filter(|_| self.transmitting[0].is_none()),
             self.surface.poll_timeout(self.now).filter(|_| self.transmitting[1].is_none()),
         ];
+        let modems = self.docked.as_ref().and_then(Docked::poll_timeout);
         // A wake-up that has passed led to no frame: it waits for another event.
         let links = links.into_iter().flatten().map(|(at, _)| at).filter(|&at| at > self.now);
         let script = self.script.poll_timeout().filter(|_| self.ended.is_none());
@@ -30,6 +32,7 @@ impl Mission {
             .chain(script)
             .chain(fix)
             .chain(channel)
+            .chain(modems)
             .min()
     }
 
@@ -58,6 +61,7 @@ impl Mission {
                 }
             }
         }
+        self.handle_modems();
         if now >= self.times.step {
             self.times.step = self.times.step + Duration::from_secs_f64(STEP_S);
             self.step();
@@ -84,10 +88,19 @@ impl Mission {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => self.vehicle.handle_persisted(),
-                VehicleOutput::Waypoint(x, y) => self.motion.set_target(Some((x, y))),
+                VehicleOutput::Waypoint(x, y) => {
+                    self.legs.push((self.vehicle.navigator().position(), (x, y)));
+                    self.motion.set_target(Some((x, y)));
+                }
                 VehicleOutput::Hold => self.motion.set_target(None),
+                VehicleOutput::Surface => self.motion.come_up(),
                 VehicleOutput::RefineRate(words_per_s) => self.mapper.set_refine_rate(words_per_s),
-                VehicleOutput::Applied(applied) => self.applied.push(applied),
+                VehicleOutput::Applied(applied) => {
+                    if applied.id == SlotId::Fence {
+                        self.legs_before_fence = self.legs.len();
+                    }
+                    self.applied.push(applied);
+                }
             }
         }
         while let Some(output) = self.surface.poll_output() {
@@ -95,6 +108,9 @@ impl Mission {
             self.events.push(output);
         }
         self.note_issued();
+        if self.docked.is_some() {
+            return self.speak_through_modems();
+        }
         if self.transmitting[0].is_none()
             && let Some(t) = self.vehicle.poll_transmit(self.now)
         {
@@ -128,22 +144,39 @@ impl Mission {
         if self.recording.is_some() || self.ended.is_some() {
             return;
         }
-        self.vehicle.steer();
+        self.vehicle.steer(self.now);
         self.pump();
         let o = self.motion.step(self.vehicle.navigator().position(), STEP_S);
-        let depth = self.vehicle.navigator().depth_m();
+        let depth = self.motion.depth_m(self.vehicle.navigator().depth_m(), self.survey_depth_m(), STEP_S);
         self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, depth, self.now);
         self.place_vehicle();
     }
 
     pub(super) fn place_vehicle(&mut self) {
         let depth = self.vehicle.navigator().depth_m();
-        self.channel.place(VEHICLE, Position::new(self.motion.x_m, self.motion.y_m, -depth));
+        let place = Position::new(self.motion.x_m, self.motion.y_m, -depth);
+        self.channel.place(VEHICLE, place);
+        if let Some(docked) = &mut self.docked {
+            docked.place(docked::VEHICLE, place);
+        }
+    }
+
+    fn survey_depth_m(&self) -> f64 {
+        (self.config.survey.depth_m - self.config.survey.altitude_m).max(0.0)
+    }
+
+    /// Whether the sea floor is out of the camera's sight.
+    fn is_high(&self) -> bool {
+        self.recording.is_none() && self.vehicle.navigator().depth_m() < self.survey_depth_m() - 1.0
     }
 
     fn camera(&mut self) -> Result<(), Problem> {
         if self.ended.is_some() {
             self.times.frame = self.now + Duration::from_secs(3600);
+            return Ok(());
+        }
+        if self.is_high() {
+            self.times.frame = self.times.frame + Duration::from_secs_f64(1.0 / self.config.camera.rate_hz);
             return Ok(());
         }
         let (image, scale) = match &self.recording {

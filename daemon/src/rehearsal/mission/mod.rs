@@ -1,7 +1,9 @@
 //! The loop of a rehearsal: the roles, the water and the sea floor on one virtual clock.
 
+mod carrier;
 mod events;
 
+use super::docked::{self, Docked};
 use super::frames_log::FramesLog;
 use super::meter::Meter;
 use super::motion::Motion;
@@ -48,6 +50,9 @@ struct Timetable {
     look: Instant,
 }
 
+/// From where to where, metres east and north.
+pub type Leg = ((f64, f64), (f64, f64));
+
 /// A mission under way.
 pub struct Mission {
     pub(super) config: Config,
@@ -70,8 +75,14 @@ pub struct Mission {
     pub(super) update: Option<MapUpdate>,
     /// Where the vehicle was when it saw something, by its own belief.
     pub(super) track: Vec<(f64, f64)>,
+    /// Each order to go somewhere: from, to, by its belief.
+    pub(super) legs: Vec<Leg>,
+    /// How many legs there were when the vehicle put the last fence in force.
+    pub(super) legs_before_fence: usize,
     channel: Channel,
-    modem: ModemProfile,
+    /// Drivers and emulated modems with a water of their own, if the configuration names a make of modem.
+    docked: Option<Docked>,
+    pub(super) modem: ModemProfile,
     script: Script,
     recording: Option<Recording>,
     recorder: Option<Recorder>,
@@ -90,8 +101,10 @@ impl Mission {
     /// A mission at its start.
     pub fn new(config: Config, options: MissionOptions) -> Result<Self, Problem> {
         let MissionOptions { world, seed, record } = options;
-        let modem = ends::modem_profile(&config, config.channel.bit_rate);
         let now = Instant::ZERO;
+        let mut docked = carrier::docked(&config, seed, now)?;
+        let water = ends::modem_profile(&config, config.channel.bit_rate);
+        let [modem, surface_modem] = docked.as_mut().map_or([water; 2], carrier::profiles);
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
@@ -104,15 +117,20 @@ impl Mission {
         }
         let dice = Stream::new(seed, &[2]);
         let vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
-        let surface = ends::surface(&config, modem, seed ^ 0x5EA, now)?;
+        let surface = ends::surface(&config, surface_modem, seed ^ 0x5EA, now)?;
         let (x, y) = vehicle.navigator().position();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let mut channel = Channel::new(channel_config(&config), seed);
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
-        channel.place(SURFACE, Position::new(middle.0 + config.channel.range_m, middle.1, -1.0));
+        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, -1.0);
+        channel.place(SURFACE, surface_place);
+        if let Some(docked) = &mut docked {
+            docked.place(docked::SURFACE, surface_place);
+        }
         let script = match config.operator.script.as_str() {
             "scripted" => Script::of_survey(config.survey.duration_s),
+            "fenced" => Script::fenced(config.survey.duration_s, area, config.survey.speed_m_s),
             _ => Script::none(),
         };
         let fix_period = Instant::from_secs_f64(config.navigation.fix_period_s);
@@ -133,6 +151,8 @@ impl Mission {
             ended: None,
             update: None,
             track: Vec::new(),
+            legs: Vec::new(),
+            legs_before_fence: 0,
             transmitting: [None; 2],
             map_version: 0,
             picture_version: 0,
@@ -146,6 +166,7 @@ impl Mission {
             surface,
             motion,
             channel,
+            docked,
             modem,
             script,
             recording,
@@ -185,6 +206,16 @@ impl Mission {
     /// The vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
+    }
+
+    /// Each order to go somewhere that the vehicle gave itself: from where to where, by its belief.
+    pub fn legs(&self) -> &[Leg] {
+        &self.legs
+    }
+
+    /// Metres that the vehicle really went.
+    pub fn distance_m(&self) -> f64 {
+        self.motion.distance_m
     }
 
     /// The vehicle's address.

@@ -57,7 +57,7 @@ impl<R: StateReplica> End for Surface<R> {
         let weights = (1..=with % 8).map(|label| (label, with as i8 / 2)).collect();
         let slot = match what % 4 {
             0 => Slot::Utility(Utility { weights, ..Utility::default() }),
-            1 => Slot::Constraints(Constraints { hold: with & 1 != 0 }),
+            1 => Slot::Constraints(Constraints { hold: with & 1 != 0, abort: with & 2 != 0 }),
             2 => Slot::Fix(Fix { x_m: f64::from(with), ..Fix::default() }),
             _ => return self.set_shares(Shares([with % 20; 5])),
         };

@@ -289,6 +289,11 @@ impl<R: StateReplica> SurfaceLink<R> {
         }
     }
 
+    /// The modem put `bits` on air beside what it was given, as one that repeats by itself does.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.budget.spend(bits, now);
+    }
+
     /// Puts a frame into the modem.
     fn send(&mut self, ready: Ready, last: bool, now: Instant) -> Transmit {
         let to = ready.transmit.to;

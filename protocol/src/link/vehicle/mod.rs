@@ -257,6 +257,11 @@ impl<S: StateSource> VehicleLink<S> {
         self.clock.as_ref()
     }
 
+    /// When a frame of the surface was last taken, in this pair of runs.
+    pub fn last_heard(&self) -> Option<Instant> {
+        self.heard.map(|h| h.at)
+    }
+
     /// One-way propagation, as the surface has measured it.
     pub fn one_way(&self) -> Option<Duration> {
         self.one_way
@@ -273,6 +278,11 @@ impl<S: StateSource> VehicleLink<S> {
             self.budget.handle_delay(self.floor.in_modem() as usize, now);
         }
         self.floor.handle_sent();
+    }
+
+    /// The modem put `bits` on air beside what it was given, as one that repeats by itself does.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.budget.spend(bits, now);
     }
 
     /// The modem asks for `frames` frames of a cycle that begins now ([`crate::mac::Access::Polled`]).

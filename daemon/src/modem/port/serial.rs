@@ -1,21 +1,15 @@
-//! A transparent modem: a byte pipe on a serial device.
+//! A serial device.
 
-use super::pipe::{FIRST_PAUSE, back_off, carry, forget};
+use super::carry::carry;
+use super::{Ends, FIRST_PAUSE, back_off};
 use crate::problem::Problem;
-use bytes::Bytes;
-use tokio::sync::mpsc;
-use tokio_serial::{SerialPortBuilderExt, SerialStream};
+use tokio::time::Instant;
+use tokio_serial::{SerialPort, SerialPortBuilderExt, SerialStream};
 
 /// Opens the device, and opens it again whenever it fails: an unplugged adapter comes back under its stable path.
-pub(super) fn open(
-    device: String,
-    baud: u32,
-    most: usize,
-    to_modem: mpsc::Receiver<Bytes>,
-    from_modem: mpsc::Sender<Bytes>,
-) -> Result<(), Problem> {
+pub(super) fn open(device: String, baud: u32, ends: Ends) -> Result<(), Problem> {
     let stream = open_port(&device, baud).map_err(|e| Problem::Input(format!("modem.device: {device}: {e}")))?;
-    tokio::spawn(keep_open(stream, device, baud, most, to_modem, from_modem));
+    tokio::spawn(keep_open(stream, device, baud, ends));
     Ok(())
 }
 
@@ -23,17 +17,12 @@ fn open_port(device: &str, baud: u32) -> tokio_serial::Result<SerialStream> {
     let mut stream = tokio_serial::new(device, baud).open_native_async()?;
     // Two ends may share a pseudo-terminal in a rehearsal; where exclusiveness is not to be had, it is not needed.
     let _ = stream.set_exclusive(false);
+    // Some modems garble what they say while RTS is up and flow control off; a pseudo-terminal has no such line.
+    let _ = stream.write_request_to_send(false);
     Ok(stream)
 }
 
-async fn keep_open(
-    stream: SerialStream,
-    device: String,
-    baud: u32,
-    most: usize,
-    mut to_modem: mpsc::Receiver<Bytes>,
-    from_modem: mpsc::Sender<Bytes>,
-) {
+async fn keep_open(stream: SerialStream, device: String, baud: u32, mut ends: Ends) {
     let mut next = Some(stream);
     let mut pause = FIRST_PAUSE;
     loop {
@@ -43,9 +32,8 @@ async fn keep_open(
         };
         match opened {
             Ok(stream) => {
-                forget(&mut to_modem);
-                let began = tokio::time::Instant::now();
-                match carry(stream, most, &mut to_modem, &from_modem).await {
+                let began = Instant::now();
+                match carry(stream, &mut ends).await {
                     Ok(()) => return,
                     Err(e) => tracing::warn!("modem: {device}: {e}; opening it again"),
                 }
@@ -54,6 +42,9 @@ async fn keep_open(
                 }
             }
             Err(e) => tracing::debug!("modem: {device}: {e}"),
+        }
+        if ends.from.is_closed() {
+            return;
         }
         tokio::time::sleep(pause).await;
         pause = back_off(pause);

@@ -1,0 +1,181 @@
+//! What the operator types, as slots of the directive. Every refusal is one line that says what is allowed.
+
+use scenecast_protocol::directive::{Band, Fence, Limits, Place, Polygon, Reaction};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A fence as it is typed: vertices east and north of the origin, metres.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FenceOrder {
+    /// The vehicle stays inside; `None`: no fence.
+    pub fence: Option<Vec<[f64; 2]>>,
+    /// The vehicle stays outside of each.
+    #[serde(default)]
+    pub keep_outs: Vec<Vec<[f64; 2]>>,
+    /// Where it returns to; `None`: where its run began.
+    pub return_point: Option<[f64; 2]>,
+}
+
+/// Limits as they are typed; what is left out is not limited, or as configured on the vehicle.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsOrder {
+    /// Least and greatest depth, metres.
+    pub depth_m: Option<[f64; 2]>,
+    /// Least and greatest altitude, metres.
+    pub altitude_m: Option<[f64; 2]>,
+    /// Metres of way, the way back included.
+    pub distance_m: Option<f64>,
+    /// Seconds, the way back included.
+    pub time_s: Option<f64>,
+    /// Seconds that the surface may be silent.
+    pub silence_s: Option<f64>,
+    /// What to do then.
+    pub on_silence: Option<String>,
+    /// What to do on a breach.
+    pub on_breach: Option<String>,
+    /// What to do on an abort.
+    pub on_abort: Option<String>,
+}
+
+impl From<&Fence> for FenceOrder {
+    fn from(fence: &Fence) -> Self {
+        let vertex = |p: &Place| [p.metres().0, p.metres().1];
+        let outline = |p: &Polygon| p.0.iter().map(vertex).collect();
+        Self {
+            fence: fence.fence.as_ref().map(outline),
+            keep_outs: fence.keep_outs.iter().map(outline).collect(),
+            return_point: fence.return_point.as_ref().map(vertex),
+        }
+    }
+}
+
+impl From<&Limits> for LimitsOrder {
+    fn from(limits: &Limits) -> Self {
+        let band = |b: Band| [f64::from(b.low_dm) / 10.0, f64::from(b.high_dm) / 10.0];
+        let name = |r: Reaction| r.name().to_owned();
+        Self {
+            depth_m: limits.depth.map(band),
+            altitude_m: limits.altitude.map(band),
+            distance_m: limits.distance_m.map(f64::from),
+            time_s: limits.time_s.map(f64::from),
+            silence_s: limits.silence_s.map(f64::from),
+            on_silence: limits.on_silence.map(name),
+            on_breach: limits.on_breach.map(name),
+            on_abort: limits.on_abort.map(name),
+        }
+    }
+}
+
+impl FenceOrder {
+    /// The slot's content.
+    pub fn read(&self) -> Result<Fence, String> {
+        let fence = Fence {
+            fence: self.fence.as_deref().map(|v| outline("fence", v)).transpose()?,
+            keep_outs: self.keep_outs.iter().map(|v| outline("keep_outs", v)).collect::<Result<_, _>>()?,
+            return_point: self.return_point.map(|p| place("return_point", p)).transpose()?,
+        };
+        fence.check().map_err(|fault| fault.to_string())?;
+        Ok(fence)
+    }
+}
+
+impl LimitsOrder {
+    /// The slot's content.
+    pub fn read(&self) -> Result<Limits, String> {
+        let limits = Limits {
+            depth: self.depth_m.map(|b| band("depth_m", b)).transpose()?,
+            altitude: self.altitude_m.map(|b| band("altitude_m", b)).transpose()?,
+            distance_m: self.distance_m.map(|v| whole("distance_m", v, Limits::MOST)).transpose()?,
+            time_s: self.time_s.map(|v| whole("time_s", v, Limits::MOST)).transpose()?,
+            silence_s: self.silence_s.map(|v| whole("silence_s", v, u16::MAX.into())).transpose()?.map(|s| s as u16),
+            on_silence: reaction("on_silence", self.on_silence.as_deref())?,
+            on_breach: reaction("on_breach", self.on_breach.as_deref())?,
+            on_abort: reaction("on_abort", self.on_abort.as_deref())?,
+        };
+        limits.check().map_err(|fault| fault.to_string())?;
+        Ok(limits)
+    }
+}
+
+fn outline(what: &str, vertices: &[[f64; 2]]) -> Result<Polygon, String> {
+    vertices.iter().map(|&v| place(what, v)).collect::<Result<_, _>>().map(Polygon)
+}
+
+fn place(what: &str, [x, y]: [f64; 2]) -> Result<Place, String> {
+    let far = format!("{what}: [{x}, {y}] is no place within 838 km of the origin");
+    Place::from_metres(x, y).ok_or(far)
+}
+
+fn band(what: &str, [low, high]: [f64; 2]) -> Result<Band, String> {
+    let dm = |m: f64| {
+        let dm = (m * 10.0).round();
+        let ok = (0.0..=65_535.0).contains(&dm);
+        ok.then_some(dm as u16).ok_or(format!("{what}: {m} is not within 0 to 6553.5 m"))
+    };
+    Ok(Band { low_dm: dm(low)?, high_dm: dm(high)? })
+}
+
+fn whole(what: &str, value: f64, most: u32) -> Result<u32, String> {
+    let rounded = value.round();
+    let ok = (1.0..=f64::from(most)).contains(&rounded);
+    ok.then_some(rounded as u32).ok_or(format!("{what} {value}: it takes 1 to {most}"))
+}
+
+fn reaction(what: &str, name: Option<&str>) -> Result<Option<Reaction>, String> {
+    let named =
+        |name: &str| Reaction::from_name(name).ok_or(format!("{what} {name:?}: it takes hold, return or surface"));
+    name.map(named).transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fence(json: &str) -> Result<Fence, String> {
+        serde_json::from_str::<FenceOrder>(json).map_err(|e| e.to_string())?.read()
+    }
+
+    fn limits(json: &str) -> Result<Limits, String> {
+        serde_json::from_str::<LimitsOrder>(json).map_err(|e| e.to_string())?.read()
+    }
+
+    #[test]
+    fn what_no_vehicle_could_obey_is_refused_where_it_is_typed() {
+        let refused = |json: &str| fence(json).unwrap_err();
+        assert_eq!(refused(r#"{"fence": [[0,0],[9,0]]}"#), "fence: 2 vertices: it takes 3 to 34");
+        assert_eq!(refused(r#"{"fence": []}"#), "fence: 0 vertices: it takes 3 to 34");
+        assert_eq!(refused(r#"{"fence": [[0,0],[9,9],[9,0],[0,9]]}"#), "fence: edge 1 crosses or touches edge 3");
+        assert_eq!(refused(r#"{"fence": [[0,0],[1,1],[2,2]]}"#), "fence: it has no area");
+        assert_eq!(
+            refused(r#"{"fence": [[0,0],[9,0],[9,9]], "return_point": [0, 9]}"#),
+            "return_point lies outside the fence"
+        );
+        assert!(refused(r#"{"fence": [[0,0],[1e9,0],[9,9]]}"#).contains("838 km"));
+        assert!(refused(r#"{"fenze": []}"#).contains("unknown field"));
+        assert_eq!(
+            limits(r#"{"depth_m": [30, 10]}"#).unwrap_err(),
+            "depth_m: the lowest value must be below the highest"
+        );
+        assert_eq!(limits(r#"{"time_s": 0}"#).unwrap_err(), "time_s 0: it takes 1 to 16777215");
+        assert_eq!(
+            limits(r#"{"on_silence": "panic"}"#).unwrap_err(),
+            "on_silence \"panic\": it takes hold, return or surface"
+        );
+        assert!(limits(r#"{"altitude_m": [-1, 10]}"#).unwrap_err().contains("0 to 6553.5 m"));
+    }
+
+    #[test]
+    fn what_is_typed_is_what_is_sent() {
+        let sent =
+            fence(r#"{"fence": [[0,0],[9.04,0],[9,9]], "keep_outs": [[[4,1],[5,1],[5,2]]], "return_point": [8,1]}"#);
+        let sent = sent.unwrap();
+        assert_eq!(sent.fence.unwrap().0[1], Place { x_dm: 90, y_dm: 0 });
+        assert_eq!((sent.keep_outs.len(), sent.return_point), (1, Some(Place { x_dm: 80, y_dm: 10 })));
+        assert_eq!(fence("{}"), Ok(Fence::default()), "lifts the fence");
+        let sent = limits(r#"{"depth_m": [5, 40], "silence_s": 600, "on_silence": "return"}"#).unwrap();
+        assert_eq!(sent.depth, Some(Band { low_dm: 50, high_dm: 400 }));
+        assert_eq!((sent.silence_s, sent.on_silence), (Some(600), Some(Reaction::Return)));
+    }
+}

@@ -1,0 +1,66 @@
+//! Parallel legs over all that may be seen.
+
+use super::lattice::Node;
+use super::{Planner, Question};
+
+/// East-west legs from the south, each a camera's width from the last; at the end from the north again.
+#[derive(Debug, Default)]
+pub struct Lawnmower {
+    /// Places still to come, the next one last.
+    coming: Vec<Node>,
+}
+
+impl Planner for Lawnmower {
+    fn plan(&mut self, q: &Question<'_>) -> Vec<Node> {
+        if self.coming.is_empty() {
+            self.coming = legs(q);
+            // From the end that is nearer.
+            let ways = q.lattice.ways(q.from);
+            let metres = |node: Option<&Node>| node.map_or(f64::INFINITY, |&n| ways.metres[n]);
+            if metres(self.coming.first()) > metres(self.coming.last()) {
+                // As it is: the last comes first.
+            } else {
+                self.coming.reverse();
+            }
+        }
+        while let Some(&next) = self.coming.last() {
+            if next == q.from {
+                self.coming.pop();
+                continue;
+            }
+            let ways = q.lattice.ways(q.from);
+            let mut way = ways.to(next);
+            if way.is_empty() {
+                self.coming.pop();
+                continue;
+            }
+            way.truncate(way.iter().take_while(|&&n| q.can_return(n, ways.metres[n])).count());
+            return way;
+        }
+        Vec::new()
+    }
+
+    fn handle_change(&mut self) {
+        self.coming.clear();
+    }
+}
+
+/// Ends of the open stretches of every other row, there and back.
+fn legs(q: &Question<'_>) -> Vec<Node> {
+    let (columns, rows) = q.lattice.size();
+    let mut legs = Vec::new();
+    for (leg, row) in (0..rows).step_by(2).enumerate() {
+        let is_worth = |n: &Node| q.lattice.is_open(*n) && q.home.metres[*n].is_finite();
+        let mut stretch: Vec<Node> = (row * columns..(row + 1) * columns).filter(is_worth).collect();
+        if leg % 2 == 1 {
+            stretch.reverse();
+        }
+        let inner = |i: usize| {
+            let joined =
+                |j: Option<usize>| j.and_then(|j| stretch.get(j)).is_some_and(|&n| stretch[i].abs_diff(n) == 1);
+            joined(i.checked_sub(1)) && joined(Some(i + 1))
+        };
+        legs.extend((0..stretch.len()).filter(|&i| !inner(i)).map(|i| stretch[i]));
+    }
+    legs
+}

@@ -1,0 +1,227 @@
+//! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
+
+use super::{Vehicle, VehicleOutput};
+use crate::auv::{Area, Durable, MapUpdate};
+use crate::config::Config;
+use crate::ends;
+use crate::rehearsal::motion::Motion;
+use crate::rehearsal::witness::stretches_outside;
+use proptest::prelude::*;
+use scenecast_protocol::directive::{
+    Constraints, Fence, Limits, Place, PlannerKind, Polygon, Reaction, Settings, Slot, Utility,
+};
+use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::map::Cell;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+const AREA: Area = Area { west: 0.0, south: 0.0, east: 40.0, north: 30.0 };
+const STEP_S: f64 = 0.5;
+
+/// A vehicle in kinematic water, and what it was told.
+struct Sea {
+    vehicle: Vehicle,
+    motion: Motion,
+    now: Instant,
+    fence: Fence,
+    /// Limit of distance, and what of it is used.
+    limit: Option<(f64, f64)>,
+}
+
+fn profile(config: &Config) -> ModemProfile {
+    ends::modem_of_process(config, ends::vehicle_address(config).unwrap()).unwrap()
+}
+
+impl Sea {
+    fn new(drift: f64, seed: u64) -> Self {
+        let mut config = Config::default();
+        config.camera.width_px = 320;
+        config.camera.height_px = 240;
+        let profile = profile(&config);
+        let now = Instant::ZERO;
+        let vehicle = ends::vehicle(&config, profile, AREA, Durable::default(), seed, now).unwrap();
+        let (x, y) = vehicle.navigator().position();
+        Self { vehicle, motion: Motion::new(x, y, 0.5, drift, seed), now, fence: Fence::default(), limit: None }
+    }
+
+    fn tell(&mut self, slot: Slot) {
+        if self.vehicle.apply(slot.clone(), self.now).is_err() {
+            return;
+        }
+        match slot {
+            Slot::Fence(fence) => self.fence = fence,
+            Slot::Limits(limits) => self.limit = limits.distance_m.map(|m| (f64::from(m), 0.0)),
+            _ => {}
+        }
+    }
+
+    fn see(&mut self, seed: u64) {
+        let patch = |x: i32, y: i32| (((x / 9 + 3 * (y / 7)) as u64).wrapping_mul(seed | 1) >> 40) as u8 % 4 + 1;
+        let (x, y) = self.vehicle.navigator().position();
+        let (x, y) = ((x / 0.25) as i32, (y / 0.25) as i32);
+        let cells = (-6..6).flat_map(|dy| (-6..6).map(move |dx| (x + dx, y + dy)));
+        let mut known: Vec<(Cell, u8)> = self.vehicle.cells().collect();
+        known.extend(cells.map(|(x, y)| (Cell::new(x, y), patch(x, y))));
+        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: 0.0, epoch: 0, cells: known, planes, perplexity, labels: 4 };
+        self.vehicle.handle_map(&update, self.now);
+    }
+
+    /// Half a second; checks every leg that the vehicle sets out on.
+    fn step(&mut self) {
+        self.now = self.now + Duration::from_secs_f64(STEP_S);
+        self.vehicle.steer(self.now);
+        let at = self.vehicle.navigator().position();
+        while let Some(output) = self.vehicle.poll_output() {
+            match output {
+                VehicleOutput::Waypoint(x, y) => {
+                    self.check(at, (x, y));
+                    self.motion.set_target(Some((x, y)));
+                }
+                VehicleOutput::Hold => self.motion.set_target(None),
+                VehicleOutput::Surface => self.motion.come_up(),
+                _ => {}
+            }
+        }
+        let o = self.motion.step(at, STEP_S);
+        self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, self.vehicle.navigator().depth_m(), self.now);
+        if let Some((_, used)) = &mut self.limit {
+            *used += o.dx_m.hypot(o.dy_m);
+        }
+    }
+
+    fn check(&self, from: (f64, f64), to: (f64, f64)) {
+        let is_back = stretches_outside(&[from, from], &self.fence) > 0;
+        assert!(stretches_outside(&[to, to], &self.fence) == 0, "{to:?} is outside of {:?}", self.fence);
+        // From outside the way in is straight.
+        assert!(is_back || stretches_outside(&[from, to], &self.fence) == 0, "{from:?} to {to:?}: {:?}", self.fence);
+        let returns = self.vehicle.mode().0 == VehicleMode::Return;
+        if let Some((limit, used)) = self.limit.filter(|_| !returns) {
+            let leg = (to.0 - from.0).hypot(to.1 - from.1);
+            assert!(used + leg <= limit, "{used} m and {leg} m more are beyond {limit} m");
+        }
+    }
+}
+
+fn fence() -> impl Strategy<Value = Slot> {
+    let corner =
+        |x: std::ops::Range<i32>, y: std::ops::Range<i32>| (x, y).prop_map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+    let outline =
+        (corner(-20..8, -20..8), corner(150..410, -20..8), corner(150..410, 120..310), corner(-20..8, 120..310));
+    let keep_out = (0i32..350, 0i32..250, 10i32..120).prop_map(|(x, y, r)| {
+        let at = |dx: i32, dy: i32| Place { x_dm: x + dx, y_dm: y + dy };
+        Polygon(vec![at(-r, -r), at(r, -r / 2), at(r / 3, r)])
+    });
+    let home = proptest::option::of(corner(0..200, 0..150));
+    (outline, proptest::collection::vec(keep_out, 0..4), home).prop_map(|((a, b, c, d), keep_outs, return_point)| {
+        Slot::Fence(Fence { fence: Some(Polygon(vec![a, b, c, d])), keep_outs, return_point })
+    })
+}
+
+fn order() -> impl Strategy<Value = Slot> {
+    let reaction =
+        || proptest::sample::select(vec![None, Some(Reaction::Hold), Some(Reaction::Return), Some(Reaction::Surface)]);
+    let limits = (
+        proptest::option::of(10u32..300),
+        proptest::option::of(60u32..2000),
+        proptest::option::of(5u16..400),
+        reaction(),
+        reaction(),
+    );
+    prop_oneof![
+        4 => fence(),
+        2 => limits.prop_map(|(distance_m, time_s, silence_s, on_silence, on_breach)| {
+            Slot::Limits(Limits { distance_m, time_s, silence_s, on_silence, on_breach, ..Limits::default() })
+        }),
+        2 => (-100i8..=100, -100i8..=100, -100i8..=100, -20i8..=100).prop_map(|(a, b, c, exploration)| {
+            Slot::Utility(Utility { epoch: 0, exploration, curiosity: c / 2, weights: [(1, a), (2, b), (3, c)].into() })
+        }),
+        1 => (any::<bool>(), prop::bool::weighted(0.2)).prop_map(|(hold, abort)| Slot::Constraints(Constraints { hold, abort })),
+        1 => Just(Slot::Constraints(Constraints::default())),
+        1 => proptest::sample::select(vec![None, Some(PlannerKind::Lawnmower), Some(PlannerKind::Greedy), Some(PlannerKind::Horizon)])
+            .prop_map(|planner| Slot::Settings(Settings { refine_words_per_s: 0, planner })),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn no_waypoint_leads_out_of_the_fence_into_a_keep_out_or_beyond_a_limit(
+        orders in proptest::collection::vec((0u32..160, order()), 1..12),
+        drift in 0.0f64..0.05, seed: u64, fixes: bool,
+    ) {
+        let mut sea = Sea::new(drift, seed);
+        sea.see(seed);
+        for (steps, slot) in orders {
+            sea.tell(slot);
+            for step in 0..steps {
+                sea.step();
+                if step % 8 == 0 {
+                    sea.see(seed);
+                }
+                if fixes && step % 20 == 0 {
+                    let (x, y) = (sea.motion.x_m, sea.motion.y_m);
+                    sea.vehicle.navigator.handle_fix(x, y, 0.3, sea.now, sea.now);
+                }
+            }
+        }
+    }
+}
+
+/// A fence from the origin to (20, 20) m with a return point at (5, 5) m.
+fn small_fence() -> Fence {
+    let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+    let fence = Polygon(vec![place(-1, -1), place(20, -1), place(20, 20), place(-1, 20)]);
+    Fence { fence: Some(fence), keep_outs: Vec::new(), return_point: Some(place(5, 5)) }
+}
+
+#[test]
+fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.tell(Slot::Fence(small_fence()));
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
+    sea.vehicle.navigator.set_pose(25.0, 5.0, 0.0, 16.0, sea.now);
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Return, ModeReason::Fence));
+    assert_eq!(sea.vehicle.durable().breach, 2);
+    (0..200).for_each(|_| sea.step());
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Hold, ModeReason::Fence), "back at the return point");
+    sea.tell(Slot::Constraints(Constraints::default()));
+    sea.step();
+    assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
+}
+
+#[test]
+fn silence_and_abort_bring_the_vehicle_home_or_up() {
+    let mut sea = Sea::new(0.0, 1);
+    let limits = Limits { silence_s: Some(30), on_silence: Some(Reaction::Surface), ..Limits::default() };
+    sea.tell(Slot::Limits(limits));
+    (0..70).for_each(|_| sea.step());
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Surface, ModeReason::Silence));
+    let mut sea = Sea::new(0.0, 1);
+    sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Hold), ..Limits::default() }));
+    sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Abort, ModeReason::Order));
+}
+
+#[test]
+fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.tell(Slot::Fence(small_fence()));
+    let far = Fence {
+        fence: small_fence().fence.map(|p| Polygon(p.0.iter().map(|v| Place { x_dm: v.x_dm + 900, ..*v }).collect())),
+        ..Fence::default()
+    };
+    sea.tell(Slot::Fence(far));
+    assert_eq!(sea.fence, small_fence(), "a fence that the vehicle is outside of is refused");
+    let config = Config::default();
+    let durable = sea.vehicle.durable().clone();
+    let again = ends::vehicle(&config, profile(&config), AREA, durable, 1, sea.now).unwrap();
+    assert!(!again.steering.bounds().holds((25.0, 5.0)));
+    assert!(again.steering.bounds().holds((15.0, 5.0)));
+    assert_eq!(again.steering.home(), (5.0, 5.0));
+}

@@ -1,0 +1,302 @@
+//! Where the vehicle may be.
+
+use super::polygon::{Place, Polygon, PolygonFault};
+use crate::map_codec::bits::{BitReader, BitWriter};
+
+/// The outline that the vehicle stays in, those that it stays out of, and the place that it returns to.
+///
+/// Bits follow each other, the most significant first; the last byte is filled with zeros.
+///
+/// ```text
+///  bits   1       4          1        48        10 + 2w (n-1)             2w
+///       +-------+----------+--------+--------+-------------------------+--------------+---------
+///       | fence | keep-outs| return | anchor | an outline, for each    | return point | zeros
+///       +-------+----------+--------+--------+-------------------------+--------------+---------
+///  an outline:
+///       +-----------+-----+---------------------------------+
+///       | n - 3: 5  | w: 5| dx, dy: w + w, for each vertex  |
+///       +-----------+-----+---------------------------------+
+/// ```
+/// * fence, return: whether there is one; keep-outs: 0 to 15. The fence comes first.
+/// * anchor: x, y of the first vertex, or of the return point if there is no outline: decimetres, two's complement,
+///   within 838 860.7 m; left out if there is neither.
+/// * n: vertices, 3 to 34. w: bits of a difference, 1 to 25, two's complement, decimetres.
+/// * dx, dy: from the vertex before; a later outline's first vertex from the anchor. The very first vertex is the anchor
+///   and is left out.
+/// * return point: from the anchor, in a width of its own, written before it in 5 bits; left out if it is the anchor.
+///
+/// Source: surface. Eight vertices with edges of up to 800 m and a return point take at most 37 bytes, which fit a
+/// frame of 64 bytes under a key; without one, edges may have 6 km.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Fence {
+    /// The vehicle stays inside.
+    pub fence: Option<Polygon>,
+    /// The vehicle stays outside of each.
+    pub keep_outs: Vec<Polygon>,
+    /// Where it goes on its return; `None`: where its run began.
+    pub return_point: Option<Place>,
+}
+
+/// What is wrong with a fence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FenceFault {
+    /// The fence is no polygon.
+    #[error("fence: {0}")]
+    Fence(PolygonFault),
+    /// A keep-out, counted from 1, is no polygon.
+    #[error("keep_outs: outline {0}: {1}")]
+    KeepOut(usize, PolygonFault),
+    /// More than fit the count.
+    #[error("keep_outs: {0} outlines: it takes 15 or fewer")]
+    TooMany(usize),
+    /// A keep-out, counted from 1, covers the whole fence.
+    #[error("keep_outs: outline {0} covers the whole fence: nothing is left")]
+    NothingLeft(usize),
+    /// The vehicle could never get there.
+    #[error("return_point lies outside the fence")]
+    ReturnOutside,
+    /// The vehicle could never get there; the keep-out counts from 1.
+    #[error("return_point lies in keep-out {0}")]
+    ReturnKeptOut(usize),
+    /// The return point is too far from the origin.
+    #[error("return_point lies more than 838 km from the origin")]
+    ReturnTooFar,
+}
+
+impl Fence {
+    /// Most keep-outs.
+    pub const MOST_KEEP_OUTS: usize = 15;
+
+    /// Whether a vehicle could obey it.
+    pub fn check(&self) -> Result<(), FenceFault> {
+        if let Some(fence) = &self.fence {
+            fence.check().map_err(FenceFault::Fence)?;
+        }
+        if self.keep_outs.len() > Self::MOST_KEEP_OUTS {
+            return Err(FenceFault::TooMany(self.keep_outs.len()));
+        }
+        for (i, keep_out) in (1..).zip(&self.keep_outs) {
+            keep_out.check().map_err(|fault| FenceFault::KeepOut(i, fault))?;
+            let covers = |f: &Polygon| f.0.iter().all(|&v| keep_out.contains(v)) && !f.meets(keep_out);
+            if self.fence.as_ref().is_some_and(covers) {
+                return Err(FenceFault::NothingLeft(i));
+            }
+        }
+        let Some(home) = self.return_point else { return Ok(()) };
+        if Place::from_metres(home.metres().0, home.metres().1).is_none() {
+            return Err(FenceFault::ReturnTooFar);
+        }
+        if self.fence.as_ref().is_some_and(|f| !f.contains(home)) {
+            return Err(FenceFault::ReturnOutside);
+        }
+        match self.keep_outs.iter().position(|k| k.contains(home)) {
+            Some(i) => Err(FenceFault::ReturnKeptOut(i + 1)),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether the vehicle may be at a place.
+    pub fn allows(&self, place: Place) -> bool {
+        self.fence.as_ref().is_none_or(|f| f.contains(place)) && !self.keep_outs.iter().any(|k| k.contains(place))
+    }
+
+    /// Every outline, the fence first.
+    pub fn outlines(&self) -> impl Iterator<Item = &Polygon> {
+        self.fence.iter().chain(&self.keep_outs)
+    }
+
+    /// The payload. What [`Self::check`] does not allow is cut to what the layout can say.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bits = BitWriter::default();
+        let keep_outs = self.keep_outs.len().min(Self::MOST_KEEP_OUTS);
+        bits.bit(self.fence.is_some());
+        bits.put(keep_outs as u64, 4);
+        bits.bit(self.return_point.is_some());
+        let outlines = || self.fence.iter().chain(self.keep_outs.iter().take(keep_outs));
+        let first = outlines().next().and_then(|o| o.0.first()).copied();
+        let Some(anchor) = first.or(self.return_point) else { return bits.into_bytes() };
+        put_pair(&mut bits, anchor, 24);
+        for (i, outline) in outlines().enumerate() {
+            put_outline(&mut bits, outline, anchor, i == 0);
+        }
+        if let Some(home) = self.return_point.filter(|_| first.is_some()) {
+            let step = minus(home, anchor);
+            let width = width_of([step]);
+            bits.put(u64::from(width), 5);
+            put_pair(&mut bits, step, width);
+        }
+        bits.into_bytes()
+    }
+
+    /// Reads a payload; `None` if it is none. What it says is still to be checked.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut bits = BitReader::new(bytes);
+        let has_fence = bits.bit()?;
+        let keep_outs = bits.take(4)?;
+        let has_return = bits.bit()?;
+        let mut read = Self::default();
+        let outlines = u64::from(has_fence) + keep_outs;
+        if outlines > 0 || has_return {
+            let anchor = take_pair(&mut bits, 24)?;
+            for i in 0..outlines {
+                let outline = take_outline(&mut bits, anchor, i == 0)?;
+                if has_fence && i == 0 { read.fence = Some(outline) } else { read.keep_outs.push(outline) }
+            }
+            read.return_point = match (has_return, outlines) {
+                (false, _) => None,
+                (true, 0) => Some(anchor),
+                (true, _) => {
+                    let width = take_width(&mut bits)?;
+                    Some(plus(anchor, take_pair(&mut bits, width)?))
+                }
+            };
+        }
+        bits.rest_of_bytes().filter(|rest| rest.is_empty()).map(|_| read)
+    }
+}
+
+fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: Place, is_first: bool) {
+    let vertices = outline.0.get(..Polygon::MOST_VERTICES).unwrap_or(&outline.0);
+    let before = std::iter::once(anchor).chain(vertices.iter().copied());
+    let steps: Vec<Place> =
+        vertices.iter().zip(before).map(|(&v, b)| minus(v, b)).skip(usize::from(is_first)).collect();
+    let width = width_of(steps.iter().copied());
+    bits.put((vertices.len() as u64).saturating_sub(3), 5);
+    bits.put(u64::from(width), 5);
+    steps.into_iter().for_each(|step| put_pair(bits, step, width));
+}
+
+fn take_outline(bits: &mut BitReader<'_>, anchor: Place, is_first: bool) -> Option<Polygon> {
+    let n = bits.take(5)? + 3;
+    let width = take_width(bits)?;
+    let mut vertices = Vec::with_capacity(n as usize);
+    if is_first {
+        vertices.push(anchor);
+    }
+    while (vertices.len() as u64) < n {
+        let before = vertices.last().copied().unwrap_or(anchor);
+        vertices.push(plus(before, take_pair(bits, width)?));
+    }
+    Some(Polygon(vertices))
+}
+
+fn take_width(bits: &mut BitReader<'_>) -> Option<u32> {
+    let width = bits.take(5)? as u32;
+    (1..=25).contains(&width).then_some(width)
+}
+
+fn put_pair(bits: &mut BitWriter, place: Place, width: u32) {
+    for v in [place.x_dm, place.y_dm] {
+        bits.put(v as u32 as u64, width);
+    }
+}
+
+fn take_pair(bits: &mut BitReader<'_>, width: u32) -> Option<Place> {
+    let mut signed = || bits.take(width).map(|v| ((v as u32) << (32 - width)) as i32 >> (32 - width));
+    Some(Place { x_dm: signed()?, y_dm: signed()? })
+}
+
+fn minus(a: Place, b: Place) -> Place {
+    Place { x_dm: a.x_dm.wrapping_sub(b.x_dm), y_dm: a.y_dm.wrapping_sub(b.y_dm) }
+}
+
+fn plus(a: Place, b: Place) -> Place {
+    Place { x_dm: a.x_dm.wrapping_add(b.x_dm), y_dm: a.y_dm.wrapping_add(b.y_dm) }
+}
+
+/// Bits that hold every number in two's complement, 1 to 25.
+fn width_of(steps: impl IntoIterator<Item = Place>) -> u32 {
+    let bits = |v: i32| 33 - (v ^ (v >> 31)).leading_zeros();
+    steps.into_iter().map(|s| bits(s.x_dm).max(bits(s.y_dm))).max().unwrap_or(1).min(25)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn polygon(vertices: &[(i32, i32)]) -> Polygon {
+        Polygon(vertices.iter().map(|&(x_dm, y_dm)| Place { x_dm, y_dm }).collect())
+    }
+
+    fn square(x: i32, y: i32, side: i32) -> Polygon {
+        polygon(&[(x, y), (x + side, y), (x + side, y + side), (x, y + side)])
+    }
+
+    #[test]
+    fn golden_bytes_of_a_fence() {
+        let fence = Fence {
+            fence: Some(square(-100, 50, 400)),
+            keep_outs: vec![polygon(&[(0, 100), (50, 100), (0, 180)])],
+            return_point: Some(Place { x_dm: -90, y_dm: 60 }),
+        };
+        assert_eq!(fence.check(), Ok(()));
+        let bytes = fence.to_bytes();
+        let golden = [
+            0x8F, 0xFF, 0xFE, 0x70, 0x00, 0x00, 0xC8, 0x2A, 0x64, 0x00, 0x00, 0x01, 0x90, 0x9C, 0x00, 0x00, 0x21, 0x90,
+            0xC8, 0xC8, 0x03, 0x39, 0x40, 0xAA, 0x50,
+        ];
+        assert_eq!(bytes, golden, "{bytes:02X?}");
+        assert_eq!(Fence::from_bytes(&bytes), Some(fence));
+        assert_eq!(Fence::default().to_bytes(), [0]);
+        let home = Fence { return_point: Some(Place { x_dm: 1, y_dm: -1 }), ..Fence::default() };
+        assert_eq!(home.to_bytes(), [0x04, 0, 0, 0x07, 0xFF, 0xFF, 0xFC]);
+        assert_eq!(Fence::from_bytes(&home.to_bytes()), Some(home));
+    }
+
+    #[test]
+    fn eight_vertices_and_a_return_point_fit_a_frame_of_64_bytes_under_a_key() {
+        let r = 8_000.0f64;
+        let octagon = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
+        let vertices =
+            octagon.map(|a| Place { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
+        let fence = Polygon(vertices.collect());
+        let return_point = Some(Place { x_dm: -8_000_000, y_dm: 7_000_000 });
+        let fence = Fence { fence: Some(fence), keep_outs: Vec::new(), return_point };
+        assert_eq!(fence.check(), Ok(()));
+        // Five bytes of the slot's head, 13 of the frame's, 8 of a tag.
+        assert!(fence.to_bytes().len() <= 64 - 13 - 8 - 5, "{} bytes", fence.to_bytes().len());
+    }
+
+    #[test]
+    fn a_fence_that_no_vehicle_could_obey_is_refused_by_what_is_wrong() {
+        let fence = |f: Polygon, k: &[Polygon], home: Option<(i32, i32)>| {
+            let return_point = home.map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+            Fence { fence: Some(f), keep_outs: k.to_vec(), return_point }.check()
+        };
+        let field = square(0, 0, 100);
+        assert_eq!(fence(field.clone(), &[square(50, 50, 100)], Some((10, 10))), Ok(()));
+        assert_eq!(fence(field.clone(), &[], Some((200, 10))), Err(FenceFault::ReturnOutside));
+        assert_eq!(fence(field.clone(), &[square(5, 5, 10)], Some((10, 10))), Err(FenceFault::ReturnKeptOut(1)));
+        assert_eq!(fence(field.clone(), &[square(-5, -5, 200)], None), Err(FenceFault::NothingLeft(1)));
+        let flat = polygon(&[(0, 0), (1, 1), (2, 2)]);
+        assert_eq!(fence(field.clone(), &[flat], None), Err(FenceFault::KeepOut(1, PolygonFault::NoArea)));
+        assert_eq!(fence(field.clone(), &vec![square(1, 1, 2); 16], None), Err(FenceFault::TooMany(16)));
+        let bow = polygon(&[(0, 0), (10, 10), (10, 0), (0, 10)]);
+        let fault = fence(bow, &[], None).unwrap_err();
+        assert_eq!(fault.to_string(), "fence: edge 1 crosses or touches edge 3");
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_read_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..60)) {
+            if let Some(fence) = Fence::from_bytes(&bytes) {
+                let _ = fence.check();
+            }
+        }
+
+        #[test]
+        fn outlines_round_trip(
+            outlines in proptest::collection::vec(
+                proptest::collection::vec((-8_388_607i32..=8_388_607, -8_388_607i32..=8_388_607), 3..34), 0..5),
+            has_fence: bool,
+            home in proptest::option::of((-8_388_607i32..=8_388_607, -8_388_607i32..=8_388_607)),
+        ) {
+            let mut outlines: Vec<Polygon> = outlines.iter().map(|o| polygon(o)).collect();
+            let fence = if has_fence { outlines.pop() } else { None };
+            let return_point = home.map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+            let fence = Fence { fence, keep_outs: outlines, return_point };
+            prop_assert_eq!(Fence::from_bytes(&fence.to_bytes()), Some(fence));
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Polygons in whole decimetres: every predicate is exact.
+
+/// A place on the horizontal plane, decimetres from the origin, each coordinate within [`Place::REACH_DM`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Place {
+    /// East.
+    pub x_dm: i32,
+    /// North.
+    pub y_dm: i32,
+}
+
+impl Place {
+    /// Largest coordinate that fits the wire, either sign.
+    pub const REACH_DM: i32 = 8_388_607;
+
+    /// The nearest place to one in metres; `None` if that is not on the plane that the wire can say.
+    pub fn from_metres(x_m: f64, y_m: f64) -> Option<Self> {
+        let dm = |m: f64| {
+            let dm = (m * 10.0).round();
+            (dm.abs() <= f64::from(Self::REACH_DM)).then_some(dm as i32)
+        };
+        Some(Self { x_dm: dm(x_m)?, y_dm: dm(y_m)? })
+    }
+
+    /// East and north of the origin, metres.
+    pub fn metres(self) -> (f64, f64) {
+        (f64::from(self.x_dm) / 10.0, f64::from(self.y_dm) / 10.0)
+    }
+
+    fn is_in_reach(self) -> bool {
+        self.x_dm.unsigned_abs().max(self.y_dm.unsigned_abs()) <= Self::REACH_DM.unsigned_abs()
+    }
+}
+
+/// A polygon, the last vertex joined to the first; either sense of rotation.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Polygon(pub Vec<Place>);
+
+/// Why vertices make no polygon. Vertices and edges count from 1; edge n begins at vertex n.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum PolygonFault {
+    /// No area can lie between so few.
+    #[error("{0} vertices: it takes 3 to {most}", most = Polygon::MOST_VERTICES)]
+    Vertices(usize),
+    /// A vertex is too far from the origin.
+    #[error("vertex {0} lies more than 838 km from the origin")]
+    TooFar(usize),
+    /// Two neighbouring vertices are the same.
+    #[error("vertex {0} is at the same place as the one before it")]
+    Repeated(usize),
+    /// All vertices lie on one line.
+    #[error("it has no area")]
+    NoArea,
+    /// Two edges cross or touch.
+    #[error("edge {0} crosses or touches edge {1}")]
+    Crossing(usize, usize),
+}
+
+impl Polygon {
+    /// Most vertices.
+    pub const MOST_VERTICES: usize = 34;
+
+    /// Whether this is a simple polygon that the wire can say.
+    pub fn check(&self) -> Result<(), PolygonFault> {
+        let n = self.0.len();
+        if !(3..=Self::MOST_VERTICES).contains(&n) {
+            return Err(PolygonFault::Vertices(n));
+        }
+        if let Some(far) = self.0.iter().position(|p| !p.is_in_reach()) {
+            return Err(PolygonFault::TooFar(far + 1));
+        }
+        let edges: Vec<(Place, Place)> = self.edges().collect();
+        if let Some(same) = edges.iter().position(|(a, b)| a == b) {
+            return Err(PolygonFault::Repeated((same + 1) % n + 1));
+        }
+        let Some(&first) = self.0.first() else { return Err(PolygonFault::Vertices(0)) };
+        if edges.iter().all(|&(a, b)| cross(first, a, b) == 0) {
+            return Err(PolygonFault::NoArea);
+        }
+        for (i, &(a, b)) in edges.iter().enumerate() {
+            for (j, &(c, d)) in edges.iter().enumerate().skip(i + 1) {
+                let meets = match (j == i + 1, i == 0 && j == n - 1) {
+                    (true, _) => folds_back(a, b, d),
+                    (_, true) => folds_back(c, d, b),
+                    _ => segments_meet((a, b), (c, d)),
+                };
+                if meets {
+                    return Err(PolygonFault::Crossing(i + 1, j + 1));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Edges, the closing one last.
+    pub fn edges(&self) -> impl Iterator<Item = (Place, Place)> + '_ {
+        self.0.iter().copied().zip(self.0.iter().copied().cycle().skip(1))
+    }
+
+    /// Whether a place lies inside or on the edge.
+    pub fn contains(&self, p: Place) -> bool {
+        let mut inside = false;
+        for (a, b) in self.edges() {
+            if cross(a, b, p) == 0 && is_between(a, b, p) {
+                return true;
+            }
+            if (a.y_dm > p.y_dm) != (b.y_dm > p.y_dm) {
+                inside ^= (cross(a, b, p) > 0) == (b.y_dm > a.y_dm);
+            }
+        }
+        inside
+    }
+
+    /// Whether an edge of this polygon crosses or touches one of the other.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        self.edges().any(|e| other.edges().any(|f| segments_meet(e, f)))
+    }
+}
+
+/// Twice the area of the triangle, positive if it turns left.
+fn cross(a: Place, b: Place, c: Place) -> i64 {
+    let d = |p: i32, q: i32| i64::from(p) - i64::from(q);
+    d(b.x_dm, a.x_dm) * d(c.y_dm, a.y_dm) - d(b.y_dm, a.y_dm) * d(c.x_dm, a.x_dm)
+}
+
+/// Whether `p` lies in the box of `a` and `b`.
+fn is_between(a: Place, b: Place, p: Place) -> bool {
+    (a.x_dm.min(b.x_dm)..=a.x_dm.max(b.x_dm)).contains(&p.x_dm)
+        && (a.y_dm.min(b.y_dm)..=a.y_dm.max(b.y_dm)).contains(&p.y_dm)
+}
+
+/// Whether the way from `a` over `b` to `c` turns round on itself.
+fn folds_back(a: Place, b: Place, c: Place) -> bool {
+    cross(a, b, c) == 0 && (is_between(a, b, c) || is_between(b, c, a))
+}
+
+fn segments_meet((a, b): (Place, Place), (c, d): (Place, Place)) -> bool {
+    let (s, t) = (cross(a, b, c).signum() * cross(a, b, d).signum(), cross(c, d, a).signum() * cross(c, d, b).signum());
+    let touches = |p: Place, q: Place, r: Place| cross(p, q, r) == 0 && is_between(p, q, r);
+    (s < 0 && t < 0) || touches(a, b, c) || touches(a, b, d) || touches(c, d, a) || touches(c, d, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(vertices: &[(i32, i32)]) -> Polygon {
+        Polygon(vertices.iter().map(|&(x_dm, y_dm)| Place { x_dm, y_dm }).collect())
+    }
+
+    #[test]
+    fn simple_polygons_of_either_sense_are_sound() {
+        assert_eq!(polygon(&[(0, 0), (10, 0), (10, 10), (0, 10)]).check(), Ok(()));
+        assert_eq!(polygon(&[(0, 10), (10, 10), (10, 0), (0, 0)]).check(), Ok(()));
+        assert_eq!(polygon(&[(0, 0), (40, 0), (40, 40), (20, 10), (0, 40)]).check(), Ok(()), "not convex");
+        assert_eq!(polygon(&[(0, 0), (5, 0), (10, 0), (10, 10)]).check(), Ok(()), "a vertex on a straight edge");
+        let far = Place::REACH_DM;
+        assert_eq!(polygon(&[(-far, -far), (far, -far), (far, far), (-far, far)]).check(), Ok(()));
+    }
+
+    #[test]
+    fn what_is_no_polygon_is_refused_by_what_is_wrong() {
+        use PolygonFault::*;
+        assert_eq!(polygon(&[(0, 0), (10, 0)]).check(), Err(Vertices(2)));
+        assert_eq!(polygon(&[]).check(), Err(Vertices(0)));
+        assert_eq!(polygon(&[(0, 0); 35]).check(), Err(Vertices(35)));
+        assert_eq!(polygon(&[(0, 0), (10, 0), (20, 0)]).check(), Err(NoArea));
+        assert_eq!(polygon(&[(0, 0), (10, 10), (10, 0), (0, 10)]).check(), Err(Crossing(1, 3)), "a bow tie");
+        assert_eq!(polygon(&[(0, 0), (10, 0), (10, 0), (0, 10)]).check(), Err(Repeated(3)));
+        assert_eq!(polygon(&[(0, 0), (10, 0), (0, 10), (0, 0)]).check(), Err(Repeated(1)));
+        assert_eq!(polygon(&[(0, 0), (20, 0), (10, 0), (10, 10)]).check(), Err(Crossing(1, 2)), "a spike");
+        assert_eq!(polygon(&[(0, 0), (20, 0), (20, 20), (10, 0), (0, 20)]).check(), Err(Crossing(1, 3)), "a pinch");
+        assert_eq!(polygon(&[(0, 0), (i32::MAX, 0), (0, i32::MIN)]).check(), Err(TooFar(2)));
+    }
+
+    #[test]
+    fn a_place_is_inside_on_the_edge_or_outside() {
+        let u = polygon(&[(0, 0), (30, 0), (30, 30), (20, 30), (20, 10), (10, 10), (10, 30), (0, 30)]);
+        assert_eq!(u.check(), Ok(()));
+        for (x_dm, y_dm, inside) in [
+            (5, 20, true),
+            (15, 20, false),
+            (25, 20, true),
+            (15, 5, true),
+            (15, 10, true),
+            (30, 30, true),
+            (31, 5, false),
+            (-1, 30, false),
+        ] {
+            assert_eq!(u.contains(Place { x_dm, y_dm }), inside, "{x_dm}, {y_dm}");
+        }
+    }
+}
