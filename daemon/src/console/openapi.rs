@@ -47,8 +47,9 @@ fn describe() -> Value {
         path[operation.method.as_str().to_lowercase()] = described;
     }
     let refusal = schemas.sent.subschema_for::<Refusal>();
-    let mut types = schemas.taken.take_definitions(true);
-    types.extend(schemas.sent.take_definitions(true));
+    let mut types = schemas.sent.take_definitions(true);
+    // What is both taken and told, as a fence, may be told whole but taken in part.
+    types.extend(schemas.taken.take_definitions(true));
     json!({
         "openapi": "3.1.0",
         "info": { "title": "scenecast", "version": env!("CARGO_PKG_VERSION"), "description": ABOUT },
