@@ -6,6 +6,7 @@ pub mod auv;
 pub mod cli;
 pub mod config;
 pub mod console;
+pub mod ctl;
 mod ends;
 mod figures;
 mod imagery;

@@ -33,6 +33,12 @@ export const askExemplar = (id, label) => write(`/vehicles/${id}/exemplars`, { l
 export const sendHold = (id, hold) => write(`/vehicles/${id}/constraints`, { hold });
 export const sendBudget = (bps) => write("/budget", { budget_bps: bps });
 
+/** Goes to the login if the surface takes a token and no longer knows ours. */
+export async function logInIfAsked() {
+  const answer = await fetch(`${BASE}/state`, { cache: "no-store", signal: AbortSignal.timeout(10000) }).catch(() => null);
+  if (answer?.status === 401) location.assign("/login");
+}
+
 /** The map of a vehicle with its planes as typed arrays, rows from the south. */
 export async function readMap(id) {
   const m = await read(`/vehicles/${id}/map`);

@@ -71,6 +71,12 @@ impl Surface {
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
+    /// Counts up whenever the operator's map of a vehicle or a plane of it changes.
+    pub fn map_version(&self, vehicle: Address) -> u64 {
+        let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
+        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
+    }
+
     /// Bits a second that the surface may use.
     pub fn budget_bps(&self) -> u32 {
         self.link.budget_bps()
@@ -307,6 +313,7 @@ impl Surface {
                     }
                     None => {
                         desk.whole = Some(picture::read_whole(&bytes)?);
+                        desk.wholes += 1;
                         Some(SurfaceOutput::MapChanged(vehicle))
                     }
                 }

@@ -5,12 +5,14 @@ mod keys;
 mod load;
 mod place;
 mod print;
+mod token_file;
 
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
 pub use place::{Place, autopilot_place, origin, position_places};
 pub use print::print;
+pub use token_file::{load_token, read_token};
 
 use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Shares;
@@ -330,6 +332,10 @@ section! {
     Console {
         /// Address to listen on; empty = no page.
         listen: String = "127.0.0.1:8460".into(),
+        /// File of the token that others must show; empty = none, and only loopback addresses are listened on.
+        token_file: String = String::new(),
+        /// Name of this machine for others; empty = they ask for its address.
+        host: String = String::new(),
     }
 }
 section! {

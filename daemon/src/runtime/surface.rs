@@ -6,7 +6,7 @@ use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
 use crate::asv::position::world_file;
 use crate::asv::{Surface, SurfaceOutput};
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use crate::modem::{self, Modem, ModemEvent};
 use crate::picture;
@@ -21,6 +21,13 @@ use tokio::sync::oneshot;
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
+        let entrance = match config.console.listen.as_str() {
+            "" => None,
+            address => {
+                let token = config::load_token(&config)?;
+                Some(bind(address, "console.listen", token, &config.console.host).await?)
+            }
+        };
         let dir = PathBuf::from(&config.runtime.state_dir);
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
@@ -31,14 +38,10 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
-        let console = match config.console.listen.as_str() {
-            "" => None,
-            address => {
-                let console = start(bind(address, "console.listen").await?);
-                println!("the operator's page is at http://{address} (end with Ctrl-C)");
-                Some(console)
-            }
-        };
+        let console = entrance.map(|entrance| {
+            println!("the operator's page is at http://{} (end with Ctrl-C)", config.console.listen);
+            start(entrance)
+        });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = modem::open(&config, Address::SURFACE, profile, clock).await?;

@@ -49,13 +49,21 @@ function levelOf(p) {
 /** A quantity without a unit is a share. */
 export const planeText = (p, value) => (p.unit === "" ? percent(value) : `${minus(String(Number(value.toFixed(1))))} ${p.unit}`);
 
-/** Latitude and longitude of a place near `origin`, on a tangent plane, by the radii of WGS 84 there. */
+const A = 6378137;
+const E2 = (2 - 1 / 298.257223563) / 298.257223563;
+const meridianRadius = (lat) => (A * (1 - E2)) / (1 - E2 * Math.sin(lat) ** 2) ** 1.5;
+
+/** Latitude and longitude of a place near `origin`: the inverse transverse Mercator projection about it on WGS 84
+ * (Snyder, USGS Professional Paper 1395, p. 63), as the daemon's exports have it. */
 export function toLatLon(origin, x, y) {
-  const lat = (origin.lat_deg * Math.PI) / 180;
-  const w2 = 1 - 0.00669437999014 * Math.sin(lat) ** 2;
-  const north = (6378137 * (1 - 0.00669437999014)) / w2 ** 1.5;
-  const east = (6378137 / Math.sqrt(w2)) * Math.cos(lat);
-  return [origin.lat_deg + ((y / north) * 180) / Math.PI, origin.lon_deg + ((x / east) * 180) / Math.PI];
+  const lat0 = (origin.lat_deg * Math.PI) / 180;
+  let lat = lat0;
+  for (let i = 0; i < 3; i += 1) lat = lat0 + y / meridianRadius((lat + lat0) / 2);
+  const n = A / Math.sqrt(1 - E2 * Math.sin(lat) ** 2);
+  const [t, d, c] = [Math.tan(lat), x / n, (E2 / (1 - E2)) * Math.cos(lat) ** 2];
+  const north = lat - ((n * t) / meridianRadius(lat)) * (d ** 2 / 2 - ((5 + 3 * t * t + 10 * c) * d ** 4) / 24);
+  const east = (d - ((1 + 2 * t * t + c) * d ** 3) / 6) / Math.cos(lat);
+  return [(north * 180) / Math.PI, origin.lon_deg + (east * 180) / Math.PI];
 }
 
 /** A place of a vehicle's map in the world: east and north of the mission's origin, metres. */
