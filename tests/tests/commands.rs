@@ -160,7 +160,7 @@ fn the_configuration_files_that_ship_are_accepted() {
 fn two_grounds(dir: &Path, name: &str) -> (String, String) {
     let (mosaic, labels) = (dir.join(format!("{name}.png")), dir.join(format!("{name}_label.png")));
     let speckle = |x: u32, y: u32| ((x * 31 + y * 17) % 40) as u8;
-    let ground = |x: u32, y: u32| (x / 40 + y / 60) % 2 == 0;
+    let ground = |x: u32, y: u32| (x / 40 + y / 60).is_multiple_of(2);
     let colour = |x, y| if ground(x, y) { [60, 90 + speckle(x, y), 140] } else { [150 + speckle(y, x), 110, 60] };
     image::RgbImage::from_fn(160, 120, |x, y| image::Rgb(colour(x, y))).save(&mosaic).unwrap();
     image::GrayImage::from_fn(160, 120, |x, y| image::Luma([u8::from(ground(x, y))])).save(&labels).unwrap();

@@ -242,8 +242,8 @@ impl VehicleStatus {
         out.push(self.refused_frames);
         out.push(told.iter().fold(0, |bits, (slot, _)| bits | 0x80 >> slot));
         out.extend(told.iter().map(|(_, s)| s.version_low));
-        let codes: Vec<u8> = told.iter().map(|(_, s)| s.state.code()).collect();
-        out.extend(codes.chunks(2).map(|pair| pair[0] << 4 | pair.get(1).copied().unwrap_or(0)));
+        let code = |of: Option<&(usize, &SlotReport)>| of.map_or(0, |(_, s)| s.state.code());
+        out.extend(told.chunks(2).map(|pair| code(pair.first()) << 4 | code(pair.get(1))));
         let Some(placement) = self.placement.filter(|_| left.is_empty()) else {
             return Some((out, left.first().map_or(0, |&(slot, _)| slot)));
         };
