@@ -14,12 +14,12 @@ const option = (name) => {
   return at > 0 ? process.argv[at + 1] : null;
 };
 
-const STORIES = ["map", "labels", "vehicle", "link", "truth", "export", "cloud", "access", "cost"];
+const STORIES = ["map", "labels", "vehicle", "constraints", "link", "truth", "export", "cloud", "access", "cost"];
 
 async function stories() {
   const modules = await Promise.all(STORIES.map((s) => import(`./stories/${s}.mjs`)));
-  const only = option("only");
-  return modules.flatMap((m) => m.default).filter((s) => !only || s.name.includes(only));
+  const only = option("only")?.split(",");
+  return modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
 }
 
 async function main() {

@@ -35,7 +35,7 @@ export function drawFences(c, view, ink, vehicle, chosen) {
 }
 
 /** Lines over any label: a wide halo, then the tone. */
-function stroke(c, ink, tone, dash, width = 2) {
+function stroke(c, ink, tone, dash, width = 2.5) {
   c.lineJoin = "round";
   for (const [style, w, d] of [[ink.sea, width + 2.5, []], [tone, width, dash]]) {
     c.strokeStyle = style;
@@ -86,7 +86,7 @@ function hatch(c, corners, tone) {
 }
 
 function name(c, ink, corners, words) {
-  const [x, y] = corners.reduce((a, b) => (b[1] < a[1] ? b : a));
+  const [x, y] = corners.reduce((a, b) => (b[1] < a[1] - 1 || (b[1] < a[1] + 1 && b[0] < a[0]) ? b : a));
   c.font = FONT;
   c.textAlign = "left";
   haloText(c, words, x + 8, y - 7, ink);

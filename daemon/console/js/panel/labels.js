@@ -19,7 +19,7 @@ const line = lifeline("Weights");
 const empty = h("p.empty", {}, "No labels yet. They appear with the first cells of the map.");
 const terms = [
   termRow("exploration", "Unexplored", "Weight of unexplored ground against known labels"),
-  termRow("curiosity", "Puzzling", "Curiosity: weight of ground that the scene model explains badly (perplexity)"),
+  termRow("curiosity", "Curiosity", "Weight of ground that the scene model explains badly (perplexity)"),
 ];
 const others = othersNote(ours, "Weights");
 const go = h("button.primary", { type: "button", id: "send-weights", onclick: () => send(store.vehicle, labels()) }, "Send weights");

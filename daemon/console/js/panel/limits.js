@@ -53,7 +53,7 @@ const number = (input) => (input.validity.badInput ? "?" : input.value === "" ? 
 
 function line(key, name, hint, inputs, faultOf) {
   const fault = h("p.error", { id: `${key}-fault`, role: "alert" });
-  const node = h("div.limit", { title: hint, role: "group", "aria-label": name }, h("span.way", {}, name), h("span.inputs", {}, ...inputs), fault);
+  const node = h("div.limit", inputs.length > 1 ? { title: hint, role: "group", "aria-label": name } : { title: hint }, h("span.way", {}, name), h("span.inputs", {}, ...inputs), fault);
   const update = (value) => {
     const wrong = faultOf(value);
     show(fault, wrong !== null);

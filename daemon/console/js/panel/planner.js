@@ -9,7 +9,7 @@ import { othersNote } from "./ours.js";
 
 const CHOICES = [
   ["", "as configured there"], ["lawnmower", "lawnmower: parallel legs"],
-  ["greedy", "greedy: best gain a metre"], ["horizon", "horizon: looks steps ahead"],
+  ["greedy", "greedy: best nearby"], ["horizon", "horizon: looks ahead"],
 ];
 const order = new Order("settings", (v) => v.planner ?? "", (v, planner) => sendPlanner(v.id, planner));
 const pick = h("select", { id: "planner", onchange: () => order.set(store.vehicle, pick.value) }, ...CHOICES.map(([value, name]) => h("option", { value }, name)));
