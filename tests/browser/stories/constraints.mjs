@@ -35,7 +35,7 @@ const share = (s, from, to, tone) => s.inPage(({ view }, [a, b, name]) => {
   let hits = 0;
   for (let i = 0; i < 400; i += 1) {
     const [x, y] = view.toScreen(a[0] + ((b[0] - a[0]) * i) / 400, a[1] + ((b[1] - a[1]) * i) / 400);
-    const seen = c.getImageData(Math.round(x), Math.round(y), 1, 1).data;
+    const seen = c.getImageData(Math.floor(x), Math.floor(y), 1, 1).data;
     hits += wanted.every((v, n) => Math.abs(v - seen[n]) < 12) ? 1 : 0;
   }
   return hits / 400;

@@ -30,8 +30,17 @@ export function drawFences(c, view, ink, vehicle, chosen) {
   if (!chosen || !pen.shown) return;
   const plan = fenceOrder.value(vehicle);
   const edited = fenceOrder.changed(vehicle);
-  if (edited) drawPlan(c, view, ink, plan, [4, 3], "draft", faults(plan));
+  if (edited) drawEdited(c, view, ink, plan, fromServer(vehicle.fence));
   drawHandles(c, view, ink, plan);
+}
+
+/** Only what the edit has changed is drawn as a draft: the rest is as it was sent. */
+function drawEdited(c, view, ink, plan, sent) {
+  const wrong = faults(plan);
+  const known = new Set(sent.outlines.map((o) => JSON.stringify(o)));
+  const changed = plan.outlines.map((o, i) => wrong.outlines[i] !== null || !known.has(JSON.stringify(o)));
+  const home = JSON.stringify(plan.home) === JSON.stringify(sent.home) && !wrong.home ? null : plan.home;
+  drawPlan(c, view, ink, { ...plan, home }, [4, 3], "draft", wrong, changed);
 }
 
 /** Lines over any label: a wide halo, then the tone. */
@@ -46,9 +55,9 @@ function stroke(c, ink, tone, dash, width = 2.5) {
   c.setLineDash([]);
 }
 
-function drawPlan(c, view, ink, plan, dash, word, wrong = null) {
+function drawPlan(c, view, ink, plan, dash, word, wrong = null, changed = null) {
   for (const [i, { kind, points }] of plan.outlines.entries()) {
-    if (points.length === 0) continue;
+    if (points.length === 0 || changed?.[i] === false) continue;
     const tone = wrong?.outlines[i] ? ink.bad : kind === "fence" ? ink.fence : ink.keepout;
     const corners = points.map((p) => view.toScreen(...p));
     c.beginPath();

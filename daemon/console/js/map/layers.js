@@ -78,15 +78,15 @@ export function drawLegend() {
   const map = store.map;
   const plane = map?.planes.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
-  const coarse = layer.name === "label" && map ? coarseBlocks(map).length : 0;
+  const coarse = layer.name === "label" && Boolean(map) && coarseBlocks(map).length > 0;
   const key = `${layer.name}.${top}.${plane?.min}.${plane?.max}.${coarse}`;
   if (key === legendKey) return;
   legendKey = key;
   const box = $("legend");
-  show(box, Boolean(map) && (layer.name !== "label" || coarse > 0));
+  show(box, Boolean(map) && (layer.name !== "label" || coarse));
   if (box.hidden) return;
-  if (coarse > 0) {
-    const words = `pale: one cell of 16 was sent, the rest is not known yet (${coarse} ${coarse === 1 ? "block" : "blocks"})`;
+  if (coarse) {
+    const words = `pale: one cell of 16 was sent, the rest is not known yet`;
     box.replaceChildren(h("span.pale", { "aria-hidden": "true" }), h("span", {}, words));
     return;
   }

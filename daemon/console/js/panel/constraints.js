@@ -1,10 +1,10 @@
 // Where the vehicle may go and when it stops by itself: fence and limits.
 
 import { $, h } from "../dom.js";
-import { finish, pen } from "../fence/edit.js";
+import { fenceOrder, finish, pen } from "../fence/edit.js";
 import { store } from "../store.js";
 import { fencePart, update as updateFence } from "./fence.js";
-import { limitsPart, update as updateLimits } from "./limits.js";
+import { limitsOrder, limitsPart, update as updateLimits } from "./limits.js";
 
 export function startConstraints() {
   $("constraints").append(h("header", {}, h("h2", { id: "constraints-title" }, "Constraints")), fencePart, limitsPart);
@@ -22,4 +22,8 @@ export function startConstraints() {
 function update() {
   updateFence();
   updateLimits();
+  const v = store.vehicle;
+  const unsent = Boolean(v) && (fenceOrder.changed(v) || limitsOrder.changed(v));
+  $("tab-constraints").classList.toggle("unsent", unsent);
+  $("tab-constraints").title = unsent ? "Edits that were not sent" : "";
 }
