@@ -19,6 +19,7 @@ import { View } from "./view.js";
 
 export const view = new View();
 export const options = { grid: recall("grid", true), rings: recall("rings", false) };
+const FENCE_REACH = 4;
 const canvas = $("chart");
 let ink = {};
 let dirty = false;
@@ -84,6 +85,10 @@ function measureKey() {
 }
 
 function keepInView() {
+  if (pen.tool && view.mode !== "free") {
+    view.mode = "free";
+    store.tell("view");
+  }
   const s = store.vehicle?.status;
   if (view.mode === "follow" && s) view.centre(s.x_m, s.y_m);
   const all = view.mode === "fit" ? bounds() : null;
@@ -100,7 +105,7 @@ function extentOf(map) {
   return extents.get(map);
 }
 
-/** What "fit" shows: every map, every vehicle and its waypoint. */
+/** What "fit" shows: every map, every vehicle and its waypoint; fences too, unless the map would be lost in them. */
 function bounds() {
   const boxes = [];
   for (const map of store.maps.values()) boxes.push(extentOf(map));
@@ -108,12 +113,17 @@ function bounds() {
     const s = v.status;
     if (s) boxes.push([s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4]);
     if (s?.waypoint) boxes.push([...s.waypoint, ...s.waypoint]);
-    for (const [x, y] of v.fence?.fence ?? []) boxes.push([x, y, x, y]);
   }
   const known = boxes.filter(Boolean);
   if (known.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
-  return known.reduce((a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])]);
+  const near = around(known);
+  const corners = (store.snapshot?.vehicles ?? []).flatMap((v) => v.fence?.fence ?? []);
+  const all = around([near, ...corners.map(([x, y]) => [x, y, x, y])]);
+  return reach(all) <= FENCE_REACH * reach(near) ? all : near;
 }
+
+const around = (boxes) => boxes.reduce((a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])]);
+const reach = ([west, south, east, north]) => Math.max(east - west, north - south);
 
 function readInk() {
   for (const name of ["sea", "text", "grid", "craft", "track", "stale", "accent", "fence", "keepout", "bad"]) ink[name] = colour(`map-${name}`);

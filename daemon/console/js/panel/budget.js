@@ -96,7 +96,6 @@ async function submit(event) {
   const bps = Math.round(Number(number.value));
   typed = false;
   order.set(store.vehicle, { ...value(), budget_bps: bps });
-  if (!order.changed(store.vehicle)) return;
   if (!(await order.send(store.vehicle))) {
     order.revert(store.vehicle);
     number.value = bps;
@@ -114,7 +113,7 @@ export function refreshBudget() {
   if (!vehicle) return;
   const { error: problem, waiting } = order.settle(vehicle);
   const { budget_bps: bps, shares } = value();
-  if (!typed && document.activeElement !== number) number.value = bps;
+  if (!typed) number.value = bps;
   if (document.activeElement !== slider || !order.changed(vehicle)) slider.value = placeOf(bps);
   slider.setAttribute("aria-valuetext", rate(bps));
   show(shareBox, shares !== null);
