@@ -2,7 +2,7 @@
 //
 //   node run.mjs                        against the mock
 //   node run.mjs --url http://HOST:PORT against a running daemon (stories that need the mock are skipped)
-//   --only TEXT   only stories whose name holds TEXT      --require   a missing browser is a failure
+//   --only A,B   only stories whose name holds A or B      --require   a missing browser is a failure
 
 import { existsSync } from "node:fs";
 import { LAUNCH } from "./browser.mjs";

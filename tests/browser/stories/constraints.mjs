@@ -92,6 +92,24 @@ export default [
     },
   },
   {
+    name: "after a refusal the fence in force can be taken up again",
+    scenario: "rich",
+    async run(s) {
+      const force = [[-20, -20], [30, -20], [30, 30], [-20, 30]];
+      await open(s);
+      await s.steer({ loss: 0 });
+      await s.post("/vehicles/1/fence", { fence: force });
+      await s.shows("[aria-labelledby=fence-title] .steps [aria-current]", /Applied/, { advance: 2 });
+      await s.steer({ refuse: "fence" });
+      await s.post("/vehicles/1/fence", { fence: [[50, 50], [60, 50], [60, 60]] });
+      await s.shows("[aria-labelledby=fence-title] .note", /Version 1 stays in force \(solid lines\)/, { advance: 2 });
+      await s.button("Edit the one in force").click();
+      await sendFence(s).click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));
+      assert.deepEqual(s.posts.at(-1).body.fence, force);
+    },
+  },
+  {
     name: "an outline that crosses itself or has too few corners is not sent, and says so beside it",
     async run(s) {
       await clear(s);

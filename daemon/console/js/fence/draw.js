@@ -68,7 +68,7 @@ function drawPlan(c, view, ink, plan, dash, word, wrong = null, changed = null) 
     for (const p of corners) c.lineTo(...p);
     c.closePath();
     stroke(c, ink, tone, dash);
-    name(c, ink, corners, nameOutline(plan, i) + (word && `, ${word}`));
+    name(c, view, ink, corners, nameOutline(plan, i) + (word && `, ${word}`));
   }
   if (plan.home) drawHome(c, view, ink, plan.home, wrong?.home ? ink.bad : ink.fence, word);
 }
@@ -94,11 +94,12 @@ function hatch(c, corners, tone) {
   c.restore();
 }
 
-function name(c, ink, corners, words) {
+function name(c, view, ink, corners, words) {
   const [x, y] = corners.reduce((a, b) => (b[1] < a[1] - 1 || (b[1] < a[1] + 1 && b[0] < a[0]) ? b : a));
   c.font = FONT;
-  c.textAlign = "left";
-  haloText(c, words, x + 8, y - 7, ink);
+  const left = x > view.width - 140;
+  c.textAlign = left ? "right" : "left";
+  haloText(c, words, x + (left ? -8 : 8), y - 7, ink);
 }
 
 function drawHome(c, view, ink, home, tone, word) {

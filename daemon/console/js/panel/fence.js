@@ -3,7 +3,7 @@
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { known } from "../fence/draw.js";
 import { addCorner, begin, fenceOrder, finish, middle, pen, plan, put, removeCorner, removeOutline, setCorner, setHome } from "../fence/edit.js";
-import { faults, isSound, nameOutline } from "../fence/plan.js";
+import { faults, fromServer, isSound, nameOutline } from "../fence/plan.js";
 import { store } from "../store.js";
 import { slotOf } from "./lifeline.js";
 import { orderFoot } from "./order.js";
@@ -17,6 +17,7 @@ const tools = {
   home: h("button", { type: "button", onclick: () => onMap(() => put(pen.tool === "home" ? null : "home")) }, "Place return point"),
   done: h("button.primary", { type: "button", onclick: finish }, "Done drawing"),
 };
+const takeForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(known(store.vehicle).fence)) }, "Edit the one in force");
 const homePlace = place("Return point", (p) => setHome(p));
 const clearHome = h("button.undo", { type: "button", onclick: () => setHome(null) }, "Remove");
 clearHome.setAttribute("aria-label", "Remove the return point");
@@ -27,7 +28,7 @@ const latest = new WeakMap();
 const open = new Set();
 
 export const fencePart = h("section.part", { "aria-labelledby": "fence-title" },
-  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state,
+  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, takeForce,
   h("div.buttons", {}, tools.fence, tools.keepOut, tools.home, tools.done), hint, list, homeBox, foot.node);
 
 /** Takes up a tool and goes on to the map, where it is used. */
@@ -126,6 +127,7 @@ export function update() {
   show(homeBox, home !== null);
   if (home) homeFaultShown(home, wrong.home);
   text(state, describe(vehicle));
+  show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && known(vehicle) !== null);
 }
 
 function homeFaultShown(at, fault) {
@@ -140,5 +142,6 @@ function describe(vehicle) {
   if (!slot) return "None was sent.";
   if (slot.state === "applied") return "In force as drawn with solid lines.";
   const before = known(vehicle);
+  if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
   return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "Which one is in force meanwhile is not known here.";
 }
