@@ -102,7 +102,11 @@ pub fn vehicle(
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
-    let navigator = Navigator::new(x, y, depth, config.navigation.drift_percent / 100.0);
+    let drift = config.navigation.drift_percent / 100.0;
+    let navigator = match durable.place {
+        Some(last) => Navigator::resume(last, depth, drift),
+        None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
+    };
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
     vehicle.set_coarse_after(config.map.coarse_after_s);
     if config.map.stream == "whole-png" {

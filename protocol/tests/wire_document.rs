@@ -9,8 +9,8 @@ use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Reader, Seal,
-    SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
+    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement, Reader,
+    Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -123,6 +123,7 @@ fn status() -> VehicleStatus {
     slots[SlotId::Fix.index()] = SlotReport { version_low: 2, state: SlotState::Refused(RefusalReason::Malformed) };
     VehicleStatus {
         mode: VehicleMode::Hold,
+        autopilot_silent: false,
         reason: ModeReason::Order,
         x_m: 1.5,
         y_m: -0.1,
@@ -138,6 +139,7 @@ fn status() -> VehicleStatus {
         budget_bps: 10_000,
         refused_frames: 3,
         slots,
+        placement: None,
     }
 }
 
@@ -151,7 +153,7 @@ fn answered() -> [(ChunkKind, Vec<u8>); 2] {
     let mut slots = [SlotReport::default(); SLOTS];
     slots[SlotId::Constraints.index()] = SlotReport { version_low: 1, state: SlotState::Applied };
     let status = VehicleStatus { base_digest: 0, slots, refused_frames: 0, ..status() };
-    [(ChunkKind::Report, status.encode_report()), (ChunkKind::Pose, status.encode_pose(99))]
+    [(ChunkKind::Report, status.encode_report(99, 0).unwrap().0), (ChunkKind::Pose, status.encode_pose(99))]
 }
 
 fn map_payload() -> Vec<u8> {
@@ -338,9 +340,20 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         ("the same with a waypoint at (1, -2) m", pose(Some((1.0, -2.0)))),
         (
+            "the first pose with an autopilot that does not answer",
+            VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
+        ),
+        (
             "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, utility \
              version 7 applied, fix version 2 refused (2)",
-            status().encode_report(),
+            status().encode_report(99, 0).unwrap().0,
+        ),
+        (
+            "the same with a placement: version 2, 12.5 m east, -0.1 m north",
+            VehicleStatus { placement: Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 }), ..status() }
+                .encode_report(99, 0)
+                .unwrap()
+                .0,
         ),
         (
             "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",

@@ -82,6 +82,19 @@ impl Process {
         let _ = self.0.wait();
     }
 
+    /// Memory that it holds, bytes, and processor time that it has used; `None` where the system does not tell.
+    pub fn cost(&self) -> Option<(u64, Duration)> {
+        let file = |name| std::fs::read_to_string(format!("/proc/{}/{name}", self.0.id())).ok();
+        let status = file("status")?;
+        let resident = status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?;
+        let kilobytes: u64 = resident.trim().trim_end_matches("kB").trim().parse().ok()?;
+        let stat = file("stat")?;
+        let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
+        // Fields 14 and 15 of proc(5), in hundredths of a second.
+        let ticks: u64 = fields.get(11..13)?.iter().filter_map(|f| f.parse::<u64>().ok()).sum();
+        Some((kilobytes * 1024, Duration::from_millis(ticks * 10)))
+    }
+
     /// Asks it to read its configuration again.
     pub fn hang_up(&self) {
         let sent = Command::new("kill").args(["-HUP", &self.0.id().to_string()]).status();
@@ -112,6 +125,18 @@ pub fn free_port() -> u16 {
 
 /// One HTTP request; status and body, `None` while nobody answers.
 pub fn http(port: u16, method: &str, path: &str, headers: &str, body: &str) -> Option<(u16, Vec<u8>)> {
+    let mut answer = exchange(port, method, path, headers, body)?;
+    let split = answer.windows(4).position(|w| w == b"\r\n\r\n")?;
+    let status = std::str::from_utf8(answer.get(9..12)?).ok()?.parse().ok()?;
+    Some((status, answer.split_off(split + 4)))
+}
+
+/// One HTTP request; the answer with its head, as text.
+pub fn http_whole(port: u16, method: &str, path: &str, headers: &str, body: &str) -> Option<String> {
+    exchange(port, method, path, headers, body).map(|answer| String::from_utf8_lossy(&answer).into_owned())
+}
+
+fn exchange(port: u16, method: &str, path: &str, headers: &str, body: &str) -> Option<Vec<u8>> {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).ok()?;
     stream.set_read_timeout(Some(Duration::from_secs(10))).ok()?;
     let length = body.len();
@@ -121,7 +146,39 @@ pub fn http(port: u16, method: &str, path: &str, headers: &str, body: &str) -> O
     stream.write_all(format!("{head}{headers}\r\n{body}").as_bytes()).ok()?;
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).ok()?;
-    let split = answer.windows(4).position(|w| w == b"\r\n\r\n")?;
-    let status = std::str::from_utf8(answer.get(9..12)?).ok()?.parse().ok()?;
-    Some((status, answer.split_off(split + 4)))
+    Some(answer)
+}
+
+/// A Python with the packages of `tests/python/requirements.txt`: that of `SCENECAST_PYTHON`, or else `python3`.
+///
+/// Without it a test says that it is skipped, which `.ci/run` takes for a failure.
+pub fn python() -> Option<String> {
+    let python = std::env::var("SCENECAST_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let packages = "import jsonschema, openapi_spec_validator, plyfile, prometheus_client, rasterio, shapely";
+    let output = Command::new(&python).args(["-c", packages]).output();
+    if output.is_ok_and(|o| o.status.success()) {
+        return Some(python);
+    }
+    let said = format!(
+        "SKIPPED: {python} lacks a package of tests/python/requirements.txt (SCENECAST_PYTHON names another)\n"
+    );
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{said}");
+    // Straight to the terminal: the test's own output is not shown while it passes.
+    let _ = std::io::stderr().write_all(said.as_bytes());
+    None
+}
+
+/// Runs a script to its end; fails with what it said if it fails.
+pub fn run_script(program: &str, script: &str, arguments: &[&str]) {
+    let mut command = Command::new(program);
+    let output = command.arg(workspace().join(script)).args(arguments).output();
+    let output = output.unwrap_or_else(|e| panic!("{program}: {e}"));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{script}: {said}");
+}
+
+/// The state that a surface on `port` tells, once it does.
+pub fn state(port: u16) -> Option<serde_json::Value> {
+    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
 }

@@ -104,6 +104,15 @@ fn every_command_has_help_with_an_example() {
         &["config"],
         &["key", "new"],
         &["key", "show"],
+        &["key", "token"],
+        &["ctl"],
+        &["ctl", "status"],
+        &["ctl", "map"],
+        &["ctl", "labels"],
+        &["ctl", "utility", "set"],
+        &["ctl", "budget", "set"],
+        &["ctl", "exemplar"],
+        &["ctl", "watch"],
         &["map", "encode"],
         &["map", "decode"],
         &["map", "bench"],
@@ -151,7 +160,7 @@ fn the_configuration_files_that_ship_are_accepted() {
 fn two_grounds(dir: &Path, name: &str) -> (String, String) {
     let (mosaic, labels) = (dir.join(format!("{name}.png")), dir.join(format!("{name}_label.png")));
     let speckle = |x: u32, y: u32| ((x * 31 + y * 17) % 40) as u8;
-    let ground = |x: u32, y: u32| (x / 40 + y / 60) % 2 == 0;
+    let ground = |x: u32, y: u32| (x / 40 + y / 60).is_multiple_of(2);
     let colour = |x, y| if ground(x, y) { [60, 90 + speckle(x, y), 140] } else { [150 + speckle(y, x), 110, 60] };
     image::RgbImage::from_fn(160, 120, |x, y| image::Rgb(colour(x, y))).save(&mosaic).unwrap();
     image::GrayImage::from_fn(160, 120, |x, y| image::Luma([u8::from(ground(x, y))])).save(&labels).unwrap();
@@ -170,7 +179,8 @@ fn a_folder_of_annotated_images_is_scored_and_wrong_ones_are_named() {
     assert_eq!(report["scenes"][0]["cells"], 20 * 15);
     for method in ["scene_model", "kmeans_lab", "kmeans_pooled_words"] {
         let excess = report["median"][method]["excess_nats"].as_f64().unwrap();
-        assert!(excess > 0.4, "{method}: {excess} of 0.69");
+        // The classes themselves have 0.45 on so small a ground: 0.69 less what a shifted copy tells.
+        assert!(excess > 0.3, "{method}: {excess} of 0.45");
     }
     image::GrayImage::new(9, 9).save(dir.join("reef_label.png")).unwrap();
     assert_refused(&["scene", "score", "--dir", folder], &["reef_label.png", "9 x 9", "160 x 120"]);

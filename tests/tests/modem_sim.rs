@@ -133,7 +133,8 @@ fn hosts_at_a_device_and_at_a_tcp_port_hear_each_other() {
 #[test]
 fn a_device_is_unplugged_comes_back_and_its_link_goes_with_the_command() {
     let mut emulation = Emulation::start("modem-sim-unplug");
-    (emulation.line(), emulation.line());
+    emulation.line();
+    emulation.line();
     let mut vehicle = emulation.open("auv");
     ask(&mut vehicle, "AT?AL\r", "2\r\n");
     let link = emulation.links.join("auv");

@@ -1,13 +1,8 @@
 //! The operator's page and API of a running demo.
 
-use scenecast_tests::{Process, free_port, http, wait_until};
+use scenecast_tests::{Process, free_port, http, http_whole, state, wait_until};
 use serde_json::Value;
 use std::time::Duration;
-
-fn state(port: u16) -> Option<Value> {
-    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
-    (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
-}
 
 fn slot(state: &Value, name: &str) -> Option<String> {
     let slots = state["vehicles"][0]["directive"]["slots"].as_array()?;
@@ -56,4 +51,28 @@ fn wrong_orders_and_strangers_are_refused() {
     assert_eq!(refused("/api/v1/budget", &stranger, "{\"budget_bps\": 1000}").0, 403);
     assert_eq!(http(port, "GET", "/api/v1/vehicles/7/map", "", "").unwrap().0, 404);
     assert_eq!(refused("/api/v1/budget", ORDER, &"x".repeat(100_000)).0, 413);
+}
+
+#[test]
+fn the_page_is_small_and_what_a_browser_has_is_not_sent_again() {
+    let port = free_port();
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
+    wait_until("the page answers", Duration::from_secs(60), || state(port).is_some());
+    let (_, index) = http(port, "GET", "/", "", "").unwrap();
+    let index = String::from_utf8(index).unwrap();
+    let files =
+        index.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).filter(|f| !f.starts_with('#'));
+    let mut bytes = 0;
+    for file in files.chain(["js/main.js", ""]) {
+        let (status, packed) = http(port, "GET", &format!("/{file}"), "Accept-Encoding: gzip\r\n", "").unwrap();
+        assert_eq!(status, 200, "{file}");
+        bytes += packed.len();
+    }
+    assert!((10_000..400_000).contains(&bytes), "{bytes} bytes");
+    for path in ["/", "/js/main.js", "/api/v1/vehicles/1/map.pgw"] {
+        let answer = http_whole(port, "GET", path, "", "").unwrap();
+        let tag = answer.lines().find_map(|l| l.strip_prefix("etag: ")).expect("a tag");
+        let (status, _) = http(port, "GET", path, &format!("If-None-Match: {tag}\r\n"), "").unwrap();
+        assert!(status == 304 || path.starts_with("/api"), "{path}: {status}");
+    }
 }

@@ -36,6 +36,12 @@ export const sendPlanner = (id, planner) => write(`/vehicles/${id}/settings`, { 
 /** `shares` in percent by class; null leaves them as they are. */
 export const sendBudget = (bps, shares = null) => write("/budget", { budget_bps: bps, ...(shares && { shares }) });
 
+/** Goes to the login if the surface takes a token and no longer knows ours. */
+export async function logInIfAsked() {
+  const answer = await fetch(`${BASE}/state`, { cache: "no-store", signal: AbortSignal.timeout(10000) }).catch(() => null);
+  if (answer?.status === 401) location.assign("/login");
+}
+
 /** The map of a vehicle with its planes as typed arrays, rows from the south. */
 export async function readMap(id) {
   const m = await read(`/vehicles/${id}/map`);

@@ -1,5 +1,6 @@
 // The stream of changes, re-opened with a growing pause when it drops or falls quiet.
 
+import { logInIfAsked } from "./api.js";
 import { store } from "./store.js";
 
 const QUIET_MS = 6000;
@@ -53,6 +54,7 @@ function opened() {
 function dropped() {
   source?.close();
   source = null;
+  logInIfAsked();
   clearTimeout(timer);
   timer = setTimeout(open, pauseMs);
   setFeed("lost", performance.now() + pauseMs);

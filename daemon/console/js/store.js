@@ -69,7 +69,7 @@ export const store = new (class extends EventTarget {
     try {
       const map = await readMap(id);
       const said = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
-      this.maps.set(id, { ...map, epoch: said?.epoch ?? 0, fetchedS: this.nowS });
+      this.maps.set(id, { ...map, epoch: said?.epoch ?? 0, fetchedS: map.at_s ?? this.nowS });
       this.tell("map", { id });
     } catch (error) {
       console.warn(`map of vehicle ${id}: ${error.message}`);

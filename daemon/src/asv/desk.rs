@@ -52,6 +52,8 @@ pub struct Desk {
     pub epoch: u8,
     /// The last whole map, where the vehicle sends those.
     pub whole: Option<LabelGrid>,
+    /// Whole maps that came in.
+    pub wholes: u64,
     /// How long it is usually silent.
     pub pauses: Pauses,
     /// Where the surface's modem found it last, and when it said so.
@@ -74,6 +76,7 @@ impl Desk {
             track: VecDeque::new(),
             epoch: 0,
             whole: None,
+            wholes: 0,
             pauses: Pauses::default(),
             found: None,
         }

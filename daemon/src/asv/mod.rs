@@ -5,6 +5,7 @@ mod calls;
 mod desk;
 mod orders;
 mod pauses;
+pub mod position;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};

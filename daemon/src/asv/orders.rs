@@ -1,10 +1,11 @@
 //! What the operator types, as slots of the directive. Every refusal is one line that says what is allowed.
 
 use scenecast_protocol::directive::{Band, Fence, Limits, Place, Polygon, Reaction};
-use serde::Deserialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// A fence as it is typed: vertices east and north of the origin, metres.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FenceOrder {
     /// The vehicle stays inside; `None`: no fence.
@@ -17,7 +18,7 @@ pub struct FenceOrder {
 }
 
 /// Limits as they are typed; what is left out is not limited, or as configured on the vehicle.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LimitsOrder {
     /// Least and greatest depth, metres.
@@ -36,6 +37,35 @@ pub struct LimitsOrder {
     pub on_breach: Option<String>,
     /// What to do on an abort.
     pub on_abort: Option<String>,
+}
+
+impl From<&Fence> for FenceOrder {
+    fn from(fence: &Fence) -> Self {
+        let vertex = |p: &Place| [p.metres().0, p.metres().1];
+        let outline = |p: &Polygon| p.0.iter().map(vertex).collect();
+        Self {
+            fence: fence.fence.as_ref().map(outline),
+            keep_outs: fence.keep_outs.iter().map(outline).collect(),
+            return_point: fence.return_point.as_ref().map(vertex),
+        }
+    }
+}
+
+impl From<&Limits> for LimitsOrder {
+    fn from(limits: &Limits) -> Self {
+        let band = |b: Band| [f64::from(b.low_dm) / 10.0, f64::from(b.high_dm) / 10.0];
+        let name = |r: Reaction| r.name().to_owned();
+        Self {
+            depth_m: limits.depth.map(band),
+            altitude_m: limits.altitude.map(band),
+            distance_m: limits.distance_m.map(f64::from),
+            time_s: limits.time_s.map(f64::from),
+            silence_s: limits.silence_s.map(f64::from),
+            on_silence: limits.on_silence.map(name),
+            on_breach: limits.on_breach.map(name),
+            on_abort: limits.on_abort.map(name),
+        }
+    }
 }
 
 impl FenceOrder {

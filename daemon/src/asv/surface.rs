@@ -2,6 +2,7 @@
 
 use super::desk::Desk;
 use super::orders::{FenceOrder, LimitsOrder};
+use super::position::{Relay, UsblSighting};
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
 use crate::picture;
@@ -33,13 +34,15 @@ pub struct Surface {
     link: SurfaceLink,
     desks: BTreeMap<Address, Desk>,
     outputs: VecDeque<SurfaceOutput>,
+    /// Where the surface is and where it sees the vehicles, if it has a GPS.
+    relay: Option<Relay>,
 }
 
 impl Surface {
     /// A surface that speaks with these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
-        Self { link, desks, outputs: VecDeque::new() }
+        Self { link, desks, outputs: VecDeque::new(), relay: None }
     }
 
     /// Name for people of a vehicle that has none.
@@ -66,6 +69,12 @@ impl Surface {
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
         let whole = self.desks.get(&vehicle).and_then(|d| d.whole.as_ref());
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+    }
+
+    /// Counts up whenever the operator's map of a vehicle or a plane of it changes.
+    pub fn map_version(&self, vehicle: Address) -> u64 {
+        let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
+        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
     }
 
     /// Bits a second that the surface may use.
@@ -206,6 +215,48 @@ impl Surface {
         self.issue(vehicle, Slot::Fix(fix), now)
     }
 
+    /// Gives it a GPS.
+    pub fn set_relay(&mut self, relay: Relay) {
+        self.relay = Some(relay);
+    }
+
+    /// Where the surface is and where it sees the vehicles, if it has a GPS.
+    pub fn relay(&self) -> Option<&Relay> {
+        self.relay.as_ref()
+    }
+
+    /// The connection to the GPS was opened: what to say to it.
+    pub fn handle_gps_open(&mut self) -> &'static [u8] {
+        self.relay.as_mut().map_or(b"", |relay| relay.handle_gps_open())
+    }
+
+    /// Bytes of the GPS.
+    pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
+        self.relay.iter_mut().for_each(|relay| relay.handle_gps(bytes, now));
+    }
+
+    /// Bytes of a compass of its own.
+    pub fn handle_compass(&mut self, bytes: &[u8], now: Instant) {
+        self.relay.iter_mut().for_each(|relay| relay.handle_compass(bytes, now));
+    }
+
+    /// The USBL head saw a vehicle: if that gives a fix, the vehicle is sent it.
+    pub fn handle_usbl(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) {
+        let Some(relay) = &mut self.relay else { return };
+        if let Ok(Some(fix)) = relay.handle_usbl(vehicle, sighting, now) {
+            // A vehicle that the link does not know has no slot for it.
+            let _ = self.send_fix(vehicle, fix, now);
+        }
+    }
+
+    /// Where a vehicle says that it is, in the world's frame, metres.
+    pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
+        let view = self.link.vehicle(vehicle)?;
+        let (status, _) = view.status()?;
+        let at = (status.x_m, status.y_m);
+        Some(status.placement.map_or(at, |p| p.to_world(at)))
+    }
+
     fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
         let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
@@ -246,6 +297,7 @@ impl Surface {
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
                 self.desks.get_mut(&vehicle)?.handle_status(status, now);
+                self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::ObjectProgress { vehicle, head, held, total } => {
@@ -261,6 +313,7 @@ impl Surface {
                     }
                     None => {
                         desk.whole = Some(picture::read_whole(&bytes)?);
+                        desk.wholes += 1;
                         Some(SurfaceOutput::MapChanged(vehicle))
                     }
                 }
@@ -293,6 +346,10 @@ impl Surface {
         if let Some(desk) = self.desks.get_mut(&vehicle) {
             desk.found = Some((*line, now));
             self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        }
+        if let (Some(range_m), Some((bearing_rad, elevation_rad))) = (line.range_m, line.direction_rad) {
+            let (accuracy_m, age_s) = (line.accuracy, line.age_s);
+            self.handle_usbl(vehicle, &UsblSighting { range_m, bearing_rad, elevation_rad, accuracy_m, age_s }, now);
         }
     }
 

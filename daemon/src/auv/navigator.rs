@@ -1,35 +1,114 @@
 //! Where the vehicle believes it is.
 
-use scenecast_protocol::time::Instant;
-use std::collections::VecDeque;
+mod filter;
+mod odometer;
 
-/// Dead reckoning, corrected by fixes that may come late.
+use super::vehicle::LastPlace;
+use filter::Filter;
+use odometer::Odometer;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Placement;
+
+/// Dead reckoning in a frame of its own, and where that frame lies in the world.
+///
+/// The map is binned in the **map's frame**, in which the vehicle never jumps. What a fix says of the past goes two
+/// ways: what was wrong so far moves the [`Placement`] of that frame in the world, and with it the whole map, of which no
+/// cell is binned again; what it tells of the sensors (a compass that is off, a log that is, a current) makes the way from
+/// now on straight, so that the placement needs to move ever less.
 #[derive(Debug)]
 pub struct Navigator {
-    x_m: f64,
-    y_m: f64,
+    /// East and north in the map's frame, metres.
+    at: (f64, f64),
     heading_rad: f64,
     depth_m: f64,
-    variance_m2: f64,
-    drift: f64,
-    /// Estimates of the past, for fixes that tell where the vehicle was.
-    track: VecDeque<(Instant, f64, f64)>,
+    filter: Filter,
+    odometer: Odometer,
+    placement: Option<Placement>,
     last_fix: Option<Instant>,
+    /// Whether it has been elsewhere than it knows: the first fix tells where on its map it is.
+    is_lost: bool,
+    /// Fixes that were refused though each agreed with the one before, and by how much the last one was off.
+    refused: (u32, (f64, f64)),
+}
+
+/// What became of a fix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FixVerdict {
+    /// It corrects the estimate.
+    Used,
+    /// It is of a time that the vehicle does not remember.
+    TooOld,
+    /// It says what cannot be: no number, a place beyond every mission.
+    Absurd,
+    /// It is too far from where the vehicle can be.
+    Outlier,
+}
+
+impl FixVerdict {
+    /// Whether it corrects the estimate.
+    pub fn is_used(self) -> bool {
+        self == Self::Used
+    }
 }
 
 impl Navigator {
     /// Oldest fix that is of use.
     const MEMORY_S: f64 = 120.0;
+    /// Mahalanobis distance squared, two degrees of freedom, that one of a thousand good fixes exceeds.
+    const GATE: f64 = 13.8;
+    /// So many refused fixes in a row that agree with each other are believed.
+    const AGREEING: u32 = 4;
+    /// The placement is told anew when it has moved by so much, metres.
+    const WORTH_TELLING_M: f64 = 0.2;
+    /// How far it may have drifted while it was off, metres.
+    const RESUMED_SIGMA_M: f64 = 50.0;
+    /// Farther from the origin is no mission, metres.
+    const FARTHEST_M: f64 = 800_000.0;
 
     /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of way.
     pub fn new(x_m: f64, y_m: f64, depth_m: f64, drift: f64) -> Self {
-        let track = VecDeque::new();
-        Self { x_m, y_m, heading_rad: 0.0, depth_m, variance_m2: 0.0, drift, track, last_fix: None }
+        Self {
+            at: (x_m, y_m),
+            heading_rad: 0.0,
+            depth_m,
+            filter: Filter::new((x_m, y_m), drift),
+            odometer: Odometer::default(),
+            placement: None,
+            last_fix: None,
+            is_lost: false,
+            refused: (0, (0.0, 0.0)),
+        }
     }
 
-    /// East and north of the origin, metres.
+    /// On a map of an earlier run, about where that was at its last fix; the first fix moves the vehicle, not the map.
+    pub fn resume(last: LastPlace, depth_m: f64, drift: f64) -> Self {
+        let (x, y) = last.at();
+        let mut navigator = Self::new(x, y, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
+        let (world_x, world_y) = last.placement().map_or((x, y), |p| p.to_world((x, y)));
+        navigator.filter.shift(world_x - x, world_y - y);
+        (navigator.placement, navigator.is_lost) = (last.placement(), true);
+        navigator
+    }
+
+    /// At its start within a standard deviation, metres.
+    pub fn with_start_sigma(mut self, sigma_m: f64) -> Self {
+        self.filter.doubt(sigma_m);
+        self
+    }
+
+    /// East and north in the map's frame, metres.
     pub fn position(&self) -> (f64, f64) {
-        (self.x_m, self.y_m)
+        self.at
+    }
+
+    /// East and north of the mission's origin in the world, metres: the best estimate there is.
+    pub fn world(&self) -> (f64, f64) {
+        self.filter.position()
+    }
+
+    /// Where the map's frame lies in the world, as it was told last; `None`: no fix has moved it.
+    pub fn placement(&self) -> Option<Placement> {
+        self.placement
     }
 
     /// Heading clockwise from north, radians.
@@ -42,9 +121,9 @@ impl Navigator {
         self.depth_m
     }
 
-    /// Standard deviation of the position, metres.
+    /// Standard deviation of the position in the world, metres.
     pub fn sigma_m(&self) -> f64 {
-        self.variance_m2.sqrt()
+        self.filter.sigma_m()
     }
 
     /// When the last fix was used.
@@ -54,59 +133,183 @@ impl Navigator {
 
     /// The vehicle's own sensors say that it moved by so much since the last call.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        self.x_m += dx_m;
-        self.y_m += dy_m;
-        self.heading_rad = heading_rad;
-        self.depth_m = depth_m;
-        self.variance_m2 += (self.drift * dx_m.hypot(dy_m)).powi(2) + self.drift * dx_m.hypot(dy_m) * self.sigma_m();
-        self.track.push_back((now, self.x_m, self.y_m));
-        while self.track.front().is_some_and(|(at, ..)| now.since(*at).as_secs_f64() > Self::MEMORY_S) {
-            self.track.pop_front();
+        if ![dx_m, dy_m, heading_rad, depth_m].into_iter().all(f64::is_finite) {
+            return;
         }
+        (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
+        let (x, y) = self.filter.handle_way(dx_m, dy_m);
+        self.at = (self.at.0 + x, self.at.1 + y);
+        self.odometer.handle_way(dx_m, dy_m, now, Self::MEMORY_S);
     }
 
-    /// The position is known from elsewhere, as in a recorded mission.
+    /// The position in the map's frame is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        (self.x_m, self.y_m, self.heading_rad, self.depth_m) = (x_m, y_m, heading_rad, depth_m);
-        self.track.push_back((now, x_m, y_m));
+        self.is_lost = false;
+        let (dx, dy) = (x_m - self.at.0, y_m - self.at.1);
+        (self.at, self.heading_rad, self.depth_m) = ((x_m, y_m), heading_rad, depth_m);
+        self.filter.shift(dx, dy);
+        self.odometer.handle_way(dx, dy, now, Self::MEMORY_S);
     }
 
-    /// A fix of where the vehicle was at `taken`; says whether it was of use.
-    pub fn handle_fix(&mut self, x_m: f64, y_m: f64, sigma_m: f64, taken: Instant, now: Instant) -> bool {
-        if now.since(taken).as_secs_f64() > Self::MEMORY_S {
-            return false;
+    /// A fix of where in the world the vehicle was at `taken`.
+    pub fn handle_fix(&mut self, x_m: f64, y_m: f64, sigma_m: f64, taken: Instant, now: Instant) -> FixVerdict {
+        let is_place = x_m.abs() <= Self::FARTHEST_M && y_m.abs() <= Self::FARTHEST_M;
+        if !is_place || !sigma_m.is_finite() || sigma_m < 0.0 {
+            return FixVerdict::Absurd;
         }
-        let then = self.track.iter().rev().find(|(at, ..)| *at <= taken).or(self.track.front());
-        let (was_x, was_y) = then.map_or((self.x_m, self.y_m), |&(_, x, y)| (x, y));
-        let gain = self.variance_m2 / (self.variance_m2 + sigma_m.max(0.1).powi(2));
-        let (dx, dy) = ((x_m - was_x) * gain, (y_m - was_y) * gain);
-        self.x_m += dx;
-        self.y_m += dy;
-        for (_, x, y) in &mut self.track {
-            *x += dx;
-            *y += dy;
+        let Some(since) = self.odometer.since(taken.min(now), now, Self::MEMORY_S) else { return FixVerdict::TooOld };
+        let sigma = sigma_m.clamp(0.1, 1e4);
+        let expected = self.filter.expect(&since, sigma);
+        let off = (x_m - expected.at.0, y_m - expected.at.1);
+        if expected.distance2(off) > Self::GATE && !self.believes_anyway(off, sigma) {
+            return FixVerdict::Outlier;
         }
-        self.variance_m2 *= 1.0 - gain;
+        self.refused = (0, (0.0, 0.0));
+        self.filter.correct(&since, (x_m, y_m), sigma);
         self.last_fix = Some(now);
-        true
+        if std::mem::take(&mut self.is_lost) {
+            let world = self.filter.position();
+            self.at = self.placement.map_or(world, |p| p.to_map(world));
+        }
+        self.place();
+        FixVerdict::Used
+    }
+
+    /// Fixes that are all off by the same are right, and the estimate was wrong: it is put in doubt.
+    fn believes_anyway(&mut self, off: (f64, f64), sigma: f64) -> bool {
+        let (row, before) = self.refused;
+        let agrees = row > 0 && (off.0 - before.0).hypot(off.1 - before.1) < 4.0 * sigma + 1.0;
+        let row = if agrees { row + 1 } else { 1 };
+        self.refused = (row, off);
+        if row >= Self::AGREEING {
+            self.filter.doubt(off.0.hypot(off.1));
+        }
+        row >= Self::AGREEING
+    }
+
+    fn place(&mut self) {
+        let (x, y) = self.filter.position();
+        let (east, north) = (x - self.at.0, y - self.at.1);
+        let (was_east, was_north) = self.placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
+        if (east - was_east).hypot(north - was_north) >= Self::WORTH_TELLING_M {
+            self.placement = Some(Placement::moved_to(self.placement, east, north));
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
-    #[test]
-    fn a_late_fix_corrects_by_what_was_wrong_when_it_was_taken() {
-        let at = |s: f64| Instant::from_secs_f64(s);
+    fn at(s: f64) -> Instant {
+        Instant::from_secs_f64(s)
+    }
+
+    /// A vehicle that went east for a minute at 1 m/s, by its own reckoning.
+    fn under_way() -> Navigator {
         let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.1);
         for s in 1..=60 {
             nav.handle_odometry(1.0, 0.0, 0.0, 18.0, at(f64::from(s)));
         }
+        nav
+    }
+
+    #[test]
+    fn a_late_fix_corrects_by_what_was_wrong_when_it_was_taken() {
+        let mut nav = under_way();
         assert!(nav.sigma_m() > 0.5);
-        // At 30 s it believed to be at 30 m, but was at 33 m: now it is near 63 m.
-        assert!(nav.handle_fix(33.0, 0.0, 0.1, at(30.0), at(60.0)));
-        assert!((nav.position().0 - 63.0).abs() < 0.2, "{:?}", nav.position());
-        assert!(!nav.handle_fix(0.0, 0.0, 0.1, at(30.0), at(600.0)), "a fix of ten minutes ago is of no use");
+        // At 30 s it believed to be at 30 m, but was at 33 m: now it is near 66 m if the log is to blame, 63 m if not.
+        assert_eq!(nav.handle_fix(33.0, 0.0, 0.1, at(30.0), at(60.0)), FixVerdict::Used);
+        assert!((63.0..67.0).contains(&nav.world().0), "{:?}", nav.world());
+        assert_eq!(nav.handle_fix(0.0, 0.0, 0.1, at(30.0), at(600.0)), FixVerdict::TooOld);
+    }
+
+    #[test]
+    fn a_fix_between_two_steps_counts_where_the_vehicle_was_then() {
+        let mut nav = under_way();
+        nav.handle_fix(30.5, 0.0, 0.1, at(30.5), at(60.0));
+        assert!((nav.world().0 - 60.0).abs() < 0.05, "{:?}", nav.world());
+    }
+
+    #[test]
+    fn a_fix_moves_the_placement_and_neither_the_vehicle_nor_its_map() {
+        let mut nav = under_way();
+        assert_eq!((nav.position(), nav.placement()), ((60.0, 0.0), None));
+        nav.handle_fix(60.0, 3.0, 0.1, at(60.0), at(60.0));
+        assert_eq!(nav.position(), (60.0, 0.0), "no jump in the map's frame");
+        let first = nav.placement().unwrap();
+        assert_eq!(first.version, 1);
+        let (x, y) = first.to_world(nav.position());
+        assert!((x - 60.0).abs() < 0.3 && (y - 3.0).abs() < 0.3, "{x} {y}");
+        nav.handle_fix(60.0, 3.0, 0.1, at(60.0), at(60.0));
+        assert_eq!(nav.placement().unwrap().version, 1, "a move that is not worth telling");
+    }
+
+    #[test]
+    fn fixes_tell_what_is_wrong_with_the_sensors_and_the_way_becomes_straight() {
+        // A compass that is off by two degrees, on a way of 1 km to the east.
+        let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.03);
+        let (sin, cos) = 2f64.to_radians().sin_cos();
+        let mut error = Vec::new();
+        for s in 1..=1000 {
+            nav.handle_odometry(cos, sin, 0.0, 18.0, at(f64::from(s)));
+            if s % 10 == 0 && s <= 800 {
+                nav.handle_fix(f64::from(s), 0.0, 2.0, at(f64::from(s)), at(f64::from(s) + 1.0));
+            }
+            error.push((nav.world().0 - f64::from(s)).hypot(nav.world().1));
+        }
+        let without = 200.0 * 2.0 * (1f64.to_radians()).sin();
+        assert!(error[999] < 0.4 * without, "{} m after 200 m without a fix; {without} m uncorrected", error[999]);
+    }
+
+    #[test]
+    fn absurd_fixes_and_outliers_change_nothing() {
+        let mut nav = under_way();
+        nav.handle_fix(60.0, 0.0, 1.0, at(60.0), at(60.0));
+        let before = nav.world();
+        for (x, y, sigma, verdict) in [
+            (f64::NAN, 0.0, 1.0, FixVerdict::Absurd),
+            (0.0, f64::INFINITY, 1.0, FixVerdict::Absurd),
+            (60.0, 0.0, f64::NAN, FixVerdict::Absurd),
+            (1e7, 0.0, 1.0, FixVerdict::Absurd),
+            (60.0, 90.0, 1.0, FixVerdict::Outlier),
+            (-40.0, 0.0, 1.0, FixVerdict::Outlier),
+        ] {
+            assert_eq!(nav.handle_fix(x, y, sigma, at(60.0), at(61.0)), verdict, "{x} {y} {sigma}");
+        }
+        assert_eq!(nav.world(), before);
+    }
+
+    #[test]
+    fn fixes_that_agree_with_each_other_are_believed_in_the_end() {
+        let mut nav = under_way();
+        let verdicts: Vec<_> =
+            (0..6).map(|i| nav.handle_fix(60.0, 200.0, 1.0, at(60.0), at(61.0 + f64::from(i)))).collect();
+        assert_eq!(verdicts[..4], [FixVerdict::Outlier, FixVerdict::Outlier, FixVerdict::Outlier, FixVerdict::Used]);
+        assert!((nav.world().1 - 200.0).abs() < 2.0, "{:?}", nav.world());
+    }
+
+    #[test]
+    fn a_vehicle_that_never_moved_takes_fixes_of_its_memory() {
+        let mut nav = Navigator::new(0.0, 0.0, 5.0, 0.01).with_start_sigma(10.0);
+        assert_eq!(nav.handle_fix(8.0, -3.0, 1.0, at(4.0), at(5.0)), FixVerdict::Used);
+        assert!((nav.world().0 - 8.0).abs() < 0.3, "{:?}", nav.world());
+    }
+
+    proptest! {
+        #[test]
+        fn any_fixes_and_steps_leave_a_place(
+            steps in proptest::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), -2000.0..2000.0f64, 0.0..300.0f64), 1..60),
+        ) {
+            let mut nav = Navigator::new(0.0, 0.0, 5.0, 0.01);
+            for (i, (a, b, sigma, place, age)) in steps.into_iter().enumerate() {
+                let now = at(200.0 + i as f64);
+                nav.handle_odometry(a % 3.0, b % 3.0, 0.0, 5.0, now);
+                nav.handle_fix(a, b, sigma, now, now);
+                nav.handle_fix(place, -place, sigma % 10.0, at((200.0 + i as f64 - age).max(0.0)), now);
+                prop_assert!(nav.world().0.is_finite() && nav.world().1.is_finite() && nav.sigma_m().is_finite());
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! `scenecast bench`
 
 use super::bench_link::Link;
+use super::bench_localisation::LocalisationBench;
 use super::bench_modem::Modem;
 use super::bench_planning::Planning;
 use super::sim::WorldArguments;
@@ -15,6 +16,8 @@ pub(super) enum Bench {
     Fidelity(Fidelity),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
     Link(Link),
+    /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
+    Localisation(LocalisationBench),
     /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
     Modem(Modem),
     /// Planners against each other: utility collected a metre.
@@ -38,6 +41,7 @@ impl Bench {
         match self {
             Self::Fidelity(f) => f.run(),
             Self::Link(l) => l.run(),
+            Self::Localisation(l) => l.run(),
             Self::Modem(m) => m.run(),
             Self::Planning(p) => p.run(),
         }

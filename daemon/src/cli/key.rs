@@ -9,13 +9,15 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use zeroize::Zeroizing;
 
-/// The mission key.
+/// The mission key, and the token of the operator's page.
 #[derive(Debug, Subcommand)]
 pub(super) enum Key {
     /// Write a fresh random key to a new file.
     New(New),
     /// Print the fingerprint of a key, by which you see that both ends hold the same.
     Show(Show),
+    /// Write a fresh random token for the operator's page to a new file.
+    Token(Token),
 }
 
 /// Write a fresh random key to a new file, which only its owner may read.
@@ -24,6 +26,15 @@ pub(super) enum Key {
 pub(super) struct New {
     /// File to write; it must not exist
     #[arg(long, value_name = "FILE", default_value = "mission.key")]
+    out: PathBuf,
+}
+
+/// Write a fresh random token to a new file, which only its owner may read. Whoever shows it may steer.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast key token --out console.token")]
+pub(super) struct Token {
+    /// File to write; it must not exist
+    #[arg(long, value_name = "FILE", default_value = "console.token")]
     out: PathBuf,
 }
 
@@ -41,9 +52,14 @@ impl Key {
         match self {
             Self::New(new) => {
                 let key = random_key()?;
-                write_new(&new.out, &key)?;
+                write_new(&new.out, &key.to_text())?;
                 println!("{}: fingerprint {:08x}", new.out.display(), key.fingerprint());
                 println!("Copy the file to the vehicle and to the surface, and set link.key_file to its path at both.");
+            }
+            Self::Token(token) => {
+                write_new(&token.out, &random_token()?)?;
+                println!("{}: a new token", token.out.display());
+                println!("Set console.token_file of the surface to its path, and give a copy to those who may steer.");
             }
             Self::Show(show) => {
                 let (key, warning) = config::read_key(&show.file)?;
@@ -64,8 +80,15 @@ fn random_key() -> Result<MissionKey, Problem> {
     Ok(MissionKey::from_bytes(*bytes))
 }
 
-/// Writes a key to a file that does not exist yet, readable by its owner alone; leaves no half file.
-fn write_new(path: &Path, key: &MissionKey) -> Result<(), Problem> {
+/// A token of 128 bits from the operating system's random source.
+fn random_token() -> Result<Zeroizing<String>, Problem> {
+    let mut bytes = Zeroizing::new([0; 16]);
+    getrandom::fill(&mut *bytes).map_err(|e| Problem::Failed(format!("no random bytes from the system: {e}")))?;
+    Ok(Zeroizing::new(format!("{:032x}\n", u128::from_be_bytes(*bytes))))
+}
+
+/// Writes a secret to a file that does not exist yet, readable by its owner alone; leaves no half file.
+fn write_new(path: &Path, text: &str) -> Result<(), Problem> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
@@ -76,7 +99,7 @@ fn write_new(path: &Path, key: &MissionKey) -> Result<(), Problem> {
         }
         _ => Problem::file(path, e),
     })?;
-    file.write_all(key.to_text().as_bytes()).and_then(|()| file.sync_all()).map_err(|e| {
+    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(|e| {
         let _ = std::fs::remove_file(path);
         Problem::Failed(format!("{}: {e}", path.display()))
     })
@@ -95,7 +118,7 @@ mod tests {
     #[test]
     fn a_new_key_is_its_owners_alone_and_is_read_again() {
         let (path, key) = (fresh("new"), random_key().unwrap());
-        write_new(&path, &key).unwrap();
+        write_new(&path, &key.to_text()).unwrap();
         let (read, warning) = config::read_key(&path).unwrap();
         assert_eq!((read.fingerprint(), warning), (key.fingerprint(), None));
         #[cfg(unix)]
@@ -110,7 +133,7 @@ mod tests {
     fn a_file_that_exists_is_kept() {
         let path = fresh("kept");
         std::fs::write(&path, "precious").unwrap();
-        let refused = write_new(&path, &random_key().unwrap()).unwrap_err();
+        let refused = write_new(&path, &random_key().unwrap().to_text()).unwrap_err();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
         std::fs::remove_file(&path).unwrap();
         assert_eq!(refused.exit_code(), 2);

@@ -4,8 +4,10 @@
 
 mod bench;
 mod bench_link;
+mod bench_localisation;
 mod bench_modem;
 mod bench_planning;
+mod ctl;
 mod demo;
 mod key;
 mod map;
@@ -38,12 +40,14 @@ enum Command {
     Auv(node::Node),
     /// Run the surface: hold the operator's map, serve his page.
     Asv(node::Node),
+    /// Speak with a running surface: see what it has, give orders.
+    Ctl(ctl::Ctl),
     /// Emulate modems in one water, each on a serial device or a TCP port of its own.
     ModemSim(modem_sim::ModemSim),
     /// Measure.
     #[command(subcommand)]
     Bench(bench::Bench),
-    /// Make or show the key by which both ends know each other's frames.
+    /// Make or show the key by which both ends know each other's frames, or a token of the operator's page.
     #[command(subcommand)]
     Key(key::Key),
     /// Code label maps as the stream does, and measure it.
@@ -68,6 +72,7 @@ pub fn run(arguments: Arguments) -> Result<(), Problem> {
         Command::Sim(sim) => sim.run(),
         Command::Auv(node) => node.run_vehicle(),
         Command::Asv(node) => node.run_surface(),
+        Command::Ctl(ctl) => ctl.run(),
         Command::ModemSim(sim) => sim.run(),
         Command::Bench(bench) => bench.run(),
         Command::Key(key) => key.run(),

@@ -39,13 +39,13 @@ pub fn read_key(path: &Path) -> Result<(MissionKey, Option<String>), Problem> {
 }
 
 #[cfg(unix)]
-fn others_may_read(file: &File) -> bool {
+pub(super) fn others_may_read(file: &File) -> bool {
     use std::os::unix::fs::PermissionsExt;
     file.metadata().is_ok_and(|m| m.is_file() && m.permissions().mode() & 0o077 != 0)
 }
 
 #[cfg(not(unix))]
-fn others_may_read(_: &File) -> bool {
+pub(super) fn others_may_read(_: &File) -> bool {
     false
 }
 

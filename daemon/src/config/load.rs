@@ -56,6 +56,7 @@ fn check_together(config: &Config) -> Result<(), Problem> {
         return Err(Problem::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
     }
     crate::modem::check(config)?;
+    super::place::check(config)?;
     check_frame(config)?;
     let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
     for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {

@@ -3,12 +3,16 @@
 mod key_file;
 mod keys;
 mod load;
+mod place;
 mod print;
+mod token_file;
 
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
+pub use place::{Place, autopilot_place, origin, position_places};
 pub use print::print;
+pub use token_file::{load_token, read_token};
 
 use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Shares;
@@ -38,6 +42,10 @@ pub struct Config {
     pub survey: Survey,
     /// The vehicle's navigation.
     pub navigation: Navigation,
+    /// What flies the vehicle, or the surface vehicle.
+    pub autopilot: Autopilot,
+    /// The localisation relay of the surface.
+    pub position: Position,
     /// The operator of a rehearsal.
     pub operator: Operator,
     /// The operator's page.
@@ -65,6 +73,8 @@ section! {
         name: String = "rehearsal".into(),
         /// Number that both ends share; frames of another mission are dropped.
         id: u32 = 1,
+        /// Latitude and longitude of the world's origin in degrees; both 0 = not known.
+        origin_deg: [f64; 2] = [0.0, 0.0],
     }
 }
 section! {
@@ -254,10 +264,60 @@ section! {
     Navigation {
         /// Drift of dead reckoning in percent of the distance.
         drift_percent: f64 = 1.0,
+        /// Standard deviation of where the survey begins, metres.
+        start_sigma_m: f64 = 1.0,
         /// Seconds between two position fixes; 0 = none.
         fix_period_s: f64 = 10.0,
         /// Standard deviation of a fix.
         fix_sigma_m: f64 = 0.5,
+    }
+}
+section! {
+    /// What flies the vehicle.
+    Autopilot {
+        /// `none`, `rehearsal`, `mavlink`, `nmea` or `log`.
+        kind: String = "none".into(),
+        /// Where it is.
+        port: String = String::new(),
+        /// System number of MAVLink.
+        system: u8 = 1,
+        /// Whether to arm it and to switch it to guided mode.
+        arm: bool = false,
+        /// Seconds of silence after which it counts as gone.
+        silence_s: f64 = 5.0,
+        /// Turn rate of a simulated vehicle, degrees a second; 0 = on the spot.
+        turn_rate_deg_s: f64 = 0.0,
+        /// Current that a simulated vehicle does not see, east and north, metres a second.
+        current_m_s: [f64; 2] = [0.0, 0.0],
+    }
+}
+section! {
+    /// The localisation relay.
+    Position {
+        /// Where the GPS is.
+        gps: String = String::new(),
+        /// Where the compass is.
+        compass: String = String::new(),
+        /// USBL head from the GPS antenna: forward, to starboard, down; metres.
+        usbl_lever_m: [f64; 3] = [0.0, 0.0, 0.0],
+        /// Depth of the USBL head, metres.
+        usbl_depth_m: f64 = 1.0,
+        /// Whether bearings count from the bow.
+        usbl_from_bow: bool = false,
+        /// Turn of the head, degrees clockwise.
+        usbl_turn_deg: f64 = 0.0,
+        /// Speed of sound to correct ranges to, metres a second; 0 = none.
+        sound_speed_m_s: f64 = 0.0,
+        /// Least seconds between two fixes of a vehicle.
+        fix_period_s: f64 = 10.0,
+        /// Greatest standard deviation of a fix, metres.
+        most_sigma_m: f64 = 30.0,
+        /// Whether the surface vehicle stays above the vehicle.
+        follow: bool = false,
+        /// Distance that it keeps, metres.
+        stand_off_m: f64 = 30.0,
+        /// By how much that may be off, metres.
+        dead_band_m: f64 = 15.0,
     }
 }
 section! {
@@ -272,6 +332,10 @@ section! {
     Console {
         /// Address to listen on; empty = no page.
         listen: String = "127.0.0.1:8460".into(),
+        /// File of the token that others must show; empty = none, and only loopback addresses are listened on.
+        token_file: String = String::new(),
+        /// Name of this machine for others; empty = they ask for its address.
+        host: String = String::new(),
     }
 }
 section! {

@@ -1,5 +1,11 @@
 //! The files of the page, embedded in the binary.
 
+use super::compress::tagged;
+use super::server::not_found;
+use axum::http::{HeaderMap, Uri, header};
+use axum::response::{IntoResponse, Response};
+use crc::{CRC_32_ISCSI, Crc};
+
 static FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
 /// Content type and bytes of a file of the page; the empty path is its index.
@@ -16,4 +22,12 @@ pub(super) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
         _ => "application/octet-stream",
     };
     Some((content_type, bytes))
+}
+
+/// Serves a file of the page.
+pub(super) async fn page(uri: Uri, headers: HeaderMap) -> Response {
+    const SUM: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
+    let Some((content_type, bytes)) = find(uri.path().trim_start_matches('/')) else { return not_found() };
+    let tag = format!("{:08x}", SUM.checksum(bytes));
+    tagged(&headers, &tag, || ([(header::CONTENT_TYPE, content_type)], bytes).into_response())
 }

@@ -1,8 +1,8 @@
 //! Bits on air over time, as the surface sees them.
 
+use super::state::Rates;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
-use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -68,12 +68,9 @@ impl LinkMeter {
     }
 
     /// The history for the page.
-    pub fn history(&self) -> Value {
+    pub fn history(&self) -> Vec<Rates> {
         let rate = |bits: u64| bits as f64 / POINT_S as f64;
-        let points = self
-            .history
-            .iter()
-            .map(|(p, b)| json!({ "t_s": p * POINT_S, "up_bps": rate(b[0]), "down_bps": rate(b[1]) }));
-        Value::Array(points.collect())
+        let point = |(p, b): &(u64, [u64; 2])| Rates { t_s: p * POINT_S, up_bps: rate(b[0]), down_bps: rate(b[1]) };
+        self.history.iter().map(point).collect()
     }
 }

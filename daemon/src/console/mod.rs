@@ -6,12 +6,26 @@
 mod answer;
 mod assets;
 mod base64;
+mod compress;
+mod connections;
+mod events;
+mod export;
 mod guard;
 mod link_meter;
+mod maps;
+mod metrics;
+mod openapi;
+mod operations;
+pub mod orders;
+mod place;
+mod planes;
 mod server;
 mod snapshot;
+pub mod state;
+mod token;
 
 pub use answer::{Ask, Reply, answer};
+pub use export::{Cells, Plane};
 pub use link_meter::LinkMeter;
-pub use server::{Console, Request, bind, start};
+pub use server::{Console, Entrance, Request, bind, start};
 pub use snapshot::{MissionFacts, Snapshot, snapshot};

@@ -1,27 +1,31 @@
-//! The HTTP server.
+//! The HTTP server: what is asked for, and who answers it.
 
 use super::answer::{Ask, Reply};
+use super::guard::{self, Names};
+use super::maps::Maps;
+use super::operations::operations;
+use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, SettingsOrder, UtilityOrder};
 use super::snapshot::Snapshot;
-use super::{assets, guard};
+use super::state::Refusal;
+use super::token::Access;
+use super::{assets, compress, connections, events};
 use crate::asv::{FenceOrder, LimitsOrder};
 use crate::problem::Problem;
-use axum::extract::{DefaultBodyLimit, Path, State};
-use axum::http::{StatusCode, Uri, header};
-use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::extract::{DefaultBodyLimit, FromRequest, FromRequestParts, Path, Request as HttpRequest, State};
+use axum::http::request::Parts;
+use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use axum::routing::{get, post};
 use axum::{Json, Router};
-use futures_util::Stream;
 use scenecast_protocol::directive::Constraints;
-use scenecast_protocol::schedule::Shares;
-use serde::Deserialize;
-use serde_json::json;
-use std::collections::{BTreeMap, VecDeque};
-use std::convert::Infallible;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::net::TcpListener;
-use tokio::sync::{mpsc, oneshot, watch};
+use tokio::sync::{Semaphore, mpsc, oneshot, watch};
+use zeroize::Zeroizing;
+
+/// Most bytes of a body.
+const BODY: usize = 16 * 1024;
 
 /// An ask that waits for its reply.
 pub type Request = (Ask, oneshot::Sender<Reply>);
@@ -35,224 +39,202 @@ pub struct Console {
     pub snapshots: watch::Sender<Arc<Snapshot>>,
 }
 
-#[derive(Debug, Clone)]
-struct Shared {
-    requests: mpsc::Sender<Request>,
-    snapshots: watch::Receiver<Arc<Snapshot>>,
+/// A place to listen on, and who may ask there.
+#[derive(Debug)]
+pub struct Entrance {
+    listener: TcpListener,
+    access: Access,
 }
 
-/// Takes an address to listen on; one that is taken or not of this machine is the user's to change.
-pub async fn bind(address: &str, how_to_change: &str) -> Result<TcpListener, Problem> {
+/// What every handler sees.
+#[derive(Debug, Clone)]
+pub(super) struct Shared {
+    requests: mpsc::Sender<Request>,
+    pub(super) snapshots: watch::Receiver<Arc<Snapshot>>,
+    pub(super) maps: Arc<Maps>,
+    pub(super) access: Arc<Access>,
+    pub(super) streams: Arc<Semaphore>,
+}
+
+/// Takes an address to listen on; one that is taken is the user's to change, as is one that others reach without a token.
+///
+/// `name` is the one by which others ask for this machine, if it has one.
+pub async fn bind(
+    address: &str,
+    how_to_change: &str,
+    token: Option<Zeroizing<String>>,
+    name: &str,
+) -> Result<Entrance, Problem> {
     let addresses: Vec<_> = tokio::net::lookup_host(address)
         .await
-        .map_err(|e| Problem::Input(format!("{address} is no ADDRESS:PORT to listen on: {e}")))?
+        .map_err(|e| Problem::Input(format!("{how_to_change}: {address} is no ADDRESS:PORT to listen on: {e}")))?
         .collect();
-    if addresses.iter().any(|a| !a.ip().is_loopback()) {
+    let is_loopback = addresses.iter().all(|a| a.ip().is_loopback());
+    if !is_loopback && token.is_none() {
         return Err(Problem::Input(format!(
-            "{address}: the page is served on a loopback address only, such as 127.0.0.1:8460"
+            "{how_to_change} = {address}: others than this machine could steer the vehicle there; set console.token_file to \
+             a file that scenecast key token has written, or listen on a loopback address such as 127.0.0.1:8460"
         )));
     }
+    let names = if is_loopback { Names::Loopback } else { Names::Network(name.to_owned()) };
     let problem =
         |e| Problem::Input(format!("cannot listen on {address}: {e}; choose another port with {how_to_change}"));
-    TcpListener::bind(address).await.map_err(problem)
+    let listener = TcpListener::bind(address).await.map_err(problem)?;
+    Ok(Entrance { listener, access: Access::new(names, token) })
 }
 
-/// Serves the page on `listener` until the runtime ends.
-pub fn start(listener: TcpListener) -> Console {
+/// Serves the page until the runtime ends.
+pub fn start(entrance: Entrance) -> Console {
     let (ask, requests) = mpsc::channel(64);
     let (snapshots, seen) = watch::channel(Arc::new(Snapshot::default()));
-    let router = router(Shared { requests: ask, snapshots: seen });
-    tokio::spawn(async move {
-        if let Err(e) = axum::serve(listener, router).await {
-            tracing::error!("the operator's page ended: {e}");
-        }
-    });
+    let shared = Shared {
+        requests: ask,
+        snapshots: seen,
+        maps: Arc::default(),
+        access: Arc::new(entrance.access),
+        streams: Arc::new(Semaphore::new(events::MOST)),
+    };
+    tokio::spawn(connections::serve(entrance.listener, router(shared)));
     Console { requests, snapshots }
 }
 
 fn router(shared: Shared) -> Router {
-    Router::new()
-        .route("/api/v1/state", get(state))
-        .route("/api/v1/events", get(events))
-        .route("/api/v1/vehicles/{id}/map", get(map))
-        .route("/api/v1/vehicles/{id}/map.png", get(map_png))
-        .route("/api/v1/vehicles/{id}/exemplars/{file}", get(exemplar))
-        .route("/api/v1/vehicles/{id}/utility", post(utility))
-        .route("/api/v1/vehicles/{id}/exemplars", post(request))
-        .route("/api/v1/vehicles/{id}/constraints", post(constraints))
-        .route("/api/v1/vehicles/{id}/fence", post(fence))
-        .route("/api/v1/vehicles/{id}/limits", post(limits))
-        .route("/api/v1/vehicles/{id}/settings", post(settings))
-        .route("/api/v1/budget", post(budget))
-        .fallback(page)
-        .layer(DefaultBodyLimit::max(16 * 1024))
-        .layer(axum::middleware::from_fn(guard::guard))
+    let routes = operations().into_iter().fold(Router::new(), |r, o| r.route(o.path, (o.route)()));
+    routes
+        .fallback(assets::page)
+        .layer(axum::middleware::from_fn(compress::compress))
+        .layer(DefaultBodyLimit::max(BODY))
+        .layer(axum::middleware::from_fn_with_state(shared.access.clone(), guard::guard))
         .with_state(shared)
 }
 
 impl Shared {
-    async fn ask(&self, ask: Ask) -> Response {
+    /// What the surface says to an ask; the error is an answer that says that it is busy.
+    pub(super) async fn reply(&self, ask: Ask) -> Result<Reply, Response> {
+        let busy = || refusal(StatusCode::SERVICE_UNAVAILABLE, "too many requests at once");
         let (reply, answered) = oneshot::channel();
-        let busy =
-            || (StatusCode::SERVICE_UNAVAILABLE, Json(json!({ "error": "too many requests at once" }))).into_response();
-        if self.requests.try_send((ask, reply)).is_err() {
-            return busy();
-        }
-        match answered.await {
-            Ok(Reply::Json(value)) => Json(value).into_response(),
-            Ok(Reply::File(content_type, bytes)) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
-            Ok(Reply::Accepted(value)) => (StatusCode::ACCEPTED, Json(value)).into_response(),
-            Ok(Reply::NotFound) => not_found(),
-            Ok(Reply::Refused(why)) => refused(&why),
-            Err(_) => busy(),
-        }
+        self.requests.try_send((ask, reply)).map_err(|_| busy())?;
+        answered.await.map_err(|_| busy())
+    }
+
+    async fn ask(&self, ask: Ask) -> Response {
+        self.reply(ask).await.map_or_else(|busy| busy, respond)
     }
 }
 
-fn not_found() -> Response {
-    (StatusCode::NOT_FOUND, Json(json!({ "error": "there is no such thing" }))).into_response()
-}
-
-fn refused(why: &str) -> Response {
-    (StatusCode::UNPROCESSABLE_ENTITY, Json(json!({ "error": why }))).into_response()
-}
-
-async fn state(State(shared): State<Shared>) -> Response {
-    let state = shared.snapshots.borrow().state.clone();
-    ([(header::CONTENT_TYPE, "application/json")], state).into_response()
-}
-
-/// Events as they come: always the newest state, and which maps have changed. A slow reader misses states, never the last.
-async fn events(State(shared): State<Shared>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
-    struct Feed {
-        snapshots: watch::Receiver<Arc<Snapshot>>,
-        sent: BTreeMap<u8, u64>,
-        queue: VecDeque<Event>,
-        first: bool,
+/// The answer that a reply makes.
+pub(super) fn respond(reply: Reply) -> Response {
+    match reply {
+        Reply::Map(cells) => Json(cells.told()).into_response(),
+        Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
+        Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
+        Reply::NotFound => not_found(),
+        Reply::Refused(why) => refusal(StatusCode::UNPROCESSABLE_ENTITY, &why),
     }
-    let feed = Feed { snapshots: shared.snapshots, sent: BTreeMap::new(), queue: VecDeque::new(), first: true };
-    let stream = futures_util::stream::unfold(feed, |mut feed| async move {
-        while feed.queue.is_empty() {
-            if !std::mem::take(&mut feed.first) {
-                feed.snapshots.changed().await.ok()?;
-            }
-            let snapshot = feed.snapshots.borrow_and_update().clone();
-            feed.queue.push_back(Event::default().event("state").data(&snapshot.state));
-            for (&vehicle, &version) in &snapshot.maps {
-                if feed.sent.insert(vehicle, version) != Some(version) {
-                    let data = json!({ "vehicle": vehicle, "version": version }).to_string();
-                    feed.queue.push_back(Event::default().event("map").data(data));
-                }
-            }
-        }
-        feed.queue.pop_front().map(|event| (Ok(event), feed))
-    });
-    Sse::new(stream).keep_alive(KeepAlive::new().interval(Duration::from_secs(5)))
 }
 
-async fn map(State(shared): State<Shared>, Path(id): Path<u8>) -> Response {
-    shared.ask(Ask::Map(id)).await
+pub(super) fn refusal(status: StatusCode, why: &str) -> Response {
+    (status, Json(Refusal { error: why.to_owned() })).into_response()
 }
 
-async fn map_png(State(shared): State<Shared>, Path(id): Path<u8>) -> Response {
-    shared.ask(Ask::MapPng(id)).await
+pub(super) fn not_found() -> Response {
+    refusal(StatusCode::NOT_FOUND, "there is no such thing")
 }
 
-async fn exemplar(State(shared): State<Shared>, Path((id, file)): Path<(u8, String)>) -> Response {
+/// The vehicle in a path.
+pub(super) struct VehicleId(pub(super) u8);
+
+impl<S: Send + Sync> FromRequestParts<S> for VehicleId {
+    type Rejection = Response;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Response> {
+        let found = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
+        let id = found.ok().and_then(|Path(names)| names.get("id")?.parse().ok());
+        id.map(Self).ok_or_else(not_found)
+    }
+}
+
+/// The body of an order.
+pub(super) struct Order<T>(T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Order<T> {
+    type Rejection = Response;
+
+    async fn from_request(request: HttpRequest, state: &S) -> Result<Self, Response> {
+        let body = Json::<T>::from_request(request, state).await;
+        body.map(|Json(body)| Self(body)).map_err(|e| refusal(e.status(), &e.body_text()))
+    }
+}
+
+pub(super) async fn state(State(shared): State<Shared>) -> Response {
+    let json = shared.snapshots.borrow().json.clone();
+    if json.is_empty() {
+        return refusal(StatusCode::SERVICE_UNAVAILABLE, "the mission has not begun");
+    }
+    ([(header::CONTENT_TYPE, "application/json")], json).into_response()
+}
+
+pub(super) async fn exemplar(State(shared): State<Shared>, VehicleId(id): VehicleId, uri: axum::http::Uri) -> Response {
+    let file = uri.path().rsplit('/').next().unwrap_or_default();
     match file.strip_suffix(".webp").and_then(|label| label.parse().ok()) {
         Some(label) => shared.ask(Ask::Exemplar(id, label)).await,
         None => not_found(),
     }
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct UtilityBody {
-    weights: BTreeMap<String, f64>,
-    #[serde(default)]
-    exploration: f64,
-    #[serde(default)]
-    curiosity: f64,
-}
-
-async fn utility(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<UtilityBody>) -> Response {
-    let weights: Result<BTreeMap<u8, f64>, String> = body
-        .weights
-        .into_iter()
-        .map(|(label, w)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is no label")))
-        .collect();
-    match weights {
-        Ok(weights) => shared.ask(Ask::Utility(id, weights, (body.exploration, body.curiosity))).await,
-        Err(why) => refused(&why),
+pub(super) async fn utility(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<UtilityOrder>,
+) -> Response {
+    let weight =
+        |(label, w): (String, f64)| label.parse().map(|l| (l, w)).map_err(|_| format!("{label:?} is no label"));
+    match order.weights.into_iter().map(weight).collect::<Result<BTreeMap<u8, f64>, String>>() {
+        Ok(weights) => shared.ask(Ask::Utility(id, weights, (order.exploration, order.curiosity))).await,
+        Err(why) => refusal(StatusCode::UNPROCESSABLE_ENTITY, &why),
     }
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RequestBody {
-    label: u8,
+pub(super) async fn request(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<ExemplarOrder>,
+) -> Response {
+    shared.ask(Ask::Request(id, order.label)).await
 }
 
-async fn request(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<RequestBody>) -> Response {
-    shared.ask(Ask::Request(id, body.label)).await
+pub(super) async fn constraints(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<ConstraintsOrder>,
+) -> Response {
+    shared.ask(Ask::Order(id, Constraints { hold: order.hold, abort: order.abort })).await
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ConstraintsBody {
-    hold: bool,
-    #[serde(default)]
-    abort: bool,
+pub(super) async fn fence(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<FenceOrder>,
+) -> Response {
+    shared.ask(Ask::Fence(id, order)).await
 }
 
-async fn constraints(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<ConstraintsBody>) -> Response {
-    shared.ask(Ask::Order(id, Constraints { hold: body.hold, abort: body.abort })).await
+pub(super) async fn limits(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<LimitsOrder>,
+) -> Response {
+    shared.ask(Ask::Limits(id, order)).await
 }
 
-async fn fence(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<FenceOrder>) -> Response {
-    shared.ask(Ask::Fence(id, body)).await
+pub(super) async fn settings(
+    State(shared): State<Shared>,
+    VehicleId(id): VehicleId,
+    Order(order): Order<SettingsOrder>,
+) -> Response {
+    shared.ask(Ask::Settings(id, order)).await
 }
 
-async fn limits(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<LimitsOrder>) -> Response {
-    shared.ask(Ask::Limits(id, body)).await
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SettingsBody {
-    planner: Option<String>,
-    refine_words_per_s: Option<u32>,
-}
-
-async fn settings(State(shared): State<Shared>, Path(id): Path<u8>, Json(body): Json<SettingsBody>) -> Response {
-    shared.ask(Ask::Settings(id, body.planner, body.refine_words_per_s)).await
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct BudgetBody {
-    budget_bps: u32,
-    shares: Option<SharesBody>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SharesBody {
-    directive: u8,
-    status: u8,
-    fix: u8,
-    map: u8,
-    exemplar: u8,
-}
-
-async fn budget(State(shared): State<Shared>, Json(body): Json<BudgetBody>) -> Response {
-    let shares = body.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
-    shared.ask(Ask::Budget(body.budget_bps, shares)).await
-}
-
-async fn page(uri: Uri) -> Response {
-    match assets::find(uri.path().trim_start_matches('/')) {
-        Some((content_type, bytes)) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
-        None => not_found(),
-    }
+pub(super) async fn budget(State(shared): State<Shared>, Order(order): Order<BudgetOrder>) -> Response {
+    shared.ask(Ask::Budget(order)).await
 }

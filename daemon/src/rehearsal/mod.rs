@@ -5,6 +5,7 @@ pub mod docked;
 mod fidelity;
 mod frames_log;
 pub mod link_bench;
+mod localisation;
 mod meter;
 mod mission;
 pub mod modem_bench;
@@ -20,8 +21,10 @@ mod world;
 
 pub use fidelity::{FidelityRow, fidelity};
 pub use frames_log::FramesLog;
+pub use localisation::{Localisation, LocalisationRun, Tracks, fly_with_outliers, localisation, picture};
 pub use meter::Delays;
 pub use mission::{Mission, MissionOptions};
+pub use motion::{Motion, Odometry};
 pub use outputs::write_outputs;
 pub use recording::{RecordedFrame, Recording};
 pub use report::{Report, report};

@@ -16,7 +16,7 @@ pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), P
     super::block_on(async move {
         let console = match port {
             Some(port) => {
-                let listener = bind(&format!("127.0.0.1:{port}"), "--port").await?;
+                let listener = bind(&format!("127.0.0.1:{port}"), "--port", None, "").await?;
                 println!("the operator's page is at http://127.0.0.1:{port} (end with Ctrl-C)");
                 Some(start(listener))
             }

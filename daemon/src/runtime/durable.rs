@@ -1,7 +1,7 @@
 //! The vehicle's durable state: what is read of it at the start, and kept while it runs.
 
 use super::journal::{Damage, Journal, JournalError, Storage};
-use crate::auv::Durable;
+use crate::auv::{Durable, LastPlace};
 use crate::problem::Problem;
 use std::path::Path;
 
@@ -41,7 +41,10 @@ impl<S: Storage> Keeper<S> {
                 let last = last.map_err(|e| for_people(&place, e))?;
                 match checkpoint == Some((last.lineage, last.epoch)) {
                     true => last,
-                    false => Durable { epoch: last.epoch.wrapping_add(1), labels: 0, ..last },
+                    false => {
+                        let place = last.place.map(LastPlace::for_new_map);
+                        Durable { epoch: last.epoch.wrapping_add(1), labels: 0, place, ..last }
+                    }
                 }
             }
             None => {
@@ -151,17 +154,15 @@ mod tests {
             used: (130, 2),
             breach: 2,
             fence: vec![0],
+            place: None,
         };
         let golden = [
             &[1, 7, 2, 5, 6][..],
-            &[0, 1, 172, 2, 0, 0, 0, 1, 1],
-            &[0, 1, 0, 0, 0, 2],
-            &[3, 12, 172, 2],
-            &[1, 3, 50, 255, 1, 2, 253, 1, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
             &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0],
             &[0, 1, 0, 0, 0, 2, 0, 0],
-            &[3, 1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
-            &[3, 2, 0, 4, 130, 1, 2, 2, 1, 0],
+            &[3, 12, 172, 2],
+            &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
+            &[3, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));

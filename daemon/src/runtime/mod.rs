@@ -4,10 +4,14 @@ mod checkpoint;
 mod clock;
 mod demo;
 mod durable;
+mod flight;
 mod journal;
 #[cfg(test)]
 mod kept_labels;
 mod mapping;
+mod pilot;
+mod port;
+mod position;
 #[cfg(test)]
 mod power_cuts;
 mod refusals;

@@ -2,9 +2,11 @@
 
 use super::clock::Clock;
 use super::journal::create_folder;
+use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
+use crate::asv::position::world_file;
 use crate::asv::{Surface, SurfaceOutput};
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use crate::modem::{self, Modem, ModemEvent};
 use crate::picture;
@@ -19,6 +21,13 @@ use tokio::sync::oneshot;
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
+        let entrance = match config.console.listen.as_str() {
+            "" => None,
+            address => {
+                let token = config::load_token(&config)?;
+                Some(bind(address, "console.listen", token, &config.console.host).await?)
+            }
+        };
         let dir = PathBuf::from(&config.runtime.state_dir);
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
@@ -29,18 +38,17 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
-        let console = match config.console.listen.as_str() {
-            "" => None,
-            address => {
-                let console = start(bind(address, "console.listen").await?);
-                println!("the operator's page is at http://{address} (end with Ctrl-C)");
-                Some(console)
-            }
-        };
+        let console = entrance.map(|entrance| {
+            println!("the operator's page is at http://{} (end with Ctrl-C)", config.console.listen);
+            start(entrance)
+        });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = modem::open(&config, Address::SURFACE, profile, clock).await?;
-        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals: Refusals::default() }
+        let position = Position::open(&config, &mut surface, clock)?;
+        let vehicle = crate::ends::vehicle_address(&config)?;
+        let refusals = Refusals::default();
+        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }
             .run()
             .await
     })
@@ -56,6 +64,9 @@ struct Host {
     meter: LinkMeter,
     bits: scenecast_protocol::mac::ModemProfile,
     refusals: Refusals,
+    position: Position,
+    /// The vehicle to stay above.
+    vehicle: Address,
 }
 
 impl Host {
@@ -79,6 +90,7 @@ impl Host {
                 _ = second.tick() => self.publish(),
                 event = self.modem.next() => self.handle_modem(event?),
                 (ask, reply) = next_request(&mut self.console) => self.answer(ask, reply),
+                () = self.position.next(&mut self.surface, self.vehicle) => {}
             }
         }
     }
@@ -150,7 +162,13 @@ impl Host {
     fn write_map(&self, vehicle: Address) -> Result<(), Problem> {
         let Some(map) = self.surface.map(vehicle) else { return Ok(()) };
         let png = picture::encode(map).map_err(|e| Problem::Failed(e.to_string()))?;
-        picture::write_whole(&self.dir.join(format!("operator-map-{}.png", vehicle.number())), &png)
+        let file = |extension| self.dir.join(format!("operator-map-{}.{extension}", vehicle.number()));
+        if let (Some(plane), Some(bounds)) = (self.surface.relay().and_then(|r| r.plane()), map.bounds()) {
+            let placement = self.surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
+            let text = world_file(plane, placement, bounds, self.facts.cell_m);
+            picture::write_whole(&file("pgw"), text.as_bytes())?;
+        }
+        picture::write_whole(&file("png"), &png)
     }
 }
 

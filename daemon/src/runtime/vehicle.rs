@@ -2,6 +2,7 @@
 
 use super::clock::Clock;
 use super::durable::{Keeper, Run};
+use super::flight::Flight;
 use super::journal::Folder;
 use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
 use super::refusals::{Refusals, warn_without_key};
@@ -42,9 +43,10 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let mapper = MapperThread::start(mapper, keep)?;
         let modem = modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        let stop = Stop::new()?;
+        let (stop, flight) = (Stop::new()?, Flight::open(&config, clock)?);
         let (behind, missed) = (0, 0);
-        let host = Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, at_end, behind, missed };
+        let host =
+            Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind, missed };
         host.run(stop).await
     })
 }
@@ -91,6 +93,7 @@ struct Host {
     keeper: Keeper<Folder>,
     reload: Reload,
     refusals: Refusals,
+    flight: Flight,
     /// Whether the end of the camera's frames is the end of the survey.
     at_end: bool,
     /// Camera frames that the scene model has not seen yet.
@@ -114,8 +117,10 @@ impl Host {
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 event = self.modem.next() => self.handle_modem(event?),
                 config = self.reload.next() => self.follow(&config),
-                frame = self.camera.next() => {
+                () = self.flight.next() => self.flight.steer(&mut self.vehicle),
+                mut frame = self.camera.next() => {
                     self.behind += 1;
+                    self.flight.place_camera(&self.vehicle, &mut frame);
                     let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
                 }
                 seen = self.mapper.seen.recv() => match seen {
@@ -152,7 +157,9 @@ impl Host {
         let now = self.clock.now();
         if let Some(f) = &seen.frame {
             self.behind -= 1;
-            self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+            if !self.flight.is_piloted() {
+                self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+            }
         }
         self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
@@ -189,9 +196,21 @@ impl Host {
                     let _ = self.mapper.orders.send(ToMapper::RefineRate(rate));
                 }
                 VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
-                VehicleOutput::Waypoint(x, y) => tracing::info!("waypoint {x:.1} m east, {y:.1} m north"),
-                VehicleOutput::Hold => tracing::info!("hold"),
-                VehicleOutput::Surface => tracing::info!("come up"),
+                VehicleOutput::Waypoint(x, y) => {
+                    self.flight.set_rising(false);
+                    tracing::info!("waypoint {x:.1} m east, {y:.1} m north");
+                }
+                VehicleOutput::Hold => {
+                    self.flight.set_rising(false);
+                    tracing::info!("hold");
+                }
+                VehicleOutput::Fixed(fix, _) => {
+                    tracing::debug!("fix: {:.1} m east, {:.1} m north, +-{:.1} m", fix.x_m, fix.y_m, fix.sigma_m);
+                }
+                VehicleOutput::Surface => {
+                    self.flight.set_rising(true);
+                    tracing::info!("come up");
+                }
             }
         }
         self.modem.set_budget(self.vehicle.budget_bps());

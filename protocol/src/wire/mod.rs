@@ -8,6 +8,7 @@ mod cursor;
 mod frame;
 mod header;
 mod number;
+mod placement;
 mod stamp;
 mod status;
 
@@ -17,6 +18,7 @@ pub use cursor::{Reader, Truncated};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, Header, MissionId, SessionId};
 pub use number::unwrap_number;
+pub use placement::Placement;
 pub use stamp::Stamp;
 pub use status::{ModeReason, SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
 

@@ -1,6 +1,7 @@
 //! The vehicle's status.
 
 use super::cursor::{Reader, Truncated};
+use super::placement::Placement;
 use crate::directive::{RefusalReason, SLOTS, SlotId};
 
 /// What the vehicle is doing.
@@ -103,8 +104,9 @@ pub struct SlotReport {
 /// byte  bits  field                 unit, range
 ///  0    3     mode                  0 survey, 1 hold, 2 return, 3 surface, 4 abort, 5 done
 ///  0    1     a waypoint follows
-///  0    4     why                   0 by the survey, 1 order, 2 fence, 3 distance, 4 time, 5 silence, 6 depth or
-///                                   altitude, 7 no way; the rest is refused
+///  0    1     the autopilot does not answer: nobody carries out what the mode says
+///  0    3     why                   0 by the survey, 1 order, 2 fence, 3 distance, 4 time, 5 silence, 6 depth or
+///                                   altitude, 7 no way
 ///  1-3  24    x east                decimetres, signed, +-838 km
 ///  4-6  24    y north               decimetres, signed
 ///  7-8  16    depth                 decimetres below the surface, 0..6553.5 m
@@ -120,13 +122,17 @@ pub struct SlotReport {
 ///  2-3  16    digest of the map that the surface is known to hold (the base of this frame)
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
-///  7-14 64    eight slot reports: version, low 8 bits
-/// 15-18 32    eight slot reports: 4 bits each: 0 unknown, 1 applied, 2..9 refusal reason; the rest is refused
+///  7    8     slots that are reported of, a bit each, the first slot in the highest bit
+///  8..  8     version of each of them, low 8 bits
+/// then  4     what became of each of them: 1 applied, 2..9 refusal reason; the rest is refused; 4 bits 0 after an odd number
+/// 7 more      [where the map lies in the world, see `Placement`]; left out while it has not moved
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
     /// What it is doing.
     pub mode: VehicleMode,
+    /// Whether its autopilot does not answer, so that nobody carries out what the mode says.
+    pub autopilot_silent: bool,
     /// And why.
     pub reason: ModeReason,
     /// East of the origin, metres.
@@ -157,6 +163,8 @@ pub struct VehicleStatus {
     pub refused_frames: u8,
     /// Decisions about the slots of the directive, by slot.
     pub slots: [SlotReport; SLOTS],
+    /// Where the map lies in the world; `None` while no fix has moved it.
+    pub placement: Option<Placement>,
 }
 
 /// Why bytes are no status.
@@ -176,11 +184,11 @@ impl From<Truncated> for StatusError {
     }
 }
 
-fn decimetres(metres: f64) -> i32 {
+pub(super) fn decimetres(metres: f64) -> i32 {
     (metres * 10.0).round().clamp(-8_388_608.0, 8_388_607.0) as i32
 }
 
-fn put24(out: &mut Vec<u8>, value: u32) {
+pub(super) fn put24(out: &mut Vec<u8>, value: u32) {
     out.extend_from_slice(value.to_be_bytes().get(1..).unwrap_or_default());
 }
 
@@ -195,10 +203,14 @@ fn decode_rate(code: u16) -> u32 {
 }
 
 impl VehicleStatus {
+    /// Bytes of a report without slots.
+    const REPORT_HEAD: usize = 8;
+
     /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
         let waypoint = self.waypoint.filter(|_| room >= 21);
-        let mut out = vec![self.mode.code() << 5 | u8::from(waypoint.is_some()) << 4 | self.reason as u8];
+        let flags = u8::from(waypoint.is_some()) << 4 | u8::from(self.autopilot_silent) << 3;
+        let mut out = vec![self.mode.code() << 5 | flags | self.reason as u8];
         put24(&mut out, decimetres(self.x_m) as u32);
         put24(&mut out, decimetres(self.y_m) as u32);
         out.extend_from_slice(&((self.depth_m * 10.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
@@ -213,15 +225,34 @@ impl VehicleStatus {
         out
     }
 
-    /// The report chunk.
-    pub fn encode_report(&self) -> Vec<u8> {
+    /// A report chunk of at most `room` bytes about the slots from `first` on and the placement, and the slot that the next
+    /// one has to begin with, 0 if all is said; `None` if not one slot fits that was decided about.
+    pub fn encode_report(&self, room: usize, first: usize) -> Option<(Vec<u8>, usize)> {
+        let known = |&(_, s): &(usize, &SlotReport)| s.state != SlotState::Unknown;
+        let decided: Vec<(usize, &SlotReport)> = self.slots.iter().enumerate().skip(first).filter(known).collect();
+        // A slot takes a byte and a half.
+        let fitting = room.saturating_sub(Self::REPORT_HEAD) * 2 / 3;
+        let (told, left) = decided.split_at(fitting.min(decided.len()));
+        if told.is_empty() && !left.is_empty() {
+            return None;
+        }
         let mut out = vec![self.epoch, self.labels];
         out.extend_from_slice(&self.base_digest.to_be_bytes());
         out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
         out.push(self.refused_frames);
-        out.extend(self.slots.iter().map(|s| s.version_low));
-        out.extend(self.slots.chunks(2).map(|pair| pair.iter().fold(0, |acc, s| acc << 4 | s.state.code())));
-        out
+        out.push(told.iter().fold(0, |bits, (slot, _)| bits | 0x80 >> slot));
+        out.extend(told.iter().map(|(_, s)| s.version_low));
+        let code = |of: Option<&(usize, &SlotReport)>| of.map_or(0, |(_, s)| s.state.code());
+        out.extend(told.chunks(2).map(|pair| code(pair.first()) << 4 | code(pair.get(1))));
+        let Some(placement) = self.placement.filter(|_| left.is_empty()) else {
+            return Some((out, left.first().map_or(0, |&(slot, _)| slot)));
+        };
+        let has_room = room >= out.len() + Placement::BYTES;
+        if has_room {
+            placement.encode(&mut out);
+        }
+        let next = if has_room || told.is_empty() { 0 } else { SLOTS };
+        Some((out, next))
     }
 
     /// Reads a pose; the rest stays as it is.
@@ -229,7 +260,7 @@ impl VehicleStatus {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
         let mode = VehicleMode::ALL.get(usize::from(head >> 5)).copied().ok_or(StatusError::BadField)?;
-        let reason = ModeReason::ALL.get(usize::from(head & 15)).copied().ok_or(StatusError::BadField)?;
+        let reason = ModeReason::ALL.get(usize::from(head & 7)).copied().ok_or(StatusError::BadField)?;
         let metres = |dm: i32| f64::from(dm) / 10.0;
         let mut read = Self { mode, reason, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..self.clone() };
         read.depth_m = f64::from(r.u16()?) / 10.0;
@@ -241,6 +272,7 @@ impl VehicleStatus {
         if head & 0b1_0000 != 0 {
             read.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
         }
+        read.autopilot_silent = head & 0b1000 != 0;
         if !r.rest().is_empty() {
             return Err(StatusError::Length);
         }
@@ -248,16 +280,26 @@ impl VehicleStatus {
         Ok(())
     }
 
-    /// Reads a report; the rest stays as it is.
+    /// Reads a report; the rest stays as it is, and so do slots and the placement where it says nothing of them.
     pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
         read.budget_bps = decode_rate(r.u16()?);
         read.refused_frames = r.u8()?;
-        let versions = r.take(SLOTS)?;
-        let states = r.take(SLOTS.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
-        for ((slot, &version_low), code) in read.slots.iter_mut().zip(versions).zip(states) {
-            *slot = SlotReport { version_low, state: SlotState::from_code(code).ok_or(StatusError::BadField)? };
+        let told = r.u8()?;
+        let count = told.count_ones() as usize;
+        let versions = r.take(count)?;
+        let mut codes = r.take(count.div_ceil(2))?.iter().flat_map(|b| [b >> 4, b & 15]);
+        let slots = read.slots.iter_mut().enumerate().filter(|(slot, _)| told & 0x80 >> slot != 0);
+        for ((_, slot), &version_low) in slots.zip(versions) {
+            let state = codes.next().and_then(SlotState::from_code).filter(|&s| s != SlotState::Unknown);
+            *slot = SlotReport { version_low, state: state.ok_or(StatusError::BadField)? };
+        }
+        if codes.next().is_some_and(|padding| padding != 0) {
+            return Err(StatusError::BadField);
+        }
+        if !r.rest().is_empty() {
+            read.placement = Some(Placement::decode(&mut r)?.ok_or(StatusError::BadField)?);
         }
         if !r.rest().is_empty() {
             return Err(StatusError::Length);
@@ -292,56 +334,4 @@ impl SlotState {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    #[test]
-    fn golden_bytes_of_a_status() {
-        let mut slots = [SlotReport::default(); SLOTS];
-        slots[0] = SlotReport { version_low: 7, state: SlotState::Applied };
-        slots[5] = SlotReport { version_low: 2, state: SlotState::Refused(RefusalReason::Malformed) };
-        let status = VehicleStatus {
-            mode: VehicleMode::Hold,
-            reason: ModeReason::Fence,
-            x_m: 1.5,
-            y_m: -0.1,
-            depth_m: 18.0,
-            heading_deg: 90.0,
-            sigma_m: 1.25,
-            fix_age_s: Some(8.0),
-            waypoint: None,
-            explored_cells: 4000,
-            epoch: 1,
-            labels: 9,
-            base_digest: 0xBEEF,
-            budget_bps: 10_000,
-            refused_frames: 3,
-            slots,
-        };
-        let (pose, report) = (status.encode_pose(99), status.encode_report());
-        assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
-        assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 7, 0, 0, 0, 0, 2, 0, 0, 0x10, 0, 0x02, 0]);
-        let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
-        back.read_pose(&pose).unwrap();
-        back.read_report(&report).unwrap();
-        assert_eq!(back, status);
-    }
-
-    proptest! {
-        #[test]
-        fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..24)) {
-            let mut status = VehicleStatus::default();
-            if status.read_pose(&bytes).is_ok() {
-                prop_assert_eq!(status.encode_pose(99), bytes.clone());
-            }
-            let _ = status.read_report(&bytes);
-        }
-
-        #[test]
-        fn a_rate_comes_back_within_a_thousandth(rate in 1u32..10_000_000) {
-            let back = decode_rate(code_rate(rate));
-            prop_assert!(back <= rate && rate - back <= rate / 1000, "{} became {}", rate, back);
-        }
-    }
-}
+mod tests;

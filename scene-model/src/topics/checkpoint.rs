@@ -172,7 +172,7 @@ mod tests {
         assert_eq!(refused(&bytes[..bytes.len() - 1]), EnvelopeError::Damaged.into());
         let mut newer = bytes.clone();
         newer[8] = 9;
-        assert_eq!(refused(&newer), EnvelopeError::Version { found: 9, wanted: 1 }.into());
+        assert_eq!(refused(&newer), EnvelopeError::Version { found: 9, wanted: 2 }.into());
     }
 
     proptest! {

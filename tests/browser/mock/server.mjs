@@ -21,8 +21,8 @@ const TYPES = {
   ".js": "text/javascript; charset=utf-8",
 };
 const POLICY =
-  "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; " +
-  "form-action 'none'; frame-ancestors 'none'";
+  "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; " +
+  "base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
 /** Starts a mock; resolves to {url, close()}. */
 export async function startMock({ port = 0, scenario = "rich" } = {}) {

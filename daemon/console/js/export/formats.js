@@ -2,7 +2,7 @@
 
 import { colourOf, nameOf, shownAs } from "../book.js";
 import { depthPlane } from "../cloud/points.js";
-import { toLatLon } from "../map/readout.js";
+import { inWorld, toLatLon } from "../map/readout.js";
 import { rgb } from "../palette.js";
 import { regions } from "./regions.js";
 
@@ -35,8 +35,8 @@ export function toCsv(map, sinceFetchS) {
 export function toGeoJson(map, vehicle, origin, nowS) {
   const shown = map.labels.map((label) => (label === 0 ? 0 : shownAs(label)));
   const place = ([cx, cy]) => {
-    const [x, y] = [(map.x0 + cx) * map.cell_m, (map.y0 + cy) * map.cell_m];
-    return origin ? toLatLon(origin, x, y).reverse().map((v) => Number(v.toFixed(8))) : [x, y];
+    const [x, y] = inWorld(vehicle, (map.x0 + cx) * map.cell_m, (map.y0 + cy) * map.cell_m);
+    return origin ? toLatLon(origin, x, y).reverse().map((v) => Number(v.toFixed(9))) : [x, y];
   };
   const features = [...regions(shown, map.width, map.height)].sort((a, b) => a[0] - b[0]).map(([label, polygons]) => ({
     type: "Feature",
@@ -61,7 +61,7 @@ export function toPly(map) {
     lines.push(`${x.toFixed(3)} ${y.toFixed(3)} ${z} ${rgb(colourOf(shownAs(label))).join(" ")} ${label}`);
   }
   const head = ["ply", "format ascii 1.0", "comment scenecast map, metres east, north, up", `element vertex ${lines.length}`,
-    "property float x", "property float y", "property float z",
+    "property double x", "property double y", "property double z",
     "property uchar red", "property uchar green", "property uchar blue", "property uchar label", "end_header"];
   return `${[...head, ...lines].join("\n")}\n`;
 }
@@ -71,4 +71,16 @@ export function toWorldFile(map) {
   const west = (map.x0 + 0.5) * map.cell_m;
   const north = (map.y0 + map.height - 0.5) * map.cell_m;
   return [map.cell_m, 0, 0, -map.cell_m, west, north].map((v) => `${v}\n`).join("");
+}
+
+/** The `.aux.xml` file beside a PNG, where GDAL and QGIS look for the projection; null without an origin. */
+export function toProjection(origin) {
+  if (!origin) return null;
+  const { lat_deg, lon_deg } = origin;
+  const text = `PROJCS["metres east and north of ${lat_deg} ${lon_deg}",GEOGCS["WGS 84",DATUM["WGS_1984",` +
+    'SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],' +
+    `PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",${lat_deg}],PARAMETER["central_meridian",${lon_deg}],` +
+    'PARAMETER["scale_factor",1],PARAMETER["false_easting",0],PARAMETER["false_northing",0],UNIT["metre",1],' +
+    'AXIS["Easting",EAST],AXIS["Northing",NORTH]]';
+  return `<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping="1,2">${text.replaceAll('"', "&quot;")}</SRS>\n</PAMDataset>\n`;
 }

@@ -6,7 +6,7 @@ import { ago } from "../format.js";
 import { paintLabels } from "../map/raster.js";
 import { rgb } from "../palette.js";
 import { ageOf, store } from "../store.js";
-import { toCsv, toGeoJson, toPly, toWorldFile } from "./formats.js";
+import { toCsv, toGeoJson, toPly, toProjection, toWorldFile } from "./formats.js";
 
 async function png(map, name) {
   const tintOf = (id) => rgb(colourOf(id));
@@ -14,6 +14,8 @@ async function png(map, name) {
   const blob = await new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
   download(`${name}.png`, "image/png", [blob]);
   download(`${name}.pgw`, "text/plain", [toWorldFile(map)]);
+  const projection = toProjection(store.snapshot.mission.origin);
+  if (projection) download(`${name}.png.aux.xml`, "application/xml", [projection]);
 }
 
 const FILES = [

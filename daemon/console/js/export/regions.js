@@ -48,7 +48,7 @@ function borders(patch, width, height) {
   return edges;
 }
 
-/** Follows one ring from a corner; where two edges of the patch leave, the left turn stays with it. */
+/** Follows one ring from a corner; where two edges of the patch leave, the right turn keeps the ring from touching itself. */
 function follow(edges, corner, width) {
   const first = edges.get(corner).pop();
   const ring = [];
@@ -59,9 +59,9 @@ function follow(edges, corner, width) {
     if (edge.step !== before) ring.push([x, y]);
     before = edge.step;
     at = (y + STEPS[edge.step][1]) * (width + 1) + x + STEPS[edge.step][0];
-    if (at === corner && !(edges.get(at) ?? []).some((e) => e.id === first.id && e.step === (edge.step + 1) % 4)) break;
+    if (at === corner && !(edges.get(at) ?? []).some((e) => e.id === first.id && e.step === (edge.step + 3) % 4)) break;
     const leaving = edges.get(at);
-    const wanted = [1, 0, 3].map((turn) => leaving.findIndex((e) => e.id === first.id && e.step === (before + turn) % 4));
+    const wanted = [3, 0, 1].map((turn) => leaving.findIndex((e) => e.id === first.id && e.step === (before + turn) % 4));
     const next = wanted.find((i) => i !== -1);
     edge = leaving.splice(next, 1)[0];
   }

@@ -34,7 +34,7 @@ export function showReadout(world) {
   const cell = store.map ? cellAt(store.map, ...world) : null;
   const parts = [`E ${metres(world[0])}  N ${metres(world[1])}`];
   const origin = store.snapshot?.mission.origin;
-  if (origin) parts.push(latLon(origin, ...world));
+  if (origin) parts.push(latLon(origin, ...inWorld(store.vehicle, ...world)));
   if (cell) {
     parts.push(nameOf(shownAs(cell.label)));
     parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
@@ -57,11 +57,27 @@ function levelOf(p) {
 /** A quantity without a unit is a share. */
 export const planeText = (p, value) => (p.unit === "" ? percent(value) : `${minus(String(Number(value.toFixed(1))))} ${p.unit}`);
 
-/** Latitude and longitude of a place near `origin`, on a tangent plane. */
+const A = 6378137;
+const E2 = (2 - 1 / 298.257223563) / 298.257223563;
+const meridianRadius = (lat) => (A * (1 - E2)) / (1 - E2 * Math.sin(lat) ** 2) ** 1.5;
+
+/** Latitude and longitude of a place near `origin`: the inverse transverse Mercator projection about it on WGS 84
+ * (Snyder, USGS Professional Paper 1395, p. 63), as the daemon's exports have it. */
 export function toLatLon(origin, x, y) {
-  const lat = origin.lat_deg + y / 111132.95;
-  const lon = origin.lon_deg + x / (111412.84 * Math.cos((origin.lat_deg * Math.PI) / 180));
-  return [lat, lon];
+  const lat0 = (origin.lat_deg * Math.PI) / 180;
+  let lat = lat0;
+  for (let i = 0; i < 3; i += 1) lat = lat0 + y / meridianRadius((lat + lat0) / 2);
+  const n = A / Math.sqrt(1 - E2 * Math.sin(lat) ** 2);
+  const [t, d, c] = [Math.tan(lat), x / n, (E2 / (1 - E2)) * Math.cos(lat) ** 2];
+  const north = lat - ((n * t) / meridianRadius(lat)) * (d ** 2 / 2 - ((5 + 3 * t * t + 10 * c) * d ** 4) / 24);
+  const east = (d - ((1 + 2 * t * t + c) * d ** 3) / 6) / Math.cos(lat);
+  return [(north * 180) / Math.PI, origin.lon_deg + (east * 180) / Math.PI];
+}
+
+/** A place of a vehicle's map in the world: east and north of the mission's origin, metres. */
+export function inWorld(vehicle, x, y) {
+  const by = vehicle?.map?.placement;
+  return by ? [x + by.east_m, y + by.north_m] : [x, y];
 }
 
 function latLon(origin, x, y) {

@@ -21,6 +21,7 @@ export function startVehicle() {
     ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
     ["sigma", "Position \u03c3", "Standard deviation of its position; the ring on the map is twice this"],
     ["fix", "Last fix"], ["waypoint", "Waypoint"], ["cells", "Its own map"], ["contact", "Next contact"],
+    ["gps", "Surface GPS", "Where the surface knows itself to be, and fixes that it sent to vehicles"],
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;
@@ -36,7 +37,8 @@ function update() {
   if (!v) return;
   const s = v.status;
   text(title, v.name);
-  text(mode, s?.doing ?? s?.mode ?? "unknown");
+  const doing = s?.doing ?? s?.mode ?? "unknown";
+  text(mode, s?.autopilot_silent ? `${doing}, autopilot silent` : doing);
   mode.dataset.mode = s?.mode ?? "none";
   $("vehicle").classList.toggle("stale", isStale(v));
   text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 heard ${ago(ageOf(v.heard_s))}, due every ${span(v.expected_interval_s)}` : "No status heard yet.");
@@ -48,9 +50,19 @@ function update() {
   values.waypoint(s?.waypoint ? leg(s) : none);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
+  values.gps(gps(store.snapshot.position));
   keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
   show(nothing, v.directive.slots.length === 0);
   refreshStop(v);
+}
+
+const total = (counts) => Object.values(counts).reduce((sum, n) => sum + n, 0);
+
+function gps(p) {
+  if (!p) return "none";
+  const unused = total(p.sightings_unused);
+  const state = p.is_good ? `\u00b1 ${metres(p.sigma_m)}` : "no position";
+  return `${state}, ${count(p.fixes)} fixes${unused ? `, ${count(unused)} sightings unused` : ""}`;
 }
 
 const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s - store.nowS)}` : "overdue");

@@ -165,6 +165,7 @@ impl Vehicle {
         VehicleStatus {
             mode: self.course.mode,
             reason: self.course.reason,
+            autopilot_silent: self.autopilot_silent,
             x_m,
             y_m,
             depth_m: self.navigator.depth_m(),
@@ -175,6 +176,7 @@ impl Vehicle {
             epoch: self.durable.epoch,
             labels: self.labels,
             explored_cells: self.explored,
+            placement: self.navigator.placement(),
             ..VehicleStatus::default()
         }
     }

@@ -4,24 +4,26 @@ mod course;
 #[cfg(test)]
 mod obedience;
 mod obey;
+mod place;
 mod whole_png;
 
 use super::exemplar::{Exemplar, encode_webp};
 use super::guard::{Guard, Habits};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
-use super::planning::distance;
 use super::steering::Steering;
 use course::Doing;
-use scenecast_protocol::directive::{RefusalReason, Requests, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Fix, RefusalReason, Requests, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::{Cell, LabelGrid, PlaneSource};
+use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SlotState;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use whole_png::WholePng;
+
+pub use place::LastPlace;
 
 /// Most bytes of a representative image.
 const EXEMPLAR_BYTES: usize = 700;
@@ -59,6 +61,8 @@ pub struct Durable {
     pub breach: u8,
     /// Fence in force, as on the wire; empty: none.
     pub fence: Vec<u8>,
+    /// Where it was at its last fix.
+    pub place: Option<LastPlace>,
 }
 
 /// What the vehicle asks of its host.
@@ -77,6 +81,8 @@ pub enum VehicleOutput {
     RefineRate(u32),
     /// A slot was decided about.
     Applied(AppliedSlot),
+    /// A fix in the world that was used, and when it was taken: an autopilot may want it too.
+    Fixed(Fix, Instant),
 }
 
 /// A decision about a slot.
@@ -110,6 +116,7 @@ pub struct Vehicle {
     done: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
+    autopilot_silent: bool,
     /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0: never.
     coarse_after_s: f64,
     /// Instead of the link's map, for comparison.
@@ -149,6 +156,7 @@ impl Vehicle {
             done: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
+            autopilot_silent: false,
             coarse_after_s: 0.0,
             whole_png: None,
         };
@@ -183,11 +191,6 @@ impl Vehicle {
     /// What must survive a restart.
     pub fn durable(&self) -> &Durable {
         &self.durable
-    }
-
-    /// The position estimate.
-    pub fn navigator(&self) -> &Navigator {
-        &self.navigator
     }
 
     /// The map as the vehicle sees it.
@@ -230,11 +233,6 @@ impl Vehicle {
         self.link.assume_budget_spent(now);
     }
 
-    /// Fixes that corrected the estimate.
-    pub fn fixes_applied(&self) -> u64 {
-        self.fixes_applied
-    }
-
     /// The utility in force.
     pub fn utility(&self) -> Option<&Utility> {
         self.utility.as_ref()
@@ -249,13 +247,6 @@ impl Vehicle {
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
         self.guard.handle_way(dx_m.hypot(dy_m));
-    }
-
-    /// The position is known from elsewhere, as in a recorded mission.
-    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        let before = self.navigator.position();
-        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
-        self.guard.handle_way(distance(before, (x_m, y_m)));
     }
 
     /// The scene model has a new map.
@@ -400,10 +391,5 @@ impl Vehicle {
     /// When to ask for the next frame.
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
         self.link.poll_timeout()
-    }
-
-    /// Labels of cells as the vehicle sees them.
-    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
-        self.map().iter()
     }
 }

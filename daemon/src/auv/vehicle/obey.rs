@@ -1,6 +1,7 @@
 //! What the vehicle does with a slot of the directive.
 
-use super::{Vehicle, VehicleOutput};
+use super::{LastPlace, Vehicle, VehicleOutput};
+use crate::auv::FixVerdict;
 use scenecast_protocol::directive::{
     Budget, Constraints, Fence, Limits, LimitsFault, Place, PlannerKind, RefusalReason, Slot, Utility,
 };
@@ -40,9 +41,16 @@ impl Vehicle {
             Slot::Fence(fence) => self.apply_fence(&fence),
             Slot::Fix(fix) => {
                 let taken = now - Duration::from_secs_f64(fix.age_s);
-                let used = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
-                self.fixes_applied += u64::from(used);
-                if used { Ok(()) } else { Err(RefusalReason::TooOld) }
+                match self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now) {
+                    FixVerdict::Used => {
+                        self.fixes_applied += 1;
+                        self.durable.place = Some(LastPlace::of(&self.navigator));
+                        self.outputs.push_back(VehicleOutput::Fixed(fix, taken));
+                        Ok(())
+                    }
+                    FixVerdict::TooOld => Err(RefusalReason::TooOld),
+                    FixVerdict::Absurd | FixVerdict::Outlier => Err(RefusalReason::OutOfRange),
+                }
             }
         }
     }

@@ -42,9 +42,12 @@ pub(super) fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed:
     let mut model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| Problem::Input(format!("scene.{e}")))?;
     let (mut book, mut sent, mut streamed) = (LabelBook::new(0), map::LabelGrid::default(), 0);
     let words = (f64::from(config.scene.refine_words_per_s) * survey.step_s) as u64;
-    for (index, seen) in survey.frames().enumerate() {
-        model.insert(index as f64 * survey.step_s, &seen);
-        model.refine(words);
+    // A label has its id when it has lasted for two maps, so the last map is told once more after the last frame.
+    for (index, seen) in survey.frames().map(Some).chain([None]).enumerate() {
+        if let Some(seen) = seen {
+            model.insert(index as f64 * survey.step_s, &seen);
+            model.refine(words);
+        }
         let epoch = book.epoch();
         let published = book.publish(&model.label_map());
         if book.epoch() != epoch {

@@ -101,6 +101,7 @@ impl Mission {
                     }
                     self.applied.push(applied);
                 }
+                VehicleOutput::Fixed(..) => {}
             }
         }
         while let Some(output) = self.surface.poll_output() {

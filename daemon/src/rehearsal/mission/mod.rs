@@ -287,7 +287,7 @@ impl Mission {
 
     /// Metres between where the vehicle is and where it believes to be.
     pub fn position_error_m(&self) -> f64 {
-        let (x, y) = self.vehicle.navigator().position();
+        let (x, y) = self.vehicle.navigator().world();
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
     }
 

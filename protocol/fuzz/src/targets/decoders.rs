@@ -145,7 +145,7 @@ pub fn status(data: &[u8]) {
     }
     if report.read_report(data).is_ok() {
         let mut again = VehicleStatus::default();
-        again.read_report(&report.encode_report()).expect("a report that was written");
+        again.read_report(&report.encode_report(99, 0).expect("room").0).expect("a report that was written");
         assert_eq!(again, report);
     } else {
         assert_eq!(report, VehicleStatus::default());

@@ -52,9 +52,12 @@ impl<S: StateSource> VehicleLink<S> {
         status.refused_frames = self.pair.stats.refused().min(255) as u8;
         let share = |bytes: usize| Duration::from_secs_f64(bytes as f64 * 160.0 / f64::from(status.budget_bps.max(1)));
         if now >= self.report_due {
-            let bytes = status.encode_report();
-            if builder.push(ChunkKind::Report, &bytes) {
-                self.report_due = now + self.config.status_period.max(share(bytes.len()));
+            let report = status.encode_report(room_for_payload(builder.room()), self.report_from);
+            if let Some((bytes, next)) = report.filter(|(bytes, _)| builder.push(ChunkKind::Report, bytes)) {
+                self.report_from = next;
+                if next == 0 {
+                    self.report_due = now + self.config.status_period.max(share(bytes.len()));
+                }
                 carried.push((Part::Report, bytes.len()));
                 self.planes.iter_mut().for_each(|p| p.owes_digest = p.source.is_begun());
             }

@@ -111,6 +111,8 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     status: Option<VehicleStatus>,
     pose_due: Instant,
     report_due: Instant,
+    /// Slot that the next report begins with: one that does not fit a frame goes on in the next.
+    report_from: usize,
     floor: Floor,
     /// Frames of this turn, to be sent again if nothing else is left to say, or if the surface has not heard the last of them.
     said: VecDeque<Said>,
@@ -147,6 +149,7 @@ impl<S: StateSource> VehicleLink<S> {
             status: None,
             pose_due: now,
             report_due: now,
+            report_from: 0,
             floor: Floor::default(),
             said: VecDeque::new(),
             said_frames: 0,
@@ -211,7 +214,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// Changes the bit budget; the surface learns of it by the next report.
     pub fn set_budget(&mut self, bits_per_s: u32, now: Instant) {
         self.budget.set_rate(bits_per_s, now);
-        self.report_due = now;
+        self.owe_report(now);
     }
 
     /// The bit budget.
@@ -229,10 +232,15 @@ impl<S: StateSource> VehicleLink<S> {
         self.shares.shares()
     }
 
+    /// The surface does not know all that a report says.
+    fn owe_report(&mut self, now: Instant) {
+        (self.report_due, self.report_from) = (now, 0);
+    }
+
     /// The host's decision about the latest version of a slot.
     pub fn decide(&mut self, id: SlotId, state: SlotState, now: Instant) {
         self.inbox.decide(id, state);
-        self.report_due = now;
+        self.owe_report(now);
     }
 
     /// What must survive a restart.
@@ -302,7 +310,8 @@ impl<S: StateSource> VehicleLink<S> {
         self.source.handle_peer_restart(now);
         self.planes.iter_mut().for_each(|p| p.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
-        (self.pose_due, self.report_due, self.heard) = (now, now, None);
+        (self.pose_due, self.heard) = (now, None);
+        self.owe_report(now);
         self.forget_said();
     }
 

@@ -103,7 +103,7 @@ impl<S: StateSource> VehicleLink<S> {
                     }
                 }
                 Part::Pose if !delivered => self.pose_due = now,
-                Part::Report if !delivered => self.report_due = now,
+                Part::Report if !delivered => self.owe_report(now),
                 Part::Pose | Part::Report | Part::PlaneDigest(_) => {}
             }
         }

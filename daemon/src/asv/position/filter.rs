@@ -1,0 +1,217 @@
+//! A Kalman filter of a place in the plane that moves about steadily.
+
+/// A place with its uncertainty: covariance in m2, xx, xy, yy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// East, metres.
+    pub x_m: f64,
+    /// North, metres.
+    pub y_m: f64,
+    /// Covariance of x and y, square metres: xx, xy, yy.
+    pub cov_m2: [f64; 3],
+}
+
+impl Estimate {
+    /// A place that is as uncertain in every direction.
+    pub fn round(x_m: f64, y_m: f64, sigma_m: f64) -> Self {
+        Self { x_m, y_m, cov_m2: [sigma_m * sigma_m, 0.0, sigma_m * sigma_m] }
+    }
+
+    /// Standard deviation of one coordinate, the mean of all directions, metres.
+    pub fn sigma_m(&self) -> f64 {
+        ((self.cov_m2[0] + self.cov_m2[2]) / 2.0).max(0.0).sqrt()
+    }
+
+    /// Whether every number is one.
+    pub fn is_finite(&self) -> bool {
+        [self.x_m, self.y_m].into_iter().chain(self.cov_m2).all(f64::is_finite)
+    }
+}
+
+/// What became of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// It was used.
+    Used,
+    /// It is too far from what was expected.
+    Outlier,
+    /// It was far from what was expected, but so were the ones before, at the same place: the filter began anew there.
+    BeganAnew,
+}
+
+/// Constant velocity with random acceleration; gates what cannot be.
+#[derive(Debug, Clone)]
+pub struct PlaneFilter {
+    /// Metres a second squared, over a second.
+    acceleration: f64,
+    state: Option<State>,
+    /// Measurements in a row that were refused though each was near the one before, and the last one.
+    refused: (u32, Option<(f64, Estimate)>),
+}
+
+#[derive(Debug, Clone, Copy)]
+struct State {
+    at_s: f64,
+    /// x, y, metres.
+    place: [f64; 2],
+    /// Metres a second.
+    velocity: [f64; 2],
+    /// Covariance of one axis: place, place-velocity, velocity; both axes have the noise of the rounder measurement.
+    p: [[f64; 3]; 2],
+}
+
+impl PlaneFilter {
+    /// Mahalanobis distance squared, two degrees of freedom, that one of a thousand good measurements exceeds.
+    pub const GATE: f64 = 13.8;
+    /// So many refused measurements that agree with each other are believed.
+    const AGREEING: u32 = 4;
+    /// Standard deviation of the speed at first, m/s.
+    const FIRST_SPEED: f64 = 1.0;
+    /// Longer without a measurement, and the filter begins anew, s.
+    const FORGOTTEN_S: f64 = 600.0;
+
+    /// A filter of something that speeds up or turns by about `acceleration` m/s2 over a second.
+    pub fn new(acceleration: f64) -> Self {
+        Self { acceleration, state: None, refused: (0, None) }
+    }
+
+    /// Where it is at `at_s`.
+    pub fn predict(&self, at_s: f64) -> Option<Estimate> {
+        let s = self.state?.moved(at_s, self.acceleration);
+        Some(Estimate { x_m: s.place[0], y_m: s.place[1], cov_m2: [s.p[0][0], 0.0, s.p[1][0]] })
+    }
+
+    /// East and north, metres a second.
+    pub fn velocity(&self) -> Option<(f64, f64)> {
+        self.state.map(|s| (s.velocity[0], s.velocity[1]))
+    }
+
+    /// Takes a measurement of `at_s`; one that is older than the last counts as of the last, with what it may have moved.
+    pub fn update(&mut self, seen: &Estimate, at_s: f64) -> Verdict {
+        let state = self.state.filter(|s| at_s - s.at_s < Self::FORGOTTEN_S);
+        let Some(state) = state else {
+            self.begin(seen, at_s);
+            return Verdict::Used;
+        };
+        let late_s = (state.at_s - at_s).max(0.0);
+        // Back along its own way: what it may have turned in the meantime adds to the uncertainty.
+        let seen_now = Estimate {
+            x_m: seen.x_m + state.velocity[0] * late_s,
+            y_m: seen.y_m + state.velocity[1] * late_s,
+            cov_m2: {
+                let turned = (self.acceleration * late_s * late_s / 2.0).powi(2);
+                [seen.cov_m2[0] + turned, seen.cov_m2[1], seen.cov_m2[2] + turned]
+            },
+        };
+        let mut moved = state.moved(at_s.max(state.at_s), self.acceleration);
+        if moved.distance2(&seen_now) > Self::GATE {
+            return self.refuse(seen, at_s);
+        }
+        self.refused = (0, None);
+        moved.correct(&seen_now);
+        self.state = Some(moved);
+        Verdict::Used
+    }
+
+    fn refuse(&mut self, seen: &Estimate, at_s: f64) -> Verdict {
+        let agrees = self.refused.1.is_some_and(|(before_s, before)| {
+            let reach = 3.0 * (before.sigma_m().hypot(seen.sigma_m())) + 2.0 * (at_s - before_s).abs();
+            (seen.x_m - before.x_m).hypot(seen.y_m - before.y_m) < reach
+        });
+        let row = if agrees { self.refused.0 + 1 } else { 1 };
+        if row < Self::AGREEING {
+            self.refused = (row, Some((at_s, *seen)));
+            return Verdict::Outlier;
+        }
+        self.begin(seen, at_s);
+        Verdict::BeganAnew
+    }
+
+    fn begin(&mut self, seen: &Estimate, at_s: f64) {
+        let axis = |variance: f64| [variance, 0.0, Self::FIRST_SPEED.powi(2)];
+        let p = [axis(seen.cov_m2[0]), axis(seen.cov_m2[2])];
+        self.state = Some(State { at_s, place: [seen.x_m, seen.y_m], velocity: [0.0; 2], p });
+        self.refused = (0, None);
+    }
+}
+
+impl State {
+    fn moved(mut self, at_s: f64, acceleration: f64) -> Self {
+        let dt = (at_s - self.at_s).clamp(0.0, 3600.0);
+        let q = acceleration * acceleration;
+        for axis in 0..2 {
+            self.place[axis] += self.velocity[axis] * dt;
+            let [place, both, velocity] = self.p[axis];
+            self.p[axis] = [
+                place + 2.0 * dt * both + dt * dt * velocity + q * dt.powi(3) / 3.0,
+                both + dt * velocity + q * dt * dt / 2.0,
+                velocity + q * dt,
+            ];
+        }
+        self.at_s = self.at_s.max(at_s);
+        self
+    }
+
+    /// Mahalanobis distance squared.
+    fn distance2(&self, seen: &Estimate) -> f64 {
+        let (dx, dy) = (seen.x_m - self.place[0], seen.y_m - self.place[1]);
+        let [xx, xy, yy] = seen.cov_m2;
+        let (xx, yy) = (xx + self.p[0][0], yy + self.p[1][0]);
+        let determinant = (xx * yy - xy * xy).max(1e-9);
+        (dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx) / determinant
+    }
+
+    fn correct(&mut self, seen: &Estimate) {
+        for (axis, (value, variance)) in
+            [(seen.x_m, seen.cov_m2[0]), (seen.y_m, seen.cov_m2[2])].into_iter().enumerate()
+        {
+            let [place, both, velocity] = self.p[axis];
+            let s = (place + variance).max(1e-9);
+            let (k, kv) = (place / s, both / s);
+            let off = value - self.place[axis];
+            self.place[axis] += k * off;
+            self.velocity[axis] += kv * off;
+            self.p[axis] = [place * (1.0 - k), both * (1.0 - k), velocity - kv * both];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim_channel::Stream;
+
+    #[test]
+    fn a_steady_way_becomes_known_better_than_it_is_measured() {
+        let mut dice = Stream::new(1, &[]);
+        let mut filter = PlaneFilter::new(0.02);
+        let mut worst: f64 = 0.0;
+        for s in 0..200 {
+            let t = f64::from(s);
+            let seen = Estimate::round(t + 3.0 * dice.normal(), 2.0 * t + 3.0 * dice.normal(), 3.0);
+            assert_ne!(filter.update(&seen, t), Verdict::BeganAnew);
+            if s > 50 {
+                let e = filter.predict(t).unwrap();
+                worst = worst.max((e.x_m - t).hypot(e.y_m - 2.0 * t));
+            }
+        }
+        assert!(worst < 3.0, "{worst}");
+        let (vx, vy) = filter.velocity().unwrap();
+        assert!((vx - 1.0).abs() < 0.2 && (vy - 2.0).abs() < 0.2, "{vx} {vy}");
+    }
+
+    #[test]
+    fn an_echo_is_refused_and_a_place_that_is_told_again_and_again_is_believed() {
+        let mut filter = PlaneFilter::new(0.02);
+        for s in 0..20 {
+            filter.update(&Estimate::round(0.0, 0.0, 1.0), f64::from(s));
+        }
+        assert_eq!(filter.update(&Estimate::round(40.0, 0.0, 1.0), 20.0), Verdict::Outlier);
+        assert_eq!(filter.update(&Estimate::round(-300.0, 0.0, 1.0), 21.0), Verdict::Outlier);
+        assert_eq!(filter.update(&Estimate::round(0.5, 0.0, 1.0), 22.0), Verdict::Used);
+        let verdicts: Vec<_> =
+            (23..28).map(|s| filter.update(&Estimate::round(40.0, 0.0, 1.0), f64::from(s))).collect();
+        assert_eq!(verdicts[3], Verdict::BeganAnew, "{verdicts:?}");
+        assert!((filter.predict(28.0).unwrap().x_m - 40.0).abs() < 1.0);
+    }
+}

@@ -1,0 +1,59 @@
+//! Staying above the vehicle.
+
+/// Where the surface vehicle goes so that it stays near above the one below.
+///
+/// It keeps a stand-off, for straight above the angles of a USBL head tell the least and noise of the ship is loudest,
+/// and moves only when the distance has left a dead band, so that its engines are silent most of the time.
+#[derive(Debug, Clone)]
+pub struct Follow {
+    stand_off_m: f64,
+    dead_band_m: f64,
+    ordered: Option<(f64, f64)>,
+}
+
+impl Follow {
+    /// Seconds that the vehicle's way is thought on.
+    const AHEAD_S: f64 = 20.0;
+
+    /// Keeps `stand_off_m` from above the vehicle, give or take `dead_band_m`.
+    pub fn new(stand_off_m: f64, dead_band_m: f64) -> Self {
+        Self { stand_off_m, dead_band_m, ordered: None }
+    }
+
+    /// Where the surface vehicle is to go, if that is elsewhere than it was last told.
+    pub fn next(&mut self, own: (f64, f64), vehicle: (f64, f64), velocity: (f64, f64)) -> Option<(f64, f64)> {
+        let below = (vehicle.0 + velocity.0 * Self::AHEAD_S, vehicle.1 + velocity.1 * Self::AHEAD_S);
+        let off = |at: (f64, f64)| ((at.0 - below.0).hypot(at.1 - below.1) - self.stand_off_m).abs();
+        if off(self.ordered.unwrap_or(own)) <= self.dead_band_m {
+            return None;
+        }
+        let (dx, dy) = (own.0 - below.0, own.1 - below.1);
+        let distance = dx.hypot(dy);
+        // From straight above any direction is as good; north is one.
+        let (ux, uy) = if distance > 0.1 { (dx / distance, dy / distance) } else { (0.0, 1.0) };
+        let target = (below.0 + ux * self.stand_off_m, below.1 + uy * self.stand_off_m);
+        self.ordered = Some(target);
+        Some(target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_stays_while_the_vehicle_is_near_and_goes_to_the_stand_off_when_it_is_not() {
+        let mut follow = Follow::new(20.0, 10.0);
+        assert_eq!(follow.next((25.0, 0.0), (0.0, 0.0), (0.0, 0.0)), None, "within the dead band");
+        assert_eq!(follow.next((100.0, 0.0), (0.0, 0.0), (0.0, 0.0)), Some((20.0, 0.0)));
+        assert_eq!(follow.next((90.0, 0.0), (1.0, 0.0), (0.0, 0.0)), None, "it is on its way there");
+        assert_eq!(follow.next((20.0, 0.0), (-40.0, 0.0), (0.0, 0.0)), Some((-20.0, 0.0)));
+        assert_eq!(follow.next((-20.0, 0.0), (-20.0, 0.0), (0.0, 0.0)), Some((-20.0, 20.0)), "too near");
+    }
+
+    #[test]
+    fn it_goes_where_the_vehicle_is_going() {
+        let mut follow = Follow::new(10.0, 5.0);
+        assert_eq!(follow.next((0.0, 0.0), (100.0, 0.0), (1.0, 0.0)), Some((110.0, 0.0)));
+    }
+}

@@ -1,0 +1,131 @@
+//! Places on the Earth, and the plane that touches it where the mission is.
+
+use std::f64::consts::PI;
+
+/// Latitude and longitude on the WGS-84 ellipsoid, at its surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LatLon {
+    /// Degrees north, -90..=90.
+    pub lat_deg: f64,
+    /// Degrees east, -180..=180.
+    pub lon_deg: f64,
+}
+
+impl LatLon {
+    /// A place; `None` if there is none of these coordinates.
+    pub fn new(lat_deg: f64, lon_deg: f64) -> Option<Self> {
+        let is_place = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 180.0;
+        is_place.then_some(Self { lat_deg, lon_deg })
+    }
+}
+
+/// The world frame of a mission: the plane that touches the ellipsoid at its origin, x east and y north in metres.
+///
+/// Heights are left out: the sea is at height 0 and a mission within some kilometres, where the plane departs from the
+/// ellipsoid by metres in height and by millimetres in place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TangentPlane {
+    origin: LatLon,
+    /// Of the origin, metres from the Earth's middle.
+    ecef: [f64; 3],
+}
+
+/// Semi-major axis, metres (NIMA TR8350.2).
+const A: f64 = 6_378_137.0;
+/// Flattening.
+const F: f64 = 1.0 / 298.257_223_563;
+/// First eccentricity squared.
+const E2: f64 = F * (2.0 - F);
+
+impl TangentPlane {
+    /// The plane at `origin`.
+    pub fn new(origin: LatLon) -> Self {
+        Self { origin, ecef: to_ecef(origin) }
+    }
+
+    /// Where it touches the Earth.
+    pub fn origin(&self) -> LatLon {
+        self.origin
+    }
+
+    /// East and north of the origin, metres.
+    pub fn to_plane(&self, place: LatLon) -> (f64, f64) {
+        let to = to_ecef(place);
+        let [dx, dy, dz] = [to[0] - self.ecef[0], to[1] - self.ecef[1], to[2] - self.ecef[2]];
+        let (sin_lat, cos_lat) = self.origin.lat_deg.to_radians().sin_cos();
+        let (sin_lon, cos_lon) = self.origin.lon_deg.to_radians().sin_cos();
+        let east = cos_lon * dy - sin_lon * dx;
+        let north = cos_lat * dz - sin_lat * (cos_lon * dx + sin_lon * dy);
+        (east, north)
+    }
+
+    /// The place at sea level that lies `x_m` east and `y_m` north of the origin; right to a millimetre within 50 km.
+    pub fn to_place(&self, x_m: f64, y_m: f64) -> LatLon {
+        let mut place = self.origin;
+        // Newton's method: what the radii of curvature leave over shrinks by far more than a hundred each time.
+        for _ in 0..5 {
+            let (x, y) = self.to_plane(place);
+            let (meridian, parallel) = radii(place.lat_deg);
+            place.lat_deg += ((y_m - y) / meridian).to_degrees();
+            place.lon_deg += ((x_m - x) / parallel.max(1.0)).to_degrees();
+        }
+        place.lat_deg = place.lat_deg.clamp(-90.0, 90.0);
+        place.lon_deg = (place.lon_deg + 180.0).rem_euclid(360.0) - 180.0;
+        place
+    }
+}
+
+/// Earth-centred coordinates of a place at height 0, metres.
+fn to_ecef(place: LatLon) -> [f64; 3] {
+    let (sin_lat, cos_lat) = place.lat_deg.to_radians().sin_cos();
+    let (sin_lon, cos_lon) = place.lon_deg.to_radians().sin_cos();
+    let n = A / (1.0 - E2 * sin_lat * sin_lat).sqrt();
+    [n * cos_lat * cos_lon, n * cos_lat * sin_lon, n * (1.0 - E2) * sin_lat]
+}
+
+/// Metres a radian of latitude and of longitude.
+fn radii(lat_deg: f64) -> (f64, f64) {
+    let (sin, cos) = lat_deg.to_radians().sin_cos();
+    let w2 = 1.0 - E2 * sin * sin;
+    (A * (1.0 - E2) / w2.powf(1.5), A / w2.sqrt() * cos)
+}
+
+/// The angle in -pi..=pi that is the same direction.
+pub fn wrap_rad(angle: f64) -> f64 {
+    (angle + PI).rem_euclid(2.0 * PI) - PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn a_minute_of_latitude_is_about_a_sea_mile() {
+        let plane = TangentPlane::new(LatLon::new(29.5, 34.92).unwrap());
+        let (x, y) = plane.to_plane(LatLon::new(29.5 + 1.0 / 60.0, 34.92).unwrap());
+        assert!(x.abs() < 1e-6 && (y - 1847.4).abs() < 1.0, "{x} {y}");
+        // 1" of longitude at the equator is the length of the equator, 40 075 016.686 m, over 1 296 000.
+        let equator = TangentPlane::new(LatLon::new(0.0, 0.0).unwrap());
+        let (x, _) = equator.to_plane(LatLon::new(0.0, 1.0 / 3600.0).unwrap());
+        assert!((x - 40_075_016.686 / 1_296_000.0).abs() < 1e-4, "{x}");
+    }
+
+    #[test]
+    fn there_is_no_place_beyond_the_poles_or_of_no_number() {
+        assert_eq!(LatLon::new(90.1, 0.0), None);
+        assert_eq!(LatLon::new(0.0, f64::NAN), None);
+        assert_eq!(LatLon::new(f64::INFINITY, 0.0), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_place_comes_back_through_the_plane(
+            lat in -80.0..80.0f64, lon in -180.0..180.0f64, x in -20_000.0..20_000.0f64, y in -20_000.0..20_000.0f64,
+        ) {
+            let plane = TangentPlane::new(LatLon::new(lat, lon).unwrap());
+            let (back_x, back_y) = plane.to_plane(plane.to_place(x, y));
+            prop_assert!((back_x - x).abs() < 1e-3 && (back_y - y).abs() < 1e-3, "{} {}", back_x - x, back_y - y);
+        }
+    }
+}

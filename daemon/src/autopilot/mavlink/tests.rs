@@ -1,0 +1,182 @@
+//! The state machine against an autopilot that is made of bytes.
+
+use super::*;
+use proptest::prelude::*;
+
+fn at(s: f64) -> Instant {
+    Instant::from_secs_f64(10.0 + s)
+}
+
+fn pilot(arms: bool) -> Mavlink {
+    Mavlink::new(MavlinkConfig { system: 1, arms, silence: Duration::from_secs(5) }, at(0.0))
+}
+
+fn frame(system: u8, id: u32, payload: Vec<u8>) -> Vec<u8> {
+    encode(&Frame { system, component: 1, id, payload }, 0, heard_extra(id).unwrap())
+}
+
+fn heartbeat(mode: u32, armed: bool) -> Vec<u8> {
+    let base_mode = if armed { 0x81 } else { 1 };
+    frame(1, 0, [&mode.to_le_bytes()[..], &[12, 3, base_mode, 4, 3]].concat())
+}
+
+fn local(ms: u32, place: [f32; 3], velocity: [f32; 3]) -> Vec<u8> {
+    let floats = place.into_iter().chain(velocity).flat_map(f32::to_le_bytes);
+    frame(1, 32, ms.to_le_bytes().into_iter().chain(floats).collect())
+}
+
+/// Everything that was sent, as message number and payload.
+fn sent(pilot: &mut Mavlink) -> Vec<(u32, Vec<u8>)> {
+    let mut deframer = Deframer::default();
+    let mut found = Vec::new();
+    let extra = |id| [(0, 50), (76, 152), (84, 143), (86, 5), (232, 151)].into_iter().find(|e| e.0 == id).map(|e| e.1);
+    while let Some(bytes) = pilot.poll_output() {
+        deframer.push(&bytes, extra, |f| found.push((f.id, f.payload)));
+    }
+    assert_eq!(deframer.refused(), frame::Refused::default());
+    found
+}
+
+fn count(sent: &[(u32, Vec<u8>)], id: u32) -> usize {
+    sent.iter().filter(|(i, _)| *i == id).count()
+}
+
+const GOAL: Option<Goal> = Some(Goal { east_m: 10.0, north_m: 0.0, depth_m: Some(5.0), place: None });
+
+#[test]
+fn it_beats_asks_for_streams_and_arms_only_where_it_may() {
+    for arms in [false, true] {
+        let mut pilot = pilot(arms);
+        pilot.handle_timeout(at(0.0));
+        assert_eq!(sent(&mut pilot).len(), 1, "a heartbeat, and nothing to a stranger");
+        pilot.set_goal(GOAL, at(0.5));
+        pilot.handle_bytes(&heartbeat(19, false), at(0.5));
+        pilot.handle_bytes(&local(500, [0.0; 3], [0.0; 3]), at(0.5));
+        pilot.handle_timeout(at(1.0));
+        let said = sent(&mut pilot);
+        let commands: Vec<u16> =
+            said.iter().filter(|(id, _)| *id == 76).map(|(_, p)| u16::from_le_bytes([p[28], p[29]])).collect();
+        let expected: &[u16] = if arms { &[511, 511, 511, SET_MODE, ARM] } else { &[511, 511, 511] };
+        assert_eq!(commands, expected);
+        assert_eq!((pilot.health(at(1.0)), count(&said, 84)), (Health::NotInCommand, 0));
+    }
+}
+
+#[test]
+fn a_target_is_said_anew_each_second_as_way_from_where_it_is() {
+    let mut pilot = pilot(true);
+    pilot.set_goal(GOAL, at(0.0));
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    let mut targets = Vec::new();
+    for s in 0..4 {
+        // Under way to the east at 1 m/s; at 2 s the autopilot takes a fix in and its frame jumps by 100 m.
+        let jump = if s >= 2 { 100.0 } else { 0.0 };
+        pilot.handle_bytes(&heartbeat(4, true), at(f64::from(s)));
+        pilot.handle_bytes(&local(1000 * s as u32, [jump, s as f32 + jump, 4.0], [0.0, 1.0, 0.0]), at(f64::from(s)));
+        pilot.handle_timeout(at(f64::from(s)));
+        targets.extend(
+            sent(&mut pilot)
+                .into_iter()
+                .filter(|(id, _)| *id == 84)
+                .map(|(_, p)| [4, 8, 12].map(|i| f32::from_le_bytes(p[i..i + 4].try_into().unwrap()))),
+        );
+    }
+    assert_eq!(targets, [[0.0, 10.0, 5.0], [0.0, 10.0, 5.0], [100.0, 110.0, 5.0], [100.0, 110.0, 5.0]]);
+    let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
+    assert_eq!(steps.len(), 3);
+    assert!(steps.iter().all(|s| s.dx_m == 1.0 && s.dy_m == 0.0 && s.depth_m == 4.0), "{steps:?}");
+}
+
+#[test]
+fn a_pilot_who_takes_over_is_obeyed() {
+    let mut pilot = pilot(true);
+    pilot.set_goal(GOAL, at(0.0));
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    pilot.handle_bytes(&heartbeat(19, true), at(1.0));
+    pilot.handle_bytes(&local(0, [0.0; 3], [0.0; 3]), at(1.0));
+    sent(&mut pilot);
+    pilot.handle_timeout(at(1.0));
+    let said = sent(&mut pilot);
+    assert_eq!((count(&said, 84), count(&said, 76)), (0, 0), "{said:?}");
+    assert!(std::iter::from_fn(|| pilot.poll_note()).any(|n| n.contains("taken out of guided mode")));
+}
+
+#[test]
+fn silence_is_counted_once_and_said_and_it_goes_on_when_the_autopilot_is_back() {
+    let mut pilot = pilot(false);
+    assert_eq!(pilot.health(at(0.0)), Health::Awaited);
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    assert_eq!(pilot.health(at(4.0)), Health::InCommand);
+    for s in 5..9 {
+        pilot.handle_timeout(at(f64::from(s)));
+    }
+    assert_eq!((pilot.health(at(9.0)), pilot.counters()["silences"]), (Health::Silent, 1));
+    pilot.handle_bytes(&heartbeat(4, true), at(9.0));
+    assert_eq!(pilot.health(at(9.0)), Health::InCommand);
+    let notes: Vec<String> = std::iter::from_fn(|| pilot.poll_note()).collect();
+    assert_eq!(notes, ["the autopilot answers", "the autopilot does not answer any more", "the autopilot answers"]);
+}
+
+#[test]
+fn places_go_out_as_gps_input_and_move_on_with_the_vehicle() {
+    let mut pilot = pilot(false);
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    pilot.handle_bytes(&local(0, [0.0; 3], [10.0, 0.0, 0.0]), at(0.0));
+    pilot.handle_place(LatLon { lat_deg: 29.5, lon_deg: 34.92 }, 2.5, at(0.0));
+    pilot.handle_timeout(at(0.0));
+    pilot.handle_bytes(&local(1000, [10.0, 0.0, 0.0], [10.0, 0.0, 0.0]), at(1.0));
+    pilot.handle_timeout(at(1.0));
+    let gps: Vec<Vec<u8>> = sent(&mut pilot).into_iter().filter(|(id, _)| *id == 232).map(|(_, p)| p).collect();
+    let lat = |p: &[u8]| i32::from_le_bytes(p[12..16].try_into().unwrap());
+    assert_eq!(lat(&gps[0]), 295_000_000);
+    // 10 m to the north are 10 / 110 856 degrees there.
+    assert!((lat(&gps[1]) - 295_000_902).abs() < 5, "{}", lat(&gps[1]));
+    pilot.handle_timeout(at(20.0));
+    assert_eq!(count(&sent(&mut pilot), 232), 0, "a place is not passed on for ever");
+}
+
+#[test]
+fn an_autopilot_that_tells_only_where_on_the_earth_it_is_is_steered_there() {
+    let mut pilot = pilot(false);
+    pilot.set_goal(Some(Goal { east_m: 0.0, north_m: 100.0, depth_m: None, place: None }), at(0.0));
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    let global: Vec<u8> = [1000i32, 295_000_000, 349_200_000, 0, -3000].iter().flat_map(|v| v.to_le_bytes()).collect();
+    pilot.handle_bytes(&frame(1, 33, [&global[..], &[0, 0, 0, 0, 0, 0, 0xFF, 0xFF]].concat()), at(0.0));
+    pilot.handle_timeout(at(0.0));
+    let said = sent(&mut pilot);
+    let (_, target) = said.iter().find(|(id, _)| *id == 86).unwrap();
+    let lat = i32::from_le_bytes(target[4..8].try_into().unwrap());
+    let alt = f32::from_le_bytes(target[12..16].try_into().unwrap());
+    assert!((lat - 295_009_021).abs() < 20 && alt == -3.0, "{lat} {alt}");
+}
+
+#[test]
+fn frames_of_others_and_absurd_numbers_are_counted() {
+    let mut pilot = pilot(false);
+    pilot.handle_bytes(&frame(7, 0, vec![4, 0, 0, 0, 12, 3, 0x81, 4, 3]), at(0.0));
+    assert_eq!(pilot.health(at(0.0)), Health::Awaited);
+    pilot.handle_bytes(&local(0, [f32::NAN; 3], [0.0; 3]), at(0.0));
+    pilot.handle_bytes(&local(0, [0.0; 3], [1e9, 0.0, 0.0]), at(0.0));
+    pilot.handle_bytes(&local(1000, [0.0; 3], [1e9, 0.0, 0.0]), at(1.0));
+    assert_eq!(pilot.poll_step(), None);
+    let counters = pilot.counters();
+    assert_eq!((counters["other_systems"], counters["unreadable"], counters["absurd_velocities"]), (1, 1, 1));
+}
+
+proptest! {
+    #[test]
+    fn any_messages_are_taken(
+        messages in proptest::collection::vec((prop_oneof![Just(0u32), Just(30), Just(32), Just(33), Just(77), Just(253)],
+            proptest::collection::vec(any::<u8>(), 1..60)), 0..40),
+    ) {
+        let mut pilot = pilot(true);
+        pilot.set_goal(GOAL, at(0.0));
+        for (i, (id, payload)) in messages.into_iter().enumerate() {
+            pilot.handle_bytes(&frame(1, id, payload), at(i as f64));
+            pilot.handle_timeout(at(i as f64));
+            while let Some(step) = pilot.poll_step() {
+                prop_assert!(step.dx_m.is_finite() && step.dy_m.is_finite());
+            }
+        }
+    }
+}

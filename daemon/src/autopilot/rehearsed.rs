@@ -1,0 +1,82 @@
+//! A simulated vehicle as an autopilot.
+
+use super::{Autopilot, Counters, Goal, Health, Step};
+use crate::asv::position::LatLon;
+use crate::rehearsal::Motion;
+use scenecast_protocol::time::Instant;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Kinematics that are stepped twice a second of mission time.
+#[derive(Debug)]
+pub struct Rehearsed {
+    motion: Motion,
+    depth_m: f64,
+    next: Instant,
+    steps: VecDeque<Step>,
+}
+
+impl Rehearsed {
+    /// Seconds between two steps.
+    const STEP_S: f64 = 0.5;
+    /// Dives and rises so fast, m/s.
+    const DIVES_M_S: f64 = 0.3;
+
+    /// A vehicle that moves as `motion` does, at a depth.
+    pub fn new(motion: Motion, depth_m: f64, now: Instant) -> Self {
+        Self { motion, depth_m, next: now, steps: VecDeque::new() }
+    }
+}
+
+impl Autopilot for Rehearsed {
+    fn handle_open(&mut self, _now: Instant) {}
+
+    fn handle_bytes(&mut self, _bytes: &[u8], _now: Instant) {}
+
+    fn handle_timeout(&mut self, now: Instant) {
+        // A host that slept for long is caught up with a minute at most.
+        if now.since(self.next) > Duration::from_secs(60) {
+            self.next = now;
+        }
+        while now >= self.next {
+            self.next = self.next + Duration::from_secs_f64(Self::STEP_S);
+            let o = self.motion.step_on(Self::STEP_S);
+            let (dx_m, dy_m, heading_rad, depth_m) = (o.dx_m, o.dy_m, o.heading_rad, self.depth_m);
+            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m });
+        }
+    }
+
+    fn poll_timeout(&self) -> Instant {
+        self.next
+    }
+
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        None
+    }
+
+    fn poll_step(&mut self) -> Option<Step> {
+        self.steps.pop_front()
+    }
+
+    fn poll_note(&mut self) -> Option<String> {
+        None
+    }
+
+    fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
+        self.motion.set_way(goal.map(|g| (g.east_m, g.north_m)));
+        if let Some(depth) = goal.and_then(|g| g.depth_m) {
+            let most = Self::DIVES_M_S;
+            self.depth_m += (depth - self.depth_m).clamp(-most, most);
+        }
+    }
+
+    fn handle_place(&mut self, _place: LatLon, _sigma_m: f64, _now: Instant) {}
+
+    fn health(&self, _now: Instant) -> Health {
+        Health::InCommand
+    }
+
+    fn counters(&self) -> Counters {
+        Counters::new()
+    }
+}

@@ -1,0 +1,164 @@
+//! The Kalman filter of the vehicle's place and of what is wrong with its sensors.
+
+use super::odometer::Way;
+
+/// Numbers of the state: place (2, metres), log too short by (1, a metre), compass off by (1, radians), and what is not
+/// along the way, as by a current (2, metres a metre of way).
+const N: usize = 6;
+type Vector = [f64; N];
+
+/// An extended Kalman filter; the way is its clock, for a vehicle that stands does not drift.
+#[derive(Debug)]
+pub(super) struct Filter {
+    state: Vector,
+    p: [Vector; N],
+    drift: f64,
+}
+
+/// Where the vehicle must have been at the time of a fix, and how far off a fix may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Expected {
+    /// East and north in the world, metres.
+    pub(super) at: (f64, f64),
+    /// Covariance of the difference, square metres: xx, xy, yy.
+    cov_m2: [f64; 3],
+}
+
+impl Expected {
+    /// Mahalanobis distance squared of a difference.
+    pub(super) fn distance2(&self, (dx, dy): (f64, f64)) -> f64 {
+        let [xx, xy, yy] = self.cov_m2;
+        (dx * dx * yy - 2.0 * dx * dy * xy + dy * dy * xx) / (xx * yy - xy * xy).max(1e-12)
+    }
+}
+
+impl Filter {
+    /// Way after which a drift has become another, metres.
+    const MEMORY_M: f64 = 500.0;
+    /// Of the drift, what is random from metre to metre: standard deviation after a metre over the drift.
+    const RANDOM: f64 = 0.5;
+
+    /// At a place for certain; `drift` is the expected error a metre of way.
+    pub(super) fn new((x_m, y_m): (f64, f64), drift: f64) -> Self {
+        let mut p = [[0.0; N]; N];
+        for (i, row) in p.iter_mut().enumerate().skip(2) {
+            row[i] = drift * drift;
+        }
+        Self { state: [x_m, y_m, 0.0, 0.0, 0.0, 0.0], p, drift }
+    }
+
+    pub(super) fn position(&self) -> (f64, f64) {
+        (self.state[0], self.state[1])
+    }
+
+    pub(super) fn sigma_m(&self) -> f64 {
+        ((self.p[0][0] + self.p[1][1]) / 2.0).max(0.0).sqrt()
+    }
+
+    /// The place may be off by about so much more.
+    pub(super) fn doubt(&mut self, sigma_m: f64) {
+        self.p[0][0] += sigma_m * sigma_m;
+        self.p[1][1] += sigma_m * sigma_m;
+    }
+
+    /// The place is known to have moved by so much.
+    pub(super) fn shift(&mut self, dx_m: f64, dy_m: f64) {
+        self.state[0] += dx_m;
+        self.state[1] += dy_m;
+    }
+
+    /// What a stretch of way is, by what is known of the sensors.
+    fn corrected(&self, way: &Way) -> (f64, f64) {
+        let [_, _, scale, turn, cx, cy] = self.state;
+        let (sin, cos) = turn.sin_cos();
+        let (dx, dy) = (way.dx_m * (1.0 + scale), way.dy_m * (1.0 + scale));
+        (dx * cos - dy * sin + cx * way.length_m, dx * sin + dy * cos + cy * way.length_m)
+    }
+
+    /// Derivatives of the corrected way by the last four numbers of the state: of x and of y.
+    fn slopes(way: &Way) -> [[f64; 4]; 2] {
+        // Taken at no correction: the corrections are some percent, so these are right to some percent.
+        [[way.dx_m, -way.dy_m, way.length_m, 0.0], [way.dy_m, way.dx_m, 0.0, way.length_m]]
+    }
+
+    /// The sensors told a step; returns it corrected.
+    pub(super) fn handle_way(&mut self, dx_m: f64, dy_m: f64) -> (f64, f64) {
+        let way = Way { dx_m, dy_m, length_m: dx_m.hypot(dy_m) };
+        let (x, y) = self.corrected(&way);
+        self.shift(x, y);
+        // P = F P F' + Q, F being the identity with the slopes in its upper right.
+        let slopes = Self::slopes(&way);
+        for (row, slope) in slopes.iter().enumerate() {
+            for column in 0..N {
+                self.p[row][column] += (0..4).map(|k| slope[k] * self.p[k + 2][column]).sum::<f64>();
+            }
+        }
+        for (column, slope) in slopes.iter().enumerate() {
+            for row in 0..N {
+                self.p[row][column] += (0..4).map(|k| slope[k] * self.p[row][k + 2]).sum::<f64>();
+            }
+        }
+        let per_metre = self.drift * self.drift * way.length_m;
+        for i in 0..2 {
+            self.p[i][i] += Self::RANDOM * Self::RANDOM * per_metre;
+        }
+        for i in 2..N {
+            let goal = self.drift * self.drift;
+            // What is forgotten is never more than what there was to know.
+            self.p[i][i] = (self.p[i][i] + 2.0 * per_metre / Self::MEMORY_M).min(goal.max(self.p[i][i]));
+        }
+        (x, y)
+    }
+
+    /// What a fix measures, as sums of the state: for x and for y.
+    fn measures(since: &Way) -> [Vector; 2] {
+        let [x, y] = Self::slopes(since);
+        [[1.0, 0.0, -x[0], -x[1], -x[2], -x[3]], [0.0, 1.0, -y[0], -y[1], -y[2], -y[3]]]
+    }
+
+    fn times(&self, h: &Vector) -> Vector {
+        std::array::from_fn(|row| (0..N).map(|k| self.p[row][k] * h[k]).sum())
+    }
+
+    /// Where the vehicle was before the way `since`, and how far from it a fix of `sigma` metres may lie.
+    pub(super) fn expect(&self, since: &Way, sigma: f64) -> Expected {
+        let (back_x, back_y) = self.corrected(since);
+        let [hx, hy] = Self::measures(since);
+        let dot = |a: &Vector, b: &Vector| (0..N).map(|k| a[k] * b[k]).sum::<f64>();
+        let (px, py) = (self.times(&hx), self.times(&hy));
+        let noise = sigma * sigma + self.noise_since(since);
+        let cov_m2 = [dot(&hx, &px) + noise, dot(&hx, &py), dot(&hy, &py) + noise];
+        Expected { at: (self.state[0] - back_x, self.state[1] - back_y), cov_m2 }
+    }
+
+    /// What was random on the way since a fix was taken is noise of that fix.
+    fn noise_since(&self, since: &Way) -> f64 {
+        (Self::RANDOM * self.drift).powi(2) * since.length_m
+    }
+
+    /// Takes a fix of where the vehicle was before the way `since`.
+    pub(super) fn correct(&mut self, since: &Way, fix: (f64, f64), sigma: f64) {
+        let noise = sigma * sigma + self.noise_since(since);
+        let measures = Self::measures(since);
+        for (axis, h) in measures.iter().enumerate() {
+            let at = self.expect(since, sigma).at;
+            let off = if axis == 0 { fix.0 - at.0 } else { fix.1 - at.1 };
+            let ph = self.times(h);
+            let s = (0..N).map(|k| h[k] * ph[k]).sum::<f64>() + noise;
+            for row in 0..N {
+                self.state[row] += ph[row] / s * off;
+                for column in 0..N {
+                    self.p[row][column] -= ph[row] * ph[column] / s;
+                }
+            }
+        }
+        // Rounding must not make it certain beyond reason, nor lopsided.
+        for row in 0..N {
+            self.p[row][row] = self.p[row][row].max(0.0);
+            for column in 0..row {
+                let mean = (self.p[row][column] + self.p[column][row]) / 2.0;
+                (self.p[row][column], self.p[column][row]) = (mean, mean);
+            }
+        }
+    }
+}

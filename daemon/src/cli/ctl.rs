@@ -1,0 +1,166 @@
+//! `scenecast ctl`
+
+use crate::config;
+use crate::ctl::{self, BudgetChange, Client};
+use crate::problem::Problem;
+use clap::{Args, Subcommand};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+const EXAMPLES: &str = "\
+Example: scenecast ctl status
+         scenecast ctl map --out reef.png
+         scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120
+         scenecast ctl budget set 2000 --shares map=60,exemplar=10
+         scenecast ctl exemplar 3 --out label-3.webp
+         scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
+
+Exit codes: 0 done; 1 refused, not applied in time, or nobody answers; 2 wrong usage";
+
+/// Speak with a running surface: see what it has, give orders.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Ctl {
+    /// Where the surface serves its page
+    #[arg(long, global = true, value_name = "URL", default_value = "http://127.0.0.1:8460")]
+    url: String,
+    /// File of the surface's token, if it has one
+    #[arg(long, global = true, value_name = "FILE")]
+    token_file: Option<PathBuf>,
+    /// Print JSON for programs
+    #[arg(long, global = true)]
+    json: bool,
+    /// Address of the vehicle, if there are several
+    #[arg(long, global = true, value_name = "N")]
+    vehicle: Option<u8>,
+    /// Wait so long for an order to be applied; for an image 600 unless it is given
+    #[arg(long, global = true, value_name = "SECONDS", allow_negative_numbers = true)]
+    wait: Option<f64>,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Print how mission, link and vehicles are, with the age of each value.
+    #[command(after_help = "Example: scenecast ctl status")]
+    Status,
+    /// Write the operator's map; the name's end says the format: .png (with world file and projection), .geojson, .ply,
+    /// .csv, .json.
+    #[command(after_help = "Example: scenecast ctl map --out reef.png")]
+    Map {
+        /// File to write
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
+    /// Print the labels on the map.
+    #[command(after_help = "Example: scenecast ctl labels --json")]
+    Labels,
+    /// Print the weights that were sent last, or send others.
+    #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120")]
+    Utility {
+        #[command(subcommand)]
+        change: Option<UtilityCommand>,
+    },
+    /// Print the bit budget and the shares of the classes, or change them.
+    #[command(after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10")]
+    Budget {
+        #[command(subcommand)]
+        change: Option<BudgetCommand>,
+    },
+    /// Write the image of a label, which the vehicle is asked for if it is not here.
+    #[command(after_help = "Example: scenecast ctl exemplar 3 --out label-3.webp --wait 300")]
+    Exemplar {
+        /// Label
+        label: u8,
+        /// File to write, WebP
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// Ask for a further image, although there is one
+        #[arg(long)]
+        again: bool,
+    },
+    /// Print changes as they come, until Ctrl-C.
+    #[command(after_help = "Example: scenecast ctl watch --json")]
+    Watch,
+}
+
+#[derive(Debug, Subcommand)]
+enum UtilityCommand {
+    /// Send weights; labels that are not named weigh 0.
+    #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2")]
+    Set {
+        /// Label and weight, -1 to 1
+        #[arg(value_name = "LABEL=WEIGHT", value_parser = label_weight)]
+        weights: Vec<(u8, f64)>,
+        /// Weight of unseen cells, -1 to 1
+        #[arg(long, value_name = "WEIGHT", value_parser = weight, allow_hyphen_values = true)]
+        exploration: Option<f64>,
+        /// Keep the weights that are not named as they were sent last
+        #[arg(long)]
+        keep: bool,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+enum BudgetCommand {
+    /// Change the budget of the surface and of all vehicles.
+    #[command(after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --wait 60")]
+    Set {
+        /// Bits on air a second, 10 to 10000000; left out: as it is
+        #[arg(value_name = "BIT/S", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
+        bits_per_s: Option<u32>,
+        /// Least shares in percent by class, together at most 100; those that are not named stay
+        #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
+        shares: Vec<(String, u8)>,
+    },
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    let weight = text.parse().ok().filter(|w| (-1.0..=1.0).contains(w));
+    weight.ok_or_else(|| "it takes a number from -1 to 1".to_owned())
+}
+
+fn label_weight(text: &str) -> Result<(u8, f64), String> {
+    let (label, w) = text.split_once('=').ok_or("it takes LABEL=WEIGHT, as in 3=0.8")?;
+    let label = label.parse().ok().filter(|l| (1..=254).contains(l)).ok_or("a label is a number from 1 to 254")?;
+    Ok((label, weight(w)?))
+}
+
+fn class_percent(text: &str) -> Result<(String, u8), String> {
+    let (class, percent) = text.split_once('=').ok_or("it takes CLASS=PERCENT, as in map=60")?;
+    let percent = percent.parse().ok().filter(|p| *p <= 100).ok_or("a share is a number from 0 to 100")?;
+    Ok((class.trim().to_owned(), percent))
+}
+
+impl Ctl {
+    pub(super) fn run(self) -> Result<(), Problem> {
+        let wait = match self.wait {
+            Some(s) if !(0.0..=1e6).contains(&s) => {
+                return Err(Problem::Input(format!("--wait {s}: it takes 0 to 1000000 seconds")));
+            }
+            wait => wait.map(Duration::from_secs_f64),
+        };
+        let token = self.token_file.as_deref().map(config::read_token).transpose()?;
+        let client = Client::new(&self.url, token)?;
+        let ctl = ctl::Ctl { client, json: self.json, vehicle: self.vehicle, wait };
+        ctl::block_on(async move {
+            match self.command {
+                Command::Status => ctl.status().await,
+                Command::Map { out } => ctl.map(&out).await,
+                Command::Labels => ctl.labels().await,
+                Command::Utility { change: None } => ctl.utility().await,
+                Command::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
+                    ctl.set_utility(BTreeMap::from_iter(weights), exploration, keep).await
+                }
+                Command::Budget { change: None } => ctl.budget().await,
+                Command::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares }) } => {
+                    ctl.set_budget(BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares) }).await
+                }
+                Command::Exemplar { label, out, again } => ctl.exemplar(label, &out, again).await,
+                Command::Watch => ctl.watch().await,
+            }
+        })
+    }
+}

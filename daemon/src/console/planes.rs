@@ -1,0 +1,84 @@
+//! The planes of a map as they are told: what the surface knows of each cell beside its label.
+
+use super::export::Plane;
+use scenecast_protocol::link::PeerView;
+use scenecast_protocol::map::{PlaneKind, PlaneReplica, Rect, Replica};
+use scenecast_protocol::time::Instant;
+
+/// The planes of which anything was heard.
+pub(super) fn planes(view: &PeerView<'_>, bounds: Rect, now: Instant) -> Vec<Plane> {
+    PlaneKind::ALL.into_iter().filter_map(|kind| Some(plane(kind, view.plane(kind)?, bounds, now))).collect()
+}
+
+/// Seconds since each cell was heard of, 65535 = never.
+pub(super) fn ages(replica: &Replica, bounds: Rect, now: Instant) -> Vec<u16> {
+    let age = |at: Instant| now.since(at).as_secs().min(65_534) as u16;
+    bounds.cells().map(|cell| replica.heard(cell).map_or(u16::MAX, age)).collect()
+}
+
+/// A plane: the middle of each cell's level, 0 to 254 between those of the lowest and of the highest level, 255 not known.
+fn plane(kind: PlaneKind, replica: &PlaneReplica, bounds: Rect, now: Instant) -> Plane {
+    let (scale, shown) = (replica.scale(), replica.levels().shown());
+    let levels: Vec<u8> = bounds.cells().map(|cell| shown.get(cell)).collect();
+    let known = || levels.iter().copied().filter(|&level| level > 0);
+    // A depth is shown on the scale of what there is, a confidence on its own.
+    let (lowest, highest) = match kind {
+        PlaneKind::Confidence => (1, scale.levels()),
+        PlaneKind::Depth => (known().min().unwrap_or(1), known().max().unwrap_or(1)),
+    };
+    let middle = |level: u8| scale.bounds(level).map_or(0.0, |(low, high)| (low + high) / 2.0);
+    let shade = |level: u8| match u32::from(level).checked_sub(u32::from(lowest)).filter(|_| level > 0) {
+        Some(above) => ((above * 254) as f64 / f64::from((highest - lowest).max(1))).round() as u8,
+        None => 255,
+    };
+    let step = scale.bounds(1).map_or(0.0, |(low, high)| high - low);
+    Plane {
+        name: kind.name(),
+        unit: if kind == PlaneKind::Depth { "m" } else { "" },
+        min: rounded(middle(lowest)),
+        max: rounded(middle(highest)),
+        step: rounded(step),
+        shades: levels.iter().map(|&level| shade(level)).collect(),
+        age_s: ages(replica.levels(), bounds, now),
+    }
+}
+
+/// Without the noise of binary fractions.
+fn rounded(x: f64) -> f64 {
+    (x * 1000.0).round() / 1000.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::map::{Cell, PlaneChunk, PlaneScale, PlaneSource, StateSource};
+    use scenecast_protocol::map_codec::Codec;
+    use std::time::Duration;
+
+    /// The plane as the surface has it after everything was said at 10 s.
+    fn heard(scale: PlaneScale, cells: &[(Cell, f64)]) -> PlaneReplica {
+        let at = Instant::from_secs_f64(10.0);
+        let mut source = PlaneSource::new(scale, Codec::Png, Duration::ZERO);
+        source.set(cells.iter().copied(), at);
+        let (chunk, _) = source.next_chunk(1000, at).unwrap();
+        let Some(PlaneChunk::Patch(scale, patch)) = PlaneChunk::decode(&chunk) else { panic!("no patch") };
+        let mut replica = PlaneReplica::new(scale);
+        assert!(replica.apply(1, scale, patch, at));
+        replica
+    }
+
+    #[test]
+    fn a_plane_is_told_by_the_middles_of_its_levels_and_what_is_not_known_is_not_told() {
+        let bounds = Rect { x: 0, y: 0, width: 3, height: 1 };
+        let cells = [(Cell::new(0, 0), 20.1), (Cell::new(2, 0), 22.9)];
+        let depth = heard(PlaneScale::depth_around(20.0, 0.5), &cells);
+        let told = plane(PlaneKind::Depth, &depth, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((told.min, told.max, told.step), (20.25, 22.75, 0.5));
+        assert_eq!((told.shades.clone(), told.age_s.clone()), (vec![0, 255, 254], vec![3, u16::MAX, 3]));
+        assert_eq!([0, 1, 2].map(|at| told.value(at)), [Some(20.25), None, Some(22.75)]);
+        let confidence = heard(PlaneScale::Confidence, &[(Cell::new(0, 0), 0.6), (Cell::new(1, 0), 1.0)]);
+        let told = plane(PlaneKind::Confidence, &confidence, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((told.min, told.max, told.unit), (0.125, 0.875, ""));
+        assert_eq!(told.shades, [169, 254, 255]);
+    }
+}

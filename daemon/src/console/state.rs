@@ -1,0 +1,472 @@
+//! What the API tells: the answers as types, from which the OpenAPI document is made.
+
+use crate::asv::{FenceOrder, LimitsOrder};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Everything that the page shows but the maps and images themselves. Times end in `_s`: seconds of mission time.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct State {
+    /// Mission time now.
+    pub now_s: f64,
+    /// The mission.
+    pub mission: Mission,
+    /// The vehicles that the surface speaks with.
+    pub vehicles: Vec<Vehicle>,
+    /// The surface's GPS; null without one.
+    pub position: Option<Position>,
+    /// The link as a whole, of all vehicles.
+    pub link: Link,
+}
+
+/// The surface's GPS, and what became of what it and the USBL head told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Position {
+    /// Whether it knows where it is.
+    pub is_good: bool,
+    /// Metres east in the world.
+    pub x_m: Option<f64>,
+    /// Metres north in the world.
+    pub y_m: Option<f64>,
+    /// Standard deviation, metres.
+    pub sigma_m: Option<f64>,
+    /// Latitude of the last good position.
+    pub lat_deg: Option<f64>,
+    /// Longitude of the last good position.
+    pub lon_deg: Option<f64>,
+    /// When that was.
+    pub at_s: Option<f64>,
+    /// Clockwise from north.
+    pub heading_deg: Option<f64>,
+    /// What the GPS said and was not used, by reason: checksum, unreadable, overlong, no_position, frozen, jump.
+    pub refused: BTreeMap<String, u64>,
+    /// Positions beyond its way.
+    pub outliers: u64,
+    /// Fixes sent to vehicles.
+    pub fixes: u64,
+    /// What the USBL head saw and was not sent, by reason: unreadable, range_only, depth, no_heading, no_gps, outlier,
+    /// too_vague, too_old.
+    pub sightings_unused: BTreeMap<String, u64>,
+}
+
+/// By how much a vehicle's map must be moved to lie where it belongs in the world.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Placement {
+    /// Counts the moves.
+    pub version: u8,
+    /// Add to its places, metres east.
+    pub east_m: f64,
+    /// Add to its places, metres north.
+    pub north_m: f64,
+}
+
+/// The mission.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Mission {
+    /// Name for people.
+    pub name: String,
+    /// Another one each run.
+    pub id: String,
+    /// Mission seconds a second.
+    pub speed: f64,
+    /// Whether the survey is over.
+    pub ended: bool,
+    /// Where x = y = 0 lies on the Earth; null if nobody has said so.
+    pub origin: Option<Origin>,
+}
+
+/// A place on the Earth, WGS 84.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Origin {
+    /// Latitude, north positive.
+    pub lat_deg: f64,
+    /// Longitude, east positive.
+    pub lon_deg: f64,
+}
+
+/// A vehicle as the surface knows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Vehicle {
+    /// Acoustic address.
+    #[schemars(range(min = 1, max = 14))]
+    pub id: u8,
+    /// Name for people.
+    pub name: String,
+    /// When a frame was last taken.
+    pub heard_s: Option<f64>,
+    /// The longest pause between two frames that is usual, a duration: three times that is silence.
+    pub expected_interval_s: f64,
+    /// When the next turn is granted at the latest.
+    pub next_contact_s: Option<f64>,
+    /// What the vehicle said last; null before the first.
+    pub status: Option<Status>,
+    /// Time, metres east and north of each status, the last 500.
+    pub track: Vec<(f64, f64, f64)>,
+    /// The map, without its cells.
+    pub map: MapSummary,
+    /// The utility that was sent last, besides the weights of the labels.
+    pub utility: Utility,
+    /// The fence that was sent last; null before.
+    pub fence: Option<FenceOrder>,
+    /// The limits that were sent last; null before.
+    pub limits: Option<LimitsOrder>,
+    /// The planner that was sent last; null: as configured on the vehicle.
+    pub planner: Option<String>,
+    /// The labels on the map.
+    pub labels: Vec<Label>,
+    /// What was measured of the water to this vehicle.
+    pub link: VehicleLink,
+    /// Where the surface's modem found the vehicle last; null before the first.
+    pub usbl: Option<Usbl>,
+    /// What was ordered and how far that has come.
+    pub directive: Directive,
+}
+
+/// Where the surface's modem found a vehicle.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Usbl {
+    /// When.
+    pub at_s: f64,
+    /// Slant range; null if only directions are known.
+    pub range_m: Option<f64>,
+    /// Clockwise from north; null if only the range is good.
+    pub bearing_rad: Option<f64>,
+    /// Above the horizontal; null if only the range is good.
+    pub elevation_rad: Option<f64>,
+    /// Metres, of directions alone radians.
+    pub accuracy: f64,
+}
+
+/// What a vehicle said of itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Status {
+    /// When it came in.
+    pub at_s: f64,
+    /// Metres east.
+    pub x_m: f64,
+    /// Metres north.
+    pub y_m: f64,
+    /// Metres up: the depth with a minus.
+    pub z_m: f64,
+    /// Heading, clockwise from north.
+    pub heading_deg: f64,
+    /// Standard deviation of the position, metres.
+    pub sigma_m: f64,
+    /// What it does.
+    pub mode: Mode,
+    /// Whether its autopilot does not answer, so that nobody carries out what the mode says.
+    pub autopilot_silent: bool,
+    /// Why, if not because the survey asks for it: order, fence, distance, time, silence, depth or altitude, no way.
+    pub reason: Option<String>,
+    /// Mode and reason in words, as in "holding: fence".
+    pub doing: String,
+    /// Where it is going, metres east and north.
+    pub waypoint: Option<(f64, f64)>,
+    /// Cells that it has explored.
+    pub cells: u32,
+    /// Labels that it knows.
+    pub labels: u32,
+    /// Seconds since its last position fix.
+    pub fix_age_s: Option<f64>,
+    /// Its own budget in force, bits a second, with 12 bits of precision.
+    pub budget_bps: u32,
+    /// Frames that it refused for want of authenticity; 255 is that or more.
+    pub refused_frames: u32,
+}
+
+/// What a vehicle does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// It surveys.
+    Survey,
+    /// It stays.
+    Hold,
+    /// It returns.
+    Return,
+    /// It surfaces.
+    Surface,
+    /// It has aborted.
+    Abort,
+    /// Its survey is over.
+    Done,
+}
+
+/// A map without its cells.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct MapSummary {
+    /// Counts up whenever a label or a plane changes.
+    pub version: u64,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Column of the south-west cell; its west edge is at `x0 * cell_m` metres east.
+    pub x0: i32,
+    /// Row of the south-west cell.
+    pub y0: i32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Cells with a label.
+    pub explored_cells: u32,
+    /// When the vehicle last confirmed or changed the map.
+    pub updated_s: Option<f64>,
+    /// Counts up when labels begin to mean something else.
+    pub epoch: u8,
+    /// Where it lies in the world; null while no fix has moved it.
+    pub placement: Option<Placement>,
+}
+
+/// The utility beside the weights.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Utility {
+    /// Weight of unseen cells, -1 to 1.
+    pub exploration: f64,
+    /// Weight of cells that the scene model explains badly, -1 to 1.
+    pub curiosity: f64,
+}
+
+/// A label on the map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Label {
+    /// Label id.
+    #[schemars(range(min = 1, max = 254))]
+    pub id: u8,
+    /// Cells that have it.
+    pub cells: u32,
+    /// Their area, square metres.
+    pub area_m2: f64,
+    /// Weight that was sent last, -1 to 1.
+    pub weight: f64,
+    /// The image of it.
+    pub exemplar: Exemplar,
+}
+
+/// How far the image of a label has come.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Exemplar {
+    /// How far.
+    pub state: ExemplarState,
+    /// 0 to 1.
+    pub progress: f64,
+    /// Size of the file, once it is known.
+    pub bytes: Option<usize>,
+    /// Where the image is, once it is here.
+    pub url: Option<String>,
+    /// When this last changed.
+    pub at_s: Option<f64>,
+}
+
+/// How far an image has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExemplarState {
+    /// Nobody has asked.
+    None,
+    /// The request waits for its turn.
+    Queued,
+    /// The request is under way.
+    OnAir,
+    /// The image is coming.
+    Coming,
+    /// The image is here.
+    Here,
+    /// The vehicle refused the request.
+    Refused,
+}
+
+/// What was measured of the water to one vehicle lately.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleLink {
+    /// From the vehicle.
+    pub up: Water,
+    /// To the vehicle.
+    pub down: Water,
+    /// Two-way travel time, a duration.
+    pub round_trip_s: Option<f64>,
+    /// One-way travel time, a duration.
+    pub one_way_s: Option<f64>,
+    /// The vehicle's clock minus the surface's.
+    pub clock_ahead_s: Option<f64>,
+    /// Frames from it that the surface dropped, by reason: truncated, version, not_for_us, checksum, malformed,
+    /// old_session, duplicate, late, no_base, stranger, unauthenticated (no proof of the key), keyed (under a key, and
+    /// here is none).
+    pub dropped: BTreeMap<String, u64>,
+}
+
+/// One direction of the water.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Water {
+    /// Share of the last 64 frames that was lost, 0 to 1.
+    pub loss: f64,
+    /// Useful bits a second, over a minute.
+    pub goodput_bps: f64,
+}
+
+/// What was ordered.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Directive {
+    /// The newest version of each slot that was issued.
+    pub slots: Vec<Slot>,
+}
+
+/// A slot of the directive.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Slot {
+    /// Name: utility, requests, constraints, fix, budget and so on.
+    pub slot: String,
+    /// Counts up with each order.
+    pub version: u16,
+    /// How far it has come.
+    pub state: LifeLine,
+    /// Why the vehicle refused it.
+    pub reason: Option<String>,
+    /// When it was ordered.
+    pub issued_s: f64,
+    /// When `state` last changed.
+    pub changed_s: f64,
+}
+
+/// How far an order has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LifeLine {
+    /// It waits for its turn on the link.
+    Queued,
+    /// It was sent.
+    OnAir,
+    /// The vehicle has it.
+    Heard,
+    /// The vehicle says that it is in force.
+    Applied,
+    /// The vehicle refused it.
+    Refused,
+}
+
+/// The link as a whole.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Link {
+    /// Bits on air a second that the surface may send.
+    pub budget_bps: u32,
+    /// Window of the budget, a duration.
+    pub budget_window_s: f64,
+    /// Least shares of the classes in percent.
+    pub shares: BTreeMap<String, u8>,
+    /// Frames of no known vehicle, or unreadable.
+    pub strangers: u64,
+    /// From the vehicles, as the surface heard it.
+    pub up: Direction,
+    /// To the vehicles, as the surface sent it.
+    pub down: Direction,
+    /// Two-way travel time to the first vehicle that has one, a duration.
+    pub round_trip_s: Option<f64>,
+    /// Bits that wait; null where nobody knows.
+    pub backlog_bits: Option<u64>,
+    /// Rates on air, every 5 s, the last 20 minutes.
+    pub history: Vec<Rates>,
+}
+
+/// One direction of the link, since the surface began.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct Direction {
+    /// Bits on air a second, over a minute.
+    pub bps_1min: f64,
+    /// Most bits on air a second over any window of the budget.
+    pub worst_window_bps: f64,
+    /// Share of frames that was lost, 0 to 1.
+    pub loss: f64,
+    /// Frames.
+    pub frames: u64,
+    /// Frames that were lost.
+    pub lost: u64,
+    /// Useful bits a second.
+    pub goodput_bps: f64,
+    /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, overhead.
+    pub bytes_by_class: BTreeMap<String, u64>,
+}
+
+/// Rates on air.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rates {
+    /// When.
+    pub t_s: u64,
+    /// From the vehicles, bits a second.
+    pub up_bps: f64,
+    /// To the vehicles, bits a second.
+    pub down_bps: f64,
+}
+
+/// A map with its cells, row by row from the south-west.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Map {
+    /// Counts up whenever a label or a plane changes.
+    pub version: u64,
+    /// When the ages were true.
+    pub at_s: f64,
+    /// Column of the south-west cell; its west edge is at `x0 * cell_m` metres east.
+    pub x0: i32,
+    /// Row of the south-west cell.
+    pub y0: i32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+    /// Base64: one byte a cell, 0 = unexplored.
+    pub labels: String,
+    /// Base64: two bytes a cell, little-endian: seconds since the cell was heard of, 65535 = never.
+    pub age_s: String,
+    /// What else was heard of the cells.
+    pub planes: Vec<Plane>,
+}
+
+/// A quantity of each cell that a vehicle tells of where labels leave room. It may be older than the label of its cell, and
+/// then speaks of an earlier one; where a cell has no label it does not count.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Plane {
+    /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor.
+    pub name: String,
+    /// `m`, or empty.
+    pub unit: String,
+    /// The middle of the lowest level.
+    pub min: f64,
+    /// The middle of the highest level.
+    pub max: f64,
+    /// What a level spans: the true value lies half of it at most from the one in `data`, and a fifth of it more where a
+    /// cell stays in its level at the edge.
+    pub step: f64,
+    /// Base64: one byte a cell in the order of `labels`, 0 to 254 for `min` to `max`, in between linear; 255 = not known.
+    pub data: String,
+    /// Base64, as of the labels: seconds since the level of the cell was heard of.
+    pub age_s: String,
+}
+
+/// A map, or a plane of it, has changed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct MapEvent {
+    /// Address of the vehicle.
+    pub vehicle: u8,
+    /// Version of its map.
+    pub version: u64,
+}
+
+/// An order was taken and waits for its turn on the link; what becomes of it is in `directive.slots` of the state.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Accepted {
+    /// The slot of the directive that carries it.
+    pub slot: String,
+    /// Its version, if it goes to one vehicle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub version: Option<u16>,
+    /// Its version at each vehicle that it goes to, by address.
+    pub versions: BTreeMap<u8, u16>,
+}
+
+/// Why not.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Refusal {
+    /// One line for people.
+    pub error: String,
+}

@@ -1,0 +1,102 @@
+//! Layout of the status, and what is refused.
+
+use super::*;
+use proptest::prelude::*;
+
+#[test]
+fn golden_bytes_of_a_status() {
+    let mut slots = [SlotReport::default(); SLOTS];
+    slots[0] = SlotReport { version_low: 7, state: SlotState::Applied };
+    slots[5] = SlotReport { version_low: 2, state: SlotState::Refused(RefusalReason::Malformed) };
+    let status = VehicleStatus {
+        mode: VehicleMode::Hold,
+        autopilot_silent: false,
+        reason: ModeReason::Fence,
+        x_m: 1.5,
+        y_m: -0.1,
+        depth_m: 18.0,
+        heading_deg: 90.0,
+        sigma_m: 1.25,
+        fix_age_s: Some(8.0),
+        waypoint: None,
+        explored_cells: 4000,
+        epoch: 1,
+        labels: 9,
+        base_digest: 0xBEEF,
+        budget_bps: 10_000,
+        refused_frames: 3,
+        slots,
+        placement: None,
+    };
+    let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
+    assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
+    assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0b1000_0100, 7, 2, 0x12]);
+    let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
+    back.read_pose(&pose).unwrap();
+    back.read_report(&report).unwrap();
+    assert_eq!(back, status);
+    let helpless = VehicleStatus { autopilot_silent: true, ..status.clone() }.encode_pose(99);
+    assert_eq!((helpless[0], &helpless[1..]), (0x2A, &pose[1..]));
+    back.read_pose(&helpless).unwrap();
+    assert!(std::mem::take(&mut back.autopilot_silent));
+    let placement = Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 });
+    let placed = VehicleStatus { placement, ..status.clone() };
+    let (long, _) = placed.encode_report(99, 0).unwrap();
+    assert_eq!(long, [&report[..], &[2, 0, 0, 125, 0xFF, 0xFF, 0xFF]].concat());
+    back.read_report(&long).unwrap();
+    assert_eq!(back, placed);
+    assert_eq!(placed.encode_report(long.len() - 1, 0).unwrap(), (report.clone(), SLOTS), "no room for it");
+    back.read_report(&placed.encode_report(15, SLOTS).unwrap().0).unwrap();
+    assert_eq!(back, placed);
+    back.read_report(&report).unwrap();
+    assert_eq!(back.placement, placement, "it has not moved back");
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..24)) {
+        let mut status = VehicleStatus::default();
+        if status.read_pose(&bytes).is_ok() {
+            prop_assert_eq!(status.encode_pose(99), bytes.clone());
+        }
+        let _ = status.read_report(&bytes);
+    }
+
+    #[test]
+    fn reports_of_any_size_tell_of_every_slot_that_was_decided_about(
+        decided in proptest::collection::vec((any::<u8>(), 0u8..10), SLOTS),
+        room in 0usize..30,
+        moved in any::<bool>(),
+    ) {
+        let placement = moved.then_some(Placement { version: 1, east_m: 2.5, north_m: -7.0 });
+        let mut status = VehicleStatus { budget_bps: 100, placement, ..VehicleStatus::default() };
+        for (slot, (version_low, code)) in status.slots.iter_mut().zip(decided) {
+            let state = SlotState::from_code(code).unwrap();
+            let version_low = if state == SlotState::Unknown { 0 } else { version_low };
+            *slot = SlotReport { version_low, state };
+        }
+        let (mut heard, mut first) = (VehicleStatus::default(), 0);
+        for _ in 0..=SLOTS {
+            let Some((bytes, next)) = status.encode_report(room, first) else {
+                prop_assert!(room < 10);
+                return Ok(());
+            };
+            prop_assert!(bytes.len() <= room.max(8));
+            heard.read_report(&bytes).unwrap();
+            first = next;
+            if first == 0 {
+                break;
+            }
+        }
+        if room < 15 {
+            status.placement = None;
+        }
+        prop_assert_eq!((first, heard), (0, status));
+    }
+
+    #[test]
+    fn a_rate_comes_back_within_a_thousandth(rate in 1u32..10_000_000) {
+        let back = decode_rate(code_rate(rate));
+        prop_assert!(back <= rate && rate - back <= rate / 1000, "{} became {}", rate, back);
+    }
+}

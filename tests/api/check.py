@@ -1,0 +1,154 @@
+"""Holds a running surface against its own OpenAPI document: python check.py URL
+
+Validates the document, asks every operation, validates each answer against its schema, and the figures as Prometheus
+reads them.
+"""
+
+import json
+import re
+import sys
+import urllib.error
+import urllib.request
+
+import jsonschema
+import openapi_spec_validator
+import prometheus_client.parser
+
+URL = sys.argv[1].rstrip("/")
+ORDERS = {
+    "set_utility": {"weights": {}, "exploration": 0.1},
+    "ask_exemplar": None,
+    "set_constraints": {"hold": False},
+    "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
+    "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
+    "set_settings": {"planner": "greedy"},
+    "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
+}
+
+
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_):
+        return None
+
+
+OPENER = urllib.request.build_opener(NoRedirect)
+
+
+def ask(method, path, body=None, headers=None):
+    """Status, headers and body."""
+    given = {"x-scenecast": "1", "content-type": "application/json", **(headers or {})}
+    request = urllib.request.Request(URL + path, method=method, data=body, headers=given)
+    try:
+        with OPENER.open(request, timeout=20) as answer:
+            return answer.status, answer.headers, answer.read()
+    except urllib.error.HTTPError as e:
+        return e.code, e.headers, e.read()
+
+
+def expect(condition, what):
+    if not condition:
+        sys.exit(f"{URL}: {what}")
+
+
+def validator(document, schema):
+    whole = {**schema, "components": document["components"]}
+    return jsonschema.Draft202012Validator(whole)
+
+
+def strict(schema):
+    """The schema with every object closed: a member that is not documented is an error here."""
+    if isinstance(schema, dict):
+        closed = {k: strict(v) for k, v in schema.items()}
+        if "properties" in closed and "additionalProperties" not in closed:
+            closed["additionalProperties"] = False
+        return closed
+    return [strict(v) for v in schema] if isinstance(schema, list) else schema
+
+
+def validate(document, schema, value, what):
+    error = jsonschema.exceptions.best_match(validator(document, schema).iter_errors(value))
+    expect(error is None, f"{what} is not as documented: {error and error.json_path}: {error and error.message}")
+
+
+def events(document, content, state_only):
+    """Reads the stream until each kind of event was seen."""
+    wanted = dict(content["x-events"])
+    if state_only:
+        wanted.pop("map")
+    with OPENER.open(URL + "/api/v1/events", timeout=20) as stream:
+        name = None
+        for _ in range(1000):
+            line = stream.readline().decode().rstrip("\n")
+            if line.startswith("event: "):
+                name = line[7:]
+                expect(name in content["x-events"], f"event {name} is not documented")
+            elif line.startswith("data: "):
+                validate(document, content["x-events"][name], json.loads(line[6:]), f"event {name}")
+                wanted.pop(name, None)
+            if not wanted:
+                return
+    sys.exit(f"{URL}: no event {', '.join(wanted)} came")
+
+
+def check(document, path, method, operation, state):
+    vehicle = state["vehicles"][0]
+    asked = path.replace("{id}", str(vehicle["id"]))
+    if "{file}" in path:
+        here = [l["id"] for l in vehicle["labels"] if l["exemplar"]["state"] == "here"]
+        expect(here, "no image is here to ask for")
+        asked = asked.replace("{file}", f"{here[0]}.webp")
+    name = operation["operationId"]
+    good = next(status for status in operation["responses"] if status != "default")
+    content = operation["responses"][good].get("content", {})
+    if name == "events":
+        return events(document, content["text/event-stream"], not vehicle["labels"])
+    body, headers = None, None
+    if name == "login":
+        body, headers = b"token=any", {"content-type": "application/x-www-form-urlencoded"}
+    elif "requestBody" in operation:
+        order = ORDERS[name] or {"label": vehicle["labels"][0]["id"]}
+        schema = operation["requestBody"]["content"]["application/json"]["schema"]
+        validate(document, schema, order, f"the example of {name}")
+        body = json.dumps(order).encode()
+    status, got, answer = ask(method, asked, body, headers)
+    expect(str(status) == good, f"{method} {asked}: {status} instead of {good}: {answer[:200]}")
+    if content:
+        kind, described = next(iter(content.items()))
+        expect(got["content-type"] == kind, f"{asked} is {got['content-type']} instead of {kind}")
+        if "schema" in described:
+            validate(document, described["schema"], json.loads(answer), asked)
+    if "{id}" in path:
+        refused, _, why = ask(method, path.replace("{id}", "13").replace("{file}", "1.webp"), body, headers)
+        expect(refused == 404, f"{method} {path} of no vehicle: {refused}")
+        validate(document, {"$ref": "#/components/schemas/Refusal"}, json.loads(why), f"the refusal of {path}")
+    other = "POST" if "post" not in document["paths"][path] else "DELETE"
+    expect(ask(other, asked, b"{}")[0] == 405, f"{other} {asked} is not documented, yet taken")
+
+
+def check_metrics():
+    figures = {f.name: f for f in prometheus_client.parser.text_string_to_metric_families(ask("GET", "/metrics")[2].decode())}
+    expect(len(figures) > 20, f"only {len(figures)} figures")
+    for f in figures.values():
+        expect(f.documentation and f.type in ("counter", "gauge"), f"{f.name} has no HELP or TYPE")
+        expect(re.fullmatch(r"scenecast_[a-z_]+", f.name), f"{f.name} is a strange name")
+        for sample in f.samples:
+            expect((f.type == "counter") == sample.name.endswith("_total"), f"{sample.name} is a {f.type}")
+    classes = {s.labels["class"] for s in figures["scenecast_link_bits"].samples}
+    expect(classes == set(json.loads(ask("GET", "/api/v1/state")[2])["link"]["up"]["bytes_by_class"]), f"classes {classes}")
+    expect(any(s.value for s in figures["scenecast_link_bits"].samples), "no bit was counted")
+
+
+def main():
+    document = json.loads(ask("GET", "/api/openapi.json")[2])
+    openapi_spec_validator.validate(document)
+    document["components"]["schemas"] = strict(document["components"]["schemas"])
+    state = json.loads(ask("GET", "/api/v1/state")[2])
+    every = [(method, path, o) for path, methods in document["paths"].items() for method, o in methods.items()]
+    # An order for a further image takes the one that is here away: readings first.
+    for method, path, operation in sorted(every, key=lambda one: one[0]):
+        check(document, path, method.upper(), operation, state)
+    check_metrics()
+    print(f"{len(every)} operations are as documented")
+
+
+main()

@@ -1,0 +1,171 @@
+//! The API as programs use it: its document, its files, `scenecast ctl`.
+
+use scenecast_tests::{Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until};
+use serde_json::Value;
+use std::process::Output;
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(90);
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+/// A mission whose map has labels.
+fn demo(port: u16, more: &[&str]) -> Process {
+    let port_text = port.to_string();
+    let demo = Process::start(&[&["demo", "--port", &port_text, "--speed", "20"][..], more].concat());
+    wait_until("labels on the map", LIMIT, || labels(port).len() > 1);
+    demo
+}
+
+fn labels(port: u16) -> Vec<u64> {
+    let state = state(port).unwrap_or_default();
+    let labels = state["vehicles"][0]["labels"].as_array().cloned().unwrap_or_default();
+    labels.iter().filter_map(|l| l["id"].as_u64()).collect()
+}
+
+/// `scenecast ctl` to the surface on a port.
+fn ctl(port: u16, arguments: &[&str]) -> Output {
+    let url = format!("http://127.0.0.1:{port}");
+    run(&[&["ctl", "--url", &url], arguments].concat())
+}
+
+#[test]
+fn orders_are_followed_until_they_are_applied_and_a_refusal_is_told() {
+    let port = free_port();
+    let _demo = demo(port, &["--duration", "3000"]);
+    let label = labels(port)[0];
+    let weight = format!("{label}=-0.75");
+    let sent = ctl(port, &["utility", "set", &weight, "--exploration", "0.25", "--wait", "60", "--json"]);
+    assert_eq!(sent.status.code(), Some(0), "{}", said(&sent));
+    let outcome: Value = serde_json::from_slice(&sent.stdout).unwrap();
+    assert_eq!((&outcome[0]["state"], &outcome[0]["slot"]), (&"applied".into(), &"utility".into()));
+    let kept = ctl(port, &["utility", "--json"]);
+    let kept: Value = serde_json::from_slice(&kept.stdout).unwrap();
+    assert_eq!((&kept["weights"][label.to_string()], &kept["exploration"]), (&(-0.75).into(), &0.25.into()));
+
+    let budget = ctl(port, &["budget", "set", "8000", "--shares", "map=40,exemplar=30", "--wait", "60"]);
+    assert_eq!(budget.status.code(), Some(0), "{}", said(&budget));
+    let link = &state(port).unwrap()["link"];
+    assert_eq!(
+        (&link["budget_bps"], &link["shares"]["map"], &link["shares"]["status"]),
+        (&8000.into(), &40.into(), &5.into())
+    );
+
+    let image = scratch("ctl-image").join("label.webp");
+    let here = ctl(port, &["exemplar", &label.to_string(), "--out", image.to_str().unwrap(), "--wait", "80"]);
+    assert_eq!(here.status.code(), Some(0), "{}", said(&here));
+    assert!(std::fs::read(&image).unwrap().starts_with(b"RIFF"));
+
+    let refused = ctl(port, &["utility", "set", "250=1"]);
+    assert_eq!(refused.status.code(), Some(1), "{}", said(&refused));
+    assert!(said(&refused).contains("label 250 is not on the map"), "{}", said(&refused));
+    let shares = ctl(port, &["budget", "set", "8000", "--shares", "map=90"]);
+    assert!(shares.status.code() == Some(1) && said(&shares).contains("100 or less"), "{}", said(&shares));
+
+    let status = said(&ctl(port, &["status"]));
+    for word in ["mission rehearsal", "vehicle 1 auv-1", "utility", "version 1 applied", "ago", "8000 bit/s"] {
+        assert!(status.contains(word), "{word} is missing in {status}");
+    }
+    assert!(said(&ctl(port, &["labels"])).contains("-0.75"));
+    if let Some(python) = python() {
+        run_script(&python, "tests/api/check.py", &[&format!("http://127.0.0.1:{port}")]);
+    }
+}
+
+#[test]
+fn wrong_usage_is_told_from_a_surface_that_does_not_answer() {
+    let url = format!("http://127.0.0.1:{}", free_port());
+    let absent = run(&["ctl", "status", "--url", &url]);
+    assert_eq!(absent.status.code(), Some(1), "{}", said(&absent));
+    assert!(said(&absent).contains(&url) && said(&absent).contains("scenecast asv or demo"), "{}", said(&absent));
+    assert_eq!(said(&absent).trim().lines().count(), 1);
+    assert_refused(&["ctl", "status", "--url", "ftp://nowhere"], &["--url ftp://nowhere", "http://HOST:PORT"]);
+    assert_refused(&["ctl", "utility", "set", "3=2"], &["3=2", "-1 to 1"]);
+    assert_refused(&["ctl", "utility", "set", "0=1"], &["0=1", "1 to 254"]);
+    assert_refused(&["ctl", "budget", "set", "5"], &["5", "10..=10000000"]);
+    assert_refused(&["ctl", "map", "--out", "reef.tiff"], &["reef.tiff", ".geojson"]);
+    assert_refused(&["ctl", "status", "--wait", "-1"], &["--wait"]);
+    assert_refused(&["ctl", "status", "--token-file", "nowhere.token"], &["nowhere.token", "key token"]);
+}
+
+#[test]
+fn others_on_the_network_need_a_token() {
+    let dir = scratch("token");
+    let file = dir.join("console.token");
+    let file = file.to_str().unwrap();
+    assert!(run(&["key", "token", "--out", file]).status.success());
+    let token = std::fs::read_to_string(file).unwrap().trim().to_owned();
+    let config = scenecast_tests::workspace().join("config/asv.toml");
+    let (port, modem) = (free_port(), free_port());
+    let sets = [
+        format!("console.listen=0.0.0.0:{port}"),
+        format!("modem.listen=127.0.0.1:{modem}"),
+        format!("runtime.state_dir=\"{}\"", dir.join("asv").display()),
+    ];
+    let mut arguments = vec!["asv", "--config", config.to_str().unwrap()];
+    arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
+    assert_refused(&arguments, &["console.listen", "console.token_file", "key token"]);
+    let with = format!("console.token_file={file}");
+    arguments.extend(["--set", &with]);
+    let _surface = Process::start(&arguments);
+    wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
+    let asked = |path: &str, headers: &str| http(port, "GET", path, headers, "").unwrap().0;
+    for path in ["/api/v1/state", "/api/v1/events", "/metrics", "/api/openapi.json", "/js/main.js", "/index.html"] {
+        assert_eq!(asked(path, ""), 401, "{path}");
+    }
+    assert_eq!(asked("/", ""), 303);
+    assert_eq!(asked("/api/v1/state", &format!("Authorization: Bearer {token}\r\n")), 200);
+    assert_eq!(asked("/api/v1/state", &format!("Authorization: Bearer {token}0\r\n")), 401);
+    let form = |token: &str, more: &str| {
+        let headers = format!("Content-Type: application/x-www-form-urlencoded\r\n{more}");
+        scenecast_tests::http_whole(port, "POST", "/login", &headers, &format!("token={token}")).unwrap()
+    };
+    assert!(form("wrong", "").starts_with("HTTP/1.1 401"));
+    assert!(form(&token, "Origin: http://elsewhere.example\r\n").starts_with("HTTP/1.1 403"));
+    let answer = form(&token, "");
+    let cookie = answer.lines().find_map(|l| l.strip_prefix("set-cookie: ")).expect("a cookie");
+    assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
+    assert!(!cookie.contains(&token), "the cookie is not the token");
+    let session = cookie.split(';').next().unwrap();
+    assert_eq!(asked("/", &format!("Cookie: {session}\r\n")), 200);
+    let url = format!("http://127.0.0.1:{port}");
+    assert_eq!(run(&["ctl", "status", "--url", &url, "--token-file", file]).status.code(), Some(0));
+    let without = run(&["ctl", "status", "--url", &url]);
+    assert!(without.status.code() == Some(1) && said(&without).contains("--token-file"), "{}", said(&without));
+}
+
+/// Exports everything of a mission that is over, and has it read by others.
+fn assert_exports_open(name: &str, origin: &[&str]) {
+    let Some(python) = python() else { return };
+    let (dir, port) = (scratch(name), free_port());
+    let _demo = demo(port, &[&["--duration", "200"], origin].concat());
+    let mut last = Value::Null;
+    wait_until("the last map", LIMIT, || {
+        let state = state(port).unwrap_or_default();
+        let version = state["vehicles"][0]["map"]["version"].clone();
+        std::thread::sleep(Duration::from_secs(1));
+        state["mission"]["ended"] == true && std::mem::replace(&mut last, version.clone()) == version
+    });
+    let path = |file: &str| dir.join(file).display().to_string();
+    for file in ["map.json", "ctl.png", "ctl.geojson", "ctl.ply", "ctl.csv"] {
+        let made = ctl(port, &["map", "--out", &path(file)]);
+        assert_eq!(made.status.code(), Some(0), "{file}: {}", said(&made));
+    }
+    std::fs::write(path("state.json"), state(port).unwrap().to_string()).unwrap();
+    // The page paints its PNG on a canvas, one pixel a cell like this one; its place is in the files beside it.
+    std::fs::copy(path("ctl.png"), path("page.png")).unwrap();
+    run_script("node", "tests/exports/page.mjs", &[&path("")]);
+    run_script(&python, "tests/exports/check.py", &[&path("")]);
+}
+
+#[test]
+fn exports_of_a_mission_on_the_earth_open_in_the_right_place() {
+    assert_exports_open("exports-earth", &["--set", "mission.origin_deg=[60.17, -10.25]"]);
+}
+
+#[test]
+fn exports_of_a_mission_that_is_nowhere_open_in_metres() {
+    assert_exports_open("exports-metres", &[]);
+}

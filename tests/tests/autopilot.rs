@@ -1,0 +1,209 @@
+//! The vehicle and an autopilot built on pymavlink that behaves as ArduSub does.
+
+use scenecast::asv::position::LatLon;
+use scenecast::autopilot::mavlink::MavlinkConfig;
+use scenecast::autopilot::{Autopilot, Goal, Health, Mavlink};
+use scenecast_protocol::time::Instant;
+use scenecast_tests::{Process, free_port, http, scratch, wait_until, workspace};
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Write};
+use std::net::UdpSocket;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// A Python that has pymavlink: `SCENECAST_PYTHON`, or `python3`. Without one the test is skipped, loudly; where `CI` is
+/// true it fails.
+fn python() -> Option<PathBuf> {
+    let python = std::env::var_os("SCENECAST_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
+    let imports = Command::new(&python).args(["-c", "import pymavlink"]).stderr(Stdio::null()).status();
+    if imports.is_ok_and(|s| s.success()) {
+        return Some(python);
+    }
+    let what = format!("{} has no pymavlink (pip install pymavlink; SCENECAST_PYTHON)", python.display());
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "{what}, and CI is true");
+    // Past the capture of the test harness, which would keep it to itself.
+    let _ = writeln!(std::io::stderr(), "SKIPPED: {what}: nothing was tested against ArduSub");
+    None
+}
+
+/// The peer as a process.
+struct Peer {
+    child: Child,
+    orders: ChildStdin,
+    seen: Arc<Mutex<Value>>,
+}
+
+impl Peer {
+    fn start(python: &PathBuf, port: u16, speed_m_s: f64) -> Self {
+        let script = workspace().join("tests/ardusub_peer.py");
+        let mut child = Command::new(python)
+            .arg(script)
+            .args([port.to_string(), speed_m_s.to_string()])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the peer starts");
+        let lines = BufReader::new(child.stdout.take().expect("it has an output")).lines();
+        let orders = child.stdin.take().expect("it has an input");
+        let seen = Arc::new(Mutex::new(Value::Null));
+        let told = Arc::clone(&seen);
+        std::thread::spawn(move || {
+            for line in lines.map_while(Result::ok) {
+                *told.lock().expect("nobody panics") = serde_json::from_str(&line).unwrap_or_default();
+            }
+        });
+        Self { child, orders, seen }
+    }
+
+    fn order(&mut self, order: &str) {
+        writeln!(self.orders, "{order}").expect("the peer lives");
+    }
+
+    fn seen(&self) -> Value {
+        self.seen.lock().expect("nobody panics").clone()
+    }
+
+    fn number(&self, name: &str) -> f64 {
+        self.seen()[name].as_f64().unwrap_or(0.0)
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Our state machine on a socket of this thread.
+struct Bench {
+    pilot: Mavlink,
+    socket: UdpSocket,
+    peer: Option<std::net::SocketAddr>,
+    began: std::time::Instant,
+    way: (f64, f64),
+}
+
+impl Bench {
+    fn new() -> Self {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+        let config = MavlinkConfig { system: 1, arms: true, silence: Duration::from_secs(3) };
+        let began = std::time::Instant::now();
+        Self { pilot: Mavlink::new(config, Instant::ZERO), socket, peer: None, began, way: (0.0, 0.0) }
+    }
+
+    fn now(&self) -> Instant {
+        Instant::ZERO + self.began.elapsed()
+    }
+
+    fn step(&mut self) {
+        let mut buffer = [0; 2048];
+        if let Ok((n, from)) = self.socket.recv_from(&mut buffer) {
+            self.peer = Some(from);
+            self.pilot.handle_bytes(&buffer[..n], self.now());
+        }
+        if self.now() >= self.pilot.poll_timeout() {
+            self.pilot.handle_timeout(self.now());
+        }
+        while let Some(bytes) = self.pilot.poll_output() {
+            self.peer.iter().for_each(|peer| drop(self.socket.send_to(&bytes, peer)));
+        }
+        while let Some(step) = self.pilot.poll_step() {
+            self.way = (self.way.0 + step.dx_m, self.way.1 + step.dy_m);
+        }
+    }
+
+    fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
+        let limit = std::time::Instant::now() + Duration::from_secs(40);
+        while !done(self) {
+            assert!(std::time::Instant::now() < limit, "{what}: not within 40 s; {:?}", self.pilot.counters());
+            self.step();
+        }
+    }
+}
+
+#[test]
+fn ardusub_is_armed_guided_to_a_waypoint_and_told_where_it_is() {
+    let Some(python) = python() else { return };
+    let mut bench = Bench::new();
+    let port = bench.socket.local_addr().unwrap().port();
+    let mut peer = Peer::start(&python, port, 4.0);
+    bench.pilot.set_goal(Some(Goal { east_m: 12.0, north_m: 9.0, depth_m: Some(1.0), place: None }), Instant::ZERO);
+    bench.until("the autopilot is in command", |b| b.pilot.health(b.now()) == Health::InCommand);
+    assert_eq!((peer.number("mode"), peer.seen()["armed"].as_bool()), (4.0, Some(true)));
+    // Half way it takes a fix in, and its own frame jumps by 25 m: neither way nor goal may.
+    bench.until("half of the way", |b| b.way.0 > 5.0);
+    let place = LatLon { lat_deg: 29.5001, lon_deg: 34.9201 };
+    bench.until("five GPS inputs", |b| {
+        b.pilot.handle_place(place, 1.5, b.now());
+        peer.seen()["jumped"] == true
+    });
+    bench.until("the goal", |b| (b.way.0 - 12.0).hypot(b.way.1 - 9.0) < 0.7);
+    bench.until("the peer tells", |_| (peer.number("east") - 12.0).hypot(peer.number("north") - 9.0) < 1.0);
+    let gps = peer.seen()["gps"].clone();
+    assert!((gps[0].as_f64().unwrap() - 29.5001).abs() < 2e-4 && gps[2].as_f64() == Some(1.5), "{gps}");
+    let seen = peer.seen();
+    assert_eq!((seen["bad"].as_u64(), seen["failsafes"].as_u64()), (Some(0), Some(0)), "{seen}");
+    // A pilot takes over: he is not fought.
+    peer.order("pilot 2");
+    bench.until("the pilot is noticed", |b| b.pilot.health(b.now()) == Health::NotInCommand);
+    let targets = peer.number("targets");
+    let until = bench.now() + Duration::from_secs(3);
+    bench.until("three seconds", |b| b.now() >= until);
+    assert_eq!((peer.number("mode"), peer.number("targets")), (2.0, targets));
+}
+
+#[test]
+fn a_vehicle_flies_its_survey_on_ardusub_and_says_so_when_it_goes_silent() {
+    let Some(python) = python() else { return };
+    let dir = scratch("ardusub");
+    let [modem, page, mavlink] = [(); 3].map(|()| free_port());
+    let file = |name: &str, text: String| {
+        let path = dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let state = |who: &str| dir.join(who).display().to_string();
+    let auv = file(
+        "auv.toml",
+        format!(
+            "[modem]\nconnect = \"127.0.0.1:{modem}\"\n[survey]\narea_m = [0, 0, 30, 20]\n[link]\nstatus_period_s = 1\n\
+             [autopilot]\nkind = \"mavlink\"\nport = \"udp:127.0.0.1:{mavlink}\"\narm = true\nsilence_s = 2\n\
+             [runtime]\nstate_dir = \"{}\"\n",
+            state("auv")
+        ),
+    );
+    let asv = file(
+        "asv.toml",
+        format!(
+            "[modem]\nlisten = \"127.0.0.1:{modem}\"\n[link]\nmax_idle_s = 1\n[console]\nlisten = \"127.0.0.1:{page}\"\n\
+             [runtime]\nstate_dir = \"{}\"\n",
+            state("asv")
+        ),
+    );
+    let _asv = Process::start(&["asv", "--config", &asv]);
+    let _auv = Process::start(&["auv", "--config", &auv]);
+    let mut peer = Peer::start(&python, mavlink, 3.0);
+    let status = || {
+        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        Some(serde_json::from_slice::<Value>(&body).ok()?["vehicles"][0]["status"].clone())
+    };
+    let limit = Duration::from_secs(90);
+    wait_until("the survey is flown", limit, || peer.number("targets") > 5.0 && peer.number("east") > 10.0);
+    wait_until("the operator sees it move", limit, || {
+        status().is_some_and(|s| s["x_m"].as_f64() > Some(8.0) && s["autopilot_silent"] == false)
+    });
+    peer.order("silent");
+    wait_until("the operator sees that it is silent", limit, || {
+        status().is_some_and(|s| s["autopilot_silent"] == true)
+    });
+    let at = status().unwrap()["at_s"].as_f64();
+    wait_until("the link goes on", limit, || status().is_some_and(|s| s["at_s"].as_f64() > at));
+    peer.order("speak");
+    wait_until("it is back", limit, || status().is_some_and(|s| s["autopilot_silent"] == false));
+    let seen = peer.seen();
+    assert_eq!((seen["bad"].as_u64(), seen["targets_refused"].as_u64()), (Some(0), Some(0)), "{seen}");
+}

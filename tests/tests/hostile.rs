@@ -1,0 +1,123 @@
+//! Clients that are slow or hostile: they cost the surface neither its link nor its memory.
+
+use scenecast_tests::{Process, free_port, http, state, wait_until};
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+const SPEED: f64 = 5.0;
+
+fn connect(port: u16, said: &str) -> Option<TcpStream> {
+    let mut stream = TcpStream::connect(("127.0.0.1", port)).ok()?;
+    stream.set_read_timeout(Some(Duration::from_secs(5))).ok()?;
+    stream.write_all(said.as_bytes()).ok()?;
+    Some(stream)
+}
+
+/// Ends the operator's work.
+struct End<'a>(&'a AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Does `attack` while an operator goes on working; his answers come soon, mission and link run at their pace, and the
+/// surface does not grow.
+fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) {
+    let before = state(port).unwrap();
+    let (held, _) = demo.cost().unwrap_or_default();
+    let began = Instant::now();
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        // Also when the attack fails.
+        let _end = End(&done);
+        scope.spawn(|| {
+            while !done.load(Ordering::Relaxed) {
+                let asked = Instant::now();
+                let answer = state(port);
+                assert!(answer.is_some(), "{what}: the operator gets no answer");
+                assert!(asked.elapsed() < Duration::from_secs(3), "{what}: he waited {:?}", asked.elapsed());
+                std::thread::sleep(Duration::from_millis(200));
+            }
+        });
+        attack();
+        std::thread::sleep(Duration::from_secs(2).saturating_sub(began.elapsed()));
+    });
+    let after = state(port).unwrap();
+    let passed = after["now_s"].as_f64().unwrap() - before["now_s"].as_f64().unwrap();
+    let expected = began.elapsed().as_secs_f64() * SPEED;
+    assert!(passed > 0.7 * expected - 5.0, "{what}: {passed} s of mission instead of {expected}");
+    let frames = |s: &serde_json::Value| s["link"]["up"]["frames"].as_u64().unwrap();
+    assert!(frames(&after) > frames(&before), "{what}: no frame was heard meanwhile");
+    let (holds, _) = demo.cost().unwrap_or_default();
+    assert!(holds < held + (64 << 20), "{what}: the surface grew from {held} to {holds} bytes");
+}
+
+#[test]
+fn no_client_stalls_the_link_or_fills_the_memory() {
+    let port = free_port();
+    let demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "5", "--duration", "30000"]);
+    wait_until("a map", Duration::from_secs(90), || {
+        state(port).is_some_and(|s| s["vehicles"][0]["map"]["explored_cells"].as_u64() > Some(50))
+    });
+    let host = format!("Host: 127.0.0.1:{port}\r\n");
+    assert_unmoved(&demo, port, "ten thousand slow heads", || {
+        for _ in 0..25 {
+            let held: Vec<_> =
+                (0..400).filter_map(|_| connect(port, "GET /api/v1/state HTTP/1.1\r\nX-Slow: ")).collect();
+            assert!(held.len() > 200, "the surface takes connections");
+        }
+    });
+    assert_unmoved(&demo, port, "readers that do not read", || {
+        let ask = format!("GET /api/v1/events HTTP/1.1\r\n{host}\r\n");
+        let deaf: Vec<_> = (0..100).filter_map(|_| connect(port, &ask)).collect();
+        std::thread::sleep(Duration::from_secs(3));
+        assert_eq!(http(port, "GET", "/api/v1/events", "", "").unwrap().0, 503, "there are only so many streams");
+        drop(deaf);
+    });
+    assert_unmoved(&demo, port, "a thousand bodies that do not come", || {
+        let head =
+            format!("POST /api/v1/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
+        for _ in 0..3 {
+            let ask = format!("{head}Content-Length: 100\r\n\r\n{{");
+            let held: Vec<_> = (0..350).filter_map(|_| connect(port, &ask)).collect();
+            assert!(held.len() > 200, "the surface takes connections");
+            std::thread::sleep(Duration::from_millis(500));
+        }
+    });
+    assert_unmoved(&demo, port, "bodies without end", || {
+        for length in ["Content-Length: 99999999999", "Transfer-Encoding: chunked"] {
+            let head =
+                format!("POST /api/v1/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
+            let mut stream = connect(port, &format!("{head}{length}\r\n\r\n")).unwrap();
+            let chunk = format!("10000\r\n{}\r\n", "1".repeat(0x10000));
+            let written = (0..2000).map_while(|_| stream.write_all(chunk.as_bytes()).ok()).count();
+            assert!(written < 2000, "{length}: it was all taken");
+        }
+    });
+    assert_unmoved(&demo, port, "heads without end", || {
+        let mut stream = connect(port, "GET / HTTP/1.1\r\n").unwrap();
+        let line = format!("X-More: {}\r\n", "y".repeat(1000));
+        let written = (0..100_000).map_while(|_| stream.write_all(line.as_bytes()).ok()).count();
+        assert!(written < 100_000);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        assert!(answer.is_empty() || answer.starts_with(b"HTTP/1.1 4"), "{}", String::from_utf8_lossy(&answer));
+    });
+    assert_unmoved(&demo, port, "all files at once", || {
+        std::thread::scope(|scope| {
+            for i in 0..60 {
+                let file = ["map", "map.png", "map.geojson", "map.ply"][i % 4];
+                scope.spawn(move || http(port, "GET", &format!("/api/v1/vehicles/1/{file}"), "", ""));
+            }
+        });
+    });
+    wait_until("a reader is served again", Duration::from_secs(30), || {
+        let ask = format!("GET /api/v1/events HTTP/1.1\r\n{host}\r\n");
+        let mut first = [0; 12];
+        connect(port, &ask).is_some_and(|mut s| s.read_exact(&mut first).is_ok() && first.ends_with(b"200"))
+    });
+}
