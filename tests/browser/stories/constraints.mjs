@@ -257,6 +257,25 @@ export default [
     },
   },
   {
+    name: "an edit that goes on while the last one is on its way is not taken for another console's",
+    scenario: "rich",
+    async run(s) {
+      await open(s);
+      await draw(s, "Draw fence", ...AROUND);
+      await s.page.route("**/fence", async (route) => {
+        await new Promise((resolve) => setTimeout(resolve, 400));
+        await route.continue();
+      });
+      await sendFence(s).click();
+      await draw(s, "Add keep-out", [0.4, 0.4], [0.5, 0.4], [0.5, 0.5]);
+      await s.until("its version", async () => (await slot(s, "fence"))?.version === 1);
+      await new Promise((resolve) => setTimeout(resolve, 1200));
+      assert.equal(await s.page.locator("[aria-labelledby=fence-title] .others").isVisible(), false);
+      assert.equal(await s.page.locator(".outlines > li").count(), 2, "the edit is still there");
+      assert.equal(await sendFence(s).isDisabled(), false);
+    },
+  },
+  {
     name: "a fence changed by another console shows, with a draft as a warning",
     scenario: "rich",
     async run(s) {

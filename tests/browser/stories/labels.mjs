@@ -195,6 +195,11 @@ export default [
       await s.shows("#send .others", /Changed by another console \(version 2\)/);
       await s.page.getByRole("button", { name: "OK: Weights changed by another console" }).click();
       assert.equal(await s.page.locator("#send .others").isVisible(), false);
+      await s.page.locator("#exploration").fill("0.6");
+      await s.post("/vehicles/1/utility", { weights: { 1: -0.5 }, exploration: -0.3 });
+      await s.shows("#send .others", /changed by another console meanwhile/);
+      await s.button("Discard").click();
+      assert.equal(await s.page.locator("#exploration").inputValue(), "-0.3");
     },
   },
   {

@@ -25,17 +25,22 @@ export const term = (vehicle, name) => draft().terms.get(name)?.value ?? serverT
 
 export const weight = (label) => draft().weights.get(label.id)?.value ?? label.weight;
 
+/** What a further edit starts from: its own start, what we sent if that is on its way, or the server's value. */
+const startOf = (mine, server) => (!mine ? server : mine.sent ? mine.value : mine.base);
+
 export function setWeight(label, value) {
   const { weights } = draft();
-  const base = weights.get(label.id)?.base ?? label.weight;
+  const base = startOf(weights.get(label.id), label.weight);
   if (same(value, base)) weights.delete(label.id);
   else weights.set(label.id, { value, base, sent: false });
   store.tell("draft");
 }
 
 export function setTerm(vehicle, name, value) {
-  if (same(value, serverTerm(vehicle, name) ?? NaN)) draft().terms.delete(name);
-  else draft().terms.set(name, { value, sent: false });
+  const { terms } = draft();
+  const base = startOf(terms.get(name), serverTerm(vehicle, name));
+  if (same(value, base ?? NaN)) terms.delete(name);
+  else terms.set(name, { value, base, sent: false });
   store.tell("draft");
 }
 
@@ -54,8 +59,12 @@ export const unsent = () => moved().filter((m) => !m.sent).length;
 /** The server's weight when somebody else changed it under our draft, else null. */
 export function changedElsewhere(label) {
   const d = draft().weights.get(label.id);
-  return d && !d.sent && !same(label.weight, d.base) ? label.weight : null;
+  return d && !d.sent && draft().sentVersion === null && !same(label.weight, d.base) ? label.weight : null;
 }
+
+/** Whether somebody else changed under our draft the weight of unseen or of puzzling ground. */
+export const termsChangedElsewhere = (vehicle) =>
+  draft().sentVersion === null && [...draft().terms].some(([name, t]) => !t.sent && t.base !== null && !same(serverTerm(vehicle, name) ?? NaN, t.base));
 
 /** Drops sent values once the server's own state carries them. */
 export function settle(vehicle) {

@@ -4,6 +4,7 @@ import { $, announce, h, keyed, show, text } from "../dom.js";
 import { known } from "../fence/draw.js";
 import { addCorner, begin, fenceOrder, finish, middle, pen, plan, put, removeCorner, removeOutline, setCorner, setHome } from "../fence/edit.js";
 import { faults, fromServer, isSound, nameOutline } from "../fence/plan.js";
+import { metres } from "../format.js";
 import { store } from "../store.js";
 import { slotOf } from "./lifeline.js";
 import { orderFoot } from "./order.js";
@@ -11,6 +12,7 @@ import { orderFoot } from "./order.js";
 const list = h("ul.outlines");
 const hint = h("p.hint", { role: "status" });
 const state = h("p.note");
+const frame = h("p.note");
 const tools = {
   fence: h("button", { type: "button", onclick: () => onMap(() => begin("fence")) }, "Draw fence"),
   keepOut: h("button", { type: "button", onclick: () => onMap(() => begin("keep_out")) }, "Add keep-out"),
@@ -28,7 +30,7 @@ const latest = new WeakMap();
 const open = new Set();
 
 export const fencePart = h("section.part", { "aria-labelledby": "fence-title" },
-  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, takeForce,
+  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, takeForce, frame,
   h("div.buttons", {}, tools.fence, tools.keepOut, tools.home, tools.done), hint, list, homeBox, foot.node);
 
 /** Takes up a tool and goes on to the map, where it is used. */
@@ -127,6 +129,9 @@ export function update() {
   show(homeBox, home !== null);
   if (home) homeFaultShown(home, wrong.home);
   text(state, describe(vehicle));
+  const by = vehicle.map.placement;
+  show(frame, Boolean(by));
+  if (by) text(frame, `In metres of its own map, which lies ${metres(by.east_m)} east and ${metres(by.north_m)} north in the world.`);
   show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && known(vehicle) !== null);
 }
 

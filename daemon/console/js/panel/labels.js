@@ -4,7 +4,7 @@ import { $, h, keyed, show, text } from "../dom.js";
 import { shownLabels } from "../book.js";
 import { recall, remember } from "../prefs.js";
 import { isStale, store } from "../store.js";
-import { discard, draft, ours, send, serverTerm, setTerm, settle, term, unsent, weight } from "./draft.js";
+import { discard, draft, ours, send, serverTerm, setTerm, settle, term, termsChangedElsewhere, unsent, weight } from "./draft.js";
 import { makeRow, refreshRow } from "./label-row.js";
 import { lifeline, slotOf } from "./lifeline.js";
 import { othersNote } from "./ours.js";
@@ -29,7 +29,7 @@ const labels = () => (store.vehicle ? shownLabels(store.vehicle) : []);
 let shownVehicle = null;
 
 function termRow(name, words, hint) {
-  const slider = h("input", { type: "range", min: 0, max: 1, step: 0.05, id: name, oninput: () => setTerm(store.vehicle, name, slider.valueAsNumber) });
+  const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, id: name, oninput: () => setTerm(store.vehicle, name, slider.valueAsNumber) });
   const value = h("output.value", { for: name });
   const node = h("div.exploration", { data: { term: name } }, h("label", { for: name, title: hint }, words), slider, value);
   const update = (vehicle) => {
@@ -76,7 +76,7 @@ function refreshLine() {
   const d = draft();
   const slot = slotOf(vehicle, "utility");
   refreshPlanner(vehicle);
-  others.update(vehicle);
+  others.update(vehicle, termsChangedElsewhere(vehicle) ? "Exploration or curiosity was changed by another console meanwhile; sending replaces it, Discard takes it over." : null);
   const n = unsent();
   const again = slot?.state === "refused";
   go.disabled = d.busy || !store.connected || labels().length === 0 || (n === 0 && !again);

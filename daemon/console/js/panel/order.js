@@ -16,7 +16,7 @@ export class Order {
   #edit(vehicle) {
     const { mission } = store.snapshot;
     const key = `${mission.id ?? mission.name}.${vehicle.id}`;
-    if (!this.#edits.has(key)) this.#edits.set(key, { value: null, base: null, version: null, busy: false, error: null });
+    if (!this.#edits.has(key)) this.#edits.set(key, { value: null, base: null, version: null, last: null, busy: false, error: null });
     return this.#edits.get(key);
   }
 
@@ -32,8 +32,10 @@ export class Order {
 
   set(vehicle, value) {
     const e = this.#edit(vehicle);
-    if (e.value === null || e.version !== null) e.base = JSON.stringify(this.read(vehicle));
-    const same = JSON.stringify(value) === JSON.stringify(this.read(vehicle));
+    // What is on its way to the server is what a further edit starts from.
+    if (e.version !== null) e.base = JSON.stringify(e.value);
+    else if (e.value === null) e.base = JSON.stringify(this.read(vehicle));
+    const same = JSON.stringify(value) === JSON.stringify(this.read(vehicle)) && e.version === null;
     Object.assign(e, { value: same ? null : value, version: null, error: null });
     store.tell("draft");
   }
@@ -45,7 +47,9 @@ export class Order {
 
   /** Whether another console changed under our edit what it started from. */
   changedElsewhere(vehicle) {
-    return this.changed(vehicle) && JSON.stringify(this.read(vehicle)) !== this.#edit(vehicle).base;
+    const { base, last } = this.#edit(vehicle);
+    const ours = last !== null && !this.ours.arrived(vehicle, last);
+    return this.changed(vehicle) && !ours && JSON.stringify(this.read(vehicle)) !== base;
   }
 
   /** Drops a refused edit, and keeps the words of the refusal. */
@@ -63,7 +67,9 @@ export class Order {
     try {
       const { version } = await this.post(vehicle, value);
       this.ours.sent(vehicle, version);
+      e.last = version;
       if (e.value === value) e.version = version;
+      else e.base = JSON.stringify(value);
     } catch (error) {
       e.error = error.message;
     }
