@@ -2,7 +2,7 @@
 //
 //   node run.mjs                        against the mock
 //   node run.mjs --url http://HOST:PORT against a running daemon (stories that need the mock are skipped)
-//   --only TEXT   only stories whose name holds TEXT      --require   a missing browser is a failure
+//   --only A,B   only stories whose name holds A or B      --require   a missing browser is a failure
 
 import { existsSync } from "node:fs";
 import { LAUNCH } from "./browser.mjs";
@@ -14,12 +14,12 @@ const option = (name) => {
   return at > 0 ? process.argv[at + 1] : null;
 };
 
-const STORIES = ["map", "labels", "vehicle", "link", "truth", "export", "cloud", "access", "cost"];
+const STORIES = ["map", "labels", "vehicle", "constraints", "link", "truth", "export", "cloud", "access", "cost"];
 
 async function stories() {
   const modules = await Promise.all(STORIES.map((s) => import(`./stories/${s}.mjs`)));
-  const only = option("only");
-  return modules.flatMap((m) => m.default).filter((s) => !only || s.name.includes(only));
+  const only = option("only")?.split(",");
+  return modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
 }
 
 async function main() {

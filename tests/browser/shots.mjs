@@ -2,6 +2,9 @@
 //
 //   node shots.mjs [--out DIR] [--only TEXT]           from the mock, into out/console-shots
 //   node shots.mjs --url http://127.0.0.1:8460 --out DIR   what a running daemon shows now
+//   ... --operate                                          after weights, pictures and a fence were sent to it
+//
+// docs/page.png is daemon-light-wide.png of `scenecast demo --speed 6` after ten minutes of mission, with --operate.
 
 import { mkdir } from "node:fs/promises";
 import { join } from "node:path";
@@ -30,6 +33,8 @@ const SCENES = {
   lost: { scenario: "rich", steps: (page, steer) => steer({ down: true }).then(() => page.waitForTimeout(1500)) },
   vehicle: { scenario: "refused", sizes: ["phone"], steps: tab("Vehicle") },
   link: { scenario: "rich", sizes: ["phone"], steps: tab("Link") },
+  constraints: { scenario: "rich", steps: constrained },
+  coarse: { scenario: "empty", steps: (page, steer) => steer({ coarse: true, loss: 0, advance: 100 }).then(() => page.waitForTimeout(500)) },
   two: { scenario: "two", sizes: ["wide"] },
   age: { scenario: "rich", sizes: ["wide"], steps: (page) => page.selectOption("#layer", "age") },
   cloud: { scenario: "rich", sizes: ["wide"], steps: cloud },
@@ -49,10 +54,48 @@ async function working(page, steer) {
   if (wide) await page.mouse.move(820, 380);
 }
 
+/** A fence in force, a keep-out being drawn wrongly, a band upside down. */
+async function constrained(page, steer) {
+  const [x, y] = [[0.03, 0.97], [0.1, 0.9]];
+  const draw = async (tool, places) => {
+    await page.getByRole("button", { name: tool }).click();
+    const box = await page.locator("#chart").boundingBox();
+    for (const [px, py] of places) await page.mouse.click(box.x + px * box.width, box.y + py * box.height);
+    await page.getByRole("button", { name: "Done drawing" }).click();
+  };
+  await page.getByRole("tab", { name: "Constraints" }).click();
+  await draw("Draw fence", [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]]);
+  await draw("Add keep-out", [[0.5, 0.3], [0.62, 0.34], [0.56, 0.5]]);
+  await page.locator("#send-fence").click();
+  await steer({ advance: 50, loss: 0 });
+  await draw("Add keep-out", [[0.2, 0.3], [0.3, 0.5], [0.3, 0.3], [0.2, 0.5]]);
+  await page.getByLabel("Depth, m, lowest").fill("50");
+  await page.getByLabel("Depth, m, highest").fill("5");
+}
+
 async function cloud(page, steer) {
   await steer({ planes: true, advance: 14 });
   await page.waitForTimeout(500);
   await page.getByRole("button", { name: "3-D" }).click();
+}
+
+/** Steers the first vehicle of a demo as an operator would, and waits until it has all. */
+async function operate(url) {
+  const post = (path, body) => fetch(`${url}/api/v1${path}`, { method: "POST", headers: { "content-type": "application/json", "x-scenecast": "1" }, body: JSON.stringify(body) });
+  const first = async () => (await (await fetch(`${url}/api/v1/state`)).json()).vehicles[0];
+  const v = await first();
+  const m = v.map;
+  const [west, south, east, north] = [m.x0, m.y0, m.x0 + m.width, m.y0 + m.height].map((cells, i) => cells * m.cell_m + (i < 2 ? -2 : 2));
+  const x = v.status.x_m > (west + east) / 2 ? west + 5 : east - 9;
+  const keepOut = [[x, north - 6], [x + 4, north - 7], [x + 2, north - 10]];
+  await post(`/vehicles/${v.id}/fence`, { fence: [[west, south], [east, south], [east, north], [west, north]], keep_outs: [keepOut], return_point: [west + 2, south + 1] });
+  await post(`/vehicles/${v.id}/utility`, { weights: { 3: 0.8, 5: -0.3 }, exploration: 0.2, curiosity: 0.1 });
+  const asked = v.labels.slice(0, 3).map((l) => l.id);
+  for (const label of asked) {
+    await post(`/vehicles/${v.id}/exemplars`, { label });
+    const here = async () => (await first()).labels.find((l) => l.id === label).exemplar.state === "here";
+    for (let i = 0; i < 60 && !(await here()); i += 1) await new Promise((resolve) => setTimeout(resolve, 500));
+  }
 }
 
 async function shoot(browser, url, { name, size, theme, steps, steer }) {
@@ -70,6 +113,7 @@ async function shoot(browser, url, { name, size, theme, steps, steer }) {
 await mkdir(out, { recursive: true });
 const browser = await chromium.launch(LAUNCH);
 if (given) {
+  if (process.argv.includes("--operate")) await operate(given);
   for (const theme of THEMES) for (const size of Object.keys(SIZES)) await shoot(browser, given, { name: "daemon", size, theme });
 } else {
   const mock = await startMock();

@@ -27,11 +27,14 @@ async function write(path, body) {
   return said;
 }
 
-export const sendUtility = (id, weights, exploration) =>
-  write(`/vehicles/${id}/utility`, { weights, exploration });
+export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
 export const askExemplar = (id, label) => write(`/vehicles/${id}/exemplars`, { label });
-export const sendHold = (id, hold) => write(`/vehicles/${id}/constraints`, { hold });
-export const sendBudget = (bps) => write("/budget", { budget_bps: bps });
+export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints`, order);
+export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
+export const sendLimits = (id, limits) => write(`/vehicles/${id}/limits`, limits);
+export const sendPlanner = (id, planner) => write(`/vehicles/${id}/settings`, { planner });
+/** `shares` in percent by class; null leaves them as they are. */
+export const sendBudget = (bps, shares = null) => write("/budget", { budget_bps: bps, ...(shares && { shares }) });
 
 /** Goes to the login if the surface takes a token and no longer knows ours. */
 export async function logInIfAsked() {

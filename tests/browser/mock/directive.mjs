@@ -1,9 +1,12 @@
 // The life line of the directive slots: queued -> on_air -> heard -> applied | refused.
 
-const SLOTS = ["utility", "constraints", "budget", "requests", "fix"];
+const SLOTS = ["utility", "constraints", "settings", "budget", "requests", "fix", "limits", "fence"];
 const REASONS = {
   utility: "label 3 was retired under epoch 1",
   constraints: "holding here would break the return margin",
+  fence: "the vehicle is outside of it",
+  limits: "depth_m: the vehicle flies at 16.4 m",
+  settings: "no such planner here",
   budget: "below the 500 bit/s that status needs",
   requests: "no image kept for this label",
 };

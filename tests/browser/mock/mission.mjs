@@ -21,6 +21,7 @@ export class Mission {
     this.speed = 1;
     this.loss = 0.1;
     this.budgetBps = 10000;
+    this.shares = { directive: 10, status: 5, fix: 5, map: 50, exemplar: 20 };
     this.planes = false;
     this.ended = false;
     this.down = new Direction(7);
@@ -86,9 +87,9 @@ export class Mission {
     return this.vehicles.reduce((sum, v) => sum + v.up.rateAt(this.nowS), 0);
   }
 
-  utility(v, { weights, exploration }) {
+  utility(v, { weights, exploration = 0, curiosity = 0 }) {
     for (const [id, w] of Object.entries(weights)) v.weights.set(Number(id), w);
-    v.exploration = exploration;
+    Object.assign(v.terms, { exploration, curiosity });
     return v.directive.issue("utility", this.nowS);
   }
 
@@ -99,7 +100,7 @@ export class Mission {
       mission: { name: this.name, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       link: {
-        budget_bps: this.budgetBps, budget_window_s: 10,
+        budget_bps: this.budgetBps, shares: this.shares, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),
         round_trip_s: this.vehicles[0].heardS === null ? null : 1.62,
         backlog_bits: this.vehicles[0].heardS === null ? null : Math.round(backlog * 1.1),

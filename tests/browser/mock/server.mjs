@@ -4,7 +4,7 @@
 //
 // POST /mock steers it in tests:
 //   {"scenario": "rich", "advance": 60, "speed": 20, "silent": true, "refuse": "utility",
-//    "loss": 0.3, "planes": true, "ended": true, "stream": false, "mute": true, "down": true}
+//    "loss": 0.3, "planes": true, "coarse": true, "ended": true, "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
 import { deflateSync } from "node:zlib";
@@ -97,10 +97,11 @@ async function post(mock, req, res, path) {
     if (!Number.isInteger(bps) || bps < 100 || bps > 100000) {
       return reply(res, 422, { error: "budget_bps must be 100 to 100000" });
     }
-    const [first] = mission.vehicles;
-    return accepted(mock, res, first.directive.issue("budget", mission.nowS, (s) => {
-      if (s === "applied") mission.budgetBps = bps;
-    }));
+    const sum = Object.values(given.shares ?? {}).reduce((a, b) => a + b, 0);
+    if (sum > 100) return reply(res, 422, { error: `shares add up to ${sum} percent: allowed is 100 or less` });
+    Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares });
+    const [answer] = mission.vehicles.map((v) => v.directive.issue("budget", mission.nowS));
+    return accepted(mock, res, answer);
   }
   const [, id, what] = path.match(/^vehicles\/(\d+)\/(\w+)$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
@@ -113,10 +114,22 @@ async function post(mock, req, res, path) {
   if (what === "exemplars") return accepted(mock, res, v.request(given.label, mission.nowS));
   if (what === "constraints") {
     return accepted(mock, res, v.directive.issue("constraints", mission.nowS, (s) => {
-      if (s === "applied") v.hold = given.hold;
+      if (s === "applied") Object.assign(v, { hold: given.hold, aborted: given.abort === true });
     }));
   }
+  const orders = { fence: () => fence(given), limits: () => limits(given), settings: () => given.planner || null };
+  if (what in orders) {
+    v[what === "settings" ? "planner" : what] = orders[what]();
+    return accepted(mock, res, v.directive.issue(what, mission.nowS));
+  }
   return reply(res, 404, { error: "no such thing" });
+}
+
+const fence = (f) => ({ fence: f.fence ?? null, keep_outs: f.keep_outs ?? [], return_point: f.return_point ?? null });
+
+function limits(given) {
+  const names = ["depth_m", "altitude_m", "distance_m", "time_s", "silence_s", "on_silence", "on_breach", "on_abort"];
+  return Object.fromEntries(names.map((n) => [n, given[n] ?? null]));
 }
 
 function accepted(mock, res, answer) {
@@ -128,6 +141,7 @@ function steer(mock, order, res) {
   if (order.scenario) mock.mission = new Mission(order.scenario);
   const { mission } = mock;
   for (const key of ["loss", "planes", "ended", "speed"]) if (key in order) mission[key] = order[key];
+  if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;
   if (order.refuse) mission.vehicles[0].directive.refuseNext.add(order.refuse);
   if ("down" in order) mock.down = order.down;

@@ -21,7 +21,8 @@ export class Vehicle {
     this.directive = new Directive();
     this.published = new Map();
     this.weights = new Map();
-    this.exploration = 0.2;
+    this.terms = { exploration: 0.2, curiosity: 0 };
+    Object.assign(this, { fence: null, limits: null, planner: null, coarse: false, aborted: false });
     this.exemplars = new Map();
     this.track = [];
     this.hold = false;
@@ -50,7 +51,7 @@ export class Vehicle {
   }
 
   step(nowS, dt, loss, budgetBps, planes) {
-    if (!this.hold) this.alongM += this.speed * dt;
+    if (!this.hold && !this.aborted) this.alongM += this.speed * dt;
     const p = this.pose();
     this.observe(p, nowS);
     if (nowS - this.fixS > 40) this.fixS = nowS;
@@ -80,15 +81,18 @@ export class Vehicle {
     const parts = { map: Math.min(room, 900 + this.pending.size * 6), status: 22, directive: 3, exemplar: exemplar ? 96 : 0 };
     if (!this.up.send(nowS, parts, loss)) return false;
     this.heardS = nowS;
-    for (const c of this.pending.values()) this.heard.set(c.x, c.y, c.label, nowS);
-    this.pending.clear();
+    for (const [key, c] of this.pending) {
+      if (this.coarse && (c.x % 4 !== 0 || c.y % 4 !== 0)) continue;
+      this.heard.set(c.x, c.y, c.label, nowS);
+      this.pending.delete(key);
+    }
     this.heard.version += 1;
     this.updatedS = nowS;
     const ahead = this.pose();
     this.status = {
       at_s: nowS - 0.8, x_m: p.x, y_m: p.y, z_m: -16.4 - 0.6 * Math.sin(nowS / 30),
       heading_deg: (p.heading + 360) % 360, sigma_m: 0.6 + 0.03 * (nowS - this.fixS),
-      mode: this.hold ? "hold" : "survey",
+      mode: this.aborted ? "abort" : this.hold ? "hold" : "survey",
       waypoint: this.hold ? null : [p.heading > 180 ? this.legs.x : this.legs.x + this.legs.width, ahead.y],
       cells: this.own.cells.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
     };
@@ -138,6 +142,7 @@ export class Vehicle {
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
+      utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner,
       directive: this.directive.json(),
     };
   }

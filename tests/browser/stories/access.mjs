@@ -27,15 +27,34 @@ const audits = ["light", "dark", "red"].flatMap((theme) =>
       await clean(s);
       await s.page.keyboard.press("Escape");
       await s.page.setViewportSize(PHONE);
-      for (const tab of ["Labels", "Vehicle", "Link"]) {
+      for (const tab of ["Labels", "Vehicle", "Constraints", "Link"]) {
         await s.page.getByRole("tab", { name: tab }).click();
         await clean(s);
       }
     },
   })));
 
+const editing = ["light", "dark", "red"].map((theme) => ({
+  name: `axe finds nothing serious while a fence is edited and an abort is asked for: ${theme}`,
+  theme,
+  scenario: "rich",
+  async run(s) {
+    await s.page.getByRole("tab", { name: "Constraints" }).click();
+    await s.button("Draw fence").click();
+    const box = await s.page.locator("#chart").boundingBox();
+    for (const [x, y] of [[0.2, 0.2], [0.8, 0.8], [0.8, 0.2], [0.2, 0.8]]) await s.page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    await s.page.getByRole("button", { name: "Fence: 4 corners, as numbers" }).click();
+    await s.page.getByLabel("Depth, m, lowest").fill("50");
+    await clean(s);
+    await s.page.getByRole("tab", { name: "Vehicle" }).click();
+    await s.page.locator("#abort").click();
+    await clean(s);
+  },
+}));
+
 export default [
   ...audits,
+  ...editing,
   {
     name: "weights can be set and sent with the keyboard alone",
     async run(s) {

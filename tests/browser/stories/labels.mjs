@@ -155,6 +155,54 @@ export default [
     },
   },
   {
+    name: "weights of unexplored and puzzling ground go with those of the labels",
+    async run(s) {
+      await firstLabels(s);
+      await s.page.locator("#exploration").fill("0.45");
+      await s.page.locator("#curiosity").fill("0.3");
+      assert.equal(await send(s).innerText(), "Send 2 changes");
+      await send(s).click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/utility")));
+      const { exploration, curiosity } = s.posts.at(-1).body;
+      assert.deepEqual([exploration, curiosity], [0.45, 0.3]);
+      await s.until("the server's values", async () => {
+        const { utility } = await s.vehicle();
+        return utility.exploration === 0.45 && utility.curiosity === 0.3;
+      });
+      await s.until("no draft left", async () => (await send(s).innerText()) !== "Send 2 changes");
+      assert.equal(await s.page.locator("#curiosity").inputValue(), "0.3");
+    },
+  },
+  {
+    name: "the planner is chosen, set and followed",
+    async run(s) {
+      await s.page.selectOption("#planner", "greedy");
+      await s.page.locator("#send-planner").click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/settings")));
+      assert.deepEqual(s.posts.at(-1).body, { planner: "greedy" });
+      await s.shows(".planner .note", /applied/, { ms: 240000, advance: 2 });
+      assert.equal((await s.vehicle()).planner, "greedy");
+    },
+  },
+  {
+    name: "weights that another console sent after ours are said to be theirs",
+    scenario: "rich",
+    async run(s) {
+      await slider(s, "Label 1").fill("0.4");
+      await send(s).click();
+      await s.until("its version", async () => (await s.vehicle()).directive.slots.some((x) => x.slot === "utility" && x.version === 1));
+      await s.post("/vehicles/1/utility", { weights: { 1: -0.5 }, exploration: 0.2 });
+      await s.shows("#send .others", /Changed by another console \(version 2\)/);
+      await s.page.getByRole("button", { name: "OK: Weights changed by another console" }).click();
+      assert.equal(await s.page.locator("#send .others").isVisible(), false);
+      await s.page.locator("#exploration").fill("0.6");
+      await s.post("/vehicles/1/utility", { weights: { 1: -0.5 }, exploration: -0.3 });
+      await s.shows("#send .others", /changed by another console meanwhile/);
+      await s.button("Discard").click();
+      assert.equal(await s.page.locator("#exploration").inputValue(), "-0.3");
+    },
+  },
+  {
     name: "one label can be shown alone",
     async run(s) {
       const [first] = await firstLabels(s);

@@ -40,6 +40,72 @@ export default [
     tolerates: /422/,
   },
   {
+    name: "a class share is dragged and sent when let go, never more than 100 together",
+    async run(s) {
+      const { link: { shares } } = await s.get("/state");
+      const handle = s.page.locator(".handle[title$='exemplar']");
+      await handle.scrollIntoViewIfNeeded();
+      const [from, bar] = [await handle.boundingBox(), await s.page.locator(".stack").boundingBox()];
+      const y = from.y + from.height / 2;
+      const less = (2 * bar.width) / 100;
+      await s.page.mouse.move(from.x + from.width / 2, y);
+      await s.page.mouse.down();
+      await s.page.mouse.move(from.x + from.width / 2 - less, y, { steps: 4 });
+      assert.equal(s.posts.length, 0, "nothing goes out while it is held");
+      await s.page.mouse.up();
+      await s.until("the message", () => s.posts.length > 0);
+      const sent = s.posts.at(-1).body.shares;
+      assert.equal(sent.exemplar, Math.max(0, shares.exemplar - 2));
+      await s.until("the server's shares", async () => (await s.get("/state")).link.shares.exemplar === sent.exemplar);
+      const map = s.page.getByRole("slider", { name: "Least share of map, percent" });
+      await map.fill("100");
+      await s.until("the second message", () => s.posts.length > 1);
+      const all = Object.values(s.posts.at(-1).body.shares).reduce((a, b) => a + b, 0);
+      assert.equal(all, 100);
+      await s.shows("#link .steps [aria-current]", /Applied/, { ms: 240000, advance: 2 });
+    },
+  },
+  {
+    name: "budget and shares follow the keys, and a run of keys is one message",
+    async run(s) {
+      const map = s.page.getByRole("slider", { name: "Least share of map, percent" });
+      const was = Number(await map.inputValue());
+      await map.focus();
+      for (let i = 0; i < 3; i += 1) await s.page.keyboard.press("ArrowLeft");
+      await s.until("the message", () => s.posts.length > 0);
+      assert.equal(s.posts.length, 1);
+      assert.equal(s.posts[0].body.shares.map, was - 3);
+      await s.page.getByRole("slider", { name: "Budget, logarithmic" }).focus();
+      await s.page.keyboard.press("ArrowLeft");
+      await s.until("the budget", () => s.posts.length > 1);
+      assert.equal(s.posts[1].body.shares, undefined);
+    },
+  },
+  {
+    name: "refused shares go back to those in force, with the reason",
+    scenario: "rich",
+    async run(s) {
+      await s.page.route("**/budget", (route) => route.fulfill({ status: 422, contentType: "application/json", body: '{"error":"shares add up to 130 percent: allowed is 100 or less"}' }));
+      const map = s.page.getByRole("slider", { name: "Least share of map, percent" });
+      await map.fill("30");
+      await s.shows("#link .error", /shares add up to 130 percent/);
+      assert.equal(await map.inputValue(), "50");
+    },
+    tolerates: /422/,
+  },
+  {
+    name: "a budget changed by another console is followed and said",
+    scenario: "rich",
+    async run(s) {
+      await s.page.getByRole("slider", { name: "Least share of fix, percent" }).fill("2");
+      await s.until("the message", () => s.posts.length > 0);
+      await s.until("its version", async () => (await s.vehicle()).directive.slots.some((x) => x.slot === "budget" && x.version === 1));
+      await s.post("/budget", { budget_bps: 4000 });
+      await s.shows("#link .others", /Changed by another console \(version 2\)/);
+      assert.equal(await s.page.locator("#budget").inputValue(), "4000");
+    },
+  },
+  {
     name: "the backlog says when it will be empty",
     scenario: "rich",
     async run(s) {

@@ -188,6 +188,42 @@ export default [
     },
   },
   {
+    name: "blocks of which one cell was sent are pale, read out as not sent, and in no export",
+    scenario: "empty",
+    async run(s) {
+      await s.steer({ coarse: true, loss: 0, advance: 40 });
+      await s.shows("#legend", /pale: one cell of 16 was sent/);
+      const block = await s.inPage(async ({ store, view: v, tintOf, shownAs }) => {
+        const { coarseBlocks } = await import("/js/map/coarse.js");
+        const m = store.map;
+        const box = document.getElementById("chart").getBoundingClientRect();
+        const far = ([x, y]) => store.vehicle.track.every(([, tx, ty]) => Math.hypot(tx - x, ty - y) > 1);
+        const place = (b, d) => [(m.x0 + b.x + d) * m.cell_m, (m.y0 + b.y + d) * m.cell_m];
+        const b = coarseBlocks(m).find((k) => far(place(k, 1.5)));
+        return { sent: v.toScreen(...place(b, 0.5)), rest: v.toScreen(...place(b, 2.5)), left: box.left, top: box.top, tint: tintOf(shownAs(m.labels[b.at])), known: m.labels.filter((l) => l > 0).length };
+      });
+      assert.deepEqual(await pixel(s, ...block.sent), block.tint);
+      const pale = await pixel(s, ...block.rest);
+      const sea = await s.page.evaluate(() => getComputedStyle(document.documentElement).getPropertyValue("--map-sea").match(/[0-9a-f]{2}/gi).map((x) => parseInt(x, 16)));
+      assert.notDeepEqual(pale, block.tint);
+      assert.notDeepEqual(pale, sea);
+      await s.page.mouse.move(block.left + block.rest[0], block.top + block.rest[1]);
+      await s.shows("#readout", /not sent; Label \d+ at the one cell sent of 16/);
+      assert.equal(block.known, (await s.vehicle()).map.explored_cells);
+      await s.page.mouse.move(5, 5);
+      await s.steer({ coarse: false, advance: 30 });
+      await s.until("the whole map", async () => !(await s.page.locator("#legend").isVisible()));
+    },
+  },
+  {
+    name: "a map that came cell by cell has no pale blocks",
+    scenario: "rich",
+    async run(s) {
+      const blocks = await s.inPage(async ({ store }) => (await import("/js/map/coarse.js")).coarseBlocks(store.map).length);
+      assert.equal(blocks, 0);
+    },
+  },
+  {
     name: "grid and rings are remembered",
     async run(s) {
       const rings = () => s.button("Rings").getAttribute("aria-pressed");

@@ -42,7 +42,7 @@ export default [
       await s.post("/vehicles/1/constraints", { hold: true });
       const late = await s.context.newPage();
       await late.goto(s.url);
-      await late.locator(".slots", { hasText: "Constraints" }).waitFor();
+      await late.locator(".slots", { hasText: "Hold, abort" }).waitFor();
       await s.until("the weight", async () => (await late.getByRole("slider", { name: "Weight of Label 1", exact: true }).inputValue()) === "0.5");
     },
   },

@@ -5,9 +5,12 @@ import { ago, count, span } from "../format.js";
 import { recall, remember } from "../prefs.js";
 import { ageOf, isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
+import { drawFences } from "../fence/draw.js";
+import { clickAt, finish, grab, pen, penKeys } from "../fence/edit.js";
 import { drawCraft, drawSurface } from "./craft.js";
+import { overhang } from "./coarse.js";
 import { listen } from "./input.js";
-import { canvasOf, drawLegend, layer } from "./layers.js";
+import { canvasOf, coarseCanvasOf, drawLegend, layer } from "./layers.js";
 import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
 import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { extent, rectangle } from "./raster.js";
@@ -16,6 +19,7 @@ import { View } from "./view.js";
 
 export const view = new View();
 export const options = { grid: recall("grid", true), rings: recall("rings", false) };
+const FENCE_REACH = 4;
 const canvas = $("chart");
 let ink = {};
 let dirty = false;
@@ -29,11 +33,12 @@ export function startChart() {
     changed: () => (redraw(), store.tell("view")),
     point: hover,
     click,
-    keys: { 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, Escape: () => measure.on && measureKey(), Enter: () => click(view.width / 2, view.height / 2) },
+    grab: (px, py) => (measure.on ? null : grab(view, px, py)),
+    keys: { ...penKeys(view), 0: fit, f: follow, F: follow, m: measureKey, M: measureKey, Escape: end, Enter: () => click(view.width / 2, view.height / 2) },
   });
   canvas.addEventListener("focus", redraw);
   canvas.addEventListener("blur", redraw);
-  store.on("state map select feed book highlight tick", () => {
+  store.on("state map select feed book highlight tick draft", () => {
     keepInView();
     redraw();
   });
@@ -69,12 +74,21 @@ export function toggle(option) {
   redraw();
 }
 
+function end() {
+  if (pen.tool) finish();
+  else if (measure.on) measureKey();
+}
+
 function measureKey() {
   toggleMeasure();
   store.tell("view");
 }
 
 function keepInView() {
+  if (pen.tool && view.mode !== "free") {
+    view.mode = "free";
+    store.tell("view");
+  }
   const s = store.vehicle?.status;
   if (view.mode === "follow" && s) view.centre(s.x_m, s.y_m);
   const all = view.mode === "fit" ? bounds() : null;
@@ -91,7 +105,7 @@ function extentOf(map) {
   return extents.get(map);
 }
 
-/** What "fit" shows: every map, every vehicle and its waypoint. */
+/** What "fit" shows: every map, every vehicle and its waypoint; fences too, unless the map would be lost in them. */
 function bounds() {
   const boxes = [];
   for (const map of store.maps.values()) boxes.push(extentOf(map));
@@ -102,11 +116,17 @@ function bounds() {
   }
   const known = boxes.filter(Boolean);
   if (known.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
-  return known.reduce((a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])]);
+  const near = around(known);
+  const corners = (store.snapshot?.vehicles ?? []).flatMap((v) => v.fence?.fence ?? []);
+  const all = around([near, ...corners.map(([x, y]) => [x, y, x, y])]);
+  return reach(all) <= FENCE_REACH * reach(near) ? all : near;
 }
 
+const around = (boxes) => boxes.reduce((a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])]);
+const reach = ([west, south, east, north]) => Math.max(east - west, north - south);
+
 function readInk() {
-  for (const name of ["sea", "text", "grid", "craft", "track", "stale", "accent"]) ink[name] = colour(`map-${name}`);
+  for (const name of ["sea", "text", "grid", "craft", "track", "stale", "accent", "fence", "keepout", "bad"]) ink[name] = colour(`map-${name}`);
   redraw();
 }
 
@@ -128,7 +148,7 @@ function hover(px, py) {
 }
 
 function click(px, py) {
-  if (!measure.on) return;
+  if (clickAt(...view.toWorld(px, py)) || !measure.on) return;
   addPoint(...view.toWorld(px, py));
   redraw();
 }
@@ -154,6 +174,7 @@ function draw() {
   const centre = surface ?? store.vehicle?.status;
   if (options.rings && centre) drawRings(c, view, ink, centre.x_m, centre.y_m);
   if (surface) drawSurface(c, view, ink, surface);
+  for (const v of byChoice) drawFences(c, view, ink, v, v.id === store.selectedId);
   for (const v of byChoice) drawCraft(c, view, ink, v, v.id === store.selectedId);
   drawMeasure(c, view, ink);
   if (byKeys()) drawCross(c);
@@ -171,6 +192,9 @@ function drawMap(c, vehicle) {
   const [left, top] = view.toScreen(west, north);
   const [right, bottom] = view.toScreen(east, south);
   c.imageSmoothingEnabled = (right - left) / map.width < 1;
+  const coarse = coarseCanvasOf(vehicle, map);
+  const over = overhang(map) * view.scale;
+  if (coarse) c.drawImage(coarse, left, top - over, right - left + over, bottom - top + over);
   c.drawImage(canvasOf(vehicle, map), left, top, right - left, bottom - top);
 }
 

@@ -3,10 +3,12 @@
 const KEY_PAN_PX = 60;
 
 /** Wires `canvas`; calls `changed()` after the view moved, `point(px, py | null)` as the pointer moves,
- *  `click(px, py)` for a press that did not pan. */
-export function listen(canvas, view, { changed, point, click, keys }) {
+ *  `click(px, py)` for a press that did not pan; `grab(px, py)` gives what a press there drags instead of the map,
+ *  {move(px, py), press()}, or null. `keys` go before the own ones; "Shift+ArrowLeft" is one with shift. */
+export function listen(canvas, view, { changed, point, click, grab, keys }) {
   const fingers = new Map();
   let moved = 0;
+  let held = null;
 
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
@@ -17,6 +19,7 @@ export function listen(canvas, view, { changed, point, click, keys }) {
     canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, place(event));
     moved = fingers.size > 1 ? Infinity : 0;
+    held = fingers.size > 1 || event.button > 0 ? null : grab(...place(event));
     point(...place(event));
   });
 
@@ -28,7 +31,8 @@ export function listen(canvas, view, { changed, point, click, keys }) {
     const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
     moved += Math.hypot(now[0] - before[0], now[1] - before[1]);
     if (moved < 4) return;
-    if (other) pinch(view, before, now, other);
+    if (held) held.move(...now);
+    else if (other) pinch(view, before, now, other);
     else view.panBy(now[0] - before[0], now[1] - before[1]);
     fingers.set(event.pointerId, now);
     changed();
@@ -36,7 +40,8 @@ export function listen(canvas, view, { changed, point, click, keys }) {
 
   const lift = (event) => {
     const here = fingers.delete(event.pointerId);
-    if (here && event.type === "pointerup" && moved < 4) click(...place(event));
+    if (here && event.type === "pointerup" && moved < 4) held ? held.press() : click(...place(event));
+    held = null;
   };
   canvas.addEventListener("pointerup", lift);
   canvas.addEventListener("pointercancel", lift);
@@ -65,7 +70,7 @@ export function listen(canvas, view, { changed, point, click, keys }) {
       "=": () => view.zoomAt(view.width / 2, view.height / 2, 1.3),
       "-": () => view.zoomAt(view.width / 2, view.height / 2, 1 / 1.3),
       ...keys,
-    }[event.key];
+    }[event.shiftKey && event.key.startsWith("Arrow") ? `Shift+${event.key}` : event.key];
     if (!act) return;
     event.preventDefault();
     act();

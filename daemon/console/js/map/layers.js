@@ -6,7 +6,8 @@ import { isStale, store } from "../store.js";
 import { nice, span } from "../format.js";
 import { ramp } from "../palette.js";
 import { current as theme, onTheme } from "../theme.js";
-import { paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
+import { coarseBlocks, paintCoarse } from "./coarse.js";
+import { labelTones, paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
 import { planeText } from "./readout.js";
 
 const AGE_REPAINT_S = 5;
@@ -51,6 +52,20 @@ export function canvasOf(vehicle, map) {
   return canvas;
 }
 
+const coarsely = new Map();
+
+/** What a vehicle's map holds only coarsely, painted pale below its cells in the label layer, or null. */
+export function coarseCanvasOf(vehicle, map) {
+  if (vehicle.id !== store.selectedId || layer.name !== "label" || coarseBlocks(map).length === 0) return null;
+  const key = `${map.epoch}.${map.version}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`;
+  const have = coarsely.get(vehicle.id);
+  if (have?.key === key && have.map === map) return have.canvas;
+  const tones = labelTones({ tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
+  const canvas = paintCoarse(map, tones);
+  coarsely.set(vehicle.id, { key, map, canvas });
+  return canvas;
+}
+
 /** The upper end of the age scale: a round number above the oldest cell. */
 export function ageTop(map) {
   let oldest = 60;
@@ -63,12 +78,18 @@ export function drawLegend() {
   const map = store.map;
   const plane = map?.planes.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
-  const key = `${layer.name}.${top}.${plane?.min}.${plane?.max}`;
+  const coarse = layer.name === "label" && Boolean(map) && coarseBlocks(map).length > 0;
+  const key = `${layer.name}.${top}.${plane?.min}.${plane?.max}.${coarse}`;
   if (key === legendKey) return;
   legendKey = key;
   const box = $("legend");
-  show(box, Boolean(map) && layer.name !== "label");
+  show(box, Boolean(map) && (layer.name !== "label" || coarse));
   if (box.hidden) return;
+  if (coarse) {
+    const words = `pale: one cell of 16 was sent, the rest is not known yet`;
+    box.replaceChildren(h("span.pale", { "aria-hidden": "true" }), h("span", {}, words));
+    return;
+  }
   const half = (plane?.step ?? 0) / 2;
   const [title, low, high, flip] = plane
     ? [plane.name, planeText(plane, plane.min - half), planeText(plane, plane.max + half), false]

@@ -52,8 +52,8 @@ function paint(map, rgbaOf) {
 
 const mix = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
 
-/** Labels in their colours; greyed when stale, the rest faint when one is highlighted. */
-export function paintLabels(map, { tintOf, shownAs, stale, highlight }) {
+/** Labels in their colours; greyed when stale, the rest faint when one is highlighted: label -> [r, g, b, a]. */
+export function labelTones({ tintOf, shownAs, stale, highlight }) {
   const table = new Array(256);
   const lookup = (label) => {
     const shown = shownAs(label);
@@ -63,7 +63,12 @@ export function paintLabels(map, { tintOf, shownAs, stale, highlight }) {
     const tone = stale ? mix(full, pale, 0.7) : full;
     return [...tone, highlight === null || highlight === shown ? 255 : 36];
   };
-  return paint(map, (_, label) => (table[label] ??= lookup(label)));
+  return (label) => (table[label] ??= lookup(label));
+}
+
+export function paintLabels(map, look) {
+  const tones = labelTones(look);
+  return paint(map, (_, label) => tones(label));
 }
 
 /** Seconds since each cell was heard, on the sequential scale from 0 to `top`. */

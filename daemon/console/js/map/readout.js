@@ -4,6 +4,7 @@ import { $, show, text } from "../dom.js";
 import { metres, minus, none, percent, span } from "../format.js";
 import { nameOf, shownAs } from "../book.js";
 import { ageOf, store } from "../store.js";
+import { blockAt } from "./coarse.js";
 
 /** The cell under (x, y) metres: {label, ageS, planes} or null when outside the map; each plane with its own age. */
 export function cellAt(map, x, y) {
@@ -20,6 +21,12 @@ export function cellAt(map, x, y) {
   return { label: map.labels[at], ageS: seconds(map.age), planes };
 }
 
+/** The label that stands for the unexplored cell under (x, y) metres, where the map came coarsely; else null. */
+function coarseAt(map, x, y) {
+  const block = blockAt(map, Math.floor(x / map.cell_m) - map.x0, Math.floor(y / map.cell_m) - map.y0);
+  return block && map.labels[block.at];
+}
+
 export function showReadout(world) {
   const plate = $("readout");
   show(plate, world !== null);
@@ -33,7 +40,8 @@ export function showReadout(world) {
     parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
     for (const p of cell.planes) parts.push(`${p.name} ${levelOf(p)}${p.ageS === null ? "" : `, heard ${span(p.ageS)} ago`}`);
   } else {
-    parts.push("unexplored");
+    const block = store.map ? coarseAt(store.map, ...world) : null;
+    parts.push(block === null ? "unexplored" : `not sent; ${nameOf(shownAs(block))} at the one cell sent of 16 around`);
   }
   text(plate, parts.join("  ·  "));
   return cell;

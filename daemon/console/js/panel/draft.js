@@ -3,59 +3,68 @@
 import { sendUtility } from "../api.js";
 import { store } from "../store.js";
 import { slotOf } from "./lifeline.js";
+import { Ours } from "./ours.js";
 
 const drafts = new Map();
-const DEFAULT_EXPLORATION = 0.2;
+/** Weights of cells rather than labels, and what they are where the daemon does not say. */
+export const TERMS = { exploration: 0.2, curiosity: 0 };
+export const ours = new Ours("utility");
 
 /** The draft of the chosen vehicle: weights by label id with the server's value they started from. */
 export function draft() {
   const id = store.selectedId;
-  if (!drafts.has(id)) drafts.set(id, { weights: new Map(), exploration: null, sentVersion: null, error: null, busy: false });
+  if (!drafts.has(id)) drafts.set(id, { weights: new Map(), terms: new Map(), sentVersion: null, error: null, busy: false });
   return drafts.get(id);
 }
 
 const same = (a, b) => Math.abs(a - b) < 1e-6;
 
-export const serverExploration = (vehicle) => vehicle.utility?.exploration ?? null;
+export const serverTerm = (vehicle, name) => vehicle.utility?.[name] ?? null;
 
-export function exploration(vehicle) {
-  return draft().exploration ?? serverExploration(vehicle) ?? DEFAULT_EXPLORATION;
-}
+export const term = (vehicle, name) => draft().terms.get(name)?.value ?? serverTerm(vehicle, name) ?? TERMS[name];
 
 export const weight = (label) => draft().weights.get(label.id)?.value ?? label.weight;
 
+/** What a further edit starts from: its own start, what we sent if that is on its way, or the server's value. */
+const startOf = (mine, server) => (!mine ? server : mine.sent ? mine.value : mine.base);
+
 export function setWeight(label, value) {
   const { weights } = draft();
-  const base = weights.get(label.id)?.base ?? label.weight;
+  const base = startOf(weights.get(label.id), label.weight);
   if (same(value, base)) weights.delete(label.id);
   else weights.set(label.id, { value, base, sent: false });
   store.tell("draft");
 }
 
-export function setExploration(vehicle, value) {
-  draft().exploration = value === serverExploration(vehicle) ? null : value;
-  draft().explorationSent = false;
+export function setTerm(vehicle, name, value) {
+  const { terms } = draft();
+  const base = startOf(terms.get(name), serverTerm(vehicle, name));
+  if (same(value, base ?? NaN)) terms.delete(name);
+  else terms.set(name, { value, base, sent: false });
   store.tell("draft");
 }
 
 export function discard() {
-  Object.assign(draft(), { exploration: null, error: null });
+  draft().error = null;
   draft().weights.clear();
+  draft().terms.clear();
   store.tell("draft");
 }
 
+const moved = () => [...draft().weights.values(), ...draft().terms.values()];
+
 /** How many values differ from what was sent. */
-export function unsent() {
-  const d = draft();
-  const moved = [...d.weights.values()].filter((w) => !w.sent).length;
-  return moved + (d.exploration !== null && !d.explorationSent ? 1 : 0);
-}
+export const unsent = () => moved().filter((m) => !m.sent).length;
 
 /** The server's weight when somebody else changed it under our draft, else null. */
 export function changedElsewhere(label) {
   const d = draft().weights.get(label.id);
-  return d && !d.sent && !same(label.weight, d.base) ? label.weight : null;
+  return d && !d.sent && draft().sentVersion === null && !same(label.weight, d.base) ? label.weight : null;
 }
+
+/** Whether somebody else changed under our draft the weight of unseen or of puzzling ground. */
+export const termsChangedElsewhere = (vehicle) =>
+  draft().sentVersion === null && [...draft().terms].some(([name, t]) => !t.sent && t.base !== null && !same(serverTerm(vehicle, name) ?? NaN, t.base));
 
 /** Drops sent values once the server's own state carries them. */
 export function settle(vehicle) {
@@ -63,7 +72,7 @@ export function settle(vehicle) {
   const slot = slotOf(vehicle, "utility");
   if (d.sentVersion === null || !slot || slot.version < d.sentVersion) return;
   for (const [id, w] of d.weights) if (w.sent) d.weights.delete(id);
-  if (d.explorationSent && serverExploration(vehicle) !== null) d.exploration = null;
+  for (const [name, t] of d.terms) if (t.sent && serverTerm(vehicle, name) !== null) d.terms.delete(name);
   d.sentVersion = null;
 }
 
@@ -75,12 +84,13 @@ export async function send(vehicle, labels) {
   d.busy = true;
   d.error = null;
   store.tell("draft");
-  const moved = [...d.weights.entries()];
+  const sending = moved();
+  const terms = Object.fromEntries(Object.keys(TERMS).map((name) => [name, term(vehicle, name)]));
   try {
-    const answer = await sendUtility(vehicle.id, weights, exploration(vehicle));
+    const answer = await sendUtility(vehicle.id, { weights, ...terms });
     d.sentVersion = answer.version;
-    for (const [id, w] of moved) if (d.weights.get(id) === w) w.sent = true;
-    if (d.exploration !== null) d.explorationSent = true;
+    ours.sent(vehicle, answer.version);
+    for (const m of sending) m.sent = true;
   } catch (error) {
     d.error = error.message;
   }

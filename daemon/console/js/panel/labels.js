@@ -4,9 +4,11 @@ import { $, h, keyed, show, text } from "../dom.js";
 import { shownLabels } from "../book.js";
 import { recall, remember } from "../prefs.js";
 import { isStale, store } from "../store.js";
-import { discard, draft, exploration, send, serverExploration, setExploration, settle, unsent, weight } from "./draft.js";
+import { discard, draft, ours, send, serverTerm, setTerm, settle, term, termsChangedElsewhere, unsent, weight } from "./draft.js";
 import { makeRow, refreshRow } from "./label-row.js";
 import { lifeline, slotOf } from "./lifeline.js";
+import { othersNote } from "./ours.js";
+import { plannerPart, refreshPlanner } from "./planner.js";
 
 const ORDERS = {
   id: (a, b) => a.id - b.id,
@@ -15,15 +17,31 @@ const ORDERS = {
 };
 const line = lifeline("Weights");
 const empty = h("p.empty", {}, "No labels yet. They appear with the first cells of the map.");
-const slider = h("input", { type: "range", min: 0, max: 1, step: 0.05, id: "exploration", oninput: () => setExploration(store.vehicle, Number(slider.value)) });
-const value = h("output.value", { for: "exploration" });
-const explore = h("div.exploration", {},
-  h("label", { for: "exploration", title: "Weight of unexplored ground against known labels" }, "Unexplored"), slider, value);
+const terms = [
+  termRow("exploration", "Unexplored", "Weight of unexplored ground against known labels"),
+  termRow("curiosity", "Curiosity", "Weight of ground that the scene model explains badly (perplexity)"),
+];
+const others = othersNote(ours, "Weights");
 const go = h("button.primary", { type: "button", id: "send-weights", onclick: () => send(store.vehicle, labels()) }, "Send weights");
 const drop = h("button", { type: "button", onclick: discard }, "Discard");
 const error = h("p.error", { role: "alert" });
 const labels = () => (store.vehicle ? shownLabels(store.vehicle) : []);
 let shownVehicle = null;
+
+function termRow(name, words, hint) {
+  const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, id: name, oninput: () => setTerm(store.vehicle, name, slider.valueAsNumber) });
+  const value = h("output.value", { for: name });
+  const node = h("div.exploration", { data: { term: name } }, h("label", { for: name, title: hint }, words), slider, value);
+  const update = (vehicle) => {
+    const w = term(vehicle, name);
+    const known = serverTerm(vehicle, name) !== null || draft().terms.has(name);
+    if (slider.valueAsNumber !== w) slider.value = w;
+    text(value, w.toFixed(2));
+    value.title = known ? "" : "The daemon does not report this value; this is the default.";
+    node.classList.toggle("moved", draft().terms.has(name));
+  };
+  return { node, update };
+}
 
 export function startLabels() {
   const order = $("label-order");
@@ -32,8 +50,8 @@ export function startLabels() {
     remember("label-order", order.value);
     update();
   });
-  $("label-list").before(explore, empty);
-  $("send").append(h("div.buttons", {}, go, drop), error, line.node);
+  $("label-list").before(plannerPart, ...terms.map((t) => t.node), empty);
+  $("send").append(h("div.buttons", {}, go, drop), error, others.node, line.node);
   store.on("state select draft book highlight feed theme", update);
   store.on("tick", refreshLine);
 }
@@ -47,12 +65,8 @@ function update() {
   const rows = labels().sort(ORDERS[$("label-order").value] ?? ORDERS.id);
   keyed($("label-list"), rows, (l) => l.id, makeRow, refreshRow);
   show(empty, rows.length === 0);
-  const e = exploration(vehicle);
-  if (Number(slider.value) !== e) slider.value = e;
   $("labels").classList.toggle("stale", isStale(vehicle));
-  const known = serverExploration(vehicle) !== null || draft().exploration !== null;
-  text(value, e.toFixed(2));
-  value.title = known ? "" : "The daemon does not report this value; this is the default.";
+  for (const t of terms) t.update(vehicle);
   refreshLine();
 }
 
@@ -61,6 +75,8 @@ function refreshLine() {
   if (!vehicle) return;
   const d = draft();
   const slot = slotOf(vehicle, "utility");
+  refreshPlanner(vehicle);
+  others.update(vehicle, termsChangedElsewhere(vehicle) ? "Exploration or curiosity was changed by another console meanwhile; sending replaces it, Discard takes it over." : null);
   const n = unsent();
   const again = slot?.state === "refused";
   go.disabled = d.busy || !store.connected || labels().length === 0 || (n === 0 && !again);

@@ -1,11 +1,10 @@
 // The acoustic link: rates against the budget, bits by class, loss, delay, backlog.
 
-import { sendBudget } from "../api.js";
-import { $, h, row, show, text } from "../dom.js";
+import { $, h, row, text } from "../dom.js";
 import { bits, count, none, percent, rate, span } from "../format.js";
 import { ageOf, store } from "../store.js";
+import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
-import { lifeline, slotOf } from "./lifeline.js";
 
 const CLASSES = ["map", "confidence", "depth", "status", "directive", "fix", "exemplar", "overhead"];
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
@@ -13,10 +12,6 @@ const history = h("canvas", { role: "img" });
 const values = {};
 const list = h("dl.values");
 const classes = h("table.classes");
-const budget = h("input", { type: "number", id: "budget", min: 1, step: 1, required: true, oninput: () => (edited = true) });
-const line = lifeline("Budget");
-let edited = false;
-const error = h("p.error", { role: "alert" });
 const age = h("p.age");
 
 function direction(name, title) {
@@ -34,38 +29,19 @@ export function startLink() {
   }
   classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
     h("tbody", {}, ...CLASSES.map((c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td")))));
-  const form = h("form.budget", { onsubmit: submit, onkeydown: (event) => event.key === "Escape" && forget() },
-    h("label", { for: "budget" }, "Budget, bit/s"), budget, h("button", { type: "submit" }, "Set"));
   $("link").append(h("header", {}, h("h2", { id: "link-title" }, "Link"), age),
-    directions.up.node, directions.down.node, history, list, classes, form, error, line.node);
+    directions.up.node, directions.down.node, history, list, classes, ...budgetParts);
   store.on("state feed theme", update);
   store.on("tick", refreshAge);
+  store.on("draft select", refreshBudget);
   new ResizeObserver(update).observe(history);
-}
-
-async function submit(event) {
-  event.preventDefault();
-  text(error, "");
-  try {
-    await sendBudget(Math.round(Number(budget.value)));
-    edited = false;
-  } catch (problem) {
-    text(error, problem.message);
-  }
-}
-
-function forget() {
-  edited = false;
-  update();
 }
 
 function refreshAge() {
   if (!store.snapshot) return;
   const old = ageOf(store.snapshot.now_s);
   text(age, store.connected ? "now" : `${span(old)} old`);
-  const slot = slotOf(store.vehicle, "budget");
-  show(line.node, slot !== null);
-  line.update(slot);
+  refreshBudget();
 }
 
 function update() {
@@ -84,7 +60,6 @@ function update() {
   values.trip(link.round_trip_s === null ? none : `${link.round_trip_s.toFixed(2)} s`);
   values.backlog(backlog(link));
   refreshClasses(link);
-  if (!edited) budget.value = link.budget_bps;
   history.setAttribute("aria-label", `Rate over time. Up now ${rate(link.up.bps_1min)}, down ${rate(link.down.bps_1min)}, budget ${rate(link.budget_bps)}.`);
   drawHistory(history, link, store.snapshot.now_s);
   refreshAge();

@@ -1,8 +1,12 @@
-// On narrow screens the panels share one place; these are their tabs.
+// The panels share one place; these are their tabs. On wide screens labels have a place of their own, and vehicle and
+// link stand together.
 
 import { $, h } from "../dom.js";
+import { store } from "../store.js";
 
-const PANELS = [["labels", "Labels"], ["vehicle", "Vehicle"], ["link", "Link"]];
+const PANELS = [["labels", "Labels"], ["vehicle", "Vehicle"], ["constraints", "Constraints"], ["link", "Link"]];
+const WIDE = matchMedia("(min-width: 1101px)");
+const ofWide = (id) => (id === "constraints" ? id : "vehicle");
 
 export function startTabs() {
   const bar = $("tabs");
@@ -12,12 +16,14 @@ export function startTabs() {
   bar.addEventListener("keydown", (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     if (!step) return;
-    const at = PANELS.findIndex(([id]) => id === document.body.dataset.tab);
-    const [next] = PANELS[(at + step + PANELS.length) % PANELS.length];
+    const offered = PANELS.filter(([id]) => !WIDE.matches || ofWide(id) === id);
+    const at = offered.findIndex(([id]) => id === document.body.dataset.tab);
+    const [next] = offered[(at + step + offered.length) % offered.length];
     choose(next);
     $(`tab-${next}`).focus();
   });
-  choose("labels");
+  WIDE.addEventListener("change", () => choose(WIDE.matches ? ofWide(document.body.dataset.tab) : document.body.dataset.tab));
+  choose(WIDE.matches ? "vehicle" : "labels");
 }
 
 function choose(chosen) {
@@ -27,4 +33,5 @@ function choose(chosen) {
     tab.setAttribute("aria-selected", String(id === chosen));
     tab.tabIndex = id === chosen ? 0 : -1;
   }
+  store.tell("tab");
 }

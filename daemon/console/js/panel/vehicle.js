@@ -1,14 +1,13 @@
-// The chosen vehicle: where it says it is, what it does, the slots of its directive, hold.
+// The chosen vehicle: where it says it is, what it does, the slots of its directive.
 
-import { sendHold } from "../api.js";
 import { $, h, keyed, row, show, text } from "../dom.js";
 import { ago, count, degrees, metres, missionTime, none, span } from "../format.js";
 import { bearing } from "../map/measure.js";
 import { ageOf, isStale, store } from "../store.js";
-import { contact } from "./banners.js";
-import { describe, lifeline, slotOf, word } from "./lifeline.js";
+import { describe, word } from "./lifeline.js";
+import { refreshStop, stopParts } from "./stop.js";
 
-const NAMES = { utility: "Weights", constraints: "Constraints", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Pictures", fix: "Position fix" };
+const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Pictures", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
 const age = h("p.age");
@@ -16,9 +15,6 @@ const values = {};
 const list = h("dl.values");
 const slots = h("ul.slots");
 const nothing = h("p.note", {}, "Nothing sent yet.");
-const hold = h("button", { type: "button", id: "hold", onclick: confirmHold });
-const line = lifeline("Constraints");
-const error = h("p.error", { role: "alert" });
 
 export function startVehicle() {
   for (const [key, name, hint] of [
@@ -32,8 +28,8 @@ export function startVehicle() {
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
-    h("h3", {}, "Directive"), slots, nothing, h("div.buttons", {}, hold), error, line.node);
-  store.on("state select tick feed", update);
+    h("h3", {}, "Directive"), slots, nothing, ...stopParts);
+  store.on("state select tick feed draft", update);
 }
 
 function update() {
@@ -57,11 +53,7 @@ function update() {
   values.gps(gps(store.snapshot.position));
   keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
   show(nothing, v.directive.slots.length === 0);
-  text(hold, s?.mode === "hold" ? "Resume survey" : "Hold position");
-  hold.disabled = !store.connected;
-  const slot = slotOf(v, "constraints");
-  show(line.node, slot !== null);
-  line.update(slot);
+  refreshStop(v);
 }
 
 const total = (counts) => Object.values(counts).reduce((sum, n) => sum + n, 0);
@@ -90,27 +82,4 @@ function refreshSlot(node, slot) {
   text(since, span(ageOf(slot.changed_s)));
   node.dataset.state = slot.state;
   node.title = describe(slot);
-}
-
-function confirmHold() {
-  const v = store.vehicle;
-  const holding = v.status?.mode === "hold";
-  const dialog = $("dialog");
-  dialog.replaceChildren(
-    h("h2", { id: "dialog-title" }, holding ? `Let ${v.name} resume its survey?` : `Hold ${v.name} where it is?`),
-    h("p", {}, `The order goes out with the surface's next turn. ${contact(v)}`),
-    h("div.buttons", {},
-      h("button", { type: "button", onclick: () => dialog.close() }, "Cancel"),
-      h("button.primary", { type: "button", onclick: () => (order(v, !holding), dialog.close()) }, holding ? "Resume" : "Hold")),
-  );
-  dialog.showModal();
-}
-
-async function order(v, on) {
-  text(error, "");
-  try {
-    await sendHold(v.id, on);
-  } catch (problem) {
-    text(error, problem.message);
-  }
 }

@@ -1,0 +1,138 @@
+// Fences on the map: in force solid, under way dashed, refused dotted, and the one being edited with its corners.
+
+import { FONT, haloText } from "../map/overlays.js";
+import { slotOf } from "../panel/lifeline.js";
+import { store } from "../store.js";
+import { fenceOrder, middle, pen } from "./edit.js";
+import { faults, fromServer, nameOutline } from "./plan.js";
+
+const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], heard: [9, 6], refused: [2, 5] };
+const inForce = new Map();
+
+/** The fence last seen to be applied: one that is still on its way does not replace it. Null: not known here. */
+export function known(vehicle) {
+  const { mission } = store.snapshot;
+  const key = `${mission.id ?? mission.name}.${vehicle.id}`;
+  const slot = slotOf(vehicle, "fence");
+  if (slot?.state === "applied") inForce.set(key, { version: slot.version, fence: vehicle.fence });
+  return inForce.get(key) ?? null;
+}
+
+export function drawFences(c, view, ink, vehicle, chosen) {
+  const slot = slotOf(vehicle, "fence");
+  c.globalAlpha = chosen ? 1 : 0.55;
+  const force = known(vehicle);
+  if (force) drawPlan(c, view, ink, fromServer(force.fence), [], "");
+  if (slot && slot.state !== "applied" && vehicle.fence) {
+    drawPlan(c, view, ink, fromServer(vehicle.fence), DASH[slot.state] ?? [9, 6], slot.state === "refused" ? "refused" : "not in force yet");
+  }
+  c.globalAlpha = 1;
+  if (!chosen || !pen.shown) return;
+  const plan = fenceOrder.value(vehicle);
+  const edited = fenceOrder.changed(vehicle);
+  if (edited) drawEdited(c, view, ink, plan, fromServer(vehicle.fence));
+  drawHandles(c, view, ink, plan);
+}
+
+/** Only what the edit has changed is drawn as a draft: the rest is as it was sent. */
+function drawEdited(c, view, ink, plan, sent) {
+  const wrong = faults(plan);
+  const known = new Set(sent.outlines.map((o) => JSON.stringify(o)));
+  const changed = plan.outlines.map((o, i) => wrong.outlines[i] !== null || !known.has(JSON.stringify(o)));
+  const home = JSON.stringify(plan.home) === JSON.stringify(sent.home) && !wrong.home ? null : plan.home;
+  drawPlan(c, view, ink, { ...plan, home }, [4, 3], "draft", wrong, changed);
+}
+
+/** Lines over any label: a wide halo, then the tone. */
+function stroke(c, ink, tone, dash, width = 2.5) {
+  c.lineJoin = "round";
+  for (const [style, w, d] of [[ink.sea, width + 2.5, []], [tone, width, dash]]) {
+    c.strokeStyle = style;
+    c.lineWidth = w;
+    c.setLineDash(d);
+    c.stroke();
+  }
+  c.setLineDash([]);
+}
+
+function drawPlan(c, view, ink, plan, dash, word, wrong = null, changed = null) {
+  for (const [i, { kind, points }] of plan.outlines.entries()) {
+    if (points.length === 0 || changed?.[i] === false) continue;
+    const tone = wrong?.outlines[i] ? ink.bad : kind === "fence" ? ink.fence : ink.keepout;
+    const corners = points.map((p) => view.toScreen(...p));
+    c.beginPath();
+    for (const p of corners) c.lineTo(...p);
+    c.closePath();
+    if (kind === "keep_out") hatch(c, corners, tone);
+    c.beginPath();
+    for (const p of corners) c.lineTo(...p);
+    c.closePath();
+    stroke(c, ink, tone, dash);
+    name(c, view, ink, corners, nameOutline(plan, i) + (word && `, ${word}`));
+  }
+  if (plan.home) drawHome(c, view, ink, plan.home, wrong?.home ? ink.bad : ink.fence, word);
+}
+
+/** Slanting lines within the path: where the vehicle must not go, without hiding the labels. */
+function hatch(c, corners, tone) {
+  const xs = corners.map((p) => p[0]);
+  const ys = corners.map((p) => p[1]);
+  const [left, right] = [Math.max(Math.min(...xs), -50), Math.min(Math.max(...xs), c.canvas.width + 50)];
+  const [top, bottom] = [Math.max(Math.min(...ys), -50), Math.min(Math.max(...ys), c.canvas.height + 50)];
+  c.save();
+  c.clip("evenodd");
+  c.beginPath();
+  const gap = 9;
+  for (let x = Math.floor((left - (bottom - top)) / gap) * gap; x < right; x += gap) {
+    c.moveTo(x, bottom);
+    c.lineTo(x + (bottom - top), top);
+  }
+  c.globalAlpha *= 0.65;
+  c.strokeStyle = tone;
+  c.lineWidth = 1.5;
+  c.stroke();
+  c.restore();
+}
+
+function name(c, view, ink, corners, words) {
+  const [x, y] = corners.reduce((a, b) => (b[1] < a[1] - 1 || (b[1] < a[1] + 1 && b[0] < a[0]) ? b : a));
+  c.font = FONT;
+  const left = x > view.width - 140;
+  c.textAlign = left ? "right" : "left";
+  haloText(c, words, x + (left ? -8 : 8), y - 7, ink);
+}
+
+function drawHome(c, view, ink, home, tone, word) {
+  const [x, y] = view.toScreen(...home);
+  c.beginPath();
+  c.arc(x, y, 8, 0, 2 * Math.PI);
+  c.moveTo(x - 4, y);
+  c.lineTo(x + 4, y);
+  c.moveTo(x, y - 4);
+  c.lineTo(x, y + 4);
+  stroke(c, ink, tone, []);
+  c.font = FONT;
+  c.textAlign = "left";
+  haloText(c, word ? `Return point, ${word}` : "Return point", x + 13, y + 4, ink);
+}
+
+function drawHandles(c, view, ink, plan) {
+  for (const [i, { points }] of plan.outlines.entries()) {
+    points.forEach((p, k) => {
+      const [x, y] = view.toScreen(...p);
+      if (points.length > 2 && pen.tool === null) dot(c, ink, view.toScreen(...middle(p, points[(k + 1) % points.length])), 3.5, ink.sea);
+      const chosen = pen.outline === i && pen.corner === k;
+      dot(c, ink, [x, y], chosen ? 8 : 6, chosen ? ink.accent : ink.craft);
+    });
+  }
+}
+
+function dot(c, ink, [x, y], radius, fill) {
+  c.beginPath();
+  c.arc(x, y, radius, 0, 2 * Math.PI);
+  c.fillStyle = fill;
+  c.fill();
+  c.lineWidth = 1.5;
+  c.strokeStyle = ink.text;
+  c.stroke();
+}

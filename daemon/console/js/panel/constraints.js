@@ -1,0 +1,29 @@
+// Where the vehicle may go and when it stops by itself: fence and limits.
+
+import { $, h } from "../dom.js";
+import { fenceOrder, finish, pen } from "../fence/edit.js";
+import { store } from "../store.js";
+import { fencePart, update as updateFence } from "./fence.js";
+import { limitsOrder, limitsPart, update as updateLimits } from "./limits.js";
+
+export function startConstraints() {
+  $("constraints").append(h("header", {}, h("h2", { id: "constraints-title" }, "Constraints")), fencePart, limitsPart);
+  store.on("state select draft feed", update);
+  store.on("tick", () => pen.shown && update());
+  store.on("tab", () => {
+    const shown = document.body.dataset.tab === "constraints";
+    if (pen.shown && !shown && store.vehicle && pen.tool) finish();
+    pen.shown = shown;
+    update();
+    store.tell("draft");
+  });
+}
+
+function update() {
+  updateFence();
+  updateLimits();
+  const v = store.vehicle;
+  const unsent = Boolean(v) && (fenceOrder.changed(v) || limitsOrder.changed(v));
+  $("tab-constraints").classList.toggle("unsent", unsent);
+  $("tab-constraints").title = unsent ? "Edits that were not sent" : "";
+}

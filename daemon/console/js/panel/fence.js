@@ -1,0 +1,152 @@
+// The fence in the panel: its outlines with their corners as numbers, what is wrong with them, sending.
+
+import { $, announce, h, keyed, show, text } from "../dom.js";
+import { known } from "../fence/draw.js";
+import { addCorner, begin, fenceOrder, finish, middle, pen, plan, put, removeCorner, removeOutline, setCorner, setHome } from "../fence/edit.js";
+import { faults, fromServer, isSound, nameOutline } from "../fence/plan.js";
+import { metres } from "../format.js";
+import { store } from "../store.js";
+import { slotOf } from "./lifeline.js";
+import { orderFoot } from "./order.js";
+
+const list = h("ul.outlines");
+const hint = h("p.hint", { role: "status" });
+const state = h("p.note");
+const frame = h("p.note");
+const tools = {
+  fence: h("button", { type: "button", onclick: () => onMap(() => begin("fence")) }, "Draw fence"),
+  keepOut: h("button", { type: "button", onclick: () => onMap(() => begin("keep_out")) }, "Add keep-out"),
+  home: h("button", { type: "button", onclick: () => onMap(() => put(pen.tool === "home" ? null : "home")) }, "Place return point"),
+  done: h("button.primary", { type: "button", onclick: finish }, "Done drawing"),
+};
+const takeForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(known(store.vehicle).fence)) }, "Edit the one in force");
+const homePlace = place("Return point", (p) => setHome(p));
+const clearHome = h("button.undo", { type: "button", onclick: () => setHome(null) }, "Remove");
+clearHome.setAttribute("aria-label", "Remove the return point");
+const homeFault = h("p.error", { role: "alert" });
+const homeBox = h("div.outline", {}, h("div.head", {}, h("b", {}, "Return point"), clearHome), homePlace.node, homeFault);
+const foot = orderFoot(fenceOrder, "Fence", "send-fence");
+const latest = new WeakMap();
+const open = new Set();
+
+export const fencePart = h("section.part", { "aria-labelledby": "fence-title" },
+  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, takeForce, frame,
+  h("div.buttons", {}, tools.fence, tools.keepOut, tools.home, tools.done), hint, list, homeBox, foot.node);
+
+/** Takes up a tool and goes on to the map, where it is used. */
+function onMap(take) {
+  take();
+  $("chart").focus({ preventScroll: true });
+}
+
+/** Two number fields for a place in metres; `set([x, y])` when both are numbers. */
+function place(name, set) {
+  const field = (axis) => h("input", { type: "number", step: 0.1, "aria-label": `${name}, metres ${axis}`, oninput: said });
+  const [east, north] = [field("east"), field("north")];
+  function said() {
+    const p = [east.valueAsNumber, north.valueAsNumber];
+    if (p.every(Number.isFinite)) set(p);
+  }
+  const node = h("div.place", {}, h("span.axis", { "aria-hidden": "true" }, "E"), east, h("span.axis", { "aria-hidden": "true" }, "N"), north);
+  const update = (p) => [east, north].forEach((f, n) => {
+    if (f.valueAsNumber !== p[n] && document.activeElement !== f) f.value = p[n];
+  });
+  return { node, update };
+}
+
+function makeOutline() {
+  const node = h("li.outline");
+  const at = () => latest.get(node);
+  const corners = h("ol.corners");
+  const more = h("button.quiet", { type: "button", onclick: () => flip(at()) });
+  const title = h("b");
+  const draw = h("button.undo", { type: "button", onclick: () => onMap(() => put("corner", at())) }, "Add corners");
+  const drop = h("button.undo", { type: "button", onclick: () => removeOutline(at()) }, "Delete");
+  const fault = h("p.error", { role: "alert" });
+  node.append(h("div.head", {}, title, more, draw, drop), corners, fault);
+  node.parts = { corners, more, title, draw, drop, fault };
+  return node;
+}
+
+function flip(i) {
+  if (!open.delete(i)) open.add(i);
+  update();
+}
+
+function refreshOutline(node, { outline, i, name, fault }) {
+  latest.set(node, i);
+  const { corners, more, title, draw, drop, fault: problem } = node.parts;
+  const n = outline.points.length;
+  text(title, name);
+  text(more, `${n} ${n === 1 ? "corner" : "corners"}`);
+  more.setAttribute("aria-expanded", String(open.has(i)));
+  more.setAttribute("aria-label", `${name}: ${n} ${n === 1 ? "corner" : "corners"}, as numbers`);
+  draw.setAttribute("aria-label", `Add corners to ${name} on the map`);
+  drop.setAttribute("aria-label", `Delete ${name}`);
+  show(problem, fault !== null);
+  text(problem, fault ?? "");
+  show(corners, open.has(i));
+  const rows = open.has(i) ? outline.points.map((p, k) => ({ p, k })) : [];
+  keyed(corners, rows, (r) => `${i}.${r.k}`, (r) => makeCorner(i, r.k, name), refreshCorner);
+}
+
+function makeCorner(i, k, name) {
+  const fields = place(`${name}, corner ${k + 1}`, (p) => setCorner(i, k, p));
+  const after = h("button.undo", { type: "button", title: "Add a corner after this one", onclick: () => {
+    const { points } = plan().outlines[i];
+    addCorner(i, k + 1, middle(points[k], points[(k + 1) % points.length]));
+  } }, "+");
+  after.setAttribute("aria-label", `Add a corner after corner ${k + 1} of ${name}`);
+  const drop = h("button.undo", { type: "button", onclick: () => (removeCorner(i, k), announce(`Corner ${k + 1} deleted`)) }, "\u00d7");
+  drop.setAttribute("aria-label", `Delete corner ${k + 1} of ${name}`);
+  const node = h("li", {}, h("span.axis", {}, String(k + 1)), fields.node, after, drop);
+  node.fields = fields;
+  return node;
+}
+
+function refreshCorner(node, { p, k }) {
+  node.fields.update(p);
+  node.classList.toggle("chosen", pen.corner === k && pen.outline === latest.get(node.closest(".outline")));
+}
+
+const HINTS = {
+  corner: "Click the map for each corner; click the first one again, or Done, to close. By keys: Enter sets one at the cross, Escape ends.",
+  home: "Click the map where the vehicle shall return to. By keys: Enter sets it at the cross.",
+};
+
+export function update() {
+  const vehicle = store.vehicle;
+  if (!vehicle) return;
+  const { outlines, home } = plan();
+  if (pen.tool === "corner" && !outlines[pen.outline]) put(null);
+  const wrong = faults(plan());
+  foot.update(vehicle, !isSound(plan()));
+  text(tools.fence, outlines[0]?.kind === "fence" ? "Extend fence" : "Draw fence");
+  tools.home.setAttribute("aria-pressed", String(pen.tool === "home"));
+  for (const [name, node] of Object.entries(tools)) show(node, (name === "done") === (pen.tool === "corner"));
+  text(hint, HINTS[pen.tool] ?? (outlines.length > 0 ? "Drag corners on the map; the small dots between add one. Keys: N and P choose, Shift with arrows moves, Delete removes." : ""));
+  keyed(list, outlines.map((outline, i) => ({ outline, i, name: nameOutline(plan(), i), fault: wrong.outlines[i] })), (o) => o.i, makeOutline, refreshOutline);
+  show(homeBox, home !== null);
+  if (home) homeFaultShown(home, wrong.home);
+  text(state, describe(vehicle));
+  const by = vehicle.map.placement;
+  show(frame, Boolean(by));
+  if (by) text(frame, `In metres of its own map, which lies ${metres(by.east_m)} east and ${metres(by.north_m)} north in the world.`);
+  show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && known(vehicle) !== null);
+}
+
+function homeFaultShown(at, fault) {
+  homePlace.update(at);
+  show(homeFault, fault !== null);
+  text(homeFault, fault ?? "");
+}
+
+/** What holds now, as far as this page knows. */
+function describe(vehicle) {
+  const slot = slotOf(vehicle, "fence");
+  if (!slot) return "None was sent.";
+  if (slot.state === "applied") return "In force as drawn with solid lines.";
+  const before = known(vehicle);
+  if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
+  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "Which one is in force meanwhile is not known here.";
+}

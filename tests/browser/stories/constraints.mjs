@@ -1,0 +1,298 @@
+import assert from "node:assert/strict";
+import { PHONE } from "../stage.mjs";
+
+const open = (s) => s.page.getByRole("tab", { name: "Constraints" }).click();
+const state = async (s) => s.vehicle((await s.inPage(({ store }) => store.selectedId)));
+const field = (s, name) => s.page.getByLabel(name, { exact: true });
+const sendFence = (s) => s.page.locator("#send-fence");
+const sendLimits = (s) => s.page.locator("#send-limits");
+const slot = async (s, name) => (await state(s)).directive.slots.find((x) => x.slot === name);
+
+/** Clicks places of the map given as shares of its width and height. */
+async function click(s, ...places) {
+  const box = await s.page.locator("#chart").boundingBox();
+  for (const [x, y] of places) await s.page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+}
+
+async function clear(s) {
+  await open(s);
+  for (const b of await s.page.getByRole("button", { name: /^Delete (Fence|Keep-out)/ }).all()) await b.click();
+}
+
+async function draw(s, tool, ...places) {
+  await s.button(tool).click();
+  await click(s, ...places);
+  await s.button("Done drawing").click();
+}
+
+const AROUND = [[0.03, 0.06], [0.97, 0.06], [0.97, 0.94], [0.03, 0.94]];
+const CROSSED = [[0.1, 0.1], [0.3, 0.3], [0.3, 0.1], [0.1, 0.3]];
+
+/** Colours along a line of the map, for what is drawn solid and what dashed: the share of pixels in `tone`. */
+const share = (s, from, to, tone) => s.inPage(({ view }, [a, b, name]) => {
+  const c = document.getElementById("chart").getContext("2d");
+  const wanted = getComputedStyle(document.documentElement).getPropertyValue(name).match(/[0-9a-f]{2}/gi).map((v) => parseInt(v, 16));
+  let hits = 0;
+  for (let i = 0; i < 400; i += 1) {
+    const [x, y] = view.toScreen(a[0] + ((b[0] - a[0]) * i) / 400, a[1] + ((b[1] - a[1]) * i) / 400);
+    const seen = c.getImageData(Math.floor(x), Math.floor(y), 1, 1).data;
+    hits += wanted.every((v, n) => Math.abs(v - seen[n]) < 12) ? 1 : 0;
+  }
+  return hits / 400;
+}, [from, to, tone]);
+
+export default [
+  {
+    name: "a fence drawn on the map is sent, followed, and stays with the vehicle",
+    async run(s) {
+      await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
+      await clear(s);
+      await s.button("Fit").click();
+      await draw(s, "Draw fence", ...AROUND);
+      const before = (await slot(s, "fence"))?.version ?? 0;
+      await sendFence(s).click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));
+      assert.equal(s.posts.at(-1).body.fence.length, 4);
+      await s.shows("[aria-labelledby=fence-title] .steps [aria-current]", /Applied|Refused/, { ms: 240000, advance: 2 });
+      assert.ok((await slot(s, "fence")).version > before);
+      assert.deepEqual((await state(s)).fence.fence, s.posts.at(-1).body.fence);
+    },
+  },
+  {
+    name: "a fence under way is dashed, one in force solid",
+    scenario: "rich",
+    async run(s) {
+      const fence = [[-11, -8], [18, -8], [18, 14], [-11, 14]];
+      await s.steer({ loss: 1 });
+      await s.post("/vehicles/1/fence", { fence });
+      await s.until("a dashed line", async () => {
+        const seen = await share(s, fence[0], fence[3], "--map-fence");
+        return seen > 0.4 && seen < 0.8;
+      });
+      await s.steer({ loss: 0, advance: 60 });
+      await s.until("a solid line", async () => (await share(s, fence[0], fence[3], "--map-fence")) > 0.95);
+      await s.steer({ loss: 1 });
+      const other = [[-13, -8], [18, -8], [18, 14], [-13, 14]];
+      await s.post("/vehicles/1/fence", { fence: other });
+      await s.until("both", async () => (await share(s, other[0], other[3], "--map-fence")) > 0.4 && (await share(s, fence[0], fence[3], "--map-fence")) > 0.95);
+      await open(s);
+      await s.shows("[aria-labelledby=fence-title] .note", /Version 1 stays in force meanwhile/);
+    },
+  },
+  {
+    name: "a fence that the vehicle refuses says why",
+    scenario: "rich",
+    async run(s) {
+      await open(s);
+      await s.steer({ refuse: "fence", loss: 0 });
+      await draw(s, "Draw fence", ...AROUND);
+      await sendFence(s).click();
+      await s.shows("[aria-labelledby=fence-title] .lifeline", /Refused.*the vehicle is outside of it/s, { advance: 3 });
+      assert.match(await sendFence(s).innerText(), /again/);
+    },
+  },
+  {
+    name: "after a refusal the fence in force can be taken up again",
+    scenario: "rich",
+    async run(s) {
+      const force = [[-20, -20], [30, -20], [30, 30], [-20, 30]];
+      await open(s);
+      await s.steer({ loss: 0 });
+      await s.post("/vehicles/1/fence", { fence: force });
+      await s.shows("[aria-labelledby=fence-title] .steps [aria-current]", /Applied/, { advance: 2 });
+      await s.steer({ refuse: "fence" });
+      await s.post("/vehicles/1/fence", { fence: [[50, 50], [60, 50], [60, 60]] });
+      await s.shows("[aria-labelledby=fence-title] .note", /Version 1 stays in force \(solid lines\)/, { advance: 2 });
+      await s.button("Edit the one in force").click();
+      await sendFence(s).click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));
+      assert.deepEqual(s.posts.at(-1).body.fence, force);
+    },
+  },
+  {
+    name: "an outline that crosses itself or has too few corners is not sent, and says so beside it",
+    async run(s) {
+      await clear(s);
+      await s.button("Add keep-out").click();
+      await click(s, CROSSED[0], CROSSED[1]);
+      await s.shows(".outline .error", /2 corners: it takes 3 to 34/);
+      assert.ok(await sendFence(s).isDisabled());
+      await click(s, CROSSED[2], CROSSED[3]);
+      await s.shows(".outline .error", /side after corner 1 crosses or touches the one after corner 3/);
+      assert.ok(await sendFence(s).isDisabled());
+      await s.button("Done drawing").click();
+      await s.page.getByRole("button", { name: "Keep-out 1: 4 corners, as numbers" }).click();
+      await s.page.getByRole("button", { name: "Delete corner 4 of Keep-out 1" }).click();
+      await s.until("no fault", async () => !(await s.page.locator(".outlines .error").first().isVisible()));
+      assert.equal(await sendFence(s).isDisabled(), false);
+      await s.button("Discard fence edits").click();
+    },
+  },
+  {
+    name: "a corner is dragged, a side gets one more, and a chosen one is deleted",
+    scenario: "rich",
+    async run(s) {
+      await open(s);
+      await draw(s, "Draw fence", ...AROUND);
+      const plan = () => s.inPage(async () => (await import("/js/fence/edit.js")).plan().outlines[0].points);
+      const first = await plan();
+      const box = await s.page.locator("#chart").boundingBox();
+      const drag = async (from, to) => {
+        await s.page.mouse.move(box.x + from[0] * box.width, box.y + from[1] * box.height);
+        await s.page.mouse.down();
+        await s.page.mouse.move(box.x + to[0] * box.width, box.y + to[1] * box.height, { steps: 5 });
+        await s.page.mouse.up();
+      };
+      await drag(AROUND[0], [0.1, 0.2]);
+      const moved = await plan();
+      assert.ok(moved[0][0] > first[0][0] && moved[0][1] < first[0][1], `${first[0]} -> ${moved[0]}`);
+      assert.deepEqual(moved.slice(1), first.slice(1));
+      await drag([0.97, 0.5], [0.9, 0.5]);
+      assert.equal((await plan()).length, 5);
+      await s.page.locator("#chart").focus();
+      await s.page.keyboard.press("Delete");
+      assert.deepEqual(await plan(), moved);
+    },
+  },
+  {
+    name: "a fence is drawn, moved and sent by keys alone",
+    scenario: "rich",
+    async run(s) {
+      await s.page.locator("#tab-vehicle").focus();
+      await s.page.keyboard.press("ArrowRight");
+      await s.button("Draw fence").focus();
+      await s.page.keyboard.press("Enter");
+      const press = async (key, times) => {
+        for (let i = 0; i < times; i += 1) await s.page.keyboard.press(key);
+      };
+      await press("ArrowLeft", 5), await press("ArrowUp", 4), await press("Enter", 1);
+      await press("ArrowRight", 10), await press("Enter", 1);
+      await press("ArrowDown", 8), await press("Enter", 1);
+      await press("ArrowLeft", 10), await press("Enter", 1);
+      await press("Escape", 1);
+      const plan = () => s.inPage(async () => (await import("/js/fence/edit.js")).plan().outlines[0].points);
+      const drawn = await plan();
+      assert.equal(drawn.length, 4);
+      await press("n", 1);
+      await press("Shift+ArrowRight", 2);
+      const moved = await plan();
+      assert.ok(moved[0][0] > drawn[0][0] && moved[0][1] === drawn[0][1]);
+      await sendFence(s).focus();
+      await press("Enter", 1);
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));
+      assert.deepEqual(s.posts.at(-1).body.fence, moved);
+    },
+  },
+  {
+    name: "corners are set with a finger on a phone without panning the map",
+    scenario: "rich",
+    size: PHONE,
+    async run(s) {
+      await open(s);
+      await s.button("Draw fence").click();
+      const box = await s.page.locator("#chart").boundingBox();
+      const before = await s.inPage(({ view }) => [view.east, view.north]);
+      for (const [x, y] of [[0.1, 0.2], [0.9, 0.2], [0.5, 0.9]]) await s.page.touchscreen.tap(box.x + x * box.width, box.y + y * box.height);
+      await s.button("Done drawing").click();
+      assert.deepEqual(await s.inPage(({ view }) => [view.east, view.north]), before);
+      await s.page.getByRole("button", { name: "Fence: 3 corners, as numbers" }).waitFor();
+      assert.equal(await sendFence(s).isDisabled(), false);
+    },
+  },
+  {
+    name: "a return point outside the fence is objected to at once",
+    scenario: "rich",
+    async run(s) {
+      await open(s);
+      await draw(s, "Draw fence", [0.3, 0.3], [0.7, 0.3], [0.7, 0.7], [0.3, 0.7]);
+      await s.button("Place return point").click();
+      await click(s, [0.1, 0.1]);
+      await s.shows("[aria-labelledby=fence-title] > .outline .error", /outside the fence/);
+      assert.ok(await sendFence(s).isDisabled());
+      await s.page.getByRole("button", { name: "Remove the return point" }).click();
+      assert.equal(await sendFence(s).isDisabled(), false);
+    },
+  },
+  {
+    name: "limits are checked as they are typed, sent as a whole and followed",
+    async run(s) {
+      await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
+      await open(s);
+      await field(s, "Depth, m, lowest").fill("50");
+      await field(s, "Depth, m, highest").fill("0.5");
+      await s.shows("#depth_m-fault", /lowest must be below the highest/);
+      assert.ok(await sendLimits(s).isDisabled());
+      await field(s, "Depth, m, lowest").fill("0");
+      await field(s, "Depth, m, highest").fill("");
+      await s.shows("#depth_m-fault", /both ends, or neither/);
+      await field(s, "Depth, m, highest").fill("500");
+      await field(s, "Silence, s").fill("0");
+      await s.shows("#silence_s-fault", /whole numbers from 1 to 65535/);
+      await field(s, "Silence, s").fill("900");
+      await s.page.getByLabel("On silence").selectOption("return");
+      await sendLimits(s).click();
+      await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/limits")));
+      const kept = s.posts.at(-1).body;
+      assert.deepEqual([kept.depth_m, kept.silence_s, kept.on_silence], [[0, 500], 900, "return"]);
+      await s.shows("[aria-labelledby=limits-title] .steps [aria-current]", /Applied/, { ms: 240000, advance: 2 });
+      assert.equal((await state(s)).limits.silence_s, 900);
+    },
+  },
+  {
+    name: "abort needs a second, deliberate yes",
+    async run(s) {
+      await s.page.locator("#abort").click();
+      const go = s.page.locator("#dialog .primary");
+      assert.ok(await go.isDisabled());
+      await s.button("Cancel").click();
+      assert.equal(s.posts.length, 0);
+      if (!s.mocked) return;
+      await s.page.locator("#abort").click();
+      await s.page.getByLabel("Yes, abort").check();
+      await go.click();
+      await s.until("the message", () => s.posts.length > 0);
+      assert.deepEqual(s.posts.at(-1).body, { hold: false, abort: true });
+      await s.shows("#vehicle .mode", /abort/, { advance: 4 });
+      assert.ok(await s.page.locator("#resume").isVisible());
+    },
+  },
+  {
+    name: "an edit that goes on while the last one is on its way is not taken for another console's",
+    scenario: "rich",
+    async run(s) {
+      await open(s);
+      await draw(s, "Draw fence", ...AROUND);
+      await s.page.route("**/fence", async (route) => {
+        await new Promise((resolve) => setTimeout(resolve, 400));
+        await route.continue();
+      });
+      await sendFence(s).click();
+      await draw(s, "Add keep-out", [0.4, 0.4], [0.5, 0.4], [0.5, 0.5]);
+      await s.until("its version", async () => (await slot(s, "fence"))?.version === 1);
+      await new Promise((resolve) => setTimeout(resolve, 1200));
+      assert.equal(await s.page.locator("[aria-labelledby=fence-title] .others").isVisible(), false);
+      assert.equal(await s.page.locator(".outlines > li").count(), 2, "the edit is still there");
+      assert.equal(await sendFence(s).isDisabled(), false);
+    },
+  },
+  {
+    name: "a fence changed by another console shows, with a draft as a warning",
+    scenario: "rich",
+    async run(s) {
+      await open(s);
+      await draw(s, "Draw fence", ...AROUND);
+      await sendFence(s).click();
+      await s.until("its version", async () => (await slot(s, "fence"))?.version === 1);
+      await s.post("/vehicles/1/fence", { fence: [[-30, -30], [40, -30], [40, 40]] });
+      await s.shows("[aria-labelledby=fence-title] .others", /Changed by another console \(version 2\) since you sent yours/);
+      await s.page.getByRole("button", { name: "Fence: 3 corners, as numbers" }).waitFor();
+      await draw(s, "Add keep-out", [0.1, 0.1], [0.2, 0.1], [0.2, 0.2]);
+      await s.post("/vehicles/1/fence", {});
+      await s.shows("[aria-labelledby=fence-title] .others", /meanwhile; sending replaces it/);
+      await s.button("Discard fence edits").click();
+      await s.until("theirs", async () => (await s.page.locator(".outlines > li").count()) === 0);
+      await s.page.getByRole("button", { name: "OK: Fence changed by another console" }).click();
+      await s.until("no note", async () => !(await s.page.locator("[aria-labelledby=fence-title] .others").isVisible()));
+    },
+  },
+];
