@@ -1,5 +1,9 @@
 //! Harness of the whole-system tests.
 
+mod recorded;
+
+pub use recorded::recorded;
+
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};

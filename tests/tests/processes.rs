@@ -1,36 +1,10 @@
 //! The two ends as processes, over TCP and over real serial devices.
 
-use scenecast::config;
-use scenecast::rehearsal::{Mission, MissionOptions, World};
-use scenecast_tests::{Process, free_port, http, scratch, wait_until};
+use scenecast_tests::{Process, free_port, http, recorded, scratch, wait_until};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
 use std::path::Path;
-use std::sync::OnceLock;
 use std::time::Duration;
-
-const SHARED: [&str; 3] = ["camera.width_px=320", "camera.height_px=240", "operator.script=none"];
-
-/// A recorded mission, and the map that `sim` makes of it.
-fn recorded() -> &'static (std::path::PathBuf, Vec<u8>) {
-    static RECORDED: OnceLock<(std::path::PathBuf, Vec<u8>)> = OnceLock::new();
-    RECORDED.get_or_init(|| {
-        let dir = scratch("recorded");
-        let fly = |sets: &[String], record| {
-            let sets: Vec<String> = SHARED.iter().map(|s| (*s).to_owned()).chain(sets.iter().cloned()).collect();
-            let config = config::load(None, &sets).unwrap();
-            let options = MissionOptions { world: World::procedural(2, 0.01), seed: 1, record };
-            let mut mission = Mission::new(config, options).unwrap();
-            mission.run(Duration::from_secs(3600), &mut |_| {}).unwrap();
-            mission
-        };
-        fly(&["survey.duration_s=60".into()], Some(dir.clone()));
-        let replay = fly(&["survey.duration_s=90".into(), format!("camera.source=frames:{}", dir.display())], None);
-        assert!(replay.is_drained());
-        let map = scenecast::picture::encode(replay.vehicle().map()).unwrap();
-        (dir, map)
-    })
-}
 
 /// Both ends' arguments over a link; the map must become the one that `sim` makes.
 fn assert_map_arrives(name: &str, vehicle_link: &[String], surface_link: &[String]) {

@@ -21,7 +21,7 @@ const RESUMES: Duration = Duration::from_secs(10);
 /// an S2C that speaks to one that has forgotten their connection, for a train and for its patience.
 fn cycle(name: &str) -> Duration {
     match name {
-        "s2c burst" => 9 * SECOND,
+        "s2c burst" => 6 * SECOND,
         "s2c im" | "transparent" => Duration::ZERO,
         _ => 8 * SECOND,
     }

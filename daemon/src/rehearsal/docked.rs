@@ -57,7 +57,6 @@ impl Docked {
         let mut config = config.clone();
         // Emulated ports are serial ones.
         config.modem.device = "emulated".to_owned();
-        config.runtime.time_scale = 1.0;
         let vehicle = ends::vehicle_address(&config)?;
         let mut basin = Basin::new(channel);
         basin.advance(now.into());

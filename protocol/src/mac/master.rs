@@ -1,6 +1,6 @@
 //! The surface's side of the turns.
 
-use super::{ModemProfile, quarter_seconds};
+use super::{Access, ModemProfile, quarter_seconds};
 use crate::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -152,8 +152,9 @@ impl Master {
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, losable: u32, now: Instant) {
         let flight =
             self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
-        // A vehicle farther away than it was thought to be must not be talked over for ever.
-        let patience = Duration::from_secs(1) * self.unanswered.saturating_sub(4).min(10);
+        // A vehicle farther away than it was thought to be must not be talked over for ever; a modem that polls waits itself.
+        let doubts = if profile.access == Access::Polled { 0 } else { self.unanswered.saturating_sub(4).min(10) };
+        let patience = Duration::from_secs(1) * doubts;
         let frames = if self.is_saturated { losable + 1 } else { 1 };
         let answer = (profile.frame_airtime() * frames).min(self.granted_airtime.max(profile.frame_airtime()));
         let until = now + patience + flight + profile.turn_around * 2 + answer;

@@ -11,6 +11,8 @@ use std::time::Duration;
 const TRAVEL: Duration = Duration::from_secs(2);
 /// What modems take to decode and to turn round, and hosts to answer.
 const SLACK: Duration = Duration::from_secs(2);
+/// A vehicle is never so fast that the way to it and back grows by more than a hundredth of the time (7.5 m/s).
+const RECEDES: u32 = 100;
 /// After a refusal of the modem.
 const PAUSE: Duration = Duration::from_secs(1);
 
@@ -30,7 +32,8 @@ struct Begun {
     frames: u8,
     /// Whether we fill it.
     ours: bool,
-    /// When it is over at the latest.
+    /// When it was begun, and when it is over at the latest.
+    at: Instant,
     until: Instant,
     /// How often it may be begun again, if the modem refuses or forgets it.
     tries: u8,
@@ -59,6 +62,8 @@ pub(super) struct Cycles {
     taken: Vec<Token>,
     /// When the packet with `taken` has left at the latest.
     leaves: Option<Instant>,
+    /// From the beginning of a cycle to that of its packet, as the last one that was answered showed, and when that was.
+    answered: Option<(Duration, Instant)>,
 }
 
 impl Cycles {
@@ -67,8 +72,13 @@ impl Cycles {
         let offered = std::mem::take(&mut self.offered).into_iter().map(|given| given.token);
         let tokens: Vec<Token> = std::mem::take(&mut self.taken).into_iter().chain(offered).collect();
         let again = self.begun.filter(|b| b.tries > 0 && !self.polled).or(self.again);
-        *self = Self { again, ..Self::default() };
+        *self = Self { again, answered: self.answered, ..Self::default() };
         tokens
+    }
+
+    /// How long the packet of a cycle of somebody else is waited for, if it ever was heard.
+    fn patience(&self, now: Instant) -> Option<Duration> {
+        self.answered.map(|(took, at)| took + SLACK + now.since(at) / RECEDES)
     }
 
     pub(super) fn is_free(&self, now: Instant) -> bool {
@@ -101,8 +111,9 @@ impl Micromodem {
         let rate = self.config.rate;
         let ours = from == self.config.address;
         let travel = if ours { Duration::ZERO } else { TRAVEL * 2 };
-        let until = now + rate::CYCLE_INIT + travel + self.fill_time() + rate.packet() + SLACK;
-        self.cycles.begun = Some(Begun { from, to, frames, ours, until, tries });
+        let most = rate::CYCLE_INIT + travel + self.fill_time() + rate.packet() + SLACK;
+        let wait = self.cycles.patience(now).filter(|_| !ours).map_or(most, |patience| patience.min(most));
+        self.cycles.begun = Some(Begun { from, to, frames, ours, at: now, until: now + wait, tries });
         self.cycles.polled = false;
         self.say(&format!("CCCYC,0,{from},{to},{},0,{frames}", rate.number));
     }
@@ -131,12 +142,14 @@ impl Micromodem {
     }
 
     /// A sentence of a modem at work.
-    pub(super) fn handle_traffic(&mut self, s: &Sentence) {
+    pub(super) fn handle_traffic(&mut self, s: &Sentence, now: Instant) {
         match s.name.as_str() {
             "CADRQ" => self.handle_request(s),
             "CACYC" => self.handle_cycle(s),
             "CARXD" => self.handle_frame(s),
-            "CATXF" if !self.cycles.taken.is_empty() => self.handle_left(),
+            "CARXP" => self.handle_packet(now),
+            // Without bytes it was a cycle init that left.
+            "CATXF" if !self.cycles.taken.is_empty() && s.number::<u32>(0) != Some(0) => self.handle_left(),
             "CACST" => self.handle_statistics(s),
             "CAMPR" => self.handle_ping(s),
             _ => {}
@@ -159,6 +172,15 @@ impl Micromodem {
         let own = s.number(1) == Some(self.config.address);
         if own && self.cycles.begun.is_none() && self.cycles.request.is_none() && self.cycles.taken.is_empty() {
             self.cycles.polled = false;
+        }
+    }
+
+    /// A packet begins to be heard: if it is the one that we have asked for, it is waited out.
+    fn handle_packet(&mut self, now: Instant) {
+        let packet = self.config.rate.packet() + self.fill_time() + SLACK;
+        if let Some(begun) = self.cycles.begun.as_mut().filter(|b| !b.ours) {
+            self.cycles.answered = Some((now.since(begun.at), now));
+            begun.until = begun.until.max(now + packet);
         }
     }
 

@@ -22,6 +22,8 @@ use std::time::Duration;
 const SETTLE: Duration = Duration::from_millis(300);
 /// Longest wait for the echo of a sentence.
 const PATIENCE: Duration = Duration::from_secs(3);
+/// Longest wait however much else the modem has to say: it may never have heard the question.
+const LONGEST_WAIT: Duration = Duration::from_secs(9);
 /// Between two questions to a modem at work.
 const BEAT: Duration = Duration::from_secs(5);
 /// After a wrong address.
@@ -66,6 +68,7 @@ pub struct Micromodem {
     parser: SentenceParser,
     /// Until when an answer to a question of ours is waited for.
     asked: Option<Instant>,
+    asked_at: Instant,
     beat_at: Instant,
     heard: Instant,
     output: VecDeque<Vec<u8>>,
@@ -83,6 +86,7 @@ impl Micromodem {
             phase: Phase::Closed,
             parser: SentenceParser::default(),
             asked: None,
+            asked_at: Instant::ZERO,
             beat_at: Instant::ZERO,
             heard: Instant::ZERO,
             output: VecDeque::new(),
@@ -143,7 +147,7 @@ impl Micromodem {
 
     fn ask(&mut self, body: &str, now: Instant) {
         self.say(body);
-        self.asked = Some(now + PATIENCE);
+        (self.asked, self.asked_at) = (Some(now + PATIENCE), now);
     }
 
     /// `CACFG,<name>,<value>`
@@ -208,12 +212,17 @@ impl Micromodem {
     fn handle_sentence(&mut self, sentence: &Sentence, now: Instant) {
         self.heard = now;
         // An answer waits behind what else the modem has to say, which may take seconds on a slow line.
-        self.asked = self.asked.map(|deadline| deadline.max(now + PATIENCE));
+        let latest = self.asked_at + LONGEST_WAIT;
+        self.asked = self.asked.map(|deadline| deadline.max((now + PATIENCE).min(latest)));
         match sentence.name.as_str() {
             "CACFG" => self.handle_setting(sentence.text(0), sentence.text(1), now),
             "CAREV" if sentence.text(1) == "INIT" => self.start_over(SETTLE, now),
+            // What was asked before the last line of its banner, it did not hear.
+            "CAREV" if matches!(self.phase, Phase::SettingUp(0)) => self.start_over(SETTLE, now),
             "CAERR" => self.handle_complaint(now),
-            _ if self.phase == Phase::Ready => self.handle_traffic(sentence),
+            _ if self.phase == Phase::Ready => self.handle_traffic(sentence, now),
+            // A modem that is left waiting hears nothing.
+            "CADRQ" => self.say(&format!("CCTXD,{},{},0,", sentence.text(1), sentence.text(2))),
             _ => {}
         }
     }

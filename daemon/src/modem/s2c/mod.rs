@@ -28,6 +28,8 @@ use std::time::Duration;
 const SETTLE: Duration = Duration::from_millis(300);
 /// Longest wait for a reply, beside what the line takes.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Longest wait however much else the modem has to say: the reply may have been lost on the line.
+const LONGEST_WAIT: Duration = Duration::from_secs(9);
 /// From `ATO` to data.
 const DATA_MODE: Duration = Duration::from_millis(1500);
 /// Between two questions to a modem at work.
@@ -83,6 +85,7 @@ pub struct S2c {
     /// Whether commands go as `+++AT`.
     ties: bool,
     asked: Option<(Asked, Instant)>,
+    asked_at: Instant,
     output: VecDeque<Vec<u8>>,
     events: VecDeque<Event>,
     tokens: Token,
@@ -122,6 +125,7 @@ impl S2c {
             parser: LineParser::default(),
             ties: false,
             asked: None,
+            asked_at: Instant::ZERO,
             output: VecDeque::new(),
             events: VecDeque::new(),
             tokens: 0,
@@ -177,7 +181,7 @@ impl S2c {
         let prefix: &[u8] = if self.ties { b"+++AT" } else { b"AT" };
         let bytes = [prefix, command, self.end_of_line()].concat();
         let deadline = now + PATIENCE + self.config.line_time(bytes.len());
-        self.asked = Some((asked, deadline));
+        (self.asked, self.asked_at) = (Some((asked, deadline)), now);
         self.output.push_back(bytes);
     }
 

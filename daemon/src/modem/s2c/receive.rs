@@ -1,7 +1,7 @@
 //! What an S2C modem says, and what it means.
 
 use super::notice::{Heard, Notice, Place, Position, Service};
-use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, Line, PATIENCE, Phase, S2c};
+use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, LONGEST_WAIT, Line, PATIENCE, Phase, S2c};
 use crate::modem::driver::{Event, ModemAddress, Reception, Token, UsblLine};
 use crate::modem::framing::Deframer;
 use bytes::Bytes;
@@ -27,8 +27,9 @@ impl S2c {
             Line::Notice(notice) => {
                 self.heard = now;
                 // A reply waits behind what else the modem has to say, which may take seconds on a slow line.
+                let latest = self.asked_at + LONGEST_WAIT;
                 if let Some((_, deadline)) = &mut self.asked {
-                    *deadline = (*deadline).max(now + PATIENCE);
+                    *deadline = (*deadline).max((now + PATIENCE).min(latest));
                 }
                 self.handle_notice(notice, now);
             }

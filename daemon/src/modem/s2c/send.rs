@@ -18,6 +18,8 @@ const LONGEST_REFUSAL: Duration = Duration::from_secs(60);
 const TRIES: u32 = 3;
 /// A message may wait for so long for its turn in a connection.
 const TURN: Duration = Duration::from_secs(45);
+/// Without connections it goes out at once, but for another one that is just heard.
+const AT_ONCE: Duration = Duration::from_secs(5);
 /// So long after burst data of a modem an acknowledgement to it finds a ride.
 const RIDE: Duration = Duration::from_secs(15);
 /// A record that the modem says nothing of for so long is lost from sight.
@@ -96,7 +98,8 @@ impl S2c {
         match asked {
             Asked::Message(job, acked) if taken => {
                 self.events.push_back(Event::Accepted(job.token));
-                let until = now + instant_airtime(job.bytes.len()) + TURN;
+                let wait = if self.config.mode == S2cMode::Instant { AT_ONCE } else { TURN };
+                let until = now + instant_airtime(job.bytes.len()) + wait;
                 self.jobs.message = Some(Message { job, acked, until });
             }
             Asked::Copy(job) => {

@@ -1,0 +1,151 @@
+//! Both ends as processes, each at a modem of `scenecast modem-sim` on a device of its own, a kilometre apart in a harbour.
+
+use scenecast_tests::{free_port, http, recorded, scenecast, scratch, wait_until};
+use serde_json::Value;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// Seconds of the rehearsal a second.
+const TIME_SCALE: &str = "20";
+/// Longest wait for anything.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A command whose standard error goes to a file.
+struct Logged {
+    child: Child,
+    log: PathBuf,
+}
+
+impl Logged {
+    fn start(arguments: &[String], log: PathBuf) -> Self {
+        let mut command = scenecast();
+        command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(File::create(&log).unwrap());
+        Self { child: command.spawn().unwrap(), log }
+    }
+
+    /// Interrupts it as a person would; what it had to say.
+    fn finish(mut self) -> String {
+        let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        assert_eq!(self.child.wait().unwrap().code(), Some(0), "{}", self.said());
+        self.said()
+    }
+
+    fn said(&self) -> String {
+        std::fs::read_to_string(&self.log).unwrap()
+    }
+}
+
+impl Drop for Logged {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Modems of a kind on the ship and on the vehicle; the links to them are in the folder `modems`.
+fn moor(dir: &Path, modem: &str) -> Logged {
+    let scenario = format!(
+        "[channel]\npreset = \"shallow_harbour\"\n\
+         [[modem]]\nname = \"ship\"\n{ship}\nposition_m = [0, 0, 2]\n\
+         [[modem]]\nname = \"auv\"\n{auv}\nposition_m = [1000, 0, 20]\n",
+        ship = modem.replace("ADDRESS", "10"),
+        auv = modem.replace("ADDRESS", "1"),
+    );
+    let file = dir.join("modems.toml");
+    std::fs::write(&file, scenario).unwrap();
+    let (file, links) = (file.display().to_string(), dir.join("modems").display().to_string());
+    let arguments = ["modem-sim", "--scenario", &file, "--link-dir", &links, "--time-scale", TIME_SCALE];
+    let sea = Logged::start(&arguments.map(str::to_owned), dir.join("modem-sim.log"));
+    wait_until("the modems are there", PATIENCE, || ["ship", "auv"].iter().all(|n| dir.join("modems").join(n).exists()));
+    sea
+}
+
+/// One end at the modem of that name.
+fn end(dir: &Path, role: &str, modem: &str, file: &str, sets: &[&str]) -> Logged {
+    let path = dir.join(format!("{role}.toml"));
+    let state = dir.join(role);
+    let runtime = format!("[runtime]\nstate_dir = \"{}\"\ntime_scale = {TIME_SCALE}\n", state.display());
+    std::fs::write(&path, format!("{runtime}{file}")).unwrap();
+    let device = format!("modem.device={}", dir.join("modems").join(modem).display());
+    let sets = sets.iter().copied().chain([device.as_str()]).flat_map(|set| ["--set".to_owned(), set.to_owned()]);
+    let arguments: Vec<String> =
+        [role.to_owned(), "--config".to_owned(), path.display().to_string()].into_iter().chain(sets).collect();
+    Logged::start(&arguments, dir.join(format!("{role}.log")))
+}
+
+/// The state of the vehicle as the page has it.
+fn vehicle_of(port: u16) -> Option<Value> {
+    let (_, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    let state: Value = serde_json::from_slice(&body).ok()?;
+    state["vehicles"].get(0).cloned()
+}
+
+fn is_applied(port: u16, slot: &str) -> bool {
+    let Some(vehicle) = vehicle_of(port) else { return false };
+    let slots = vehicle["directive"]["slots"].as_array().cloned().unwrap_or_default();
+    slots.iter().any(|s| s["slot"] == slot && s["state"] == "applied")
+}
+
+/// What an end put on air kept to its budget, by its own account.
+fn assert_budget_held(log: &str) {
+    assert!(!log.contains("budget was exceeded"), "{log}");
+    let account = log.lines().rev().find(|line| line.contains("bits on air")).unwrap_or_else(|| panic!("{log}"));
+    assert!(!account.contains(" 0 transmissions"), "{account}");
+}
+
+/// The survey reaches the operator and his order the vehicle; `modem` is its part of the scenario, `sets` that of the ends.
+fn assert_survey_arrives(name: &str, modem: &str, sets: &[&str]) {
+    let (recording, expected) = recorded();
+    let dir = scratch(name);
+    let _sea = moor(&dir, modem);
+    let port = free_port();
+    let page = format!("[console]\nlisten = \"127.0.0.1:{port}\"\n");
+    let camera = format!("[camera]\nsource = \"frames:{}\"\n", recording.display());
+    let surface = end(&dir, "asv", "ship", &page, sets);
+    let vehicle = end(&dir, "auv", "auv", &camera, sets);
+    wait_until("the vehicle is heard", PATIENCE, || vehicle_of(port).is_some_and(|v| v["heard_s"].is_number()));
+    let order = ("/api/v1/vehicles/1/utility", r#"{"weights": {}, "exploration": 0.5, "curiosity": 0.1}"#);
+    let (status, _) = http(port, "POST", order.0, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", order.1).unwrap();
+    assert_eq!(status, 202);
+    wait_until("the order is known to be applied", PATIENCE, || is_applied(port, "utility"));
+    let map = dir.join("asv/operator-map-1.png");
+    wait_until("the operator's map equals the one of the rehearsal", PATIENCE, || {
+        std::fs::read(&map).is_ok_and(|png| png == *expected)
+    });
+    let said = vehicle.finish();
+    assert_eq!(said.matches("utility 1: Applied").count(), 1, "{said}");
+    assert_budget_held(&said);
+    assert_budget_held(&surface.finish());
+}
+
+#[test]
+fn a_survey_arrives_through_bursts() {
+    assert_survey_arrives("harbour-burst", "kind = \"s2c\"\naddress = ADDRESS", &["modem.kind=s2c"]);
+}
+
+#[test]
+fn a_survey_arrives_through_instant_messages() {
+    let sets = ["modem.kind=s2c", "modem.s2c_mode=im"];
+    assert_survey_arrives("harbour-instant", "kind = \"s2c\"\naddress = ADDRESS", &sets);
+}
+
+#[test]
+fn a_survey_arrives_through_micromodems_at_rate_5() {
+    let modem = "kind = \"micromodem\"\naddress = ADDRESS\nbaud = 115200";
+    assert_survey_arrives("harbour-rate-5", modem, &["modem.kind=micromodem", "modem.rate=5", "modem.baud=115200"]);
+}
+
+#[test]
+fn a_survey_arrives_through_micromodems_at_rate_1() {
+    let modem = "kind = \"micromodem\"\naddress = ADDRESS";
+    assert_survey_arrives("harbour-rate-1", modem, &["modem.kind=micromodem", "modem.rate=1"]);
+}
+
+#[test]
+fn a_survey_arrives_through_pipes_of_9600_baud() {
+    let sets = ["modem.kind=transparent", "modem.baud=9600", "modem.bit_rate=9600"];
+    assert_survey_arrives("harbour-pipe", "kind = \"transparent\"\nbaud = 9600", &sets);
+}
