@@ -59,7 +59,9 @@ fn moor(dir: &Path, modem: &str) -> Logged {
     let (file, links) = (file.display().to_string(), dir.join("modems").display().to_string());
     let arguments = ["modem-sim", "--scenario", &file, "--link-dir", &links, "--time-scale", TIME_SCALE];
     let sea = Logged::start(&arguments.map(str::to_owned), dir.join("modem-sim.log"));
-    wait_until("the modems are there", PATIENCE, || ["ship", "auv"].iter().all(|n| dir.join("modems").join(n).exists()));
+    wait_until("the modems are there", PATIENCE, || {
+        ["ship", "auv"].iter().all(|n| dir.join("modems").join(n).exists())
+    });
     sea
 }
 
@@ -108,7 +110,8 @@ fn assert_survey_arrives(name: &str, modem: &str, sets: &[&str]) {
     let vehicle = end(&dir, "auv", "auv", &camera, sets);
     wait_until("the vehicle is heard", PATIENCE, || vehicle_of(port).is_some_and(|v| v["heard_s"].is_number()));
     let order = ("/api/v1/vehicles/1/utility", r#"{"weights": {}, "exploration": 0.5, "curiosity": 0.1}"#);
-    let (status, _) = http(port, "POST", order.0, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", order.1).unwrap();
+    let (status, _) =
+        http(port, "POST", order.0, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", order.1).unwrap();
     assert_eq!(status, 202);
     wait_until("the order is known to be applied", PATIENCE, || is_applied(port, "utility"));
     let map = dir.join("asv/operator-map-1.png");
