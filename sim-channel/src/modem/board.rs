@@ -67,7 +67,11 @@ impl<Event> Board<Event> {
     /// Does those faults that are the lines' own; true if this was one.
     fn inject(&mut self, fault: Fault, now: Duration) -> bool {
         let Self { lines, chance, .. } = self;
-        lines.values_mut().map(|line| line.inject(fault, chance, now)).filter(|done| *done).count() > 0
+        let mut done = false;
+        for line in lines.values_mut() {
+            done |= line.inject(fault, chance, now);
+        }
+        done
     }
 }
 
