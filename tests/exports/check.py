@@ -40,7 +40,7 @@ def tangent_plane(origin, lon, lat):
 
 
 class Told:
-    """The map as the API told it."""
+    """The map as the API told it, where it lies in the world."""
 
     def __init__(self, directory):
         state = json.loads((directory / "state.json").read_text())
@@ -49,7 +49,8 @@ class Told:
         self.cell = told["cell_m"]
         shape = (told["height"], told["width"])
         self.labels = np.frombuffer(base64.b64decode(told["labels"]), np.uint8).reshape(shape)
-        self.west, self.south = told["x0"] * self.cell, told["y0"] * self.cell
+        moved = state["vehicles"][0]["map"]["placement"] or {"east_m": 0, "north_m": 0}
+        self.west, self.south = told["x0"] * self.cell + moved["east_m"], told["y0"] * self.cell + moved["north_m"]
         rows, columns = np.nonzero(self.labels)
         self.x = self.west + (columns + 0.5) * self.cell
         self.y = self.south + (rows + 0.5) * self.cell

@@ -25,7 +25,7 @@ store.snapshot = state;
 store.selectedId = state.vehicles[0].id;
 const { origin } = state.mission;
 const files = {
-  "page.csv": toCsv(map, 0), "page.geojson": toGeoJson(map, state.vehicles[0], origin, told.at_s),
-  "page.ply": toPly(map), "page.pgw": toWorldFile(map), "page.png.aux.xml": toProjection(origin),
+  "page.csv": toCsv(map, state.vehicles[0], 0), "page.geojson": toGeoJson(map, state.vehicles[0], origin, told.at_s),
+  "page.ply": toPly(map, state.vehicles[0]), "page.pgw": toWorldFile(map, state.vehicles[0]), "page.png.aux.xml": toProjection(origin),
 };
 for (const [name, text] of Object.entries(files)) if (text !== null) writeFileSync(join(dir, name), text);

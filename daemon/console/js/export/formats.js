@@ -1,4 +1,5 @@
-// The map as files: CSV of cells, GeoJSON of regions, PLY of points, PNG with a world file.
+// The map as files: CSV of cells, GeoJSON of regions, PLY of points, PNG with a world file. Places are those of the world, to
+// which fixes have moved the vehicle's map.
 
 import { colourOf, nameOf, shownAs } from "../book.js";
 import { depthPlane } from "../cloud/points.js";
@@ -8,11 +9,11 @@ import { regions } from "./regions.js";
 
 const quoted = (s) => `"${s.replaceAll('"', '""')}"`;
 
-function* cells(map) {
+function* cells(map, vehicle) {
   for (let at = 0; at < map.labels.length; at += 1) {
     if (map.labels[at] === 0) continue;
-    const x = (map.x0 + (at % map.width) + 0.5) * map.cell_m;
-    const y = (map.y0 + Math.floor(at / map.width) + 0.5) * map.cell_m;
+    const [column, row] = [at % map.width, Math.floor(at / map.width)];
+    const [x, y] = inWorld(vehicle, (map.x0 + column + 0.5) * map.cell_m, (map.y0 + row + 0.5) * map.cell_m);
     yield { at, x, y, label: map.labels[at] };
   }
 }
@@ -21,9 +22,9 @@ const valueOf = (plane, at) =>
   plane.data[at] === 255 ? "" : (plane.min + ((plane.max - plane.min) * plane.data[at]) / 254).toFixed(3);
 
 /** One line a cell: centre in metres, label as the vehicle knows it, as shown, age, planes. */
-export function toCsv(map, sinceFetchS) {
+export function toCsv(map, vehicle, sinceFetchS) {
   const lines = [["east_m", "north_m", "label", "shown_as", "name", "age_s", ...map.planes.map((p) => p.name)].join(",")];
-  for (const { at, x, y, label } of cells(map)) {
+  for (const { at, x, y, label } of cells(map, vehicle)) {
     const shown = shownAs(label);
     const age = map.age[at] === 65535 ? "" : Math.round(map.age[at] + sinceFetchS);
     lines.push([x.toFixed(3), y.toFixed(3), label, shown, quoted(nameOf(shown)), age, ...map.planes.map((p) => valueOf(p, at))].join(","));
@@ -53,10 +54,10 @@ export function toGeoJson(map, vehicle, origin, nowS) {
 }
 
 /** ASCII PLY: x east, y north, z up (0 where no depth is known), colour, label. */
-export function toPly(map) {
+export function toPly(map, vehicle) {
   const depth = depthPlane(map);
   const lines = [];
-  for (const { at, x, y, label } of cells(map)) {
+  for (const { at, x, y, label } of cells(map, vehicle)) {
     const z = depth && depth.data[at] !== 255 ? (-Number(valueOf(depth, at))).toFixed(3) : "0";
     lines.push(`${x.toFixed(3)} ${y.toFixed(3)} ${z} ${rgb(colourOf(shownAs(label))).join(" ")} ${label}`);
   }
@@ -67,9 +68,8 @@ export function toPly(map) {
 }
 
 /** The six lines of a world file: pixel size and the centre of the north-west pixel. */
-export function toWorldFile(map) {
-  const west = (map.x0 + 0.5) * map.cell_m;
-  const north = (map.y0 + map.height - 0.5) * map.cell_m;
+export function toWorldFile(map, vehicle) {
+  const [west, north] = inWorld(vehicle, (map.x0 + 0.5) * map.cell_m, (map.y0 + map.height - 0.5) * map.cell_m);
   return [map.cell_m, 0, 0, -map.cell_m, west, north].map((v) => `${v}\n`).join("");
 }
 

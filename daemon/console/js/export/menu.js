@@ -13,17 +13,17 @@ async function png(map, name) {
   const canvas = paintLabels(map, { tintOf, shownAs, stale: false, highlight: null });
   const blob = await new Promise((resolve) => canvas.toBlob(resolve, "image/png"));
   download(`${name}.png`, "image/png", [blob]);
-  download(`${name}.pgw`, "text/plain", [toWorldFile(map)]);
+  download(`${name}.pgw`, "text/plain", [toWorldFile(map, store.vehicle)]);
   const projection = toProjection(store.snapshot.mission.origin);
   if (projection) download(`${name}.png.aux.xml`, "application/xml", [projection]);
 }
 
 const FILES = [
   ["PNG and world file", "one pixel a cell, as coloured here", png],
-  ["CSV", "one line a cell with label and age", (map, name) => download(`${name}.csv`, "text/csv", [toCsv(map, ageOf(map.fetchedS))])],
+  ["CSV", "one line a cell with label and age", (map, name) => download(`${name}.csv`, "text/csv", [toCsv(map, store.vehicle, ageOf(map.fetchedS))])],
   ["GeoJSON", "regions of equal label", (map, name) =>
     download(`${name}.geojson`, "application/geo+json", [toGeoJson(map, store.vehicle, store.snapshot.mission.origin, store.nowS)])],
-  ["PLY", "coloured points for 3-D tools", (map, name) => download(`${name}.ply`, "application/octet-stream", [toPly(map)])],
+  ["PLY", "coloured points for 3-D tools", (map, name) => download(`${name}.ply`, "application/octet-stream", [toPly(map, store.vehicle)])],
 ];
 
 export function openExport() {
