@@ -90,7 +90,8 @@ def check_geojson(path, told):
         place = list(zip(*rasterio.warp.transform(crs, "EPSG:4326", told.x, told.y)))
         first = next(iter(regions.values())).geoms[0].exterior.coords[0]
         x, y = tangent_plane(told.origin, *first)
-        close([x / told.cell, y / told.cell], np.round([x / told.cell, y / told.cell]), "corners of cells", CENTIMETRE / told.cell)
+        corner = [(x - told.west) / told.cell, (y - told.south) / told.cell]
+        close(corner, np.round(corner), "corners of cells", CENTIMETRE / told.cell)
     for label, region in regions.items():
         assert region.is_valid, f"label {label}: {shapely.is_valid_reason(region)}"
         inside = shapely.contains_xy(region, *zip(*place))
