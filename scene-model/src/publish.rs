@@ -76,11 +76,6 @@ impl LabelBook {
         self.ids.get(&topic).copied()
     }
 
-    /// The labels that the last map had: x, y, label, sorted by (y, x).
-    pub fn shown(&self) -> impl Iterator<Item = (i32, i32, u8)> {
-        self.shown.iter().filter_map(|&(y, x, topic)| Some((x, y, self.label_of(topic)?)))
-    }
-
     /// All ids given in this epoch, in the order in which they were given.
     pub fn labels(&self) -> impl Iterator<Item = u8> {
         1..=self.topics.len() as u8
@@ -109,16 +104,26 @@ impl LabelBook {
     pub fn publish(&mut self, cells: &[FlatCell]) -> Vec<PublishedCell> {
         self.give_ids(cells);
         let known: Vec<Option<TopicId>> = self.known_topics(cells);
-        let mut published = Vec::with_capacity(cells.len());
         self.shown.clear();
         for (index, cell) in cells.iter().enumerate() {
             let Some(topic) = known[index].or_else(|| self.around(cells, &known, index)) else { continue };
-            let Some(label) = self.label_of(topic) else { continue };
-            let confidence = if topic == cell.topic { cell.confidence } else { 0.0 };
-            self.shown.push((cell.y, cell.x, topic));
-            published.push(PublishedCell { x: cell.x, y: cell.y, label, confidence, perplexity: cell.perplexity });
+            if self.ids.contains_key(&topic) {
+                self.shown.push((cell.y, cell.x, topic));
+            }
         }
-        published
+        self.published(cells)
+    }
+
+    /// What the last call of [`Self::publish`] made of the same map: a restored book goes on showing it.
+    pub fn published(&self, cells: &[FlatCell]) -> Vec<PublishedCell> {
+        let mut cells = cells.iter();
+        let publish = |&(y, x, topic): &(i32, i32, TopicId)| {
+            let label = self.label_of(topic)?;
+            let cell = cells.find(|cell| (cell.y, cell.x) == (y, x))?;
+            let confidence = if topic == cell.topic { cell.confidence } else { 0.0 };
+            Some(PublishedCell { x, y, label, confidence, perplexity: cell.perplexity })
+        };
+        self.shown.iter().filter_map(publish).collect()
     }
 
     fn give_ids(&mut self, cells: &[FlatCell]) {

@@ -33,6 +33,13 @@ pub struct Goal {
     pub place: Option<LatLon>,
 }
 
+impl Goal {
+    /// Whether it is anywhere at all.
+    fn is_finite(&self) -> bool {
+        self.east_m.is_finite() && self.north_m.is_finite() && self.depth_m.is_none_or(f64::is_finite)
+    }
+}
+
 /// A stretch of way, as the autopilot measured it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {

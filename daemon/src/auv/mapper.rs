@@ -7,7 +7,7 @@ use crate::scene::read_vocabulary;
 use image::RgbImage;
 use scene_model::exemplars::ExemplarStore;
 use scene_model::project::{DownCamera, Pose};
-use scene_model::publish::LabelBook;
+use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_protocol::map::{Cell, PlaneKind};
@@ -125,30 +125,18 @@ impl Mapper {
 
     /// The map as it was published last.
     pub fn current(&self) -> MapUpdate {
-        let cells: Vec<_> = self.book.shown().map(|(x, y, label)| (Cell::new(x, y), label)).collect();
-        let planes = self.planes(&cells);
-        let perplexity = cells.iter().filter_map(|&(cell, _)| Some((cell, self.flat_at(cell)?.perplexity))).collect();
-        let labels = self.book.labels().count() as u8;
-        MapUpdate { t_s: self.last_s.unwrap_or(0.0), epoch: self.book.epoch(), cells, planes, perplexity, labels }
-    }
-
-    fn planes(&self, shown: &[(Cell, u8)]) -> BTreeMap<PlaneKind, Vec<(Cell, f64)>> {
-        let confidence =
-            shown.iter().filter_map(|&(cell, label)| Some((cell, self.confidence(cell, label)?))).collect();
-        let depth = shown.iter().filter_map(|&(cell, _)| Some((cell, self.relief.depth_m(cell)?))).collect();
-        BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)])
-    }
-
-    fn flat_at(&self, cell: Cell) -> Option<&FlatCell> {
-        let at = self.flat.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).ok()?;
-        self.flat.get(at)
-    }
-
-    /// How sure the model is of the label that a cell shows; nothing while it holds the cell for another one.
-    fn confidence(&self, cell: Cell, label: u8) -> Option<f64> {
-        let flat = self.flat_at(cell)?;
-        let is_shown = self.book.topic_of(label) == Some(flat.topic);
-        Some(if is_shown { f64::from(flat.confidence) } else { 0.0 })
+        let published = self.book.published(&self.flat);
+        let place = |c: &PublishedCell| Cell::new(c.x, c.y);
+        let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
+        let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
+        MapUpdate {
+            t_s: self.last_s.unwrap_or(0.0),
+            epoch: self.book.epoch(),
+            cells: published.iter().map(|c| (place(c), c.label)).collect(),
+            planes: BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)]),
+            perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
+            labels: self.book.labels().count() as u8,
+        }
     }
 
     /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.

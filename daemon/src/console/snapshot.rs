@@ -2,8 +2,9 @@
 
 use super::link_meter::LinkMeter;
 use super::{place, state};
+use crate::asv::position::LatLon;
 use crate::asv::{Desk, ExemplarState, Surface};
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::figures::dropped;
 use axum::body::Bytes;
 use scenecast_protocol::directive::{LifeLine, PlannerKind, SlotId, SlotProgress};
@@ -49,15 +50,16 @@ impl MissionFacts {
             idle_s: config.link.max_idle_s,
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
             frame_bits: modem.bits_on_air(modem.frame_bytes),
-            origin: origin(config.mission.origin_deg),
+            origin: origin(config),
         }
     }
 }
 
 /// The origin that is configured, if any is.
-fn origin([lat_deg, lon_deg]: [f64; 2]) -> Option<state::Origin> {
-    let is_known = (lat_deg, lon_deg) != (0.0, 0.0) && lat_deg.abs() < 90.0;
-    is_known.then_some(state::Origin { lat_deg, lon_deg })
+fn origin(config: &Config) -> Option<state::Origin> {
+    // At a pole there is no east.
+    let LatLon { lat_deg, lon_deg } = config::origin(config).ok()?.filter(|o| o.lat_deg.abs() < 90.0)?;
+    Some(state::Origin { lat_deg, lon_deg })
 }
 
 /// The state at a moment.

@@ -367,8 +367,7 @@ impl Autopilot for Mavlink {
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
-        self.goal =
-            goal.filter(|g| g.east_m.is_finite() && g.north_m.is_finite() && g.depth_m.is_none_or(f64::is_finite));
+        self.goal = goal.filter(Goal::is_finite);
     }
 
     fn handle_place(&mut self, place: LatLon, sigma_m: f64, now: Instant) {
