@@ -6,6 +6,7 @@ mod limits;
 mod outbox;
 mod polygon;
 mod settings;
+mod tuning;
 mod utility;
 
 pub use fence::{Fence, FenceFault};
@@ -13,7 +14,8 @@ pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
 pub use polygon::{Place, Polygon, PolygonFault};
-pub use settings::{Budget, Constraints, PlannerKind, Requests, Settings};
+pub use settings::{Budget, Constraints, PlannerKind, Requests};
+pub use tuning::{CellBand, Change, Figure, PlaneSet, Settings, SettingsFault};
 pub use utility::Utility;
 
 use crate::schedule::Class;
@@ -177,7 +179,7 @@ impl Slot {
         match self {
             Self::Utility(v) => v.encode(out),
             Self::Constraints(v) => v.encode(out),
-            Self::Settings(v) => v.encode(out),
+            Self::Settings(v) => out.extend(v.to_bytes()),
             Self::Budget(v) => v.encode(out),
             Self::Requests(v) => v.encode(out),
             Self::Fix(v) => v.encode(out),

@@ -1,4 +1,4 @@
-//! The slots that set how a vehicle behaves.
+//! Short slots that set how a vehicle behaves.
 
 use crate::schedule::Shares;
 use crate::wire::{Reader, Truncated};
@@ -39,7 +39,7 @@ pub enum PlannerKind {
 }
 
 impl PlannerKind {
-    /// Every planner, in wire order from 1.
+    /// Every planner, in wire order.
     pub const ALL: [Self; 3] = [Self::Lawnmower, Self::Greedy, Self::Horizon];
 
     /// Name in files and in the API.
@@ -54,42 +54,6 @@ impl PlannerKind {
     /// The planner of that name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|p| p.name() == name)
-    }
-
-    /// Number on the wire; 0 = as configured on the vehicle.
-    pub fn code(planner: Option<Self>) -> u8 {
-        planner.map_or(0, |p| p as u8 + 1)
-    }
-
-    /// The planner of that number.
-    pub fn from_code(code: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|&p| p as u8 + 1 == code)
-    }
-}
-
-/// How the vehicle builds its map and chooses its way.
-///
-/// ```text
-/// bytes 0-3: word refinements a second of mission time, 0 = as configured on the vehicle
-/// byte 4:    bits 7-6 planner: 0 as configured on the vehicle, 1 lawnmower, 2 greedy, 3 horizon; the rest reserved, 0,
-///            not read
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Settings {
-    /// Words resampled a second of mission time.
-    pub refine_words_per_s: u32,
-    /// How it chooses its way; `None`: as configured.
-    pub planner: Option<PlannerKind>,
-}
-
-impl Settings {
-    pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.extend_from_slice(&self.refine_words_per_s.to_be_bytes());
-        out.push(PlannerKind::code(self.planner) << 6);
-    }
-
-    pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        Ok(Self { refine_words_per_s: r.u32()?, planner: PlannerKind::from_code(r.u8()? >> 6) })
     }
 }
 

@@ -9,7 +9,7 @@ const BITS_PER_CELL: usize = 2;
 /// Decides between a picture of the whole and a picture of a part.
 #[derive(Debug, Default)]
 pub(super) struct Coarse {
-    /// More than so many bytes of backlog go out coarse to fine, if that is wanted.
+    /// More than so many bytes of backlog go out coarse to fine, if that is wanted; 0: whatever waits does.
     after_bytes: Option<usize>,
 }
 
@@ -20,9 +20,9 @@ impl Coarse {
 
     /// The lattice that the next chunk is to be of: the coarse one while it has a cell waiting and there is too much to say.
     pub(super) fn stride(&self, counts: &Counts) -> Stride {
-        let bytes = counts.waiting * BITS_PER_CELL / 8;
+        let bits = counts.waiting * BITS_PER_CELL;
         match self.after_bytes {
-            Some(most) if bytes > most && counts.waiting_coarse > 0 => Stride::Four,
+            Some(most) if bits > most.saturating_mul(8) && counts.waiting_coarse > 0 => Stride::Four,
             _ => Stride::One,
         }
     }

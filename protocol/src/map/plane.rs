@@ -205,6 +205,11 @@ impl PlaneSource {
         self.levels.set(levels, now)
     }
 
+    /// As [`MapSource::set_coarse_limit`].
+    pub fn set_coarse_limit(&mut self, after_bytes: Option<usize>) {
+        self.levels.set_coarse_limit(after_bytes);
+    }
+
     /// Nothing is known any more.
     pub fn clear(&mut self, now: Instant) {
         self.levels.clear(now);

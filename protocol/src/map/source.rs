@@ -62,7 +62,7 @@ impl MapSource {
     }
 
     /// A backlog of about more than so many bytes goes out coarse to fine: every fourth cell in both directions first, then
-    /// all. `None`: never.
+    /// all. 0: always; `None`: never.
     pub fn set_coarse_limit(&mut self, after_bytes: Option<usize>) {
         self.coarse.set_limit(after_bytes);
     }

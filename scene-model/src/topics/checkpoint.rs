@@ -159,6 +159,38 @@ mod tests {
     }
 
     #[test]
+    fn a_model_with_new_priors_goes_on_as_one_that_is_built_with_them() {
+        for (alpha, beta, gamma) in [(0.3, 0.1, 0.01), (0.01, 2.0, 0.01), (0.01, 0.1, 5.0), (2.0, 0.02, 0.0)] {
+            let mut tuned = model(5);
+            let (before, topics) = (tuned.save(), tuned.snapshot().topics);
+            tuned.set_priors(alpha, beta, gamma).unwrap();
+            assert_eq!((tuned.config().alpha, tuned.config().beta, tuned.config().gamma), (alpha, beta, gamma));
+            assert_ne!(tuned.save(), before, "a checkpoint has the priors in force");
+            assert_eq!(tuned.snapshot().topics, topics, "no label has changed its meaning");
+            // All that depends on the priors is built from scratch on loading.
+            let mut built = SceneModel::load(&tuned.save()).unwrap();
+            assert_eq!(built.label_map(), tuned.label_map());
+            for t in 4..8 {
+                feed(&mut tuned, t);
+                feed(&mut built, t);
+            }
+            built.sweep(2);
+            tuned.sweep(2);
+            assert_eq!(built.label_map(), tuned.label_map());
+            assert_eq!(built.save(), tuned.save());
+        }
+    }
+
+    #[test]
+    fn priors_out_of_range_are_refused_and_change_nothing() {
+        let mut model = model(5);
+        let before = model.save();
+        assert_eq!(model.set_priors(0.1, 0.0, 0.1).unwrap_err().key, "beta");
+        assert_eq!(model.set_priors(f64::NAN, 0.1, 0.1).unwrap_err().key, "alpha");
+        assert_eq!(model.save(), before);
+    }
+
+    #[test]
     fn an_empty_model_survives() {
         let empty = SceneModel::new(SceneConfig::default()).unwrap();
         assert_eq!(SceneModel::load(&empty.save()).unwrap().cells(), 0);

@@ -12,6 +12,7 @@ enum Step {
     Refine(u64),
     Sweep(u32),
     Map,
+    Priors(f64, f64, f64),
 }
 
 fn step() -> impl Strategy<Value = Step> {
@@ -21,6 +22,8 @@ fn step() -> impl Strategy<Value = Step> {
         3 => (0u64..400).prop_map(Step::Refine),
         2 => (1u32..4).prop_map(Step::Sweep),
         1 => Just(Step::Map),
+        1 => prop::sample::select(vec![(1e-9, 1e-9, 1e-12), (1e-3, 0.5, 0.0), (0.5, 0.1, 1e-5), (1e3, 1e3, 1e3)])
+            .prop_map(|(alpha, beta, gamma)| Step::Priors(alpha, beta, gamma)),
     ]
 }
 
@@ -41,6 +44,7 @@ fn take(model: &mut SceneModel, step: &Step) {
         Step::Refine(words) => assert!(model.refine(*words) >= *words || model.words() == 0),
         Step::Sweep(sweeps) => assert_eq!(model.sweep(*sweeps), u64::from(*sweeps) * model.words()),
         Step::Map => drop(model.label_map()),
+        Step::Priors(alpha, beta, gamma) => model.set_priors(*alpha, *beta, *gamma).unwrap(),
     }
 }
 

@@ -92,6 +92,15 @@ impl Labels {
         labels
     }
 
+    /// Other priors from now on; counts and topics stay.
+    pub(crate) fn set_priors(&mut self, config: &super::SceneConfig) {
+        self.beta = config.beta as f32;
+        self.alpha = config.alpha as f32;
+        self.birth_weight = config.birth_weight() as f32;
+        self.word_mass = f64::from(config.vocabulary) * config.beta;
+        self.settle();
+    }
+
     /// Slots of a checkpoint; the counts are still to come.
     pub(crate) fn restore(config: &super::SceneConfig, topics: &[Option<TopicId>], next_topic: u32) -> Self {
         Self { topics: topics.to_vec(), next_topic, ..Self::new(config) }

@@ -113,6 +113,20 @@ impl SceneModel {
         &self.config
     }
 
+    /// Goes on with other priors: words keep their labels and labels their topics, and what the map shows is evaluated anew.
+    /// Fails, and changes nothing, if one is out of its range.
+    pub fn set_priors(&mut self, alpha: f64, beta: f64, gamma: f64) -> Result<(), ConfigError> {
+        let config = SceneConfig { alpha, beta, gamma, ..self.config.clone() };
+        config.check()?;
+        if config == self.config {
+            return Ok(());
+        }
+        self.config = config;
+        self.labels.set_priors(&self.config);
+        (0..self.cells.len() as u32).for_each(|cell| self.touch(cell));
+        Ok(())
+    }
+
     /// The vector units in use.
     pub fn kernel(&self) -> Kernel {
         self.kernel

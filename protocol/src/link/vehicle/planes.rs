@@ -14,6 +14,8 @@ pub(super) struct PlaneOut {
     has_share: bool,
     /// Whether its digest is to be told.
     pub(super) owes_digest: bool,
+    /// Whether it is told at all; one that is not rests with what the surface has of it.
+    is_told: bool,
 }
 
 impl PlaneOut {
@@ -28,16 +30,27 @@ impl<S: StateSource> VehicleLink<S> {
         let mut shares = [0; Class::PLANES.len()];
         self.planes.clear();
         for (source, share) in planes {
-            let plane = PlaneOut { source, has_share: share > 0, owes_digest: false };
+            let plane = PlaneOut { source, has_share: share > 0, owes_digest: false, is_told: true };
             Class::PLANES.iter().zip(&mut shares).filter(|(c, _)| **c == plane.class()).for_each(|(_, s)| *s = share);
             self.planes.push(plane);
         }
         self.shares.set_planes(shares);
     }
 
-    /// The planes that are replicated.
+    /// The planes that are told.
     pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
-        self.planes.iter().map(|p| &p.source)
+        self.planes.iter().filter(|p| p.is_told).map(|p| &p.source)
+    }
+
+    /// Which of the planes are told from now on; the others rest, and go on from there when they are told again.
+    pub fn set_told_planes(&mut self, is_told: impl Fn(PlaneKind) -> bool) {
+        self.forget_said();
+        self.planes.iter_mut().for_each(|p| p.is_told = is_told(p.source.scale().kind()));
+    }
+
+    /// As [`PlaneSource::set_coarse_limit`], for each plane.
+    pub fn set_coarse_planes(&mut self, after_bytes: Option<usize>) {
+        self.planes.iter_mut().for_each(|p| p.source.set_coarse_limit(after_bytes));
     }
 
     /// Sets quantities of cells of a plane; nothing happens if it is not replicated.
@@ -70,7 +83,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     fn going(&self, now: Instant) -> impl Iterator<Item = &PlaneOut> {
         let spare = self.budget.is_plentiful(now);
-        self.planes.iter().filter(move |p| (p.has_share || spare) && p.source.backlog_bytes() > 0)
+        self.planes.iter().filter(move |p| p.is_told && (p.has_share || spare) && p.source.backlog_bytes() > 0)
     }
 
     pub(super) fn fill_plane(
@@ -91,7 +104,7 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// The digests that are owed, as far as there is room for them.
     pub(super) fn fill_digests(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
-        for plane in self.planes.iter_mut().filter(|p| p.owes_digest) {
+        for plane in self.planes.iter_mut().filter(|p| p.is_told && p.owes_digest) {
             let bytes = plane.source.digest_chunk();
             if builder.push(ChunkKind::Plane, &bytes) {
                 plane.owes_digest = false;

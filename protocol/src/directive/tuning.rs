@@ -1,0 +1,432 @@
+//! How a vehicle builds its map, how finely it tells it, and how it chooses its way.
+
+use super::PlannerKind;
+use crate::map::PlaneKind;
+use crate::wire::{Reader, Truncated};
+use std::fmt;
+use std::ops::RangeInclusive;
+
+/// What an order says of one setting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Change<T> {
+    /// Nothing: it stays as it is.
+    #[default]
+    Keep,
+    /// It is as the vehicle is configured.
+    Configured,
+    /// It is this.
+    To(T),
+}
+
+impl<T: Copy> Change<T> {
+    /// What was ordered last, of this and an order after it.
+    pub fn then(self, later: Self) -> Self {
+        if matches!(later, Self::Keep) { self } else { later }
+    }
+
+    /// What is in force, if it is not what the vehicle is configured with.
+    pub fn value(self) -> Option<T> {
+        match self {
+            Self::To(value) => Some(value),
+            Self::Keep | Self::Configured => None,
+        }
+    }
+
+    fn code(self, index: impl FnOnce(T) -> u8) -> u8 {
+        match self {
+            Self::Keep => 0,
+            Self::Configured => 1,
+            Self::To(value) => index(value) + 2,
+        }
+    }
+
+    fn from_code(code: u8, value: impl FnOnce(u8) -> Option<T>) -> Result<Self, Truncated> {
+        match code {
+            0 => Ok(Self::Keep),
+            1 => Ok(Self::Configured),
+            _ => value(code - 2).map(Self::To).ok_or(Truncated),
+        }
+    }
+}
+
+/// A positive number of three decimal digits, so that what is typed is what is in force.
+///
+/// ```text
+/// bit 15: 0; bits 14-10: e; bits 9-0: m, 100..=999. The value is m x 10^(e - 14); all bits 0: as configured.
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Figure {
+    digits: u16,
+    exponent: u8,
+}
+
+impl Figure {
+    const OFFSET: i32 = 14;
+    const MOST_EXPONENT: i32 = 31;
+
+    /// The number nearest to `value`; none for what is not positive or lies off the scale of 1e-12 to 9.99e19.
+    pub fn new(value: f64) -> Option<Self> {
+        if !(value.is_finite() && value > 0.0) {
+            return None;
+        }
+        let mut exponent = value.log10().floor() as i32 - 2;
+        let mut digits = (value * power(-exponent)).round();
+        // The logarithm, or the digits, may have been rounded over a power of ten.
+        while digits >= 1000.0 {
+            exponent += 1;
+            digits = (value * power(-exponent)).round();
+        }
+        while digits < 100.0 {
+            exponent -= 1;
+            digits = (value * power(-exponent)).round();
+        }
+        let exponent = exponent + Self::OFFSET;
+        let fits = (0..=Self::MOST_EXPONENT).contains(&exponent) && (100.0..1000.0).contains(&digits);
+        fits.then_some(Self { digits: digits as u16, exponent: exponent as u8 })
+    }
+
+    /// The number.
+    pub fn value(self) -> f64 {
+        let exponent = i32::from(self.exponent) - Self::OFFSET;
+        // Digits and powers up to 10^17 are exact, so one rounding gives what the decimal numeral would.
+        if exponent < 0 { f64::from(self.digits) / power(-exponent) } else { f64::from(self.digits) * power(exponent) }
+    }
+
+    fn encode(change: Change<Self>, out: &mut Vec<u8>) {
+        match change {
+            Change::Keep => {}
+            Change::Configured => out.extend([0, 0]),
+            Change::To(Self { digits, exponent }) => {
+                out.extend((u16::from(exponent) << 10 | digits).to_be_bytes());
+            }
+        }
+    }
+
+    fn decode(r: &mut Reader<'_>) -> Result<Change<Self>, Truncated> {
+        let bits = r.u16()?;
+        let (digits, exponent) = (bits & 0x3FF, (bits >> 10) as u8);
+        match (bits, digits) {
+            (0, _) => Ok(Change::Configured),
+            (..=0x7FFF, 100..=999) => Ok(Change::To(Self { digits, exponent })),
+            _ => Err(Truncated),
+        }
+    }
+}
+
+fn power(exponent: i32) -> f64 {
+    10f64.powi(exponent)
+}
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.value().fmt(f)
+    }
+}
+
+/// Which cells of the map a vehicle tells: a band of sizes, the finest and the coarsest. The model's own cells stay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CellBand {
+    /// Every cell.
+    Fine,
+    /// Every fourth cell in both directions first where there is too much to say, then every cell.
+    CoarseToFine,
+    /// Every fourth cell in both directions. Cells that the surface knows already stay up to date.
+    Coarse,
+}
+
+impl CellBand {
+    /// Every band, in wire order.
+    pub const ALL: [Self; 3] = [Self::Fine, Self::CoarseToFine, Self::Coarse];
+
+    /// Name in files and in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fine => "fine",
+            Self::CoarseToFine => "coarse-to-fine",
+            Self::Coarse => "coarse",
+        }
+    }
+
+    /// The band of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|band| band.name() == name)
+    }
+}
+
+/// Planes that are told beside the labels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PlaneSet {
+    /// How sure the model is of a label.
+    pub confidence: bool,
+    /// Depth of the sea floor.
+    pub depth: bool,
+}
+
+impl PlaneSet {
+    /// Whether a plane is among them.
+    pub fn has(self, kind: PlaneKind) -> bool {
+        match kind {
+            PlaneKind::Confidence => self.confidence,
+            PlaneKind::Depth => self.depth,
+        }
+    }
+}
+
+/// A setting that no vehicle could obey.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{name} {value}: it takes {} to {}", range.start(), range.end())]
+pub struct SettingsFault {
+    /// Name of the setting.
+    pub name: &'static str,
+    /// What it was set to.
+    pub value: f64,
+    /// What it may be.
+    pub range: RangeInclusive<f64>,
+}
+
+/// How the vehicle builds its map, how finely it tells it and how it chooses its way; what is not named stays as it is.
+///
+/// ```text
+///         7   6   5   4   3   2   1   0
+///       +-----------+-----------+-------+
+/// byte 0| planner   | cells     | planes|
+///       +---+---+---+---+---+---+---+---+
+/// byte 1| C | D | 0 | a | b | g | r | f |
+///       +---+---+---+---+---+---+---+---+
+/// then 2 bytes, a figure, for each of a, b, g, r, f that is 1
+/// ```
+/// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
+/// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
+/// * planes: 0 stay, 1 as configured, 2 those of C (confidence) and D (depth).
+/// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
+///   second that the scene model sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Settings {
+    /// How the vehicle chooses its way.
+    pub planner: Change<PlannerKind>,
+    /// Which cells it tells.
+    pub cells: Change<CellBand>,
+    /// Which planes it tells.
+    pub planes: Change<PlaneSet>,
+    /// Preference for labels that are used elsewhere.
+    pub alpha: Change<Figure>,
+    /// Prior weight of each word in a label.
+    pub beta: Change<Figure>,
+    /// Weight of a new label.
+    pub gamma: Change<Figure>,
+    /// Words resampled a second of mission time.
+    pub refine_words_per_s: Change<Figure>,
+    /// Camera frames a second that the scene model sees at most.
+    pub frames_per_s: Change<Figure>,
+}
+
+impl Settings {
+    /// What alpha and beta may be.
+    pub const PRIOR: RangeInclusive<f64> = 1e-9..=1e3;
+    /// What gamma may be.
+    pub const GAMMA: RangeInclusive<f64> = 1e-12..=1e3;
+    /// Words a second that may be resampled.
+    pub const WORDS_PER_S: RangeInclusive<f64> = 1.0..=1e8;
+    /// Frames a second that the scene model may see.
+    pub const FRAMES_PER_S: RangeInclusive<f64> = 0.01..=30.0;
+    /// Most bytes of the payload.
+    pub const MAX_BYTES: usize = 12;
+
+    /// What both together say, this one first.
+    #[must_use]
+    pub fn then(&self, later: &Self) -> Self {
+        Self {
+            planner: self.planner.then(later.planner),
+            cells: self.cells.then(later.cells),
+            planes: self.planes.then(later.planes),
+            alpha: self.alpha.then(later.alpha),
+            beta: self.beta.then(later.beta),
+            gamma: self.gamma.then(later.gamma),
+            refine_words_per_s: self.refine_words_per_s.then(later.refine_words_per_s),
+            frames_per_s: self.frames_per_s.then(later.frames_per_s),
+        }
+    }
+
+    /// Each number with its name and range.
+    pub fn figures(&self) -> [(&'static str, Change<Figure>, RangeInclusive<f64>); 5] {
+        [
+            ("alpha", self.alpha, Self::PRIOR),
+            ("beta", self.beta, Self::PRIOR),
+            ("gamma", self.gamma, Self::GAMMA),
+            ("refine_words_per_s", self.refine_words_per_s, Self::WORDS_PER_S),
+            ("frames_per_s", self.frames_per_s, Self::FRAMES_PER_S),
+        ]
+    }
+
+    /// Says which number no vehicle could obey, if any.
+    pub fn check(&self) -> Result<(), SettingsFault> {
+        for (name, change, range) in self.figures() {
+            let value = change.value().map(Figure::value);
+            if let Some(value) = value.filter(|value| !range.contains(value)) {
+                return Err(SettingsFault { name, value, range });
+            }
+        }
+        Ok(())
+    }
+
+    /// The payload, which is also how it is kept.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let planner = self.planner.code(|p| p as u8);
+        let cells = self.cells.code(|c| c as u8);
+        let planes = self.planes.code(|_| 0);
+        let set = self.planes.value().unwrap_or_default();
+        let mut out = vec![planner << 5 | cells << 2 | planes, u8::from(set.confidence) << 7 | u8::from(set.depth) << 6];
+        for (index, (_, change, _)) in self.figures().into_iter().enumerate() {
+            if !matches!(change, Change::Keep) {
+                out[1] |= 0x10 >> index;
+            }
+            Figure::encode(change, &mut out);
+        }
+        out
+    }
+
+    pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
+        let (choices, given) = (r.u8()?, r.u8()?);
+        if given & 0x20 != 0 {
+            return Err(Truncated);
+        }
+        let set = PlaneSet { confidence: given & 0x80 != 0, depth: given & 0x40 != 0 };
+        let planes = Change::from_code(choices & 3, |code| (code == 0).then_some(set))?;
+        if planes.value().is_none() && set != PlaneSet::default() {
+            return Err(Truncated);
+        }
+        let mut figure = |bit: u8| if given & bit != 0 { Figure::decode(r) } else { Ok(Change::Keep) };
+        Ok(Self {
+            alpha: figure(0x10)?,
+            beta: figure(0x08)?,
+            gamma: figure(0x04)?,
+            refine_words_per_s: figure(0x02)?,
+            frames_per_s: figure(0x01)?,
+            planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
+            cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
+            planes,
+        })
+    }
+
+    /// Reads [`Self::to_bytes`]; none if they make no sense.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut r = Reader::new(bytes);
+        Self::decode(&mut r).ok().filter(|_| r.rest().is_empty())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn to(value: f64) -> Change<Figure> {
+        Change::To(Figure::new(value).unwrap())
+    }
+
+    fn change<T: Copy + fmt::Debug + 'static>(value: impl Strategy<Value = T>) -> impl Strategy<Value = Change<T>> {
+        prop_oneof![Just(Change::Keep), Just(Change::Configured), value.prop_map(Change::To)]
+    }
+
+    fn figure() -> impl Strategy<Value = Figure> {
+        (100u16..=999, 0u8..=31).prop_map(|(digits, exponent)| Figure { digits, exponent })
+    }
+
+    fn settings() -> impl Strategy<Value = Settings> {
+        let choices = (
+            change(proptest::sample::select(PlannerKind::ALL.to_vec())),
+            change(proptest::sample::select(CellBand::ALL.to_vec())),
+            change((any::<bool>(), any::<bool>()).prop_map(|(confidence, depth)| PlaneSet { confidence, depth })),
+        );
+        let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
+        (choices, figures).prop_map(|((planner, cells, planes), (alpha, beta, gamma, refine, frames))| Settings {
+            planner,
+            cells,
+            planes,
+            alpha,
+            beta,
+            gamma,
+            refine_words_per_s: refine,
+            frames_per_s: frames,
+        })
+    }
+
+    #[test]
+    fn golden_bytes_of_settings() {
+        let settings = Settings {
+            planner: Change::To(PlannerKind::Horizon),
+            cells: Change::To(CellBand::Coarse),
+            planes: Change::To(PlaneSet { confidence: false, depth: true }),
+            alpha: to(0.01),
+            gamma: Change::Configured,
+            frames_per_s: to(0.25),
+            ..Settings::default()
+        };
+        let bytes = [0x92, 0x55, 0x28, 0x64, 0, 0, 0x2C, 0xFA];
+        assert_eq!(settings.to_bytes(), bytes);
+        assert_eq!(Settings::from_bytes(&bytes), Some(settings));
+        assert_eq!(Settings::default().to_bytes(), [0, 0]);
+    }
+
+    #[test]
+    fn what_is_typed_with_three_digits_is_what_is_in_force() {
+        for text in ["0.01", "1e-12", "0.0005", "5e-5", "0.123", "999", "1000", "30", "50000", "1e8", "9.99e19", "0.3"] {
+            let value: f64 = text.parse().unwrap();
+            assert_eq!(Figure::new(value).map(Figure::value), Some(value), "{text}");
+        }
+        assert_eq!(Figure::new(0.099_96).map(Figure::value), Some(0.1));
+        for off in [0.0, -1.0, 9e-13, 1e20, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE] {
+            assert_eq!(Figure::new(off), None, "{off}");
+        }
+    }
+
+    #[test]
+    fn an_order_adds_to_those_before_it_and_can_take_them_back() {
+        let first = Settings { alpha: to(0.5), gamma: to(1e-5), ..Settings::default() };
+        let second = Settings { alpha: Change::Configured, beta: to(0.2), ..Settings::default() };
+        let both = first.then(&second);
+        assert_eq!((both.alpha, both.beta, both.gamma), (Change::Configured, to(0.2), to(1e-5)));
+        assert_eq!((both.alpha.value(), both.then(&first).alpha), (None, to(0.5)));
+    }
+
+    #[test]
+    fn a_number_out_of_its_range_is_named() {
+        let said = |settings: Settings| settings.check().unwrap_err().to_string();
+        assert_eq!(said(Settings { alpha: to(5000.0), ..Settings::default() }), "alpha 5000: it takes 0.000000001 to 1000");
+        let fast = Settings { frames_per_s: to(31.0), ..Settings::default() };
+        assert_eq!(said(fast), "frames_per_s 31: it takes 0.01 to 30");
+        assert_eq!(Settings { gamma: to(1e-12), beta: to(1e3), ..Settings::default() }.check(), Ok(()));
+    }
+
+    #[test]
+    fn reserved_bits_and_codes_are_refused() {
+        for bytes in [&[0xA0, 0][..], &[0x14, 0], &[3, 0], &[0, 0x20], &[0, 0x80], &[0, 0x10, 0, 99], &[0, 0x10, 0x80, 100]] {
+            assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
+        }
+        assert_eq!(Settings::from_bytes(&[0, 0, 0]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn settings_round_trip(settings in settings()) {
+            let bytes = settings.to_bytes();
+            prop_assert!(bytes.len() <= Settings::MAX_BYTES);
+            prop_assert_eq!(Settings::from_bytes(&bytes), Some(settings));
+        }
+
+        #[test]
+        fn any_bytes_are_settings_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..14)) {
+            if let Some(settings) = Settings::from_bytes(&bytes) {
+                prop_assert_eq!(settings.to_bytes(), bytes);
+            }
+        }
+
+        #[test]
+        fn a_number_is_off_by_half_a_percent_at_most(power in -12.0f64..19.9) {
+            let value = 10f64.powf(power);
+            let told = Figure::new(value).unwrap();
+            prop_assert!((told.value() / value - 1.0).abs() <= 0.005);
+            prop_assert_eq!(Figure::new(told.value()), Some(told));
+        }
+    }
+}
