@@ -5,7 +5,8 @@ use crate::auv::{Area, Durable, Footprint, Habits, Navigator, Steering, Vehicle,
 use crate::config::{Config, load_key};
 use crate::modem;
 use crate::problem::Problem;
-use scenecast_protocol::directive::{PlannerKind, Reaction};
+use crate::tuning::TuningTable;
+use scenecast_protocol::directive::{PlaneSet, PlannerKind, Reaction};
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
@@ -108,14 +109,20 @@ pub fn vehicle(
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.set_coarse_after(config.map.coarse_after_s);
+    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, told_planes(config));
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }
     Ok(vehicle)
 }
 
-/// The planes of the map that are sent, and their parts of the map's share in percent.
+/// The planes of the map that are told.
+fn told_planes(config: &Config) -> PlaneSet {
+    let is_told = |kind: PlaneKind| config.map.planes.iter().any(|name| name == kind.name());
+    PlaneSet { confidence: is_told(PlaneKind::Confidence), depth: is_told(PlaneKind::Depth) }
+}
+
+/// Every plane that the operator could ask for, and its part of the map's share in percent.
 fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u8)> {
     let map = &config.map;
     let settle = Duration::from_secs_f64(map.settle_s);
@@ -124,8 +131,8 @@ fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u
         PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),
     };
     let planes = PlaneKind::ALL.into_iter().zip(map.plane_shares);
-    let wanted = planes.filter(|(kind, _)| map.stream == "delta" && map.planes.iter().any(|name| name == kind.name()));
-    wanted.map(move |(kind, share)| (PlaneSource::new(scale(kind), codec, settle), share))
+    let possible = planes.filter(|_| map.stream == "delta");
+    possible.map(move |(kind, share)| (PlaneSource::new(scale(kind), codec, settle), share))
 }
 
 /// The vehicles that the surface speaks with from the beginning, by address and name.
@@ -158,5 +165,6 @@ pub fn surface(config: &Config, modem: ModemProfile, seed: u64, now: Instant) ->
         authenticity: authenticity(config)?,
     };
     let link = SurfaceLink::new(link, seed, now);
-    Ok(Surface::new(link, vehicles))
+    let table = TuningTable::load(&config.scene.tuning_table)?;
+    Ok(Surface::new(link, vehicles).with_tuning_table(table))
 }

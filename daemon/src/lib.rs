@@ -17,5 +17,6 @@ mod problem;
 pub mod rehearsal;
 pub mod runtime;
 mod scene;
+pub mod tuning;
 
 pub use problem::Problem;

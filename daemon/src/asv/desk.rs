@@ -1,9 +1,10 @@
 //! What the operator has and asked for, for one vehicle.
 
 use super::pauses::Pauses;
+use super::settings::SettingsDesk;
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
-use scenecast_protocol::directive::{Fence, Limits, Requests, Settings, Utility};
+use scenecast_protocol::directive::{Fence, Limits, Requests, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -42,8 +43,8 @@ pub struct Desk {
     pub fence: Option<Fence>,
     /// The limits that were sent last.
     pub limits: Option<Limits>,
-    /// The settings that were sent last.
-    pub settings: Settings,
+    /// The settings that were asked for, and those in force.
+    pub settings: SettingsDesk,
     /// Images by label.
     pub exemplars: BTreeMap<u8, ExemplarDesk>,
     /// Where the vehicle said it was: time, east, north.
@@ -71,7 +72,7 @@ impl Desk {
             utility: Utility::default(),
             fence: None,
             limits: None,
-            settings: Settings::default(),
+            settings: SettingsDesk::default(),
             exemplars: BTreeMap::new(),
             track: VecDeque::new(),
             epoch: 0,

@@ -6,8 +6,10 @@ mod desk;
 mod orders;
 mod pauses;
 pub mod position;
+mod settings;
 mod surface;
 
 pub use desk::{Desk, ExemplarState};
 pub use orders::{FenceOrder, LimitsOrder};
+pub use settings::{SettingsDesk, SettingsOrder};
 pub use surface::{Surface, SurfaceOutput};

@@ -3,10 +3,12 @@
 use super::desk::Desk;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
+use super::settings::SettingsOrder;
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
 use crate::picture;
-use scenecast_protocol::directive::{Budget, Constraints, Fix, PlannerKind, Slot, SlotId, Utility};
+use crate::tuning::{Fit, NoRow, TuningTable};
+use scenecast_protocol::directive::{Budget, Constraints, Fix, LifeLine, Slot, SlotId, Utility};
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::Shares;
@@ -36,13 +38,20 @@ pub struct Surface {
     outputs: VecDeque<SurfaceOutput>,
     /// Where the surface is and where it sees the vehicles, if it has a GPS.
     relay: Option<Relay>,
+    tuning: TuningTable,
 }
 
 impl Surface {
     /// A surface that speaks with these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
-        Self { link, desks, outputs: VecDeque::new(), relay: None }
+        Self { link, desks, outputs: VecDeque::new(), relay: None, tuning: TuningTable::default() }
+    }
+
+    /// Knows what settings of the scene model reach.
+    #[must_use]
+    pub fn with_tuning_table(self, tuning: TuningTable) -> Self {
+        Self { tuning, ..self }
     }
 
     /// Name for people of a vehicle that has none.
@@ -170,26 +179,31 @@ impl Surface {
         Ok(version)
     }
 
-    /// Changes how a vehicle chooses its way (`""`: as configured there) and how many words it resamples a second (0: as
-    /// configured there); what is not given stays as it was sent last.
-    pub fn set_settings(
-        &mut self,
-        vehicle: Address,
-        planner: Option<&str>,
-        refine_words_per_s: Option<u32>,
-        now: Instant,
-    ) -> Result<u16, String> {
-        let mut settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings;
-        if let Some(name) = planner {
-            settings.planner = PlannerKind::from_name(name);
-            if settings.planner.is_none() && !name.is_empty() {
-                return Err(format!("planner {name:?}: it takes lawnmower, greedy or horizon, or \"\" as configured"));
-            }
-        }
-        settings.refine_words_per_s = refine_words_per_s.unwrap_or(settings.refine_words_per_s);
+    /// Changes settings of a vehicle; what the order does not name stays as it is there.
+    pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
+        let order = order.read()?;
+        let last = self.life_of(vehicle, SlotId::Settings);
+        let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.to_send(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings = settings;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
         Ok(version)
+    }
+
+    /// Bits a second that are the map's of a vehicle's budget: its share of what the vehicle has said, or of ours before.
+    pub fn map_bits_per_s(&self, vehicle: Address) -> f64 {
+        let [_, _, _, map, _] = self.link.shares().0;
+        let said = self.link.vehicle(vehicle).and_then(|v| v.status().map(|(status, _)| status.budget_bps));
+        f64::from(said.unwrap_or(self.link.budget_bps())) * f64::from(map) / 100.0
+    }
+
+    /// The settings of the scene model that tell most of those whose stream takes at most `bits_per_s`.
+    pub fn fit(&self, cell_m: f64, bits_per_s: f64) -> Result<Fit, NoRow> {
+        self.tuning.fit(cell_m, bits_per_s)
+    }
+
+    /// How far the last order of a slot has come.
+    fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<LifeLine> {
+        self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.life)
     }
 
     /// Changes the bit budget of the surface and of every vehicle, and the least shares of the classes if there are any.
@@ -293,7 +307,12 @@ impl Surface {
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
-            SurfaceEvent::SlotSettled(vehicle, slot) => Some(SurfaceOutput::SlotSettled(vehicle, slot)),
+            SurfaceEvent::SlotSettled(vehicle, slot) => {
+                if let Some(life) = self.life_of(vehicle, slot).filter(|_| slot == SlotId::Settings) {
+                    self.desks.get_mut(&vehicle)?.settings.handle_settled(life);
+                }
+                Some(SurfaceOutput::SlotSettled(vehicle, slot))
+            }
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
                 self.desks.get_mut(&vehicle)?.handle_status(status, now);

@@ -68,14 +68,16 @@ impl Mapper {
         ENVELOPE.seal(&postcard::to_allocvec(&kept).unwrap_or_default())
     }
 
-    /// Goes on from a checkpoint, if it was made with the parameters that are configured.
+    /// Goes on from a checkpoint, if it was made with the parameters that are configured. Priors may differ: they are those
+    /// of the checkpoint until [`Mapper::tune`] says which are in force.
     pub fn restore(config: &Config, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
         let content = ENVELOPE.open(bytes)?;
         let kept: Kept<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
             postcard::from_bytes(content).map_err(|_| NoCheckpoint::Inconsistent)?;
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, kept.book.epoch(), config.runtime.seed)?;
-        let configured = SceneConfig { seed: model.config().seed, ..fresh.model.config().clone() };
+        let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
+        let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
         let (words, configured_words) = (kept.words.config(), fresh.extractor.measures());
         if *model.config() != configured || words != configured_words.config() {
             return Err(NoCheckpoint::OtherParameters);
@@ -101,6 +103,7 @@ mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
+    use scenecast_protocol::directive::{Change, Figure, Settings};
 
     fn config(sets: &[&str]) -> Config {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
@@ -135,6 +138,44 @@ mod tests {
     }
 
     #[test]
+    fn other_priors_do_not_cost_the_checkpoint_and_those_in_force_go_on() {
+        let figure = |value: f64| Change::To(Figure::new(value).unwrap());
+        let settings = Settings { gamma: figure(0.2), alpha: figure(0.5), ..Settings::default() };
+        let mut whole = Mapper::new(&config(&[]), 3, 1).unwrap();
+        (0..4).for_each(|at| drop(frame(&mut whole, at)));
+        whole.tune(&settings);
+        (4..9).for_each(|at| drop(frame(&mut whole, at)));
+        assert_eq!(whole.priors(), [0.5, 0.1, 0.2]);
+        for sets in [&[][..], &["scene.gamma=0.01", "scene.alpha=3"]] {
+            let mut again = Mapper::restore(&config(sets), &whole.save(7)).unwrap().mapper;
+            assert_eq!((again.priors(), again.current()), (whole.priors(), whole.current()));
+            again.tune(&settings);
+            assert_eq!(again.current(), whole.current());
+            let mut went_on = Mapper::restore(&config(&[]), &whole.save(7)).unwrap().mapper;
+            went_on.tune(&settings);
+            assert_eq!(frame(&mut again, 9), frame(&mut went_on, 9));
+        }
+        let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), &whole.save(7)).unwrap().mapper;
+        other.tune(&Settings::default());
+        assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured where nobody says otherwise");
+        assert_eq!(frame(&mut other, 9).epoch, 3);
+    }
+
+    #[test]
+    fn a_frame_rate_takes_the_first_frame_of_each_interval() {
+        let mut mapper = Mapper::new(&config(&[]), 0, 1).unwrap();
+        let taken = |mapper: &mut Mapper| {
+            (0..20).filter(|at| mapper.takes(f64::from(*at) * 2.0).then(|| frame(mapper, *at)).is_some()).count()
+        };
+        assert_eq!(taken(&mut mapper), 20);
+        for (rate, frames) in [(30.0, 20), (0.5, 20), (0.25, 10), (0.3, 12), (0.05, 2)] {
+            mapper.tune(&Settings { frames_per_s: Change::To(Figure::new(rate).unwrap()), ..Settings::default() });
+            mapper.last_s = None;
+            assert_eq!(taken(&mut mapper), frames, "{rate} 1/s of 0.5");
+        }
+    }
+
+    #[test]
     fn other_parameters_and_damage_are_refused_by_name() {
         let mut mapper = Mapper::new(&config(&[]), 0, 1).unwrap();
         frame(&mut mapper, 0);
@@ -142,7 +183,7 @@ mod tests {
         let said = |sets: &[&str], bytes: &[u8]| Mapper::restore(&config(sets), bytes).err().map(|e| e.to_string());
         assert_eq!(said(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
         let other = Some("it was made with other parameters of the scene model".to_owned());
-        assert_eq!(said(&["scene.gamma=0.01"], &bytes), other);
+        assert_eq!(said(&["scene.max_labels=20"], &bytes), other);
         assert_eq!(said(&["scene.cell_m=0.5"], &bytes), other);
         assert_eq!(said(&[], &bytes[..bytes.len() / 2]), Some("cut off or damaged".to_owned()));
         assert_eq!(said(&[], b"hello"), Some("a file of another kind".to_owned()));

@@ -10,6 +10,7 @@ use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_protocol::directive::{Change, Figure, Settings};
 use scenecast_protocol::map::{Cell, PlaneKind};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -46,9 +47,23 @@ pub struct Mapper {
     pub(super) exemplars: ExemplarStore,
     pub(super) relief: Relief,
     refine_words_per_s: f64,
-    configured_words_per_s: f64,
+    /// Camera frames a second that are taken at most; none: every one.
+    frames_per_s: Option<f64>,
+    configured: Configured,
     pub(super) last_s: Option<f64>,
     pub(super) flat: Vec<FlatCell>,
+}
+
+/// What the settings of the operator take the place of.
+struct Configured {
+    priors: [f64; 3],
+    refine_words_per_s: f64,
+    frames_per_s: Option<f64>,
+}
+
+/// A frame rate as it is configured, where 0 is every frame.
+fn every_frame_or(rate: f64) -> Option<f64> {
+    (rate > 0.0).then_some(rate)
 }
 
 /// Edge of a cell in metres.
@@ -93,15 +108,41 @@ impl Mapper {
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
             relief: Relief::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
-            configured_words_per_s: f64::from(config.scene.refine_words_per_s),
+            frames_per_s: every_frame_or(config.scene.frames_per_s),
+            configured: Configured {
+                priors: [config.scene.alpha, config.scene.beta, config.scene.gamma],
+                refine_words_per_s: f64::from(config.scene.refine_words_per_s),
+                frames_per_s: every_frame_or(config.scene.frames_per_s),
+            },
             last_s: None,
             flat: Vec::new(),
         })
     }
 
-    /// Sets the words resampled a second of mission time; 0: as configured.
-    pub fn set_refine_rate(&mut self, words_per_s: u32) {
-        self.refine_words_per_s = if words_per_s == 0 { self.configured_words_per_s } else { f64::from(words_per_s) };
+    /// Follows settings that were checked; what they do not name is as configured. Topics and their labels stay.
+    pub fn tune(&mut self, settings: &Settings) {
+        let or = |change: Change<Figure>, configured: f64| change.value().map_or(configured, Figure::value);
+        let [alpha, beta, gamma] = self.configured.priors;
+        let priors = (or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma));
+        if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
+            // What a vehicle accepts lies within what the model takes.
+            tracing::error!("the scene model keeps its priors: {e}");
+        }
+        self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
+        self.frames_per_s = settings.frames_per_s.value().map(Figure::value).or(self.configured.frames_per_s);
+    }
+
+    /// Whether a frame taken at mission time `t_s` is to be seen: of each interval of the frame rate the first one is.
+    pub fn takes(&self, t_s: f64) -> bool {
+        let Some(rate) = self.frames_per_s else { return true };
+        let interval = |t_s: f64| (t_s * rate + 1e-6).floor();
+        self.last_s.is_none_or(|last_s| interval(last_s) != interval(t_s))
+    }
+
+    /// Priors in force: alpha, beta, gamma.
+    pub fn priors(&self) -> [f64; 3] {
+        let config = self.model.config();
+        [config.alpha, config.beta, config.gamma]
     }
 
     /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.

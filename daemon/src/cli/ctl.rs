@@ -1,7 +1,8 @@
 //! `scenecast ctl`
 
+use crate::asv::SettingsOrder;
 use crate::config;
-use crate::ctl::{self, BudgetChange, Client};
+use crate::ctl::{self, BudgetChange, Client, SettingsChange};
 use crate::problem::Problem;
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -13,6 +14,8 @@ Example: scenecast ctl status
          scenecast ctl map --out reef.png
          scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120
          scenecast ctl budget set 2000 --shares map=60,exemplar=10
+         scenecast ctl settings --gamma 1e-5 --cells coarse --wait 120
+         scenecast ctl settings --fit 800
          scenecast ctl exemplar 3 --out label-3.webp
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
@@ -69,6 +72,9 @@ enum Command {
         #[command(subcommand)]
         change: Option<BudgetCommand>,
     },
+    /// Print the settings of the vehicle, asked for and in force, or send others; what is not named stays as it is there.
+    #[command(after_help = SETTINGS_EXAMPLES)]
+    Settings(SettingsArgs),
     /// Write the image of a label, which the vehicle is asked for if it is not here.
     #[command(after_help = "Example: scenecast ctl exemplar 3 --out label-3.webp --wait 300")]
     Exemplar {
@@ -84,6 +90,64 @@ enum Command {
     /// Print changes as they come, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
     Watch,
+}
+
+const SETTINGS_EXAMPLES: &str = "\
+Example: scenecast ctl settings
+         scenecast ctl settings --gamma 1e-5 --frames 0.2 --planes none --wait 120
+         scenecast ctl settings --alpha 0 --cells \"\"     both as the vehicle is configured
+         scenecast ctl settings --fit                    what fits the map's share of the budget
+         scenecast ctl settings --fit 800 --dry-run      what would fit 800 bit/s";
+
+#[derive(Debug, Args)]
+struct SettingsArgs {
+    /// Preference for labels that are used elsewhere, 1e-9 to 1e3; 0: as configured
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    alpha: Option<f64>,
+    /// Prior weight of each word in a label, 1e-9 to 1e3; 0: as configured
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    beta: Option<f64>,
+    /// Weight of a new label, 1e-12 to 1e3; 0: as configured
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    gamma: Option<f64>,
+    /// Words resampled a second of mission time, 1 to 1e8; 0: as configured
+    #[arg(long, value_name = "WORDS/S", allow_negative_numbers = true)]
+    refine: Option<f64>,
+    /// Camera frames a second that the scene model sees at most, 0.01 to 30; 0: as configured
+    #[arg(long, value_name = "1/S", allow_negative_numbers = true)]
+    frames: Option<f64>,
+    /// Cells that are told: fine, coarse-to-fine, coarse (every fourth both ways); "": as configured
+    #[arg(long, value_name = "BAND")]
+    cells: Option<String>,
+    /// Planes that are told: none, confidence, depth, both; "": as configured
+    #[arg(long, value_name = "PLANES")]
+    planes: Option<String>,
+    /// lawnmower, greedy, horizon; "": as configured
+    #[arg(long, value_name = "NAME")]
+    planner: Option<String>,
+    /// Take the settings that tell most of those whose stream fits so many bits a second [default: the map's share of the
+    /// vehicle's budget]; the options above go before them
+    #[arg(long, value_name = "BIT/S", num_args = 0..=1, allow_negative_numbers = true)]
+    fit: Option<Option<f64>>,
+    /// Say what would be sent, and send nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl SettingsArgs {
+    fn change(self) -> SettingsChange {
+        let order = SettingsOrder {
+            planner: self.planner,
+            cells: self.cells,
+            planes: self.planes,
+            alpha: self.alpha,
+            beta: self.beta,
+            gamma: self.gamma,
+            refine_words_per_s: self.refine,
+            frames_per_s: self.frames,
+        };
+        SettingsChange { order, fit: self.fit, dry_run: self.dry_run }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -158,6 +222,7 @@ impl Ctl {
                 Command::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares }) } => {
                     ctl.set_budget(BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares) }).await
                 }
+                Command::Settings(settings) => ctl.settings(settings.change()).await,
                 Command::Exemplar { label, out, again } => ctl.exemplar(label, &out, again).await,
                 Command::Watch => ctl.watch().await,
             }

@@ -233,6 +233,13 @@ pub const KEYS: &[Key] = &[
         "a backlog that the budget needs longer for goes out coarse to fine: every fourth cell in both directions first; 0: never",
     ),
     key(
+        "map.cells",
+        "",
+        Choice(&["fine", "coarse"]),
+        "ar",
+        "cells that are told: every one, or every fourth in both directions; the scene model's cells stay, and the operator may choose otherwise",
+    ),
+    key(
         "map.planes",
         "",
         Words(&["confidence", "depth"]),
@@ -265,6 +272,13 @@ pub const KEYS: &[Key] = &[
     key("scene.birth", "", Choice(&["literal", "collapsed", "rost"]), "ar", "reading of the new-label weight"),
     key("scene.max_labels", "", Range(2.0, 254.0), "ar", "most labels at a time"),
     key("scene.refine_words_per_s", "1/s", Range(0.0, 1e8), "ar", "words resampled a second of mission time"),
+    key(
+        "scene.frames_per_s",
+        "1/s",
+        Range(0.0, 30.0),
+        "ar",
+        "camera frames a second that the scene model sees at most, the first of each interval; 0: every one",
+    ),
     key("scene.max_words_per_cell", "", Range(8.0, 60_000.0), "ar", "words kept a cell"),
     key(
         "scene.vocabulary",
@@ -279,6 +293,13 @@ pub const KEYS: &[Key] = &[
         Range(0.0, 86_400.0),
         "a",
         "mission time between two checkpoints of the scene model, from which a restarted vehicle goes on; 0: none",
+    ),
+    key(
+        "scene.tuning_table",
+        "",
+        Text,
+        "s",
+        "table of scenecast tune from which fit to budget picks settings of the scene model; empty: the one that ships, of procedural sea floors",
     ),
     key("survey.duration_s", "s", Range(0.0, 1e7), "ar", "when the survey ends; 0: never"),
     key("survey.speed_m_s", "m/s", Range(0.01, 10.0), "ar", "speed over ground"),

@@ -184,6 +184,8 @@ section! {
         settle_s: f64 = 0.0,
         /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0 = never.
         coarse_after_s: f64 = 0.0,
+        /// `fine` or `coarse`.
+        cells: String = "fine".into(),
         /// Planes that are sent beside the labels.
         planes: Vec<String> = PlaneKind::ALL.map(|p| p.name().to_owned()).to_vec(),
         /// Percent of the map's share for confidence and depth; 0 = what nobody else needs.
@@ -224,12 +226,16 @@ section! {
         max_labels: u32 = 16,
         /// Words resampled a second of mission time.
         refine_words_per_s: u32 = 50_000,
+        /// Camera frames a second that are seen at most; 0 = every one.
+        frames_per_s: f64 = 0.0,
         /// Words kept a cell.
         max_words_per_cell: u32 = 200,
         /// File of a trained vocabulary; empty = the one that ships.
         vocabulary: String = String::new(),
         /// Seconds of mission time between two checkpoints; 0 = none.
         checkpoint_s: f64 = 60.0,
+        /// File of a tuning table; empty = the one that ships.
+        tuning_table: String = String::new(),
     }
 }
 section! {

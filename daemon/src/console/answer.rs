@@ -1,11 +1,12 @@
 //! What a browser may ask of the surface.
 
 use super::export::Cells;
-use super::orders::{BudgetOrder, SettingsOrder};
+use super::fit;
+use super::orders::BudgetOrder;
 use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
-use crate::asv::{ExemplarState, FenceOrder, LimitsOrder, Surface};
+use crate::asv::{ExemplarState, FenceOrder, LimitsOrder, SettingsOrder, Surface};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::Shares;
@@ -33,8 +34,10 @@ pub enum Ask {
     Fence(u8, FenceOrder),
     /// Send limits.
     Limits(u8, LimitsOrder),
-    /// Change planner and refinement.
+    /// Change settings.
     Settings(u8, SettingsOrder),
+    /// Which settings fit so many bits a second, or the map's share of the budget.
+    Fit(u8, Option<f64>),
     /// Change the bit budget, and the least shares if there are any.
     Budget(BudgetOrder),
 }
@@ -48,6 +51,8 @@ pub enum Reply {
     File(&'static str, Vec<u8>),
     /// Taken; on its way.
     Accepted(Accepted),
+    /// Settings that fit.
+    Fit(Box<fit::Fit>),
     /// There is no such thing.
     NotFound,
     /// Not allowed, and why.
@@ -93,10 +98,13 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
             Some(a) => accepted(a, SlotId::Limits, surface.set_limits(a, &limits, now)),
             None => Reply::NotFound,
         },
-        Ask::Settings(id, SettingsOrder { planner, refine_words_per_s }) => match address(id) {
-            Some(a) => {
-                accepted(a, SlotId::Settings, surface.set_settings(a, planner.as_deref(), refine_words_per_s, now))
-            }
+        Ask::Settings(id, settings) => match address(id) {
+            Some(a) => accepted(a, SlotId::Settings, surface.set_settings(a, &settings, now)),
+            None => Reply::NotFound,
+        },
+        Ask::Fit(id, bits_per_s) => match address(id).map(|a| fit::fit(surface, a, cell_m, bits_per_s)) {
+            Some(Ok(fit)) => Reply::Fit(Box::new(fit)),
+            Some(Err(why)) => Reply::Refused(why),
             None => Reply::NotFound,
         },
     }

@@ -10,6 +10,7 @@ mod compress;
 mod connections;
 mod events;
 mod export;
+pub mod fit;
 mod guard;
 mod link_meter;
 mod maps;

@@ -127,6 +127,11 @@ fn parameters(operation: &Operation) -> Vec<Value> {
         parameters
             .push(json!({ "name": "file", "in": "path", "required": true, "description": what, "schema": schema }));
     }
+    if operation.id == "fit_settings" {
+        let schema = json!({ "type": "number", "minimum": 1, "maximum": 10_000_000 });
+        let what = "Bits a second that the stream of the map may take; left out: the map's least share of the vehicle's budget";
+        parameters.push(json!({ "name": "bits_per_s", "in": "query", "description": what, "schema": schema }));
+    }
     if operation.body.is_some() {
         let schema = json!({ "type": "string", "const": "1" });
         let what = "No other site's page can send it";

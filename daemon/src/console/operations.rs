@@ -1,11 +1,11 @@
 //! Every path and method of the server, in one table that makes both the router and the OpenAPI document.
 
 use super::maps::{self, Format};
-use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, SettingsOrder, UtilityOrder};
+use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
 use super::server::{self, Shared, VehicleId};
 use super::state::{Accepted, Map, State as Everything};
-use super::{events, metrics, openapi, token};
-use crate::asv::{FenceOrder, LimitsOrder};
+use super::{events, fit, metrics, openapi, token};
+use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
@@ -152,6 +152,13 @@ fn map_files() -> Vec<Operation> {
             "The cells as a coloured point cloud, metres east, north, up",
             maps::PLY
         ),
+        read(
+            "/api/v1/vehicles/{id}/fit",
+            "fit_settings",
+            "The settings of the scene model that tell most of those whose stream fits a budget, and what they give up",
+            Content::Json(schema::<fit::Fit>),
+            || get(fit::read),
+        ),
         map_file!("/api/v1/vehicles/{id}/map.csv", "map_csv", "A line for each explored cell", maps::CSV),
     ]
 }
@@ -199,7 +206,8 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v1/vehicles/{id}/settings",
             "set_settings",
-            "Changes planner and refinement",
+            "Changes how the vehicle builds its map, which cells and planes of it it tells, and how it chooses its way. What is \
+             left out or null stays as it is there; 0 or an empty text is as the vehicle is configured. Labels keep their meaning.",
             schema::<SettingsOrder>,
             || post(server::settings),
         ),

@@ -40,18 +40,6 @@ pub struct ConstraintsOrder {
     pub abort: bool,
 }
 
-/// Changes planner and refinement; what is left out stays as it was sent last.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SettingsOrder {
-    /// lawnmower, greedy, horizon, or empty: as configured on the vehicle.
-    #[serde(default)]
-    pub planner: Option<String>,
-    /// Words resampled a second; 0: as configured on the vehicle.
-    #[serde(default)]
-    pub refine_words_per_s: Option<u32>,
-}
-
 /// Budget of the surface, at once, and of each vehicle, by the directive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -4,12 +4,12 @@ use super::answer::{Ask, Reply};
 use super::guard::{self, Names};
 use super::maps::Maps;
 use super::operations::operations;
-use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, SettingsOrder, UtilityOrder};
+use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
 use super::snapshot::Snapshot;
 use super::state::Refusal;
 use super::token::Access;
 use super::{assets, compress, connections, events};
-use crate::asv::{FenceOrder, LimitsOrder};
+use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
 use crate::problem::Problem;
 use axum::extract::{DefaultBodyLimit, FromRequest, FromRequestParts, Path, Request as HttpRequest, State};
 use axum::http::request::Parts;
@@ -117,7 +117,7 @@ impl Shared {
         answered.await.map_err(|_| busy())
     }
 
-    async fn ask(&self, ask: Ask) -> Response {
+    pub(super) async fn ask(&self, ask: Ask) -> Response {
         self.reply(ask).await.map_or_else(|busy| busy, respond)
     }
 }
@@ -127,6 +127,7 @@ pub(super) fn respond(reply: Reply) -> Response {
     match reply {
         Reply::Map(cells) => Json(cells.told()).into_response(),
         Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
+        Reply::Fit(fit) => Json(*fit).into_response(),
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
         Reply::NotFound => not_found(),
         Reply::Refused(why) => refusal(StatusCode::UNPROCESSABLE_ENTITY, &why),

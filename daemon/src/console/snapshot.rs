@@ -130,7 +130,11 @@ fn vehicle(
         },
         fence: desk.fence.as_ref().map(Into::into),
         limits: desk.limits.as_ref().map(Into::into),
-        planner: desk.settings.planner.map(|p| PlannerKind::name(p).to_owned()),
+        planner: desk.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
+        settings: state::VehicleSettings {
+            asked: desk.settings.asked().into(),
+            in_force: desk.settings.in_force().map(Into::into),
+        },
         labels: labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect(),
         link: link_of(&view, now),
         usbl: desk.found.as_ref().map(|(line, at)| state::Usbl {

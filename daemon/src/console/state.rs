@@ -1,6 +1,6 @@
 //! What the API tells: the answers as types, from which the OpenAPI document is made.
 
-use crate::asv::{FenceOrder, LimitsOrder};
+use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -113,6 +113,8 @@ pub struct Vehicle {
     pub limits: Option<LimitsOrder>,
     /// The planner that was sent last; null: as configured on the vehicle.
     pub planner: Option<String>,
+    /// Settings that were asked for, and those in force.
+    pub settings: VehicleSettings,
     /// The labels on the map.
     pub labels: Vec<Label>,
     /// What was measured of the water to this vehicle.
@@ -121,6 +123,15 @@ pub struct Vehicle {
     pub usbl: Option<Usbl>,
     /// What was ordered and how far that has come.
     pub directive: Directive,
+}
+
+/// Settings of a vehicle. Null members stay as this surface found them; 0 or an empty text is as the vehicle is configured.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleSettings {
+    /// All that this surface has asked for.
+    pub asked: SettingsOrder,
+    /// What of that the vehicle has said to follow; null while nobody knows, since an order was overtaken on its way.
+    pub in_force: Option<SettingsOrder>,
 }
 
 /// Where the surface's modem found a vehicle.

@@ -5,9 +5,11 @@ mod client;
 mod figures;
 mod files;
 mod orders;
+mod settings;
 
 pub use client::Client;
 pub use orders::BudgetChange;
+pub use settings::SettingsChange;
 
 use crate::console::state::{State, Vehicle};
 use crate::problem::Problem;

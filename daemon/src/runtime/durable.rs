@@ -147,9 +147,8 @@ mod tests {
             hold: true,
             budget_bps: Some(500),
             shares: Some([10, 5, 5, 50, 20]),
-            refine_words_per_s: None,
             abort: false,
-            planner: 3,
+            settings: vec![0x40, 0],
             limits: vec![0, 4],
             used: (130, 2),
             breach: 2,
@@ -161,8 +160,8 @@ mod tests {
             &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0],
             &[0, 1, 0, 0, 0, 2, 0, 0],
             &[3, 12, 172, 2],
-            &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 0],
-            &[3, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0],
+            &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20],
+            &[2, 0x40, 0, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));

@@ -8,6 +8,7 @@ use crate::problem::Problem;
 use crate::rehearsal::{RecordedFrame, Recording};
 use image::RgbImage;
 use scene_model::project::Pose;
+use scenecast_protocol::directive::Settings;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -15,8 +16,8 @@ use tokio::sync::mpsc;
 
 /// What the thread is told.
 pub(super) enum ToMapper {
-    /// Resample so many words a second.
-    RefineRate(u32),
+    /// Follow these settings.
+    Tune(Settings),
     /// The camera saw something.
     Frame(Box<RecordedFrame>),
     /// Keep a checkpoint now.
@@ -27,6 +28,8 @@ pub(super) enum ToMapper {
 pub(super) enum FromMapper {
     /// The map, after a camera frame or at the start.
     Seen(Seen),
+    /// A camera frame that the frame rate leaves out.
+    Passed(Box<RecordedFrame>),
     /// A camera frame that could not be read.
     Missed(Problem),
 }
@@ -117,8 +120,9 @@ impl Work {
         }
         while is_heard && let Some(order) = incoming.blocking_recv() {
             match order {
-                ToMapper::RefineRate(rate) => self.mapper.set_refine_rate(rate),
+                ToMapper::Tune(settings) => self.mapper.tune(&settings),
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
+                ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => is_heard = self.tell(FromMapper::Passed(frame)),
                 ToMapper::Frame(frame) => {
                     let told = self.see(*frame);
                     // First the checkpoint: then it has every label that the surface hears of.

@@ -34,7 +34,7 @@ impl Stride {
     }
 
     /// The cell of the lattice that a cell of the map is, if it is on it.
-    pub(super) fn on_lattice(self, cell: Cell) -> Option<Cell> {
+    pub fn on_lattice(self, cell: Cell) -> Option<Cell> {
         let n = self.cells();
         (cell.x % n == 0 && cell.y % n == 0).then(|| Cell::new(cell.x / n, cell.y / n))
     }

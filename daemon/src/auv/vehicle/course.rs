@@ -3,7 +3,7 @@
 use super::{Vehicle, VehicleOutput};
 use crate::auv::planning::distance;
 use crate::auv::steering::Course;
-use scenecast_protocol::directive::{Constraints, Fence, Limits, PlannerKind, Reaction};
+use scenecast_protocol::directive::{Constraints, Fence, Limits, Reaction};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, VehicleMode, VehicleStatus};
 
@@ -41,7 +41,7 @@ impl Vehicle {
         if let Some(reason) = ModeReason::from_code(durable.breach) {
             self.guard.handle_breach(reason);
         }
-        self.steering.set_planner(PlannerKind::from_code(durable.planner));
+        self.steering.set_planner(self.telling.settings.planner.value());
         if let Some(fence) = Fence::from_bytes(&durable.fence).filter(|f| f.check().is_ok()) {
             self.steering.set_fence(&fence);
         }
@@ -95,9 +95,8 @@ impl Vehicle {
         if !is_back && self.waypoint.is_some_and(|w| distance(w, at) >= self.steering.arrival_m()) {
             return;
         }
-        let map = self.whole_png.as_ref().map_or_else(|| self.link.map(), super::WholePng::map);
-        let version = self.whole_png.as_ref().map_or_else(|| self.link.map_version(), super::WholePng::version);
         let left_m = self.guard.left_m();
+        let (map, version) = (&self.telling.seen, self.telling.version);
         match self.steering.next(at, (map, version), self.utility.as_ref(), left_m) {
             Course::Go(to) => self.go(to, VehicleMode::Survey, ModeReason::Survey),
             Course::UsedUp => self.go_home(at, self.guard.tighter()),

@@ -5,6 +5,7 @@ mod course;
 mod obedience;
 mod obey;
 mod place;
+mod tuning;
 mod whole_png;
 
 use super::exemplar::{Exemplar, encode_webp};
@@ -13,7 +14,7 @@ use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::steering::Steering;
 use course::Doing;
-use scenecast_protocol::directive::{Fix, RefusalReason, Requests, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Fix, RefusalReason, Requests, Settings, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::object::ObjectId;
@@ -21,6 +22,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SlotState;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
+use tuning::Telling;
 use whole_png::WholePng;
 
 pub use place::LastPlace;
@@ -49,10 +51,8 @@ pub struct Durable {
     pub budget_bps: Option<u32>,
     /// Least shares in force in percent, if somebody has changed them.
     pub shares: Option<[u8; 5]>,
-    /// Words to resample a second, if the operator has said so.
-    pub refine_words_per_s: Option<u32>,
-    /// Planner in force, as on the wire.
-    pub planner: u8,
+    /// Settings in force, as on the wire; empty: all as configured.
+    pub settings: Vec<u8>,
     /// Limits in force, as on the wire; empty: none.
     pub limits: Vec<u8>,
     /// Metres and seconds of them that are used up, nearly.
@@ -77,8 +77,8 @@ pub enum VehicleOutput {
     Hold,
     /// Come up.
     Surface,
-    /// Resample so many words a second; 0: as configured.
-    RefineRate(u32),
+    /// Have the scene model follow these settings; what they do not name is as configured.
+    Tune(Settings),
     /// A slot was decided about.
     Applied(AppliedSlot),
     /// A fix in the world that was used, and when it was taken: an autopilot may want it too.
@@ -117,8 +117,7 @@ pub struct Vehicle {
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
     autopilot_silent: bool,
-    /// Seconds of the budget that a backlog must exceed to go out coarse to fine; 0: never.
-    coarse_after_s: f64,
+    telling: Telling,
     /// Instead of the link's map, for comparison.
     whole_png: Option<WholePng>,
 }
@@ -145,6 +144,7 @@ impl Vehicle {
             steering,
             // Weights speak of labels of their epoch; a new epoch has none yet.
             utility: utility.filter(|u| u.epoch == durable.epoch),
+            telling: Telling::restore(&durable.settings),
             durable,
             requests: Requests::default(),
             answered: Vec::new(),
@@ -157,7 +157,6 @@ impl Vehicle {
             outputs: VecDeque::new(),
             fixes_applied: 0,
             autopilot_silent: false,
-            coarse_after_s: 0.0,
             whole_png: None,
         };
         if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
@@ -166,7 +165,8 @@ impl Vehicle {
             vehicle.durable.inbox = vehicle.link.persistent_state().clone();
             vehicle.outputs.push_back(VehicleOutput::Persist);
         }
-        vehicle.outputs.extend(vehicle.durable.refine_words_per_s.map(VehicleOutput::RefineRate));
+        vehicle.outputs.push_back(VehicleOutput::Tune(vehicle.telling.settings));
+        vehicle.follow_telling();
         vehicle.follow_utility();
         vehicle.restore_course();
         vehicle
@@ -177,33 +177,22 @@ impl Vehicle {
         self.whole_png = Some(WholePng::default());
     }
 
-    /// A backlog that the budget needs longer for goes out coarse to fine; 0: never.
-    pub fn set_coarse_after(&mut self, seconds: f64) {
-        self.coarse_after_s = seconds;
-        self.limit_backlog();
-    }
-
-    pub(super) fn limit_backlog(&mut self) {
-        let bytes = f64::from(self.link.budget_bps()) / 8.0 * self.coarse_after_s;
-        self.link.source_mut().set_coarse_limit((bytes > 0.0).then_some(bytes as usize));
-    }
-
     /// What must survive a restart.
     pub fn durable(&self) -> &Durable {
         &self.durable
     }
 
-    /// The map as the vehicle sees it.
+    /// The map as the vehicle tells it.
     pub fn map(&self) -> &LabelGrid {
         self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
     }
 
-    /// The planes of the map that are sent.
+    /// The planes of the map that are told.
     pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
         self.link.planes()
     }
 
-    /// Versions of the map so far.
+    /// Versions of that map so far.
     pub fn map_version(&self) -> u64 {
         self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
     }
@@ -261,15 +250,10 @@ impl Vehicle {
         }
         self.labels = update.labels;
         self.explored = update.cells.len() as u32;
-        let cells = update.cells.iter().copied();
+        self.telling.see(update);
         match &mut self.whole_png {
-            Some(whole) => whole.set(cells),
-            None => {
-                self.link.set_map(cells, now);
-                for (&kind, cells) in &update.planes {
-                    self.link.set_plane(kind, cells.iter().copied(), now);
-                }
-            }
+            Some(whole) => whole.set(update.cells.iter().copied()),
+            None => self.tell(now),
         }
         let at = self.navigator.position();
         self.steering.handle_view(at);
@@ -279,6 +263,7 @@ impl Vehicle {
     /// Label ids start afresh: the surface learns it by a new run, before any of the new ids.
     fn begin_epoch(&mut self, epoch: u8, now: Instant) {
         self.link.begin_epoch(now);
+        self.telling.forget();
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
         (self.durable.epoch, self.durable.labels) = (epoch, 0);
         self.utility = None;

@@ -8,7 +8,7 @@ use crate::rehearsal::motion::Motion;
 use crate::rehearsal::witness::stretches_outside;
 use proptest::prelude::*;
 use scenecast_protocol::directive::{
-    Constraints, Fence, Limits, Place, PlannerKind, Polygon, Reaction, Settings, Slot, Utility,
+    Change, Constraints, Fence, Limits, Place, PlannerKind, Polygon, Reaction, Settings, Slot, Utility,
 };
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
@@ -141,7 +141,7 @@ fn order() -> impl Strategy<Value = Slot> {
         1 => (any::<bool>(), prop::bool::weighted(0.2)).prop_map(|(hold, abort)| Slot::Constraints(Constraints { hold, abort })),
         1 => Just(Slot::Constraints(Constraints::default())),
         1 => proptest::sample::select(vec![None, Some(PlannerKind::Lawnmower), Some(PlannerKind::Greedy), Some(PlannerKind::Horizon)])
-            .prop_map(|planner| Slot::Settings(Settings { refine_words_per_s: 0, planner })),
+            .prop_map(|planner| Slot::Settings(Settings { planner: planner.map_or(Change::Configured, Change::To), ..Settings::default() })),
     ]
 }
 

@@ -3,7 +3,7 @@
 use super::{LastPlace, Vehicle, VehicleOutput};
 use crate::auv::FixVerdict;
 use scenecast_protocol::directive::{
-    Budget, Constraints, Fence, Limits, LimitsFault, Place, PlannerKind, RefusalReason, Slot, Utility,
+    Budget, Constraints, Fence, Limits, LimitsFault, Place, RefusalReason, Slot, Utility,
 };
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
@@ -16,14 +16,7 @@ impl Vehicle {
                 self.follow_order(constraints);
                 Ok(())
             }
-            Slot::Settings(settings) => {
-                self.durable.refine_words_per_s = Some(settings.refine_words_per_s);
-                self.durable.planner = PlannerKind::code(settings.planner);
-                self.steering.set_planner(settings.planner);
-                self.reconsider();
-                self.outputs.push_back(VehicleOutput::RefineRate(settings.refine_words_per_s));
-                Ok(())
-            }
+            Slot::Settings(settings) => self.apply_settings(&settings, now),
             Slot::Budget(budget) if is_in_range(&budget) => {
                 self.follow_budget(budget, now);
                 Ok(())
@@ -129,7 +122,7 @@ impl Vehicle {
 
     fn follow_budget(&mut self, budget: Budget, now: Instant) {
         self.link.set_budget(budget.bits_per_s, now);
-        self.limit_backlog();
+        self.follow_telling();
         self.link.set_shares(budget.shares);
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);

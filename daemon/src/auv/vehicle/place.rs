@@ -61,7 +61,7 @@ impl Vehicle {
 
     /// Labels of cells as the vehicle sees them.
     pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
-        self.map().iter()
+        self.telling.seen.iter()
     }
 
     /// The position estimate.

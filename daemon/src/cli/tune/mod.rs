@@ -5,21 +5,19 @@ mod grid;
 mod measure;
 mod picture;
 mod survey;
-mod table;
 
-use crate::auv::cell_m;
 use crate::cli::progress::Progress;
 use crate::config::{self, Config};
 use crate::picture::write_whole;
 use crate::problem::Problem;
 use clap::Args;
-use grid::{Grid, Setting};
-use measure::{Measurement, measure};
-use std::path::PathBuf;
+use crate::tuning::{Measurement, Row, Setting, TuningTable, least, most};
+use grid::Grid;
+use measure::{mean, measure};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use survey::{Site, Survey};
-use table::{Row, Table};
 
 /// Search the settings of the scene model whose labels tell most about annotations of a similar site.
 ///
@@ -28,22 +26,26 @@ use table::{Row, Table};
 /// sweeps over all words and the map is compared with the annotations. A run that was interrupted goes on where it was.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Example: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning"
+    after_help = "Examples: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
+          scenecast tune --procedural 1,2,3 --grid grid.toml --out tuning"
 )]
 pub(super) struct Tune {
     /// Image of the sea floor
-    #[arg(long, value_name = "IMG")]
-    mosaic: PathBuf,
+    #[arg(long, value_name = "IMG", requires = "annotations", required_unless_present = "procedural")]
+    mosaic: Option<PathBuf>,
     /// Size of the image's pixels on the sea floor [default: camera.metres_per_pixel]
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     metres_per_pixel: Option<f64>,
     /// Classes of the image's pixels: a grey or indexed image of the same size
-    #[arg(long, value_name = "LABELS")]
-    annotations: PathBuf,
+    #[arg(long, value_name = "LABELS", requires = "mosaic")]
+    annotations: Option<PathBuf>,
+    /// Instead of an image: sea floors drawn from these seeds; the figures are their means
+    #[arg(long, value_name = "SEEDS", value_delimiter = ',', conflicts_with_all = ["mosaic", "annotations"])]
+    procedural: Vec<u64>,
     /// Classes that do not count
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
-    /// TOML file with lists alpha, beta, gamma and cell_m (metres), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4, 1e-5; scene.cell_m]
+    /// TOML file with lists alpha, beta, gamma, cell_m (metres), refine_words_per_s, frames_per_s and cells ("fine", "coarse"), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4, 1e-5; the rest as configured]
     #[arg(long, value_name = "FILE")]
     grid: Option<PathBuf>,
     /// Most bits a second that the stream of the best setting may take [default: link.budget_bps]
@@ -76,18 +78,20 @@ impl Tune {
         if !(budget_bps > 0.0 && budget_bps.is_finite()) {
             return Err(Problem::Input(format!("--budget {budget_bps}: it takes bits a second, above 0")));
         }
-        let grid = Grid::load(self.grid.as_deref(), cell_m(&config))?;
-        let site = Site::load(&self.mosaic, &self.annotations, &self.ignore, &config)?;
+        let grid = Grid::load(self.grid.as_deref(), &config)?;
+        let sites = self.sites(&config)?;
         std::fs::create_dir_all(&self.out).map_err(|e| Problem::file(&self.out, e))?;
-        let inputs = site.fingerprint(&format!("{} sweeps, seed {}", self.sweeps, self.seed));
-        let mut table = Table::open(&self.out.join("tuning.csv"), inputs)?;
+        let inputs = Site::fingerprint(&sites, &format!("{} sweeps, seed {}", self.sweeps, self.seed));
+        let path = self.out.join("tuning.csv");
+        let mut table = Growing { table: open(&path, &inputs)?, path, inputs };
         let settings = grid.settings();
-        let left: Vec<Setting> = settings.iter().copied().filter(|setting| !table.has(setting)).collect();
+        let left: Vec<Setting> = settings.iter().copied().filter(|setting| !table.table.has(setting)).collect();
         if left.len() < settings.len() {
             eprintln!("tune: {} of {} settings are in tuning.csv already", settings.len() - left.len(), settings.len());
         }
-        self.search(&site, &left, &mut table)?;
-        self.conclude(&config, table.rows(), budget_bps)
+        self.search(&sites, &left, &mut table)?;
+        let rows: Vec<Row> = table.table.rows().copied().collect();
+        self.conclude(&config, &rows, budget_bps)
     }
 
     fn config(&self) -> Result<Config, Problem> {
@@ -96,16 +100,25 @@ impl Tune {
         config::load(self.config.as_deref(), &sets)
     }
 
+    fn sites<'a>(&'a self, config: &'a Config) -> Result<Vec<Site<'a>>, Problem> {
+        match (&self.mosaic, &self.annotations) {
+            (Some(mosaic), Some(annotations)) => Ok(vec![Site::load(mosaic, annotations, &self.ignore, config)?]),
+            _ => Ok(self.procedural.iter().map(|&seed| Site::procedural(seed, config)).collect()),
+        }
+    }
+
     /// Measures settings, those with one size of cells after another, each written down as soon as it is known.
-    fn search(&self, site: &Site<'_>, settings: &[Setting], table: &mut Table) -> Result<(), Problem> {
+    fn search(&self, sites: &[Site<'_>], settings: &[Setting], table: &mut Growing) -> Result<(), Problem> {
         let progress = Mutex::new((Progress::new("settings"), 0));
         let table = Mutex::new(table);
         for same_cells in settings.chunk_by(|a, b| a.cell_m == b.cell_m) {
-            let survey = Survey::new(site, same_cells[0].cell_m)?;
+            let surveys = sites.iter().map(|site| Survey::new(site, same_cells[0].cell_m));
+            let surveys: Vec<Survey<'_>> = surveys.collect::<Result<_, _>>()?;
             let next = AtomicUsize::new(0);
             let work = || -> Result<(), Problem> {
                 while let Some(setting) = same_cells.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let measurement = measure(&survey, setting, self.sweeps, self.seed)?;
+                    let measured = surveys.iter().map(|survey| measure(survey, setting, self.sweeps, self.seed));
+                    let measurement = mean(&measured.collect::<Result<Vec<_>, _>>()?);
                     table.lock().unwrap_or_else(PoisonError::into_inner).add(*setting, measurement)?;
                     let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
                     progress.1 += 1;
@@ -126,7 +139,7 @@ impl Tune {
     }
 
     fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), Problem> {
-        let best = best::best(rows, budget_bps);
+        let best = most(rows.iter().filter(|row| row.measurement.stream_bps <= budget_bps));
         let figure = picture::Figure::new(rows, best);
         write_whole(&self.out.join("tuning.svg"), figure.svg().as_bytes())?;
         write_whole(&self.out.join("tuning.png"), &figure.png()?)?;
@@ -137,7 +150,7 @@ impl Tune {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Problem::file(&path, e)),
                 _ => {}
             }
-            let least = rows.iter().map(|row| row.measurement.stream_bps).fold(f64::INFINITY, f64::min);
+            let least = least(rows.iter()).map_or(f64::INFINITY, |row| row.measurement.stream_bps);
             let what = format!("the stream of no setting fits --budget {budget_bps} bit/s: the least is {least:.0}");
             return Err(Problem::Failed(what));
         };
@@ -149,5 +162,35 @@ impl Tune {
             best.setting
         );
         Ok(())
+    }
+}
+
+/// The table of a run, written with each setting that is measured.
+struct Growing {
+    table: TuningTable,
+    path: PathBuf,
+    /// Fingerprint of everything but the setting that the figures depend on.
+    inputs: String,
+}
+
+impl Growing {
+    fn add(&mut self, setting: Setting, measurement: Measurement) -> Result<(), Problem> {
+        self.table.insert(self.inputs.clone(), Row { setting, measurement });
+        write_whole(&self.path, self.table.text().as_bytes())
+    }
+}
+
+/// The table of an earlier run with the same inputs, or an empty one.
+fn open(path: &Path, inputs: &str) -> Result<TuningTable, Problem> {
+    let refused = |line: usize, what: String| Problem::Input(format!("{}:{line}: {what}", path.display()));
+    let table = match std::fs::read_to_string(path) {
+        Ok(text) => TuningTable::read(&text).map_err(|(line, what)| refused(line, format!("{what}; give another --out")))?,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => TuningTable::default(),
+        Err(e) => return Err(Problem::file(path, e)),
+    };
+    let what = "was measured with another sea floor, annotations or options than this run's";
+    match table.line_of_others(inputs) {
+        Some(line) => Err(refused(line, format!("{what}; give those again, or another --out"))),
+        None => Ok(table),
     }
 }

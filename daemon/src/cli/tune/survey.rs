@@ -1,9 +1,9 @@
 //! The mosaic with its annotations, and a virtual survey over it.
 
-use super::grid::Setting;
 use crate::config::Config;
 use crate::imagery::{read_classes, read_image};
 use crate::problem::Problem;
+use crate::tuning::Setting;
 use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::score::{Annotations, mosaic_classes};
@@ -16,6 +16,8 @@ const OVERLAP: f64 = 0.1;
 /// Most words of a survey: 1.5 GB of them.
 const MOST_WORDS: f64 = 1e8;
 const LEAST_PX: u32 = 64;
+/// Width and height of a sea floor that is drawn, and about the size of its patches, as a rehearsal has it.
+const REEF_PX: (u32, u32, u32) = (2600, 1800, 25);
 
 /// What all settings have in common.
 pub(super) struct Site<'a> {
@@ -52,12 +54,21 @@ impl<'a> Site<'a> {
         Ok(Self { image, classes, ignore, config, crc: digest.finalize() })
     }
 
-    /// 16 hexadecimal digits over everything but the setting that a measurement depends on.
-    pub(super) fn fingerprint(&self, options: &str) -> String {
-        let Config { camera, scene, survey, link, map, .. } = self.config;
+    /// A sea floor that is drawn, with every pixel annotated.
+    pub(super) fn procedural(seed: u64, config: &'a Config) -> Self {
+        let reef = scene_model::generate::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
+        let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(reef.image.as_raw());
+        Self { image: reef.image, classes, ignore: &[], config, crc }
+    }
+
+    /// 16 hexadecimal digits over everything but the setting that a measurement of these sites depends on.
+    pub(super) fn fingerprint(sites: &[Self], options: &str) -> String {
+        let Some(Self { config, ignore, .. }) = sites.first() else { return String::new() };
+        let Config { camera, scene, survey, link, map, .. } = config;
         let rest = format!(
-            "1 {options} {:?} {} {} {} {} {} {} {} {} {} {} {} {:?}",
-            self.ignore,
+            "2 {options} {:?} {} {} {} {} {} {} {} {} {} {} {:?}",
+            ignore,
             camera.metres_per_pixel,
             camera.width_px,
             camera.height_px,
@@ -65,13 +76,13 @@ impl<'a> Site<'a> {
             survey.speed_m_s,
             scene.birth,
             scene.max_labels,
-            scene.refine_words_per_s,
             scene.max_words_per_cell,
             link.frame_bytes,
             map.codec,
             WordConfig::default()
         );
-        format!("{:08x}{:08x}", self.crc, crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(rest.as_bytes()))
+        let images = sites.iter().fold(0, |all: u32, site| all.rotate_left(5) ^ site.crc);
+        format!("{images:08x}{:08x}", crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(rest.as_bytes()))
     }
 }
 

@@ -94,7 +94,7 @@ impl Mission {
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::Surface => self.motion.come_up(),
-                VehicleOutput::RefineRate(words_per_s) => self.mapper.set_refine_rate(words_per_s),
+                VehicleOutput::Tune(settings) => self.mapper.tune(&settings),
                 VehicleOutput::Applied(applied) => {
                     if applied.id == SlotId::Fence {
                         self.legs_before_fence = self.legs.len();
@@ -213,6 +213,9 @@ impl Mission {
             let (x_m, y_m, file) = (pose.x, pose.y, Default::default());
             let frame = RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale };
             recorder.push(image, &frame)?;
+        }
+        if !self.mapper.takes(t_s) {
+            return Ok(());
         }
         self.track.push((pose.x, pose.y));
         let update = self.mapper.handle_frame(image, &pose, scale, t_s);

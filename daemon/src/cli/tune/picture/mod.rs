@@ -4,9 +4,8 @@ mod axis;
 mod raster;
 mod svg;
 
-use super::measure::Measurement;
-use super::table::Row;
 use crate::problem::Problem;
+use crate::tuning::{Measurement, Row};
 use axis::Axis;
 use raster::Raster;
 use svg::Svg;
@@ -168,12 +167,13 @@ fn front(rows: &[Row], told: impl Fn(&Row) -> f64) -> Vec<&Row> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::grid::Setting;
     use super::*;
+    use crate::tuning::TuningTable;
 
     fn rows() -> Vec<Row> {
+        let setting = TuningTable::shipped().rows().next().unwrap().setting;
         let row = |(map_bytes, mutual_information_nats)| Row {
-            setting: Setting { cell_m: 0.25, alpha: mutual_information_nats, beta: 0.1, gamma: 1e-5 },
+            setting: crate::tuning::Setting { alpha: mutual_information_nats, ..setting },
             measurement: Measurement {
                 mutual_information_nats,
                 normalised_mutual_information: 0.0,
