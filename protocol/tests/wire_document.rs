@@ -1,8 +1,8 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
 use scenecast_protocol::directive::{
-    Band, Budget, Constraints, Fence, Fix, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Requests,
-    SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+    Band, Budget, CellBand, Change, Constraints, Fence, Figure, Fix, Limits, Place, PlaneSet, PlannerKind, Polygon,
+    Reaction, RefusalReason, Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
@@ -289,6 +289,15 @@ fn parts_of_a_frame_are_those_of_the_document() {
     };
     let depth = PlaneScale::Depth { step_dm: 5, first: 24 };
     assert_eq!((depth.bounds(1), PlaneScale::Confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
+    let settings = Settings {
+        planner: Change::To(PlannerKind::Horizon),
+        cells: Change::To(CellBand::Coarse),
+        planes: Change::To(PlaneSet { confidence: false, depth: true }),
+        alpha: Change::To(Figure::new(0.01).unwrap()),
+        gamma: Change::Configured,
+        frames_per_s: Change::To(Figure::new(0.25).unwrap()),
+        ..Settings::default()
+    };
     let limits = Limits {
         depth: Some(Band { low_dm: 50, high_dm: 400 }),
         distance_m: Some(3000),
@@ -361,8 +370,9 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         ("slot: series ABCD, version 1, constraints: hold", hold()),
         (
-            "slot: series ABCD, version 2, settings: 5000 words a second, planner horizon",
-            slot(2, Slot::Settings(Settings { refine_words_per_s: 5000, planner: Some(PlannerKind::Horizon) })),
+            "slot: series ABCD, version 2, settings: planner horizon, coarse cells, depth alone, alpha 0.01, gamma as \
+             configured, 0.25 frames a second",
+            slot(2, Slot::Settings(settings)),
         ),
         (
             "slot: series ABCD, version 2, constraints: abort",
