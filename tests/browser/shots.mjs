@@ -34,6 +34,7 @@ const SCENES = {
   vehicle: { scenario: "refused", sizes: ["phone"], steps: tab("Vehicle") },
   link: { scenario: "rich", sizes: ["phone"], steps: tab("Link") },
   constraints: { scenario: "rich", steps: constrained },
+  model: { scenario: "rich", steps: tuned },
   coarse: { scenario: "empty", steps: (page, steer) => steer({ coarse: true, loss: 0, advance: 100 }).then(() => page.waitForTimeout(500)) },
   two: { scenario: "two", sizes: ["wide"] },
   age: { scenario: "rich", sizes: ["wide"], steps: (page) => page.selectOption("#layer", "age") },
@@ -71,6 +72,18 @@ async function constrained(page, steer) {
   await draw("Add keep-out", [[0.2, 0.3], [0.3, 0.5], [0.3, 0.3], [0.2, 0.5]]);
   await page.getByLabel("Depth, m, lowest").fill("50");
   await page.getByLabel("Depth, m, highest").fill("5");
+}
+
+/** Settings in force, one more that no vehicle takes, and what fits a budget. */
+async function tuned(page, steer) {
+  await page.getByRole("tab", { name: "Model" }).click();
+  await page.locator("#set-gamma").fill("1e-5");
+  await page.locator("#set-planes").selectOption("depth");
+  await page.locator("#send-settings").click();
+  await steer({ advance: 40, loss: 0 });
+  await page.locator("#fit-bps").fill("1000");
+  await page.locator("#fit").click();
+  await page.locator("#set-beta").fill("5000");
 }
 
 async function cloud(page, steer) {

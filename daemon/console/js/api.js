@@ -6,8 +6,9 @@ export class Refused extends Error {}
 
 async function read(path) {
   const answer = await fetch(BASE + path, { cache: "no-store", signal: AbortSignal.timeout(10000) });
-  if (!answer.ok) throw new Refused(`${answer.status} ${answer.statusText}`);
-  return answer.json();
+  const said = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Refused(said.error ?? `${answer.status} ${answer.statusText}`);
+  return said;
 }
 
 async function write(path, body) {
@@ -33,6 +34,9 @@ export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints
 export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
 export const sendLimits = (id, limits) => write(`/vehicles/${id}/limits`, limits);
 export const sendPlanner = (id, planner) => write(`/vehicles/${id}/settings`, { planner });
+export const sendSettings = (id, settings) => write(`/vehicles/${id}/settings`, settings);
+/** The settings that tell most within so many bits a second; null: within the map's share of the vehicle's budget. */
+export const readFit = (id, bps) => read(`/vehicles/${id}/fit${bps === null ? "" : `?bits_per_s=${bps}`}`);
 /** `shares` in percent by class; null leaves them as they are. */
 export const sendBudget = (bps, shares = null) => write("/budget", { budget_bps: bps, ...(shares && { shares }) });
 

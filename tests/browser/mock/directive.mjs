@@ -6,7 +6,7 @@ const REASONS = {
   constraints: "holding here would break the return margin",
   fence: "the vehicle is outside of it",
   limits: "depth_m: the vehicle flies at 16.4 m",
-  settings: "no such planner here",
+  settings: "a value is outside what the vehicle accepts",
   budget: "below the 500 bit/s that status needs",
   requests: "no image kept for this label",
 };

@@ -13,6 +13,7 @@ import { dirname, extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { Mission } from "./mission.mjs";
 import { encodePng } from "./png.mjs";
+import { faultOf, fit } from "./settings.mjs";
 
 const HERE = dirname(fileURLToPath(import.meta.url));
 const ASSETS = join(HERE, "../../../daemon/console");
@@ -82,6 +83,7 @@ async function api(mock, req, res, path) {
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
   if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
   if (what === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.planes));
+  if (what === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
   if (what === "map.png") return send(res, 200, "image/png", encodePng(vehicle.mapJson(mission.nowS, false), deflateSync));
   const [, label] = what.match(/^exemplars\/(\d+)\.webp$/) ?? [];
   if (vehicle.exemplars.get(Number(label))?.state !== "here") return reply(res, 404, { error: "not here" });
@@ -117,9 +119,17 @@ async function post(mock, req, res, path) {
       if (s === "applied") Object.assign(v, { hold: given.hold, aborted: given.abort === true });
     }));
   }
-  const orders = { fence: () => fence(given), limits: () => limits(given), settings: () => given.planner || null };
+  if (what === "settings") {
+    const wrong = faultOf(given);
+    if (wrong) return reply(res, 422, { error: wrong });
+    const last = v.directive.slots.get("settings")?.state;
+    v.settings.ask(given, last);
+    if ("planner" in given) v.planner = given.planner || null;
+    return accepted(mock, res, v.directive.issue("settings", mission.nowS, (s) => v.settings.settle(s)));
+  }
+  const orders = { fence: () => fence(given), limits: () => limits(given) };
   if (what in orders) {
-    v[what === "settings" ? "planner" : what] = orders[what]();
+    v[what] = orders[what]();
     return accepted(mock, res, v.directive.issue(what, mission.nowS));
   }
   return reply(res, 404, { error: "no such thing" });

@@ -4,6 +4,7 @@ import { habitat, confidence, floorDepth } from "./scene.mjs";
 import { Grid } from "./grid.mjs";
 import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
+import { Settings } from "./settings.mjs";
 
 const PLANES = [
   { name: "confidence", unit: "", min: 0.125, max: 0.875, step: 0.25, at: confidence },
@@ -22,7 +23,7 @@ export class Vehicle {
     this.published = new Map();
     this.weights = new Map();
     this.terms = { exploration: 0.2, curiosity: 0 };
-    Object.assign(this, { fence: null, limits: null, planner: null, coarse: false, aborted: false });
+    Object.assign(this, { fence: null, limits: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
     this.exemplars = new Map();
     this.track = [];
     this.hold = false;
@@ -142,7 +143,7 @@ export class Vehicle {
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
-      utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner,
+      utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner, settings: this.settings.json(),
       directive: this.directive.json(),
     };
   }

@@ -27,7 +27,7 @@ const audits = ["light", "dark", "red"].flatMap((theme) =>
       await clean(s);
       await s.page.keyboard.press("Escape");
       await s.page.setViewportSize(PHONE);
-      for (const tab of ["Labels", "Vehicle", "Constraints", "Link"]) {
+      for (const tab of ["Labels", "Vehicle", "Constraints", "Link", "Model"]) {
         await s.page.getByRole("tab", { name: tab }).click();
         await clean(s);
       }

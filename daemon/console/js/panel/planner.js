@@ -11,7 +11,7 @@ const CHOICES = [
   ["", "as configured there"], ["lawnmower", "lawnmower: parallel legs"],
   ["greedy", "greedy: best nearby"], ["horizon", "horizon: looks ahead"],
 ];
-const order = new Order("settings", (v) => v.planner ?? "", (v, planner) => sendPlanner(v.id, planner));
+export const order = new Order("settings", (v) => v.planner ?? "", (v, planner) => sendPlanner(v.id, planner));
 const pick = h("select", { id: "planner", onchange: () => order.set(store.vehicle, pick.value) }, ...CHOICES.map(([value, name]) => h("option", { value }, name)));
 const set = h("button", { type: "button", id: "send-planner", onclick: () => order.send(store.vehicle) }, "Set");
 set.setAttribute("aria-label", "Set the planner");

@@ -8,7 +8,8 @@ use crate::rehearsal::motion::Motion;
 use crate::rehearsal::witness::stretches_outside;
 use proptest::prelude::*;
 use scenecast_protocol::directive::{
-    Change, Constraints, Fence, Limits, Place, PlannerKind, Polygon, Reaction, Settings, Slot, Utility,
+    CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Settings,
+    Slot, Utility,
 };
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
@@ -224,4 +225,39 @@ fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
     assert!(!again.steering.bounds().holds((25.0, 5.0)));
     assert!(again.steering.bounds().holds((15.0, 5.0)));
     assert_eq!(again.steering.home(), (5.0, 5.0));
+}
+
+#[test]
+fn settings_out_of_range_are_refused_and_those_in_force_survive_a_restart() {
+    let figure = |value: f64| Change::To(Figure::new(value).unwrap());
+    let mut sea = Sea::new(0.0, 1);
+    let asked = Settings {
+        planner: Change::To(PlannerKind::Greedy),
+        cells: Change::To(CellBand::Coarse),
+        gamma: figure(1e-5),
+        frames_per_s: figure(0.2),
+        ..Settings::default()
+    };
+    let tuned = |vehicle: &mut Vehicle| {
+        let outputs = std::iter::from_fn(|| vehicle.poll_output());
+        outputs.filter_map(|o| if let VehicleOutput::Tune(settings) = o { Some(settings) } else { None }).last()
+    };
+    assert_eq!(tuned(&mut sea.vehicle), Some(Settings::default()), "the host is told at the start of a run");
+    assert_eq!(sea.vehicle.apply(Slot::Settings(asked), sea.now), Ok(()));
+    assert_eq!(tuned(&mut sea.vehicle), Some(asked));
+    for settings in [
+        Settings { alpha: figure(1e4), ..Settings::default() },
+        Settings { frames_per_s: figure(0.001), gamma: figure(0.1), ..Settings::default() },
+        Settings { refine_words_per_s: figure(1e9), ..Settings::default() },
+    ] {
+        assert_eq!(sea.vehicle.apply(Slot::Settings(settings), sea.now), Err(RefusalReason::OutOfRange));
+        assert_eq!((sea.vehicle.settings(), tuned(&mut sea.vehicle)), (&asked, None));
+    }
+    let more = Settings { alpha: figure(0.3), gamma: Change::Configured, ..Settings::default() };
+    assert_eq!(sea.vehicle.apply(Slot::Settings(more), sea.now), Ok(()));
+    let config = Config::default();
+    let durable = sea.vehicle.durable().clone();
+    let mut again = ends::vehicle(&config, profile(&config), AREA, durable, 1, sea.now).unwrap();
+    assert_eq!(again.settings(), &asked.then(&more));
+    assert_eq!(tuned(&mut again), Some(asked.then(&more)));
 }

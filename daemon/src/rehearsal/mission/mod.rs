@@ -2,6 +2,8 @@
 
 mod carrier;
 mod events;
+#[cfg(test)]
+mod tuned;
 
 use super::docked::{self, Docked};
 use super::frames_log::FramesLog;

@@ -1,0 +1,50 @@
+// Settings of the scene model: what was asked for, what is in force, what fits a budget.
+
+const NUMBERS = {
+  alpha: [1e-9, 1e3], beta: [1e-9, 1e3], gamma: [1e-12, 1e3], refine_words_per_s: [1, 1e8], frames_per_s: [0.01, 30],
+};
+const KEYS = ["planner", "cells", "planes", ...Object.keys(NUMBERS)];
+const nothing = () => Object.fromEntries(KEYS.map((k) => [k, null]));
+const stated = (order) => Object.fromEntries(Object.entries(order).filter(([k, v]) => KEYS.includes(k) && v !== null));
+
+export class Settings {
+  asked = nothing();
+  inForce = nothing();
+
+  ask(order, last) {
+    this.asked = { ...(last === "refused" ? this.inForce : this.asked), ...stated(order) };
+  }
+
+  settle(state) {
+    if (state === "applied") this.inForce = this.asked;
+  }
+
+  json() {
+    return { asked: this.asked, in_force: this.inForce };
+  }
+}
+
+export function faultOf(order) {
+  for (const [key, [low, high]] of Object.entries(NUMBERS)) {
+    const value = order[key] ?? 0;
+    if (value !== 0 && !(value >= low && value <= high)) return `${key} ${value}: it takes ${low} to ${high}, or 0 as configured`;
+  }
+  return null;
+}
+
+const row = (settings, nats, labels, bps) => ({
+  settings: { ...nothing(), refine_words_per_s: 50000, beta: 0.1, ...settings }, mutual_information_nats: nats, lost_nats: 0.31 - nats, labels, stream_bps: bps,
+});
+const BEST = row({ alpha: 0.01, gamma: 1e-4, frames_per_s: 0.5, cells: "fine" }, 0.31, 16, 1900);
+const FEWER = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "fine" }, 0.29, 9, 800);
+const LEANEST = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "coarse" }, 0.2, 9, 90);
+
+export function fit(asked, mission) {
+  const bps = asked === null ? (mission.budgetBps * mission.shares.map) / 100 : Number(asked);
+  const chosen = [BEST, FEWER, LEANEST].find((r) => r.stream_bps <= bps) ?? null;
+  const given = chosen === null ? `no setting fits ${bps} bit/s: the leanest needs 90 bit/s, 0.11 nats (35 %) below the best`
+    : chosen === BEST ? "nothing is given up: it tells most of all settings"
+      : chosen === FEWER ? "fewer labels, fewer camera frames: 0.02 nats (6 %) below the best, which needs 1.9 kbit/s"
+        : "coarser cells, fewer labels: 0.11 nats (35 %) below the best, which needs 1.9 kbit/s";
+  return { bits_per_s: bps, chosen, best: BEST, leanest: LEANEST, given_up: given };
+}
