@@ -32,6 +32,37 @@ fn ctl(port: u16, arguments: &[&str]) -> Output {
 }
 
 #[test]
+fn settings_are_fitted_to_a_budget_sent_and_told_as_in_force() {
+    let port = free_port();
+    let _demo = demo(port, &["--duration", "3000"]);
+    let refused = ctl(port, &["settings", "--alpha", "5000"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("alpha 5000: it takes 0.000000001 to 1000"), "{}", said(&refused));
+    let sent = ctl(port, &["settings", "--gamma", "1e-5", "--planes", "none", "--wait", "80"]);
+    assert_eq!(sent.status.code(), Some(0), "{}", said(&sent));
+    let told = ctl(port, &["settings", "--json"]);
+    let told: Value = serde_json::from_slice(&told.stdout).unwrap();
+    assert_eq!((&told["in_force"]["gamma"], &told["in_force"]["planes"]), (&1e-5.into(), &"none".into()));
+    assert_eq!((&told["asked"]["gamma"], &told["asked"]["alpha"]), (&1e-5.into(), &Value::Null));
+
+    let nothing = ctl(port, &["settings", "--fit", "1"]);
+    assert_eq!(nothing.status.code(), Some(1));
+    assert!(said(&nothing).contains("no setting fits 1 bit/s: the leanest needs"), "{}", said(&nothing));
+    let fit = |more: &[&str]| {
+        let output = ctl(port, &[&["settings", "--fit"], more, &["--dry-run", "--json"]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        let order: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (order, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (whole, words) = fit(&["100000"]);
+    assert!(words.contains("nothing is given up") && whole["cells"].is_string(), "{words}: {whole}");
+    let (named, _) = fit(&["--alpha", "0.3"]);
+    assert_eq!(named["alpha"], 0.3, "what is named goes before what fits");
+    let bad = http(port, "GET", "/api/v1/vehicles/1/fit?bits_per_s=x", "", "").unwrap();
+    assert_eq!(bad.0, 422);
+}
+
+#[test]
 fn orders_are_followed_until_they_are_applied_and_a_refusal_is_told() {
     let port = free_port();
     let _demo = demo(port, &["--duration", "3000"]);

@@ -160,9 +160,18 @@ mod tests {
         let refused = |json: &str| read(json).unwrap_err();
         assert_eq!(refused(r#"{"alpha": 5000}"#), "alpha 5000: it takes 0.000000001 to 1000, or 0 as configured");
         assert_eq!(refused(r#"{"gamma": -1}"#), "gamma -1: it takes 0.000000000001 to 1000, or 0 as configured");
-        assert_eq!(refused(r#"{"frames_per_s": 0.001}"#), "frames_per_s 0.001: it takes 0.01 to 30, or 0 as configured");
-        assert_eq!(refused(r#"{"refine_words_per_s": 0.5}"#), "refine_words_per_s 0.5: it takes 1 to 100000000, or 0 as configured");
-        assert_eq!(refused(r#"{"cells": "huge"}"#), "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured");
+        assert_eq!(
+            refused(r#"{"frames_per_s": 0.001}"#),
+            "frames_per_s 0.001: it takes 0.01 to 30, or 0 as configured"
+        );
+        assert_eq!(
+            refused(r#"{"refine_words_per_s": 0.5}"#),
+            "refine_words_per_s 0.5: it takes 1 to 100000000, or 0 as configured"
+        );
+        assert_eq!(
+            refused(r#"{"cells": "huge"}"#),
+            "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
+        );
         assert!(refused(r#"{"planes": "perplexity"}"#).contains("none, confidence, depth or both"));
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
         assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));

@@ -122,7 +122,9 @@ impl Work {
             match order {
                 ToMapper::Tune(settings) => self.mapper.tune(&settings),
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
-                ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => is_heard = self.tell(FromMapper::Passed(frame)),
+                ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
+                    is_heard = self.tell(FromMapper::Passed(frame))
+                }
                 ToMapper::Frame(frame) => {
                     let told = self.see(*frame);
                     // First the checkpoint: then it has every label that the surface hears of.

@@ -17,7 +17,9 @@ pub struct Fit {
 
 /// No setting of the table speaks of cells of this size.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("the tuning table has settings for cells of {sizes} and none for those of {cell_m} m; make one with scenecast tune and name it in scene.tuning_table")]
+#[error(
+    "the tuning table has settings for cells of {sizes} and none for those of {cell_m} m; make one with scenecast tune and name it in scene.tuning_table"
+)]
 pub struct NoRow {
     cell_m: f64,
     sizes: String,
@@ -180,7 +182,10 @@ pub(super) mod tests {
     fn settings_for_other_cells_are_not_offered() {
         assert!(known().fit(0.2505, 1e4).is_ok());
         let why = known().fit(0.1, 1e4).unwrap_err().to_string();
-        assert!(why.starts_with("the tuning table has settings for cells of 0.25 m and none for those of 0.1 m"), "{why}");
+        assert!(
+            why.starts_with("the tuning table has settings for cells of 0.25 m and none for those of 0.1 m"),
+            "{why}"
+        );
         assert!(table([]).fit(0.25, 1e4).is_err());
     }
 

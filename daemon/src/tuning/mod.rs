@@ -3,6 +3,6 @@
 mod fit;
 mod table;
 
-pub(crate) use fit::{least, most};
 pub use fit::{Fit, NoRow};
+pub(crate) use fit::{least, most};
 pub use table::{Measurement, Row, Setting, TuningTable};

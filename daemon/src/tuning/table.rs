@@ -237,8 +237,8 @@ mod tests {
                 assert_eq!(Figure::new(value).map(Figure::value), Some(value), "{s}");
             }
         }
-        let [fine, coarse] = [CellBand::Fine, CellBand::Coarse]
-            .map(|band| table.rows().filter(|row| row.setting.cells == band).count());
+        let [fine, coarse] =
+            [CellBand::Fine, CellBand::Coarse].map(|band| table.rows().filter(|row| row.setting.cells == band).count());
         assert!(fine > 0 && coarse > 0);
     }
 }

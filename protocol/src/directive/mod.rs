@@ -1,6 +1,7 @@
 //! What the surface tells a vehicle: independent versioned slots.
 
 mod fence;
+mod figure;
 mod fix;
 mod limits;
 mod outbox;
@@ -10,12 +11,13 @@ mod tuning;
 mod utility;
 
 pub use fence::{Fence, FenceFault};
+pub use figure::Figure;
 pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
 pub use polygon::{Place, Polygon, PolygonFault};
 pub use settings::{Budget, Constraints, PlannerKind, Requests};
-pub use tuning::{CellBand, Change, Figure, PlaneSet, Settings, SettingsFault};
+pub use tuning::{CellBand, Change, PlaneSet, Settings, SettingsFault};
 pub use utility::Utility;
 
 use crate::schedule::Class;

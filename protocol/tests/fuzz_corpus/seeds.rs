@@ -207,7 +207,11 @@ fn golden() -> Vec<Seed> {
         seed("slot", "utility", vec![12, 0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]),
         seed("slot", "requests", vec![10, 0x80, 0xAB, 0xCD, 0, 4, 1, 3, 1, 5, 2]),
         seed("slot", "budget", vec![13, 0x60, 0xAB, 0xCD, 0, 4, 0, 0x27, 0x10, 10, 5, 5, 50, 20]),
-        seed("slot", "settings-of-two-series", vec![9, 0x40, 0, 1, 0, 4, 0x92, 0x10, 0x28, 0x64, 7, 0x40, 0, 2, 0, 1, 0x04, 0]),
+        seed(
+            "slot",
+            "settings-of-two-series",
+            vec![9, 0x40, 0, 1, 0, 4, 0x92, 0x10, 0x28, 0x64, 7, 0x40, 0, 2, 0, 1, 0x04, 0],
+        ),
         seed("key_text", "key", text(&key)),
         seed("key_text", "commented", text(&format!("# reef\r\n\r\n  {}# end", *key))),
         seed("key_text", "twice", text(&format!("{}{}", *key, *key))),

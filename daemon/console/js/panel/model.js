@@ -60,7 +60,7 @@ function inForce(key) {
   const known = store.vehicle.settings?.in_force;
   if (!known) return "not known";
   const value = known[key] ?? null;
-  if (value === null) return AS_IS;
+  if (value === null) return "not set from here";
   return value === 0 || value === "" ? CONFIGURED : key === "planes" ? PLANES[value] : key === "cells" ? value.replaceAll("-", " ") : String(value);
 }
 

@@ -8,8 +8,8 @@ use crate::rehearsal::motion::Motion;
 use crate::rehearsal::witness::stretches_outside;
 use proptest::prelude::*;
 use scenecast_protocol::directive::{
-    CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Settings,
-    Slot, Utility,
+    CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason,
+    Settings, Slot, Utility,
 };
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
@@ -251,7 +251,7 @@ fn settings_out_of_range_are_refused_and_those_in_force_survive_a_restart() {
         Settings { refine_words_per_s: figure(1e9), ..Settings::default() },
     ] {
         assert_eq!(sea.vehicle.apply(Slot::Settings(settings), sea.now), Err(RefusalReason::OutOfRange));
-        assert_eq!((sea.vehicle.settings(), tuned(&mut sea.vehicle)), (&asked, None));
+        assert_eq!((*sea.vehicle.settings(), tuned(&mut sea.vehicle)), (asked, None));
     }
     let more = Settings { alpha: figure(0.3), gamma: Change::Configured, ..Settings::default() };
     assert_eq!(sea.vehicle.apply(Slot::Settings(more), sea.now), Ok(()));

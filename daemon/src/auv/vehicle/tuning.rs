@@ -126,7 +126,8 @@ impl Vehicle {
         let cells: Vec<(Cell, u8)> = telling.seen.iter().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
         link.set_map(cells, now);
         for (&kind, cells) in &telling.planes {
-            let cells: Vec<(Cell, f64)> = cells.iter().copied().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
+            let cells: Vec<(Cell, f64)> =
+                cells.iter().copied().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
             link.set_plane(kind, cells, now);
         }
     }

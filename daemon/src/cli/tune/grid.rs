@@ -72,7 +72,10 @@ impl Grid {
         let mut grid: Self = toml::from_str(text).map_err(|e: toml::de::Error| {
             let line =
                 e.span().and_then(|span| text.get(..span.start)).map_or(1, |before| before.matches('\n').count() + 1);
-            format!(":{line}: {} (it takes lists alpha, beta, gamma, cell_m, refine_words_per_s, frames_per_s, cells)", e.message())
+            format!(
+                ":{line}: {} (it takes lists alpha, beta, gamma, cell_m, refine_words_per_s, frames_per_s, cells)",
+                e.message()
+            )
         })?;
         let ranges = [
             ("alpha", &grid.alpha, 1e-9, 1e3),

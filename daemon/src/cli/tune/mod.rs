@@ -10,8 +10,8 @@ use crate::cli::progress::Progress;
 use crate::config::{self, Config};
 use crate::picture::write_whole;
 use crate::problem::Problem;
-use clap::Args;
 use crate::tuning::{Measurement, Row, Setting, TuningTable, least, most};
+use clap::Args;
 use grid::Grid;
 use measure::{mean, measure};
 use std::path::{Path, PathBuf};
@@ -184,7 +184,9 @@ impl Growing {
 fn open(path: &Path, inputs: &str) -> Result<TuningTable, Problem> {
     let refused = |line: usize, what: String| Problem::Input(format!("{}:{line}: {what}", path.display()));
     let table = match std::fs::read_to_string(path) {
-        Ok(text) => TuningTable::read(&text).map_err(|(line, what)| refused(line, format!("{what}; give another --out")))?,
+        Ok(text) => {
+            TuningTable::read(&text).map_err(|(line, what)| refused(line, format!("{what}; give another --out")))?
+        }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => TuningTable::default(),
         Err(e) => return Err(Problem::file(path, e)),
     };

@@ -1,0 +1,108 @@
+//! Numbers of three decimal digits in two bytes.
+
+use super::Change;
+use crate::wire::{Reader, Truncated};
+use std::fmt;
+
+/// A positive number of three decimal digits, so that what is typed is what is in force.
+///
+/// ```text
+/// bit 15: 0; bits 14-10: e; bits 9-0: m, 100..=999. The value is m x 10^(e - 14); all bits 0: as configured.
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Figure {
+    digits: u16,
+    exponent: u8,
+}
+
+impl Figure {
+    const OFFSET: i32 = 14;
+    const MOST_EXPONENT: i32 = 31;
+
+    /// The number nearest to `value`; none for what is not positive or lies off the scale of 1e-12 to 9.99e19.
+    pub fn new(value: f64) -> Option<Self> {
+        if !(value.is_finite() && value > 0.0) {
+            return None;
+        }
+        let mut exponent = value.log10().floor() as i32 - 2;
+        let mut digits = (value * power(-exponent)).round();
+        // The logarithm, or the digits, may have been rounded over a power of ten.
+        while digits >= 1000.0 {
+            exponent += 1;
+            digits = (value * power(-exponent)).round();
+        }
+        while digits < 100.0 {
+            exponent -= 1;
+            digits = (value * power(-exponent)).round();
+        }
+        let exponent = exponent + Self::OFFSET;
+        let fits = (0..=Self::MOST_EXPONENT).contains(&exponent) && (100.0..1000.0).contains(&digits);
+        fits.then_some(Self { digits: digits as u16, exponent: exponent as u8 })
+    }
+
+    /// The number.
+    pub fn value(self) -> f64 {
+        let exponent = i32::from(self.exponent) - Self::OFFSET;
+        // Digits and powers up to 10^17 are exact, so one rounding gives what the decimal numeral would.
+        if exponent < 0 { f64::from(self.digits) / power(-exponent) } else { f64::from(self.digits) * power(exponent) }
+    }
+
+    pub(super) fn encode(change: Change<Self>, out: &mut Vec<u8>) {
+        match change {
+            Change::Keep => {}
+            Change::Configured => out.extend([0, 0]),
+            Change::To(Self { digits, exponent }) => {
+                out.extend((u16::from(exponent) << 10 | digits).to_be_bytes());
+            }
+        }
+    }
+
+    pub(super) fn decode(r: &mut Reader<'_>) -> Result<Change<Self>, Truncated> {
+        let bits = r.u16()?;
+        let (digits, exponent) = (bits & 0x3FF, (bits >> 10) as u8);
+        match (bits, digits) {
+            (0, _) => Ok(Change::Configured),
+            (..=0x7FFF, 100..=999) => Ok(Change::To(Self { digits, exponent })),
+            _ => Err(Truncated),
+        }
+    }
+}
+
+fn power(exponent: i32) -> f64 {
+    10f64.powi(exponent)
+}
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.value().fmt(f)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn what_is_typed_with_three_digits_is_what_is_in_force() {
+        for text in ["0.01", "1e-12", "0.0005", "5e-5", "0.123", "999", "1000", "30", "50000", "1e8", "9.99e19", "0.3"]
+        {
+            let value: f64 = text.parse().unwrap();
+            assert_eq!(Figure::new(value).map(Figure::value), Some(value), "{text}");
+        }
+        assert_eq!(Figure::new(0.099_96).map(Figure::value), Some(0.1));
+        for off in [0.0, -1.0, 9e-13, 1e20, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE] {
+            assert_eq!(Figure::new(off), None, "{off}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_number_is_off_by_half_a_percent_at_most(power in -12.0f64..19.9) {
+            let value = 10f64.powf(power);
+            let told = Figure::new(value).unwrap();
+            prop_assert!((told.value() / value - 1.0).abs() <= 0.005);
+            prop_assert_eq!(Figure::new(told.value()), Some(told));
+        }
+    }
+}
