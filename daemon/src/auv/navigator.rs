@@ -111,6 +111,16 @@ impl Navigator {
         self.placement
     }
 
+    /// A place of the map's frame in the world, as the map lies now.
+    pub fn to_world(&self, at: (f64, f64)) -> (f64, f64) {
+        self.placement.map_or(at, |p| p.to_world(at))
+    }
+
+    /// A place of the world in the map's frame.
+    pub fn to_map(&self, at: (f64, f64)) -> (f64, f64) {
+        self.placement.map_or(at, |p| p.to_map(at))
+    }
+
     /// Heading clockwise from north, radians.
     pub fn heading_rad(&self) -> f64 {
         self.heading_rad
@@ -169,7 +179,7 @@ impl Navigator {
         self.last_fix = Some(now);
         if std::mem::take(&mut self.is_lost) {
             let world = self.filter.position();
-            self.at = self.placement.map_or(world, |p| p.to_map(world));
+            self.at = self.to_map(world);
         }
         self.place();
         FixVerdict::Used
