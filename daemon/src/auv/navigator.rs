@@ -152,6 +152,12 @@ impl Navigator {
         self.odometer.handle_way(dx_m, dy_m, now, Self::MEMORY_S);
     }
 
+    /// It may have gone so far in any direction without a word of its sensors.
+    pub fn handle_unseen_way(&mut self, metres: f64) {
+        // A standard deviation in each of two directions, of which the distance is the mean square.
+        self.filter.doubt(metres.max(0.0) / std::f64::consts::SQRT_2);
+    }
+
     /// The position in the map's frame is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.is_lost = false;
@@ -289,6 +295,17 @@ mod tests {
             assert_eq!(nav.handle_fix(x, y, sigma, at(60.0), at(61.0)), verdict, "{x} {y} {sigma}");
         }
         assert_eq!(nav.world(), before);
+    }
+
+    #[test]
+    fn a_way_that_nobody_measured_makes_the_place_uncertain_until_a_fix() {
+        let mut nav = under_way();
+        nav.handle_fix(60.0, 0.0, 1.0, at(60.0), at(60.0));
+        let before = nav.sigma_m();
+        nav.handle_unseen_way(30.0);
+        assert!((20.0..25.0).contains(&nav.sigma_m()), "{} m, {before} m before", nav.sigma_m());
+        assert_eq!(nav.handle_fix(60.0, 25.0, 1.0, at(61.0), at(61.0)), FixVerdict::Used, "no outlier any more");
+        assert!(nav.sigma_m() < 2.0);
     }
 
     #[test]
