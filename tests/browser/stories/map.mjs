@@ -123,6 +123,26 @@ export default [
     },
   },
   {
+    name: "the surface vehicle is on the map where its GPS has it, and not when the GPS is lost",
+    scenario: "rich",
+    async run(s) {
+      const position = { is_good: true, x_m: 14, y_m: 9, sigma_m: 1.2, lat_deg: 29.5, lon_deg: 34.92, at_s: 1, heading_deg: 45, refused: {}, outliers: 0, fixes: 3, sightings_unused: {} };
+      await s.steer({ position });
+      await s.until("the position", () => s.inPage(({ store }) => store.snapshot.position?.is_good));
+      await s.button("Fit").click();
+      const seen = () => s.inPage(({ view }) => {
+        const [x, y] = view.toScreen(14, 9);
+        const wanted = getComputedStyle(document.documentElement).getPropertyValue("--map-craft").match(/[0-9a-f]{2}/gi).map((v) => parseInt(v, 16));
+        const data = document.getElementById("chart").getContext("2d").getImageData(x - 3, y + 3, 1, 1).data;
+        return wanted.every((v, n) => Math.abs(v - data[n]) < 12);
+      });
+      await s.until("the surface on the map", seen);
+      await s.steer({ position: { ...position, is_good: false, x_m: null, y_m: null, sigma_m: null } });
+      await s.until("it to be gone", async () => !(await seen()));
+      await s.steer({ position: null });
+    },
+  },
+  {
     name: "a tapped cell is read out on a phone",
     size: PHONE,
     async run(s) {

@@ -106,7 +106,7 @@ function extentOf(map) {
   return extents.get(map);
 }
 
-/** What "fit" shows: every map, every vehicle and its waypoint; fences too, unless the map would be lost in them. */
+/** What "fit" shows: every map, every vehicle and its waypoint; fences and the surface too, unless the map would be lost. */
 function bounds() {
   const boxes = [];
   for (const v of store.snapshot?.vehicles ?? []) {
@@ -117,8 +117,10 @@ function bounds() {
   }
   if (boxes.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
   const near = around(boxes);
+  const surface = surfaceAt();
   const corners = (store.snapshot?.vehicles ?? []).flatMap((v) => v.fence?.fence ?? []);
-  const all = around([near, ...corners.map(([x, y]) => [x, y, x, y])]);
+  const further = [...corners, ...(surface ? [[surface.x_m, surface.y_m]] : [])];
+  const all = around([near, ...further.map(([x, y]) => [x, y, x, y])]);
   return reach(all) <= FENCE_REACH * reach(near) ? all : near;
 }
 
@@ -170,7 +172,7 @@ function draw() {
   const byChoice = [...vehicles].sort((a, b) => (a.id === store.selectedId) - (b.id === store.selectedId));
   for (const v of byChoice) drawMap(c, v);
   if (options.grid) drawGrid(c, view, ink);
-  const surface = store.snapshot?.surface;
+  const surface = surfaceAt();
   const s = store.vehicle?.status;
   const centre = surface ? [surface.x_m, surface.y_m] : s && inWorld(store.vehicle, s.x_m, s.y_m);
   if (options.rings && centre) drawRings(c, view, ink, ...centre);
@@ -184,6 +186,12 @@ function draw() {
   drawLegend();
   plates();
   readout();
+}
+
+/** The surface's position while its GPS knows it, or null. */
+function surfaceAt() {
+  const p = store.snapshot?.position;
+  return p?.is_good && p.x_m !== null ? p : null;
 }
 
 function drawMap(c, vehicle) {
