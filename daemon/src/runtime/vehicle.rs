@@ -24,7 +24,7 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let config = load()?;
         warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
-        let Start { run, mapper, keep } = start(&config, dir)?;
+        let Start { run, mut mapper, keep } = start(&config, dir)?;
         let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = crate::ends::vehicle_address(&config)?;
@@ -40,6 +40,7 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         }
         let at_end = recording.is_some();
         let camera = Camera::new(recording, clock, mapper.last_s());
+        mapper.tune(vehicle.settings());
         let mapper = MapperThread::start(mapper, keep)?;
         let modem = modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());

@@ -222,7 +222,7 @@ mod tests {
         assert_eq!(refused("cells,", "").0, 2);
         assert_eq!(refused("0.25,1,", "0.25,one,"), (5, "alpha \"one\": it takes 0.000000001 to 1000".to_owned()));
         assert_eq!(refused("0.25,1,", "0.25,NaN,").0, 5);
-        assert_eq!(refused("fine", "huge"), (3, "cells \"huge\": it takes fine or coarse".to_owned()));
+        assert_eq!(refused(",fine", ",huge"), (3, "cells \"huge\": it takes fine or coarse".to_owned()));
         assert_eq!(refused(",fine", ""), (3, "14 fields; the table has 15".to_owned()));
         assert_eq!(TuningTable::read("").unwrap_err().0, 1);
     }

@@ -77,7 +77,8 @@ pub enum VehicleOutput {
     Hold,
     /// Come up.
     Surface,
-    /// Have the scene model follow these settings; what they do not name is as configured.
+    /// Have the scene model follow these settings; what they do not name is as configured. A run begins with
+    /// [`Vehicle::settings`].
     Tune(Settings),
     /// A slot was decided about.
     Applied(AppliedSlot),
@@ -165,7 +166,6 @@ impl Vehicle {
             vehicle.durable.inbox = vehicle.link.persistent_state().clone();
             vehicle.outputs.push_back(VehicleOutput::Persist);
         }
-        vehicle.outputs.push_back(VehicleOutput::Tune(vehicle.telling.settings));
         vehicle.follow_telling();
         vehicle.follow_utility();
         vehicle.restore_course();

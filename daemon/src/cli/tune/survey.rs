@@ -16,8 +16,8 @@ const OVERLAP: f64 = 0.1;
 /// Most words of a survey: 1.5 GB of them.
 const MOST_WORDS: f64 = 1e8;
 const LEAST_PX: u32 = 64;
-/// Width and height of a sea floor that is drawn, and about the size of its patches, as a rehearsal has it.
-const REEF_PX: (u32, u32, u32) = (2600, 1800, 25);
+/// Width and height of a sea floor that is drawn, and about the size of its patches, pixels.
+const REEF_PX: (u32, u32, u32) = (2600, 1800, 100);
 
 /// What all settings have in common.
 pub(super) struct Site<'a> {
