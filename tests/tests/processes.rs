@@ -158,3 +158,51 @@ fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_la
     wait_until("labels in a new epoch", Duration::from_secs(60), || epoch().is_some_and(|epoch| epoch > 0));
     wait_until("the map learnt anew", Duration::from_secs(120), arrived);
 }
+
+#[test]
+fn settings_from_the_surface_outlive_the_vehicle_and_do_not_cost_its_checkpoint() {
+    let (recording, _) = recorded();
+    let dir = scratch("settings");
+    let (port, page) = (free_port(), free_port());
+    let file = |name: &str, text: String| {
+        let path = dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let state = |who: &str| format!("[runtime]\ntime_scale = 4\nstate_dir = \"{}\"\n", dir.join(who).display());
+    let link = |key: &str| format!("[modem]\n{key} = \"127.0.0.1:{port}\"\n");
+    let camera = format!("[camera]\nsource = \"frames:{}\"\n[scene]\ncheckpoint_s = 1\n", recording.display());
+    let vehicle = file("auv.toml", [state("auv"), link("connect"), camera].concat());
+    let console = format!("[console]\nlisten = \"127.0.0.1:{page}\"\n");
+    let surface = file("asv.toml", [state("asv"), link("listen"), console].concat());
+    let _surface = Process::start(&["asv", "--config", &surface]);
+    let told = || {
+        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        let state: serde_json::Value = serde_json::from_slice(&body).ok()?;
+        Some(state["vehicles"][0].clone())
+    };
+    let checkpoint = dir.join("auv/scene.checkpoint");
+    let kept = || std::fs::read(&checkpoint).unwrap_or_default();
+    let mut first = Process::start(&["auv", "--config", &vehicle]);
+    wait_until("a label on the map", Duration::from_secs(60), || {
+        told().is_some_and(|v| v["labels"].as_array().is_some_and(|l| !l.is_empty()))
+    });
+    let headers = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
+    let order = r#"{"gamma": 0.2, "alpha": 0.5}"#;
+    assert_eq!(http(page, "POST", "/api/v1/vehicles/1/settings", headers, order).unwrap().0, 202);
+    wait_until("settings in force", Duration::from_secs(60), || {
+        told().is_some_and(|v| v["settings"]["in_force"]["gamma"] == 0.2)
+    });
+    let before = kept();
+    wait_until("a checkpoint with them", Duration::from_secs(60), || kept() != before);
+    first.kill();
+    let before = kept();
+    let _again = Process::start(&["auv", "--config", &vehicle]);
+    wait_until("a checkpoint of the next run", Duration::from_secs(60), || kept() != before);
+    wait_until("the vehicle is heard again", Duration::from_secs(60), || {
+        told().is_some_and(|v| v["map"]["explored_cells"].as_u64() > Some(0))
+    });
+    let vehicle = told().unwrap();
+    assert_eq!(vehicle["map"]["epoch"], 0, "labels go on: the checkpoint was not passed over");
+    assert_eq!(vehicle["settings"]["in_force"]["alpha"], 0.5);
+}

@@ -127,7 +127,7 @@ impl SettingsDesk {
     }
 
     /// What is to go out for an order: what was asked for before it included, but for what the vehicle has refused.
-    pub(super) fn to_send(&self, order: &Settings, last: Option<LifeLine>) -> Settings {
+    pub(super) fn next_order(&self, order: &Settings, last: Option<LifeLine>) -> Settings {
         let base = if matches!(last, Some(LifeLine::Refused(_))) { &self.in_force } else { &self.asked };
         base.then(order)
     }
@@ -202,7 +202,7 @@ mod tests {
         let order = |json: &str| read(json).unwrap();
         let mut desk = SettingsDesk::default();
         let send = |desk: &mut SettingsDesk, json: &str, last| {
-            let settings = desk.to_send(&order(json), last);
+            let settings = desk.next_order(&order(json), last);
             desk.handle_sent(settings, last);
         };
         send(&mut desk, r#"{"alpha": 0.5}"#, None);

@@ -183,7 +183,7 @@ impl Surface {
     pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
         let order = order.read()?;
         let last = self.life_of(vehicle, SlotId::Settings);
-        let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.to_send(&order, last);
+        let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
         self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
         Ok(version)

@@ -278,6 +278,25 @@ mod tests {
     }
 
     #[test]
+    fn every_setting_at_once_leaves_room_in_a_frame_of_48_bytes() {
+        let figure = Change::To(Figure::new(0.01).unwrap());
+        let settings = Settings {
+            planner: Change::To(PlannerKind::Greedy),
+            cells: Change::To(CellBand::CoarseToFine),
+            planes: Change::To(PlaneSet::default()),
+            alpha: figure,
+            beta: figure,
+            gamma: figure,
+            refine_words_per_s: figure,
+            frames_per_s: figure,
+        };
+        let bytes = VersionedSlot::encode(1, 1, &Slot::Settings(settings));
+        assert_eq!(bytes.len(), 17);
+        let back = VersionedSlot::decode(&bytes).map(|slot| slot.content);
+        assert_eq!(back, Ok(Some(Slot::Settings(settings))));
+    }
+
+    #[test]
     fn golden_bytes_of_a_utility() {
         let weights = [(3, 80), (5, -20)].into_iter().collect();
         let utility = Utility { epoch: 1, exploration: 20, curiosity: 0, weights };

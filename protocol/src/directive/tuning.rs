@@ -200,14 +200,16 @@ impl Settings {
         let cells = self.cells.code(|c| c as u8);
         let planes = self.planes.code(|_| 0);
         let set = self.planes.value().unwrap_or_default();
-        let mut out =
-            vec![planner << 5 | cells << 2 | planes, u8::from(set.confidence) << 7 | u8::from(set.depth) << 6];
+        let mut given = u8::from(set.confidence) << 7 | u8::from(set.depth) << 6;
+        let mut numbers = Vec::new();
         for (index, (_, change, _)) in self.figures().into_iter().enumerate() {
             if !matches!(change, Change::Keep) {
-                out[1] |= 0x10 >> index;
+                given |= 0x10 >> index;
             }
-            Figure::encode(change, &mut out);
+            Figure::encode(change, &mut numbers);
         }
+        let mut out = vec![planner << 5 | cells << 2 | planes, given];
+        out.append(&mut numbers);
         out
     }
 
