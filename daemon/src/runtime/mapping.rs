@@ -28,8 +28,6 @@ pub(super) enum ToMapper {
 pub(super) enum FromMapper {
     /// The map, after a camera frame or at the start.
     Seen(Seen),
-    /// A camera frame that the frame rate leaves out.
-    Passed(Box<RecordedFrame>),
     /// A camera frame that could not be read.
     Missed(Problem),
 }
@@ -122,8 +120,9 @@ impl Work {
             match order {
                 ToMapper::Tune(settings) => self.mapper.tune(&settings),
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
+                // A frame that the frame rate leaves out changes nothing but where the vehicle is.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_heard = self.tell(FromMapper::Passed(frame))
+                    is_heard = self.tell(FromMapper::Seen(self.seen(Some(*frame))));
                 }
                 ToMapper::Frame(frame) => {
                     let told = self.see(*frame);

@@ -12,7 +12,7 @@ use crate::auv::{Area, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
 use crate::problem::Problem;
-use crate::rehearsal::{RecordedFrame, Recording};
+use crate::rehearsal::Recording;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
@@ -126,10 +126,6 @@ impl Host {
                 }
                 seen = self.mapper.seen.recv() => match seen {
                     Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
-                    Some(FromMapper::Passed(frame)) => {
-                        self.follow_pose(&frame);
-                        self.finish_at_end();
-                    }
                     Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
                     None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
                 },
@@ -160,20 +156,15 @@ impl Host {
 
     fn handle_seen(&mut self, seen: Seen) {
         let now = self.clock.now();
-        if let Some(frame) = &seen.frame {
-            self.follow_pose(frame);
+        if let Some(f) = &seen.frame {
+            self.behind -= 1;
+            if !self.flight.is_piloted() {
+                self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
+            }
         }
         self.vehicle.handle_map(&seen.update, now);
         self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
         self.finish_at_end();
-    }
-
-    /// The scene model is done with a camera frame; without an autopilot the vehicle is where that was taken.
-    fn follow_pose(&mut self, f: &RecordedFrame) {
-        self.behind -= 1;
-        if !self.flight.is_piloted() {
-            self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, self.clock.now());
-        }
     }
 
     /// One bad frame does not end a mission.

@@ -223,6 +223,7 @@ impl Mission {
             recorder.push(image, &frame)?;
         }
         if !self.mapper.takes(t_s) {
+            self.vehicle.answer_requests(&|label| self.mapper.exemplar(label));
             return Ok(());
         }
         self.track.push((pose.x, pose.y));
