@@ -204,15 +204,15 @@ fn tuning_goes_on_where_it_was_and_gives_a_configuration() {
     let first = run_with(&[]);
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
     let csv = std::fs::read_to_string(out.join("tuning.csv")).unwrap();
-    assert_eq!(csv.lines().count(), 3);
-    let shorter: Vec<&str> = csv.lines().take(2).collect();
+    assert_eq!(csv.lines().count(), 4);
+    let shorter: Vec<&str> = csv.lines().take(3).collect();
     std::fs::write(out.join("tuning.csv"), shorter.join("\n") + "\n").unwrap();
     let again = run_with(&[]);
     assert!(String::from_utf8_lossy(&again.stderr).contains("1 of 2 settings are in tuning.csv already"));
     assert_eq!(std::fs::read_to_string(out.join("tuning.csv")).unwrap(), csv, "the same figures again");
     let best = out.join("best.toml");
     let other = tune(&["--seed", "2"]);
-    assert_refused(&other.iter().map(String::as_str).collect::<Vec<_>>(), &["tuning.csv:2", "another"]);
+    assert_refused(&other.iter().map(String::as_str).collect::<Vec<_>>(), &["tuning.csv:3", "another"]);
     let sim = run(&[
         "sim",
         "--scenario",

@@ -26,8 +26,8 @@ use survey::{Site, Survey};
 /// sweeps over all words and the map is compared with the annotations. A run that was interrupted goes on where it was.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
-          scenecast tune --procedural 1,2,3 --grid grid.toml --out tuning"
+    after_help = "Example: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
+         scenecast tune --procedural 1,2,3 --grid grid.toml --out tuning"
 )]
 pub(super) struct Tune {
     /// Image of the sea floor
