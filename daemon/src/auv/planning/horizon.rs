@@ -5,9 +5,8 @@ use super::{Planner, Question, greedy};
 
 /// A beam search over ways of many steps: orienteering with a gain that each block gives once.
 ///
-/// A way's score is its gain less what its metres would bring elsewhere: a share, [`Horizon::elsewhere`], of the best rate
-/// that a search has found. At a share of 1 this is Dinkelbach's method for ratios. Where all that is left fits the horizon,
-/// metres cost nothing.
+/// A way's score is its gain less what its metres would bring elsewhere; that rate is the best one that a search has found
+/// (Dinkelbach's method for ratios). Where all that is left fits the horizon, metres cost nothing.
 #[derive(Debug)]
 pub struct Horizon {
     /// Steps ahead.
@@ -18,13 +17,11 @@ pub struct Horizon {
     pub alike: usize,
     /// Searches, each with the rate of the last.
     pub rounds: usize,
-    /// What a metre brings elsewhere, as a share of the best rate found: the next way is seldom as good as the best one now.
-    pub elsewhere: f64,
 }
 
 impl Default for Horizon {
     fn default() -> Self {
-        Self { steps: 24, beam: 60, alike: 3, rounds: 2, elsewhere: 0.6 }
+        Self { steps: 24, beam: 60, alike: 3, rounds: 2 }
     }
 }
 
@@ -44,7 +41,7 @@ impl Planner for Horizon {
         let mut best = Vec::new();
         let mut own = f64::MIN;
         for _ in 0..self.rounds {
-            let (way, found) = self.search(q, self.elsewhere * rate);
+            let (way, found) = self.search(q, rate);
             (best, own) = (way, found);
             if q.left_m <= horizon_m || found <= rate {
                 break;
