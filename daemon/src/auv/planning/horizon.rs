@@ -21,7 +21,7 @@ pub struct Horizon {
 
 impl Default for Horizon {
     fn default() -> Self {
-        Self { steps: 24, beam: 60, alike: 3, rounds: 2 }
+        Self { steps: 24, beam: 150, alike: 3, rounds: 2 }
     }
 }
 
