@@ -12,7 +12,7 @@ use std::path::PathBuf;
 /// Label maps are those of the scene model, on procedural reefs and on annotated images; the operator favours one class
 /// through the labels that cover it. A map is seen bit by bit. The unit is what a metre
 /// brings where all in sight is new, on the mean of the scene. `told all` is what `horizon` would collect if it knew the whole
-/// map before it starts: no planner gets there. Takes a few minutes; the same seed gives the same table.
+/// map before it starts, about the most that the limit allows. Takes a few minutes; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench planning --seed 3 --out tracks")]
 pub(super) struct Planning {
