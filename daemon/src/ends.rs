@@ -10,7 +10,7 @@ use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, Vehicle
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, MissionId};
 use std::collections::BTreeMap;
@@ -107,12 +107,18 @@ pub fn vehicle(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
+    link.set_spend(durable.spend.and_then(SpendOrder::from_code).unwrap_or_else(|| spend(config)));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
     vehicle.set_coarse_after(config.map.coarse_after_s);
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }
     Ok(vehicle)
+}
+
+/// What left-over bits are spent on; the file was checked when it was read.
+pub fn spend(config: &Config) -> SpendOrder {
+    SpendOrder::from_names(&config.link.spend).unwrap_or_default()
 }
 
 /// The planes of the map that are sent, and their parts of the map's share in percent.
@@ -158,5 +164,7 @@ pub fn surface(config: &Config, modem: ModemProfile, seed: u64, now: Instant) ->
         authenticity: authenticity(config)?,
     };
     let link = SurfaceLink::new(link, seed, now);
-    Ok(Surface::new(link, vehicles))
+    let mut surface = Surface::new(link, vehicles);
+    surface.set_spend(spend(config));
+    Ok(surface)
 }

@@ -1,5 +1,6 @@
 //! The surface: holds the operator's map of each vehicle, sends each its directive.
 
+mod album;
 #[cfg(test)]
 mod calls;
 mod desk;
@@ -8,6 +9,7 @@ mod pauses;
 pub mod position;
 mod surface;
 
-pub use desk::{Desk, ExemplarState};
+pub use album::{Album, AskState, Asked, Page, Picture, Wish};
+pub use desk::Desk;
 pub use orders::{FenceOrder, LimitsOrder};
 pub use surface::{Surface, SurfaceOutput};

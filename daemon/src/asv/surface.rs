@@ -1,15 +1,18 @@
 //! The surface's role: link and operator in one sans-IO whole.
 
+use super::album::{Album, Wish};
 use super::desk::Desk;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
 use crate::picture;
-use scenecast_protocol::directive::{Budget, Constraints, Fix, PlannerKind, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{
+    Budget, Constraints, Fix, LifeLine, PlannerKind, Slot, SlotId, SlotProgress, Utility,
+};
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::{BTreeMap, VecDeque};
@@ -34,6 +37,7 @@ pub struct Surface {
     link: SurfaceLink,
     desks: BTreeMap<Address, Desk>,
     outputs: VecDeque<SurfaceOutput>,
+    spend: SpendOrder,
     /// Where the surface is and where it sees the vehicles, if it has a GPS.
     relay: Option<Relay>,
 }
@@ -42,7 +46,7 @@ impl Surface {
     /// A surface that speaks with these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
-        Self { link, desks, outputs: VecDeque::new(), relay: None }
+        Self { link, desks, outputs: VecDeque::new(), spend: SpendOrder::default(), relay: None }
     }
 
     /// Name for people of a vehicle that has none.
@@ -135,13 +139,31 @@ impl Surface {
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 
-    /// Asks for a representative image of a label.
-    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
+    /// Asks for an image of a label. The error is one line for the operator.
+    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, wish: Wish, now: Instant) -> Result<u16, String> {
         if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
             return Err(format!("label {label} is not on the map"));
         }
-        let requests = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.request(label, now);
-        self.issue(vehicle, Slot::Requests(requests), now)
+        self.change_requests(vehicle, |album| album.ask(label, wish, now), now)
+    }
+
+    /// Nobody wants the image of a label any more that was asked for.
+    pub fn cancel_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
+        self.change_requests(vehicle, |album| album.cancel(label), now)
+    }
+
+    fn change_requests(
+        &mut self,
+        vehicle: Address,
+        change: impl FnOnce(&mut Album) -> Result<(), String>,
+        now: Instant,
+    ) -> Result<u16, String> {
+        let desk = self.desks.get(&vehicle).ok_or("no such vehicle")?;
+        let mut album = desk.album.clone();
+        change(&mut album)?;
+        let version = self.issue(vehicle, Slot::Requests(album.wanted(desk.epoch)), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.album = album;
+        Ok(version)
     }
 
     /// Tells a vehicle to stay, or to go on.
@@ -192,8 +214,25 @@ impl Surface {
         Ok(version)
     }
 
-    /// Changes the bit budget of the surface and of every vehicle, and the least shares of the classes if there are any.
-    pub fn set_budget(&mut self, bits_per_s: u32, shares: Option<Shares>, now: Instant) -> Result<(), String> {
+    /// What the vehicles spend left-over bits on, as it was configured or sent last.
+    pub fn spend(&self) -> SpendOrder {
+        self.spend
+    }
+
+    /// What the next budget that is sent says of left-over bits, unless it is given.
+    pub fn set_spend(&mut self, spend: SpendOrder) {
+        self.spend = spend;
+    }
+
+    /// Changes the bit budget of the surface and of every vehicle, and if they are given the least shares of the classes and
+    /// what left-over bits are spent on.
+    pub fn set_budget(
+        &mut self,
+        bits_per_s: u32,
+        shares: Option<Shares>,
+        spend: Option<SpendOrder>,
+        now: Instant,
+    ) -> Result<(), String> {
         if !(10..=10_000_000).contains(&bits_per_s) {
             return Err(format!("budget_bps {bits_per_s} is not within 10 to 10000000"));
         }
@@ -203,10 +242,12 @@ impl Surface {
             return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
         }
         let vehicles: Vec<Address> = self.desks.keys().copied().collect();
-        let slot = Slot::Budget(Budget { bits_per_s, shares });
+        let spend = spend.unwrap_or(self.spend);
+        let slot = Slot::Budget(Budget { bits_per_s, shares, spend });
         vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
         self.link.set_budget(bits_per_s, now);
         self.link.set_shares(shares);
+        self.spend = spend;
         Ok(())
     }
 
@@ -292,8 +333,14 @@ impl Surface {
                 Some(SurfaceOutput::VehicleFound(vehicle))
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
-            SurfaceEvent::VehicleRestarted(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
-            SurfaceEvent::SlotSettled(vehicle, slot) => Some(SurfaceOutput::SlotSettled(vehicle, slot)),
+            SurfaceEvent::VehicleRestarted(vehicle) => {
+                self.ask_again(vehicle, now);
+                Some(SurfaceOutput::MapChanged(vehicle))
+            }
+            SurfaceEvent::SlotSettled(vehicle, slot) => {
+                self.handle_settled(vehicle, slot, now);
+                Some(SurfaceOutput::SlotSettled(vehicle, slot))
+            }
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
                 self.desks.get_mut(&vehicle)?.handle_status(status, now);
@@ -306,18 +353,32 @@ impl Surface {
             }
             SurfaceEvent::Object(vehicle, bytes) => {
                 let desk = self.desks.get_mut(&vehicle)?;
-                match Exemplar::decode(&bytes) {
-                    Some(exemplar) => {
-                        let label = exemplar.label;
-                        desk.handle_exemplar(exemplar, now).then_some(SurfaceOutput::ExemplarHere(vehicle, label))
-                    }
-                    None => {
-                        desk.whole = Some(picture::read_whole(&bytes)?);
-                        desk.wholes += 1;
-                        Some(SurfaceOutput::MapChanged(vehicle))
-                    }
+                if let Some(whole) = picture::read_whole(&bytes) {
+                    desk.whole = Some(whole);
+                    desk.wholes += 1;
+                    return Some(SurfaceOutput::MapChanged(vehicle));
                 }
+                let exemplar = Exemplar::decode(&bytes)?;
+                let is_new = desk.handle_exemplar(&exemplar, now);
+                is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
+        }
+    }
+
+    /// A vehicle that has restarted does not know what it was asked.
+    fn ask_again(&mut self, vehicle: Address, now: Instant) {
+        let wanted = self.desks.get(&vehicle).map(Desk::wanted).filter(|r| !r.wanted.is_empty());
+        if let Some(requests) = wanted {
+            // It was taken before.
+            let _ = self.issue(vehicle, Slot::Requests(requests), now);
+        }
+    }
+
+    fn handle_settled(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
+        let refused = |s: &SlotProgress| s.id == slot && matches!(s.life, LifeLine::Refused(_));
+        let is_refused = self.link.vehicle(vehicle).is_some_and(|v| v.slots().any(refused));
+        if let Some(desk) = self.desks.get_mut(&vehicle).filter(|_| slot == SlotId::Requests && is_refused) {
+            desk.album.handle_refusal(now);
         }
     }
 

@@ -5,6 +5,7 @@ mod fix;
 mod limits;
 mod outbox;
 mod polygon;
+mod requests;
 mod settings;
 mod utility;
 
@@ -13,7 +14,8 @@ pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
 pub use polygon::{Place, Polygon, PolygonFault};
-pub use settings::{Budget, Constraints, PlannerKind, Requests, Settings};
+pub use requests::{Request, Requests};
+pub use settings::{Budget, Constraints, PlannerKind, Settings};
 pub use utility::Utility;
 
 use crate::schedule::Class;
