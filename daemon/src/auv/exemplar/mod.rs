@@ -10,7 +10,7 @@ use image::{RgbImage, imageops};
 use scenecast_protocol::directive::Request;
 
 /// Bytes before the image.
-const HEAD: usize = 4;
+pub const HEAD: usize = 4;
 /// Structural similarity that is worth bytes.
 pub const GOOD_SSIM: f64 = 0.9;
 

@@ -63,6 +63,11 @@ impl Gallery {
         self.pictures = pictures;
     }
 
+    #[cfg(test)]
+    pub(super) fn take_pictures(&mut self) -> BTreeMap<u8, Vec<Picture>> {
+        std::mem::take(&mut self.pictures)
+    }
+
     /// What is wanted from now on, by the surface's run `series`; what is not wanted any more is not sent to its end, and what
     /// nobody asked for gives way.
     pub(super) fn replace_requests(&mut self, requests: Requests, series: Option<u16>, link: &mut VehicleLink) {

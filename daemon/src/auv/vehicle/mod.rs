@@ -290,6 +290,12 @@ impl Vehicle {
         self.tend_gallery();
     }
 
+    /// Takes the images away, as if nothing had been seen.
+    #[cfg(test)]
+    pub(crate) fn take_pictures(&mut self) -> BTreeMap<u8, Vec<Picture>> {
+        self.gallery.take_pictures()
+    }
+
     fn tend_gallery(&mut self) {
         let Self { utility, gallery, link, durable, .. } = self;
         let weight = |label| utility.as_ref().map_or(0.0, |u| u.weight(label));
