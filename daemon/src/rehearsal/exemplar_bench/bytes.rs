@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Frames across and along an image.
-const FRAMES: (u32, u32) = (6, 5);
+const FRAMES: (u32, u32) = (4, 3);
 
 /// Where patches come from.
 #[derive(Debug, Clone)]
