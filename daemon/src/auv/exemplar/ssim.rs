@@ -56,12 +56,16 @@ fn smooth(values: &[f64], width: usize) -> Vec<f64> {
     let weight = |i: usize| (-(i as f64 - 5.0).powi(2) / (2.0 * SIGMA * SIGMA)).exp();
     let sum: f64 = (0..WINDOW).map(weight).sum();
     let weights: [f64; WINDOW] = std::array::from_fn(|i| weight(i) / sum);
-    let mean = |values: &mut dyn Iterator<Item = &f64>| weights.iter().zip(values).map(|(w, v)| w * v).sum::<f64>();
-    let across: Vec<f64> =
-        values.chunks_exact(width).flat_map(|row| row.windows(WINDOW).map(|w| mean(&mut w.iter()))).collect();
     let columns = width + 1 - WINDOW;
-    let places = across.len() - columns * (WINDOW - 1);
-    (0..places).map(|i| mean(&mut across[i..].iter().step_by(columns))).collect()
+    let mut across = Vec::with_capacity(values.len());
+    for row in values.chunks_exact(width) {
+        across.extend(row.windows(WINDOW).map(|w| weights.iter().zip(w).map(|(w, v)| w * v).sum::<f64>()));
+    }
+    let mut down = vec![0.0; across.len() - columns * (WINDOW - 1)];
+    for (i, weight) in weights.iter().enumerate() {
+        down.iter_mut().zip(&across[i * columns..]).for_each(|(sum, v)| *sum += weight * v);
+    }
+    down
 }
 
 #[cfg(test)]
