@@ -29,7 +29,7 @@ pub(super) struct ExemplarBench {
     #[arg(long, value_name = "DIR")]
     images: Vec<PathBuf>,
     /// Images to ask for in each row
-    #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     requests: u32,
 }
 

@@ -71,12 +71,12 @@ impl Gallery {
     /// What is wanted from now on, by the surface's run `series`; what is not wanted any more is not sent to its end, and what
     /// nobody asked for gives way.
     pub(super) fn replace_requests(&mut self, requests: Requests, series: Option<u16>, link: &mut VehicleLink) {
-        if series != self.series {
+        if self.series.is_some() && series != self.series {
             // Another run of the surface was shown nothing.
-            self.series = series;
             self.shown.clear();
             self.seen.clear();
         }
+        self.series = series;
         let (kept, dropped) =
             std::mem::take(&mut self.answers).into_iter().partition(|a| requests.wanted.contains(&a.request));
         self.answers = kept;
@@ -194,7 +194,9 @@ impl Gallery {
         for Answer { request, number, object } in open {
             self.withdraw(request.label, number, object, link);
         }
-        self.unasked = None;
+        if let Some(Unasked { label, number, object }) = self.unasked.take() {
+            self.withdraw(label, number, Some(object), link);
+        }
         self.seen.clear();
     }
 }

@@ -117,7 +117,9 @@ pub(super) struct Water {
 
 impl Water {
     pub(super) fn new(setting: Setting, patches: &[RgbImage], seed: u64) -> Result<Self, Problem> {
-        let config = Config::default();
+        let mut config = Config::default();
+        // Noise has nothing that the other coder could take: it need not be tried.
+        config.map.codec = "context".to_owned();
         let now = Instant::ZERO;
         let modem = ends::modem_profile(&config, config.channel.bit_rate);
         let area = Area { west: 0.0, south: 0.0, east: 16.0, north: 16.0 };

@@ -112,11 +112,16 @@ fn bits_that_are_left_over_show_every_label_once_and_give_way_to_what_is_asked_f
 }
 
 #[test]
-fn nothing_that_nobody_asked_for_is_sent_while_the_map_waits() {
+fn while_the_map_waits_what_nobody_asked_for_gets_only_ends_of_frames_that_no_cell_fits_into() {
     let loaded = Setting { loaded: true, ..IDLE };
-    let mut water = water(loaded, 5);
-    spend(&mut water, &["exemplars", "depth", "confidence"]);
-    wait(&mut water, 600.0);
-    assert_eq!(exemplar_bytes(&water), 0);
-    assert!(water.page(1).is_none_or(|page| page.pictures.is_empty()));
+    let map_bytes = |names: &[&str]| {
+        let mut water = water(loaded, 5);
+        spend(&mut water, names);
+        wait(&mut water, 300.0);
+        let map = water.vehicle.stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
+        assert!(exemplar_bytes(&water) < map / 100, "{} beside {map}", exemplar_bytes(&water));
+        map
+    };
+    let (without, with) = (map_bytes(&[]), map_bytes(&["exemplars"]));
+    assert!(without > 200_000 && with.abs_diff(without) < without / 100, "{with} with, {without} without");
 }
