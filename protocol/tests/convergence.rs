@@ -161,7 +161,7 @@ fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_n
     pair.vehicle.set_spend(SpendOrder::new(&[Extra::Exemplars, Extra::Depth]).unwrap());
     pair.vehicle.set_map(speckled(20, 1), pair.now);
     pair.set_planes(100, 1);
-    pair.vehicle.push_extra_object((0..9_000u32).map(|i| (i * i >> 3) as u8).collect());
+    pair.vehicle.push_extra_object((0..9_000u32).map(|i| ((i * i) >> 3) as u8).collect());
     for _ in 0..400 {
         pair.run(pair.now + Duration::from_secs(1), false);
         let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Depth));
@@ -180,7 +180,7 @@ fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_a
         pair.vehicle.set_spend(SpendOrder::new(&order).unwrap());
         pair.vehicle.source_mut().set_coarse_limit(Some(500));
         pair.vehicle.set_map(speckled(200, 1), pair.now);
-        pair.vehicle.push_extra_object((0..5_000u32).map(|i| (i * i >> 3) as u8).collect());
+        pair.vehicle.push_extra_object((0..5_000u32).map(|i| ((i * i) >> 3) as u8).collect());
         pair.run(pair.now + Duration::from_secs(60), false);
         let early = sent(&pair, Class::Exemplar);
         pair.run(pair.now + Duration::from_secs(600), true);

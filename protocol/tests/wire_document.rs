@@ -1,8 +1,8 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
 use scenecast_protocol::directive::{
-    Band, Budget, Constraints, Fence, Fix, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Request, Requests,
-    SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+    Band, Budget, Constraints, Fence, Fix, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason, Request,
+    Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
@@ -383,10 +383,16 @@ fn parts_of_a_frame_are_those_of_the_document() {
              (10, 18) m, return point (2, 3) m",
             slot(7, Slot::Fence(fence)),
         ),
-        ("slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, left-over bits to finer cells, depth, \
-             exemplars, confidence", slot(3, Slot::Budget(budget))),
-        ("slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, picture 9 with an edge of \
-             128 pixels", slot(1, Slot::Requests(requests))),
+        (
+            "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, left-over bits to finer cells, depth, \
+             exemplars, confidence",
+            slot(3, Slot::Budget(budget)),
+        ),
+        (
+            "slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, picture 9 with an edge of \
+             128 pixels",
+            slot(1, Slot::Requests(requests)),
+        ),
         ("slot: series ABCD, version 9, fix: x -12.3 m, y 400 m, sigma 1.5 m, age 0.82 s", slot(9, Slot::Fix(fix))),
     ];
     assert_same(found, expected);

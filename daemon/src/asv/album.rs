@@ -107,7 +107,10 @@ impl Album {
             })?;
             if picture.size >= Self::LARGEST {
                 let edge = edge_px(picture.size);
-                return Err(format!("picture {} of label {label} is as large as they come: {edge} pixels", picture.number));
+                return Err(format!(
+                    "picture {} of label {label} is as large as they come: {edge} pixels",
+                    picture.number
+                ));
             }
             (request.picture, request.size) = (picture.number, picture.size + 1);
         }
@@ -170,9 +173,8 @@ impl Album {
     }
 
     fn make_room(&mut self) {
-        let bytes = |pages: &BTreeMap<u8, Page>| {
-            pages.values().flat_map(|p| &p.pictures).map(|p| p.webp.len()).sum::<usize>()
-        };
+        let bytes =
+            |pages: &BTreeMap<u8, Page>| pages.values().flat_map(|p| &p.pictures).map(|p| p.webp.len()).sum::<usize>();
         while bytes(&self.pages) > Self::MOST_BYTES {
             let with_some = self.pages.values_mut().filter(|page| !page.pictures.is_empty());
             let Some(page) = with_some.min_by_key(|page| page.pictures.first().map(|p| p.came)) else { return };
@@ -208,9 +210,15 @@ mod tests {
     #[test]
     fn a_request_is_met_by_its_own_answer_and_a_larger_one_takes_the_place_of_the_smaller() {
         let mut album = Album::default();
-        assert_eq!(album.ask(5, Wish::Larger(None), NOW).unwrap_err(), "no image of label 5 is here yet: ask for one first");
+        assert_eq!(
+            album.ask(5, Wish::Larger(None), NOW).unwrap_err(),
+            "no image of label 5 is here yet: ask for one first"
+        );
         album.ask(5, Wish::Another, NOW).unwrap();
-        assert_eq!(album.wanted(3), Requests { epoch: 3, wanted: vec![Request { label: 5, serial: 1, size: 0, picture: 0 }] });
+        assert_eq!(
+            album.wanted(3),
+            Requests { epoch: 3, wanted: vec![Request { label: 5, serial: 1, size: 0, picture: 0 }] }
+        );
         album.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
         assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
         assert!(album.handle_exemplar(&come(5, 1, 0, 9), NOW));
@@ -260,7 +268,10 @@ mod tests {
         (1..=8).for_each(|label| album.ask(label, Wish::Another, NOW).unwrap());
         assert!(album.ask(9, Wish::Another, NOW).unwrap_err().contains("8 images are on their way"));
         album.ask(8, Wish::Another, NOW).unwrap();
-        let large = |label, picture| Exemplar { bytes: [vec![0x10, 0, 0], vec![9; 16_000]].concat(), ..come(label, 0, 0, picture) };
+        let large = |label, picture| Exemplar {
+            bytes: [vec![0x10, 0, 0], vec![9; 16_000]].concat(),
+            ..come(label, 0, 0, picture)
+        };
         for picture in 1..=20 {
             for label in 1..=20 {
                 album.handle_exemplar(&large(label, picture), Instant::from_secs_f64(f64::from(picture)));

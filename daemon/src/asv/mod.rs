@@ -7,6 +7,7 @@ mod desk;
 mod orders;
 mod pauses;
 pub mod position;
+mod requests;
 mod surface;
 
 pub use album::{Album, AskState, Asked, Page, Picture, Wish};

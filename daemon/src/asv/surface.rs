@@ -1,15 +1,12 @@
 //! The surface's role: link and operator in one sans-IO whole.
 
-use super::album::{Album, Wish};
 use super::desk::Desk;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
 use crate::picture;
-use scenecast_protocol::directive::{
-    Budget, Constraints, Fix, LifeLine, PlannerKind, Slot, SlotId, SlotProgress, Utility,
-};
+use scenecast_protocol::directive::{Budget, Constraints, Fix, PlannerKind, Slot, SlotId, Utility};
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::{Shares, SpendOrder};
@@ -34,8 +31,8 @@ pub enum SurfaceOutput {
 
 /// The surface.
 pub struct Surface {
-    link: SurfaceLink,
-    desks: BTreeMap<Address, Desk>,
+    pub(super) link: SurfaceLink,
+    pub(super) desks: BTreeMap<Address, Desk>,
     outputs: VecDeque<SurfaceOutput>,
     spend: SpendOrder,
     /// Where the surface is and where it sees the vehicles, if it has a GPS.
@@ -137,33 +134,6 @@ impl Surface {
         utility.epoch = desk.epoch;
         desk.utility = utility.clone();
         self.issue(vehicle, Slot::Utility(utility), now)
-    }
-
-    /// Asks for an image of a label. The error is one line for the operator.
-    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, wish: Wish, now: Instant) -> Result<u16, String> {
-        if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
-            return Err(format!("label {label} is not on the map"));
-        }
-        self.change_requests(vehicle, |album| album.ask(label, wish, now), now)
-    }
-
-    /// Nobody wants the image of a label any more that was asked for.
-    pub fn cancel_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
-        self.change_requests(vehicle, |album| album.cancel(label), now)
-    }
-
-    fn change_requests(
-        &mut self,
-        vehicle: Address,
-        change: impl FnOnce(&mut Album) -> Result<(), String>,
-        now: Instant,
-    ) -> Result<u16, String> {
-        let desk = self.desks.get(&vehicle).ok_or("no such vehicle")?;
-        let mut album = desk.album.clone();
-        change(&mut album)?;
-        let version = self.issue(vehicle, Slot::Requests(album.wanted(desk.epoch)), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.album = album;
-        Ok(version)
     }
 
     /// Tells a vehicle to stay, or to go on.
@@ -298,7 +268,7 @@ impl Surface {
         Some(status.placement.map_or(at, |p| p.to_world(at)))
     }
 
-    fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
+    pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
         let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)
@@ -362,23 +332,6 @@ impl Surface {
                 let is_new = desk.handle_exemplar(&exemplar, now);
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
-        }
-    }
-
-    /// A vehicle that has restarted does not know what it was asked.
-    fn ask_again(&mut self, vehicle: Address, now: Instant) {
-        let wanted = self.desks.get(&vehicle).map(Desk::wanted).filter(|r| !r.wanted.is_empty());
-        if let Some(requests) = wanted {
-            // It was taken before.
-            let _ = self.issue(vehicle, Slot::Requests(requests), now);
-        }
-    }
-
-    fn handle_settled(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
-        let refused = |s: &SlotProgress| s.id == slot && matches!(s.life, LifeLine::Refused(_));
-        let is_refused = self.link.vehicle(vehicle).is_some_and(|v| v.slots().any(refused));
-        if let Some(desk) = self.desks.get_mut(&vehicle).filter(|_| slot == SlotId::Requests && is_refused) {
-            desk.album.handle_refusal(now);
         }
     }
 

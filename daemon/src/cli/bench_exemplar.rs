@@ -89,10 +89,15 @@ fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
     }
     println!();
     println!("Bytes of the patches that the vehicle picked, from {} sources:", bytes.sources);
-    println!("edge  patches  fewest at SSIM 0.9: median    p95  worst  sent: median    p95  worst  at 0.9  SSIM median  least");
+    println!(
+        "edge  patches  fewest at SSIM 0.9: median    p95  worst  sent: median    p95  worst  at 0.9  SSIM median  least"
+    );
     for s in &bytes.sizes {
         let sent = s.sent.map_or([0.0; 3], in_order);
-        let fewest = s.fewest.map(in_order).map_or(["-".to_owned(), "-".to_owned(), "-".to_owned()], |f| f.map(|n| format!("{n:.0}")));
+        let fewest = s
+            .fewest
+            .map(in_order)
+            .map_or(["-".to_owned(), "-".to_owned(), "-".to_owned()], |f| f.map(|n| format!("{n:.0}")));
         println!(
             "{:>4} {:>8} {:>27} {:>6} {:>6} {:>13.0} {:>6.0} {:>6.0} {:>6.0}% {:>12.3} {:>6.3}",
             s.edge_px,

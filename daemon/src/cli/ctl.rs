@@ -70,7 +70,9 @@ enum Command {
         change: Option<UtilityCommand>,
     },
     /// Print the bit budget and the shares of the classes, or change them.
-    #[command(after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --spend exemplars,depth")]
+    #[command(
+        after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --spend exemplars,depth"
+    )]
     Budget {
         #[command(subcommand)]
         change: Option<BudgetCommand>,

@@ -109,7 +109,9 @@ impl Ctl {
                     ExemplarState::Coming => self.note(&mut last, format!("coming, {:.0} %", 100.0 * image.progress)),
                     ExemplarState::NoneYet => self.note(&mut last, "the vehicle has none yet".to_owned()),
                     ExemplarState::OnAir => self.note(&mut last, "on air".to_owned()),
-                    ExemplarState::None | ExemplarState::Here => return Err(Problem::Failed("it was cancelled".to_owned())),
+                    ExemplarState::None | ExemplarState::Here => {
+                        return Err(Problem::Failed("it was cancelled".to_owned()));
+                    }
                     ExemplarState::Queued => self.note(&mut last, "queued".to_owned()),
                 }
             }

@@ -55,7 +55,7 @@ impl Default for SpendOrder {
 impl SpendOrder {
     /// These extras in this order; `None` if one is named twice.
     pub fn new(extras: &[Extra]) -> Option<Self> {
-        let is_repeated = (1..extras.len()).any(|i| extras.get(..i).is_some_and(|before| before.contains(&extras[i])));
+        let is_repeated = Extra::ALL.into_iter().any(|extra| extras.iter().filter(|&&e| e == extra).count() > 1);
         let mut places = extras.iter().copied();
         let order = Self(std::array::from_fn(|_| places.next()));
         (!is_repeated && places.next().is_none()).then_some(order)

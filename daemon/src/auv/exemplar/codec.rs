@@ -102,8 +102,11 @@ mod tests {
     use super::*;
 
     fn patch(edge: u32, roughness: u32) -> RgbImage {
-        let value = |x: u32, y: u32| 90 + (x + y) * 60 / edge + (x * 7919 + y * 104_729 + x * y * 31) % 97 * roughness / 97;
-        RgbImage::from_fn(edge, edge, |x, y| image::Rgb([value(x, y) as u8, value(y, x) as u8, (40 + x * 50 / edge) as u8]))
+        let value =
+            |x: u32, y: u32| 90 + (x + y) * 60 / edge + (x * 7919 + y * 104_729 + x * y * 31) % 97 * roughness / 97;
+        RgbImage::from_fn(edge, edge, |x, y| {
+            image::Rgb([value(x, y) as u8, value(y, x) as u8, (40 + x * 50 / edge) as u8])
+        })
     }
 
     #[test]

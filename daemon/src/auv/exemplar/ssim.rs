@@ -24,9 +24,8 @@ pub struct Luma {
 impl Luma {
     /// The luma of an image, ITU-R BT.601, 0 to 255.
     pub fn of(image: &RgbImage) -> Self {
-        let luma = |p: &image::Rgb<u8>| {
-            0.299 * f64::from(p.0[0]) + 0.587 * f64::from(p.0[1]) + 0.114 * f64::from(p.0[2])
-        };
+        let luma =
+            |p: &image::Rgb<u8>| 0.299 * f64::from(p.0[0]) + 0.587 * f64::from(p.0[1]) + 0.114 * f64::from(p.0[2]);
         Self { width: image.width() as usize, values: image.pixels().map(luma).collect() }
     }
 

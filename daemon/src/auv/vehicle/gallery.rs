@@ -132,7 +132,8 @@ impl Gallery {
             object.into_iter().for_each(|id| link.cancel_object(id));
         }
         let head = Exemplar { epoch, label: request.label, serial: request.serial, size: 0, picture: 0, bytes: vec![] };
-        let exemplar = chosen.as_ref().and_then(|(n, p)| fill(head.clone(), *n, &p.patch, request.size)).unwrap_or(head);
+        let exemplar =
+            chosen.as_ref().and_then(|(n, p)| fill(head.clone(), *n, &p.patch, request.size)).unwrap_or(head);
         let Some(object) = link.push_object(exemplar.encode()) else { return };
         self.answers.push(Answer { request, number: exemplar.picture, object: Some(object) });
         if let Some((number, picture)) = chosen {
@@ -203,7 +204,8 @@ impl Gallery {
 
 /// A name for a picture that outlives a restart: of the place and time it was taken at.
 fn number_of(picture: &Picture) -> u8 {
-    let bits = picture.t_s.to_bits() ^ picture.place.0.to_bits().rotate_left(21) ^ picture.place.1.to_bits().rotate_left(42);
+    let bits =
+        picture.t_s.to_bits() ^ picture.place.0.to_bits().rotate_left(21) ^ picture.place.1.to_bits().rotate_left(42);
     let mixed = (bits ^ bits >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
     (mixed % u64::from(Request::MOST_PICTURE)) as u8 + 1
 }

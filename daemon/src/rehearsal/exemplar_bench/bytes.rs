@@ -94,11 +94,7 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, Problem> {
 }
 
 /// Measures the patches of all sources; the patches too.
-pub fn sizes(
-    sources: &[Source],
-    seed: u64,
-    progress: &mut dyn FnMut(f64),
-) -> Result<(Bytes, Vec<RgbImage>), Problem> {
+pub fn sizes(sources: &[Source], seed: u64, progress: &mut dyn FnMut(f64)) -> Result<(Bytes, Vec<RgbImage>), Problem> {
     let mut all = Vec::new();
     for (i, source) in sources.iter().enumerate() {
         all.extend(patches(source, seed)?);
