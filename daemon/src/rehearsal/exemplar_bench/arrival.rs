@@ -29,7 +29,7 @@ const GIVE_UP: Duration = Duration::from_secs(600);
 /// Labels on the map.
 pub(super) const LABELS: u8 = 12;
 /// Edge of the part of the map that is always changing, cells.
-const EDGE: i32 = 64;
+const EDGE: i32 = 112;
 /// Seconds between two changes of it and between two fixes.
 const CHANGE_S: f64 = 2.0;
 const FIX_S: f64 = 10.0;
