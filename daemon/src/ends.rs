@@ -11,7 +11,7 @@ use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, Vehicle
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, MissionId};
 use std::collections::BTreeMap;
@@ -108,6 +108,7 @@ pub fn vehicle(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
+    link.set_spend(durable.spend.and_then(SpendOrder::from_code).unwrap_or_else(|| spend(config)));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
     vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, told_planes(config));
     if config.map.stream == "whole-png" {
@@ -120,6 +121,11 @@ pub fn vehicle(
 fn told_planes(config: &Config) -> PlaneSet {
     let is_told = |kind: PlaneKind| config.map.planes.iter().any(|name| name == kind.name());
     PlaneSet { confidence: is_told(PlaneKind::Confidence), depth: is_told(PlaneKind::Depth) }
+}
+
+/// What left-over bits are spent on; the file was checked when it was read.
+pub fn spend(config: &Config) -> SpendOrder {
+    SpendOrder::from_names(&config.link.spend).unwrap_or_default()
 }
 
 /// Every plane that the operator could ask for, and its part of the map's share in percent.
@@ -166,5 +172,7 @@ pub fn surface(config: &Config, modem: ModemProfile, seed: u64, now: Instant) ->
     };
     let link = SurfaceLink::new(link, seed, now);
     let table = TuningTable::load(&config.scene.tuning_table)?;
-    Ok(Surface::new(link, vehicles).with_tuning_table(table))
+    let mut surface = Surface::new(link, vehicles).with_tuning_table(table);
+    surface.set_spend(spend(config));
+    Ok(surface)
 }

@@ -8,7 +8,7 @@ use scenecast_protocol::directive::{LifeLine, Slot, Utility};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, PlaneKind};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::Class;
+use scenecast_protocol::schedule::{Class, Extra, SpendOrder};
 use std::time::Duration;
 
 fn water() -> impl Strategy<Value = Water> {
@@ -148,6 +148,49 @@ fn planes_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() 
     let part = |bytes: u64| bytes as f64 / (labels + confidence + depth) as f64;
     assert!((0.08..0.13).contains(&part(confidence)), "{labels} {confidence} {depth}");
     assert!((0.03..0.08).contains(&part(depth)), "{labels} {confidence} {depth}");
+}
+
+fn sent(pair: &Pair, class: Class) -> u64 {
+    pair.vehicle.stats().bytes_by_class.get(&class).copied().unwrap_or(0)
+}
+
+#[test]
+fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_not_name() {
+    let setup = Setup { planes: Some([0, 0]), ..Setup::new(256, 4_000, Codec::Context) };
+    let mut pair = Pair::new(3, setup, Water { loss: 0.1, ..CALM });
+    pair.vehicle.set_spend(SpendOrder::new(&[Extra::Exemplars, Extra::Depth]).unwrap());
+    pair.vehicle.set_map(speckled(20, 1), pair.now);
+    pair.set_planes(100, 1);
+    pair.vehicle.push_extra_object((0..9_000u32).map(|i| ((i * i) >> 3) as u8).collect());
+    for _ in 0..400 {
+        pair.run(pair.now + Duration::from_secs(1), false);
+        let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Depth));
+        // Ends of frames into which no part of the object fits, and what waits for its verdicts, are left over, too.
+        assert!(object >= 9_000 || depth <= object / 20, "{depth} bytes of depth after {object} of the object");
+    }
+    assert!(sent(&pair, Class::Depth) > 500, "then it is its turn");
+    assert_eq!(sent(&pair, Class::Confidence) / 100, 0, "but for what says that nothing was sent");
+    assert_budget(&pair, 4_000);
+}
+
+#[test]
+fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_agree_in_the_end() {
+    let after_a_minute = |order: [Extra; 2]| {
+        let mut pair = Pair::new(5, Setup::new(256, 4_000, Codec::Context), Water { loss: 0.1, ..CALM });
+        pair.vehicle.set_spend(SpendOrder::new(&order).unwrap());
+        pair.vehicle.source_mut().set_coarse_limit(Some(500));
+        pair.vehicle.set_map(speckled(200, 1), pair.now);
+        pair.vehicle.push_extra_object((0..5_000u32).map(|i| ((i * i) >> 3) as u8).collect());
+        pair.run(pair.now + Duration::from_secs(60), false);
+        let early = sent(&pair, Class::Exemplar);
+        pair.run(pair.now + Duration::from_secs(600), true);
+        assert_eq!(pair.shown(), pair.vehicle.map());
+        assert_budget(&pair, 4_000);
+        early
+    };
+    assert!(after_a_minute([Extra::Exemplars, Extra::Finer]) >= 5_000);
+    let at_ends_of_frames = after_a_minute([Extra::Finer, Extra::Exemplars]);
+    assert!(at_ends_of_frames < 1_500, "{at_ends_of_frames}");
 }
 
 #[test]

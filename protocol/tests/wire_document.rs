@@ -2,11 +2,11 @@
 
 use scenecast_protocol::directive::{
     Band, Budget, CellBand, Change, Constraints, Fence, Figure, Fix, Limits, Place, PlaneSet, PlannerKind, Polygon,
-    Reaction, RefusalReason, Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+    Reaction, RefusalReason, Request, Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement, Reader,
@@ -279,9 +279,15 @@ fn parts_of_a_frame_are_those_of_the_document() {
     };
     let utility =
         Utility { epoch: 1, exploration: 20, curiosity: 0, weights: [(3, 80), (5, -20)].into_iter().collect() };
-    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]) };
+    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), spend: SpendOrder::default() };
     let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
-    let requests = Requests { epoch: 1, wanted: vec![(3, 2)] };
+    let requests = Requests {
+        epoch: 1,
+        wanted: vec![
+            Request { label: 3, serial: 2, size: 0, picture: 0 },
+            Request { label: 5, serial: 1, size: 1, picture: 9 },
+        ],
+    };
     let plane = |chunk: PlaneChunk<'_>| {
         let bytes = chunk.encode();
         assert_eq!(PlaneChunk::decode(&bytes), Some(chunk));
@@ -387,8 +393,16 @@ fn parts_of_a_frame_are_those_of_the_document() {
              (10, 18) m, return point (2, 3) m",
             slot(7, Slot::Fence(fence)),
         ),
-        ("slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20", slot(3, Slot::Budget(budget))),
-        ("slot: series ABCD, version 1, requests: epoch 1, label 3, request 2", slot(1, Slot::Requests(requests))),
+        (
+            "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, left-over bits to finer cells, depth, \
+             exemplars, confidence",
+            slot(3, Slot::Budget(budget)),
+        ),
+        (
+            "slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, picture 9 with an edge of \
+             128 pixels",
+            slot(1, Slot::Requests(requests)),
+        ),
         ("slot: series ABCD, version 9, fix: x -12.3 m, y 400 m, sigma 1.5 m, age 0.82 s", slot(9, Slot::Fix(fix))),
     ];
     assert_same(found, expected);

@@ -1,6 +1,7 @@
 //! The image patches that show best what a label means, in a bounded store.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use image::{RgbImage, imageops};
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,7 @@ use crate::topics::TopicId;
 pub struct Exemplar {
     /// Square patch of the store's edge length.
     #[serde(with = "pixels")]
-    pub patch: RgbImage,
+    pub patch: Arc<RgbImage>,
     /// How well it represents the topic, higher is better (the daemon offers the cell's confidence).
     pub score: f32,
     /// When it was seen, seconds.
@@ -65,7 +66,7 @@ impl ExemplarStore {
         }
         kept.retain(|other| !near(other));
         let rank = kept.partition_point(|other| other.score >= score);
-        kept.insert(rank, Exemplar { patch, score, t_s, place });
+        kept.insert(rank, Exemplar { patch: Arc::new(patch), score, t_s, place });
         kept.truncate(self.per_label);
         self.drop_the_weakest_topic();
     }
@@ -74,6 +75,21 @@ impl ExemplarStore {
     pub fn would_keep(&self, topic: TopicId, score: f32) -> bool {
         let kept = self.topics.get(&topic).map_or(&[][..], Vec::as_slice);
         kept.len() < self.per_label || kept.last().is_some_and(|worst| score > worst.score)
+    }
+
+    /// Gives every patch the score that `score` has for its topic and place now, and drops it where there is none.
+    pub fn review(&mut self, score: impl Fn(TopicId, (f64, f64)) -> Option<f32>) {
+        for (&topic, kept) in &mut self.topics {
+            kept.retain_mut(|exemplar| match score(topic, exemplar.place).filter(|score| !score.is_nan()) {
+                Some(score) => {
+                    exemplar.score = score;
+                    true
+                }
+                None => false,
+            });
+            kept.sort_by(|a, b| b.score.total_cmp(&a.score));
+        }
+        self.topics.retain(|_, kept| !kept.is_empty());
     }
 
     /// The best patch of a topic.
@@ -100,6 +116,8 @@ impl ExemplarStore {
 
 /// An image as width, height and bytes.
 mod pixels {
+    use std::sync::Arc;
+
     use image::RgbImage;
     use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -108,11 +126,11 @@ mod pixels {
         (image.width(), image.height(), image.as_raw()).serialize(serializer)
     }
 
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<RgbImage, D::Error> {
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Arc<RgbImage>, D::Error> {
         let (width, height, raw): (u32, u32, Vec<u8>) = Deserialize::deserialize(deserializer)?;
         let is_whole = u64::from(width) * u64::from(height) * 3 == raw.len() as u64;
         let image = RgbImage::from_raw(width, height, raw).filter(|_| is_whole);
-        image.ok_or_else(|| D::Error::custom("an image of another size than its bytes"))
+        image.map(Arc::new).ok_or_else(|| D::Error::custom("an image of another size than its bytes"))
     }
 }
 

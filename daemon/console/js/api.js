@@ -29,7 +29,9 @@ async function write(path, body) {
 }
 
 export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
-export const askExemplar = (id, label) => write(`/vehicles/${id}/exemplars`, { label });
+/** `what`: another, larger or cancel; `picture`: the number of the one to enlarge. */
+export const askExemplar = (id, label, what, picture = null) =>
+  write(`/vehicles/${id}/exemplars`, { label, what, ...(picture && { picture }) });
 export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints`, order);
 export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
 export const sendLimits = (id, limits) => write(`/vehicles/${id}/limits`, limits);
@@ -37,8 +39,9 @@ export const sendPlanner = (id, planner) => write(`/vehicles/${id}/settings`, { 
 export const sendSettings = (id, settings) => write(`/vehicles/${id}/settings`, settings);
 /** The settings that tell most within so many bits a second; null: within the map's share of the vehicle's budget. */
 export const readFit = (id, bps) => read(`/vehicles/${id}/fit${bps === null ? "" : `?bits_per_s=${bps}`}`);
-/** `shares` in percent by class; null leaves them as they are. */
-export const sendBudget = (bps, shares = null) => write("/budget", { budget_bps: bps, ...(shares && { shares }) });
+/** `shares` in percent by class, `spend` what left-over bits go to, in order; null leaves them as they are. */
+export const sendBudget = (bps, shares = null, spend = null) =>
+  write("/budget", { budget_bps: bps, ...(shares && { shares }), ...(spend && { spend }) });
 
 /** Goes to the login if the surface takes a token and no longer knows ours. */
 export async function logInIfAsked() {

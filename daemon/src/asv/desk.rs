@@ -1,5 +1,6 @@
 //! What the operator has and asked for, for one vehicle.
 
+use super::album::Album;
 use super::pauses::Pauses;
 use super::settings::SettingsDesk;
 use crate::auv::Exemplar;
@@ -8,29 +9,7 @@ use scenecast_protocol::directive::{Fence, Limits, Requests, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
-use std::collections::{BTreeMap, VecDeque};
-
-/// How far a representative image has come.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ExemplarState {
-    /// Asked for; how far the request is, the directive's slot knows.
-    Asked,
-    /// Bytes held of bytes in all.
-    Coming(usize, usize),
-    /// Here: the WebP file.
-    Here(Vec<u8>),
-}
-
-/// An image of a label that was asked for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExemplarDesk {
-    /// Serial number of the request.
-    pub serial: u8,
-    /// How far it has come.
-    pub state: ExemplarState,
-    /// When that last changed.
-    pub changed: Instant,
-}
+use std::collections::VecDeque;
 
 /// The operator's papers about one vehicle.
 #[derive(Debug)]
@@ -45,8 +24,8 @@ pub struct Desk {
     pub limits: Option<Limits>,
     /// The settings that were asked for, and those in force.
     pub settings: SettingsDesk,
-    /// Images by label.
-    pub exemplars: BTreeMap<u8, ExemplarDesk>,
+    /// Images of labels.
+    pub album: Album,
     /// Where the vehicle said it was: time, east, north.
     pub track: VecDeque<(Instant, f64, f64)>,
     /// Epoch of the labels.
@@ -73,7 +52,7 @@ impl Desk {
             fence: None,
             limits: None,
             settings: SettingsDesk::default(),
-            exemplars: BTreeMap::new(),
+            album: Album::default(),
             track: VecDeque::new(),
             epoch: 0,
             whole: None,
@@ -88,7 +67,7 @@ impl Desk {
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
-            self.exemplars.clear();
+            self.album = Album::default();
         }
         self.track.push_back((now, status.x_m, status.y_m));
         if self.track.len() > Self::TRACK {
@@ -96,36 +75,19 @@ impl Desk {
         }
     }
 
-    /// Asks for an image of a label, a further one if there is one already; returns all that is still wanted.
-    pub fn request(&mut self, label: u8, now: Instant) -> Requests {
-        let serial = self.exemplars.get(&label).map_or(1, |e| e.serial.wrapping_add(1));
-        self.exemplars.insert(label, ExemplarDesk { serial, state: ExemplarState::Asked, changed: now });
-        self.wanted()
-    }
-
-    /// Requests that are not met yet.
-    pub fn wanted(&self) -> Requests {
-        let open = self.exemplars.iter().filter(|(_, e)| !matches!(e.state, ExemplarState::Here(_)));
-        Requests { epoch: self.epoch, wanted: open.map(|(&label, e)| (label, e.serial)).collect() }
-    }
-
     /// Part of an image came in; `head` are its first bytes, once they are held.
     pub fn handle_progress(&mut self, head: Option<&[u8]>, held: usize, total: usize, now: Instant) {
-        let Some(&[epoch, label, serial]) = head.and_then(|h| h.first_chunk::<3>()) else { return };
-        let Some(desk) = self.exemplars.get_mut(&label) else { return };
-        if epoch == self.epoch && serial == desk.serial && !matches!(desk.state, ExemplarState::Here(_)) {
-            (desk.state, desk.changed) = (ExemplarState::Coming(held, total), now);
-        }
+        let head = head.and_then(|h| h.first_chunk::<4>()).filter(|h| h[0] == self.epoch);
+        head.into_iter().for_each(|head| self.album.handle_progress(*head, (held, total), now));
     }
 
-    /// An image is complete; says whether it was asked for.
-    pub fn handle_exemplar(&mut self, exemplar: Exemplar, now: Instant) -> bool {
-        let wanted = exemplar.epoch == self.epoch;
-        let Some(desk) = self.exemplars.get_mut(&exemplar.label).filter(|_| wanted) else { return false };
-        if desk.serial != exemplar.serial {
-            return false;
-        }
-        (desk.state, desk.changed) = (ExemplarState::Here(exemplar.webp), now);
-        true
+    /// An image is complete; says whether there is something new to show.
+    pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
+        exemplar.epoch == self.epoch && self.album.handle_exemplar(exemplar, now)
+    }
+
+    /// Images that are asked for and not here.
+    pub fn wanted(&self) -> Requests {
+        self.album.wanted(self.epoch)
     }
 }

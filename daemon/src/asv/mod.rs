@@ -1,15 +1,18 @@
 //! The surface: holds the operator's map of each vehicle, sends each its directive.
 
+mod album;
 #[cfg(test)]
 mod calls;
 mod desk;
 mod orders;
 mod pauses;
 pub mod position;
+mod requests;
 mod settings;
 mod surface;
 
-pub use desk::{Desk, ExemplarState};
+pub use album::{Album, AskState, Asked, Page, Picture, Wish};
+pub use desk::Desk;
 pub use orders::{FenceOrder, LimitsOrder};
 pub use settings::{SettingsDesk, SettingsOrder};
 pub use surface::{Surface, SurfaceOutput};

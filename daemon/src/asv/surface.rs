@@ -11,7 +11,7 @@ use crate::tuning::{Fit, NoRow, TuningTable};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, LifeLine, Slot, SlotId, Utility};
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::{BTreeMap, VecDeque};
@@ -33,9 +33,10 @@ pub enum SurfaceOutput {
 
 /// The surface.
 pub struct Surface {
-    link: SurfaceLink,
-    desks: BTreeMap<Address, Desk>,
+    pub(super) link: SurfaceLink,
+    pub(super) desks: BTreeMap<Address, Desk>,
     outputs: VecDeque<SurfaceOutput>,
+    spend: SpendOrder,
     /// Where the surface is and where it sees the vehicles, if it has a GPS.
     relay: Option<Relay>,
     tuning: TuningTable,
@@ -45,7 +46,8 @@ impl Surface {
     /// A surface that speaks with these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
-        Self { link, desks, outputs: VecDeque::new(), relay: None, tuning: TuningTable::default() }
+        let (tuning, spend) = (TuningTable::default(), SpendOrder::default());
+        Self { link, desks, outputs: VecDeque::new(), spend, relay: None, tuning }
     }
 
     /// Knows what settings of the scene model reach.
@@ -144,15 +146,6 @@ impl Surface {
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 
-    /// Asks for a representative image of a label.
-    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
-        if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
-            return Err(format!("label {label} is not on the map"));
-        }
-        let requests = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.request(label, now);
-        self.issue(vehicle, Slot::Requests(requests), now)
-    }
-
     /// Tells a vehicle to stay, or to go on.
     pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
         self.set_order(vehicle, Constraints { hold, abort: false }, now)
@@ -206,8 +199,25 @@ impl Surface {
         self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.life)
     }
 
-    /// Changes the bit budget of the surface and of every vehicle, and the least shares of the classes if there are any.
-    pub fn set_budget(&mut self, bits_per_s: u32, shares: Option<Shares>, now: Instant) -> Result<(), String> {
+    /// What the vehicles spend left-over bits on, as it was configured or sent last.
+    pub fn spend(&self) -> SpendOrder {
+        self.spend
+    }
+
+    /// What the next budget that is sent says of left-over bits, unless it is given.
+    pub fn set_spend(&mut self, spend: SpendOrder) {
+        self.spend = spend;
+    }
+
+    /// Changes the bit budget of the surface and of every vehicle, and if they are given the least shares of the classes and
+    /// what left-over bits are spent on.
+    pub fn set_budget(
+        &mut self,
+        bits_per_s: u32,
+        shares: Option<Shares>,
+        spend: Option<SpendOrder>,
+        now: Instant,
+    ) -> Result<(), String> {
         if !(10..=10_000_000).contains(&bits_per_s) {
             return Err(format!("budget_bps {bits_per_s} is not within 10 to 10000000"));
         }
@@ -217,10 +227,12 @@ impl Surface {
             return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
         }
         let vehicles: Vec<Address> = self.desks.keys().copied().collect();
-        let slot = Slot::Budget(Budget { bits_per_s, shares });
+        let spend = spend.unwrap_or(self.spend);
+        let slot = Slot::Budget(Budget { bits_per_s, shares, spend });
         vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
         self.link.set_budget(bits_per_s, now);
         self.link.set_shares(shares);
+        self.spend = spend;
         Ok(())
     }
 
@@ -271,7 +283,7 @@ impl Surface {
         Some(status.placement.map_or(at, |p| p.to_world(at)))
     }
 
-    fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
+    pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
         let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
         self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         Ok(version)
@@ -306,11 +318,15 @@ impl Surface {
                 Some(SurfaceOutput::VehicleFound(vehicle))
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
-            SurfaceEvent::VehicleRestarted(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
+            SurfaceEvent::VehicleRestarted(vehicle) => {
+                self.ask_again(vehicle, now);
+                Some(SurfaceOutput::MapChanged(vehicle))
+            }
             SurfaceEvent::SlotSettled(vehicle, slot) => {
                 if let Some(life) = self.life_of(vehicle, slot).filter(|_| slot == SlotId::Settings) {
                     self.desks.get_mut(&vehicle)?.settings.handle_settled(life);
                 }
+                self.handle_settled(vehicle, slot, now);
                 Some(SurfaceOutput::SlotSettled(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
@@ -325,17 +341,14 @@ impl Surface {
             }
             SurfaceEvent::Object(vehicle, bytes) => {
                 let desk = self.desks.get_mut(&vehicle)?;
-                match Exemplar::decode(&bytes) {
-                    Some(exemplar) => {
-                        let label = exemplar.label;
-                        desk.handle_exemplar(exemplar, now).then_some(SurfaceOutput::ExemplarHere(vehicle, label))
-                    }
-                    None => {
-                        desk.whole = Some(picture::read_whole(&bytes)?);
-                        desk.wholes += 1;
-                        Some(SurfaceOutput::MapChanged(vehicle))
-                    }
+                if let Some(whole) = picture::read_whole(&bytes) {
+                    desk.whole = Some(whole);
+                    desk.wholes += 1;
+                    return Some(SurfaceOutput::MapChanged(vehicle));
                 }
+                let exemplar = Exemplar::decode(&bytes)?;
+                let is_new = desk.handle_exemplar(&exemplar, now);
+                is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
         }
     }

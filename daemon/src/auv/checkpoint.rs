@@ -130,7 +130,7 @@ mod tests {
         assert_eq!(restored.current(), shown);
         assert!(shown.cells.len() > 20 && shown.labels > 1);
         for label in 1..=shown.labels {
-            assert_eq!(restored.exemplar(label), whole.exemplar(label));
+            assert_eq!(restored.exemplars(label), whole.exemplars(label));
         }
         for at in 12..20 {
             assert_eq!(frame(&mut restored, at), frame(&mut whole, at));

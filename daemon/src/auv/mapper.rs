@@ -1,11 +1,12 @@
 //! Camera frames to label map.
 
+use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use crate::config::Config;
 use crate::problem::Problem;
 use crate::scene::read_vocabulary;
 use image::RgbImage;
-use scene_model::exemplars::ExemplarStore;
+use scene_model::exemplars::{Exemplar, ExemplarStore};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
@@ -15,8 +16,6 @@ use scenecast_protocol::map::{Cell, PlaneKind};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Edge of a representative image in pixels.
-const EXEMPLAR_PX: u32 = 64;
 /// Representative images kept a label.
 const EXEMPLARS_KEPT: usize = 4;
 
@@ -105,7 +104,8 @@ impl Mapper {
             cell_m,
             model: SceneModel::new(scene).map_err(|e| Problem::Input(format!("scene.{e}")))?,
             book: LabelBook::new(epoch),
-            exemplars: ExemplarStore::new(EXEMPLARS_KEPT, EXEMPLAR_PX),
+            exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
+                .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
             relief: Relief::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
@@ -160,7 +160,10 @@ impl Mapper {
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.model.label_map();
         self.book.publish(&self.flat);
-        self.offer_exemplar(image, pose, t_s);
+        let (cell_m, metres_per_pixel) = (self.cell_m, camera.metres_per_pixel);
+        let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
+        judge.review(&mut self.exemplars);
+        judge.offer(&mut self.exemplars, image, pose, t_s);
         self.current()
     }
 
@@ -194,26 +197,20 @@ impl Mapper {
         self.last_s
     }
 
-    /// The middle of the frame, where the camera distorts least, may represent the label below it.
-    fn offer_exemplar(&mut self, image: &RgbImage, pose: &Pose, t_s: f64) {
-        let middle = (self.cell(pose.y), self.cell(pose.x));
-        let Ok(at) = self.flat.binary_search_by_key(&middle, |c| (c.y, c.x)) else { return };
-        let (topic, score) = (self.flat[at].topic, self.flat[at].confidence);
-        if image.width() < EXEMPLAR_PX || image.height() < EXEMPLAR_PX || !self.exemplars.would_keep(topic, score) {
-            return;
-        }
-        let (x, y) = ((image.width() - EXEMPLAR_PX) / 2, (image.height() - EXEMPLAR_PX) / 2);
-        let patch = image::imageops::crop_imm(image, x, y, EXEMPLAR_PX, EXEMPLAR_PX).to_image();
-        self.exemplars.offer(topic, patch, score, t_s, (pose.x, pose.y));
-    }
-
     fn cell(&self, metres: f64) -> i32 {
         (metres / self.cell_m).floor() as i32
     }
 
-    /// The image that represents a label best so far.
-    pub fn exemplar(&self, label: u8) -> Option<&RgbImage> {
-        self.exemplars.best(self.book.topic_of(label)?).map(|e| &e.patch)
+    /// The images that represent a label best so far, the best first.
+    pub fn exemplars(&self, label: u8) -> &[Exemplar] {
+        self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
+    }
+
+    /// The images of all labels that have some.
+    pub fn gallery(&self) -> BTreeMap<u8, Vec<Exemplar>> {
+        let labels = self.book.labels();
+        let images = labels.map(|label| (label, self.exemplars(label).to_vec()));
+        images.filter(|(_, images)| !images.is_empty()).collect()
     }
 
     /// Epoch of the label ids.

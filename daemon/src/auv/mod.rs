@@ -4,17 +4,18 @@
 //! keeps the position estimate and chooses waypoints. Neither does IO.
 
 mod checkpoint;
-mod exemplar;
+pub mod exemplar;
 mod guard;
 mod mapper;
 mod navigator;
+mod picker;
 pub mod planning;
 mod relief;
 mod steering;
 mod vehicle;
 
 pub use checkpoint::{NoCheckpoint, Restored};
-pub use exemplar::{EXEMPLAR_HEAD, Exemplar, encode_webp};
+pub use exemplar::Exemplar;
 pub use guard::{Guard, Habits};
 pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use navigator::{FixVerdict, Navigator};

@@ -1,5 +1,6 @@
 //! `scenecast bench`
 
+use super::bench_exemplar::ExemplarBench;
 use super::bench_link::Link;
 use super::bench_localisation::LocalisationBench;
 use super::bench_modem::Modem;
@@ -12,6 +13,8 @@ use clap::{Args, Subcommand};
 /// Measurements.
 #[derive(Debug, Subcommand)]
 pub(super) enum Bench {
+    /// Images of labels: seconds from the order under full load, bytes for a likeness of 0.9.
+    Exemplar(ExemplarBench),
     /// The operator's map at 100, 250, 1000 and 10 000 bit/s: our stream against whole PNGs.
     Fidelity(Fidelity),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
@@ -39,6 +42,7 @@ pub(super) struct Fidelity {
 impl Bench {
     pub(super) fn run(self) -> Result<(), Problem> {
         match self {
+            Self::Exemplar(e) => e.run(),
             Self::Fidelity(f) => f.run(),
             Self::Link(l) => l.run(),
             Self::Localisation(l) => l.run(),

@@ -2,6 +2,7 @@
 
 use crate::asv::SettingsOrder;
 use crate::config;
+use crate::console::orders::ExemplarWish;
 use crate::ctl::{self, BudgetChange, Client, SettingsChange};
 use crate::problem::Problem;
 use clap::{Args, Subcommand};
@@ -20,6 +21,11 @@ Example: scenecast ctl status
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
 Exit codes: 0 done; 1 refused, not applied in time, or nobody answers; 2 wrong usage";
+
+const EXEMPLAR_EXAMPLES: &str = "\
+Example: scenecast ctl exemplar 3 --out label-3.webp --wait 300
+         scenecast ctl exemplar 3 --out label-3-large.webp --larger
+         scenecast ctl exemplar 3 --cancel";
 
 /// Speak with a running surface: see what it has, give orders.
 #[derive(Debug, Args)]
@@ -67,7 +73,9 @@ enum Command {
         change: Option<UtilityCommand>,
     },
     /// Print the bit budget and the shares of the classes, or change them.
-    #[command(after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10")]
+    #[command(
+        after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --spend exemplars,depth"
+    )]
     Budget {
         #[command(subcommand)]
         change: Option<BudgetCommand>,
@@ -76,16 +84,22 @@ enum Command {
     #[command(after_help = SETTINGS_EXAMPLES)]
     Settings(SettingsArgs),
     /// Write the image of a label, which the vehicle is asked for if it is not here.
-    #[command(after_help = "Example: scenecast ctl exemplar 3 --out label-3.webp --wait 300")]
+    #[command(after_help = EXEMPLAR_EXAMPLES)]
     Exemplar {
         /// Label
         label: u8,
         /// File to write, WebP
-        #[arg(long, value_name = "FILE")]
-        out: PathBuf,
-        /// Ask for a further image, although there is one
+        #[arg(long, value_name = "FILE", required_unless_present = "cancel")]
+        out: Option<PathBuf>,
+        /// Ask for another image, although there is one
         #[arg(long)]
         again: bool,
+        /// Ask for the newest image with twice its edge
+        #[arg(long, conflicts_with = "again")]
+        larger: bool,
+        /// Ask for none any more: what is on its way is not sent to its end
+        #[arg(long, conflicts_with_all = ["again", "larger", "out"])]
+        cancel: bool,
     },
     /// Print changes as they come, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
@@ -178,6 +192,9 @@ enum BudgetCommand {
         /// Least shares in percent by class, together at most 100; those that are not named stay
         #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
         shares: Vec<(String, u8)>,
+        /// What left-over bits are spent on, in this order: different ones of finer, depth, exemplars, confidence, or none
+        #[arg(long, value_name = "WHAT,..", value_delimiter = ',')]
+        spend: Option<Vec<String>>,
     },
 }
 
@@ -219,11 +236,16 @@ impl Ctl {
                     ctl.set_utility(BTreeMap::from_iter(weights), exploration, keep).await
                 }
                 Command::Budget { change: None } => ctl.budget().await,
-                Command::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares }) } => {
-                    ctl.set_budget(BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares) }).await
+                Command::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares, spend }) } => {
+                    let spend = spend.map(|words| words.into_iter().filter(|w| w != "none").collect());
+                    ctl.set_budget(BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares), spend }).await
                 }
                 Command::Settings(settings) => ctl.settings(settings.change()).await,
-                Command::Exemplar { label, out, again } => ctl.exemplar(label, &out, again).await,
+                Command::Exemplar { label, out: Some(out), again, larger, .. } => {
+                    let wish = larger.then_some(ExemplarWish::Larger).or(again.then_some(ExemplarWish::Another));
+                    ctl.exemplar(label, &out, wish).await
+                }
+                Command::Exemplar { label, out: None, .. } => ctl.cancel_exemplar(label).await,
                 Command::Watch => ctl.watch().await,
             }
         })

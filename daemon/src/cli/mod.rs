@@ -3,6 +3,7 @@
 //! Exit codes: 0 done, 1 failed, 2 wrong usage or input.
 
 mod bench;
+mod bench_exemplar;
 mod bench_link;
 mod bench_localisation;
 mod bench_modem;

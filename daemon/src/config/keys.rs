@@ -82,6 +82,13 @@ pub const KEYS: &[Key] = &[
         "asr",
         "least shares of directive, status, fix, map and exemplar while each has something to send; together at most 100",
     ),
+    key(
+        "link.spend",
+        "",
+        Words(&["finer", "depth", "exemplars", "confidence"]),
+        "asr",
+        "what bits that nobody else needs are spent on, in this order; finer: the cells between those of a coarse map; depth, confidence: planes without a share; exemplars: images of new labels that nobody asked for; what is not named gets none, but for finer cells, which then go before all others",
+    ),
     key("link.status_period_s", "s", Range(1.0, 3600.0), "ar", "time between two statuses of the vehicle"),
     key("link.max_turn_s", "s", Range(1.0, 60.0), "sr", "longest turn that the surface grants"),
     key("link.max_idle_s", "s", Range(0.5, 600.0), "sr", "longest pause between turns when nothing is to be said"),

@@ -15,7 +15,7 @@ pub use print::print;
 pub use token_file::{load_token, read_token};
 
 use scenecast_protocol::map::PlaneKind;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use serde::{Deserialize, Serialize};
 
 /// Every setting; see [`KEYS`] for meaning, unit and range of each.
@@ -97,6 +97,8 @@ section! {
         frame_bytes: u32 = 256,
         /// Least shares in percent of directive, status, fix, map, exemplar.
         shares: [u8; 5] = Shares::default().0,
+        /// What left-over bits are spent on, in this order.
+        spend: Vec<String> = SpendOrder::default().names(),
         /// Seconds between two statuses.
         status_period_s: f64 = 10.0,
         /// Longest turn in seconds.

@@ -2,14 +2,14 @@
 
 use super::export::Cells;
 use super::fit;
-use super::orders::BudgetOrder;
+use super::orders::{BudgetOrder, ExemplarOrder, ExemplarWish};
 use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
-use crate::asv::{ExemplarState, FenceOrder, LimitsOrder, SettingsOrder, Surface};
+use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
-use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
@@ -22,12 +22,12 @@ const MOST_CELLS: u64 = 1 << 23;
 pub enum Ask {
     /// A vehicle's map with the age of its cells.
     Map(u8),
-    /// The image of a label.
-    Exemplar(u8, u8),
+    /// An image of a label: the one of this number, or the newest.
+    Exemplar(u8, u8, Option<u8>),
     /// Send weights of labels, and of unseen cells and perplexity.
     Utility(u8, BTreeMap<u8, f64>, (f64, f64)),
-    /// Ask the vehicle for an image of a label.
-    Request(u8, u8),
+    /// Ask the vehicle for an image of a label, or for none any more.
+    Request(u8, ExemplarOrder),
     /// Tell the vehicle to stay, to abort, or to go on.
     Order(u8, Constraints),
     /// Send a fence.
@@ -38,7 +38,7 @@ pub enum Ask {
     Settings(u8, SettingsOrder),
     /// Which settings fit so many bits a second, or the map's share of the budget.
     Fit(u8, Option<f64>),
-    /// Change the bit budget, and the least shares if there are any.
+    /// Change the bit budget, and shares and left-over bits if they are given.
     Budget(BudgetOrder),
 }
 
@@ -70,20 +70,18 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
             }
             found => found.map_or(Reply::NotFound, Reply::Map),
         },
-        Ask::Exemplar(id, label) => {
-            let desk = address(id).and_then(|a| surface.desk(a)).and_then(|d| d.exemplars.get(&label));
-            match desk.map(|e| &e.state) {
-                Some(ExemplarState::Here(webp)) => Reply::File("image/webp", webp.clone()),
-                _ => Reply::NotFound,
-            }
+        Ask::Exemplar(id, label, number) => {
+            let page = address(id).and_then(|a| surface.desk(a)).and_then(|d| d.album.page(label));
+            let picture = page.and_then(|page| page.picture(number));
+            picture.map_or(Reply::NotFound, |p| Reply::File("image/webp", p.webp.clone()))
         }
         Ask::Budget(order) => budget(surface, order, now),
         Ask::Utility(id, weights, others) => match address(id) {
             Some(a) => accepted(a, SlotId::Utility, surface.set_utility(a, &weights, others, now)),
             None => Reply::NotFound,
         },
-        Ask::Request(id, label) => match address(id) {
-            Some(a) => accepted(a, SlotId::Requests, surface.request_exemplar(a, label, now)),
+        Ask::Request(id, order) => match address(id) {
+            Some(a) => accepted(a, SlotId::Requests, request(surface, a, &order, now)),
             None => Reply::NotFound,
         },
         Ask::Order(id, order) => match address(id) {
@@ -121,9 +119,19 @@ fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Repl
     }
 }
 
+fn request(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder, now: Instant) -> Result<u16, String> {
+    let ExemplarOrder { label, what, picture } = *order;
+    match what {
+        ExemplarWish::Another => surface.request_exemplar(vehicle, label, Wish::Another, now),
+        ExemplarWish::Larger => surface.request_exemplar(vehicle, label, Wish::Larger(picture), now),
+        ExemplarWish::Cancel => surface.cancel_exemplar(vehicle, label, now),
+    }
+}
+
 fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
-    if let Err(why) = surface.set_budget(order.budget_bps, shares, now) {
+    let spend = order.spend.as_deref().map(SpendOrder::from_names).transpose();
+    if let Err(why) = spend.and_then(|spend| surface.set_budget(order.budget_bps, shares, spend, now)) {
         return Reply::Refused(why);
     }
     let issued = |a: Address| surface.view(a)?.slots().find(|s| s.id == SlotId::Budget).map(|s| s.version);

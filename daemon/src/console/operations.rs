@@ -108,7 +108,7 @@ fn readings() -> Vec<Operation> {
         read(
             "/api/v1/vehicles/{id}/exemplars/{file}",
             "exemplar",
-            "The image of a label, if it is here, as in 3.webp",
+            "An image of a label, if it is here: the newest as in 3.webp, or one by its number as in 3-17.webp",
             Content::File("image/webp"),
             || get(server::exemplar),
         ),
@@ -175,7 +175,8 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v1/vehicles/{id}/exemplars",
             "ask_exemplar",
-            "Asks the vehicle for an image of a label, or for a further one",
+            "Asks the vehicle for an image of a label: first the best, then another or a larger one; or cancels that. At most 8 \
+             are under way at a time.",
             schema::<ExemplarOrder>,
             || post(server::request),
         ),
@@ -215,7 +216,7 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v1/budget",
             "set_budget",
-            "Changes the budget of the surface, at once, and of each vehicle, by the directive",
+            "Changes the budget of the surface, at once, and of each vehicle, by the directive, and what it is spent on",
             schema::<BudgetOrder>,
             || post(server::budget),
         ),

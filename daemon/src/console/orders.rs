@@ -20,13 +20,33 @@ pub struct UtilityOrder {
     pub curiosity: f64,
 }
 
-/// Asks for an image of a label, or for a further one.
+/// Asks for an image of a label, in place of what was asked of the label before, or takes that back.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExemplarOrder {
     /// A label on the map.
     #[schemars(range(min = 1, max = 254))]
     pub label: u8,
+    /// What of it.
+    #[serde(default)]
+    pub what: ExemplarWish,
+    /// For `larger`: which picture; left out: the newest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = 63))]
+    pub picture: Option<u8>,
+}
+
+/// Which image of a label is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExemplarWish {
+    /// The best one that is not here: 64 x 64 pixels, at most 700 bytes.
+    #[default]
+    Another,
+    /// One that is here with twice its edge: 128 x 128 pixels, at most 2800 bytes.
+    Larger,
+    /// None: what was asked for is not sent to its end.
+    Cancel,
 }
 
 /// Tells the vehicle to stay, to abort, or with both false to go on, also after a breach.
@@ -50,6 +70,11 @@ pub struct BudgetOrder {
     /// Least shares; left out: those of the surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shares: Option<SharesOrder>,
+    /// What bits that nobody else needs are spent on, in this order: different ones of finer (the cells between those of a
+    /// coarse map), depth and confidence (planes without a share), exemplars (images of new labels that nobody asked for).
+    /// What is not named gets none, but for finer cells, which then go before all others. Left out: as it was sent last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spend: Option<Vec<String>>,
 }
 
 /// Least shares in percent while each class has something to send; together at most 100.

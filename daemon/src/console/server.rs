@@ -177,8 +177,10 @@ pub(super) async fn state(State(shared): State<Shared>) -> Response {
 
 pub(super) async fn exemplar(State(shared): State<Shared>, VehicleId(id): VehicleId, uri: axum::http::Uri) -> Response {
     let file = uri.path().rsplit('/').next().unwrap_or_default();
-    match file.strip_suffix(".webp").and_then(|label| label.parse().ok()) {
-        Some(label) => shared.ask(Ask::Exemplar(id, label)).await,
+    let name = file.strip_suffix(".webp").map(|name| name.split_once('-').unwrap_or((name, "")));
+    let number = |text: &str| if text.is_empty() { Some(None) } else { text.parse().ok().map(Some) };
+    match name.and_then(|(label, picture)| Some((label.parse().ok()?, number(picture)?))) {
+        Some((label, picture)) => shared.ask(Ask::Exemplar(id, label, picture)).await,
         None => not_found(),
     }
 }
@@ -201,7 +203,7 @@ pub(super) async fn request(
     VehicleId(id): VehicleId,
     Order(order): Order<ExemplarOrder>,
 ) -> Response {
-    shared.ask(Ask::Request(id, order.label)).await
+    shared.ask(Ask::Request(id, order)).await
 }
 
 pub(super) async fn constraints(

@@ -3,7 +3,8 @@
 use super::link_meter::LinkMeter;
 use super::{place, state};
 use crate::asv::position::LatLon;
-use crate::asv::{Desk, ExemplarState, Surface};
+use crate::asv::{Album, AskState, Desk, Picture, Surface};
+use crate::auv::exemplar::edge_px;
 use crate::config::{self, Config};
 use crate::figures::dropped;
 use axum::body::Bytes;
@@ -255,23 +256,47 @@ fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address,
 
 fn exemplar(id: u8, desk: &Desk, view: &PeerView<'_>, address: Address) -> state::Exemplar {
     use state::ExemplarState as Told;
-    let Some(e) = desk.exemplars.get(&id) else {
-        return state::Exemplar { state: Told::None, progress: 0.0, bytes: None, url: None, at_s: None };
-    };
-    let request = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.life);
-    let (state, progress, bytes, here) = match &e.state {
-        ExemplarState::Asked => match request {
-            Some(LifeLine::Queued) | None => (Told::Queued, 0.0, None, false),
-            Some(LifeLine::Refused(_)) => (Told::Refused, 0.0, None, false),
-            Some(_) => (Told::OnAir, 0.0, None, false),
+    let page = desk.album.page(id);
+    let base = format!("/api/v1/vehicles/{}/exemplars/{id}", address.number());
+    let pictures: Vec<state::Picture> =
+        page.into_iter().flat_map(|page| &page.pictures).map(|p| picture(p, &base)).collect();
+    let newest = pictures.last();
+    let (state, progress, bytes) = match page.and_then(|page| page.asked) {
+        None => (if newest.is_some() { Told::Here } else { Told::None }, f64::from(u8::from(newest.is_some())), None),
+        Some(asked) => match asked.state {
+            AskState::Asked if is_waiting(view) => (Told::Queued, 0.0, None),
+            AskState::Asked => (Told::OnAir, 0.0, None),
+            AskState::NoneYet => (Told::NoneYet, 0.0, None),
+            AskState::Refused => (Told::Refused, 0.0, None),
+            AskState::Coming(held, total) => (Told::Coming, held as f64 / total.max(1) as f64, Some(total)),
         },
-        ExemplarState::Coming(held, total) => {
-            (Told::Coming, *held as f64 / (*total).max(1) as f64, Some(*total), false)
-        }
-        ExemplarState::Here(webp) => (Told::Here, 1.0, Some(webp.len()), true),
     };
-    let url = here.then(|| format!("/api/v1/vehicles/{}/exemplars/{id}.webp", address.number()));
-    state::Exemplar { state, progress, bytes, url, at_s: Some(seconds(e.changed)) }
+    state::Exemplar {
+        state,
+        progress,
+        bytes: bytes.or(newest.map(|p| p.bytes)),
+        url: newest.map(|_| format!("{base}.webp")),
+        at_s: page.and_then(|page| page.asked).map(|a| seconds(a.changed)).or(newest.map(|p| p.at_s)),
+        pictures,
+    }
+}
+
+fn picture(p: &Picture, base: &str) -> state::Picture {
+    state::Picture {
+        picture: p.number,
+        edge_px: edge_px(p.size),
+        can_grow: p.size < Album::LARGEST,
+        bytes: p.sent_bytes,
+        url: format!("{base}-{}.webp", p.number),
+        at_s: seconds(p.came),
+        asked: p.asked,
+    }
+}
+
+/// Whether the requests have not been sent yet.
+fn is_waiting(view: &PeerView<'_>) -> bool {
+    let request = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.life);
+    matches!(request, Some(LifeLine::Queued) | None)
 }
 
 fn slot(s: &SlotProgress) -> state::Slot {
@@ -316,6 +341,7 @@ fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> state::Link {
         budget_bps: surface.budget_bps(),
         budget_window_s: meter.window_s(),
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
+        spend: surface.spend().names(),
         strangers: surface.strangers(),
         up: direction(0, numbered, numbered.saturating_sub(heard), &|s, c| of_class(&s.heard_by_class, c)),
         down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),

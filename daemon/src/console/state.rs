@@ -257,16 +257,38 @@ pub struct Label {
 /// How far the image of a label has come.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Exemplar {
-    /// How far.
+    /// How far what is asked for is; without a request whether there is one.
     pub state: ExemplarState,
-    /// 0 to 1.
+    /// Of what is asked for, 0 to 1.
     pub progress: f64,
-    /// Size of the file, once it is known.
+    /// Bytes of what is coming, or of the newest image that is here.
     pub bytes: Option<usize>,
-    /// Where the image is, once it is here.
+    /// Where the newest image is, if there is one.
     pub url: Option<String>,
     /// When this last changed.
     pub at_s: Option<f64>,
+    /// The images that are here, the newest last; at most 8.
+    pub pictures: Vec<Picture>,
+}
+
+/// An image of a label that is here.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Picture {
+    /// Its number among those of the label.
+    #[schemars(range(min = 1, max = 63))]
+    pub picture: u8,
+    /// Edge, pixels.
+    pub edge_px: u32,
+    /// Whether a larger one can be asked for.
+    pub can_grow: bool,
+    /// Bytes that came over the water.
+    pub bytes: usize,
+    /// Where it is.
+    pub url: String,
+    /// When it came.
+    pub at_s: f64,
+    /// Whether somebody had asked for it; else the vehicle had bits left over.
+    pub asked: bool,
 }
 
 /// How far an image has come.
@@ -279,6 +301,8 @@ pub enum ExemplarState {
     Queued,
     /// The request is under way.
     OnAir,
+    /// The vehicle has no such image yet, and sends it when it has.
+    NoneYet,
     /// The image is coming.
     Coming,
     /// The image is here.
@@ -364,6 +388,9 @@ pub struct Link {
     pub budget_window_s: f64,
     /// Least shares of the classes in percent.
     pub shares: BTreeMap<String, u8>,
+    /// What bits that nobody else needs are spent on, in this order: finer, depth, exemplars, confidence.
+    #[serde(default)]
+    pub spend: Vec<String>,
     /// Frames of no known vehicle, or unreadable.
     pub strangers: u64,
     /// From the vehicles, as the surface heard it.

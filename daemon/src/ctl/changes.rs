@@ -1,7 +1,7 @@
 //! What is new between two states.
 
-use super::figures::{is_silent, mode, slot, span};
-use crate::console::state::{ExemplarState, State, Vehicle};
+use super::figures::{self, is_silent, mode, slot, span};
+use crate::console::state::{ExemplarState, Picture, State, Vehicle};
 use serde::Serialize;
 
 /// A change.
@@ -48,6 +48,9 @@ pub(super) fn changes(before: &State, after: &State) -> Vec<Change> {
         let shares: Vec<String> = after.link.shares.iter().map(|(c, p)| format!("{c} {p} %")).collect();
         add(None, "budget", format!("the shares are {}", shares.join(", ")));
     }
+    if before.link.spend != after.link.spend {
+        add(None, "budget", format!("left-over bits go to {}", figures::spend(&after.link)));
+    }
     for new in &after.vehicles {
         match before.vehicles.iter().find(|v| v.id == new.id) {
             None => add(Some(new.id), "vehicle", format!("{} is there", new.name)),
@@ -81,6 +84,10 @@ fn of_vehicle(
             continue;
         };
         let (was, is) = (&was.exemplar, &label.exemplar);
+        let is_new = |p: &&Picture| !p.asked && was.pictures.iter().all(|old| old.picture != p.picture);
+        for p in is.pictures.iter().filter(is_new) {
+            add("exemplar", format!("image of label {} came unasked, {} bytes", label.id, p.bytes));
+        }
         if (was.state, was.progress) != (is.state, is.progress)
             || was.at_s != is.at_s && is.state == ExemplarState::Here
         {

@@ -1,6 +1,6 @@
 //! The state as text for people.
 
-use crate::console::state::{Exemplar, ExemplarState, LifeLine, Mode, Slot, State, Vehicle};
+use crate::console::state::{Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Vehicle};
 use std::fmt::Write;
 
 /// Everything, or what concerns one vehicle.
@@ -60,12 +60,21 @@ fn image(e: &Exemplar, now_s: f64) -> String {
     let state = match e.state {
         ExemplarState::None => return "-".to_owned(),
         ExemplarState::Coming => format!("coming, {:.0} %", 100.0 * e.progress),
-        ExemplarState::Here => format!("here, {} bytes", e.bytes.unwrap_or(0)),
+        ExemplarState::Here => match e.pictures.len() {
+            0 | 1 => format!("here, {} bytes", e.bytes.unwrap_or(0)),
+            n => format!("{n} here, the last one {} bytes", e.bytes.unwrap_or(0)),
+        },
+        ExemplarState::NoneYet => "the vehicle has none yet".to_owned(),
         ExemplarState::Queued => "queued".to_owned(),
         ExemplarState::OnAir => "on air".to_owned(),
         ExemplarState::Refused => "refused".to_owned(),
     };
     e.at_s.map_or(state.clone(), |at| format!("{state}, {} ago", span(now_s - at)))
+}
+
+/// What left-over bits go to.
+pub(super) fn spend(link: &Link) -> String {
+    if link.spend.is_empty() { "nothing".to_owned() } else { link.spend.join(", then ") }
 }
 
 /// Three times as long without a frame as is usual.

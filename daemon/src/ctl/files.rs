@@ -1,8 +1,8 @@
 //! Maps and images as files.
 
 use super::Ctl;
-use crate::console::orders::ExemplarOrder;
-use crate::console::state::{Exemplar, ExemplarState, State};
+use crate::console::orders::{ExemplarOrder, ExemplarWish};
+use crate::console::state::{Accepted, Exemplar, ExemplarState, State};
 use crate::picture::write_whole;
 use crate::problem::Problem;
 use std::path::{Path, PathBuf};
@@ -56,16 +56,15 @@ impl Ctl {
         Err(Problem::Failed(format!("the map has changed {TRIES} times while it was fetched; try again")))
     }
 
-    /// Writes the image of a label; asks the vehicle for it if it is not here, or for a further one.
-    pub async fn exemplar(&self, label: u8, out: &Path, again: bool) -> Result<(), Problem> {
+    /// Writes an image of a label. The vehicle is asked for it if there is none here, or for the one that is wished for.
+    pub async fn exemplar(&self, label: u8, out: &Path, wish: Option<ExemplarWish>) -> Result<(), Problem> {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?.id;
-        let here = find(&state, vehicle, label).is_some_and(|e| e.state == ExemplarState::Here);
-        if again || !here {
-            let path = format!("/api/v1/vehicles/{vehicle}/exemplars");
-            let accepted = self.client.post(&path, &ExemplarOrder { label }).await?;
+        let newest = find(&state, vehicle, label).and_then(|e| e.pictures.last()).map(|p| p.at_s);
+        if wish.is_some() || newest.is_none() {
+            let accepted = self.ask(vehicle, label, wish.unwrap_or_default()).await?;
             let version = accepted.versions.get(&vehicle).copied().unwrap_or(0);
-            self.await_image(vehicle, label, version).await?;
+            self.await_image((vehicle, label), version, newest).await?;
         }
         let (webp, _) = self.client.get(&format!("/api/v1/vehicles/{vehicle}/exemplars/{label}.webp")).await?;
         write_whole(out, &webp)?;
@@ -73,7 +72,20 @@ impl Ctl {
         self.tell(&written, || format!("{written}\n"))
     }
 
-    async fn await_image(&self, vehicle: u8, label: u8, version: u16) -> Result<(), Problem> {
+    /// Takes back what is asked of a label.
+    pub async fn cancel_exemplar(&self, label: u8) -> Result<(), Problem> {
+        let state = self.state().await?;
+        let accepted = self.ask(self.choose(&state)?.id, label, ExemplarWish::Cancel).await?;
+        self.follow(accepted).await
+    }
+
+    async fn ask(&self, vehicle: u8, label: u8, what: ExemplarWish) -> Result<Accepted, Problem> {
+        let order = ExemplarOrder { label, what, picture: None };
+        self.client.post(&format!("/api/v1/vehicles/{vehicle}/exemplars"), &order).await
+    }
+
+    /// Waits for an image that is newer than the one of `before`.
+    async fn await_image(&self, (vehicle, label): (u8, u8), version: u16, before: Option<f64>) -> Result<(), Problem> {
         let wait = self.wait.unwrap_or(IMAGE);
         let mut last = String::from("asked for");
         let coming = async {
@@ -89,14 +101,18 @@ impl Ctl {
                     return Err(Problem::Failed(format!("label {label} is not on the map any more")));
                 };
                 match image.state {
-                    ExemplarState::Here => return Ok(()),
+                    ExemplarState::Here if image.pictures.last().map(|p| p.at_s) != before => return Ok(()),
                     ExemplarState::Refused => {
                         let why = request.and_then(|r| r.reason.clone()).unwrap_or_default();
                         return Err(Problem::Failed(format!("refused: {why}")));
                     }
                     ExemplarState::Coming => self.note(&mut last, format!("coming, {:.0} %", 100.0 * image.progress)),
+                    ExemplarState::NoneYet => self.note(&mut last, "the vehicle has none yet".to_owned()),
                     ExemplarState::OnAir => self.note(&mut last, "on air".to_owned()),
-                    ExemplarState::None | ExemplarState::Queued => self.note(&mut last, "queued".to_owned()),
+                    ExemplarState::None | ExemplarState::Here => {
+                        return Err(Problem::Failed("it was cancelled".to_owned()));
+                    }
+                    ExemplarState::Queued => self.note(&mut last, "queued".to_owned()),
                 }
             }
         };

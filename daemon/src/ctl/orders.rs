@@ -15,6 +15,8 @@ pub struct BudgetChange {
     pub bits_per_s: Option<u32>,
     /// Least shares in percent by class; those that are not named stay.
     pub shares: BTreeMap<String, u8>,
+    /// What left-over bits are spent on; `None`: as it is.
+    pub spend: Option<Vec<String>>,
 }
 
 /// What became of an order at a vehicle.
@@ -67,7 +69,7 @@ impl Ctl {
     pub async fn budget(&self) -> Result<(), Problem> {
         let state = self.state().await?;
         let link = &state.link;
-        let value = serde_json::json!({ "budget_bps": link.budget_bps, "shares": link.shares });
+        let value = serde_json::json!({ "budget_bps": link.budget_bps, "shares": link.shares, "spend": link.spend });
         self.tell(&value, || {
             let shares = link.shares.iter().map(|(class, percent)| format!("{class:<10} at least {percent} %\n"));
             let theirs = state.vehicles.iter().filter_map(|v| Some((v, v.status.as_ref()?)));
@@ -76,7 +78,8 @@ impl Ctl {
                 format!("vehicle {:<2} {} bit/s, said {age} ago\n", v.id, s.budget_bps)
             });
             let own = format!("surface    {} bit/s\n", link.budget_bps);
-            [own].into_iter().chain(theirs).chain(shares).collect()
+            let rest = format!("left-over  to {}\n", figures::spend(link));
+            [own].into_iter().chain(theirs).chain(shares).chain([rest]).collect()
         })
     }
 
@@ -96,7 +99,8 @@ impl Ctl {
             exemplar: share("exemplar"),
         };
         let shares = (!change.shares.is_empty()).then_some(shares);
-        let order = BudgetOrder { budget_bps: change.bits_per_s.unwrap_or(link.budget_bps), shares };
+        let budget_bps = change.bits_per_s.unwrap_or(link.budget_bps);
+        let order = BudgetOrder { budget_bps, shares, spend: change.spend };
         let accepted = self.client.post("/api/v1/budget", &order).await?;
         self.follow(accepted).await
     }

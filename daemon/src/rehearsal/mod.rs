@@ -2,6 +2,7 @@
 
 mod baseline;
 pub mod docked;
+pub mod exemplar_bench;
 mod fidelity;
 mod frames_log;
 mod instruments;

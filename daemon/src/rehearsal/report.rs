@@ -184,9 +184,15 @@ fn directives(m: &Mission) -> Value {
 }
 
 fn exemplars(m: &Mission) -> Value {
-    let images: Vec<usize> = m.exemplars().map(|(_, webp)| webp.len()).collect();
-    let requested = m.surface.desk(m.address).map_or(0, |d| d.exemplars.len());
-    json!({ "requested": requested, "delivered": images.len(), "bytes": images.iter().sum::<usize>() })
+    let pages = || m.surface.desk(m.address).into_iter().flat_map(|d| d.album.pages()).map(|(_, page)| page);
+    let pictures = || pages().flat_map(|page| &page.pictures);
+    let delivered = pictures().filter(|p| p.asked).count();
+    json!({
+        "requested": delivered + pages().filter(|page| page.asked.is_some()).count(),
+        "delivered": delivered,
+        "unasked": pictures().filter(|p| !p.asked).count(),
+        "bytes": pictures().map(|p| p.sent_bytes).sum::<usize>(),
+    })
 }
 
 fn survey(m: &Mission) -> Value {
@@ -201,13 +207,11 @@ fn survey(m: &Mission) -> Value {
 }
 
 impl Mission {
-    /// Images of labels that the surface has.
+    /// The newest image of each label of which the surface has one: WebP files.
     pub fn exemplars(&self) -> impl Iterator<Item = (u8, &[u8])> {
         let desk = self.surface.desk(self.address);
-        desk.into_iter().flat_map(|d| &d.exemplars).filter_map(|(&label, e)| match &e.state {
-            crate::asv::ExemplarState::Here(webp) => Some((label, webp.as_slice())),
-            _ => None,
-        })
+        let pages = desk.into_iter().flat_map(|d| d.album.pages());
+        pages.filter_map(|(label, page)| Some((label, page.picture(None)?.webp.as_slice())))
     }
 
     /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out, or do not lead back

@@ -1,6 +1,6 @@
 //! The scripted operator of a rehearsal.
 
-use crate::asv::{FenceOrder, LimitsOrder, Surface};
+use crate::asv::{FenceOrder, LimitsOrder, Surface, Wish};
 use crate::auv::Area;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -97,7 +97,7 @@ fn perform(act: &Act, surface: &mut Surface, vehicle: Address, now: Instant) -> 
         }
         Act::Show(rank) => {
             let Some(label) = ranked(*rank) else { return false };
-            surface.request_exemplar(vehicle, label, now).is_ok()
+            surface.request_exemplar(vehicle, label, Wish::Another, now).is_ok()
         }
     }
 }

@@ -147,6 +147,7 @@ mod tests {
             hold: true,
             budget_bps: Some(500),
             shares: Some([10, 5, 5, 50, 20]),
+            spend: Some(0x3200),
             abort: false,
             settings: vec![0x40, 0],
             limits: vec![0, 4],
@@ -160,7 +161,7 @@ mod tests {
             &[0, 1, 172, 2, 0, 0, 0, 1, 1, 0, 0],
             &[0, 1, 0, 0, 0, 2, 0, 0],
             &[3, 12, 172, 2],
-            &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20],
+            &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 1, 128, 100],
             &[2, 0x40, 0, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());

@@ -6,11 +6,10 @@ use super::journal::Folder;
 use crate::auv::{MapUpdate, Mapper};
 use crate::problem::Problem;
 use crate::rehearsal::{RecordedFrame, Recording};
-use image::RgbImage;
+use scene_model::exemplars::Exemplar;
 use scene_model::project::Pose;
 use scenecast_protocol::directive::Settings;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
@@ -37,8 +36,8 @@ pub(super) struct Seen {
     /// None at the start, when the map is that of a checkpoint.
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
-    /// The best image of each label so far.
-    pub(super) exemplars: BTreeMap<u8, Arc<RgbImage>>,
+    /// The best images of each label so far.
+    pub(super) exemplars: BTreeMap<u8, Vec<Exemplar>>,
 }
 
 /// The thread's two ends.
@@ -151,10 +150,7 @@ impl Work {
     }
 
     fn seen(&self, frame: Option<RecordedFrame>) -> Seen {
-        let update = self.mapper.current();
-        let best = |label| Some((label, Arc::new(self.mapper.exemplar(label)?.clone())));
-        let exemplars = (1..=update.labels).filter_map(best).collect();
-        Seen { frame, update, exemplars }
+        Seen { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
     }
 }
 

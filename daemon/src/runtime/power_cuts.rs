@@ -148,12 +148,12 @@ impl World {
         match self.ticks {
             30 => {
                 self.surface.set_hold(auv, true, now).unwrap();
-                self.surface.set_budget(5000, None, now).unwrap();
+                self.surface.set_budget(5000, None, None, now).unwrap();
             }
             60 => drop(self.surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
             90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
             120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
-            150 => self.surface.set_budget(9000, None, now).unwrap(),
+            150 => self.surface.set_budget(9000, None, None, now).unwrap(),
             _ => {}
         }
     }

@@ -149,8 +149,10 @@ impl Host {
 
     /// Budget and shares of the configuration are in force, whatever the surface said before.
     fn follow(&mut self, config: &Config) {
-        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares) };
-        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %", budget.bits_per_s, budget.shares.0);
+        let spend = crate::ends::spend(config);
+        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), spend };
+        let extras = budget.spend.names().join(", ");
+        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {extras}", budget.bits_per_s, budget.shares.0);
         self.vehicle.set_budget(budget, self.clock.now());
     }
 
@@ -163,7 +165,7 @@ impl Host {
             }
         }
         self.vehicle.handle_map(&seen.update, now);
-        self.vehicle.answer_requests(&|label| seen.exemplars.get(&label).map(AsRef::as_ref));
+        self.vehicle.handle_exemplars(seen.exemplars);
         self.finish_at_end();
     }
 

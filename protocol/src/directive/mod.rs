@@ -6,6 +6,7 @@ mod fix;
 mod limits;
 mod outbox;
 mod polygon;
+mod requests;
 mod settings;
 mod tuning;
 mod utility;
@@ -16,7 +17,8 @@ pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
 pub use polygon::{Place, Polygon, PolygonFault};
-pub use settings::{Budget, Constraints, PlannerKind, Requests};
+pub use requests::{Request, Requests};
+pub use settings::{Budget, Constraints, PlannerKind};
 pub use tuning::{CellBand, Change, PlaneSet, Settings, SettingsFault};
 pub use utility::Utility;
 

@@ -1,6 +1,6 @@
 //! Short slots that set how a vehicle behaves.
 
-use crate::schedule::Shares;
+use crate::schedule::{Shares, SpendOrder};
 use crate::wire::{Reader, Truncated};
 
 /// Orders that never wait for anything longer.
@@ -62,6 +62,8 @@ impl PlannerKind {
 /// ```text
 /// bytes 0-2: budget in bits a second, 1..=16 777 215
 /// bytes 3-7: least shares in percent of directive, status, fix, map, exemplar; together at most 100
+/// bytes 8-9: what is left over goes to, in this order, four bits each: 1 finer cells, 2 depth, 3 exemplars, 4 confidence,
+///            0 nothing more
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {
@@ -69,12 +71,15 @@ pub struct Budget {
     pub bits_per_s: u32,
     /// Least share of each class while it has something to send.
     pub shares: Shares,
+    /// What bits that nobody else needs are spent on.
+    pub spend: SpendOrder,
 }
 
 impl Budget {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(self.bits_per_s.min(0xFF_FFFF).to_be_bytes().get(1..).unwrap_or_default());
         out.extend_from_slice(&self.shares.0);
+        out.extend_from_slice(&self.spend.code().to_be_bytes());
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
@@ -83,34 +88,7 @@ impl Budget {
         for share in &mut shares {
             *share = r.u8()?;
         }
-        Ok(Self { bits_per_s, shares: Shares(shares) })
-    }
-}
-
-/// Labels whose representative images the operator still wants.
-///
-/// ```text
-/// byte 0: label epoch; then pairs: label 1..=254, serial number of the request for it (a new number asks for another image)
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Requests {
-    /// Epoch of the label ids.
-    pub epoch: u8,
-    /// Label and serial number of the request.
-    pub wanted: Vec<(u8, u8)>,
-}
-
-impl Requests {
-    pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.push(self.epoch);
-        out.extend(self.wanted.iter().flat_map(|&(label, serial)| [label, serial]));
-    }
-
-    pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        let mut requests = Self { epoch: r.u8()?, wanted: Vec::new() };
-        while !r.rest().is_empty() {
-            requests.wanted.push((r.u8()?, r.u8()?));
-        }
-        Ok(requests)
+        let spend = SpendOrder::from_code(r.u16()?).ok_or(Truncated)?;
+        Ok(Self { bits_per_s, shares: Shares(shares), spend })
     }
 }

@@ -18,12 +18,17 @@ impl Coarse {
         self.after_bytes = after_bytes;
     }
 
+    /// Whether there is too much to say, and every cell of the coarse lattice is said or on its way.
+    pub(super) fn is_refining(&self, counts: &Counts) -> bool {
+        self.is_too_much(counts) && counts.waiting_coarse == 0
+    }
+
+    fn is_too_much(&self, counts: &Counts) -> bool {
+        self.after_bytes.is_some_and(|most| counts.waiting * BITS_PER_CELL > most.saturating_mul(8))
+    }
+
     /// The lattice that the next chunk is to be of: the coarse one while it has a cell waiting and there is too much to say.
     pub(super) fn stride(&self, counts: &Counts) -> Stride {
-        let bits = counts.waiting * BITS_PER_CELL;
-        match self.after_bytes {
-            Some(most) if bits > most.saturating_mul(8) && counts.waiting_coarse > 0 => Stride::Four,
-            _ => Stride::One,
-        }
+        if self.is_too_much(counts) && counts.waiting_coarse > 0 { Stride::Four } else { Stride::One }
     }
 }

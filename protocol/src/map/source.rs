@@ -174,6 +174,10 @@ impl StateSource for MapSource {
         (self.dirty.counts().waiting as f64 * self.bytes_per_cell).ceil() as usize
     }
 
+    fn is_refining(&self) -> bool {
+        self.coarse.is_refining(&self.dirty.counts())
+    }
+
     fn is_quiet(&self) -> bool {
         let counts = self.dirty.counts();
         counts.waiting == 0 && counts.flying == 0

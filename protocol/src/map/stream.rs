@@ -30,6 +30,11 @@ pub trait StateSource: Debug {
     /// About how many bytes wait for their first or next transmission, without what is held back.
     fn backlog_bytes(&self) -> usize;
 
+    /// Whether what waits only refines a coarse picture of the whole that has been said, and there is much of it.
+    fn is_refining(&self) -> bool {
+        false
+    }
+
     /// Whether nothing waits or is on its way, though something may be held back.
     fn is_quiet(&self) -> bool {
         self.is_settled()

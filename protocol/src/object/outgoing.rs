@@ -62,6 +62,8 @@ struct Progress {
 #[derive(Debug)]
 pub(super) struct Outgoing {
     pub(super) serial: u64,
+    /// Whether it may go only where bits are left over.
+    pub(super) is_extra: bool,
     attempt: u32,
     /// The object; the bytes of all source symbols once the layout is fixed.
     bytes: Vec<u8>,
@@ -69,8 +71,8 @@ pub(super) struct Outgoing {
 }
 
 impl Outgoing {
-    pub(super) fn new(serial: u64, bytes: Vec<u8>) -> Self {
-        Self { serial, attempt: 0, bytes, progress: None }
+    pub(super) fn new(serial: u64, bytes: Vec<u8>, is_extra: bool) -> Self {
+        Self { serial, is_extra, attempt: 0, bytes, progress: None }
     }
 
     /// Bytes of the symbols that wait to be sent.

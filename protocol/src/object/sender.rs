@@ -25,6 +25,15 @@ impl ObjectSender {
 
     /// Takes an object to send; `None` if it is empty or larger than [`MAX_OBJECT`].
     pub fn push(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.add(bytes, false)
+    }
+
+    /// The same for an object that is only worth bits that are left over.
+    pub fn push_extra(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.add(bytes, true)
+    }
+
+    fn add(&mut self, bytes: Vec<u8>, is_extra: bool) -> Option<ObjectId> {
         if bytes.is_empty() || bytes.len() > MAX_OBJECT {
             return None;
         }
@@ -34,7 +43,7 @@ impl ObjectSender {
         if self.objects.len() >= Self::MAX_OBJECTS || self.objects.front().is_some_and(too_old) {
             self.objects.pop_front();
         }
-        self.objects.push_back(Outgoing::new(serial, bytes));
+        self.objects.push_back(Outgoing::new(serial, bytes, is_extra));
         Some(ObjectId::of(serial))
     }
 
@@ -53,9 +62,24 @@ impl ObjectSender {
         self.objects.is_empty()
     }
 
-    /// Bytes that wait for their first or next transmission, repair symbols included.
+    /// Whether the peer is known to have every object that is no extra.
+    pub fn has_only_extra(&self) -> bool {
+        self.objects.iter().all(|o| o.is_extra)
+    }
+
+    /// Whether the peer is known to have every extra object.
+    pub fn has_no_extra(&self) -> bool {
+        self.objects.iter().all(|o| !o.is_extra)
+    }
+
+    /// Bytes that wait for their first or next transmission, repair symbols included, without extra objects.
     pub fn backlog_bytes(&self) -> usize {
-        self.objects.iter().map(Outgoing::backlog_bytes).sum()
+        self.objects.iter().filter(|o| !o.is_extra).map(Outgoing::backlog_bytes).sum()
+    }
+
+    /// The same of extra objects.
+    pub fn extra_backlog_bytes(&self) -> usize {
+        self.objects.iter().filter(|o| o.is_extra).map(Outgoing::backlog_bytes).sum()
     }
 
     /// Tells the share of frames that the link loses, 0..=0.95; repair symbols go ahead accordingly, none at 0.
@@ -67,12 +91,25 @@ impl ObjectSender {
         }
     }
 
-    /// The next part of at most `room` bytes, header included; the same again until it is marked in flight.
+    /// The next part of at most `room` bytes, header included, of an object that is no extra; the same again until it is
+    /// marked in flight.
     pub fn next_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
+        self.next_part_of(false, room)
+    }
+
+    /// The same of an extra object.
+    pub fn next_extra_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
+        self.next_part_of(true, room)
+    }
+
+    fn next_part_of(&mut self, is_extra: bool, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
         // Rooms at the end of a frame are small: an object that begins there is still cut for whole frames.
         self.usual_room = room.max(self.usual_room - self.usual_room.div_ceil(128));
         let (usual, loss) = (self.usual_room, self.loss);
-        let (run, part) = self.objects.iter_mut().find_map(|o| o.next_part(room, usual, loss))?;
+        let (run, part) = {
+            let mut of_kind = self.objects.iter_mut().filter(|o| o.is_extra == is_extra);
+            of_kind.find_map(|o| o.next_part(room, usual, loss))?
+        };
         Some((ObjectId::of(run.serial), run, part))
     }
 

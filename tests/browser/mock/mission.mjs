@@ -22,6 +22,7 @@ export class Mission {
     this.loss = 0.1;
     this.budgetBps = 10000;
     this.shares = { directive: 10, status: 5, fix: 5, map: 50, exemplar: 20 };
+    this.spend = ["finer", "depth", "exemplars", "confidence"];
     this.planes = false;
     this.ended = false;
     this.down = new Direction(7);
@@ -101,7 +102,7 @@ export class Mission {
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
       link: {
-        budget_bps: this.budgetBps, shares: this.shares, budget_window_s: 10,
+        budget_bps: this.budgetBps, shares: this.shares, spend: this.spend, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),
         round_trip_s: this.vehicles[0].heardS === null ? null : 1.62,
         backlog_bits: this.vehicles[0].heardS === null ? null : Math.round(backlog * 1.1),

@@ -85,8 +85,8 @@ async function api(mock, req, res, path) {
   if (what === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.planes));
   if (what === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
   if (what === "map.png") return send(res, 200, "image/png", encodePng(vehicle.mapJson(mission.nowS, false), deflateSync));
-  const [, label] = what.match(/^exemplars\/(\d+)\.webp$/) ?? [];
-  if (vehicle.exemplars.get(Number(label))?.state !== "here") return reply(res, 404, { error: "not here" });
+  const [, label] = what.match(/^exemplars\/(\d+)(-\d+)?\.webp$/) ?? [];
+  if (!vehicle.exemplars.get(Number(label))?.pictures.length) return reply(res, 404, { error: "not here" });
   return send(res, 200, "image/webp", await readFile(join(HERE, `exemplars/${(Number(label) - 1) % 6}.webp`)));
 }
 
@@ -101,7 +101,7 @@ async function post(mock, req, res, path) {
     }
     const sum = Object.values(given.shares ?? {}).reduce((a, b) => a + b, 0);
     if (sum > 100) return reply(res, 422, { error: `shares add up to ${sum} percent: allowed is 100 or less` });
-    Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares });
+    Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares, spend: given.spend ?? mission.spend });
     const [answer] = mission.vehicles.map((v) => v.directive.issue("budget", mission.nowS));
     return accepted(mock, res, answer);
   }
@@ -113,7 +113,7 @@ async function post(mock, req, res, path) {
     if (bad) return reply(res, 422, { error: `weight of label ${bad[0]} must be -1 to 1` });
     return accepted(mock, res, mission.utility(v, given));
   }
-  if (what === "exemplars") return accepted(mock, res, v.request(given.label, mission.nowS));
+  if (what === "exemplars") return accepted(mock, res, v.request(given, mission.nowS));
   if (what === "constraints") {
     return accepted(mock, res, v.directive.issue("constraints", mission.nowS, (s) => {
       if (s === "applied") Object.assign(v, { hold: given.hold, aborted: given.abort === true });

@@ -109,24 +109,33 @@ export class Vehicle {
     if (e.progress < 1) return;
     e.state = "here";
     e.at_s = nowS;
-    e.url = `/api/v1/vehicles/${this.id}/exemplars/${e.label}.webp`;
+    const number = e.picture ?? 10 * e.label + e.pictures.length;
+    const kept = e.pictures.filter((p) => p.picture !== number);
+    const url = `/api/v1/vehicles/${this.id}/exemplars/${e.label}-${number}.webp`;
+    const size = e.picture ? 128 : 64;
+    e.pictures = [...kept, { picture: number, edge_px: size, can_grow: size < 128, bytes: e.bytes, url, at_s: nowS, asked: true }];
   }
 
-  request(label, nowS) {
-    const e = { label, state: "queued", progress: 0, bytes: 380 + 24 * label, url: null, at_s: null };
-    this.exemplars.set(label, e);
-    return this.directive.issue("requests", nowS, (state) => {
+  request({ label, what = "another", picture = null }, nowS) {
+    const before = this.exemplars.get(label);
+    const pictures = before?.pictures ?? [];
+    const state = what === "cancel" ? (pictures.length > 0 ? "here" : "none") : "queued";
+    const larger = what === "larger" ? picture ?? pictures.at(-1).picture : null;
+    const bytes = (larger ? 4 : 1) * (380 + 24 * label);
+    this.exemplars.set(label, { label, state, progress: 0, bytes, at_s: null, picture: larger, pictures });
+    return this.directive.issue("requests", nowS, (done) => {
       const asked = [...this.exemplars.values()].filter((x) => x.state === "queued");
-      for (const x of asked) x.state = state === "refused" ? "refused" : "coming";
+      for (const x of asked) x.state = done === "refused" ? "refused" : "coming";
     });
   }
 
   exemplarJson(label) {
     const e = this.exemplars.get(label);
-    if (!e) return { state: "none", progress: 0, bytes: 0, url: null, at_s: null };
+    if (!e) return { state: "none", progress: 0, bytes: null, url: null, at_s: null, pictures: [] };
     const slot = this.directive.slots.get("requests");
     const state = e.state === "queued" && slot.state !== "queued" ? "on_air" : e.state;
-    return { state, progress: e.progress, bytes: e.bytes, url: e.url, at_s: e.at_s };
+    const url = e.pictures.length > 0 ? `/api/v1/vehicles/${this.id}/exemplars/${label}.webp` : null;
+    return { state, progress: e.progress, bytes: e.bytes, url, at_s: e.at_s ?? e.pictures.at(-1)?.at_s ?? null, pictures: e.pictures };
   }
 
   json(nowS) {

@@ -124,6 +124,31 @@ export default [
     },
   },
   {
+    name: "a picture grows, another one comes beside it, and what is cancelled goes no further",
+    async run(s) {
+      await firstLabels(s);
+      const ask = s.page.getByRole("button", { name: /^Show me: a picture of/ }).first();
+      const name = (await ask.getAttribute("aria-label")).replace(/^.*picture of /, "");
+      await ask.click();
+      const picture = s.page.getByRole("button", { name: `Picture of ${name}, enlarge` });
+      await s.until("the picture", () => picture.isVisible(), { ms: 300000, advance: 2 });
+      await picture.click();
+      const dialog = s.page.locator("#dialog");
+      await dialog.getByRole("button", { name: /^Larger/ }).click();
+      await s.shows("#dialog", /128 px/, { ms: 300000, advance: 2 });
+      await dialog.getByRole("button", { name: "Another" }).click();
+      await s.until("two pictures", async () => (await dialog.locator("figure").count()) === 2, { ms: 300000, advance: 2 });
+      await dialog.getByRole("button", { name: "Another" }).click();
+      await dialog.getByRole("button", { name: "Cancel" }).click();
+      await s.until("nothing under way", async () => !(await dialog.getByRole("button", { name: "Cancel" }).isVisible()));
+      assert.equal(s.posts.at(-1).body.what, "cancel");
+      assert.equal(await dialog.locator("figure").count(), 2);
+      await s.page.reload();
+      await s.ready();
+      await s.until("the picture after a reload", () => picture.isVisible());
+    },
+  },
+  {
     name: "a picture that the vehicle refuses says so",
     scenario: "rich",
     async run(s) {

@@ -82,6 +82,22 @@ export default [
     },
   },
   {
+    name: "left-over bits go where the operator puts them first, and nowhere where he takes it out",
+    async run(s) {
+      const box = s.page.getByRole("group", { name: "What left-over bits are spent on" });
+      await box.getByRole("button", { name: "Earlier: pictures of new labels" }).click();
+      await box.getByRole("button", { name: "Earlier: pictures of new labels" }).click();
+      await box.getByRole("checkbox", { name: "confidence" }).uncheck();
+      const wanted = ["exemplars", "finer", "depth"];
+      await s.until("the server's order", async () => (await s.get("/state")).link.spend.join() === wanted.join());
+      assert.deepEqual(s.posts.at(-1).body.spend, wanted);
+      assert.equal(s.posts.at(-1).body.shares, undefined);
+      await s.page.reload();
+      await s.ready();
+      assert.equal(await box.getByRole("checkbox", { name: "confidence" }).isChecked(), false);
+    },
+  },
+  {
     name: "refused shares go back to those in force, with the reason",
     scenario: "rich",
     async run(s) {

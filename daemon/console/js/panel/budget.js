@@ -7,14 +7,18 @@ import { store } from "../store.js";
 import { lifeline, slotOf } from "./lifeline.js";
 import { Order } from "./order.js";
 import { othersNote } from "./ours.js";
+import { spendBox } from "./spend.js";
 
 const CLASSES = ["directive", "status", "fix", "map", "exemplar"];
 const LET_GO_MS = 400;
 const [LEAST_BPS, MOST_BPS] = [10, 1e5];
 
-const read = () => ({ budget_bps: store.snapshot.link.budget_bps, shares: store.snapshot.link.shares ?? null });
-const moved = (shares) => JSON.stringify(shares) !== JSON.stringify(read().shares);
-const order = new Order("budget", read, (_, { budget_bps: bps, shares }) => sendBudget(bps, shares && moved(shares) ? shares : null));
+function read() {
+  const { budget_bps, shares, spend } = store.snapshot.link;
+  return { budget_bps, shares: shares ?? null, spend: spend ?? null };
+}
+const moved = (part, now) => now && JSON.stringify(now) !== JSON.stringify(read()[part]) ? now : null;
+const order = new Order("budget", read, (_, { budget_bps: bps, shares, spend }) => sendBudget(bps, moved("shares", shares), moved("spend", spend)));
 
 const number = h("input", { type: "number", id: "budget", min: 1, step: 1, required: true, oninput: () => (typed = true) });
 const slider = h("input", { type: "range", min: 0, max: 1, step: 0.01, "aria-label": "Budget, logarithmic", oninput: slide, onchange: soon });
@@ -25,6 +29,11 @@ const rest = h("output.value");
 const shareBox = h("div.shares", { role: "group", "aria-label": "Least shares of the classes" },
   h("h3", {}, "Least shares of what is sent, %"), bar, ...CLASSES.map((c) => rows[c].row),
   h("div.share-row", {}, h("span.swatch"), h("span", {}, "free"), h("span"), rest));
+const extras = spendBox(() => value().spend, (spend) => {
+  clearTimeout(timer);
+  order.set(store.vehicle, { ...value(), spend });
+  soon();
+});
 const error = h("p.error", { role: "alert" });
 const others = othersNote(order.ours, "Budget");
 const line = lifeline("Budget");
@@ -34,7 +43,7 @@ let timer = 0;
 bar.append(...CLASSES.flatMap((c) => [rows[c].segment, rows[c].handle]), free);
 const form = h("form.budget", { onsubmit: submit, onkeydown: (event) => event.key === "Escape" && forget() },
   h("label", { for: "budget" }, "Budget, bit/s"), number, h("button", { type: "submit" }, "Set"));
-export const budgetParts = [form, slider, shareBox, error, others.node, line.node];
+export const budgetParts = [form, slider, shareBox, extras.node, error, others.node, line.node];
 
 function shareRow(name, i) {
   const range = h("input", { type: "range", min: 0, max: 100, step: 1, "aria-label": `Least share of ${name}, percent`, oninput: () => setShare(name, range.valueAsNumber), onchange: soon });
@@ -112,12 +121,13 @@ export function refreshBudget() {
   const vehicle = store.vehicle;
   if (!vehicle) return;
   const { error: problem, waiting } = order.settle(vehicle);
-  const { budget_bps: bps, shares } = value();
+  const { budget_bps: bps, shares, spend } = value();
   if (!typed) number.value = bps;
   if (document.activeElement !== slider || !order.changed(vehicle)) slider.value = placeOf(bps);
   slider.setAttribute("aria-valuetext", rate(bps));
   show(shareBox, shares !== null);
   if (shares) refreshShares(shares);
+  extras.refresh(spend);
   text(error, problem ?? "");
   others.update(vehicle);
   const slot = slotOf(vehicle, "budget");

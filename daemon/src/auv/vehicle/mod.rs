@@ -1,6 +1,7 @@
 //! The vehicle's role: link, position estimate and steering in one sans-IO whole.
 
 mod course;
+mod gallery;
 #[cfg(test)]
 mod obedience;
 mod obey;
@@ -8,16 +9,16 @@ mod place;
 mod tuning;
 mod whole_png;
 
-use super::exemplar::{Exemplar, encode_webp};
 use super::guard::{Guard, Habits};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::steering::Steering;
 use course::Doing;
-use scenecast_protocol::directive::{Fix, RefusalReason, Requests, Settings, Slot, SlotId, Utility};
+use gallery::Gallery;
+use scene_model::exemplars::Exemplar as Picture;
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
-use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SlotState;
 use serde::{Deserialize, Serialize};
@@ -26,9 +27,6 @@ use tuning::Telling;
 use whole_png::WholePng;
 
 pub use place::LastPlace;
-
-/// Most bytes of a representative image.
-const EXEMPLAR_BYTES: usize = 700;
 
 /// What must survive a restart of the vehicle, so that nothing is applied twice and no label changes its meaning.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -51,6 +49,8 @@ pub struct Durable {
     pub budget_bps: Option<u32>,
     /// Least shares in force in percent, if somebody has changed them.
     pub shares: Option<[u8; 5]>,
+    /// What left-over bits are spent on, as on the wire, if somebody has changed it.
+    pub spend: Option<u16>,
     /// Settings in force, as on the wire; empty: all as configured.
     pub settings: Vec<u8>,
     /// Limits in force, as on the wire; empty: none.
@@ -106,9 +106,7 @@ pub struct Vehicle {
     steering: Steering,
     durable: Durable,
     utility: Option<Utility>,
-    requests: Requests,
-    /// Requests that were answered, each with the object of the answer.
-    answered: Vec<((u8, u8), ObjectId)>,
+    gallery: Gallery,
     labels: u8,
     explored: u32,
     guard: Guard,
@@ -147,8 +145,7 @@ impl Vehicle {
             utility: utility.filter(|u| u.epoch == durable.epoch),
             telling: Telling::restore(&durable.settings),
             durable,
-            requests: Requests::default(),
-            answered: Vec::new(),
+            gallery: Gallery::default(),
             labels: 0,
             explored: 0,
             guard: Guard::new(habits, now),
@@ -267,38 +264,27 @@ impl Vehicle {
         self.whole_png = self.whole_png.take().map(|_| WholePng::default());
         (self.durable.epoch, self.durable.labels) = (epoch, 0);
         self.utility = None;
-        self.requests = Requests::default();
-        self.forget_answers();
+        self.gallery = Gallery::default();
         self.follow_utility();
         self.outputs.push_back(VehicleOutput::Persist);
     }
 
-    /// What is wanted from now on; answers to what is not wanted any more are not sent to their end.
-    pub(crate) fn replace_requests(&mut self, requests: Requests) {
-        let link = &mut self.link;
-        self.answered.retain(|(request, id)| {
-            let wanted = requests.wanted.contains(request);
-            if !wanted {
-                link.cancel_object(*id);
-            }
-            wanted
-        });
-        self.requests = requests;
+    /// The images of each label that represent it best by now, the best first.
+    pub fn handle_exemplars(&mut self, pictures: BTreeMap<u8, Vec<Picture>>) {
+        self.gallery.set_pictures(pictures);
+        self.tend_gallery();
     }
 
-    /// Answers requests for representative images; `exemplar` gives the best one of a label, if there is one by now.
-    pub fn answer_requests<'a>(&mut self, exemplar: &dyn Fn(u8) -> Option<&'a image::RgbImage>) {
-        for &(label, serial) in &self.requests.wanted {
-            if self.answered.iter().any(|(request, _)| *request == (label, serial)) {
-                continue;
-            }
-            let Some(patch) = exemplar(label) else { continue };
-            let webp = encode_webp(patch, EXEMPLAR_BYTES);
-            let object = Exemplar { epoch: self.durable.epoch, label, serial, webp };
-            if let Some(id) = self.link.push_object(object.encode()) {
-                self.answered.push(((label, serial), id));
-            }
-        }
+    /// Takes the images away, as if nothing had been seen.
+    #[cfg(test)]
+    pub(crate) fn take_pictures(&mut self) -> BTreeMap<u8, Vec<Picture>> {
+        self.gallery.take_pictures()
+    }
+
+    fn tend_gallery(&mut self) {
+        let Self { utility, gallery, link, durable, .. } = self;
+        let weight = |label| utility.as_ref().map_or(0.0, |u| u.weight(label));
+        gallery.tend(durable.epoch, weight, link);
     }
 
     /// Takes received bytes.
@@ -311,22 +297,25 @@ impl Vehicle {
             match event {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
                 VehicleEvent::ObjectDelivered(id) => {
+                    self.gallery.handle_delivered(id);
+                    self.tend_gallery();
                     if let Some(whole) = &mut self.whole_png {
                         whole.handle_delivered(id);
                     }
                 }
-                VehicleEvent::SurfaceRestarted => self.forget_answers(),
+                VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
             }
         }
     }
 
-    /// The surface has none of the images that were sent.
-    fn forget_answers(&mut self) {
+    /// What was on its way to the surface is lost.
+    fn handle_surface_restart(&mut self) {
+        self.gallery.handle_restart(&mut self.link);
         self.link.cancel_objects();
-        self.answered.clear();
         if let Some(whole) = &mut self.whole_png {
             whole.send_again();
         }
+        self.tend_gallery();
     }
 
     fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {

@@ -1,5 +1,6 @@
 //! What the vehicle does with a slot of the directive.
 
+use super::gallery::Gallery;
 use super::{LastPlace, Vehicle, VehicleOutput};
 use crate::auv::FixVerdict;
 use scenecast_protocol::directive::{
@@ -23,11 +24,16 @@ impl Vehicle {
             }
             Slot::Budget(_) => Err(RefusalReason::OutOfRange),
             Slot::Requests(requests) if requests.epoch != self.durable.epoch => Err(RefusalReason::OtherEpoch),
-            Slot::Requests(requests) if requests.wanted.iter().any(|&(l, _)| l == 0 || l > self.labels) => {
+            Slot::Requests(requests) if requests.wanted.iter().any(|r| r.label == 0 || r.label > self.labels) => {
                 Err(RefusalReason::UnknownLabel)
             }
+            Slot::Requests(requests) if requests.wanted.len() > Gallery::MOST_REQUESTS => {
+                Err(RefusalReason::OutOfRange)
+            }
             Slot::Requests(requests) => {
-                self.replace_requests(requests);
+                let series = self.link.persistent_state().series;
+                self.gallery.replace_requests(requests, series, &mut self.link);
+                self.tend_gallery();
                 Ok(())
             }
             Slot::Limits(limits) => self.apply_limits(limits),
@@ -124,8 +130,11 @@ impl Vehicle {
         self.link.set_budget(budget.bits_per_s, now);
         self.follow_telling();
         self.link.set_shares(budget.shares);
+        self.link.set_spend(budget.spend);
+        self.tend_gallery();
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
+        self.durable.spend = Some(budget.spend.code());
     }
 }
 

@@ -223,13 +223,12 @@ impl Mission {
             recorder.push(image, &frame)?;
         }
         if !self.mapper.takes(t_s) {
-            self.vehicle.answer_requests(&|label| self.mapper.exemplar(label));
             return Ok(());
         }
         self.track.push((pose.x, pose.y));
         let update = self.mapper.handle_frame(image, &pose, scale, t_s);
         self.vehicle.handle_map(&update, self.now);
-        self.vehicle.answer_requests(&|label| self.mapper.exemplar(label));
+        self.vehicle.handle_exemplars(self.mapper.gallery());
         if self.vehicle.map_version() != self.map_version {
             self.map_version = self.vehicle.map_version();
             self.png_full_bytes += crate::picture::encode(self.vehicle.map()).map_or(0, |png| png.len() as u64);

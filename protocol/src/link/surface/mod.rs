@@ -94,7 +94,7 @@ pub enum SurfaceEvent {
 
 impl SurfaceEvent {
     /// Bytes of an object that [`Self::ObjectProgress`] shows.
-    pub const OBJECT_HEAD: usize = 3;
+    pub const OBJECT_HEAD: usize = 4;
 }
 
 /// A frame that the modem has.

@@ -2,7 +2,7 @@
 
 use super::{Carried, Part, VehicleLink};
 use crate::map::StateSource;
-use crate::schedule::Class;
+use crate::schedule::{Class, Extra};
 use crate::time::Instant;
 use crate::wire::{ChunkKind, FrameBuilder, room_for_payload};
 use std::time::Duration;
@@ -15,32 +15,57 @@ impl<S: StateSource> VehicleLink<S> {
             let waiting = self.waiting(now);
             let candidates: Vec<Class> = waiting.iter().copied().filter(|c| !unfit.contains(c)).collect();
             let Some(class) = self.shares.next(&candidates) else { break };
-            let before = carried.len();
-            match class {
-                Class::Status => self.fill_status(builder, carried, now),
-                Class::Exemplar => self.fill_object(builder, carried),
-                Class::Confidence | Class::Depth => self.fill_plane(class, builder, carried, now),
-                _ => self.fill_map(builder, carried, now),
-            }
-            let bytes: usize = carried.iter().skip(before).map(|(_, n)| n).sum();
+            let bytes = self.fill_class(class, false, builder, carried, now);
             if bytes == 0 {
                 unfit.push(class);
             }
             self.shares.spend(class, bytes, &waiting);
         }
+        self.fill_extras(builder, carried, now);
         self.fill_digests(builder, carried);
+    }
+
+    /// Fills what is left of a frame with what nobody has to have.
+    fn fill_extras(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
+        let mut unfit: Vec<Extra> = Vec::new();
+        loop {
+            let next = self.extras(now).find(|e| !unfit.contains(e));
+            let Some(extra) = next else { return };
+            if self.fill_class(extra.class(), true, builder, carried, now) == 0 {
+                unfit.push(extra);
+            }
+        }
+    }
+
+    /// Puts something of a class into a frame; returns the bytes of it.
+    fn fill_class(
+        &mut self,
+        class: Class,
+        is_extra: bool,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        now: Instant,
+    ) -> usize {
+        let before = carried.len();
+        match class {
+            Class::Status => self.fill_status(builder, carried, now),
+            Class::Exemplar => self.fill_object(is_extra, builder, carried),
+            Class::Confidence | Class::Depth => self.fill_plane(class, builder, carried, now),
+            _ => self.fill_map(builder, carried, now),
+        }
+        carried.iter().skip(before).map(|(_, n)| n).sum()
     }
 
     fn waiting(&self, now: Instant) -> Vec<Class> {
         let status = self.status.is_some() && self.wants_status(now);
         [
             (status, Class::Status),
-            (self.source.backlog_bytes() > 0, Class::Map),
+            (self.source.backlog_bytes() > 0 && !self.is_refining(), Class::Map),
             (self.objects.backlog_bytes() > 0, Class::Exemplar),
         ]
         .into_iter()
         .filter_map(|(waits, class)| waits.then_some(class))
-        .chain(self.waiting_planes(now))
+        .chain(self.waiting_planes())
         .collect()
     }
 
@@ -71,8 +96,10 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    fn fill_object(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
-        let Some((id, run, bytes)) = self.objects.next_part(room_for_payload(builder.room())) else { return };
+    fn fill_object(&mut self, is_extra: bool, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
+        let room = room_for_payload(builder.room());
+        let part = if is_extra { self.objects.next_extra_part(room) } else { self.objects.next_part(room) };
+        let Some((id, run, bytes)) = part else { return };
         if builder.push(ChunkKind::Object, &bytes) {
             self.objects.mark_in_flight(id, &run);
             carried.push((Part::Object(id, run), bytes.len()));

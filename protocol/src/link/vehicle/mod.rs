@@ -1,6 +1,7 @@
 //! The vehicle's end of the link.
 
 mod call;
+mod extras;
 mod fill;
 mod planes;
 mod receive;
@@ -12,7 +13,7 @@ use crate::directive::{Slot, SlotId};
 use crate::mac::{Access, ClockMap, Floor, ModemProfile};
 use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
-use crate::schedule::{BitBudget, Class, ClassShares, Shares};
+use crate::schedule::{BitBudget, Class, ClassShares, Shares, SpendOrder};
 use crate::time::Instant;
 use crate::wire::{Address, MissionId, SessionId, SlotState, VehicleStatus};
 use planes::PlaneOut;
@@ -107,6 +108,7 @@ pub struct VehicleLink<S: StateSource = MapSource> {
     planes: Vec<PlaneOut>,
     objects: ObjectSender,
     shares: ClassShares,
+    spend: SpendOrder,
     inbox: SlotInbox,
     status: Option<VehicleStatus>,
     pose_due: Instant,
@@ -141,6 +143,7 @@ impl<S: StateSource> VehicleLink<S> {
             pair,
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
             shares: ClassShares::new(config.shares),
+            spend: SpendOrder::default(),
             config,
             source,
             planes: Vec::new(),

@@ -11,15 +11,15 @@ use crate::wire::{ChunkKind, FrameBuilder, room_for_payload};
 pub(super) struct PlaneOut {
     pub(super) source: PlaneSource,
     /// Whether it has a share; one without takes what nobody else needs.
-    has_share: bool,
+    pub(super) has_share: bool,
     /// Whether its digest is to be told.
     pub(super) owes_digest: bool,
     /// Whether it is told at all; one that is not rests with what the surface has of it.
-    is_told: bool,
+    pub(super) is_told: bool,
 }
 
 impl PlaneOut {
-    fn class(&self) -> Class {
+    pub(super) fn class(&self) -> Class {
         self.source.scale().kind().into()
     }
 }
@@ -65,25 +65,14 @@ impl<S: StateSource> VehicleLink<S> {
         self.planes.iter_mut().find(|p| p.source.scale().kind() == kind)
     }
 
-    /// Classes of the planes that have something to send and may: those without a share leave half of the budget alone, so
-    /// that what comes up next does not have to wait for it.
-    pub(super) fn waiting_planes(&self, now: Instant) -> impl Iterator<Item = Class> {
-        self.going(now).map(PlaneOut::class)
+    /// Classes of the planes that have something to send and a share.
+    pub(super) fn waiting_planes(&self) -> impl Iterator<Item = Class> {
+        self.planes.iter().filter(|p| p.is_told && p.has_share && p.source.backlog_bytes() > 0).map(PlaneOut::class)
     }
 
-    /// About how many bytes of planes wait and may be sent.
-    pub(super) fn plane_backlog(&self, now: Instant) -> usize {
-        self.going(now).map(|p| p.source.backlog_bytes()).sum()
-    }
-
-    /// Whether no plane waits that may be sent, and none is on its way.
-    pub(super) fn planes_are_quiet(&self, now: Instant) -> bool {
-        self.planes().all(|p| p.is_quiet() || p.backlog_bytes() > 0) && self.plane_backlog(now) == 0
-    }
-
-    fn going(&self, now: Instant) -> impl Iterator<Item = &PlaneOut> {
-        let spare = self.budget.is_plentiful(now);
-        self.planes.iter().filter(move |p| p.is_told && (p.has_share || spare) && p.source.backlog_bytes() > 0)
+    /// About how many bytes of planes with a share wait.
+    pub(super) fn shared_plane_backlog(&self) -> usize {
+        self.planes.iter().filter(|p| p.is_told && p.has_share).map(|p| p.source.backlog_bytes()).sum()
     }
 
     pub(super) fn fill_plane(

@@ -81,7 +81,8 @@ impl<S: StateSource> VehicleLink<S> {
 
     /// About how many bytes wait and may be sent.
     fn backlog_bytes(&self, now: Instant) -> usize {
-        self.source.backlog_bytes() + self.plane_backlog(now) + self.objects.backlog_bytes()
+        let own = self.source.backlog_bytes() + self.shared_plane_backlog() + self.objects.backlog_bytes();
+        own + self.extra_backlog(now)
     }
 
     /// When something that is held back becomes due.
@@ -195,7 +196,7 @@ impl<S: StateSource> VehicleLink<S> {
     fn wish(&self, now: Instant) -> u8 {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
-        let idle = self.source.is_quiet() && self.planes_are_quiet(now) && self.objects.is_empty();
+        let idle = self.source.is_quiet() && self.extras_are_quiet(now) && self.objects.has_only_extra();
         let pause = self.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
         let wait = if idle { affordable.max(pause).min(self.config.status_period) } else { affordable };
         quarter_seconds(wait, 254)

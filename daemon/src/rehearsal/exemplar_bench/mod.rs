@@ -1,0 +1,31 @@
+//! Images of labels: how long they take under full load, and how many bytes they need.
+
+mod arrival;
+mod bytes;
+#[cfg(test)]
+mod tests;
+
+pub use arrival::{Arrivals, Setting, arrivals};
+pub use bytes::{Bytes, Sizes, Source, photos, sizes};
+
+/// The middle of the values, one of them that is exceeded by a twentieth, and the greatest.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// A twentieth is beyond.
+    pub p95: f64,
+    /// Greatest.
+    pub worst: f64,
+}
+
+impl Spread {
+    /// Of values; `None` of none.
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut values: Vec<f64> = values.into_iter().collect();
+        values.sort_by(f64::total_cmp);
+        let last = values.len().checked_sub(1)?;
+        let at = |share: f64| (values[(share * last as f64).round() as usize] * 100.0).round() / 100.0;
+        Some(Self { median: at(0.5), p95: at(0.95), worst: at(1.0) })
+    }
+}
