@@ -6,8 +6,9 @@ export class Refused extends Error {}
 
 async function read(path) {
   const answer = await fetch(BASE + path, { cache: "no-store", signal: AbortSignal.timeout(10000) });
-  if (!answer.ok) throw new Refused(`${answer.status} ${answer.statusText}`);
-  return answer.json();
+  const said = await answer.json().catch(() => ({}));
+  if (!answer.ok) throw new Refused(said.error ?? `${answer.status} ${answer.statusText}`);
+  return said;
 }
 
 async function write(path, body) {

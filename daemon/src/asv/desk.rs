@@ -3,7 +3,7 @@
 use super::pauses::Pauses;
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
-use scenecast_protocol::directive::{Fence, Limits, Requests, Settings, Utility};
+use scenecast_protocol::directive::{Fence, Limits, Requests, Settings, SlotId, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -42,6 +42,10 @@ pub struct Desk {
     pub fence: Option<Fence>,
     /// The limits that were sent last.
     pub limits: Option<Limits>,
+    /// The fence that it said last to obey, with its version.
+    pub fence_in_force: Option<(u16, Fence)>,
+    /// The limits that it said last to obey, with their version.
+    pub limits_in_force: Option<(u16, Limits)>,
     /// The settings that were sent last.
     pub settings: Settings,
     /// Images by label.
@@ -71,6 +75,8 @@ impl Desk {
             utility: Utility::default(),
             fence: None,
             limits: None,
+            fence_in_force: None,
+            limits_in_force: None,
             settings: Settings::default(),
             exemplars: BTreeMap::new(),
             track: VecDeque::new(),
@@ -92,6 +98,15 @@ impl Desk {
         self.track.push_back((now, status.x_m, status.y_m));
         if self.track.len() > Self::TRACK {
             self.track.pop_front();
+        }
+    }
+
+    /// The vehicle obeys the version of a slot that was sent last.
+    pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
+        match slot {
+            SlotId::Fence => self.fence_in_force = self.fence.clone().map(|fence| (version, fence)),
+            SlotId::Limits => self.limits_in_force = self.limits.clone().map(|limits| (version, limits)),
+            _ => {}
         }
     }
 

@@ -6,7 +6,7 @@ use super::position::{Relay, UsblSighting};
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
 use crate::picture;
-use scenecast_protocol::directive::{Budget, Constraints, Fix, PlannerKind, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Budget, Constraints, Fix, LifeLine, PlannerKind, Slot, SlotId, Utility};
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::Shares;
@@ -293,7 +293,13 @@ impl Surface {
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
-            SurfaceEvent::SlotSettled(vehicle, slot) => Some(SurfaceOutput::SlotSettled(vehicle, slot)),
+            SurfaceEvent::SlotSettled(vehicle, slot) => {
+                let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
+                if settled.life == LifeLine::Applied {
+                    self.desks.get_mut(&vehicle)?.handle_applied(slot, settled.version);
+                }
+                Some(SurfaceOutput::SlotSettled(vehicle, slot))
+            }
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
                 self.desks.get_mut(&vehicle)?.handle_status(status, now);

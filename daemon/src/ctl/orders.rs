@@ -102,7 +102,7 @@ impl Ctl {
     }
 
     /// Waits as long as is asked until an order is applied; refused is failed.
-    async fn follow(&self, accepted: Accepted) -> Result<(), Problem> {
+    pub(super) async fn follow(&self, accepted: Accepted) -> Result<(), Problem> {
         let wait = self.wait.unwrap_or(Duration::ZERO);
         let mut outcomes: Vec<Outcome> = accepted
             .versions

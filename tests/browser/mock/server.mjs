@@ -119,8 +119,12 @@ async function post(mock, req, res, path) {
   }
   const orders = { fence: () => fence(given), limits: () => limits(given), settings: () => given.planner || null };
   if (what in orders) {
-    v[what === "settings" ? "planner" : what] = orders[what]();
-    return accepted(mock, res, v.directive.issue(what, mission.nowS));
+    const order = orders[what]();
+    v[what === "settings" ? "planner" : what] = order;
+    const answer = v.directive.issue(what, mission.nowS, (s) => {
+      if (s === "applied") v.inForce[what] = { version: answer.version, order };
+    });
+    return accepted(mock, res, answer);
   }
   return reply(res, 404, { error: "no such thing" });
 }

@@ -106,12 +106,21 @@ export default [
     },
   },
   {
-    name: "the backlog says when it will be empty",
-    scenario: "rich",
+    name: "the backlog says when it will be empty, and the map by how much it lags",
     async run(s) {
-      await s.until("a backlog", async () => (await s.get("/state")).link.backlog_bits > 0);
+      await s.until("a backlog", async () => (await s.vehicle()).link.backlog?.bits > 0, { ms: 60000, advance: 2 });
       const shown = async () => bits(await s.page.locator("#link .values").innerText());
-      await s.until("its end", async () => /Backlog\s+\S+ k?bit, empty in/.test(await shown()));
+      await s.until("its end", async () => /Backlog\s+\S+ k?bit, empty in \d+ .*said \d+ s ago/.test(await shown()), { ms: 60000, advance: 2 });
+      await s.until("the lag", async () => /Map lags by\s+\d+ (s|min).*, \S+ k?bit/.test(await shown()));
+    },
+  },
+  {
+    name: "a backlog that a silent vehicle told of grows no younger, and says that nothing comes in",
+    scenario: "silent",
+    async run(s) {
+      await s.steer({ advance: 650 });
+      await s.shows("#link .values", /Backlog\s+\S+ k?bit, nothing comes in, said \d+ min/);
+      await s.shows("#link .values", /Map lags by\s+\u2013, \S+ k?bit/);
     },
   },
 ];

@@ -6,7 +6,7 @@ use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder, Stamp};
+use crate::wire::{Address, Backlog, FrameBuilder, Stamp};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -80,8 +80,15 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// About how many bytes wait and may be sent.
+    pub(super) fn backlog(&self, now: Instant) -> Backlog {
+        let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let others = self.plane_backlog(now) + self.objects.backlog_bytes();
+        Backlog { map_bytes: bytes(self.source.backlog_bytes()), other_bytes: bytes(others) }
+    }
+
     fn backlog_bytes(&self, now: Instant) -> usize {
-        self.source.backlog_bytes() + self.plane_backlog(now) + self.objects.backlog_bytes()
+        let Backlog { map_bytes, other_bytes } = self.backlog(now);
+        map_bytes.saturating_add(other_bytes) as usize
     }
 
     /// When something that is held back becomes due.

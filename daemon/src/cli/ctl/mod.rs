@@ -1,9 +1,12 @@
 //! `scenecast ctl`
 
+mod constraints;
+
 use crate::config;
 use crate::ctl::{self, BudgetChange, Client};
 use crate::problem::Problem;
 use clap::{Args, Subcommand};
+use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -14,6 +17,9 @@ Example: scenecast ctl status
          scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120
          scenecast ctl budget set 2000 --shares map=60,exemplar=10
          scenecast ctl exemplar 3 --out label-3.webp
+         scenecast ctl fence set fence.geojson --wait 120
+         scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return
+         scenecast ctl hold --wait 60
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
 Exit codes: 0 done; 1 refused, not applied in time, or nobody answers; 2 wrong usage";
@@ -80,6 +86,37 @@ enum Command {
         /// Ask for a further image, although there is one
         #[arg(long)]
         again: bool,
+    },
+    /// Print the fence with its keep-outs and return point, as sent last and as in force, or send another.
+    #[command(after_help = "Example: scenecast ctl fence set fence.geojson --wait 120")]
+    Fence {
+        #[command(subcommand)]
+        change: Option<FenceCommand>,
+    },
+    /// Move the point that the vehicle returns to.
+    #[command(after_help = "Example: scenecast ctl return-point set 12.5 -40 --wait 120")]
+    ReturnPoint {
+        #[command(subcommand)]
+        change: ReturnPointCommand,
+    },
+    /// Print the limits, as sent last and as in force, or send others.
+    #[command(after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120")]
+    Limits {
+        #[command(subcommand)]
+        change: Option<LimitsCommand>,
+    },
+    /// Tell the vehicle to stay where it is.
+    #[command(after_help = "Example: scenecast ctl hold --wait 60")]
+    Hold,
+    /// Tell the vehicle to go on, after a hold, an abort or a breach.
+    #[command(after_help = "Example: scenecast ctl resume --wait 60")]
+    Resume,
+    /// Tell the vehicle to end its survey and to do what its limits say of an abort.
+    #[command(after_help = "Example: scenecast ctl abort --yes --wait 60")]
+    Abort {
+        /// Yes, end it
+        #[arg(long)]
+        yes: bool,
     },
     /// Print changes as they come, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
@@ -159,6 +196,12 @@ impl Ctl {
                     ctl.set_budget(BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares) }).await
                 }
                 Command::Exemplar { label, out, again } => ctl.exemplar(label, &out, again).await,
+                Command::Fence { change } => constraints::fence(&ctl, change).await,
+                Command::ReturnPoint { change } => constraints::return_point(&ctl, change).await,
+                Command::Limits { change } => constraints::limits(&ctl, change).await,
+                Command::Hold => constraints::hold(&ctl, true).await,
+                Command::Resume => constraints::hold(&ctl, false).await,
+                Command::Abort { yes } => constraints::abort(&ctl, yes).await,
                 Command::Watch => ctl.watch().await,
             }
         })
