@@ -3,7 +3,7 @@
 //   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big]
 //
 // POST /mock steers it in tests:
-//   {"scenario": "rich", "advance": 60, "speed": 20, "silent": true, "refuse": "utility",
+//   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
 //    "loss": 0.3, "planes": true, "coarse": true, "ended": true, "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
@@ -152,9 +152,11 @@ function steer(mock, order, res) {
   if ("mute" in order) mock.mute = order.mute;
   if ("stream" in order) mock.stream = order.stream;
   if (order.stream === false || order.down) for (const s of mock.streams) s.destroy();
-  const changed = order.advance ? mission.advance(order.advance) : [];
-  for (const v of changed) emit(mock, "map", { vehicle: v, version: mission.vehicles.find((x) => x.id === v).heard.version });
-  emit(mock, "state", mission.json());
+  for (let i = 0; i < (order.times ?? 1); i += 1) {
+    const changed = order.advance ? mission.advance(order.advance) : [];
+    for (const v of changed) emit(mock, "map", { vehicle: v, version: mission.vehicles.find((x) => x.id === v).heard.version });
+    emit(mock, "state", mission.json());
+  }
   reply(res, 200, { now_s: mission.nowS });
 }
 

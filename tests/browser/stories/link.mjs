@@ -108,10 +108,14 @@ export default [
   {
     name: "the backlog says when it will be empty, and the map by how much it lags",
     async run(s) {
-      await s.until("a backlog", async () => (await s.vehicle()).link.backlog?.bits > 0, { ms: 60000, advance: 2 });
+      const { link: { budget_bps } } = await s.get("/state");
+      await s.post("/vehicles/1/constraints", { hold: false });
+      await s.post("/budget", { budget_bps: 400 });
+      await s.until("a backlog", async () => (await s.vehicle()).link.backlog?.bits > 0, { ms: 120000, advance: 2 });
       const shown = async () => bits(await s.page.locator("#link .values").innerText());
-      await s.until("its end", async () => /Backlog\s+\S+ k?bit, empty in \d+ .*said \d+ s ago/.test(await shown()), { ms: 60000, advance: 2 });
+      await s.until("its end", async () => /Backlog\s+\S+ k?bit, empty in \d+ .*said \d+ s ago/.test(await shown()), { ms: 120000, advance: 2 });
       await s.until("the lag", async () => /Map lags by\s+\d+ (s|min).*, \S+ k?bit/.test(await shown()));
+      await s.post("/budget", { budget_bps });
     },
   },
   {

@@ -43,13 +43,13 @@ export default [
     scenario: "rich",
     async run(s) {
       await s.steer({ down: true });
-      await s.shows("#banners", /No connection to scenecast.*trying/s, { ms: 12000 });
+      await s.shows("#banners", /No connection to scenecast.*trying/s);
       await s.shows("#feed", /Not connected/);
       assert.ok(await greyed(s));
       assert.equal(await s.page.locator("#link.stale").count(), 1);
       assert.ok(await s.page.locator("#hold").isDisabled());
       await s.steer({ down: false });
-      await s.shows("#feed", /Live/, { ms: 20000 });
+      await s.shows("#feed", /Live/);
       await s.until("the banner to go", async () => !(await banner(s).isVisible()));
     },
     tolerates: /ERR_|Failed to load/,
@@ -59,10 +59,10 @@ export default [
     scenario: "rich",
     async run(s) {
       await s.steer({ stream: false });
-      await s.until("a pause of seconds", () => s.inPage(({ store }) => store.feed.retryMs - performance.now() > 2500), { ms: 15000 });
+      await s.until("a pause of seconds", () => s.inPage(({ store }) => store.feed.retryMs - performance.now() > 7000));
       await s.steer({ stream: true });
       await s.button("Try now").click();
-      await s.shows("#feed", /Live/, { ms: 1500 });
+      await s.shows("#feed", /Live/, { ms: 5000 });
     },
     tolerates: /503|Failed to load/,
   },
@@ -71,7 +71,7 @@ export default [
     scenario: "rich",
     async run(s) {
       await s.steer({ mute: true });
-      await s.shows("#feed", /Not connected/, { ms: 10000 });
+      await s.shows("#feed", /Not connected/);
       await s.steer({ mute: false });
       await s.shows("#feed", /Live/);
     },
@@ -94,29 +94,6 @@ export default [
       await s.steer({ ended: true });
       await s.shows("#banners", /The mission has ended/);
       assert.equal(await s.page.locator(".banner").count(), 1);
-    },
-  },
-  {
-    name: "a map is in the page within 200 ms of its event",
-    scenario: "rich",
-    async run(s) {
-      await s.page.evaluate(() => {
-        const source = new EventSource("/api/v1/events");
-        source.addEventListener("map", (event) => {
-          const { version } = JSON.parse(event.data);
-          const start = performance.now();
-          const look = async () => {
-            const { store } = await import("/js/store.js");
-            if (store.map?.version >= version) window.lagMs = performance.now() - start;
-            else requestAnimationFrame(look);
-          };
-          look();
-        });
-        return new Promise((resolve) => source.addEventListener("open", () => resolve()));
-      });
-      await s.steer({ loss: 0, advance: 13 });
-      const lag = await s.until("the new map", () => s.page.evaluate(() => window.lagMs));
-      assert.ok(lag < 200, `${lag} ms`);
     },
   },
 ];
