@@ -50,7 +50,10 @@ fn vehicle(out: &mut String, v: &Vehicle, state: &State) {
 
 fn backlog(b: &Backlog, now_s: f64) -> String {
     let unknown = || "nobody knows when".to_owned();
-    let empty = b.empty_s.map_or_else(unknown, |at| format!("empty in {}", span(at - now_s)));
+    let empty = match b.empty_s {
+        _ if b.bits == 0 => "empty".to_owned(),
+        empty_s => empty_s.map_or_else(unknown, |at| format!("empty in {}", span(at - now_s))),
+    };
     let lag = b.map_lag_s.map_or_else(unknown, span);
     let said = span(now_s - b.at_s);
     format!("{} bit, {empty}; the map lags {} bit, about {lag}; said {said} ago", b.bits, b.map_bits)

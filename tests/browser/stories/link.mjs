@@ -124,7 +124,8 @@ export default [
     async run(s) {
       await s.steer({ advance: 650 });
       await s.shows("#link .values", /Backlog\s+\S+ k?bit, nothing comes in, said \d+ min/);
-      await s.shows("#link .values", /Map lags by\s+\u2013, \S+ k?bit/);
+      await s.shows("#link .values", /Map lags by\s+more than \d+ min.*, \S+ k?bit/);
+      assert.ok(await s.page.locator("#link .whole.stale").count() === 2, "both are grey");
     },
   },
 ];

@@ -2,7 +2,7 @@
 
 import { $, h, row, text } from "../dom.js";
 import { ago, bits, count, none, percent, rate, span } from "../format.js";
-import { ageOf, store } from "../store.js";
+import { ageOf, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
 
@@ -10,6 +10,8 @@ const CLASSES = ["map", "confidence", "depth", "status", "directive", "fix", "ex
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};
+/** Rows of what the chosen vehicle said or what was measured of it: grey while it is silent. */
+const ofVehicle = [];
 const list = h("dl.values");
 const classes = h("table.classes");
 const age = h("p.age");
@@ -27,6 +29,8 @@ export function startLink() {
     ["lag", "Map lags by", "By what the map here is behind the vehicle's: about how old it is, and the bits that are missing"]]) {
     const [node, set] = row(name, hint);
     values[key] = set;
+    node.classList.toggle("whole", key === "backlog" || key === "lag");
+    if (["lately", "own", "backlog", "lag"].includes(key)) ofVehicle.push(node);
     list.append(node);
   }
   classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
@@ -46,6 +50,7 @@ function refreshAge() {
   text(age, store.connected ? "now" : `${span(old)} old`);
   values.backlog(backlog());
   values.lag(lag());
+  for (const node of ofVehicle) node.classList.toggle("stale", Boolean(store.vehicle) && isStale(store.vehicle));
   refreshBudget();
 }
 
@@ -84,7 +89,7 @@ function backlog() {
 function lag() {
   const w = waiting();
   if (w === null) return none;
-  const old = w.map_lag_s === null ? none : span(w.map_lag_s + ageOf(store.snapshot.now_s));
+  const old = w.map_lag_s === null ? `more than ${span(ageOf(w.at_s))}` : span(w.map_lag_s + ageOf(store.snapshot.now_s));
   return `${old}, ${bits(w.map_bits)}`;
 }
 
