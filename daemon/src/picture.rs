@@ -176,8 +176,12 @@ mod tests {
 
     #[test]
     fn two_cells_at_the_ends_of_the_world_are_no_picture() {
-        let far: LabelGrid = [(Cell::new(-2_000_000_000, 0), 1), (Cell::new(2_000_000_000, 9), 2)].into_iter().collect();
-        assert_eq!(encode(&far).unwrap_err().to_string(), "the map spans 4000000001 x 10 cells: at most 8388608 are drawn");
+        let far: LabelGrid =
+            [(Cell::new(-2_000_000_000, 0), 1), (Cell::new(2_000_000_000, 9), 2)].into_iter().collect();
+        assert_eq!(
+            encode(&far).unwrap_err().to_string(),
+            "the map spans 4000000001 x 10 cells: at most 8388608 are drawn"
+        );
         let beside = Rect { x: 0, y: 0, width: 1 << 12, height: (1 << 11) + 1 };
         assert!(matches!(encode_within(&far, beside), Err(PictureError::TooLarge(..))));
     }

@@ -63,7 +63,8 @@ async function run(story, browser, scene) {
     await stage.open(browser, scene, story);
     await story.run(stage);
     stage.noErrors(story.tolerates);
-    console.log(`ok    ${story.name} (${[...stage.figures, `${Math.round(performance.now() - start)} ms`].join("; ")})`);
+    console.log(`ok    ${story.name} (${Math.round(performance.now() - start)} ms)`);
+    if (stage.figures.length > 0) console.log(`      figures: ${stage.figures.join(", ")}`);
     return "ok";
   } catch (error) {
     console.log(`FAIL  ${story.name}\n      ${String(error.stack ?? error).replaceAll("\n", "\n      ")}`);

@@ -37,7 +37,7 @@ fn assert_stories_hold(arguments: &[&str]) {
     assert!(output.status.success(), "{said}");
     let counts = said.lines().last().unwrap_or_default();
     assert!(!counts.starts_with("0 passed"), "no story was told: {said}");
-    let measured = said.lines().filter(|l| l.contains(';')).map(|l| format!("{l}\n"));
+    let measured = said.lines().filter(|l| l.contains("figures: ")).map(|l| format!("{l}\n"));
     let _ = std::io::stderr().write_all(format!("{}{counts}\n", measured.collect::<String>()).as_bytes());
 }
 

@@ -105,7 +105,7 @@ impl Desk {
     pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
         match slot {
             SlotId::Fence => self.fence_in_force = self.fence.clone().map(|fence| (version, fence)),
-            SlotId::Limits => self.limits_in_force = self.limits.clone().map(|limits| (version, limits)),
+            SlotId::Limits => self.limits_in_force = self.limits.map(|limits| (version, limits)),
             _ => {}
         }
     }

@@ -169,7 +169,11 @@ mod tests {
         for (is, ought) in fence.iter().zip([[-3.0, 4.0], [997.0, 4.0], [997.0, 504.0]]) {
             assert!((is[0] - ought[0]).hypot(is[1] - ought[1]) < 0.001, "{is:?} instead of {ought:?}");
         }
-        assert!(read(SQUARE.replace("60", "600").as_str(), Frame::Wgs84(plane, (0.0, 0.0))).unwrap_err().contains("--metres"));
+        assert!(
+            read(SQUARE.replace("60", "600").as_str(), Frame::Wgs84(plane, (0.0, 0.0)))
+                .unwrap_err()
+                .contains("--metres")
+        );
     }
 
     #[test]
@@ -181,7 +185,10 @@ mod tests {
         let hole = r#"{"type": "Polygon", "coordinates": [[[0,0],[9,0],[9,9],[0,0]], [[1,1],[2,1],[2,2],[1,1]]]}"#;
         assert!(refused(hole).contains("keep_out"));
         let line = r#"{"geometry": {"type": "LineString", "coordinates": [[0,0],[9,0]]}}"#;
-        assert_eq!(in_list(line), "features[0]: geometry LineString: it takes a Polygon, or a Point for the return point");
+        assert_eq!(
+            in_list(line),
+            "features[0]: geometry LineString: it takes a Polygon, or a Point for the return point"
+        );
         let role = format!(r#"{{"properties": {{"role": "wall"}}, "geometry": {SQUARE}}}"#);
         assert!(in_list(&role).contains("keep_out or return_point"));
         let plain = format!(r#"{{"geometry": {SQUARE}}}"#);

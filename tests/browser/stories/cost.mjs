@@ -119,9 +119,9 @@ export default [
         return { nodes, jsEventListeners, usedSize, takeMs: await taking() };
       };
       // Track, history and map are full by then.
-      await go(16);
+      await go(10);
       const first = await measure();
-      await go(44);
+      await go(30);
       const last = await measure();
       const { now_s } = await s.get("/state");
       const mb = (n) => (n / 1e6).toFixed(1);

@@ -50,7 +50,9 @@ pub(super) enum ReturnPointCommand {
 #[derive(Debug, Subcommand)]
 pub(super) enum LimitsCommand {
     /// Send limits in place of the last; what is not named is not limited, reactions then are as configured on the vehicle.
-    #[command(after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120")]
+    #[command(
+        after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
+    )]
     Set(Limits),
 }
 

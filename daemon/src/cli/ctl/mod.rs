@@ -100,7 +100,9 @@ enum Command {
         change: ReturnPointCommand,
     },
     /// Print the limits, as sent last and as in force, or send others.
-    #[command(after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120")]
+    #[command(
+        after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
+    )]
     Limits {
         #[command(subcommand)]
         change: Option<LimitsCommand>,
