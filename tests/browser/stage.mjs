@@ -39,7 +39,7 @@ export class Stage {
   /** Runs `fn` in the page with the page's own modules. */
   inPage(fn, argument) {
     return this.page.evaluate(`(async () => {
-      const names = ["store", "map/chart", "book", "map/layers"];
+      const names = ["store", "map/chart", "map/frames", "book", "map/layers"];
       const modules = await Promise.all(names.map((m) => import("/js/" + m + ".js")));
       return (${fn})(Object.assign({}, ...modules), ${JSON.stringify(argument)});
     })()`);

@@ -19,6 +19,7 @@ pub use rehearsed::Rehearsed;
 use crate::asv::position::LatLon;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// Where the autopilot is to take the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +52,8 @@ pub struct Step {
     pub heading_rad: f64,
     /// Depth below the surface, metres.
     pub depth_m: f64,
+    /// Time in which it may have gone anywhere, for nothing credible was told; the way is that of the rest.
+    pub unseen: Duration,
 }
 
 /// How an autopilot does.

@@ -89,15 +89,21 @@ impl Nmea {
         let heading_rad = self.gps.heading_rad(now).unwrap_or(0.0);
         if let Some((before, at)) = self.at.replace((place, now)) {
             let (dx_m, dy_m) = TangentPlane::new(before).to_plane(place);
-            if dx_m.hypot(dy_m) > 20.0 * now.since(at).as_secs_f64().max(0.1) {
-                return self.count("jumps");
+            let passed = now.since(at);
+            if dx_m.hypot(dy_m) > 20.0 * passed.as_secs_f64().max(0.1) {
+                self.count("jumps");
+                return self.push_step(0.0, 0.0, heading_rad, passed);
             }
             if let Some(goal) = &mut self.goal {
                 (goal.east_m, goal.north_m) = (goal.east_m - dx_m, goal.north_m - dy_m);
             }
-            if self.steps.len() < MOST_WAITING {
-                self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m });
-            }
+            self.push_step(dx_m, dy_m, heading_rad, Duration::ZERO);
+        }
+    }
+
+    fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration) {
+        if self.steps.len() < MOST_WAITING {
+            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen });
         }
     }
 

@@ -76,6 +76,11 @@ impl Guard {
         self.used_m += metres;
     }
 
+    /// Speed over ground at which it flies, metres a second.
+    pub fn speed_m_s(&self) -> f64 {
+        self.habits.speed_m_s
+    }
+
     /// A frame of the surface was taken.
     pub fn handle_surface_heard(&mut self, at: Instant) {
         self.heard = self.heard.max(at);

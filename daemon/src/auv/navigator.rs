@@ -111,6 +111,16 @@ impl Navigator {
         self.placement
     }
 
+    /// A place of the map's frame in the world, as the map lies now.
+    pub fn to_world(&self, at: (f64, f64)) -> (f64, f64) {
+        self.placement.map_or(at, |p| p.to_world(at))
+    }
+
+    /// A place of the world in the map's frame.
+    pub fn to_map(&self, at: (f64, f64)) -> (f64, f64) {
+        self.placement.map_or(at, |p| p.to_map(at))
+    }
+
     /// Heading clockwise from north, radians.
     pub fn heading_rad(&self) -> f64 {
         self.heading_rad
@@ -142,6 +152,12 @@ impl Navigator {
         self.odometer.handle_way(dx_m, dy_m, now, Self::MEMORY_S);
     }
 
+    /// It may have gone so far in any direction without a word of its sensors.
+    pub fn handle_unseen_way(&mut self, metres: f64) {
+        // A standard deviation in each of two directions, of which the distance is the mean square.
+        self.filter.doubt(metres.max(0.0) / std::f64::consts::SQRT_2);
+    }
+
     /// The position in the map's frame is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.is_lost = false;
@@ -169,7 +185,7 @@ impl Navigator {
         self.last_fix = Some(now);
         if std::mem::take(&mut self.is_lost) {
             let world = self.filter.position();
-            self.at = self.placement.map_or(world, |p| p.to_map(world));
+            self.at = self.to_map(world);
         }
         self.place();
         FixVerdict::Used
@@ -279,6 +295,17 @@ mod tests {
             assert_eq!(nav.handle_fix(x, y, sigma, at(60.0), at(61.0)), verdict, "{x} {y} {sigma}");
         }
         assert_eq!(nav.world(), before);
+    }
+
+    #[test]
+    fn a_way_that_nobody_measured_makes_the_place_uncertain_until_a_fix() {
+        let mut nav = under_way();
+        nav.handle_fix(60.0, 0.0, 1.0, at(60.0), at(60.0));
+        let before = nav.sigma_m();
+        nav.handle_unseen_way(30.0);
+        assert!((20.0..25.0).contains(&nav.sigma_m()), "{} m, {before} m before", nav.sigma_m());
+        assert_eq!(nav.handle_fix(60.0, 25.0, 1.0, at(61.0), at(61.0)), FixVerdict::Used, "no outlier any more");
+        assert!(nav.sigma_m() < 2.0);
     }
 
     #[test]

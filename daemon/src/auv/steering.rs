@@ -37,6 +37,9 @@ pub enum Course {
 }
 
 /// Chooses waypoints: a lawnmower until the operator has said what matters, then by the planner that is set.
+///
+/// Places are of the world, as fence and area are: when a fix moves the map, neither they nor the lattice move with it. Only
+/// cells are of the map's frame.
 #[derive(Debug)]
 pub struct Steering {
     area: Area,
@@ -55,6 +58,8 @@ pub struct Steering {
     /// Metres from the end of those ways to the return point itself.
     home_leg_m: f64,
     known: Knowledge,
+    /// East and north of the map's frame in the world, metres.
+    placed: Point,
     plan: VecDeque<Node>,
     /// The version of the map that the plan is for.
     planned_for: u64,
@@ -87,6 +92,7 @@ impl Steering {
             ways_home: None,
             home_leg_m: 0.0,
             known: Knowledge::default(),
+            placed: (0.0, 0.0),
             plan: VecDeque::new(),
             planned_for: 0,
         };
@@ -107,6 +113,20 @@ impl Steering {
     /// The bounds in force.
     pub fn bounds(&self) -> &Bounds {
         &self.bounds
+    }
+
+    /// A fix has moved the map to there in the world: ways are planned anew, from where the vehicle now believes to be.
+    pub fn set_placement(&mut self, east_m: f64, north_m: f64) {
+        if self.placed != (east_m, north_m) {
+            self.placed = (east_m, north_m);
+            self.window = Window::new(self.area.moved(-east_m, -north_m), self.window.cell_m);
+            self.plan.clear();
+        }
+    }
+
+    /// Where the map's frame lies in the world.
+    pub fn placed(&self) -> Point {
+        self.placed
     }
 
     /// Puts a fence that was checked in force.
@@ -138,7 +158,7 @@ impl Steering {
         self.plan.clear();
     }
 
-    /// The camera saw the sea floor around `at`.
+    /// The camera saw the sea floor around `at`, of the map's frame.
     pub fn handle_view(&mut self, at: Point) {
         let reach = self.footprint.reach();
         // Cells whose middle was in sight.
@@ -187,7 +207,7 @@ impl Steering {
     fn ask(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
         let Some(home) = &self.ways_home else { return Vec::new() };
         let none = Utility::default();
-        let worth = Worth::new(&self.lattice, &self.window, map, &self.known, utility.unwrap_or(&none));
+        let worth = Worth::new(&self.lattice, (&self.window, self.placed), map, &self.known, utility.unwrap_or(&none));
         let question = Question { lattice: &self.lattice, worth: &worth, from, home, left_m };
         self.planner.plan(&question)
     }

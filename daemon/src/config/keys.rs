@@ -289,7 +289,7 @@ pub const KEYS: &[Key] = &[
         "m",
         Range(-1e6, 1e6),
         "ar",
-        "west, south, east and north limits; all 0: the rehearsal's image",
+        "west, south, east and north limits in the world; all 0: the rehearsal's image",
     ),
     key(
         "survey.planner",

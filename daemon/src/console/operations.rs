@@ -182,7 +182,8 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v1/vehicles/{id}/fence",
             "set_fence",
-            "Sends a fence in place of the last. Vertices in metres east and north, 3 to 34 an outline, at most 15 keep-outs. \
+            "Sends a fence in place of the last. Vertices in metres east and north in the world, where they stay when a fix moves \
+             the vehicle's map; 3 to 34 an outline, at most 15 keep-outs. \
              Refused: edges that cross or touch, no area, a keep-out around the whole fence, a return point where the \
              vehicle may not be, more than fits a frame. The vehicle refuses a fence outside of which it is.",
             schema::<FenceOrder>,

@@ -142,7 +142,7 @@ pub struct Usbl {
 pub struct Status {
     /// When it came in.
     pub at_s: f64,
-    /// Metres east.
+    /// Metres east on its own map, as all places that it tells: the map's placement moves them into the world.
     pub x_m: f64,
     /// Metres north.
     pub y_m: f64,
@@ -160,7 +160,7 @@ pub struct Status {
     pub reason: Option<String>,
     /// Mode and reason in words, as in "holding: fence".
     pub doing: String,
-    /// Where it is going, metres east and north.
+    /// Where it is going, metres east and north on its own map.
     pub waypoint: Option<(f64, f64)>,
     /// Cells that it has explored.
     pub cells: u32,

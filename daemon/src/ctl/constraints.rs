@@ -32,7 +32,7 @@ impl Ctl {
     pub async fn set_fence(&self, file: &Path, metres: bool) -> Result<(), Problem> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
-        let frame = if metres { Frame::Metres } else { frame(&state, v) };
+        let frame = if metres { Frame::Metres } else { frame(&state) };
         self.order(v, "fence", &geojson::read_fence(file, frame)?).await
     }
 
@@ -42,7 +42,7 @@ impl Ctl {
         self.order(self.choose(&state)?, "fence", &FenceOrder::default()).await
     }
 
-    /// Moves the return point, in metres of the map's frame, or takes it away; fence and keep-outs stay as sent last.
+    /// Moves the return point, in metres of the world, or takes it away; fence and keep-outs stay as sent last.
     pub async fn set_return_point(&self, at: Option<[f64; 2]>) -> Result<(), Problem> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
@@ -91,10 +91,9 @@ impl Ctl {
 }
 
 /// Longitude and latitude where the mission is on the Earth, as in the files that `ctl map` writes.
-fn frame(state: &State, vehicle: &Vehicle) -> Frame {
+fn frame(state: &State) -> Frame {
     let origin = state.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
-    let moved = vehicle.map.placement.as_ref().map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-    origin.map_or(Frame::Metres, |origin| Frame::Wgs84(TangentPlane::new(origin), moved))
+    origin.map_or(Frame::Metres, |origin| Frame::Wgs84(TangentPlane::new(origin)))
 }
 
 fn slot<'a>(vehicle: &'a Vehicle, name: &str) -> Option<&'a Slot> {

@@ -12,10 +12,10 @@ const MOST_BYTES: u64 = 1 << 20;
 /// What the coordinates of a file are.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Frame {
-    /// Metres east and north in the map's frame.
+    /// Metres east and north of the mission's origin.
     Metres,
-    /// Longitude and latitude, WGS 84; the map lies so many metres east and north in the world.
-    Wgs84(TangentPlane, (f64, f64)),
+    /// Longitude and latitude, WGS 84, about that origin.
+    Wgs84(TangentPlane),
 }
 
 /// What an outline or point of a file is meant to be: the property `role` of its feature.
@@ -122,12 +122,12 @@ fn place(at: &Value, frame: Frame) -> Result<[f64; 2], String> {
     let (x, y) = at[0].as_f64().zip(at[1].as_f64()).ok_or(format!("{at} is no place"))?;
     match frame {
         Frame::Metres => Ok([x, y]),
-        Frame::Wgs84(plane, (east, north)) => {
+        Frame::Wgs84(plane) => {
             let place = LatLon::new(y, x).ok_or(format!(
                 "[{x}, {y}] is no longitude and latitude; --metres takes metres east and north of the origin"
             ))?;
             let (x, y) = plane.to_plane(place);
-            Ok([x - east, y - north])
+            Ok([x, y])
         }
     }
 }
@@ -159,21 +159,17 @@ mod tests {
     }
 
     #[test]
-    fn degrees_become_metres_of_the_frame_in_which_the_map_lies() {
+    fn degrees_become_metres_about_the_origin() {
         let plane = TangentPlane::new(LatLon::new(29.5, 34.9).unwrap());
         let corner = |x, y| plane.to_place(x, y);
         let [a, b, c] = [corner(0.0, 0.0), corner(1000.0, 0.0), corner(1000.0, 500.0)];
         let at = |p: LatLon| format!("[{}, {}]", p.lon_deg, p.lat_deg);
         let json = format!(r#"{{"type": "Polygon", "coordinates": [[{}, {}, {}, {}]]}}"#, at(a), at(b), at(c), at(a));
-        let fence = read(&json, Frame::Wgs84(plane, (3.0, -4.0))).unwrap().fence.unwrap();
-        for (is, ought) in fence.iter().zip([[-3.0, 4.0], [997.0, 4.0], [997.0, 504.0]]) {
+        let fence = read(&json, Frame::Wgs84(plane)).unwrap().fence.unwrap();
+        for (is, ought) in fence.iter().zip([[0.0, 0.0], [1000.0, 0.0], [1000.0, 500.0]]) {
             assert!((is[0] - ought[0]).hypot(is[1] - ought[1]) < 0.001, "{is:?} instead of {ought:?}");
         }
-        assert!(
-            read(SQUARE.replace("60", "600").as_str(), Frame::Wgs84(plane, (0.0, 0.0)))
-                .unwrap_err()
-                .contains("--metres")
-        );
+        assert!(read(SQUARE.replace("60", "600").as_str(), Frame::Wgs84(plane)).unwrap_err().contains("--metres"));
     }
 
     #[test]

@@ -210,10 +210,14 @@ impl Mission {
         })
     }
 
-    /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out.
+    /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out, or do not lead back
+    /// where a fix has shown the vehicle to be outside.
     pub fn legs_outside_fence(&self) -> usize {
         let Some(fence) = self.surface.desk(self.address).and_then(|d| d.fence.as_ref()) else { return 0 };
-        let is_out = |leg: &&super::mission::Leg| super::witness::stretches_outside(&[leg.0, leg.1], fence) > 0;
+        let outside = |from, to| super::witness::stretches_outside(&[from, to], fence) > 0;
+        let is_out = |&&(from, to): &&super::mission::Leg| {
+            if outside(from, from) { outside(to, to) } else { outside(from, to) }
+        };
         self.legs.iter().skip(self.legs_before_fence).filter(is_out).count()
     }
 

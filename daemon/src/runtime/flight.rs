@@ -60,6 +60,7 @@ impl Flight {
         let Some(pilot) = &mut self.pilot else { return };
         while let Some(step) = pilot.poll_step() {
             vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
+            vehicle.handle_unseen(step.unseen);
         }
         vehicle.set_autopilot_silent(pilot.health().is_silent());
         let navigator = vehicle.navigator();

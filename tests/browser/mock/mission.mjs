@@ -98,6 +98,7 @@ export class Mission {
       now_s: this.nowS,
       mission: { name: this.name, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
+      position: this.position ?? null,
       link: {
         budget_bps: this.budgetBps, shares: this.shares, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),

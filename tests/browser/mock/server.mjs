@@ -4,7 +4,8 @@
 //
 // POST /mock steers it in tests:
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
-//    "loss": 0.3, "planes": true, "coarse": true, "ended": true, "stream": false, "mute": true, "down": true}
+//    "loss": 0.3, "planes": true, "coarse": true, "position": {"x_m": 5, ..},
+//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
 import { deflateSync } from "node:zlib";
@@ -144,7 +145,8 @@ function accepted(mock, res, answer) {
 function steer(mock, order, res) {
   if (order.scenario) mock.mission = new Mission(order.scenario);
   const { mission } = mock;
-  for (const key of ["loss", "planes", "ended", "speed"]) if (key in order) mission[key] = order[key];
+  for (const key of ["loss", "planes", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
+  if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;
   if (order.refuse) mission.vehicles[0].directive.refuseNext.add(order.refuse);

@@ -138,7 +138,7 @@ export class Vehicle {
       next_contact_s: this.heardS === null ? null : this.nextTurnS, status: this.status, track: this.track,
       map: {
         version: this.heard.version, cell_m: this.heard.cellM, ...bounds,
-        explored_cells: this.heard.cells.size, updated_s: this.updatedS ?? null, epoch: 0,
+        explored_cells: this.heard.cells.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null,
       },
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),

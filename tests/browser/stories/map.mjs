@@ -5,7 +5,7 @@ const view = (s) => s.inPage(({ view: v }) => ({ east: v.east, north: v.north, s
 
 /** A cell of the map with its place on the screen, near the middle of what is explored. */
 async function someCell(s) {
-  return s.inPage(({ store, view: v, shownAs, tintOf }) => {
+  return s.inPage(({ store, view: v, inWorld, shownAs, tintOf }) => {
     const m = store.map;
     const box = document.getElementById("chart").getBoundingClientRect();
     const craft = store.vehicle.status ?? { x_m: 0, y_m: 0 };
@@ -13,7 +13,7 @@ async function someCell(s) {
       const x = (m.x0 + (i % m.width) + 0.5) * m.cell_m;
       const y = (m.y0 + Math.floor(i / m.width) + 0.5) * m.cell_m;
       const near = store.vehicle.track.some(([, tx, ty]) => Math.hypot(tx - x, ty - y) < 0.2);
-      const [px, py] = v.toScreen(x, y);
+      const [px, py] = v.toScreen(...inWorld(store.vehicle, x, y));
       const inside = px > 120 && py > 90 && px < v.width - 120 && py < v.height - 90;
       if (m.labels[i] === 0 || !inside || near || Math.hypot(craft.x_m - x, craft.y_m - y) < 3) continue;
       return { label: m.labels[i], tint: tintOf(shownAs(m.labels[i])), x, y, px, py, left: box.left, top: box.top };
@@ -97,6 +97,49 @@ export default [
       const cell = await someCell(s);
       await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
       await s.shows("#readout", new RegExp(`Label ${cell.label}\\b.*heard .* ago`, "s"));
+    },
+  },
+  {
+    name: "a map that a fix has moved lies in the world, and a fence stays where it is",
+    scenario: "rich",
+    async run(s) {
+      await s.post("/vehicles/1/fence", { fence: [[-11, -8], [18, -8], [18, 14], [-11, 14]] });
+      await s.until("the fence", () => s.inPage(({ store }) => store.vehicle.fence?.fence));
+      await s.steer({ placement: { version: 1, east_m: 6, north_m: -2 } });
+      await s.until("the move", () => s.inPage(({ store }) => store.vehicle.map.placement));
+      await s.button("Fit").click();
+      const cell = await s.until("a cell in its colour", async () => {
+        const found = await someCell(s);
+        const seen = await pixel(s, found.px, found.py);
+        return seen.join() === found.tint.join() && found;
+      });
+      await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
+      const shown = await s.shows("#readout", new RegExp(`Label ${cell.label}\\b`));
+      const [, east] = shown.replaceAll("\u2212", "-").match(/E ([-\d.]+)/);
+      assert.ok(Math.abs(Number(east) - (cell.x + 6)) < 0.2, `${shown}: ${cell.x} m on its map`);
+      const { fence } = await s.vehicle(1);
+      assert.deepEqual(fence.fence[0], [-11, -8]);
+      await s.steer({ placement: null });
+    },
+  },
+  {
+    name: "the surface vehicle is on the map where its GPS has it, and not when the GPS is lost",
+    scenario: "rich",
+    async run(s) {
+      const position = { is_good: true, x_m: 14, y_m: 9, sigma_m: 1.2, lat_deg: 29.5, lon_deg: 34.92, at_s: 1, heading_deg: 45, refused: {}, outliers: 0, fixes: 3, sightings_unused: {} };
+      await s.steer({ position });
+      await s.until("the position", () => s.inPage(({ store }) => store.snapshot.position?.is_good));
+      await s.button("Fit").click();
+      const seen = () => s.inPage(({ view }) => {
+        const [x, y] = view.toScreen(14, 9);
+        const wanted = getComputedStyle(document.documentElement).getPropertyValue("--map-craft").match(/[0-9a-f]{2}/gi).map((v) => parseInt(v, 16));
+        const data = document.getElementById("chart").getContext("2d").getImageData(x - 3, y + 3, 1, 1).data;
+        return wanted.every((v, n) => Math.abs(v - data[n]) < 12);
+      });
+      await s.until("the surface on the map", seen);
+      await s.steer({ position: { ...position, is_good: false, x_m: null, y_m: null, sigma_m: null } });
+      await s.until("it to be gone", async () => !(await seen()));
+      await s.steer({ position: null });
     },
   },
   {

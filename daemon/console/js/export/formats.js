@@ -3,7 +3,8 @@
 
 import { colourOf, nameOf, shownAs } from "../book.js";
 import { depthPlane } from "../cloud/points.js";
-import { inWorld, toLatLon } from "../map/readout.js";
+import { inWorld } from "../map/frames.js";
+import { toLatLon } from "../map/readout.js";
 import { rgb } from "../palette.js";
 import { regions } from "./regions.js";
 

@@ -9,6 +9,7 @@ import { drawFences } from "../fence/draw.js";
 import { clickAt, finish, grab, pen, penKeys } from "../fence/edit.js";
 import { drawCraft, drawSurface } from "./craft.js";
 import { overhang } from "./coarse.js";
+import { boxInWorld, inWorld, viewOf } from "./frames.js";
 import { listen } from "./input.js";
 import { canvasOf, coarseCanvasOf, drawLegend, layer } from "./layers.js";
 import { addPoint, drawMeasure, measure, toggleMeasure } from "./measure.js";
@@ -90,7 +91,7 @@ function keepInView() {
     store.tell("view");
   }
   const s = store.vehicle?.status;
-  if (view.mode === "follow" && s) view.centre(s.x_m, s.y_m);
+  if (view.mode === "follow" && s) view.centre(...inWorld(store.vehicle, s.x_m, s.y_m));
   const all = view.mode === "fit" ? bounds() : null;
   if (all && (!view.holds(all) || !fitted)) {
     view.fit(all);
@@ -105,20 +106,21 @@ function extentOf(map) {
   return extents.get(map);
 }
 
-/** What "fit" shows: every map, every vehicle and its waypoint; fences too, unless the map would be lost in them. */
+/** What "fit" shows: every map, every vehicle and its waypoint; fences and the surface too, unless the map would be lost. */
 function bounds() {
   const boxes = [];
-  for (const map of store.maps.values()) boxes.push(extentOf(map));
   for (const v of store.snapshot?.vehicles ?? []) {
     const s = v.status;
-    if (s) boxes.push([s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4]);
-    if (s?.waypoint) boxes.push([...s.waypoint, ...s.waypoint]);
+    const map = store.maps.get(v.id);
+    const own = [map && extentOf(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], s?.waypoint && [...s.waypoint, ...s.waypoint]];
+    boxes.push(...own.filter(Boolean).map((box) => boxInWorld(v, box)));
   }
-  const known = boxes.filter(Boolean);
-  if (known.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
-  const near = around(known);
+  if (boxes.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
+  const near = around(boxes);
+  const surface = surfaceAt();
   const corners = (store.snapshot?.vehicles ?? []).flatMap((v) => v.fence?.fence ?? []);
-  const all = around([near, ...corners.map(([x, y]) => [x, y, x, y])]);
+  const further = [...corners, ...(surface ? [[surface.x_m, surface.y_m]] : [])];
+  const all = around([near, ...further.map(([x, y]) => [x, y, x, y])]);
   return reach(all) <= FENCE_REACH * reach(near) ? all : near;
 }
 
@@ -170,12 +172,13 @@ function draw() {
   const byChoice = [...vehicles].sort((a, b) => (a.id === store.selectedId) - (b.id === store.selectedId));
   for (const v of byChoice) drawMap(c, v);
   if (options.grid) drawGrid(c, view, ink);
-  const surface = store.snapshot?.surface;
-  const centre = surface ?? store.vehicle?.status;
-  if (options.rings && centre) drawRings(c, view, ink, centre.x_m, centre.y_m);
+  const surface = surfaceAt();
+  const s = store.vehicle?.status;
+  const centre = surface ? [surface.x_m, surface.y_m] : s && inWorld(store.vehicle, s.x_m, s.y_m);
+  if (options.rings && centre) drawRings(c, view, ink, ...centre);
   if (surface) drawSurface(c, view, ink, surface);
   for (const v of byChoice) drawFences(c, view, ink, v, v.id === store.selectedId);
-  for (const v of byChoice) drawCraft(c, view, ink, v, v.id === store.selectedId);
+  for (const v of byChoice) drawCraft(c, viewOf(view, v), ink, v, v.id === store.selectedId);
   drawMeasure(c, view, ink);
   if (byKeys()) drawCross(c);
   drawScaleBar(c, view, ink);
@@ -185,10 +188,16 @@ function draw() {
   readout();
 }
 
+/** The surface's position while its GPS knows it, or null. */
+function surfaceAt() {
+  const p = store.snapshot?.position;
+  return p?.is_good && p.x_m !== null ? p : null;
+}
+
 function drawMap(c, vehicle) {
   const map = store.maps.get(vehicle.id);
   if (!map || map.width === 0) return;
-  const [west, south, east, north] = rectangle(map);
+  const [west, south, east, north] = boxInWorld(vehicle, rectangle(map));
   const [left, top] = view.toScreen(west, north);
   const [right, bottom] = view.toScreen(east, south);
   c.imageSmoothingEnabled = (right - left) / map.width < 1;

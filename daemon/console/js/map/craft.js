@@ -19,9 +19,21 @@ export function drawCraft(c, view, ink, vehicle, chosen) {
   c.globalAlpha = 1;
 }
 
-/** The surface end of the link, where the server says where it is. */
+/** The surface vehicle where its GPS has it: its bow, and two standard deviations. */
 export function drawSurface(c, view, ink, surface) {
   const [px, py] = view.toScreen(surface.x_m, surface.y_m);
+  drawSigma(c, view, surface, ink.craft);
+  if (surface.heading_deg !== null) {
+    const bow = (surface.heading_deg * Math.PI) / 180;
+    for (const [style, width] of [[ink.sea, 5], [ink.text, 2]]) {
+      c.strokeStyle = style;
+      c.lineWidth = width;
+      c.beginPath();
+      c.moveTo(px, py);
+      c.lineTo(px + 16 * Math.sin(bow), py - 16 * Math.cos(bow));
+      c.stroke();
+    }
+  }
   c.lineWidth = 3;
   c.strokeStyle = ink.sea;
   c.strokeRect(px - 7, py - 7, 14, 14);

@@ -5,8 +5,9 @@ import { metres, minus, none, percent, span } from "../format.js";
 import { nameOf, shownAs } from "../book.js";
 import { ageOf, store } from "../store.js";
 import { blockAt } from "./coarse.js";
+import { onMap } from "./frames.js";
 
-/** The cell under (x, y) metres: {label, ageS, planes} or null when outside the map; each plane with its own age. */
+/** The cell under (x, y) metres of the map's frame: {label, ageS, planes} or null when outside the map; each plane with its own age. */
 export function cellAt(map, x, y) {
   const cx = Math.floor(x / map.cell_m) - map.x0;
   const cy = Math.floor(y / map.cell_m) - map.y0;
@@ -31,16 +32,17 @@ export function showReadout(world) {
   const plate = $("readout");
   show(plate, world !== null);
   if (world === null) return null;
-  const cell = store.map ? cellAt(store.map, ...world) : null;
+  const own = onMap(store.vehicle, ...world);
+  const cell = store.map ? cellAt(store.map, ...own) : null;
   const parts = [`E ${metres(world[0])}  N ${metres(world[1])}`];
   const origin = store.snapshot?.mission.origin;
-  if (origin) parts.push(latLon(origin, ...inWorld(store.vehicle, ...world)));
+  if (origin) parts.push(latLon(origin, ...world));
   if (cell) {
     parts.push(nameOf(shownAs(cell.label)));
     parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
     for (const p of cell.planes) parts.push(`${p.name} ${levelOf(p)}${p.ageS === null ? "" : `, heard ${span(p.ageS)} ago`}`);
   } else {
-    const block = store.map ? coarseAt(store.map, ...world) : null;
+    const block = store.map ? coarseAt(store.map, ...own) : null;
     parts.push(block === null ? "unexplored" : `not sent; ${nameOf(shownAs(block))} at the one cell sent of 16 around`);
   }
   text(plate, parts.join("  ·  "));
@@ -72,12 +74,6 @@ export function toLatLon(origin, x, y) {
   const north = lat - ((n * t) / meridianRadius(lat)) * (d ** 2 / 2 - ((5 + 3 * t * t + 10 * c) * d ** 4) / 24);
   const east = (d - ((1 + 2 * t * t + c) * d ** 3) / 6) / Math.cos(lat);
   return [(north * 180) / Math.PI, origin.lon_deg + (east * 180) / Math.PI];
-}
-
-/** A place of a vehicle's map in the world: east and north of the mission's origin, metres. */
-export function inWorld(vehicle, x, y) {
-  const by = vehicle?.map?.placement;
-  return by ? [x + by.east_m, y + by.north_m] : [x, y];
 }
 
 function latLon(origin, x, y) {

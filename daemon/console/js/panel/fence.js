@@ -130,7 +130,7 @@ export function update() {
   text(state, describe(vehicle));
   const by = vehicle.map.placement;
   show(frame, Boolean(by));
-  if (by) text(frame, `In metres of its own map, which lies ${metres(by.east_m)} east and ${metres(by.north_m)} north in the world.`);
+  if (by) text(frame, `In metres of the world. Fixes have moved its map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
   show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && Boolean(vehicle.fence_in_force));
 }
 

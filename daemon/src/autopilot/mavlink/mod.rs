@@ -243,14 +243,14 @@ impl Mavlink {
         // A clock that went back is another run of the autopilot.
         if passed_ms == 0 || u128::from(passed_ms) > BRIDGED.as_millis() {
             self.count("gaps");
-            return;
+            return self.push_step(0.0, 0.0, &pose, pose.heard.since(before.heard));
         }
         let passed_s = f64::from(passed_ms) / 1000.0;
         let mean = |a: f64, b: f64| (a + b) / 2.0 * passed_s;
         let (dx_m, dy_m) = (mean(before.velocity.0, pose.velocity.0), mean(before.velocity.1, pose.velocity.1));
         if dx_m.hypot(dy_m) > 20.0 * passed_s {
             self.count("absurd_velocities");
-            return;
+            return self.push_step(0.0, 0.0, &pose, Duration::from_secs_f64(passed_s));
         }
         if let Some(goal) = &mut self.goal {
             (goal.east_m, goal.north_m) = (goal.east_m - dx_m, goal.north_m - dy_m);
@@ -258,9 +258,13 @@ impl Mavlink {
         if let Some((place, ..)) = &mut self.place {
             *place = moved(*place, dx_m, dy_m);
         }
+        self.push_step(dx_m, dy_m, &pose, Duration::ZERO);
+    }
+
+    fn push_step(&mut self, dx_m: f64, dy_m: f64, pose: &Pose, unseen: Duration) {
         if self.steps.len() < MOST_WAITING {
             let heading_rad = self.yaw.unwrap_or(0.0);
-            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m: pose.depth_m });
+            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m: pose.depth_m, unseen });
         }
     }
 

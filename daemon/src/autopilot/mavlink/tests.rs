@@ -88,6 +88,23 @@ fn a_target_is_said_anew_each_second_as_way_from_where_it_is() {
 }
 
 #[test]
+fn what_nobody_measured_is_told_as_unseen() {
+    let mut pilot = pilot(false);
+    let east = |ms: u32, s: f64, pilot: &mut Mavlink| {
+        pilot.handle_bytes(&local(ms, [0.0; 3], [0.0, 1.0, 0.0]), at(s));
+        let step = pilot.poll_step().map(|s| (s.dx_m, s.unseen.as_secs()));
+        assert_eq!(pilot.poll_step(), None);
+        step
+    };
+    pilot.handle_bytes(&heartbeat(4, true), at(0.0));
+    assert_eq!(east(1000, 0.0, &mut pilot), None);
+    assert_eq!(east(2000, 1.0, &mut pilot), Some((1.0, 0)));
+    assert_eq!(east(62_000, 61.0, &mut pilot), Some((0.0, 60)), "a minute of silence");
+    assert_eq!(east(500, 91.0, &mut pilot), Some((0.0, 30)), "its clock began anew: it was off");
+    assert_eq!(east(1500, 92.0, &mut pilot), Some((1.0, 0)));
+}
+
+#[test]
 fn a_pilot_who_takes_over_is_obeyed() {
     let mut pilot = pilot(true);
     pilot.set_goal(GOAL, at(0.0));
@@ -158,6 +175,12 @@ fn frames_of_others_and_absurd_numbers_are_counted() {
     pilot.handle_bytes(&local(0, [f32::NAN; 3], [0.0; 3]), at(0.0));
     pilot.handle_bytes(&local(0, [0.0; 3], [1e9, 0.0, 0.0]), at(0.0));
     pilot.handle_bytes(&local(1000, [0.0; 3], [1e9, 0.0, 0.0]), at(1.0));
+    let step = pilot.poll_step().unwrap();
+    assert_eq!(
+        (step.dx_m, step.dy_m, step.unseen),
+        (0.0, 0.0, Duration::from_secs(1)),
+        "no way, but no certainty either"
+    );
     assert_eq!(pilot.poll_step(), None);
     let counters = pilot.counters();
     assert_eq!((counters["other_systems"], counters["unreadable"], counters["absurd_velocities"]), (1, 1, 1));

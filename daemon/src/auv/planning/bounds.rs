@@ -30,6 +30,16 @@ impl Area {
         }
     }
 
+    /// The same area elsewhere.
+    pub fn moved(&self, east_m: f64, north_m: f64) -> Self {
+        Self {
+            west: self.west + east_m,
+            south: self.south + north_m,
+            east: self.east + east_m,
+            north: self.north + north_m,
+        }
+    }
+
     /// Whether a place lies inside or on the edge.
     pub fn contains(&self, (x, y): Point) -> bool {
         (self.west..=self.east).contains(&x) && (self.south..=self.north).contains(&y)

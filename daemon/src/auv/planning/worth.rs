@@ -1,5 +1,6 @@
 //! What it is worth to see each part of the sea floor next.
 
+use super::bounds::Point;
 use super::expect::{Expectation, Seen};
 use super::lattice::{Lattice, Node};
 use scenecast_protocol::directive::Utility;
@@ -43,8 +44,15 @@ pub struct Worth {
 pub type Shown = [usize; 4];
 
 impl Worth {
-    /// Worth by the operator's utility, in whole cells of weight 1. Beyond the cells of `area` nothing is worth anything.
-    pub fn new(lattice: &Lattice, window: &Window, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Self {
+    /// Worth by the operator's utility, in whole cells of weight 1. Beyond the cells of the window nothing is worth anything;
+    /// with it goes where its cells lie in the world.
+    pub fn new(
+        lattice: &Lattice,
+        (window, placed): (&Window, Point),
+        map: &LabelGrid,
+        known: &Knowledge,
+        utility: &Utility,
+    ) -> Self {
         let (places, rows) = lattice.size();
         let columns = places + 1;
         let mut worth = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
@@ -52,12 +60,12 @@ impl Worth {
         let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
         let cells = window.worth_of_cells(map, known, utility);
         for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
-            let y = block(window.centre(row, window.y), south_west.1);
+            let y = block(window.centre(row, window.y) + placed.1, south_west.1);
             if !(0..=rows as i64).contains(&y) {
                 continue;
             }
             for (column, value) in (0..).zip(line) {
-                let x = block(window.centre(column, window.x), south_west.0);
+                let x = block(window.centre(column, window.x) + placed.0, south_west.0);
                 if (0..columns as i64).contains(&x) {
                     worth.blocks[y as usize * columns + x as usize] += value;
                 }

@@ -1,7 +1,7 @@
 //! What the vehicle does next, and what it says of it.
 
 use super::{Vehicle, VehicleOutput};
-use crate::auv::planning::distance;
+use crate::auv::planning::{Point, distance};
 use crate::auv::steering::Course;
 use scenecast_protocol::directive::{Constraints, Fence, Limits, PlannerKind, Reaction};
 use scenecast_protocol::time::Instant;
@@ -53,7 +53,7 @@ impl Vehicle {
         if self.done {
             return;
         }
-        let at = self.navigator.position();
+        let at = self.placed();
         self.watch(at);
         let is_limited = self.guard.left_m().is_finite();
         let home_m = if is_limited { self.steering.way_home_m(at) } else { 0.0 };
@@ -66,7 +66,22 @@ impl Vehicle {
         self.record();
     }
 
-    fn watch(&mut self, at: (f64, f64)) {
+    /// Where it believes to be in the world. When that has moved under it, the way is chosen afresh: the rest of the last leg
+    /// might cross an outline now.
+    fn placed(&mut self) -> Point {
+        let (east, north) = self.navigator.to_world((0.0, 0.0));
+        if (east, north) != self.steering.placed() {
+            self.steering.set_placement(east, north);
+            self.waypoint = None;
+        }
+        self.navigator.to_world(self.navigator.position())
+    }
+
+    fn is_reached(&self, waypoint: Point) -> bool {
+        distance(waypoint, self.navigator.position()) < self.steering.arrival_m()
+    }
+
+    fn watch(&mut self, at: Point) {
         if !self.steering.bounds().holds(at) {
             self.guard.handle_breach(ModeReason::Fence);
         }
@@ -90,9 +105,9 @@ impl Vehicle {
         }
     }
 
-    fn survey(&mut self, at: (f64, f64)) {
+    fn survey(&mut self, at: Point) {
         let is_back = self.course.motion != Motion::Going || self.course.mode != VehicleMode::Survey;
-        if !is_back && self.waypoint.is_some_and(|w| distance(w, at) >= self.steering.arrival_m()) {
+        if !is_back && self.waypoint.is_some_and(|w| !self.is_reached(w)) {
             return;
         }
         let map = self.whole_png.as_ref().map_or_else(|| self.link.map(), super::WholePng::map);
@@ -106,9 +121,9 @@ impl Vehicle {
         }
     }
 
-    fn go_home(&mut self, at: (f64, f64), why: ModeReason) {
+    fn go_home(&mut self, at: Point, why: ModeReason) {
         let is_on_way = self.course.mode == VehicleMode::Return && self.course.motion == Motion::Going;
-        if is_on_way && self.waypoint.is_some_and(|w| distance(w, at) >= self.steering.arrival_m()) {
+        if is_on_way && self.waypoint.is_some_and(|w| !self.is_reached(w)) {
             return;
         }
         match self.steering.next_home(at) {
@@ -118,8 +133,10 @@ impl Vehicle {
         }
     }
 
-    fn go(&mut self, to: (f64, f64), mode: VehicleMode, reason: ModeReason) {
+    /// Goes to a place of the world; the host goes by the vehicle's own reckoning.
+    fn go(&mut self, to: Point, mode: VehicleMode, reason: ModeReason) {
         self.course = Doing { motion: Motion::Going, mode, reason, ..self.course };
+        let to = self.navigator.to_map(to);
         self.waypoint = Some(to);
         self.outputs.push_back(VehicleOutput::Waypoint(to.0, to.1));
     }

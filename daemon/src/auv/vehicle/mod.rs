@@ -71,7 +71,7 @@ pub enum VehicleOutput {
     /// Make [`Vehicle::durable`] durable, then call [`Vehicle::handle_persisted`]. If that fails, do nothing that is asked
     /// for later, and send nothing.
     Persist,
-    /// Go there, metres east and north.
+    /// Go there, metres east and north in the map's frame.
     Waypoint(f64, f64),
     /// Stay where you are.
     Hold,

@@ -1,7 +1,7 @@
 //! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
 
 use super::{Vehicle, VehicleOutput};
-use crate::auv::{Area, Durable, MapUpdate};
+use crate::auv::{Area, Durable, MapUpdate, Navigator};
 use crate::config::Config;
 use crate::ends;
 use crate::rehearsal::motion::Motion;
@@ -77,7 +77,8 @@ impl Sea {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Waypoint(x, y) => {
-                    self.check(at, (x, y));
+                    let navigator = self.vehicle.navigator();
+                    self.check(navigator.to_world(at), navigator.to_world((x, y)));
                     self.motion.set_target(Some((x, y)));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
@@ -192,6 +193,32 @@ fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
     sea.tell(Slot::Constraints(Constraints::default()));
     sea.step();
     assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
+}
+
+#[test]
+fn a_fence_stays_where_it_is_in_the_world_when_a_fix_moves_the_map() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
+    sea.tell(Slot::Fence(small_fence()));
+    sea.step();
+    let fix = |sea: &mut Sea, x, y| sea.vehicle.navigator.handle_fix(x, y, 0.1, sea.now, sea.now);
+    assert!(fix(&mut sea, 18.0, 10.0).is_used());
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
+    let (east, _) = sea.vehicle.waypoint().unwrap();
+    assert!(east < 12.0, "{east}: 20 m east of the origin is 12 m east on its map now");
+    // Its own reckoning stays within the numbers of the fence all the time.
+    sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
+    assert!(fix(&mut sea, 24.0, 10.0).is_used());
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Return, ModeReason::Fence));
+    let (x, y) = (0..200)
+        .map(|_| sea.step())
+        .last()
+        .map(|()| sea.vehicle.navigator())
+        .map(|n| n.to_world(n.position()))
+        .unwrap();
+    assert!((x - 5.0).hypot(y - 5.0) < 1.0, "({x}, {y}): the return point is of the world, too");
 }
 
 #[test]

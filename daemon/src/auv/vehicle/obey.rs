@@ -80,7 +80,7 @@ impl Vehicle {
     /// one, and hold and abort, stay at hand.
     fn apply_fence(&mut self, fence: &Fence) -> Result<(), RefusalReason> {
         fence.check().map_err(|_| RefusalReason::Contradiction)?;
-        let (x, y) = self.navigator.position();
+        let (x, y) = self.navigator.to_world(self.navigator.position());
         let is_inside = Place::from_metres(x, y).is_some_and(|at| fence.allows(at));
         if fence.outlines().next().is_some() && !is_inside {
             return Err(RefusalReason::Outside);

@@ -7,6 +7,7 @@ use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
 /// Where the vehicle was at its last fix; decimetres, so that it compares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,6 +58,13 @@ impl Vehicle {
         let before = self.navigator.position();
         self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
         self.guard.handle_way(distance(before, (x_m, y_m)));
+    }
+
+    /// For so long nobody measured the way: it may be anywhere that it could have gone to, and counts as gone there.
+    pub fn handle_unseen(&mut self, time: Duration) {
+        let metres = time.as_secs_f64() * self.guard.speed_m_s();
+        self.navigator.handle_unseen_way(metres);
+        self.guard.handle_way(metres);
     }
 
     /// Labels of cells as the vehicle sees them.

@@ -11,8 +11,8 @@ const FILE: &str = "\
 Example: scenecast ctl fence set fence.geojson --wait 120
 
 A feature's property `role` says what it is: fence (a Polygon; the one without a role), keep_out (Polygons), return_point
-(a Point). Coordinates are longitude and latitude, WGS 84, where the mission has an origin, else metres east and north.
-The vehicle keeps the fence in the metres of its own map.";
+(a Point). Coordinates are longitude and latitude, WGS 84, where the mission has an origin, else metres east and north
+of it.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FenceCommand {
@@ -21,7 +21,7 @@ pub(super) enum FenceCommand {
     Set {
         /// GeoJSON file
         file: PathBuf,
-        /// The coordinates are metres east and north of the origin, in the frame of the vehicle's map
+        /// The coordinates are metres east and north of the origin
         #[arg(long)]
         metres: bool,
     },

@@ -89,7 +89,8 @@ impl Mission {
             match output {
                 VehicleOutput::Persist => self.vehicle.handle_persisted(),
                 VehicleOutput::Waypoint(x, y) => {
-                    self.legs.push((self.vehicle.navigator().position(), (x, y)));
+                    let navigator = self.vehicle.navigator();
+                    self.legs.push((navigator.to_world(navigator.position()), navigator.to_world((x, y))));
                     self.motion.set_target(Some((x, y)));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),

@@ -50,7 +50,7 @@ struct Timetable {
     look: Instant,
 }
 
-/// From where to where, metres east and north.
+/// From where to where in the world, metres east and north.
 pub type Leg = ((f64, f64), (f64, f64));
 
 /// A mission under way.
