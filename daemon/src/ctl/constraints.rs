@@ -110,7 +110,7 @@ impl<T: PartialEq> Told<'_, T> {
         if slot.state != LifeLine::Applied {
             match self.in_force {
                 Some(f) => out += &format!("in force: version {}\n{}", f.version, text(&f.order)),
-                None => out += "in force: what the vehicle had before the surface started\n",
+                None => out += "in force: not known here\n",
             }
         }
         out

@@ -30,6 +30,11 @@ pub trait StateSource: Debug {
     /// About how many bytes wait for their first or next transmission, without what is held back.
     fn backlog_bytes(&self) -> usize;
 
+    /// The same for people: a turn would rather be too long than too short, a person is told what is likely.
+    fn told_backlog_bytes(&self) -> usize {
+        self.backlog_bytes()
+    }
+
     /// Whether nothing waits or is on its way, though something may be held back.
     fn is_quiet(&self) -> bool {
         self.is_settled()

@@ -96,4 +96,17 @@ export default [
       assert.equal(await s.page.locator(".banner").count(), 1);
     },
   },
+  {
+    name: "a map that cannot be told says why",
+    scenario: "rich",
+    async run(s) {
+      const why = "the map spans 4000000001 x 10 cells: at most 8388608 are told";
+      await s.page.route("**/vehicles/1/map", (route) => route.fulfill({ status: 422, contentType: "application/json", body: JSON.stringify({ error: why }) }));
+      await s.steer({ loss: 0, advance: 14 });
+      await s.shows("#banners", /map of auv-1 is not up to date here.*4000000001 x 10 cells/s);
+      await s.page.unroute("**/vehicles/1/map");
+      await s.until("the banner to go", async () => !(await banner(s).isVisible()), { advance: 14 });
+    },
+    tolerates: /422/,
+  },
 ];

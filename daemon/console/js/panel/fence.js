@@ -147,5 +147,5 @@ function describe(vehicle) {
   if (slot.state === "applied") return "In force as drawn with solid lines.";
   const before = vehicle.fence_in_force;
   if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
-  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "Until then the vehicle keeps what it had before the surface started.";
+  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "Which one is in force meanwhile is not known here.";
 }

@@ -109,7 +109,7 @@ function describe(vehicle) {
   if (!slot) return "None were sent since the surface started; the vehicle keeps what it has.";
   if (slot.state === "applied") return "In force as sent last.";
   const before = vehicle.limits_in_force;
-  if (!before) return "Until then the vehicle keeps what it had before the surface started.";
+  if (!before) return "Which ones are in force meanwhile is not known here.";
   const words = Object.entries(stated(before.order)).map(([key, value]) => `${WORDS[key]} ${value.join?.(" to ") ?? value}`);
   return `In force meanwhile: version ${before.version}: ${words.join("; ") || "no limits"}.`;
 }

@@ -79,16 +79,16 @@ impl<S: StateSource> VehicleLink<S> {
         answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
     }
 
-    /// About how many bytes wait and may be sent.
+    /// What waits and may be sent, for people.
     pub(super) fn backlog(&self, now: Instant) -> Backlog {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let others = self.plane_backlog(now) + self.objects.backlog_bytes();
-        Backlog { map_bytes: bytes(self.source.backlog_bytes()), other_bytes: bytes(others) }
+        Backlog { map_bytes: bytes(self.source.told_backlog_bytes()), other_bytes: bytes(others) }
     }
 
+    /// About how many bytes wait and may be sent.
     fn backlog_bytes(&self, now: Instant) -> usize {
-        let Backlog { map_bytes, other_bytes } = self.backlog(now);
-        map_bytes.saturating_add(other_bytes) as usize
+        self.source.backlog_bytes() + self.plane_backlog(now) + self.objects.backlog_bytes()
     }
 
     /// When something that is held back becomes due.
