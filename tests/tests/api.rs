@@ -95,7 +95,10 @@ fn wrong_usage_is_told_from_a_surface_that_does_not_answer() {
 #[test]
 fn a_vehicle_is_fenced_limited_held_and_sent_on_from_a_shell() {
     let (port, dir) = (free_port(), scratch("ctl-constraints"));
-    let _demo = demo(port, &["--duration", "3000"]);
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "8", "--duration", "3000"]);
+    wait_until("the vehicle tells where it is", LIMIT, || {
+        state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null())
+    });
     let file = |name: &str, text: &str| {
         std::fs::write(dir.join(name), text).unwrap();
         dir.join(name).display().to_string()
