@@ -11,7 +11,8 @@ use std::path::PathBuf;
 ///
 /// Label maps are those of the scene model, on procedural reefs and on annotated images; the operator favours one class
 /// through the labels that cover it. A map is seen bit by bit. The unit is what a metre
-/// brings where all in sight is new, on the mean of the scene. Takes a minute or two; the same seed gives the same table.
+/// brings where all in sight is new, on the mean of the scene. `told all` is what `horizon` would collect if it knew the whole
+/// map before it starts, about the most that the limit allows. Takes a few minutes; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench planning --seed 3 --out tracks")]
 pub(super) struct Planning {
@@ -39,7 +40,9 @@ impl Planning {
             std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, e))?;
         }
         if !self.json {
-            println!("scene             lawnmower   greedy  horizon  horizon/lawnmower  horizon/greedy  violations");
+            println!(
+                "scene             lawnmower   greedy  horizon  told all  horizon/lawnmower  horizon/greedy  violations"
+            );
         }
         let mut progress = Progress::new("planning");
         let table = drive_all(self.seed, &images, &mut |share, trial| {
@@ -55,7 +58,7 @@ impl Planning {
             return Ok(());
         }
         let m = table.median;
-        println!("{:<17} {:>9.3} {:>8.3} {:>8.3}", "median", m.lawnmower, m.greedy, m.horizon);
+        println!("{:<17} {:>9.3} {:>8.3} {:>8.3} {:>9.3}", "median", m.lawnmower, m.greedy, m.horizon, table.told_all);
         println!(
             "horizon: {:.2} x lawnmower, {:.2} x greedy; {} violations; {} seeds",
             m.horizon / m.lawnmower.max(1e-9),
@@ -76,8 +79,9 @@ impl Planning {
 fn print_trial(t: &Trial) {
     let [lawnmower, greedy, horizon] = t.utility_per_m;
     println!(
-        "{:<17} {lawnmower:>9.3} {greedy:>8.3} {horizon:>8.3} {:>18.2} {:>15.2} {:>11}",
+        "{:<17} {lawnmower:>9.3} {greedy:>8.3} {horizon:>8.3} {:>9.3} {:>18.2} {:>15.2} {:>11}",
         t.name,
+        t.told_all_per_m,
         horizon / lawnmower.max(1e-9),
         horizon / greedy.max(1e-9),
         t.violations

@@ -5,9 +5,10 @@ use crate::asv::Surface;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 
-/// Where x = y = 0 of the world is on the Earth; nothing while the surface's instruments do not know.
+/// Where x = y = 0 of the world is on the Earth; nothing while the surface's instruments do not know, and of a rehearsal that
+/// is nowhere: both 0 is no place, as in the configuration.
 pub(super) fn origin(surface: &Surface) -> Option<state::Origin> {
-    let origin = surface.relay()?.plane()?.origin();
+    let origin = surface.relay()?.plane().map(|p| p.origin()).filter(|o| (o.lat_deg, o.lon_deg) != (0.0, 0.0))?;
     Some(state::Origin { lat_deg: origin.lat_deg, lon_deg: origin.lon_deg })
 }
 

@@ -4,6 +4,7 @@ mod baseline;
 pub mod docked;
 mod fidelity;
 mod frames_log;
+mod instruments;
 pub mod link_bench;
 mod localisation;
 mod meter;

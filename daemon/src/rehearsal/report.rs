@@ -32,7 +32,7 @@ pub fn report(mission: &Mission, scenario: &str) -> Report {
         "link": link(mission),
         "directives": directives(mission),
         "exemplars": exemplars(mission),
-        "fixes": { "sent": mission.fixes_sent, "applied": mission.vehicle.fixes_applied() },
+        "fixes": { "sent": mission.surface.relay().map_or(0, |r| r.fixes()), "applied": mission.vehicle.fixes_applied() },
         "survey": survey(mission),
     });
     Report { figures }

@@ -62,3 +62,60 @@ pub fn planner(kind: PlannerKind) -> Box<dyn Planner> {
         PlannerKind::Horizon => Box::new(Horizon::default()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use scenecast_protocol::directive::{Fence, Place, Polygon, Utility};
+    use scenecast_protocol::map::{Cell, LabelGrid};
+
+    const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
+
+    /// The answer of a planner on a patchy map with a keep-out, and whether each of its places may be gone to.
+    fn ask(kind: PlannerKind, corner: (i32, i32), start: usize, left_m: f64, weights: (i8, i8)) -> (Vec<Node>, bool) {
+        let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let (x, y) = corner;
+        let keep_out = Polygon(vec![place(x, y), place(x + 4, y + 1), place(x + 2, y + 5)]);
+        let bounds = Bounds::new(&Fence { keep_outs: vec![keep_out], ..Fence::default() }, 0.5);
+        let lattice = Lattice::new(AREA, &[], 0.9, &bounds);
+        let seen = (0..40).flat_map(|y| (0..50).map(move |x| (x, y)));
+        let map: LabelGrid = seen.map(|(x, y)| (Cell::new(x, y), ((x / 9 + y / 7) % 3 + 1) as u8)).collect();
+        let weights = [(1, weights.0), (2, weights.1)].into_iter().collect();
+        let utility = Utility { exploration: 5, weights, ..Utility::default() };
+        let worth = Worth::new(&lattice, (&Window::new(AREA, 0.25), (0.0, 0.0)), &map, &Knowledge::default(), &utility);
+        let open: Vec<Node> = (0..lattice.places()).filter(|&n| lattice.is_open(n)).collect();
+        let (from, home) = (open[start % open.len()], lattice.ways(open[(start / 7) % open.len()]));
+        let question = Question { lattice: &lattice, worth: &worth, from, home: &home, left_m };
+        let way = planner(kind).plan(&question);
+        let (mut at, mut gone_m, mut is_allowed) = (from, 0.0, true);
+        for &node in &way {
+            let step = lattice.around(at).find(|(n, _)| *n == node).map_or(f64::INFINITY, |(_, step)| step);
+            (at, gone_m) = (node, gone_m + step);
+            is_allowed &= bounds.allows(lattice.place(node)) && gone_m + home.metres[node] <= left_m + 1e-6;
+        }
+        (way, is_allowed)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn every_way_is_allowed_leaves_the_way_home_and_is_the_same_again(
+            corner in (1i32..15, 1i32..8), start in 0usize..100_000, left_m in 0.0f64..80.0,
+            weights in (-100i8..=100, -100i8..=100),
+        ) {
+            for kind in PlannerKind::ALL {
+                let (way, is_allowed) = ask(kind, corner, start, left_m, weights);
+                prop_assert!(is_allowed, "{kind:?}: {way:?}");
+                prop_assert_eq!(&way, &ask(kind, corner, start, left_m, weights).0);
+            }
+        }
+    }
+
+    #[test]
+    fn with_metres_left_every_planner_goes() {
+        for kind in PlannerKind::ALL {
+            assert!(!ask(kind, (8, 4), 200, 80.0, (100, 0)).0.is_empty(), "{kind:?}");
+        }
+    }
+}

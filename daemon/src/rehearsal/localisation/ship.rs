@@ -1,21 +1,17 @@
-//! The surface vehicle of a rehearsed localisation: its GPS, its compass, its relay, and its way above the vehicle.
+//! The surface vehicle of a rehearsed localisation: its instruments, its relay, and its way above the vehicle.
 
-use crate::asv::position::{
-    Follow, GpsLanguage, LatLon, Mounting, Relay, RelayConfig, TangentPlane, UsblSighting, nmea,
-};
+use crate::asv::position::{Follow, GpsLanguage, LatLon, Mounting, Relay, RelayConfig, UsblSighting};
+use crate::rehearsal::instruments::{Instruments, Receiver};
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use sim_channel::Stream;
 use std::time::Duration;
 
 /// Where the rehearsal lies; any place would do.
 const ORIGIN: LatLon = LatLon { lat_deg: 29.5, lon_deg: 34.92 };
 const SPEED_M_S: f64 = 1.5;
-/// White noise of the receiver, metres; beside it an error of as much that changes over minutes.
-const GPS_SIGMA_M: f64 = 1.0;
-/// Standard deviation of the compass, degrees.
-const COMPASS_SIGMA_DEG: f64 = 0.5;
+/// A plain receiver.
+const RECEIVER: Receiver = Receiver { origin: ORIGIN, sigma_m: 1.0, hdop: 0.9, is_corrected: false };
 
 pub(super) struct Ship {
     pub(super) at: (f64, f64),
@@ -23,9 +19,7 @@ pub(super) struct Ship {
     follow: Follow,
     target: (f64, f64),
     heading_rad: f64,
-    plane: TangentPlane,
-    dice: Stream,
-    slow_error: (f64, f64),
+    instruments: Instruments,
     /// By how much the receiver is led astray, and for how many seconds more.
     astray: ((f64, f64), u32),
 }
@@ -45,9 +39,7 @@ impl Ship {
             follow: Follow::new(40.0, 20.0),
             target: (0.0, -40.0),
             heading_rad: 0.0,
-            plane: TangentPlane::new(ORIGIN),
-            dice: Stream::new(seed, &[9]),
-            slow_error: (0.0, 0.0),
+            instruments: Instruments::new(RECEIVER, seed),
             astray: ((0.0, 0.0), 0),
         }
     }
@@ -79,22 +71,11 @@ impl Ship {
     }
 
     fn tell(&mut self, second: u32, now: Instant) {
-        let [a, b, c, d, e] = [(); 5].map(|()| self.dice.normal());
-        let slow = |error: f64, draw: f64| error * 0.99 + GPS_SIGMA_M * 0.14 * draw;
-        self.slow_error = (slow(self.slow_error.0, a), slow(self.slow_error.1, b));
-        let ((mut off_x, mut off_y), left) = self.astray;
-        if left == 0 {
-            (off_x, off_y) = (0.0, 0.0);
-        }
+        let (off, left) = self.astray;
         self.astray.1 = left.saturating_sub(1);
-        let x = self.at.0 + self.slow_error.0 + GPS_SIGMA_M * c + off_x;
-        let y = self.at.1 + self.slow_error.1 + GPS_SIGMA_M * d + off_y;
-        let place = nmea::place_fields(self.plane.to_place(x, y));
-        let (h, m, s) = (second / 3600, second / 60 % 60, second % 60);
-        let gga = nmea::line(&format!("GPGGA,{h:02}{m:02}{s:02}.00,{place},1,09,0.9,0.0,M,0.0,M,,"));
-        let heading = (self.heading_rad.to_degrees() + COMPASS_SIGMA_DEG * e).rem_euclid(360.0);
-        let hdt = nmea::line(&format!("HEHDT,{heading:.2},T"));
-        self.relay.handle_gps((gga + &hdt).as_bytes(), now);
+        let off = if left == 0 { (0.0, 0.0) } else { off };
+        let said = self.instruments.say(self.at, self.heading_rad, off, second);
+        self.relay.handle_gps(said.as_bytes(), now);
     }
 
     /// The head told where it sees the vehicle, which says how deep it is.

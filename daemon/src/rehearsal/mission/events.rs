@@ -7,7 +7,7 @@ use crate::problem::Problem;
 use crate::rehearsal::docked::{self, Docked};
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::recording::RecordedFrame;
-use scenecast_protocol::directive::{Fix, SlotId};
+use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use sim_channel::{Outcome, Position};
@@ -78,6 +78,7 @@ impl Mission {
         }
         if now >= self.times.look {
             self.times.look = self.times.look + Duration::from_secs(1);
+            self.tell_position();
             self.look();
         }
         Ok(())
@@ -146,6 +147,9 @@ impl Mission {
         if self.recording.is_some() || self.ended.is_some() {
             return;
         }
+        if let Some(sighting) = self.anchored.poll_sighting(self.now) {
+            self.surface.handle_usbl(self.address, &sighting, self.now);
+        }
         self.vehicle.steer(self.now);
         self.pump();
         let o = self.motion.step(self.vehicle.navigator().position(), STEP_S);
@@ -154,9 +158,12 @@ impl Mission {
         self.place_vehicle();
     }
 
+    fn true_place(&self) -> Position {
+        Position::new(self.motion.x_m, self.motion.y_m, self.vehicle.navigator().depth_m())
+    }
+
     pub(super) fn place_vehicle(&mut self) {
-        let depth = self.vehicle.navigator().depth_m();
-        let place = Position::new(self.motion.x_m, self.motion.y_m, -depth);
+        let place = self.true_place();
         self.channel.place(VEHICLE, place);
         if let Some(docked) = &mut self.docked {
             docked.place(docked::VEHICLE, place);
@@ -227,17 +234,20 @@ impl Mission {
         Ok(())
     }
 
+    /// The surface's head asks where the vehicle is.
     fn fix(&mut self) {
         if self.recording.is_some() || self.ended.is_some() {
             return;
         }
-        let sigma_m = self.config.navigation.fix_sigma_m;
-        let x_m = self.motion.x_m + sigma_m * self.dice.normal();
-        let y_m = self.motion.y_m + sigma_m * self.dice.normal();
-        // The ranging signal was this long under way.
-        let range = self.channel.range_m(SURFACE, VEHICLE).unwrap_or(0.0);
-        let fix = Fix { x_m, y_m, sigma_m, age_s: range / self.config.channel.sound_speed_m_s };
-        self.fixes_sent += u64::from(self.surface.send_fix(self.address, fix, self.now).is_ok());
+        let range_m = self.channel.range_m(SURFACE, VEHICLE).unwrap_or(0.0);
+        let travel = Duration::from_secs_f64(range_m / self.config.channel.sound_speed_m_s);
+        self.anchored.range(&self.true_place(), travel, self.now);
+    }
+
+    /// A second has passed for the surface's instruments.
+    fn tell_position(&mut self) {
+        let said = self.anchored.say();
+        self.surface.handle_gps(said.as_bytes(), self.now);
     }
 
     pub(super) fn look(&mut self) {

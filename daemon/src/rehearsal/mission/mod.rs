@@ -1,5 +1,6 @@
 //! The loop of a rehearsal: the roles, the water and the sea floor on one virtual clock.
 
+mod anchored;
 mod carrier;
 mod events;
 
@@ -12,9 +13,10 @@ use super::script::Script;
 use super::world::World;
 use crate::asv::{Surface, SurfaceOutput};
 use crate::auv::{AppliedSlot, Area, Durable, MapUpdate, Mapper, Vehicle, cell_m};
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::ends;
 use crate::problem::Problem;
+use anchored::Anchored;
 use scene_model::project::Pose;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::mac::ModemProfile;
@@ -22,7 +24,7 @@ use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Position};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -69,7 +71,6 @@ pub struct Mission {
     pub(super) audits: [Audit; 2],
     pub(super) applied: Vec<AppliedSlot>,
     pub(super) issued: BTreeMap<(SlotId, u16), Instant>,
-    pub(super) fixes_sent: u64,
     pub(super) png_full_bytes: u64,
     pub(super) ended: Option<Instant>,
     pub(super) update: Option<MapUpdate>,
@@ -93,7 +94,7 @@ pub struct Mission {
     map_version: u64,
     picture_version: u64,
     heard_bits: u64,
-    dice: Stream,
+    anchored: Anchored,
     events: Vec<SurfaceOutput>,
 }
 
@@ -115,19 +116,20 @@ impl Mission {
             let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);
             return Err(Problem::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
         }
-        let dice = Stream::new(seed, &[2]);
         let vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
-        let surface = ends::surface(&config, surface_modem, seed ^ 0x5EA, now)?;
+        let mut surface = ends::surface(&config, surface_modem, seed ^ 0x5EA, now)?;
         let (x, y) = vehicle.navigator().position();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let mut channel = Channel::new(channel_config(&config), seed);
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
-        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, -1.0);
+        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
         channel.place(SURFACE, surface_place);
         if let Some(docked) = &mut docked {
             docked.place(docked::SURFACE, surface_place);
         }
+        let (anchored, relay) = Anchored::new(&config, surface_place, config::origin(&config)?, seed ^ 0x6B5);
+        surface.set_relay(relay);
         let script = match config.operator.script.as_str() {
             "scripted" => Script::of_survey(config.survey.duration_s),
             "fenced" => Script::fenced(config.survey.duration_s, area, config.survey.speed_m_s),
@@ -146,7 +148,6 @@ impl Mission {
             plane_meters: BTreeMap::new(),
             applied: Vec::new(),
             issued: BTreeMap::new(),
-            fixes_sent: 0,
             png_full_bytes: 0,
             ended: None,
             update: None,
@@ -171,7 +172,7 @@ impl Mission {
             script,
             recording,
             now,
-            dice,
+            anchored,
         };
         mission.place_vehicle();
         mission.pump();

@@ -93,8 +93,17 @@ impl Drive {
     }
 }
 
+/// What the planner is told of the sea floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Told {
+    /// What the vehicle has seen.
+    Seen,
+    /// All of it from the start: no vehicle can, so this is about what the limit lets anybody collect.
+    All,
+}
+
 /// Drives until what is left is the way back, and back.
-pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind) -> Drive {
+pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -> Drive {
     let sight = Footprint { across: SIGHT_M, along: SIGHT_M };
     let mut steering = Steering::new(scene.area, sight, CELL_M, kind, CLEARANCE_M);
     steering.set_fence(&task.fence);
@@ -104,9 +113,10 @@ pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind) -> Drive {
     drive.utility += look(scene, at, &mut map);
     for _ in 0..MOST_LEGS {
         let left_m = task.limit_m - drive.metres();
+        let known = if told == Told::All { &scene.labels } else { &map };
         let course = match is_back {
             true => steering.next_home(at),
-            false => steering.next(at, (&map, version), Some(&scene.utility), left_m),
+            false => steering.next(at, (known, version), Some(&scene.utility), left_m),
         };
         match course {
             Course::Go(to) => {

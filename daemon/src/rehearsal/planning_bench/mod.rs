@@ -5,7 +5,7 @@ mod picture;
 mod scene;
 
 use crate::problem::Problem;
-use drive::{Drive, Task};
+use drive::{Drive, Task, Told};
 pub use picture::picture;
 use scene::Scene;
 use scenecast_protocol::directive::PlannerKind;
@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Seeds of one run.
-pub const SEEDS: u64 = 16;
+pub const SEEDS: u64 = 32;
 
 /// One scene with one start, driven by every planner.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub struct Trial {
     pub name: String,
     /// Utility a metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
     pub utility_per_m: [f64; 3],
+    /// The same of `horizon` if it is told the whole map before it starts.
+    pub told_all_per_m: f64,
     /// Breaches of fence, keep-outs and limit, by the witness.
     pub violations: usize,
     pub(crate) scene: Scene,
@@ -46,6 +48,8 @@ pub struct PlanningTable {
     /// Utility collected a metre, in units of what a metre brings where all is new, on the mean of the scene: so rare and
     /// common classes weigh alike.
     pub median: Medians,
+    /// Median of `horizon` where it is told the whole map before it starts: what not knowing costs is between the two.
+    pub told_all: f64,
     /// Breaches of any constraint.
     pub violations: usize,
     /// Seeds.
@@ -72,7 +76,7 @@ pub fn drive_all(
     each: &mut dyn FnMut(f64, &Trial) -> Result<(), Problem>,
 ) -> Result<PlanningTable, Problem> {
     let real = images.iter().map(|(i, l)| Scene::from_files(i, l, seed)).collect::<Result<Vec<_>, _>>()?;
-    let mut found = Vec::new();
+    let (mut found, mut told_all) = (Vec::new(), Vec::new());
     let mut violations = 0;
     for n in 0..SEEDS {
         let reef = Scene::procedural(seed.wrapping_add(n));
@@ -81,21 +85,24 @@ pub fn drive_all(
             let trial = trial(scene, seed.wrapping_add(n));
             violations += trial.violations;
             found.push(trial.utility_per_m);
+            told_all.push(trial.told_all_per_m);
             each((n + 1) as f64 / SEEDS as f64, &trial)?;
         }
     }
     let [lawnmower, greedy, horizon] = [0, 1, 2].map(|i| median(found.iter().map(|f| f[i]).collect()));
-    Ok(PlanningTable { median: Medians { lawnmower, greedy, horizon }, violations, seeds: SEEDS })
+    let median_of = Medians { lawnmower, greedy, horizon };
+    Ok(PlanningTable { median: median_of, told_all: median(told_all), violations, seeds: SEEDS })
 }
 
 fn trial(scene: Scene, seed: u64) -> Trial {
     let task = Task::draw(&scene, seed);
-    let drives: Vec<Drive> = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind)).into();
-    let rate =
-        |i: usize| drives.get(i).map_or(0.0, |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9));
-    let utility_per_m = [rate(0), rate(1), rate(2)];
-    let violations = drives.iter().map(|d| d.violations(&task)).sum();
-    Trial { name: scene.name.clone(), utility_per_m, violations, scene, task, drives }
+    let drives = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind, Told::Seen));
+    let all = drive::drive(&scene, &task, PlannerKind::Horizon, Told::All);
+    let rate = |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9);
+    let utility_per_m = drives.each_ref().map(rate);
+    let told_all_per_m = rate(&all);
+    let violations = drives.iter().chain([&all]).map(|d| d.violations(&task)).sum();
+    Trial { name: scene.name.clone(), utility_per_m, told_all_per_m, violations, scene, task, drives: drives.into() }
 }
 
 /// Rounded to a thousandth.
@@ -120,6 +127,8 @@ mod tests {
         assert_eq!(a.utility_per_m, b.utility_per_m);
         assert_eq!(a.violations, 0);
         assert!(a.utility_per_m.iter().all(|&u| u > 0.0), "{:?}", a.utility_per_m);
+        let lawnmower = a.utility_per_m[0];
+        assert!(a.told_all_per_m > lawnmower, "{} against {lawnmower}", a.told_all_per_m);
         assert!(a.drives.iter().all(|d| d.metres() > 0.5 * a.task.limit_m), "the limit is made use of");
     }
 }
