@@ -14,8 +14,25 @@ pub fn colour(label: u8) -> [u8; 3] {
     [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]
 }
 
+/// Most cells of a map that is drawn or told as a rectangle: a few frames can claim two cells at the ends of the world.
+pub const MOST_CELLS: u64 = 1 << 23;
+
+/// Why a map is not drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// It spans too much.
+    #[error("the map spans {0} x {1} cells: at most {MOST_CELLS} are drawn")]
+    TooLarge(u32, u32),
+    /// The encoder has failed.
+    #[error(transparent)]
+    Png(#[from] png::EncodingError),
+}
+
 /// The map within `bounds` as an indexed PNG, north up; pixel value = label.
-pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, png::EncodingError> {
+pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, PictureError> {
+    if bounds.area() > MOST_CELLS {
+        return Err(PictureError::TooLarge(bounds.width, bounds.height));
+    }
     let highest = grid.iter().map(|(_, l)| l).max().unwrap_or(0);
     let depth = match highest {
         0..=1 => png::BitDepth::One,
@@ -50,7 +67,7 @@ pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, png::Enc
 }
 
 /// The whole map as an indexed PNG; one black pixel if nothing is explored.
-pub fn encode(grid: &LabelGrid) -> Result<Vec<u8>, png::EncodingError> {
+pub fn encode(grid: &LabelGrid) -> Result<Vec<u8>, PictureError> {
     encode_within(grid, grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 }))
 }
 
@@ -155,6 +172,18 @@ mod tests {
         assert!(decode(&encode_within(&grid, huge).unwrap(), 0, 0).is_err());
         let small = encode_within(&grid, Rect { x: 0, y: 0, width: 3, height: 2 }).unwrap();
         assert!(decode(&small, i32::MAX, i32::MAX).is_ok(), "a place at the end of the world is no panic");
+    }
+
+    #[test]
+    fn two_cells_at_the_ends_of_the_world_are_no_picture() {
+        let far: LabelGrid =
+            [(Cell::new(-2_000_000_000, 0), 1), (Cell::new(2_000_000_000, 9), 2)].into_iter().collect();
+        assert_eq!(
+            encode(&far).unwrap_err().to_string(),
+            "the map spans 4000000001 x 10 cells: at most 8388608 are drawn"
+        );
+        let beside = Rect { x: 0, y: 0, width: 1 << 12, height: (1 << 11) + 1 };
+        assert!(matches!(encode_within(&far, beside), Err(PictureError::TooLarge(..))));
     }
 
     #[test]

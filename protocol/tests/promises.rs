@@ -2,11 +2,11 @@
 
 mod pair;
 
-use pair::{Pair, Setup, Water, auv, hold, utility};
+use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::link::{DropReason, VehicleEvent};
 use scenecast_protocol::mac::Access;
-use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_protocol::map::{Cell, LabelGrid, StateSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::wire::{Address, Envelope, MissionId, Seal};
 use std::collections::BTreeMap;
@@ -220,4 +220,24 @@ fn each_end_knows_the_clock_of_the_other_and_the_way_between_them() {
         let apart = (f64::from(shown) / 1000.0 - now.as_secs_f64()).abs();
         assert!(error < 0.002 && apart < 0.01, "{error} {apart}");
     }
+}
+
+#[test]
+fn the_surface_knows_about_how_much_the_vehicle_has_still_to_send() {
+    let mut pair = Pair::new(5, Setup::new(256, 1000, Codec::Context), Water { loss: 0.2, ..STILL });
+    let told = |pair: &Pair| pair.surface.vehicle(auv()).and_then(|v| v.backlog()).map(|(b, _)| b.map_bytes as usize);
+    let mut compared = 0;
+    for phase in 0..10 {
+        pair.vehicle.set_map(patchy(200, phase).iter(), pair.now);
+        pair.run(pair.now + Duration::from_secs(30), false);
+        let (told, is) = (told(&pair), pair.vehicle.source().told_backlog_bytes());
+        if let Some(told) = told.filter(|_| phase > 2 && is > 300) {
+            // The vehicle goes on learning what its cells take, and does not count what is on its way.
+            assert!((is / 3..=is * 3).contains(&told), "{told} bytes are said to wait, and {is} do");
+            compared += 1;
+        }
+    }
+    pair.run(pair.now + Duration::from_secs(400), false);
+    assert!(compared >= 3, "the map was told too soon: {compared}");
+    assert_eq!((told(&pair), pair.is_converged()), (Some(0), true));
 }

@@ -9,8 +9,8 @@ use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement, Reader,
-    Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
+    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement,
+    Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -138,6 +138,7 @@ fn status() -> VehicleStatus {
         base_digest: 0xBEEF,
         budget_bps: 10_000,
         refused_frames: 3,
+        backlog: Backlog { map_bytes: 448, other_bytes: 15 },
         slots,
         placement: None,
     }
@@ -152,7 +153,7 @@ fn place(x_m: i32, y_m: i32) -> Place {
 fn answered() -> [(ChunkKind, Vec<u8>); 2] {
     let mut slots = [SlotReport::default(); SLOTS];
     slots[SlotId::Constraints.index()] = SlotReport { version_low: 1, state: SlotState::Applied };
-    let status = VehicleStatus { base_digest: 0, slots, refused_frames: 0, ..status() };
+    let status = VehicleStatus { base_digest: 0, slots, refused_frames: 0, backlog: Backlog::default(), ..status() };
     [(ChunkKind::Report, status.encode_report(99, 0).unwrap().0), (ChunkKind::Pose, status.encode_pose(99))]
 }
 
@@ -359,8 +360,8 @@ fn parts_of_a_frame_are_those_of_the_document() {
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
         ),
         (
-            "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, utility \
-             version 7 applied, fix version 2 refused (2)",
+            "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \
+             and 15 of all else wait, utility version 7 applied, fix version 2 refused (2)",
             status().encode_report(99, 0).unwrap().0,
         ),
         (

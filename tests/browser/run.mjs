@@ -1,10 +1,11 @@
 // Runs every user story of the operator's page in headless Chromium.
 //
-//   node run.mjs                        against the mock
-//   node run.mjs --url http://HOST:PORT against a running daemon (stories that need the mock are skipped)
+//   node run.mjs                          against the mock
+//   node run.mjs --url http://HOST:PORT   against a running daemon: stories that need no mock
+//   ... --token-file FILE                 against one with a token: how to get in
 //   --only A,B   only stories whose name holds A or B      --require   a missing browser is a failure
 
-import { existsSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
 import { LAUNCH } from "./browser.mjs";
 import { startMock } from "./mock/server.mjs";
 import { Stage } from "./stage.mjs";
@@ -14,12 +15,19 @@ const option = (name) => {
   return at > 0 ? process.argv[at + 1] : null;
 };
 
-const STORIES = ["map", "labels", "vehicle", "constraints", "model", "link", "truth", "export", "cloud", "access", "cost"];
+const STORIES = ["entrance", "map", "labels", "vehicle", "constraints", "model", "link", "truth", "export", "cloud", "access", "cost"];
 
 async function stories() {
   const modules = await Promise.all(STORIES.map((s) => import(`./stories/${s}.mjs`)));
   const only = option("only")?.split(",");
   return modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
+}
+
+/** What a story needs that is not here; null if it can be told. */
+function lacking(story, { mocked, token }) {
+  if (story.scenario && !mocked) return "the mock";
+  if (story.unmocked && mocked) return "a running daemon";
+  return Boolean(story.locked) === Boolean(token) ? null : story.locked ? "a daemon with a token" : "a daemon without a token";
 }
 
 async function main() {
@@ -31,9 +39,10 @@ async function main() {
   const url = option("url")?.replace(/\/$/, "");
   const mock = url ? null : await startMock();
   const browser = await chromium.launch(LAUNCH);
+  const scene = { url: url ?? mock.url, mocked: mock !== null, token: option("token-file") && readFileSync(option("token-file"), "utf8").trim() };
   const counts = { ok: 0, failed: 0, skipped: 0 };
   for (const story of await stories()) {
-    const outcome = await run(story, browser, url ?? mock.url, mock !== null);
+    const outcome = await run(story, browser, scene);
     counts[outcome] += 1;
   }
   await browser.close();
@@ -42,18 +51,20 @@ async function main() {
   return counts.failed > 0 ? 1 : 0;
 }
 
-async function run(story, browser, url, mocked) {
-  if (story.scenario && !mocked) {
-    console.log(`skip  ${story.name} (needs the mock)`);
+async function run(story, browser, scene) {
+  const lacks = lacking(story, scene);
+  if (lacks) {
+    console.log(`skip  ${story.name} (needs ${lacks})`);
     return "skipped";
   }
   const start = performance.now();
   const stage = new Stage();
   try {
-    await stage.open(browser, url, story, mocked);
+    await stage.open(browser, scene, story);
     await story.run(stage);
     stage.noErrors(story.tolerates);
     console.log(`ok    ${story.name} (${Math.round(performance.now() - start)} ms)`);
+    if (stage.figures.length > 0) console.log(`      figures: ${stage.figures.join(", ")}`);
     return "ok";
   } catch (error) {
     console.log(`FAIL  ${story.name}\n      ${String(error.stack ?? error).replaceAll("\n", "\n      ")}`);

@@ -116,9 +116,66 @@ fn wrong_usage_is_told_from_a_surface_that_does_not_answer() {
     assert_refused(&["ctl", "utility", "set", "3=2"], &["3=2", "-1 to 1"]);
     assert_refused(&["ctl", "utility", "set", "0=1"], &["0=1", "1 to 254"]);
     assert_refused(&["ctl", "budget", "set", "5"], &["5", "10..=10000000"]);
+    assert_refused(&["ctl", "abort"], &["--yes"]);
+    assert_refused(&["ctl", "limits", "set", "--depth", "30-5"], &["30-5", "LOW..HIGH"]);
     assert_refused(&["ctl", "map", "--out", "reef.tiff"], &["reef.tiff", ".geojson"]);
     assert_refused(&["ctl", "status", "--wait", "-1"], &["--wait"]);
     assert_refused(&["ctl", "status", "--token-file", "nowhere.token"], &["nowhere.token", "key token"]);
+}
+
+#[test]
+fn a_vehicle_is_fenced_limited_held_and_sent_on_from_a_shell() {
+    let (port, dir) = (free_port(), scratch("ctl-constraints"));
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "8", "--duration", "3000"]);
+    wait_until("the vehicle tells where it is", LIMIT, || {
+        state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null())
+    });
+    let file = |name: &str, text: &str| {
+        std::fs::write(dir.join(name), text).unwrap();
+        dir.join(name).display().to_string()
+    };
+    let applied = |arguments: &[&str]| {
+        let sent = ctl(port, &[arguments, &["--wait", "80"]].concat());
+        assert_eq!(sent.status.code(), Some(0), "{arguments:?}: {}", said(&sent));
+    };
+    let keep_out = r#"{"type": "Feature", "properties": {"role": "keep_out"},
+        "geometry": {"type": "Polygon", "coordinates": [[[70, 70], [75, 70], [75, 75], [70, 70]]]}}"#;
+    let fence = r#"{"type": "Feature", "properties": {},
+        "geometry": {"type": "Polygon", "coordinates": [[[-80, -80], [80, -80], [80, 80], [-80, 80], [-80, -80]]]}}"#;
+    let plan = format!(r#"{{"type": "FeatureCollection", "features": [{fence}, {keep_out}]}}"#);
+    applied(&["fence", "set", &file("fence.geojson", &plan)]);
+    applied(&["return-point", "set", "-5", "2.5"]);
+    let vehicle = || state(port).unwrap()["vehicles"][0].clone();
+    let order = &vehicle()["fence_in_force"]["order"];
+    assert_eq!((&order["return_point"][0], &order["keep_outs"][0][2][1]), (&(-5.0).into(), &75.0.into()));
+    assert!(said(&ctl(port, &["fence"])).contains("return point E -5.0 N 2.5"));
+
+    applied(&["limits", "set", "--depth", "0..60", "--on-silence", "hold"]);
+    applied(&["limits", "set", "--silence", "900", "--keep"]);
+    let limits = said(&ctl(port, &["limits"]));
+    assert!(limits.contains("0.0 to 60.0 m") && limits.contains("15 min"), "{limits}");
+
+    applied(&["hold"]);
+    wait_until("it holds", LIMIT, || vehicle()["status"]["mode"] == "hold");
+    applied(&["resume"]);
+    wait_until("it surveys", LIMIT, || vehicle()["status"]["mode"] == "survey");
+
+    // What the vehicle refuses, what it would never be sent, and what is no fence.
+    let elsewhere = fence.replace("-80", "300").replace("80", "400");
+    let refused = ctl(port, &["fence", "set", &file("elsewhere.geojson", &elsewhere), "--wait", "80"]);
+    assert!(refused.status.code() == Some(1) && said(&refused).contains("refused"), "{}", said(&refused));
+    assert!(said(&ctl(port, &["fence"])).contains("in force: version 2"));
+    let url = format!("http://127.0.0.1:{port}");
+    let crossed = fence.replace("[80, 80], [-80, 80]", "[-80, 80], [80, 80]");
+    let crossed = file("crossed.geojson", &crossed);
+    assert_refused(&["ctl", "--url", &url, "fence", "set", &crossed], &["crossed.geojson", "edge"]);
+    let line = file("line.geojson", &fence.replace("Polygon", "LineString"));
+    assert_refused(&["ctl", "--url", &url, "fence", "set", &line], &["line.geojson", "Polygon"]);
+    assert_refused(&["ctl", "--url", &url, "limits", "set", "--depth", "30..5"], &["depth_m", "below"]);
+    assert_refused(&["ctl", "--url", &url, "limits", "set", "--on-abort", "dive"], &["on_abort", "hold, return"]);
+    assert_refused(&["ctl", "--url", &url, "return-point", "set", "500", "0"], &["return_point", "outside"]);
+    applied(&["abort", "--yes"]);
+    wait_until("it has aborted", LIMIT, || vehicle()["status"]["mode"] != "survey");
 }
 
 #[test]

@@ -8,6 +8,8 @@ export const store = new (class extends EventTarget {
   feed = { state: "connecting", sinceMs: performance.now(), retryMs: 0 };
   selectedId = null;
   maps = new Map();
+  /** Why the map of a vehicle is not the newest, by vehicle. */
+  mapFaults = new Map();
   #fetching = new Set();
 
   /** Calls `fn` on each named event: state, map, feed, select, tick, book, highlight. */
@@ -70,9 +72,10 @@ export const store = new (class extends EventTarget {
       const map = await readMap(id);
       const said = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
       this.maps.set(id, { ...map, epoch: said?.epoch ?? 0, fetchedS: map.at_s ?? this.nowS });
+      this.mapFaults.delete(id);
       this.tell("map", { id });
     } catch (error) {
-      console.warn(`map of vehicle ${id}: ${error.message}`);
+      this.mapFaults.set(id, error.message);
     } finally {
       this.#fetching.delete(id);
     }

@@ -5,7 +5,7 @@ use super::pauses::Pauses;
 use super::settings::SettingsDesk;
 use crate::auv::Exemplar;
 use crate::modem::UsblLine;
-use scenecast_protocol::directive::{Fence, Limits, Requests, Utility};
+use scenecast_protocol::directive::{Fence, Limits, Requests, SlotId, Utility};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -22,6 +22,10 @@ pub struct Desk {
     pub fence: Option<Fence>,
     /// The limits that were sent last.
     pub limits: Option<Limits>,
+    /// The fence that it said last to obey, with its version.
+    pub fence_in_force: Option<(u16, Fence)>,
+    /// The limits that it said last to obey, with their version.
+    pub limits_in_force: Option<(u16, Limits)>,
     /// The settings that were asked for, and those in force.
     pub settings: SettingsDesk,
     /// Images of labels.
@@ -51,6 +55,8 @@ impl Desk {
             utility: Utility::default(),
             fence: None,
             limits: None,
+            fence_in_force: None,
+            limits_in_force: None,
             settings: SettingsDesk::default(),
             album: Album::default(),
             track: VecDeque::new(),
@@ -72,6 +78,15 @@ impl Desk {
         self.track.push_back((now, status.x_m, status.y_m));
         if self.track.len() > Self::TRACK {
             self.track.pop_front();
+        }
+    }
+
+    /// The vehicle obeys the version of a slot that was sent last.
+    pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
+        match slot {
+            SlotId::Fence => self.fence_in_force = self.fence.clone().map(|fence| (version, fence)),
+            SlotId::Limits => self.limits_in_force = self.limits.map(|limits| (version, limits)),
+            _ => {}
         }
     }
 

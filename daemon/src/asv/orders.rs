@@ -9,9 +9,11 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct FenceOrder {
     /// The vehicle stays inside; `None`: no fence.
+    #[schemars(length(min = 3, max = 34))]
     pub fence: Option<Vec<[f64; 2]>>,
     /// The vehicle stays outside of each.
     #[serde(default)]
+    #[schemars(length(max = 15), inner(length(min = 3, max = 34)))]
     pub keep_outs: Vec<Vec<[f64; 2]>>,
     /// Where it returns to; `None`: where its run began.
     pub return_point: Option<[f64; 2]>,
@@ -22,20 +24,28 @@ pub struct FenceOrder {
 #[serde(deny_unknown_fields)]
 pub struct LimitsOrder {
     /// Least and greatest depth, metres.
+    #[schemars(inner(range(min = 0.0, max = 6553.5)))]
     pub depth_m: Option<[f64; 2]>,
     /// Least and greatest altitude, metres.
+    #[schemars(inner(range(min = 0.0, max = 6553.5)))]
     pub altitude_m: Option<[f64; 2]>,
     /// Metres of way, the way back included.
+    #[schemars(range(min = 1, max = 16_777_215))]
     pub distance_m: Option<f64>,
     /// Seconds, the way back included.
+    #[schemars(range(min = 1, max = 16_777_215))]
     pub time_s: Option<f64>,
     /// Seconds that the surface may be silent.
+    #[schemars(range(min = 1, max = 65_535))]
     pub silence_s: Option<f64>,
     /// What to do then.
+    #[schemars(extend("enum" = ["hold", "return", "surface", null]))]
     pub on_silence: Option<String>,
     /// What to do on a breach.
+    #[schemars(extend("enum" = ["hold", "return", "surface", null]))]
     pub on_breach: Option<String>,
     /// What to do on an abort.
+    #[schemars(extend("enum" = ["hold", "return", "surface", null]))]
     pub on_abort: Option<String>,
 }
 

@@ -323,8 +323,14 @@ impl Surface {
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
             SurfaceEvent::SlotSettled(vehicle, slot) => {
-                if let Some(life) = self.life_of(vehicle, slot).filter(|_| slot == SlotId::Settings) {
-                    self.desks.get_mut(&vehicle)?.settings.handle_settled(life);
+                let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
+                let (life, version) = (settled.life, settled.version);
+                let desk = self.desks.get_mut(&vehicle)?;
+                if slot == SlotId::Settings {
+                    desk.settings.handle_settled(life);
+                }
+                if life == LifeLine::Applied {
+                    desk.handle_applied(slot, version);
                 }
                 self.handle_settled(vehicle, slot, now);
                 Some(SurfaceOutput::SlotSettled(vehicle, slot))

@@ -7,15 +7,13 @@ use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
 use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
+use crate::picture::MOST_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
-
-/// A few frames can claim two cells at the ends of the world.
-const MOST_CELLS: u64 = 1 << 23;
 
 /// A question or an order.
 #[derive(Debug, Clone, PartialEq)]

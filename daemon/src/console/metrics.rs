@@ -92,7 +92,7 @@ fn link(out: &mut String, state: &Everything) {
     figure(out, "scenecast_link_strangers_total", "counter", "Frames of no known vehicle, or unreadable.")
         .sample(&[], link.strangers as f64);
     if let Some(bits) = link.backlog_bits {
-        figure(out, "scenecast_link_backlog_bits", "gauge", "Bits that wait.").sample(&[], bits as f64);
+        figure(out, "scenecast_link_backlog_bits", "gauge", "Bits that wait at the vehicles.").sample(&[], bits as f64);
     }
 }
 
@@ -120,6 +120,8 @@ fn water(out: &mut String, state: &Everything) {
     each(out, state, "scenecast_vehicle_heard_age_seconds", heard, |v| v.heard_s.map(|at| state.now_s - at));
     let expected = "The longest pause between two frames that is usual: three times that is silence.";
     each(out, state, "scenecast_vehicle_expected_interval_seconds", expected, |v| Some(v.expected_interval_s));
+    let backlog = "Bits that the vehicle has still to send, by its last report less what has come in since.";
+    each(out, state, "scenecast_vehicle_backlog_bits", backlog, |v| Some(v.link.backlog.as_ref()?.bits as f64));
     let own = "Bits on air a second that the vehicle may send, as it says.";
     each(out, state, "scenecast_vehicle_budget_bits_per_second", own, |v| {
         v.status.as_ref().map(|s| f64::from(s.budget_bps))
@@ -129,6 +131,10 @@ fn water(out: &mut String, state: &Everything) {
 fn maps(out: &mut String, state: &Everything) {
     let age = "Mission time since the vehicle last spoke of its map.";
     each(out, state, "scenecast_map_age_seconds", age, |v| v.map.updated_s.map(|at| state.now_s - at));
+    let behind = "Bits by which the map lags behind the vehicle's.";
+    each(out, state, "scenecast_map_lag_bits", behind, |v| Some(v.link.backlog.as_ref()?.map_bits as f64));
+    let lag = "About how old the map is against the vehicle's.";
+    each(out, state, "scenecast_map_lag_seconds", lag, |v| v.link.backlog.as_ref()?.map_lag_s);
     each(out, state, "scenecast_map_cells", "Cells with a label.", |v| Some(f64::from(v.map.explored_cells)));
     each(out, state, "scenecast_map_labels", "Labels on the map.", |v| Some(v.labels.len() as f64));
     let mut versions = figure(out, "scenecast_map_versions_total", "counter", "Changes of the map.");

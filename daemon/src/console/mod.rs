@@ -6,6 +6,7 @@
 mod answer;
 mod assets;
 mod base64;
+mod body;
 mod compress;
 mod connections;
 mod events;

@@ -8,7 +8,9 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UtilityOrder {
-    /// -1 to 1 by label.
+    /// -1 to 1 by label, which must be on the map.
+    #[schemars(extend("propertyNames" = { "pattern": "^[1-9][0-9]{0,2}$" }))]
+    #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1, "maximum": 1 }))]
     pub weights: BTreeMap<String, f64>,
     /// -1 to 1 for unseen cells.
     #[serde(default)]
@@ -82,13 +84,18 @@ pub struct BudgetOrder {
 #[serde(deny_unknown_fields)]
 pub struct SharesOrder {
     /// Orders but for fixes.
+    #[schemars(range(max = 100))]
     pub directive: u8,
     /// Statuses.
+    #[schemars(range(max = 100))]
     pub status: u8,
     /// Position fixes.
+    #[schemars(range(max = 100))]
     pub fix: u8,
     /// The map.
+    #[schemars(range(max = 100))]
     pub map: u8,
     /// Images.
+    #[schemars(range(max = 100))]
     pub exemplar: u8,
 }

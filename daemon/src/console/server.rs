@@ -1,6 +1,7 @@
 //! The HTTP server: what is asked for, and who answers it.
 
 use super::answer::{Ask, Reply};
+use super::body::Order;
 use super::guard::{self, Names};
 use super::maps::Maps;
 use super::operations::operations;
@@ -11,13 +12,12 @@ use super::token::Access;
 use super::{assets, compress, connections, events};
 use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
 use crate::problem::Problem;
-use axum::extract::{DefaultBodyLimit, FromRequest, FromRequestParts, Path, Request as HttpRequest, State};
+use axum::extract::{DefaultBodyLimit, FromRequestParts, Path, State};
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
 use scenecast_protocol::directive::Constraints;
-use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use tokio::net::TcpListener;
@@ -152,18 +152,6 @@ impl<S: Send + Sync> FromRequestParts<S> for VehicleId {
         let found = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
         let id = found.ok().and_then(|Path(names)| names.get("id")?.parse().ok());
         id.map(Self).ok_or_else(not_found)
-    }
-}
-
-/// The body of an order.
-pub(super) struct Order<T>(T);
-
-impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Order<T> {
-    type Rejection = Response;
-
-    async fn from_request(request: HttpRequest, state: &S) -> Result<Self, Response> {
-        let body = Json::<T>::from_request(request, state).await;
-        body.map(|Json(body)| Self(body)).map_err(|e| refusal(e.status(), &e.body_text()))
     }
 }
 

@@ -13,7 +13,7 @@ use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Stamp, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{Address, Backlog, Stamp, VehicleMode, VehicleStatus};
 use std::collections::BTreeMap;
 
 /// Facts of the mission that the surface itself does not know.
@@ -131,6 +131,8 @@ fn vehicle(
         },
         fence: desk.fence.as_ref().map(Into::into),
         limits: desk.limits.as_ref().map(Into::into),
+        fence_in_force: in_force(&desk.fence_in_force),
+        limits_in_force: in_force(&desk.limits_in_force),
         planner: desk.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: state::VehicleSettings {
             asked: desk.settings.asked().into(),
@@ -194,7 +196,28 @@ fn link_of(view: &PeerView<'_>, now: Instant) -> state::VehicleLink {
         one_way_s: view.round_trip().map(|d| d.as_secs_f64() / 2.0),
         clock_ahead_s: view.clock().map(|c| clock_ahead_s(c, now)),
         dropped: dropped(stats).into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
+        backlog: view.backlog().map(|(backlog, at)| waiting(backlog, at, stats.goodput_in.bits_per_s(now), now)),
     }
+}
+
+/// What a vehicle has still to send, and when it will have at `goodput` bits a second.
+fn waiting(backlog: Backlog, at: Instant, goodput: f64, now: Instant) -> state::Backlog {
+    let map_bits = u64::from(backlog.map_bytes) * 8;
+    let bits = map_bits + u64::from(backlog.other_bytes) * 8;
+    // Less than a bit a second is what fades of earlier frames.
+    let takes_s = |bits: u64| (bits == 0 || goodput >= 1.0).then(|| bits as f64 / goodput.max(1.0));
+    state::Backlog {
+        at_s: seconds(at),
+        bits,
+        empty_s: takes_s(bits).map(|s| seconds(now) + s),
+        map_bits,
+        map_lag_s: takes_s(map_bits).map(|s| now.since(at).as_secs_f64() + s),
+    }
+}
+
+fn in_force<T, O: for<'a> From<&'a T>>(applied: &Option<(u16, T)>) -> Option<state::InForce<O>> {
+    let (version, order) = applied.as_ref()?;
+    Some(state::InForce { version: *version, order: order.into() })
 }
 
 /// How far the vehicle's clock is ahead of ours; clocks on the wire come round after 4 h 39 min.
@@ -346,9 +369,14 @@ fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> state::Link {
         up: direction(0, numbered, numbered.saturating_sub(heard), &|s, c| of_class(&s.heard_by_class, c)),
         down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),
         round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),
-        backlog_bits: None,
+        backlog_bits: total(views.iter().filter_map(PeerView::backlog)),
         history: meter.history(),
     }
+}
+
+/// Bits of all backlogs; nothing where nobody has told of one.
+fn total(backlogs: impl Iterator<Item = (Backlog, Instant)>) -> Option<u64> {
+    backlogs.map(|(b, _)| (u64::from(b.map_bytes) + u64::from(b.other_bytes)) * 8).reduce(|a, b| a + b)
 }
 
 fn of_class(bytes: &BTreeMap<Class, u64>, class: Class) -> u64 {

@@ -1,5 +1,11 @@
 //! What the API tells: the answers as types, from which the OpenAPI document is made.
 
+mod link;
+mod map;
+
+pub use link::{Backlog, Direction, Link, Rates, VehicleLink, Water};
+pub use map::{Map, MapEvent, MapSummary, Placement, Plane};
+
 use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -48,17 +54,6 @@ pub struct Position {
     /// What the USBL head saw and was not sent, by reason: unreadable, range_only, depth, no_heading, no_gps, outlier,
     /// too_vague, too_old.
     pub sightings_unused: BTreeMap<String, u64>,
-}
-
-/// By how much a vehicle's map must be moved to lie where it belongs in the world.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Placement {
-    /// Counts the moves.
-    pub version: u8,
-    /// Add to its places, metres east.
-    pub east_m: f64,
-    /// Add to its places, metres north.
-    pub north_m: f64,
 }
 
 /// The mission.
@@ -111,6 +106,10 @@ pub struct Vehicle {
     pub fence: Option<FenceOrder>,
     /// The limits that were sent last; null before.
     pub limits: Option<LimitsOrder>,
+    /// The fence that the vehicle said last to have in force, of those that this surface sent; null before.
+    pub fence_in_force: Option<InForce<FenceOrder>>,
+    /// The limits that the vehicle said last to have in force, of those that this surface sent; null before.
+    pub limits_in_force: Option<InForce<LimitsOrder>>,
     /// The planner that was sent last; null: as configured on the vehicle.
     pub planner: Option<String>,
     /// Settings that were asked for, and those in force.
@@ -204,31 +203,6 @@ pub enum Mode {
     Done,
 }
 
-/// A map without its cells.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct MapSummary {
-    /// Counts up whenever a label or a plane changes.
-    pub version: u64,
-    /// Edge of a cell, metres.
-    pub cell_m: f64,
-    /// Column of the south-west cell; its west edge is at `x0 * cell_m` metres east.
-    pub x0: i32,
-    /// Row of the south-west cell.
-    pub y0: i32,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Cells with a label.
-    pub explored_cells: u32,
-    /// When the vehicle last confirmed or changed the map.
-    pub updated_s: Option<f64>,
-    /// Counts up when labels begin to mean something else.
-    pub epoch: u8,
-    /// Where it lies in the world; null while no fix has moved it.
-    pub placement: Option<Placement>,
-}
-
 /// The utility beside the weights.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Utility {
@@ -311,39 +285,20 @@ pub enum ExemplarState {
     Refused,
 }
 
-/// What was measured of the water to one vehicle lately.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct VehicleLink {
-    /// From the vehicle.
-    pub up: Water,
-    /// To the vehicle.
-    pub down: Water,
-    /// Two-way travel time, a duration.
-    pub round_trip_s: Option<f64>,
-    /// One-way travel time, a duration.
-    pub one_way_s: Option<f64>,
-    /// The vehicle's clock minus the surface's.
-    pub clock_ahead_s: Option<f64>,
-    /// Frames from it that the surface dropped, by reason: truncated, version, not_for_us, checksum, malformed,
-    /// old_session, duplicate, late, no_base, stranger, unauthenticated (no proof of the key), keyed (under a key, and
-    /// here is none).
-    pub dropped: BTreeMap<String, u64>,
-}
-
-/// One direction of the water.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Water {
-    /// Share of the last 64 frames that was lost, 0 to 1.
-    pub loss: f64,
-    /// Useful bits a second, over a minute.
-    pub goodput_bps: f64,
-}
-
 /// What was ordered.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Directive {
     /// The newest version of each slot that was issued.
     pub slots: Vec<Slot>,
+}
+
+/// An order that the vehicle obeys, also while a newer one is on its way or after one was refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct InForce<T> {
+    /// Its version.
+    pub version: u16,
+    /// The order.
+    pub order: T,
 }
 
 /// A slot of the directive.
@@ -377,117 +332,6 @@ pub enum LifeLine {
     Applied,
     /// The vehicle refused it.
     Refused,
-}
-
-/// The link as a whole.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Link {
-    /// Bits on air a second that the surface may send.
-    pub budget_bps: u32,
-    /// Window of the budget, a duration.
-    pub budget_window_s: f64,
-    /// Least shares of the classes in percent.
-    pub shares: BTreeMap<String, u8>,
-    /// What bits that nobody else needs are spent on, in this order: finer, depth, exemplars, confidence.
-    #[serde(default)]
-    pub spend: Vec<String>,
-    /// Frames of no known vehicle, or unreadable.
-    pub strangers: u64,
-    /// From the vehicles, as the surface heard it.
-    pub up: Direction,
-    /// To the vehicles, as the surface sent it.
-    pub down: Direction,
-    /// Two-way travel time to the first vehicle that has one, a duration.
-    pub round_trip_s: Option<f64>,
-    /// Bits that wait; null where nobody knows.
-    pub backlog_bits: Option<u64>,
-    /// Rates on air, every 5 s, the last 20 minutes.
-    pub history: Vec<Rates>,
-}
-
-/// One direction of the link, since the surface began.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Direction {
-    /// Bits on air a second, over a minute.
-    pub bps_1min: f64,
-    /// Most bits on air a second over any window of the budget.
-    pub worst_window_bps: f64,
-    /// Share of frames that was lost, 0 to 1.
-    pub loss: f64,
-    /// Frames.
-    pub frames: u64,
-    /// Frames that were lost.
-    pub lost: u64,
-    /// Useful bits a second.
-    pub goodput_bps: f64,
-    /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, overhead.
-    pub bytes_by_class: BTreeMap<String, u64>,
-}
-
-/// Rates on air.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Rates {
-    /// When.
-    pub t_s: u64,
-    /// From the vehicles, bits a second.
-    pub up_bps: f64,
-    /// To the vehicles, bits a second.
-    pub down_bps: f64,
-}
-
-/// A map with its cells, row by row from the south-west.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Map {
-    /// Counts up whenever a label or a plane changes.
-    pub version: u64,
-    /// When the ages were true.
-    pub at_s: f64,
-    /// Column of the south-west cell; its west edge is at `x0 * cell_m` metres east.
-    pub x0: i32,
-    /// Row of the south-west cell.
-    pub y0: i32,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Edge of a cell, metres.
-    pub cell_m: f64,
-    /// Base64: one byte a cell, 0 = unexplored.
-    pub labels: String,
-    /// Base64: two bytes a cell, little-endian: seconds since the cell was heard of, 65535 = never.
-    pub age_s: String,
-    /// What else was heard of the cells.
-    pub planes: Vec<Plane>,
-}
-
-/// A quantity of each cell that a vehicle tells of where labels leave room. It may be older than the label of its cell, and
-/// then speaks of an earlier one; where a cell has no label it does not count.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Plane {
-    /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor.
-    pub name: String,
-    /// `m`, or empty.
-    pub unit: String,
-    /// The middle of the lowest level.
-    pub min: f64,
-    /// The middle of the highest level.
-    pub max: f64,
-    /// What a level spans: the true value lies half of it at most from the one in `data`, and a fifth of it more where a
-    /// cell stays in its level at the edge.
-    pub step: f64,
-    /// Base64: one byte a cell in the order of `labels`, 0 to 254 for `min` to `max`, in between linear; 255 = not known.
-    pub data: String,
-    /// Base64, as of the labels: seconds since the level of the cell was heard of.
-    pub age_s: String,
-}
-
-/// A map, or a plane of it, has changed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct MapEvent {
-    /// Address of the vehicle.
-    pub vehicle: u8,
-    /// Version of its map.
-    pub version: u64,
 }
 
 /// An order was taken and waits for its turn on the link; what becomes of it is in `directive.slots` of the state.

@@ -1,6 +1,6 @@
 //! The state as text for people.
 
-use crate::console::state::{Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Vehicle};
+use crate::console::state::{Backlog, Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Vehicle};
 use std::fmt::Write;
 
 /// Everything, or what concerns one vehicle.
@@ -40,9 +40,23 @@ fn vehicle(out: &mut String, v: &Vehicle, state: &State) {
     let trip = v.link.round_trip_s.map_or("not measured".to_owned(), |s| format!("{s:.2} s"));
     let (up, down) = (100.0 * v.link.up.loss, 100.0 * v.link.down.loss);
     let _ = writeln!(out, "  water      loss up {up:.0} %, down {down:.0} %, round trip {trip}");
+    if let Some(b) = &v.link.backlog {
+        let _ = writeln!(out, "  backlog    {}", backlog(b, now));
+    }
     for s in &v.directive.slots {
         let _ = writeln!(out, "  {:<10} {}, {} ago", s.slot, slot(s), span(now - s.changed_s));
     }
+}
+
+fn backlog(b: &Backlog, now_s: f64) -> String {
+    let unknown = || "nobody knows when".to_owned();
+    let empty = match b.empty_s {
+        _ if b.bits == 0 => "empty".to_owned(),
+        empty_s => empty_s.map_or_else(unknown, |at| format!("empty in {}", span(at - now_s))),
+    };
+    let lag = b.map_lag_s.map_or_else(unknown, span);
+    let said = span(now_s - b.at_s);
+    format!("{} bit, {empty}; the map lags {} bit, about {lag}; said {said} ago", b.bits, b.map_bits)
 }
 
 /// The labels of a vehicle as a table.

@@ -2,8 +2,10 @@
 
 mod changes;
 mod client;
+mod constraints;
 mod figures;
 mod files;
+mod geojson;
 mod orders;
 mod settings;
 

@@ -161,7 +161,14 @@ impl Host {
 
     fn write_map(&self, vehicle: Address) -> Result<(), Problem> {
         let Some(map) = self.surface.map(vehicle) else { return Ok(()) };
-        let png = picture::encode(map).map_err(|e| Problem::Failed(e.to_string()))?;
+        let png = match picture::encode(map) {
+            Ok(png) => png,
+            // What came through the water ends no run.
+            Err(e) => {
+                tracing::warn!("operator-map-{}.png is not written: {e}", vehicle.number());
+                return Ok(());
+            }
+        };
         let file = |extension| self.dir.join(format!("operator-map-{}.{extension}", vehicle.number()));
         if let (Some(plane), Some(bounds)) = (self.surface.relay().and_then(|r| r.plane()), map.bounds()) {
             let placement = self.surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));

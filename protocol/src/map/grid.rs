@@ -68,7 +68,8 @@ impl Rect {
             let (x0, y0, x1, y1) = bounds.unwrap_or((c.x, c.y, c.x, c.y));
             bounds = Some((x0.min(c.x), y0.min(c.y), x1.max(c.x), y1.max(c.y)));
         }
-        bounds.map(|(x0, y0, x1, y1)| Self { x: x0, y: y0, width: x1.abs_diff(x0) + 1, height: y1.abs_diff(y0) + 1 })
+        let span = |low: i32, high: i32| high.abs_diff(low).saturating_add(1);
+        bounds.map(|(x0, y0, x1, y1)| Self { x: x0, y: y0, width: span(x0, x1), height: span(y0, y1) })
     }
 
     /// Whether `cell` lies inside.

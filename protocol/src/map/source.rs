@@ -19,8 +19,10 @@ pub struct MapSource {
     interest: Interest,
     settling: Settling,
     coarse: Coarse,
-    /// Learned size of the stream, bytes a changed cell.
+    /// Learned size of the stream, bytes a changed cell; the last lone cells count much.
     bytes_per_cell: f64,
+    /// Bytes of the last chunks and cells that they changed, the newest counting most.
+    spent: (f64, f64),
     target: LabelGrid,
     acked: LabelGrid,
     acked_digest: MapDigest,
@@ -39,6 +41,7 @@ impl MapSource {
             settling: Settling::default(),
             coarse: Coarse::default(),
             bytes_per_cell: 1.0,
+            spent: (32.0, 32.0),
             target: LabelGrid::default(),
             acked: LabelGrid::default(),
             acked_digest: MapDigest::default(),
@@ -140,6 +143,8 @@ impl StateSource for MapSource {
         if stride == Stride::One {
             let per_cell = chunk.bytes.len() as f64 / chunk.changes.len().max(1) as f64;
             self.bytes_per_cell += (per_cell - self.bytes_per_cell) * 0.1;
+            let (bytes, cells) = self.spent;
+            self.spent = (bytes * 0.9 + chunk.bytes.len() as f64, cells * 0.9 + chunk.changes.len() as f64);
         }
         chunk.changes.iter().for_each(|&(cell, _)| self.dirty.depart(cell));
         Some((chunk.bytes, chunk.changes))
@@ -176,6 +181,11 @@ impl StateSource for MapSource {
 
     fn is_refining(&self) -> bool {
         self.coarse.is_refining(&self.dirty.counts())
+    }
+
+    fn told_backlog_bytes(&self) -> usize {
+        let (bytes, cells) = self.spent;
+        (self.dirty.counts().waiting as f64 * bytes / cells.max(1.0)).ceil() as usize
     }
 
     fn is_quiet(&self) -> bool {

@@ -35,6 +35,11 @@ pub trait StateSource: Debug {
         false
     }
 
+    /// The same for people: a turn would rather be too long than too short, a person is told what is likely.
+    fn told_backlog_bytes(&self) -> usize {
+        self.backlog_bytes()
+    }
+
     /// Whether nothing waits or is on its way, though something may be held back.
     fn is_quiet(&self) -> bool {
         self.is_settled()

@@ -3,6 +3,7 @@
 //! Multi-byte integers are big-endian. Diagrams count bits from the most significant one of the first byte.
 
 mod ack;
+mod backlog;
 mod chunk;
 mod cursor;
 mod frame;
@@ -13,6 +14,7 @@ mod stamp;
 mod status;
 
 pub use ack::{AckStatement, MAX_WINDOW};
+pub use backlog::Backlog;
 pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};
 pub use cursor::{Reader, Truncated};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};

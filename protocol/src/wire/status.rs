@@ -1,5 +1,6 @@
 //! The vehicle's status.
 
+use super::backlog::Backlog;
 use super::cursor::{Reader, Truncated};
 use super::placement::Placement;
 use crate::directive::{RefusalReason, SLOTS, SlotId};
@@ -122,8 +123,9 @@ pub struct SlotReport {
 ///  2-3  16    digest of the map that the surface is known to hold (the base of this frame)
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
-///  7    8     slots that are reported of, a bit each, the first slot in the highest bit
-///  8..  8     version of each of them, low 8 bits
+///  7-8  16    what waits to be sent, see `Backlog`
+///  9    8     slots that are reported of, a bit each, the first slot in the highest bit
+/// 10..  8     version of each of them, low 8 bits
 /// then  4     what became of each of them: 1 applied, 2..9 refusal reason; the rest is refused; 4 bits 0 after an odd number
 /// 7 more      [where the map lies in the world, see `Placement`]; left out while it has not moved
 /// ```
@@ -161,6 +163,8 @@ pub struct VehicleStatus {
     pub budget_bps: u32,
     /// Frames that it refused because they were not authentic.
     pub refused_frames: u8,
+    /// What it has still to send.
+    pub backlog: Backlog,
     /// Decisions about the slots of the directive, by slot.
     pub slots: [SlotReport; SLOTS],
     /// Where the map lies in the world; `None` while no fix has moved it.
@@ -204,7 +208,7 @@ fn decode_rate(code: u16) -> u32 {
 
 impl VehicleStatus {
     /// Bytes of a report without slots.
-    const REPORT_HEAD: usize = 8;
+    const REPORT_HEAD: usize = 8 + Backlog::BYTES;
 
     /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
@@ -240,6 +244,7 @@ impl VehicleStatus {
         out.extend_from_slice(&self.base_digest.to_be_bytes());
         out.extend_from_slice(&code_rate(self.budget_bps).to_be_bytes());
         out.push(self.refused_frames);
+        out.extend(self.backlog.encode());
         out.push(told.iter().fold(0, |bits, (slot, _)| bits | 0x80 >> slot));
         out.extend(told.iter().map(|(_, s)| s.version_low));
         let code = |of: Option<&(usize, &SlotReport)>| of.map_or(0, |(_, s)| s.state.code());
@@ -286,6 +291,7 @@ impl VehicleStatus {
         let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
         read.budget_bps = decode_rate(r.u16()?);
         read.refused_frames = r.u8()?;
+        read.backlog = Backlog::decode(&mut r)?;
         let told = r.u8()?;
         let count = told.count_ones() as usize;
         let versions = r.take(count)?;

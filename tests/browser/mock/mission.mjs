@@ -95,7 +95,6 @@ export class Mission {
   }
 
   json() {
-    const backlog = this.vehicles.reduce((sum, v) => sum + v.pending.size, 0);
     return {
       now_s: this.nowS,
       mission: { name: this.name, speed: this.speed, ended: this.ended },
@@ -105,7 +104,7 @@ export class Mission {
         budget_bps: this.budgetBps, shares: this.shares, spend: this.spend, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),
         round_trip_s: this.vehicles[0].heardS === null ? null : 1.62,
-        backlog_bits: this.vehicles[0].heardS === null ? null : Math.round(backlog * 1.1),
+        backlog_bits: this.vehicles[0].told?.bits ?? null,
         history: this.history,
       },
     };

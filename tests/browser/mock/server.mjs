@@ -3,8 +3,9 @@
 //   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big]
 //
 // POST /mock steers it in tests:
-//   {"scenario": "rich", "advance": 60, "speed": 20, "silent": true, "refuse": "utility",
-//    "loss": 0.3, "planes": true, "coarse": true, "position": {"x_m": 5, ..}, "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "stream": false, "mute": true, "down": true}
+//   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
+//    "loss": 0.3, "planes": true, "coarse": true, "position": {"x_m": 5, ..},
+//    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
 import { deflateSync } from "node:zlib";
@@ -130,7 +131,11 @@ async function post(mock, req, res, path) {
   const orders = { fence: () => fence(given), limits: () => limits(given) };
   if (what in orders) {
     v[what] = orders[what]();
-    return accepted(mock, res, v.directive.issue(what, mission.nowS));
+    const order = v[what];
+    const answer = v.directive.issue(what, mission.nowS, (s) => {
+      if (s === "applied") v.inForce[what] = { version: answer.version, order };
+    });
+    return accepted(mock, res, answer);
   }
   return reply(res, 404, { error: "no such thing" });
 }
@@ -159,9 +164,11 @@ function steer(mock, order, res) {
   if ("mute" in order) mock.mute = order.mute;
   if ("stream" in order) mock.stream = order.stream;
   if (order.stream === false || order.down) for (const s of mock.streams) s.destroy();
-  const changed = order.advance ? mission.advance(order.advance) : [];
-  for (const v of changed) emit(mock, "map", { vehicle: v, version: mission.vehicles.find((x) => x.id === v).heard.version });
-  emit(mock, "state", mission.json());
+  for (let i = 0; i < (order.times ?? 1); i += 1) {
+    const changed = order.advance ? mission.advance(order.advance) : [];
+    for (const v of changed) emit(mock, "map", { vehicle: v, version: mission.vehicles.find((x) => x.id === v).heard.version });
+    emit(mock, "state", mission.json());
+  }
   reply(res, 200, { now_s: mission.nowS });
 }
 

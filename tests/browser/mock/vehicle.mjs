@@ -23,7 +23,7 @@ export class Vehicle {
     this.published = new Map();
     this.weights = new Map();
     this.terms = { exploration: 0.2, curiosity: 0 };
-    Object.assign(this, { fence: null, limits: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
+    Object.assign(this, { told: null, inForce: {}, fence: null, limits: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
     this.exemplars = new Map();
     this.track = [];
     this.hold = false;
@@ -87,6 +87,7 @@ export class Vehicle {
       this.heard.set(c.x, c.y, c.label, nowS);
       this.pending.delete(key);
     }
+    this.told = { at_s: nowS - 0.8, bits: this.pending.size * 8 + 1200 };
     this.heard.version += 1;
     this.updatedS = nowS;
     const ahead = this.pose();
@@ -153,7 +154,28 @@ export class Vehicle {
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
       })),
       utility: this.terms, fence: this.fence, limits: this.limits, planner: this.planner, settings: this.settings.json(),
-      directive: this.directive.json(),
+      fence_in_force: this.inForce.fence ?? null, limits_in_force: this.inForce.limits ?? null,
+      directive: this.directive.json(), link: this.link(nowS), usbl: null,
+    };
+  }
+
+  link(nowS) {
+    const { loss, goodput_bps: goodput } = this.up.json(nowS);
+    const water = { loss, goodput_bps: goodput };
+    return {
+      up: water, down: { loss, goodput_bps: 12 }, round_trip_s: this.heardS === null ? null : 1.62,
+      one_way_s: this.heardS === null ? null : 0.81, clock_ahead_s: 0, dropped: {}, backlog: this.backlog(nowS, goodput),
+    };
+  }
+
+  /** What it had still to send when it was heard last. */
+  backlog(nowS, goodput) {
+    if (this.told === null) return null;
+    const { at_s, bits } = this.told;
+    const takes = (n) => (n === 0 ? 0 : goodput >= 1 ? n / goodput : null);
+    return {
+      at_s, bits, empty_s: takes(bits) === null ? null : nowS + takes(bits),
+      map_bits: bits, map_lag_s: takes(bits) === null ? null : nowS - at_s + takes(bits),
     };
   }
 

@@ -262,14 +262,15 @@ export default [
     async run(s) {
       await open(s);
       await draw(s, "Draw fence", ...AROUND);
-      await s.page.route("**/fence", async (route) => {
-        await new Promise((resolve) => setTimeout(resolve, 400));
-        await route.continue();
-      });
+      let goOn = null;
+      const drawn = new Promise((resolve) => (goOn = resolve));
+      await s.page.route("**/fence", (route) => drawn.then(() => route.continue()));
       await sendFence(s).click();
       await draw(s, "Add keep-out", [0.4, 0.4], [0.5, 0.4], [0.5, 0.5]);
+      goOn();
       await s.until("its version", async () => (await slot(s, "fence"))?.version === 1);
-      await new Promise((resolve) => setTimeout(resolve, 1200));
+      const { now_s } = await s.get("/state");
+      await s.until("states after it", () => s.inPage(({ store }, now) => store.snapshot.now_s > now + 1, now_s), { advance: 1 });
       assert.equal(await s.page.locator("[aria-labelledby=fence-title] .others").isVisible(), false);
       assert.equal(await s.page.locator(".outlines > li").count(), 2, "the edit is still there");
       assert.equal(await sendFence(s).isDisabled(), false);

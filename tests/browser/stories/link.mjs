@@ -122,12 +122,26 @@ export default [
     },
   },
   {
-    name: "the backlog says when it will be empty",
-    scenario: "rich",
+    name: "the backlog says when it will be empty, and the map by how much it lags",
     async run(s) {
-      await s.until("a backlog", async () => (await s.get("/state")).link.backlog_bits > 0);
+      const { link: { budget_bps } } = await s.get("/state");
+      await s.post("/vehicles/1/constraints", { hold: false });
+      await s.post("/budget", { budget_bps: 400 });
+      await s.until("a backlog", async () => (await s.vehicle()).link.backlog?.bits > 0, { ms: 120000, advance: 2 });
       const shown = async () => bits(await s.page.locator("#link .values").innerText());
-      await s.until("its end", async () => /Backlog\s+\S+ k?bit, empty in/.test(await shown()));
+      await s.until("its end", async () => /Backlog\s+\S+ k?bit, empty in \d+ .*said \d+ s ago/.test(await shown()), { ms: 120000, advance: 2 });
+      await s.until("the lag", async () => /Map lags by\s+\d+ (s|min).*, \S+ k?bit/.test(await shown()));
+      await s.post("/budget", { budget_bps });
+    },
+  },
+  {
+    name: "a backlog that a silent vehicle told of grows no younger, and says that nothing comes in",
+    scenario: "silent",
+    async run(s) {
+      await s.steer({ advance: 650 });
+      await s.shows("#link .values", /Backlog\s+\S+ k?bit, nothing comes in, said \d+ min/);
+      await s.shows("#link .values", /Map lags by\s+more than \d+ min.*, \S+ k?bit/);
+      assert.ok(await s.page.locator("#link .whole.stale").count() === 2, "both are grey");
     },
   },
 ];

@@ -46,4 +46,24 @@ export default [
       await s.until("the weight", async () => (await late.getByRole("slider", { name: "Weight of Label 1", exact: true }).inputValue()) === "0.5");
     },
   },
+  {
+    name: "a late joiner knows the fence and limits in force while others are on their way",
+    scenario: "rich",
+    async run(s) {
+      const applied = (slot) => async () => (await s.vehicle()).directive.slots.find((x) => x.slot === slot)?.state === "applied";
+      await s.steer({ loss: 0 });
+      await s.post("/vehicles/1/fence", { fence: [[-11, -8], [18, -8], [18, 14], [-11, 14]] });
+      await s.post("/vehicles/1/limits", { depth_m: [5, 30], on_silence: "return" });
+      await s.until("the fence", applied("fence"), { advance: 4 });
+      await s.until("the limits", applied("limits"), { advance: 4 });
+      await s.steer({ loss: 1 });
+      await s.post("/vehicles/1/fence", { fence: [[-12, -9], [19, -9], [19, 15]] });
+      await s.post("/vehicles/1/limits", { silence_s: 300 });
+      await s.page.reload();
+      await s.ready();
+      await s.page.getByRole("tab", { name: "Constraints" }).click();
+      await s.shows("[aria-labelledby=fence-title] .note", /Version 1 stays in force meanwhile/);
+      await s.shows("[aria-labelledby=limits-title] .note", /In force meanwhile: version 1: depth, m 5 to 30; on silence return/);
+    },
+  },
 ];

@@ -7,22 +7,12 @@ import { fenceOrder, middle, pen } from "./edit.js";
 import { faults, fromServer, nameOutline } from "./plan.js";
 
 const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], heard: [9, 6], refused: [2, 5] };
-const inForce = new Map();
-
-/** The fence last seen to be applied: one that is still on its way does not replace it. Null: not known here. */
-export function known(vehicle) {
-  const { mission } = store.snapshot;
-  const key = `${mission.id ?? mission.name}.${vehicle.id}`;
-  const slot = slotOf(vehicle, "fence");
-  if (slot?.state === "applied") inForce.set(key, { version: slot.version, fence: vehicle.fence });
-  return inForce.get(key) ?? null;
-}
 
 export function drawFences(c, view, ink, vehicle, chosen) {
   const slot = slotOf(vehicle, "fence");
   c.globalAlpha = chosen ? 1 : 0.55;
-  const force = known(vehicle);
-  if (force) drawPlan(c, view, ink, fromServer(force.fence), [], "");
+  const force = vehicle.fence_in_force;
+  if (force) drawPlan(c, view, ink, fromServer(force.order), [], "");
   if (slot && slot.state !== "applied" && vehicle.fence) {
     drawPlan(c, view, ink, fromServer(vehicle.fence), DASH[slot.state] ?? [9, 6], slot.state === "refused" ? "refused" : "not in force yet");
   }

@@ -23,7 +23,10 @@ function update() {
 function current() {
   const found = [];
   if (store.feed.state === "lost") found.push(lost());
-  for (const v of store.snapshot?.vehicles ?? []) if (isSilent(v)) found.push(silent(v));
+  for (const v of store.snapshot?.vehicles ?? []) {
+    if (isSilent(v)) found.push(silent(v));
+    if (store.connected && store.mapFaults.has(v.id)) found.push(mapless(v));
+  }
   if (store.snapshot?.mission.ended) found.push(ended());
   return found;
 }
@@ -44,6 +47,10 @@ function silent(v) {
     ? `nothing heard since the start; ${every}.`
     : `last heard ${span(ageOf(v.heard_s))} ago at ${missionTime(v.heard_s)}; ${every}.`;
   return { key: `silent-${v.id}`, kind: "warn", head: `${v.name} is silent`, body: `${heard} ${contact(v)}` };
+}
+
+function mapless(v) {
+  return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date here`, body: `${store.mapFaults.get(v.id)}.` };
 }
 
 export function contact(v) {

@@ -1,7 +1,6 @@
 // The fence in the panel: its outlines with their corners as numbers, what is wrong with them, sending.
 
 import { $, announce, h, keyed, show, text } from "../dom.js";
-import { known } from "../fence/draw.js";
 import { addCorner, begin, fenceOrder, finish, middle, pen, plan, put, removeCorner, removeOutline, setCorner, setHome } from "../fence/edit.js";
 import { faults, fromServer, isSound, nameOutline } from "../fence/plan.js";
 import { metres } from "../format.js";
@@ -19,7 +18,7 @@ const tools = {
   home: h("button", { type: "button", onclick: () => onMap(() => put(pen.tool === "home" ? null : "home")) }, "Place return point"),
   done: h("button.primary", { type: "button", onclick: finish }, "Done drawing"),
 };
-const takeForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(known(store.vehicle).fence)) }, "Edit the one in force");
+const takeForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(store.vehicle.fence_in_force.order)) }, "Edit the one in force");
 const homePlace = place("Return point", (p) => setHome(p));
 const clearHome = h("button.undo", { type: "button", onclick: () => setHome(null) }, "Remove");
 clearHome.setAttribute("aria-label", "Remove the return point");
@@ -132,7 +131,7 @@ export function update() {
   const by = vehicle.map.placement;
   show(frame, Boolean(by));
   if (by) text(frame, `In metres of the world. Fixes have moved its map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
-  show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && known(vehicle) !== null);
+  show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && Boolean(vehicle.fence_in_force));
 }
 
 function homeFaultShown(at, fault) {
@@ -141,12 +140,12 @@ function homeFaultShown(at, fault) {
   text(homeFault, fault ?? "");
 }
 
-/** What holds now, as far as this page knows. */
+/** What holds now, as far as the surface knows. */
 function describe(vehicle) {
   const slot = slotOf(vehicle, "fence");
-  if (!slot) return "None was sent.";
+  if (!slot) return "None was sent since the surface started; the vehicle keeps what it has.";
   if (slot.state === "applied") return "In force as drawn with solid lines.";
-  const before = known(vehicle);
+  const before = vehicle.fence_in_force;
   if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
   return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "Which one is in force meanwhile is not known here.";
 }

@@ -3,6 +3,7 @@
 import { sendLimits } from "../api.js";
 import { h, show, text } from "../dom.js";
 import { store } from "../store.js";
+import { slotOf } from "./lifeline.js";
 import { Order, orderFoot } from "./order.js";
 
 const MOST = 0xffffff;
@@ -18,6 +19,7 @@ const AMOUNTS = [
 ];
 const REACTIONS = [["on_silence", "On silence"], ["on_breach", "On a breach"], ["on_abort", "On abort"]];
 
+const WORDS = Object.fromEntries([...BANDS, ...AMOUNTS, ...REACTIONS].map(([key, name]) => [key, name.toLowerCase()]));
 const KEYS = [...BANDS, ...AMOUNTS, ...REACTIONS].map(([key]) => key);
 const read = (v) => Object.fromEntries(KEYS.map((k) => [k, v.limits?.[k] ?? null]));
 const stated = (limits) => Object.fromEntries(Object.entries(limits).filter(([, value]) => value !== null));
@@ -37,11 +39,12 @@ export function amountFault(value, most) {
   return Number.isInteger(value) && value >= 1 && value <= most ? null : `It takes whole numbers from 1 to ${most}`;
 }
 
+const state = h("p.note");
 const foot = orderFoot(limitsOrder, "Limits", "send-limits");
 const lines = [...BANDS.map(bandLine), ...AMOUNTS.map(amountLine)];
 const choices = REACTIONS.map(reactionLine);
 export const limitsPart = h("section.part", { "aria-labelledby": "limits-title" },
-  h("h3", { id: "limits-title" }, "Limits"), h("p.hint", {}, "An empty field is no limit."),
+  h("h3", { id: "limits-title" }, "Limits"), state, h("p.hint", {}, "An empty field is no limit."),
   ...lines.map((l) => l.node), ...choices.map((l) => l.node), foot.node);
 
 function set(key, value) {
@@ -100,11 +103,23 @@ function reactionLine([key, name]) {
   return { node, update: (limits) => (pick.value = limits[key] ?? "") };
 }
 
+/** What holds now, as far as the surface knows. */
+function describe(vehicle) {
+  const slot = slotOf(vehicle, "limits");
+  if (!slot) return "None were sent since the surface started; the vehicle keeps what it has.";
+  if (slot.state === "applied") return "In force as sent last.";
+  const before = vehicle.limits_in_force;
+  if (!before) return "Which ones are in force meanwhile is not known here.";
+  const words = Object.entries(stated(before.order)).map(([key, value]) => `${WORDS[key]} ${value.join?.(" to ") ?? value}`);
+  return `In force meanwhile: version ${before.version}: ${words.join("; ") || "no limits"}.`;
+}
+
 export function update() {
   const vehicle = store.vehicle;
   if (!vehicle) return;
   const limits = limitsOrder.value(vehicle);
   const sound = lines.map((l) => l.update(limits)).every(Boolean);
   for (const c of choices) c.update(limits);
+  text(state, describe(vehicle));
   foot.update(vehicle, !sound);
 }

@@ -1,8 +1,8 @@
 // The acoustic link: rates against the budget, bits by class, loss, delay, backlog.
 
 import { $, h, row, text } from "../dom.js";
-import { bits, count, none, percent, rate, span } from "../format.js";
-import { ageOf, store } from "../store.js";
+import { ago, bits, count, none, percent, rate, span } from "../format.js";
+import { ageOf, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
 
@@ -10,6 +10,8 @@ const CLASSES = ["map", "confidence", "depth", "status", "directive", "fix", "ex
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};
+/** Rows of what the chosen vehicle said or what was measured of it: grey while it is silent. */
+const ofVehicle = [];
 const list = h("dl.values");
 const classes = h("table.classes");
 const age = h("p.age");
@@ -22,9 +24,13 @@ function direction(name, title) {
 }
 
 export function startLink() {
-  for (const [key, name] of [["loss", "Frames lost, up / down"], ["lately", "Lost lately, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"], ["backlog", "Backlog"]]) {
-    const [node, set] = row(name);
+  for (const [key, name, hint] of [["loss", "Frames lost, up / down"], ["lately", "Lost lately, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"],
+    ["backlog", "Backlog", "What the vehicle has still to send: what it said last, less what has come in since. It goes on surveying meanwhile."],
+    ["lag", "Map lags by", "By what the map here is behind the vehicle's: about how old it is, and the bits that are missing"]]) {
+    const [node, set] = row(name, hint);
     values[key] = set;
+    node.classList.toggle("whole", key === "backlog" || key === "lag");
+    if (["lately", "own", "backlog", "lag"].includes(key)) ofVehicle.push(node);
     list.append(node);
   }
   classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
@@ -33,6 +39,7 @@ export function startLink() {
     directions.up.node, directions.down.node, history, list, classes, ...budgetParts);
   store.on("state feed theme", update);
   store.on("tick", refreshAge);
+  store.on("select", update);
   store.on("draft select", refreshBudget);
   new ResizeObserver(update).observe(history);
 }
@@ -41,6 +48,9 @@ function refreshAge() {
   if (!store.snapshot) return;
   const old = ageOf(store.snapshot.now_s);
   text(age, store.connected ? "now" : `${span(old)} old`);
+  values.backlog(backlog());
+  values.lag(lag());
+  for (const node of ofVehicle) node.classList.toggle("stale", Boolean(store.vehicle) && isStale(store.vehicle));
   refreshBudget();
 }
 
@@ -58,18 +68,29 @@ function update() {
   values.own(ownBudget ? rate(ownBudget) : none);
   values.goodput(`${rate(link.up.goodput_bps)} / ${rate(link.down.goodput_bps)}`);
   values.trip(link.round_trip_s === null ? none : `${link.round_trip_s.toFixed(2)} s`);
-  values.backlog(backlog(link));
   refreshClasses(link);
   history.setAttribute("aria-label", `Rate over time. Up now ${rate(link.up.bps_1min)}, down ${rate(link.down.bps_1min)}, budget ${rate(link.budget_bps)}.`);
   drawHistory(history, link, store.snapshot.now_s);
   refreshAge();
 }
 
-function backlog(link) {
-  if (link.backlog_bits === null) return none;
-  if (link.backlog_bits === 0) return "empty";
-  const left = link.up.goodput_bps > 0 ? `, empty in ${span(link.backlog_bits / link.up.goodput_bps)}` : "";
-  return `${bits(link.backlog_bits)}${left}`;
+/** What the chosen vehicle has still to send; null before it has said so. */
+const waiting = () => store.vehicle?.link?.backlog ?? null;
+
+function backlog() {
+  const w = waiting();
+  if (w === null) return none;
+  const said = `said ${ago(ageOf(w.at_s))}`;
+  if (w.bits === 0) return `empty, ${said}`;
+  const empty = w.empty_s === null ? "nothing comes in" : `empty in ${span(w.empty_s - store.nowS)}`;
+  return `${bits(w.bits)}, ${empty}, ${said}`;
+}
+
+function lag() {
+  const w = waiting();
+  if (w === null) return none;
+  const old = w.map_lag_s === null ? `more than ${span(ageOf(w.at_s))}` : span(w.map_lag_s + ageOf(store.snapshot.now_s));
+  return `${old}, ${bits(w.map_bits)}`;
 }
 
 /** The bar runs to the budget line at 80 % of its length, so that a breach would show. */

@@ -43,7 +43,7 @@ function update() {
   mode.dataset.mode = s?.mode ?? "none";
   $("vehicle").classList.toggle("stale", isStale(v));
   text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 heard ${ago(ageOf(v.heard_s))}, due every ${span(v.expected_interval_s)}` : "No status heard yet.");
-  values.position(s ? inWorld(v, s.x_m, s.y_m).map(metres).join(", ") : none);
+  values.position(s ? inWorld(v, s.x_m, s.y_m).map((m) => metres(m)).join(", ") : none);
   values.depth(s ? metres(-s.z_m) : none);
   values.heading(s ? degrees(s.heading_deg) : none);
   values.sigma(s ? metres(s.sigma_m) : none);

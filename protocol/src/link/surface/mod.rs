@@ -1,5 +1,6 @@
 //! The surface's end of the link.
 
+mod backlog;
 mod discovery;
 mod grant;
 mod peer;

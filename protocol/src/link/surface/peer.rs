@@ -1,5 +1,6 @@
 //! What the surface keeps for one vehicle.
 
+use super::backlog::Told;
 use super::planes::{Heard, Planes};
 use crate::directive::{Slot, SlotId, SlotOutbox};
 use crate::link::{Authenticity, DropReason, FrameNumber, Pair, SurfaceEvent};
@@ -35,6 +36,8 @@ pub(super) struct Peer<R> {
     pub(super) planes: Planes,
     objects: ObjectReceiver,
     pub(super) status: StatusParts,
+    /// What it had still to send.
+    pub(super) told: Option<Told>,
     /// When a frame was last taken.
     pub(super) heard: Option<Instant>,
     pub(super) clock: Option<ClockMap>,
@@ -73,6 +76,7 @@ impl<R: StateReplica> Peer<R> {
             planes: Planes::default(),
             objects: ObjectReceiver::default(),
             status: StatusParts::default(),
+            told: None,
             heard: None,
             clock: None,
             turn_began: 0,
@@ -155,9 +159,9 @@ impl<R: StateReplica> Peer<R> {
                 self.pair.stats.drop(DropReason::Malformed);
                 self.out_of_step |= chunk.kind == ChunkKind::Map;
             }
-            if sound && chunk.kind == ChunkKind::Report && self.status.status.base_digest != self.replica.base_digest()
-            {
-                self.out_of_step = true;
+            if sound && chunk.kind == ChunkKind::Report {
+                self.told = Some(Told::new(self.status.status.backlog, &self.pair.stats, now));
+                self.out_of_step |= self.status.status.base_digest != self.replica.base_digest();
             }
         }
         self.pair.stats.hear(Class::Overhead, overhead, now);
@@ -236,6 +240,7 @@ impl<R: StateReplica> Peer<R> {
         self.planes.clear();
         self.objects.clear();
         self.status = StatusParts::default();
+        self.told = None;
         self.sent.clear();
         self.clock = None;
         self.turn_began = 0;

@@ -6,7 +6,7 @@ use crate::link::LinkStats;
 use crate::mac::ClockMap;
 use crate::map::{PlaneKind, PlaneReplica, Replica, StateReplica};
 use crate::time::Instant;
-use crate::wire::VehicleStatus;
+use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
 
 /// A read-only view of a vehicle for the host.
@@ -40,6 +40,11 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The last status and when its position came in.
     pub fn status(&self) -> Option<&'a (VehicleStatus, Instant)> {
         self.0.status.whole.as_ref()
+    }
+
+    /// What the vehicle had still to send by its last report, less what has come in since, and when that report came in.
+    pub fn backlog(&self) -> Option<(Backlog, Instant)> {
+        self.0.told.map(|told| told.left(self.stats()))
     }
 
     /// When a frame was last taken.

@@ -70,7 +70,9 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn fill_status(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
+        let backlog = self.backlog(now);
         let Some(status) = self.status.as_mut() else { return };
+        status.backlog = backlog;
         status.base_digest = self.source.digest();
         status.slots = self.inbox.reports();
         status.budget_bps = self.budget.bits_per_s();

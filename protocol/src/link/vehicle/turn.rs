@@ -6,7 +6,7 @@ use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder, Stamp};
+use crate::wire::{Address, Backlog, FrameBuilder, Stamp};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -77,6 +77,13 @@ impl<S: StateSource> VehicleLink<S> {
         let answer = self.answer_due.is_some_and(|at| now >= at) || self.called.is_some();
         let news = self.backlog_bytes(now) > 0;
         answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
+    }
+
+    /// What waits and may be sent, for people.
+    pub(super) fn backlog(&self, now: Instant) -> Backlog {
+        let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let others = self.shared_plane_backlog() + self.objects.backlog_bytes() + self.extra_backlog(now);
+        Backlog { map_bytes: bytes(self.source.told_backlog_bytes()), other_bytes: bytes(others) }
     }
 
     /// About how many bytes wait and may be sent.

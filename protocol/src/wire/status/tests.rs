@@ -25,12 +25,13 @@ fn golden_bytes_of_a_status() {
         base_digest: 0xBEEF,
         budget_bps: 10_000,
         refused_frames: 3,
+        backlog: Backlog { map_bytes: 448, other_bytes: 15 },
         slots,
         placement: None,
     };
     let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
     assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
-    assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0b1000_0100, 7, 2, 0x12]);
+    assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0xE5, 0xF0, 0b1000_0100, 7, 2, 0x12]);
     let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
     back.read_pose(&pose).unwrap();
     back.read_report(&report).unwrap();
@@ -46,7 +47,7 @@ fn golden_bytes_of_a_status() {
     back.read_report(&long).unwrap();
     assert_eq!(back, placed);
     assert_eq!(placed.encode_report(long.len() - 1, 0).unwrap(), (report.clone(), SLOTS), "no room for it");
-    back.read_report(&placed.encode_report(15, SLOTS).unwrap().0).unwrap();
+    back.read_report(&placed.encode_report(17, SLOTS).unwrap().0).unwrap();
     assert_eq!(back, placed);
     back.read_report(&report).unwrap();
     assert_eq!(back.placement, placement, "it has not moved back");
@@ -78,17 +79,17 @@ proptest! {
         let (mut heard, mut first) = (VehicleStatus::default(), 0);
         for _ in 0..=SLOTS {
             let Some((bytes, next)) = status.encode_report(room, first) else {
-                prop_assert!(room < 10);
+                prop_assert!(room < 12);
                 return Ok(());
             };
-            prop_assert!(bytes.len() <= room.max(8));
+            prop_assert!(bytes.len() <= room.max(10));
             heard.read_report(&bytes).unwrap();
             first = next;
             if first == 0 {
                 break;
             }
         }
-        if room < 15 {
+        if room < 17 {
             status.placement = None;
         }
         prop_assert_eq!((first, heard), (0, status));

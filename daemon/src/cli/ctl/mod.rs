@@ -1,11 +1,14 @@
 //! `scenecast ctl`
 
+mod constraints;
+
 use crate::asv::SettingsOrder;
 use crate::config;
 use crate::console::orders::ExemplarWish;
 use crate::ctl::{self, BudgetChange, Client, SettingsChange};
 use crate::problem::Problem;
 use clap::{Args, Subcommand};
+use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -18,6 +21,9 @@ Example: scenecast ctl status
          scenecast ctl settings --gamma 1e-5 --cells coarse --wait 120
          scenecast ctl settings --fit 800
          scenecast ctl exemplar 3 --out label-3.webp
+         scenecast ctl fence set fence.geojson --wait 120
+         scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return
+         scenecast ctl hold --wait 60
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
 Exit codes: 0 done; 1 refused, not applied in time, or nobody answers; 2 wrong usage";
@@ -100,6 +106,39 @@ enum Command {
         /// Ask for none any more: what is on its way is not sent to its end
         #[arg(long, conflicts_with_all = ["again", "larger", "out"])]
         cancel: bool,
+    },
+    /// Print the fence with its keep-outs and return point, as sent last and as in force, or send another.
+    #[command(after_help = "Example: scenecast ctl fence set fence.geojson --wait 120")]
+    Fence {
+        #[command(subcommand)]
+        change: Option<FenceCommand>,
+    },
+    /// Move the point that the vehicle returns to.
+    #[command(after_help = "Example: scenecast ctl return-point set 12.5 -40 --wait 120")]
+    ReturnPoint {
+        #[command(subcommand)]
+        change: ReturnPointCommand,
+    },
+    /// Print the limits, as sent last and as in force, or send others.
+    #[command(
+        after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
+    )]
+    Limits {
+        #[command(subcommand)]
+        change: Option<LimitsCommand>,
+    },
+    /// Tell the vehicle to stay where it is.
+    #[command(after_help = "Example: scenecast ctl hold --wait 60")]
+    Hold,
+    /// Tell the vehicle to go on, after a hold, an abort or a breach.
+    #[command(after_help = "Example: scenecast ctl resume --wait 60")]
+    Resume,
+    /// Tell the vehicle to end its survey and to do what its limits say of an abort.
+    #[command(after_help = "Example: scenecast ctl abort --yes --wait 60")]
+    Abort {
+        /// Yes, end it
+        #[arg(long)]
+        yes: bool,
     },
     /// Print changes as they come, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
@@ -246,6 +285,12 @@ impl Ctl {
                     ctl.exemplar(label, &out, wish).await
                 }
                 Command::Exemplar { label, out: None, .. } => ctl.cancel_exemplar(label).await,
+                Command::Fence { change } => constraints::fence(&ctl, change).await,
+                Command::ReturnPoint { change } => constraints::return_point(&ctl, change).await,
+                Command::Limits { change } => constraints::limits(&ctl, change).await,
+                Command::Hold => constraints::hold(&ctl, true).await,
+                Command::Resume => constraints::hold(&ctl, false).await,
+                Command::Abort { yes } => constraints::abort(&ctl, yes).await,
                 Command::Watch => ctl.watch().await,
             }
         })

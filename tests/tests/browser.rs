@@ -1,0 +1,85 @@
+//! The operator's page in headless Chromium: the stories of `tests/browser`, against the mock and against real processes.
+
+use scenecast_tests::{Process, free_port, http, run, scratch, state, wait_until, workspace};
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Mutex;
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(120);
+/// The stories measure: one browser at a time.
+static BROWSER: Mutex<()> = Mutex::new(());
+
+/// What is missing here to run a browser; a failure where nothing may be skipped.
+fn is_skipped() -> bool {
+    let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
+    let packages = workspace().join("tests/browser/node_modules/playwright-core");
+    let missing = match () {
+        () if !Path::new(&chromium).exists() => format!("no browser at {chromium}"),
+        () if Command::new("node").arg("--version").output().is_err() => "no node".to_owned(),
+        () if !packages.exists() => "no packages: run npm ci in tests/browser".to_owned(),
+        () => return false,
+    };
+    let said = format!("SKIPPED: stories of the page in a browser: {missing}\n");
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{said}");
+    // Straight to the terminal: the test's own output is not shown while it passes.
+    let _ = std::io::stderr().write_all(said.as_bytes());
+    true
+}
+
+/// Tells the stories that fit; fails with those that did not hold, else says how many held.
+fn assert_stories_hold(arguments: &[&str]) {
+    let _one = BROWSER.lock().unwrap_or_else(|e| e.into_inner());
+    let script = workspace().join("tests/browser/run.mjs");
+    let output = Command::new("node").arg(script).arg("--require").args(arguments).output().expect("node runs");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let counts = said.lines().last().unwrap_or_default();
+    assert!(!counts.starts_with("0 passed"), "no story was told: {said}");
+    let measured = said.lines().filter(|l| l.contains("figures: ")).map(|l| format!("{l}\n"));
+    let _ = std::io::stderr().write_all(format!("{}{counts}\n", measured.collect::<String>()).as_bytes());
+}
+
+#[test]
+fn every_story_holds_against_the_mock() {
+    if !is_skipped() {
+        assert_stories_hold(&[]);
+    }
+}
+
+#[test]
+fn every_story_that_needs_no_mock_holds_against_a_demo() {
+    if is_skipped() {
+        return;
+    }
+    let port = free_port();
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "8", "--duration", "100000"]);
+    wait_until("labels on the map", LIMIT, || {
+        state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 3))
+    });
+    assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}")]);
+}
+
+#[test]
+fn a_surface_with_a_token_asks_the_browser_for_it() {
+    if is_skipped() {
+        return;
+    }
+    let dir = scratch("browser-token");
+    let token = dir.join("console.token").display().to_string();
+    assert!(run(&["key", "token", "--out", &token]).status.success());
+    let (port, modem) = (free_port(), free_port());
+    let config = workspace().join("config/asv.toml").display().to_string();
+    let sets = [
+        format!("console.listen=0.0.0.0:{port}"),
+        format!("console.token_file={token}"),
+        format!("modem.listen=127.0.0.1:{modem}"),
+        format!("runtime.state_dir=\"{}\"", dir.join("asv").display()),
+    ];
+    let mut arguments = vec!["asv", "--config", &config];
+    arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
+    let _surface = Process::start(&arguments);
+    wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
+    assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
+}
