@@ -134,5 +134,6 @@ fn coarse_cells_need_far_fewer_bits() {
         mission.surface.view(mission.address).unwrap().stats().heard_by_class[&scenecast_protocol::schedule::Class::Map]
     };
     let (fine, coarse) = (bytes("map.cells=fine"), bytes("map.cells=coarse"));
-    assert!(coarse * 3 < fine, "{coarse} bytes of coarse cells, {fine} of all");
+    // A sixteenth of the cells, but each alone: labels of neighbours tell less of each other four cells apart.
+    assert!(coarse * 2 < fine, "{coarse} bytes of coarse cells, {fine} of all");
 }
