@@ -12,21 +12,29 @@ pub struct Seen<'a> {
 /// How a label fades with the distance from where it was seen: the spatial Chinese Restaurant Process, carried beyond the
 /// Von Neumann neighbourhood of a cell.
 ///
-/// In an unseen cell label k weighs `n_k + alpha p_k`: n_k counts the seen cells of the label, each worth `fade` to the power
-/// of the steps (east-west plus north-south) to it; p_k is its share of the whole map; a new label weighs `gamma`. Next to
+/// In an unseen cell label k weighs `n q_k + alpha p_k`: n counts the seen cells, each worth `fade` to the power of the
+/// steps (east-west plus north-south) to it; q_k is the label's share among them by a `fade` that is steeper, so that of many
+/// seen cells the next ones tell which label it is; p_k is its share of the whole map; a new label weighs `gamma`. Next to
 /// seen cells their labels decide, far from all the mix of the map.
 #[derive(Debug, Clone)]
 pub struct Expectation<'a> {
     seen: Seen<'a>,
-    fade: f32,
+    /// The steeper fade, by which near labels are told apart.
+    steep: f32,
     alpha: f32,
     gamma: f32,
     /// Sum of the fading counts of all labels in each cell.
     near: Vec<f32>,
+    /// The same by the steeper fade.
+    next: Vec<f32>,
 }
 
 /// Reach of a label's influence, in lengths over which the labels of the map are alike.
 const REACH: f32 = 0.5;
+/// Reach of what tells near labels apart, in the same lengths.
+const NEXT: f32 = 0.1;
+/// What an unseen cell counts by the steeper fade, with the mix of the map: far from all that was seen, nothing is divided by 0.
+const UNSEEN: f32 = 1e-12;
 /// Weight of the map's overall mix, in counts of a straight edge of seen cells at the distance of one reach.
 const MIX: f32 = 0.05;
 /// Weight of a new label, as a share of that of the mix.
@@ -39,23 +47,27 @@ impl<'a> Expectation<'a> {
     }
 
     fn with(seen: Seen<'a>, reach: f32, mix: f32) -> Self {
-        let fade = (-1.0 / (reach * likeness_length(seen)).clamp(0.5, 40.0)).exp();
+        let length = likeness_length(seen);
+        let fade = (-1.0 / (reach * length).clamp(0.5, 40.0)).exp();
+        let steep = (-1.0 / (NEXT * length).clamp(0.7, 40.0)).exp();
         // A half plane of seen cells counts this much in the cell next to it.
         let edge = fade / (1.0 - fade) * (1.0 + fade) / (1.0 - fade);
         let alpha = mix * edge;
-        let counts = seen.labels.iter().map(|&l| f32::from(u8::from(l != 0))).collect();
-        let near = fading(counts, seen.width, fade);
-        Self { seen, fade, alpha, gamma: NEW * alpha, near }
+        let counts = |unseen: f32| seen.labels.iter().map(|&l| if l == 0 { unseen } else { 1.0 }).collect();
+        let near = fading(counts(0.0), seen.width, fade);
+        let next = fading(counts(UNSEEN), seen.width, steep);
+        Self { seen, steep, alpha, gamma: NEW * alpha, near, next }
     }
 
     /// Expectation in each cell of a value that depends on the label, where a new label has the value `of_new`.
     pub fn of(&self, value: impl Fn(u8) -> f32, of_new: f32) -> Vec<f32> {
-        let values: Vec<f32> = self.seen.labels.iter().map(|&l| if l == 0 { 0.0 } else { value(l) }).collect();
-        let cells = self.seen.labels.iter().filter(|&&l| l != 0).count();
-        let mean = if cells == 0 { of_new } else { values.iter().sum::<f32>() / cells as f32 };
-        let mut expected = fading(values, self.seen.width, self.fade);
-        for (e, near) in expected.iter_mut().zip(&self.near) {
-            *e = (*e + self.alpha * mean + self.gamma * of_new) / (near + self.alpha + self.gamma);
+        let known = || self.seen.labels.iter().filter(|&&l| l != 0);
+        let cells = known().count();
+        let mean = if cells == 0 { of_new } else { known().map(|&l| value(l)).sum::<f32>() / cells as f32 };
+        let values = self.seen.labels.iter().map(|&l| if l == 0 { UNSEEN * mean } else { value(l) }).collect();
+        let mut expected = fading(values, self.seen.width, self.steep);
+        for ((e, next), near) in expected.iter_mut().zip(&self.next).zip(&self.near) {
+            *e = (*e / next * near + self.alpha * mean + self.gamma * of_new) / (near + self.alpha + self.gamma);
         }
         expected
     }
