@@ -130,8 +130,8 @@ async function post(mock, req, res, path) {
   }
   const orders = { fence: () => fence(given), limits: () => limits(given) };
   if (what in orders) {
-    v[what] = orders[what]();
-    const order = v[what];
+    const order = orders[what]();
+    v[what] = order;
     const answer = v.directive.issue(what, mission.nowS, (s) => {
       if (s === "applied") v.inForce[what] = { version: answer.version, order };
     });
