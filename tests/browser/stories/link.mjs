@@ -90,6 +90,8 @@ export default [
       await box.getByRole("checkbox", { name: "confidence" }).uncheck();
       const wanted = ["exemplars", "finer", "depth"];
       await s.until("the server's order", async () => (await s.get("/state")).link.spend.join() === wanted.join());
+      // The server may tell of it before the browser tells of its request.
+      await s.until("the message", () => s.posts.at(-1)?.body.spend?.length === wanted.length);
       assert.deepEqual(s.posts.at(-1).body.spend, wanted);
       assert.equal(s.posts.at(-1).body.shares, undefined);
       await s.page.reload();
