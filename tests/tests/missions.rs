@@ -74,7 +74,7 @@ fn whole_missions_pass_with_either_codec() {
 fn planes_arrive_and_labels_do_not_wait_for_them() {
     let without = fly(&["map.planes=[]"], 8);
     assert_eq!(without["map"]["planes"], serde_json::json!({}));
-    for sets in [&["map.plane_shares=[0, 0]"], &["map.plane_shares=[10, 5]"]] {
+    for sets in [&["map.plane_shares=[0, 0]"], &["map.plane_shares=[10, 5, 0]"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
         for plane in ["confidence", "depth"] {
