@@ -251,7 +251,7 @@ pub const KEYS: &[Key] = &[
         "",
         Words(&["confidence", "depth", "curiosity"]),
         "ar",
-        "planes that are sent beside the labels where these leave room: how sure the model is of a label in quarters, the depth of the sea floor, and how badly the model explains a cell in whole bits a word; each takes a share, or a place in link.spend, which curiosity has not by default",
+        "planes that may be sent beside the labels: confidence, how sure the model is of a label, in quarters; depth of the sea floor; curiosity, how badly the model explains a cell, in whole bits a word; one without a share is sent where link.spend names it",
     ),
     key(
         "map.plane_shares",
