@@ -10,13 +10,13 @@ mod journal;
 mod kept_labels;
 mod mapping;
 mod pilot;
-mod port;
 mod position;
 #[cfg(test)]
 mod power_cuts;
 mod refusals;
 mod reload;
 mod restore;
+mod stop;
 mod surface;
 mod vehicle;
 
@@ -24,6 +24,7 @@ pub use clock::Clock;
 pub use demo::run_demo;
 pub(crate) use journal::sync_folder;
 pub use reload::Load;
+pub(crate) use stop::Stop;
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 
