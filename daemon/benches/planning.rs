@@ -42,3 +42,15 @@ fn plan<const SIGHT: u32>(bencher: divan::Bencher<'_, '_>, name: &str) {
         steering.next((12.5, 25.0), (&map, version), Some(&utility), 800.0)
     });
 }
+
+/// So little is left that `horizon` plans the rest to its end, with nearly all of it to choose from.
+#[divan::bench(consts = [4, 8], sample_count = 20)]
+fn plan_to_the_end<const SIGHT: u32>(bencher: divan::Bencher<'_, '_>) {
+    let (mut steering, map, utility) = steering(PlannerKind::Horizon, f64::from(SIGHT));
+    let mut version = 0;
+    bencher.bench_local(|| {
+        version += 1;
+        steering.replan();
+        steering.next((4.0, 4.0), (&map, version), Some(&utility), 8.0 * f64::from(SIGHT))
+    });
+}

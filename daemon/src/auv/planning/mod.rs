@@ -6,6 +6,7 @@ mod greedy;
 mod horizon;
 mod lattice;
 mod lawnmower;
+mod way_back;
 mod worth;
 
 pub use bounds::{Area, Bounds, Point, distance};
