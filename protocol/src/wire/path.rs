@@ -18,7 +18,7 @@ use crate::map_codec::bits::{BitReader, BitWriter};
 /// * dx, dy: from the waypoint before, never both 0.
 ///
 /// A path of which nothing is to be said takes no byte. Source: vehicle, at the end of a pose with a waypoint, in the map's
-/// frame as that is. Seven legs of up to 6.3 m take 14 bytes, of up to 819 m 27.
+/// frame as that is. Seven legs of up to 6.3 m take 14 bytes, of up to 819 m 26.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlannedPath {
     /// East and north, metres; the first is gone to from the waypoint in force.
