@@ -31,23 +31,24 @@ async function someCell(s) {
 const pixel = (s, px, py) =>
   s.page.evaluate(([x, y]) => [...document.getElementById("chart").getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3), [Math.round(px), Math.round(py)]);
 
-/** What `check` says of the first leg of the path. */
-const leg = (s, check, argument) =>
+/** What `check` says of waypoint and path. */
+const plan = (s, check, argument) =>
   s.inPage(`({ store }, before) => {
     const { waypoint, path } = store.vehicle.status ?? {};
     return (${check})({ drawn: Boolean(path?.length), at: JSON.stringify([waypoint, path]) }, before);
   }`, argument);
 
-/** Share of the first leg of the path that has an ink of the map. */
+/** Share of the longest leg of the path that has an ink of the map. */
 const onLeg = (s, ink) =>
   s.inPage(({ store, view: v, inWorld }, name) => {
     const { waypoint, path } = store.vehicle.status;
-    const [from, to] = [waypoint, path[0]].map((p) => v.toScreen(...inWorld(store.vehicle, ...p)));
+    const corners = [waypoint, ...path].map((p) => v.toScreen(...inWorld(store.vehicle, ...p)));
+    const legs = corners.slice(1).map((to, i) => [corners[i], to, Math.hypot(to[0] - corners[i][0], to[1] - corners[i][1])]);
+    const [from, to, length] = legs.reduce((a, b) => (b[2] > a[2] ? b : a));
     const wanted = getComputedStyle(document.documentElement).getPropertyValue(`--map-${name}`).match(/[0-9a-f]{2}/gi).map((x) => parseInt(x, 16));
     const c = document.getElementById("chart").getContext("2d");
     const is = (x, y) => wanted.every((w, n) => Math.abs(w - c.getImageData(x, y, 1, 1).data[n]) < 40);
     // Past the cross at one end and the dot at the other.
-    const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
     const [begin, end] = [10 / length, 1 - 6 / length];
     const places = Array.from({ length: 100 }, (_, i) => begin + ((end - begin) * i) / 99).map((t) => [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])]);
     return places.filter(([x, y]) => [-1, 0].some((d) => is(x + d, y) || is(x, y + d))).length / places.length;
@@ -151,25 +152,32 @@ export default [
     },
   },
   {
-    name: "the planned path is drawn, follows the plan and goes with a hold",
+    name: "the planned path is drawn and told in metres",
+    async run(s) {
+      await s.button("Fit").click();
+      await s.shows("#vehicle", /Path\s*\d waypoints, [\d.]+\sm(, goes on)?/s);
+      await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
+    },
+  },
+  {
+    name: "the planned path follows the plan and goes with a hold",
     scenario: "rich",
     async run(s) {
       await s.button("Fit").click();
-      const first = await s.until("the path", () => leg(s, (c) => c.drawn && c));
-      await s.shows("#vehicle", /Path\s*\d waypoints, [\d.]+\sm(, goes on)?/s);
-      await s.until("dashes on its first leg", async () => (await onLeg(s, "text")) > 0.3);
+      const first = await s.until("the path", () => plan(s, (c) => c.drawn && c));
+      await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
       assert.ok((await onLeg(s, "text")) < 0.95, "a dashed line");
       await s.steer({ placement: { version: 1, east_m: 3, north_m: 2 } });
       await s.until("the move", () => s.inPage(({ store }) => store.vehicle.map.placement));
       await s.until("dashes where it lies now", async () => (await onLeg(s, "text")) > 0.3);
       await s.steer({ placement: null, advance: 40 });
-      await s.until("the next plan", () => leg(s, (c, before) => c.drawn && c.at !== before.at, first));
-      await s.until("dashes on its first leg", async () => (await onLeg(s, "text")) > 0.3);
+      await s.until("the next plan", () => plan(s, (c, before) => c.drawn && c.at !== before.at, first));
+      await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
       await s.post("/vehicles/1/constraints", { hold: true, abort: false });
       await s.until("no path", () => s.inPage(({ store }) => store.vehicle.status.path.length === 0), { advance: 15 });
       await s.shows("#vehicle", /Path\s*–/s);
       await s.post("/vehicles/1/constraints", { hold: false, abort: false });
-      await s.until("a path again", () => leg(s, (c) => c.drawn), { advance: 15 });
+      await s.until("a path again", () => plan(s, (c) => c.drawn), { advance: 15 });
     },
   },
   {
@@ -178,7 +186,8 @@ export default [
     async run(s) {
       await s.button("Fit").click();
       await s.until("grey dashes", async () => (await onLeg(s, "stale")) > 0.3);
-      assert.equal(await onLeg(s, "text"), 0);
+      // The track may cross it.
+      assert.ok((await onLeg(s, "text")) < 0.15);
     },
   },
   {

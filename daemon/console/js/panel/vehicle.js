@@ -27,6 +27,7 @@ export function startVehicle() {
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;
+    node.classList.toggle("whole", key === "path");
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
