@@ -101,8 +101,12 @@ impl Process {
 
     /// Asks it to read its configuration again.
     pub fn hang_up(&self) {
-        let sent = Command::new("kill").args(["-HUP", &self.0.id().to_string()]).status();
-        assert!(sent.is_ok_and(|s| s.success()), "the process can be signalled");
+        signal(&self.0, "HUP");
+    }
+
+    /// Interrupts it as a person would; its exit code.
+    pub fn interrupt(&mut self, limit: Duration) -> Option<i32> {
+        end(&mut self.0, "INT", limit)
     }
 }
 
@@ -110,6 +114,22 @@ impl Drop for Process {
     fn drop(&mut self) {
         self.kill();
     }
+}
+
+/// Sends a signal to a process and waits until it has ended; its exit code.
+pub fn end(child: &mut Child, name: &str, limit: Duration) -> Option<i32> {
+    signal(child, name);
+    let mut status = None;
+    wait_until(&format!("the process ends at SIG{name}"), limit, || {
+        status = child.try_wait().expect("a child can be waited for");
+        status.is_some()
+    });
+    status.and_then(|s| s.code())
+}
+
+fn signal(child: &Child, name: &str) {
+    let sent = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status();
+    assert!(sent.is_ok_and(|s| s.success()), "the process can be signalled");
 }
 
 /// Waits for processes until `done`; fails after `limit`.

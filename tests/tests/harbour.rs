@@ -4,7 +4,7 @@ use scenecast_tests::{free_port, http, recorded, scenecast, scratch, wait_until}
 use serde_json::Value;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::Duration;
 
 /// Seconds of the rehearsal a second.
@@ -27,9 +27,8 @@ impl Logged {
 
     /// Interrupts it as a person would; what it had to say.
     fn finish(mut self) -> String {
-        let sent = Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().unwrap();
-        assert!(sent.success());
-        assert_eq!(self.child.wait().unwrap().code(), Some(0), "{}", self.said());
+        let code = scenecast_tests::end(&mut self.child, "INT", PATIENCE);
+        assert_eq!(code, Some(0), "{}", self.said());
         self.said()
     }
 

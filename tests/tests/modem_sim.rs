@@ -1,11 +1,11 @@
 //! `scenecast modem-sim` as somebody sees it who knows nothing of it but a device or a TCP port.
 
-use scenecast_tests::{assert_refused, scenecast, scratch, wait_until};
+use scenecast_tests::{assert_refused, end, scenecast, scratch, wait_until};
 use serialport::TTYPort;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 const SCENARIO: &str = r#"
@@ -144,9 +144,7 @@ fn a_device_is_unplugged_comes_back_and_its_link_goes_with_the_command() {
     assert_eq!(emulation.line()[0], "auv");
     drop(vehicle);
     ask(&mut emulation.open("auv"), "AT?AL\r", "2\r\n");
-    let id = emulation.child.id().to_string();
-    assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
-    assert_eq!(emulation.child.wait().unwrap().code(), Some(0));
+    assert_eq!(end(&mut emulation.child, "TERM", Duration::from_secs(10)), Some(0));
     assert!(link.symlink_metadata().is_err());
 }
 

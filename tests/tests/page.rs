@@ -76,3 +76,17 @@ fn the_page_is_small_and_what_a_browser_has_is_not_sent_again() {
         assert!(status == 304 || path.starts_with("/api"), "{path}: {status}");
     }
 }
+
+#[test]
+fn a_demo_that_is_too_fast_for_the_machine_still_answers_and_ends_when_interrupted() {
+    let port = free_port();
+    let mut demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "1000", "--duration", "1000000"]);
+    wait_until("labels on the map", Duration::from_secs(60), || {
+        state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 1))
+    });
+    for exploration in [0.1, 0.2, 0.3] {
+        let weights = format!("{{\"weights\": {{}}, \"exploration\": {exploration}}}");
+        assert_eq!(http(port, "POST", "/api/v1/vehicles/1/utility", ORDER, &weights).expect("an answer").0, 202);
+    }
+    assert_eq!(demo.interrupt(Duration::from_secs(10)), Some(0));
+}

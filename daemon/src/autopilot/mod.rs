@@ -11,10 +11,12 @@
 pub mod mavlink;
 mod nmea;
 mod rehearsed;
+mod tray;
 
 pub use mavlink::Mavlink;
 pub use nmea::Nmea;
 pub use rehearsed::Rehearsed;
+pub use tray::Tray;
 
 use crate::asv::position::LatLon;
 use scenecast_protocol::time::Instant;
@@ -103,14 +105,23 @@ pub trait Autopilot: Send {
     /// When [`Self::handle_timeout`] is due.
     fn poll_timeout(&self) -> Instant;
 
+    /// What it has ready.
+    fn tray(&mut self) -> &mut Tray;
+
     /// Bytes to send.
-    fn poll_output(&mut self) -> Option<Vec<u8>>;
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.tray().outputs.pop_front()
+    }
 
     /// The next stretch of way.
-    fn poll_step(&mut self) -> Option<Step>;
+    fn poll_step(&mut self) -> Option<Step> {
+        self.tray().steps.pop_front()
+    }
 
     /// Something that a person should read.
-    fn poll_note(&mut self) -> Option<String>;
+    fn poll_note(&mut self) -> Option<String> {
+        self.tray().notes.pop_front()
+    }
 
     /// Go there; `None`: stay. Said anew every second or so, for the autopilot may have forgotten.
     fn set_goal(&mut self, goal: Option<Goal>, now: Instant);

@@ -10,10 +10,9 @@
 //! and `$PSCHD*hh` while the vehicle is to stay. Read are positions (GGA, RMC), headings (HDT, THS) and depths below the
 //! surface (DBS).
 
-use super::{Autopilot, Counters, Goal, Health, Step};
+use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use crate::asv::position::{Gps, GpsLanguage, LatLon, Lines, TangentPlane, nmea};
 use scenecast_protocol::time::Instant;
-use std::collections::VecDeque;
 use std::time::Duration;
 
 /// A state machine of lines.
@@ -30,15 +29,9 @@ pub struct Nmea {
     goal: Option<Goal>,
     has_order: bool,
     second: Instant,
-    outputs: VecDeque<Vec<u8>>,
-    steps: VecDeque<Step>,
-    notes: VecDeque<String>,
-    counters: Counters,
+    tray: Tray,
     was_silent: bool,
 }
-
-/// Most that waits to be fetched.
-const MOST_WAITING: usize = 256;
 
 impl Nmea {
     /// `answers`: whether the vehicle tells where it is; silence of `silence` then counts.
@@ -54,22 +47,13 @@ impl Nmea {
             goal: None,
             has_order: false,
             second: now,
-            outputs: VecDeque::new(),
-            steps: VecDeque::new(),
-            notes: VecDeque::new(),
-            counters: Counters::new(),
+            tray: Tray::default(),
             was_silent: false,
         }
     }
 
-    fn count(&mut self, what: &'static str) {
-        *self.counters.entry(what).or_default() += 1;
-    }
-
     fn write(&mut self, body: &str) {
-        if self.outputs.len() < MOST_WAITING {
-            self.outputs.push_back(nmea::line(body).into_bytes());
-        }
+        self.tray.write(nmea::line(body).into_bytes());
     }
 
     fn say_goal(&mut self) {
@@ -91,7 +75,7 @@ impl Nmea {
             let (dx_m, dy_m) = TangentPlane::new(before).to_plane(place);
             let passed = now.since(at);
             if dx_m.hypot(dy_m) > 20.0 * passed.as_secs_f64().max(0.1) {
-                self.count("jumps");
+                self.tray.count("jumps");
                 return self.push_step(0.0, 0.0, heading_rad, passed);
             }
             if let Some(goal) = &mut self.goal {
@@ -102,9 +86,7 @@ impl Nmea {
     }
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration) {
-        if self.steps.len() < MOST_WAITING {
-            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen });
-        }
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen });
     }
 
     /// DBS: feet, f, metres, M, fathoms, F.
@@ -130,7 +112,7 @@ impl Autopilot for Nmea {
             }
             if nmea::fields(&line).is_ok() {
                 if self.heard.is_none() || self.was_silent {
-                    self.notes.push_back("the autopilot answers".to_owned());
+                    self.tray.note("the autopilot answers");
                 }
                 (self.heard, self.was_silent) = (Some(now), false);
             }
@@ -149,8 +131,8 @@ impl Autopilot for Nmea {
             self.say_goal();
         }
         if self.health(now) == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
-            self.count("silences");
-            self.notes.push_back("the autopilot does not answer any more".to_owned());
+            self.tray.count("silences");
+            self.tray.note("the autopilot does not answer any more");
         }
     }
 
@@ -158,16 +140,8 @@ impl Autopilot for Nmea {
         self.second
     }
 
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.outputs.pop_front()
-    }
-
-    fn poll_step(&mut self) -> Option<Step> {
-        self.steps.pop_front()
-    }
-
-    fn poll_note(&mut self) -> Option<String> {
-        self.notes.pop_front()
+    fn tray(&mut self) -> &mut Tray {
+        &mut self.tray
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
@@ -187,7 +161,7 @@ impl Autopilot for Nmea {
     }
 
     fn counters(&self) -> Counters {
-        let mut counters = self.counters.clone();
+        let mut counters = self.tray.counters.clone();
         counters.extend(self.gps.faults().map(|(fault, n)| (fault.name(), n)));
         counters
     }

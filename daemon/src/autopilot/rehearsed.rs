@@ -1,10 +1,9 @@
 //! A simulated vehicle as an autopilot.
 
-use super::{Autopilot, Counters, Goal, Health, Step};
+use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use crate::asv::position::LatLon;
 use crate::rehearsal::Motion;
 use scenecast_protocol::time::Instant;
-use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Kinematics that are stepped twice a second of mission time.
@@ -13,7 +12,7 @@ pub struct Rehearsed {
     motion: Motion,
     depth_m: f64,
     next: Instant,
-    steps: VecDeque<Step>,
+    tray: Tray,
 }
 
 impl Rehearsed {
@@ -24,7 +23,7 @@ impl Rehearsed {
 
     /// A vehicle that moves as `motion` does, at a depth.
     pub fn new(motion: Motion, depth_m: f64, now: Instant) -> Self {
-        Self { motion, depth_m, next: now, steps: VecDeque::new() }
+        Self { motion, depth_m, next: now, tray: Tray::default() }
     }
 }
 
@@ -42,7 +41,7 @@ impl Autopilot for Rehearsed {
             self.next = self.next + Duration::from_secs_f64(Self::STEP_S);
             let o = self.motion.step_on(Self::STEP_S);
             let (dx_m, dy_m, heading_rad, depth_m) = (o.dx_m, o.dy_m, o.heading_rad, self.depth_m);
-            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m, unseen: Duration::ZERO });
+            self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m, unseen: Duration::ZERO });
         }
     }
 
@@ -50,16 +49,8 @@ impl Autopilot for Rehearsed {
         self.next
     }
 
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        None
-    }
-
-    fn poll_step(&mut self) -> Option<Step> {
-        self.steps.pop_front()
-    }
-
-    fn poll_note(&mut self) -> Option<String> {
-        None
+    fn tray(&mut self) -> &mut Tray {
+        &mut self.tray
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {

@@ -2,6 +2,7 @@
 
 use crate::config::{self, Config};
 use crate::modem::{self, Class, Destination, Driver, Event, Refusal, Token};
+use crate::rehearsal::VirtualTime;
 use crate::rehearsal::modem_bench::{Dock, DockSetting};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::Cycle;

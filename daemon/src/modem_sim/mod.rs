@@ -16,6 +16,7 @@ mod tcp;
 pub use scenario::Scenario;
 
 use crate::problem::Problem;
+use crate::runtime::Stop;
 use host::FromHost;
 use links::Links;
 use orders::Order;
@@ -44,12 +45,12 @@ pub fn run(options: Options) -> Result<(), Problem> {
     let links = Links::new(options.link_dir.as_deref())?;
     let pace = Pace { began: Instant::now(), scale: options.time_scale };
     crate::runtime::block_on(async move {
-        let interrupted = interruption()?;
+        let mut stop = Stop::new()?;
         let (to_tank, from_hosts) = mpsc::channel(256);
         let mut tank = Tank::new(scenario, links, pace, to_tank)?;
         tokio::select! {
             result = serve(&mut tank, from_hosts, pace) => result,
-            () = interrupted => Ok(()),
+            () = stop.asked() => Ok(()),
         }
     })
 }
@@ -99,20 +100,4 @@ async fn serve(tank: &mut Tank, mut from_hosts: mpsc::Receiver<FromHost>, pace: 
         }
         tank.advance(pace.now())?;
     }
-}
-
-/// Ends at Ctrl-C, and where there is one at the signal to terminate.
-fn interruption() -> Result<impl Future<Output = ()>, Problem> {
-    #[cfg(unix)]
-    let mut terminate = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())
-        .map_err(|e| Problem::Failed(format!("SIGTERM: {e}")))?;
-    Ok(async move {
-        #[cfg(unix)]
-        tokio::select! {
-            _ = tokio::signal::ctrl_c() => {}
-            _ = terminate.recv() => {}
-        }
-        #[cfg(not(unix))]
-        let _ = tokio::signal::ctrl_c().await;
-    })
 }

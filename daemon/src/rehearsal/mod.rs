@@ -18,6 +18,7 @@ pub mod planning_bench;
 mod recording;
 mod report;
 mod script;
+mod virtual_time;
 pub mod witness;
 mod world;
 
@@ -30,4 +31,5 @@ pub use motion::{Motion, Odometry};
 pub use outputs::write_outputs;
 pub use recording::{RecordedFrame, Recording};
 pub use report::{Report, report};
+pub use virtual_time::VirtualTime;
 pub use world::World;

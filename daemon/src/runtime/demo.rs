@@ -1,5 +1,6 @@
 //! A rehearsal at the pace of the world, with the operator's page.
 
+use super::stop::Stop;
 use crate::console::{Console, LinkMeter, MissionFacts, answer, bind, snapshot, start};
 use crate::problem::Problem;
 use crate::rehearsal::Mission;
@@ -7,13 +8,20 @@ use scenecast_protocol::time::Instant;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Wall time of a step.
+/// Wall time between two steps.
 const TICK: Duration = Duration::from_millis(50);
+/// Wall time that a step may take: then the page is served, however far the mission has come.
+const STEP_LIMIT: Duration = Duration::from_millis(200);
+/// Mission time that is flown between two looks at the wall clock.
+const STRIDE: Duration = Duration::from_millis(250);
+/// Wall time between two snapshots for the page when nothing happens.
+const PUBLISH: Duration = Duration::from_secs(1);
 
 /// Flies a mission at `speed` mission seconds a second and serves the operator's page on `port`, until it is interrupted;
 /// without a page, until the operator has everything.
 pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), Problem> {
     super::block_on(async move {
+        let stop = Stop::new()?;
         let console = match port {
             Some(port) => {
                 let listener = bind(&format!("127.0.0.1:{port}"), "--port", None, "").await?;
@@ -22,7 +30,7 @@ pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), P
             }
             None => None,
         };
-        Demo::new(mission, speed).run(console).await
+        Demo::new(mission, speed).run(console, stop).await
     })
 }
 
@@ -31,7 +39,7 @@ struct Demo {
     meter: LinkMeter,
     facts: MissionFacts,
     counted: [u64; 2],
-    published: Option<Instant>,
+    published: Option<std::time::Instant>,
 }
 
 impl Demo {
@@ -41,23 +49,19 @@ impl Demo {
         Self { meter: LinkMeter::new(window), mission, facts, counted: [0; 2], published: None }
     }
 
-    async fn run(mut self, mut console: Option<Console>) -> Result<(), Problem> {
-        let clock = super::clock::Clock::new(self.facts.speed);
-        let end = Instant::from_secs_f64(self.mission.config().survey.duration_s);
+    async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), Problem> {
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let mut before = std::time::Instant::now();
         loop {
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => return Ok(()),
+                () = stop.asked() => return Ok(()),
                 _ = tick.tick() => {}
             }
-            let now = clock.now();
-            if now >= end && !self.facts.ended {
-                self.mission.advance(end)?;
-                self.mission.end_survey();
-                self.facts.ended = true;
-            }
-            self.mission.advance(now)?;
+            // A machine that is too slow for the speed falls behind; it must not try to catch up, or each step takes longer.
+            let passed = before.elapsed().min(STEP_LIMIT + TICK);
+            before = std::time::Instant::now();
+            self.fly(self.mission.now() + passed.mul_f64(self.facts.speed))?;
             self.count();
             let changed = !self.mission.take_events().is_empty();
             match &mut console {
@@ -68,6 +72,22 @@ impl Demo {
         }
     }
 
+    /// Flies the mission on to `until`, or as far as there is time for.
+    fn fly(&mut self, until: Instant) -> Result<(), Problem> {
+        let end = Instant::from_secs_f64(self.mission.config().survey.duration_s);
+        let began = std::time::Instant::now();
+        while self.mission.now() < until && began.elapsed() < STEP_LIMIT {
+            let next = until.min(self.mission.now() + STRIDE);
+            if next >= end && !self.facts.ended {
+                self.mission.advance(end)?;
+                self.mission.end_survey();
+                self.facts.ended = true;
+            }
+            self.mission.advance(next)?;
+        }
+        Ok(())
+    }
+
     fn serve(&mut self, console: &mut Console, mut changed: bool) {
         let now = self.mission.now();
         while let Ok((ask, reply)) = console.requests.try_recv() {
@@ -76,9 +96,9 @@ impl Demo {
             let _ = reply.send(answer(self.mission.surface(), ask, cell_m, now));
             changed = true;
         }
-        let due = self.published.is_none_or(|at| now.since(at).as_secs_f64() >= self.facts.speed);
+        let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH);
         if changed || due {
-            self.published = Some(now);
+            self.published = Some(std::time::Instant::now());
             let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
             console.snapshots.send_replace(Arc::new(snapshot));
         }

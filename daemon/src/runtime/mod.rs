@@ -17,6 +17,7 @@ mod power_cuts;
 mod refusals;
 mod reload;
 mod restore;
+mod stop;
 mod surface;
 mod vehicle;
 
@@ -24,6 +25,7 @@ pub use clock::Clock;
 pub use demo::run_demo;
 pub(crate) use journal::sync_folder;
 pub use reload::Load;
+pub(crate) use stop::Stop;
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 

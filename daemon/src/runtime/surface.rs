@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::journal::create_folder;
 use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
+use super::stop::Stop;
 use crate::asv::position::world_file;
 use crate::asv::{Surface, SurfaceOutput};
 use crate::config::{self, Config};
@@ -21,6 +22,7 @@ use tokio::sync::oneshot;
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config) -> Result<(), Problem> {
     super::block_on(async move {
+        let stop = Stop::new()?;
         let entrance = match config.console.listen.as_str() {
             "" => None,
             address => {
@@ -49,7 +51,7 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         let vehicle = crate::ends::vehicle_address(&config)?;
         let refusals = Refusals::default();
         Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }
-            .run()
+            .run(stop)
             .await
     })
 }
@@ -70,7 +72,7 @@ struct Host {
 }
 
 impl Host {
-    async fn run(mut self) -> Result<(), Problem> {
+    async fn run(mut self, mut stop: Stop) -> Result<(), Problem> {
         let mut second = tokio::time::interval(Duration::from_secs(1));
         second.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
@@ -82,7 +84,7 @@ impl Host {
             let wake = self.surface.poll_timeout(now).map(|(at, _)| at).filter(|&at| at > now);
             let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
             tokio::select! {
-                _ = tokio::signal::ctrl_c() => {
+                () = stop.asked() => {
                     self.modem.log_audit();
                     return Ok(());
                 }

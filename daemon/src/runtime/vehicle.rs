@@ -8,6 +8,7 @@ use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
+use super::stop::Stop;
 use crate::auv::{Area, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
@@ -21,6 +22,7 @@ use std::path::Path;
 /// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
 pub fn run_vehicle(load: Load) -> Result<(), Problem> {
     super::block_on(async move {
+        let stop = Stop::new()?;
         let config = load()?;
         warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
@@ -44,7 +46,7 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
         let mapper = MapperThread::start(mapper, keep)?;
         let modem = modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        let (stop, flight) = (Stop::new()?, Flight::open(&config, clock)?);
+        let flight = Flight::open(&config, clock)?;
         let (behind, missed) = (0, 0);
         let host =
             Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind, missed };
@@ -56,33 +58,6 @@ fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, P
     let area = crate::ends::configured_area(config).or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
     area.ok_or_else(|| Problem::Input(missing.to_owned()))
-}
-
-/// Who asks the process to end: a person or the system.
-struct Stop {
-    #[cfg(unix)]
-    terminate: tokio::signal::unix::Signal,
-}
-
-impl Stop {
-    fn new() -> Result<Self, Problem> {
-        Ok(Self {
-            #[cfg(unix)]
-            terminate: tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())
-                .map_err(|e| Problem::Failed(format!("SIGTERM: {e}")))?,
-        })
-    }
-
-    /// Returns when the process is to end.
-    async fn asked(&mut self) {
-        #[cfg(unix)]
-        tokio::select! {
-            _ = tokio::signal::ctrl_c() => {}
-            _ = self.terminate.recv() => {}
-        }
-        #[cfg(not(unix))]
-        let _ = tokio::signal::ctrl_c().await;
-    }
 }
 
 struct Host {

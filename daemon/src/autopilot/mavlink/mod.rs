@@ -3,12 +3,11 @@
 pub mod frame;
 pub mod message;
 
-use super::{Autopilot, Counters, Goal, Health, Step};
+use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use crate::asv::position::LatLon;
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, heard_extra};
 use scenecast_protocol::time::Instant;
-use std::collections::VecDeque;
 use std::time::Duration;
 
 /// How this end presents itself and what it may do.
@@ -73,10 +72,7 @@ pub struct Mavlink {
     /// Whether it was in command once: from then on whoever takes it out of that is obeyed.
     was_in_command: bool,
     due: Due,
-    outputs: VecDeque<Vec<u8>>,
-    steps: VecDeque<Step>,
-    notes: VecDeque<String>,
-    counters: Counters,
+    tray: Tray,
     was_silent: bool,
 }
 
@@ -100,9 +96,6 @@ const BRIDGED: Duration = Duration::from_secs(3);
 const GPS_PERIOD: Duration = Duration::from_millis(200);
 /// A place on the Earth is passed on for so long after it was told.
 const PLACE_LASTS: Duration = Duration::from_secs(5);
-/// Most that waits to be fetched.
-const MOST_WAITING: usize = 256;
-
 impl Mavlink {
     /// Toward an autopilot that has said nothing yet.
     pub fn new(config: MavlinkConfig, now: Instant) -> Self {
@@ -119,16 +112,9 @@ impl Mavlink {
             place: None,
             was_in_command: false,
             due: Due { second: now, gps: now },
-            outputs: VecDeque::new(),
-            steps: VecDeque::new(),
-            notes: VecDeque::new(),
-            counters: Counters::new(),
+            tray: Tray::default(),
             was_silent: false,
         }
-    }
-
-    fn count(&mut self, what: &'static str) {
-        *self.counters.entry(what).or_default() += 1;
     }
 
     fn say(&mut self, said: &Said, now: Instant) {
@@ -137,28 +123,20 @@ impl Mavlink {
         let time_ms = now.since(self.began).as_millis() as u32;
         let payload = said.payload(self.config.system, component, time_ms);
         let frame = Frame { system: self.config.system, component: OWN_COMPONENT, id, payload };
-        if self.outputs.len() < MOST_WAITING {
-            self.outputs.push_back(encode(&frame, self.seq, extra));
-        }
+        self.tray.write(encode(&frame, self.seq, extra));
         self.seq = self.seq.wrapping_add(1);
-    }
-
-    fn note(&mut self, text: String) {
-        if self.notes.len() < MOST_WAITING {
-            self.notes.push_back(text);
-        }
     }
 
     fn handle_frame(&mut self, frame: &Frame, now: Instant) {
         if frame.system != self.config.system {
-            self.count("other_systems");
+            self.tray.count("other_systems");
             return;
         }
         let Some(heard) = Heard::read(frame.id, &frame.payload) else {
-            self.count("unreadable");
+            self.tray.count("unreadable");
             return;
         };
-        self.count("messages");
+        self.tray.count("messages");
         match heard {
             Heard::Heartbeat { custom_mode, kind, autopilot, base_mode } => {
                 // Cameras and ground stations of the same system have no autopilot.
@@ -187,15 +165,15 @@ impl Mavlink {
             Heard::Ack { command, result } => {
                 // In progress is no refusal.
                 if !matches!(result, 0 | 5) {
-                    self.count("commands_refused");
+                    self.tray.count("commands_refused");
                     if command != INTERVAL {
-                        self.note(format!("the autopilot refuses command {command}: result {result}"));
+                        self.tray.note(format!("the autopilot refuses command {command}: result {result}"));
                     }
                 }
             }
             Heard::Text { severity, text } => {
                 if severity <= 4 {
-                    self.note(format!("the autopilot says: {text}"));
+                    self.tray.note(format!("the autopilot says: {text}"));
                 }
             }
         }
@@ -209,14 +187,12 @@ impl Mavlink {
         let was_in_command = self.peer.is_some_and(|p| p.is_in_command());
         self.peer = Some(peer);
         if is_new {
-            self.note("the autopilot answers".to_owned());
+            self.tray.note("the autopilot answers");
             self.was_silent = false;
             self.ask_for_streams(now);
         }
         if was_in_command && !peer.is_in_command() {
-            self.note(
-                "the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back".to_owned(),
-            );
+            self.tray.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back");
         }
         self.was_in_command |= peer.is_in_command();
     }
@@ -242,14 +218,14 @@ impl Mavlink {
         let passed_ms = pose.time_boot_ms.wrapping_sub(before.time_boot_ms);
         // A clock that went back is another run of the autopilot.
         if passed_ms == 0 || u128::from(passed_ms) > BRIDGED.as_millis() {
-            self.count("gaps");
+            self.tray.count("gaps");
             return self.push_step(0.0, 0.0, &pose, pose.heard.since(before.heard));
         }
         let passed_s = f64::from(passed_ms) / 1000.0;
         let mean = |a: f64, b: f64| (a + b) / 2.0 * passed_s;
         let (dx_m, dy_m) = (mean(before.velocity.0, pose.velocity.0), mean(before.velocity.1, pose.velocity.1));
         if dx_m.hypot(dy_m) > 20.0 * passed_s {
-            self.count("absurd_velocities");
+            self.tray.count("absurd_velocities");
             return self.push_step(0.0, 0.0, &pose, Duration::from_secs_f64(passed_s));
         }
         if let Some(goal) = &mut self.goal {
@@ -262,18 +238,16 @@ impl Mavlink {
     }
 
     fn push_step(&mut self, dx_m: f64, dy_m: f64, pose: &Pose, unseen: Duration) {
-        if self.steps.len() < MOST_WAITING {
-            let heading_rad = self.yaw.unwrap_or(0.0);
-            self.steps.push_back(Step { dx_m, dy_m, heading_rad, depth_m: pose.depth_m, unseen });
-        }
+        let heading_rad = self.yaw.unwrap_or(0.0);
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: pose.depth_m, unseen });
     }
 
     fn handle_second(&mut self, now: Instant) {
         self.say(&Said::Heartbeat, now);
         let health = self.health(now);
         if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
-            self.count("silences");
-            self.note("the autopilot does not answer any more".to_owned());
+            self.tray.count("silences");
+            self.tray.note("the autopilot does not answer any more");
         }
         let Some(peer) = self.peer.filter(|_| !health.is_silent()) else { return };
         if self.pose.is_none_or(|p| now.since(p.heard) > BRIDGED) {
@@ -293,7 +267,7 @@ impl Mavlink {
 
     fn send_target(&mut self, now: Instant) {
         let Some(pose) = self.pose.filter(|p| now.since(p.heard) < BRIDGED) else { return };
-        self.count("targets");
+        self.tray.count("targets");
         match (pose.local, self.goal) {
             (Some(at), Some(goal)) => {
                 let down = goal.depth_m.map_or(at[2], |d| d as f32);
@@ -348,7 +322,7 @@ impl Autopilot for Mavlink {
             let fresh = self.place.filter(|(_, _, at)| now.since(*at) < PLACE_LASTS);
             if let Some((place, sigma_m, _)) = fresh.filter(|_| !self.health(now).is_silent()) {
                 let (lat, lon) = units(place);
-                self.count("gps_inputs");
+                self.tray.count("gps_inputs");
                 self.say(&Said::Gps { lat, lon, sigma_m }, now);
             }
         }
@@ -358,16 +332,8 @@ impl Autopilot for Mavlink {
         if self.place.is_some() { self.due.second.min(self.due.gps) } else { self.due.second }
     }
 
-    fn poll_output(&mut self) -> Option<Vec<u8>> {
-        self.outputs.pop_front()
-    }
-
-    fn poll_step(&mut self) -> Option<Step> {
-        self.steps.pop_front()
-    }
-
-    fn poll_note(&mut self) -> Option<String> {
-        self.notes.pop_front()
+    fn tray(&mut self) -> &mut Tray {
+        &mut self.tray
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
@@ -389,7 +355,7 @@ impl Autopilot for Mavlink {
 
     fn counters(&self) -> Counters {
         let refused = self.deframer.refused();
-        let mut counters = self.counters.clone();
+        let mut counters = self.tray.counters.clone();
         let more = [
             ("checksum", refused.checksum),
             ("incompatible", refused.incompatible),

@@ -32,9 +32,6 @@ async fn pump(stream: impl AsyncRead + AsyncWrite + Unpin, ends: &mut Ends) -> i
                     return Err(io::ErrorKind::WriteZero.into());
                 }
                 let _ = out.split_to(written);
-                if out.is_empty() {
-                    writer.flush().await?;
-                }
             }
             order = ends.to.recv(), if out.is_empty() => match order {
                 Some(ToPort::Bytes(bytes)) => out = bytes,

@@ -7,6 +7,7 @@ use crate::auv::{Area, Durable, MapUpdate, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::ends;
 use crate::problem::Problem;
+use crate::rehearsal::VirtualTime;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar as Picture;
 use scenecast_protocol::directive::Fix;
@@ -74,12 +75,12 @@ pub fn arrivals(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Arrivals, Problem> {
     let mut water = Water::new(setting, patches, seed)?;
-    water.run(Instant::from_secs_f64(WARM_UP_S), |_| false);
+    water.run_until(Instant::from_secs_f64(WARM_UP_S), |_| false);
     let (began, before) = (water.now, water.sent_bits);
     let mut took = Vec::new();
     for i in 0..setting.requests {
         let next = water.now + Duration::from_secs_f64(1.0 + 40.0 * water.dice.uniform());
-        water.run(next, |_| false);
+        water.run_until(next, |_| false);
         let label = water.any_label();
         let first = water.get(label, Wish::Another)?;
         took.extend(if setting.larger { water.get(label, Wish::Larger(None))? } else { first });
@@ -162,7 +163,7 @@ impl Water {
     pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, Problem> {
         let asked = self.now;
         self.surface.request_exemplar(self.address, label, wish, asked).map_err(Problem::Failed)?;
-        if !self.run(asked + GIVE_UP, |w| w.is_met(label)) {
+        if !self.run_until(asked + GIVE_UP, |w| w.is_met(label)) {
             self.surface.cancel_exemplar(self.address, label, self.now).map_err(Problem::Failed)?;
             return Ok(None);
         }
@@ -178,20 +179,28 @@ impl Water {
         self.page(label).is_some_and(|page| page.asked.is_none())
     }
 
-    /// Runs until `until` or until it is done; says whether it is done.
-    pub(super) fn run(&mut self, until: Instant, done: impl Fn(&Self) -> bool) -> bool {
-        self.pump();
-        while !done(self) {
-            let next = self.next_event();
-            if next > until {
-                self.now = until;
-                return false;
-            }
-            self.now = self.now.max(next);
-            self.handle_events();
-            self.pump();
-        }
-        true
+    /// Labels as they come, in places that change more than the link can tell; without load the map stays as it is.
+    fn change_map(&mut self) {
+        let cells = (0..EDGE * EDGE).map(|i| {
+            let label = match self.setting.loaded {
+                true => 1 + (self.dice.uniform() * f64::from(LABELS)) as u8,
+                false => 1 + (i % i32::from(LABELS)) as u8,
+            };
+            (Cell::new(i % EDGE, i / EDGE), label)
+        });
+        let (cells, planes, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, planes, perplexity, labels: LABELS };
+        self.vehicle.handle_map(&update, self.now);
+    }
+}
+
+impl VirtualTime for Water {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn set_now(&mut self, now: Instant) {
+        self.now = now;
     }
 
     fn next_event(&self) -> Instant {
@@ -239,20 +248,6 @@ impl Water {
             self.next_change = now + Duration::from_secs_f64(CHANGE_S);
             self.change_map();
         }
-    }
-
-    /// Labels as they come, in places that change more than the link can tell; without load the map stays as it is.
-    fn change_map(&mut self) {
-        let cells = (0..EDGE * EDGE).map(|i| {
-            let label = match self.setting.loaded {
-                true => 1 + (self.dice.uniform() * f64::from(LABELS)) as u8,
-                false => 1 + (i % i32::from(LABELS)) as u8,
-            };
-            (Cell::new(i % EDGE, i / EDGE), label)
-        });
-        let (cells, planes, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
-        let update = MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, planes, perplexity, labels: LABELS };
-        self.vehicle.handle_map(&update, self.now);
     }
 
     fn pump(&mut self) {

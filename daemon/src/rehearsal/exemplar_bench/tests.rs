@@ -2,6 +2,7 @@
 
 use super::arrival::{LABELS, Setting, Water};
 use crate::asv::{AskState, Wish};
+use crate::rehearsal::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::{Class, Shares, SpendOrder};
@@ -23,7 +24,7 @@ fn water(setting: Setting, seed: u64) -> Water {
     let mut water = Water::new(setting, &patches, seed).unwrap();
     let budget = Budget { bits_per_s: 10_000, shares: Shares::default(), spend: SpendOrder::new(&[]).unwrap() };
     water.vehicle.set_budget(budget, water.now);
-    water.run(Instant::from_secs_f64(120.0), |_| false);
+    water.run_until(Instant::from_secs_f64(120.0), |_| false);
     assert_eq!(exemplar_bytes(&water), 0);
     water
 }
@@ -36,7 +37,7 @@ fn spend(water: &mut Water, names: &[&str]) {
 
 fn wait(water: &mut Water, seconds: f64) {
     let until = water.now + std::time::Duration::from_secs_f64(seconds);
-    water.run(until, |_| false);
+    water.run_until(until, |_| false);
 }
 
 fn exemplar_bytes(water: &Water) -> u64 {
@@ -69,10 +70,10 @@ fn what_is_cancelled_costs_no_more_bits() {
     water.get(4, Wish::Another).unwrap().unwrap();
     water.surface.request_exemplar(water.address, 4, Wish::Larger(None), water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
+    assert!(water.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
     let version = water.surface.cancel_exemplar(water.address, 4, water.now).unwrap();
     let heard = |w: &Water| w.vehicle.durable().inbox.versions[4] == Some(version);
-    assert!(water.run(until, heard), "the vehicle hears of it");
+    assert!(water.run_until(until, heard), "the vehicle hears of it");
     let then = exemplar_bytes(&water);
     wait(&mut water, 120.0);
     assert_eq!(exemplar_bytes(&water), then);
@@ -86,11 +87,11 @@ fn a_vehicle_without_an_image_says_so_and_sends_it_when_it_has_one() {
     let gallery = water.vehicle.take_pictures();
     water.surface.request_exemplar(water.address, 2, Wish::Another, water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run(until, |w| state(w, 2) == Some(AskState::NoneYet)));
+    assert!(water.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));
     wait(&mut water, 60.0);
     assert_eq!(state(&water, 2), Some(AskState::NoneYet));
     water.vehicle.handle_exemplars(gallery);
-    assert!(water.run(until, |w| w.page(2).unwrap().pictures.len() == 1));
+    assert!(water.run_until(until, |w| w.page(2).unwrap().pictures.len() == 1));
     assert_eq!(state(&water, 2), None);
 }
 
@@ -99,7 +100,7 @@ fn bits_that_are_left_over_show_every_label_once_and_give_way_to_what_is_asked_f
     let mut water = water(IDLE, 4);
     spend(&mut water, &["exemplars"]);
     let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
+    assert!(water.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
     let (seconds, _) = water.get(LABELS, Wish::Another).unwrap().unwrap();
     assert!(seconds < 30.0, "{seconds} s");
     wait(&mut water, 300.0);

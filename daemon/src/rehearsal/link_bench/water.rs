@@ -2,6 +2,7 @@
 
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
+use crate::rehearsal::VirtualTime;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, Transmit, VehicleConfig, VehicleEvent,
@@ -162,25 +163,33 @@ impl Water {
         self.surface.vehicle(auv())
     }
 
-    /// Runs for `duration`.
-    pub fn run(&mut self, duration: Duration) {
-        self.run_until(self.now + duration, |_| false);
+    fn note_grant(&mut self, transmit: &Transmit) {
+        let header = Envelope::decode(&transmit.bytes, |_| true).map(|e| e.header);
+        if let Some(quarters) = header.ok().filter(|h| h.to.is_vehicle() && h.remaining == 0).and_then(|h| h.turn) {
+            self.grants.0 += 1;
+            self.grants.1 += Duration::from_millis(250) * u32::from(quarters);
+        }
     }
 
-    /// Runs until `done`, which is asked after every event, or until `until`; says whether it was done.
-    pub fn run_until(&mut self, until: Instant, mut done: impl FnMut(&Self) -> bool) -> bool {
-        self.pump();
-        while !done(self) {
-            let next = self.next_event();
-            if next > until {
-                self.now = until;
-                return false;
-            }
-            self.now = next;
-            self.handle_events();
-            self.pump();
-        }
-        true
+    fn transmit(&mut self, from: NodeId, transmit: Transmit) {
+        assert!(transmit.bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
+        let airtime = self.modem.airtime(transmit.bytes.len());
+        let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
+        self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
+        let who = if from == SURFACE { "surface" } else { "vehicle" };
+        *self.tally.airtime.entry((who, transmit.kind)).or_default() += airtime;
+        self.ending.insert((self.now + airtime, from), ());
+        self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
+    }
+}
+
+impl VirtualTime for Water {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn set_now(&mut self, now: Instant) {
+        self.now = now;
     }
 
     /// The next moment at which something happens, at most a while away.
@@ -237,25 +246,6 @@ impl Water {
                 self.transmit(node, transmit);
             }
         }
-    }
-
-    fn note_grant(&mut self, transmit: &Transmit) {
-        let header = Envelope::decode(&transmit.bytes, |_| true).map(|e| e.header);
-        if let Some(quarters) = header.ok().filter(|h| h.to.is_vehicle() && h.remaining == 0).and_then(|h| h.turn) {
-            self.grants.0 += 1;
-            self.grants.1 += Duration::from_millis(250) * u32::from(quarters);
-        }
-    }
-
-    fn transmit(&mut self, from: NodeId, transmit: Transmit) {
-        assert!(transmit.bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
-        let airtime = self.modem.airtime(transmit.bytes.len());
-        let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
-        self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
-        let who = if from == SURFACE { "surface" } else { "vehicle" };
-        *self.tally.airtime.entry((who, transmit.kind)).or_default() += airtime;
-        self.ending.insert((self.now + airtime, from), ());
-        self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
     }
 }
 

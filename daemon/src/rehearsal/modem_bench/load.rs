@@ -4,6 +4,7 @@ use crate::config::Config;
 use crate::ends;
 use crate::modem::ModemEvent;
 use crate::problem::Problem;
+use crate::rehearsal::VirtualTime;
 use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
 use crate::rehearsal::link_bench::{OpaqueReplica, OpaqueSource, Summary};
 use scenecast_protocol::directive::{Slot, SlotId, Utility};
@@ -138,55 +139,6 @@ impl Dock {
         self.surface.vehicle(self.address)
     }
 
-    /// Runs for `duration`.
-    pub fn run(&mut self, duration: Duration) {
-        self.run_until(self.now + duration, |_| false);
-    }
-
-    /// Runs until `done`, which is asked after every event, or until `until`; says whether it was done.
-    pub fn run_until(&mut self, until: Instant, mut done: impl FnMut(&Self) -> bool) -> bool {
-        self.pump();
-        while !done(self) {
-            let next = self.next_event();
-            if next > until {
-                self.now = until;
-                return false;
-            }
-            self.now = next.max(self.now);
-            self.docked.handle_timeout(self.now);
-            self.pump();
-        }
-        true
-    }
-
-    fn next_event(&self) -> Instant {
-        let links = self.vehicle.poll_timeout().into_iter().chain(self.surface.poll_timeout(self.now));
-        let links = links.map(|(at, _)| at).filter(|&at| at > self.now);
-        links.chain(self.docked.poll_timeout()).min().unwrap_or(self.now + Duration::from_secs(1))
-    }
-
-    fn pump(&mut self) {
-        for end in [VEHICLE, SURFACE] {
-            while let Some(event) = self.docked.poll_event(end) {
-                self.handle_modem(end, event);
-            }
-        }
-        while let Some(event) = self.vehicle.poll_event() {
-            if let VehicleEvent::Slot { id, version, .. } = event {
-                self.vehicle.decide(id, SlotState::Applied, self.now);
-                self.vehicle.handle_persisted();
-                self.applied.entry((id, version)).or_default().push(self.now);
-            }
-        }
-        while self.surface.poll_event().is_some() {}
-        self.vehicle.set_status(VehicleStatus::default());
-        if let Some(bytes) = self.load {
-            self.vehicle.source_mut().fill(bytes);
-        }
-        self.speak();
-        self.docked.write(self.now);
-    }
-
     fn handle_modem(&mut self, end: usize, event: ModemEvent) {
         let now = self.now;
         match (event, end) {
@@ -273,5 +225,47 @@ impl Dock {
     /// Most of the vehicle's bits in any window, over what the budget allows.
     pub fn budget_use(&mut self) -> f64 {
         self.docked.station(VEHICLE).audit().worst_window_bits() as f64 / self.budget_bits
+    }
+}
+
+impl VirtualTime for Dock {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn set_now(&mut self, now: Instant) {
+        self.now = now;
+    }
+
+    fn next_event(&self) -> Instant {
+        let links = self.vehicle.poll_timeout().into_iter().chain(self.surface.poll_timeout(self.now));
+        let links = links.map(|(at, _)| at).filter(|&at| at > self.now);
+        links.chain(self.docked.poll_timeout()).min().unwrap_or(self.now + Duration::from_secs(1))
+    }
+
+    fn handle_events(&mut self) {
+        self.docked.handle_timeout(self.now);
+    }
+
+    fn pump(&mut self) {
+        for end in [VEHICLE, SURFACE] {
+            while let Some(event) = self.docked.poll_event(end) {
+                self.handle_modem(end, event);
+            }
+        }
+        while let Some(event) = self.vehicle.poll_event() {
+            if let VehicleEvent::Slot { id, version, .. } = event {
+                self.vehicle.decide(id, SlotState::Applied, self.now);
+                self.vehicle.handle_persisted();
+                self.applied.entry((id, version)).or_default().push(self.now);
+            }
+        }
+        while self.surface.poll_event().is_some() {}
+        self.vehicle.set_status(VehicleStatus::default());
+        if let Some(bytes) = self.load {
+            self.vehicle.source_mut().fill(bytes);
+        }
+        self.speak();
+        self.docked.write(self.now);
     }
 }

@@ -1,0 +1,43 @@
+//! Virtual time: from event to event.
+
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+/// A small world in which time passes only from one event to the next.
+pub trait VirtualTime {
+    /// The time.
+    fn now(&self) -> Instant;
+
+    /// Sets the time; it never goes back.
+    fn set_now(&mut self, now: Instant);
+
+    /// The next moment at which something happens.
+    fn next_event(&self) -> Instant;
+
+    /// What happens at this moment.
+    fn handle_events(&mut self);
+
+    /// Lets every end say what it may say now.
+    fn pump(&mut self);
+
+    /// Runs for `duration`.
+    fn run(&mut self, duration: Duration) {
+        self.run_until(self.now() + duration, |_| false);
+    }
+
+    /// Runs until `done`, which is asked after every event, or until `until`; says whether it was done.
+    fn run_until(&mut self, until: Instant, mut done: impl FnMut(&Self) -> bool) -> bool {
+        self.pump();
+        while !done(self) {
+            let next = self.next_event();
+            if next > until {
+                self.set_now(until);
+                return false;
+            }
+            self.set_now(next.max(self.now()));
+            self.handle_events();
+            self.pump();
+        }
+        true
+    }
+}
