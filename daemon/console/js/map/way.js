@@ -11,12 +11,13 @@ export function drawWay(c, view, ink, s, stale) {
   if (way.length === 0) return;
   const [here, waypoint, ...path] = way;
   c.lineJoin = "round";
-  for (const [style, width] of [[ink.sea, 3.5], [stale ? ink.stale : ink.text, 1.5]]) {
+  // The ground is whole, so that dashes show on a track that went the same way.
+  for (const [style, width, near, far] of [[ink.sea, 4, [], []], [stale ? ink.stale : ink.text, 1.75, [3, 4], [8, 5]]]) {
     c.strokeStyle = style;
     c.fillStyle = style;
     c.lineWidth = width;
-    dashed(c, [3, 4], [here, waypoint]);
-    dashed(c, [8, 5], [waypoint, ...path]);
+    dashed(c, near, [here, waypoint]);
+    dashed(c, far, [waypoint, ...path]);
     for (const [x, y] of path) dot(c, x, y, width + 1);
     if (s.path_goes_on && path.length > 0) arrowHead(c, way.at(-2), way.at(-1));
     cross(c, ...waypoint);

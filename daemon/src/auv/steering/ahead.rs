@@ -64,7 +64,8 @@ impl Steering {
             if way.is_full() {
                 break;
             }
-            for node in self.lattice.ways(end).to(goal) {
+            let straight = self.lattice.straight(end, goal);
+            for node in straight.unwrap_or_else(|| self.lattice.ways(end).to(goal)) {
                 let place = self.lattice.place(node);
                 if !self.leaves_way_home(node, way.metres + distance(way.end(), place), left_m) {
                     return way.told();
