@@ -13,6 +13,7 @@ mod imagery;
 pub mod modem;
 pub mod modem_sim;
 pub mod picture;
+pub mod port;
 mod problem;
 pub mod rehearsal;
 pub mod runtime;

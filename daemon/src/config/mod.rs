@@ -10,7 +10,7 @@ mod token_file;
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
-pub use place::{Place, autopilot_place, origin, position_places};
+pub use place::{autopilot_place, is_gpsd, origin, position_places};
 pub use print::print;
 pub use token_file::{load_token, read_token};
 

@@ -2,67 +2,46 @@
 
 use super::Config;
 use crate::asv::position::LatLon;
+use crate::port::Place;
 use crate::problem::Problem;
 use std::path::PathBuf;
 
-/// Where an instrument is.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
-    /// Device and speed.
-    Serial(String, u32),
-    /// HOST:PORT.
-    Tcp(String),
-    /// gpsd at HOST:PORT.
-    Gpsd(String),
-    /// Own ADDRESS:PORT; answers go to whoever spoke last.
-    Udp(String),
-    /// HOST:PORT.
-    UdpTo(String),
-    /// Lines are appended.
-    File(PathBuf),
+/// Reads `kind:what`; `kinds` are the allowed ones. The error names the key.
+fn parse(key: &str, text: &str, kinds: &[&str]) -> Result<Place, Problem> {
+    let shown: Vec<String> = kinds.iter().map(|k| form(k)).collect();
+    let wrong = || Problem::Input(format!("{key} = \"{text}\" is not allowed: it takes {}", shown.join(", ")));
+    let (kind, what) = text.split_once(':').filter(|(k, w)| kinds.contains(k) && !w.is_empty()).ok_or_else(wrong)?;
+    let address = || {
+        let port = what.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, p)| p.parse::<u16>().ok());
+        port.filter(|p| *p > 0).map(|_| what.to_owned()).ok_or_else(wrong)
+    };
+    Ok(match kind {
+        "serial" => match what.rsplit_once(':') {
+            Some((device, baud)) => {
+                let baud = baud.parse().ok().filter(|b| (300..=4_000_000).contains(b)).ok_or_else(wrong)?;
+                Place::Serial(device.to_owned(), baud)
+            }
+            None => return Err(wrong()),
+        },
+        "tcp" | "gpsd" => Place::Connect(address()?),
+        "udp" => Place::Datagrams(address()?, String::new()),
+        "udp-to" => Place::Datagrams(String::new(), address()?),
+        _ => Place::File(PathBuf::from(what)),
+    })
 }
 
-impl Place {
-    /// Reads `kind:what`; `kinds` are the allowed ones. The error names the key.
-    fn parse(key: &str, text: &str, kinds: &[&str]) -> Result<Self, Problem> {
-        let shown: Vec<String> = kinds.iter().map(|k| Self::form(k)).collect();
-        let wrong = || Problem::Input(format!("{key} = \"{text}\" is not allowed: it takes {}", shown.join(", ")));
-        let (kind, what) =
-            text.split_once(':').filter(|(k, w)| kinds.contains(k) && !w.is_empty()).ok_or_else(wrong)?;
-        let address = || {
-            let port =
-                what.rsplit_once(':').filter(|(host, _)| !host.is_empty()).and_then(|(_, p)| p.parse::<u16>().ok());
-            port.filter(|p| *p > 0).map(|_| what.to_owned()).ok_or_else(wrong)
-        };
-        Ok(match kind {
-            "serial" => match what.rsplit_once(':') {
-                Some((device, baud)) => {
-                    let baud = baud.parse().ok().filter(|b| (300..=4_000_000).contains(b)).ok_or_else(wrong)?;
-                    Self::Serial(device.to_owned(), baud)
-                }
-                None => return Err(wrong()),
-            },
-            "tcp" => Self::Tcp(address()?),
-            "gpsd" => Self::Gpsd(address()?),
-            "udp" => Self::Udp(address()?),
-            "udp-to" => Self::UdpTo(address()?),
-            _ => Self::File(PathBuf::from(what)),
-        })
-    }
-
-    fn form(kind: &str) -> String {
-        match kind {
-            "serial" => "serial:DEVICE:BAUD".to_owned(),
-            "file" => "file:PATH".to_owned(),
-            "udp" => "udp:ADDRESS:PORT".to_owned(),
-            kind => format!("{kind}:HOST:PORT"),
-        }
+fn form(kind: &str) -> String {
+    match kind {
+        "serial" => "serial:DEVICE:BAUD".to_owned(),
+        "file" => "file:PATH".to_owned(),
+        "udp" => "udp:ADDRESS:PORT".to_owned(),
+        kind => format!("{kind}:HOST:PORT"),
     }
 }
 
 /// Where the autopilot is; `None` for a kind that is nowhere.
 pub fn autopilot_place(config: &Config) -> Result<Option<Place>, Problem> {
-    let parse = |kinds| Place::parse("autopilot.port", &config.autopilot.port, kinds).map(Some);
+    let parse = |kinds| parse("autopilot.port", &config.autopilot.port, kinds).map(Some);
     match config.autopilot.kind.as_str() {
         "mavlink" | "nmea" => parse(&["serial", "udp", "udp-to", "tcp"]),
         "log" => parse(&["file"]),
@@ -72,12 +51,16 @@ pub fn autopilot_place(config: &Config) -> Result<Option<Place>, Problem> {
 
 /// Where the GPS and the compass of the surface are, if there are any.
 pub fn position_places(config: &Config) -> Result<[Option<Place>; 2], Problem> {
-    let place =
-        |key, text: &String, kinds: &[&str]| (!text.is_empty()).then(|| Place::parse(key, text, kinds)).transpose();
+    let place = |key, text: &String, kinds: &[&str]| (!text.is_empty()).then(|| parse(key, text, kinds)).transpose();
     Ok([
         place("position.gps", &config.position.gps, &["serial", "tcp", "gpsd"])?,
         place("position.compass", &config.position.compass, &["serial", "tcp"])?,
     ])
+}
+
+/// Whether the GPS is behind a gpsd.
+pub fn is_gpsd(config: &Config) -> bool {
+    config.position.gps.starts_with("gpsd:")
 }
 
 /// The origin of the world that is configured, if any.
@@ -111,9 +94,9 @@ mod tests {
     #[test]
     fn places_are_read_and_what_is_none_is_refused_with_what_is_allowed() {
         let kinds = ["serial", "tcp", "gpsd"];
-        let parse = |text| Place::parse("position.gps", text, &kinds);
+        let parse = |text| parse("position.gps", text, &kinds);
         assert_eq!(parse("serial:/dev/ttyUSB0:4800").unwrap(), Place::Serial("/dev/ttyUSB0".to_owned(), 4800));
-        assert_eq!(parse("gpsd:localhost:2947").unwrap(), Place::Gpsd("localhost:2947".to_owned()));
+        assert_eq!(parse("gpsd:localhost:2947").unwrap(), Place::Connect("localhost:2947".to_owned()));
         for wrong in ["", "gpsd", "tcp:", "tcp:host", "tcp:host:99999", "serial:/dev/x", "serial:/dev/x:1", "udp:a:1"] {
             let said = parse(wrong).unwrap_err().to_string();
             assert!(said.contains("position.gps") && said.contains("serial:DEVICE:BAUD, tcp:HOST:PORT"), "{said}");

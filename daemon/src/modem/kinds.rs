@@ -3,10 +3,10 @@
 use super::driver::{Driver, ModemAddress};
 use super::micromodem::{Micromodem, MicromodemConfig, Rate};
 use super::paced::Paced;
-use super::port::Place;
 use super::s2c::{BURST_FRAME_BYTES, INSTANT_BYTES, S2c, S2cConfig, S2cMode};
 use super::station::AddressBook;
 use crate::config::{self, Config};
+use crate::port::Place;
 use crate::problem::Problem;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::wire::Address;

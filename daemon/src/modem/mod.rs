@@ -1,4 +1,4 @@
-//! Modems: drivers without IO, the ports to them, and the account of what goes on air.
+//! Modems: drivers without IO, and the account of what goes on air.
 //!
 //! | module | is |
 //! |---|---|
@@ -6,14 +6,12 @@
 //! | [`s2c`], [`micromodem`], [`paced`] | the drivers; `paced` is for pipes, TCP and UDP |
 //! | [`framing`] | frames in a stream of bytes |
 //! | [`Station`] | a driver as the link sees it; what rehearsals and processes share |
-//! | [`port`] | serial, TCP, UDP |
 
 mod driver;
 pub mod framing;
 mod kinds;
 pub mod micromodem;
 pub mod paced;
-pub mod port;
 pub mod s2c;
 mod station;
 
@@ -27,9 +25,9 @@ pub use kinds::{address_book, check, driver, full_frame_bytes};
 pub use station::{AddressBook, ModemEvent, PIPE_FRAMING_BITS, Station};
 
 use crate::config::Config;
+use crate::port::{FromPort, Place, Port};
 use crate::problem::Problem;
 use crate::runtime::Clock;
-use port::{FromPort, Port, ToPort};
 use scenecast_protocol::link::{Cycle, Transmit};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
@@ -103,7 +101,7 @@ impl Modem {
                 self.note(&event)?;
                 return Ok(event);
             }
-            self.write().await;
+            self.write();
             let wake = self.station.poll_timeout();
             let timeout = async {
                 match wake {
@@ -113,32 +111,30 @@ impl Modem {
             };
             tokio::select! {
                 () = timeout => self.station.handle_timeout(self.clock.now()),
-                told = self.port.from.recv() => self.handle_port(told)?,
+                told = self.port.next() => self.handle_port(told),
             }
         }
     }
 
-    fn handle_port(&mut self, told: Option<FromPort>) -> Result<(), Problem> {
+    fn handle_port(&mut self, told: FromPort) {
         let now = self.clock.now();
         match told {
-            Some(FromPort::Open) => self.station.handle_open(now),
-            Some(FromPort::Closed) => self.station.handle_closed(now),
-            Some(FromPort::Bytes(bytes)) => self.station.handle_bytes(&bytes, now),
-            None => return Err(Problem::Failed("the modem's port has ended".to_owned())),
+            FromPort::Open => self.station.handle_open(now),
+            FromPort::Closed => self.station.handle_closed(now),
+            FromPort::Bytes(bytes) => self.station.handle_bytes(&bytes, now),
         }
-        Ok(())
     }
 
     /// Writes what the driver has for the port, once the link has had its say.
-    async fn write(&mut self) {
+    fn write(&mut self) {
         let now = self.clock.now();
         if self.station.wants_reopening(now) && now.since(self.reopened) > Duration::from_secs(10) {
             self.reopened = now;
-            let _ = self.port.to.try_send(ToPort::Reopen);
+            self.port.reopen();
         }
         // A port that takes nothing is a dead one: the driver notices, and what it has to say is stale by then.
         while let Some(bytes) = self.station.poll_output(now) {
-            if self.port.to.try_send(ToPort::Bytes(bytes.into())).is_err() {
+            if !self.port.write(bytes) {
                 tracing::debug!("modem: the port takes no more");
             }
         }
@@ -165,13 +161,25 @@ pub async fn open(config: &Config, end: Address, profile: ModemProfile, clock: C
     let driver = driver(config, end, profile)?;
     let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
     let window_bits = f64::from(config.link.budget_bps) * config.link.budget_window_s;
+    let place = kinds::place(config)?;
+    let port = Port::open("modem", place.clone()).await.map_err(|e| not_there(&place, &e))?;
     Ok(Modem {
         station: Station::new(driver, address_book(config), audit),
-        port: port::open(kinds::place(config)?).await?,
+        port,
         clock,
         window_bits,
         exceeded: false,
         was_ready: false,
         reopened: clock.now(),
+    })
+}
+
+fn not_there(place: &Place, e: &std::io::Error) -> Problem {
+    Problem::Input(match place {
+        Place::Serial(device, _) => format!("modem.device: {device}: {e}"),
+        Place::Listen(address) => format!("modem.listen: cannot listen on {address}: {e}"),
+        Place::Connect(address) => format!("modem.connect: {address}: {e}"),
+        Place::Datagrams(..) => format!("modem.listen, modem.connect: {e}"),
+        Place::File(path) => format!("{}: {e}", path.display()),
     })
 }

@@ -10,7 +10,6 @@ mod journal;
 mod kept_labels;
 mod mapping;
 mod pilot;
-mod port;
 mod position;
 #[cfg(test)]
 mod power_cuts;

@@ -1,11 +1,11 @@
 //! An autopilot at its port.
 
 use super::clock::Clock;
-use super::port::{FromPort, Port};
 use crate::asv::position::LatLon;
 use crate::autopilot::mavlink::MavlinkConfig;
 use crate::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Rehearsed, Step};
 use crate::config::{Config, autopilot_place};
+use crate::port::{FromPort, Port};
 use crate::problem::Problem;
 use crate::rehearsal::Motion;
 use std::time::Duration;
@@ -35,7 +35,7 @@ impl Pilot {
             _ => return Ok(None),
         };
         let place = autopilot_place(config)?;
-        let port = place.map(|place| Port::open("autopilot", place, None));
+        let port = place.map(|place| Port::open_when_there("autopilot", place, None));
         let health = autopilot.health(now);
         Ok(Some(Self { autopilot, port, clock, health }))
     }

@@ -2,11 +2,11 @@
 
 use super::clock::Clock;
 use super::pilot::{Pilot, next_of};
-use super::port::{FromPort, Port};
 use crate::asv::Surface;
 use crate::asv::position::{Follow, GpsLanguage, Mounting, Relay, RelayConfig};
 use crate::autopilot::Goal;
-use crate::config::{Config, Place, origin, position_places};
+use crate::config::{Config, is_gpsd, origin, position_places};
+use crate::port::{FromPort, Port};
 use crate::problem::Problem;
 use scenecast_protocol::wire::Address;
 use std::time::Duration;
@@ -38,13 +38,13 @@ impl Position {
     pub(super) fn open(config: &Config, surface: &mut Surface, clock: Clock) -> Result<Self, Problem> {
         let p = &config.position;
         let [gps, compass] = position_places(config)?;
-        let language = if matches!(gps, Some(Place::Gpsd(_))) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
+        let language = if is_gpsd(config) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
         if gps.is_some() {
             surface.set_relay(Relay::new(relay_config(config, language)?));
         }
         Ok(Self {
-            gps: gps.map(|place| Port::open("GPS", place, Some(QUIET))),
-            compass: compass.map(|place| Port::open("compass", place, Some(QUIET))),
+            gps: gps.map(|place| Port::open_when_there("GPS", place, Some(QUIET))),
+            compass: compass.map(|place| Port::open_when_there("compass", place, Some(QUIET))),
             pilot: Pilot::open(config, clock)?,
             follow: p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m)),
             target: None,
