@@ -119,8 +119,7 @@ pub fn vehicle(
 
 /// The planes of the map that are told.
 fn told_planes(config: &Config) -> PlaneSet {
-    let is_told = |kind: PlaneKind| config.map.planes.iter().any(|name| name == kind.name());
-    PlaneSet { confidence: is_told(PlaneKind::Confidence), depth: is_told(PlaneKind::Depth) }
+    PlaneSet::of(|kind| config.map.planes.iter().any(|name| name == kind.name()))
 }
 
 /// What left-over bits are spent on; the file was checked when it was read.
@@ -135,6 +134,7 @@ fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u
     let scale = |kind| match kind {
         PlaneKind::Confidence => PlaneScale::Confidence,
         PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),
+        PlaneKind::Curiosity => PlaneScale::Curiosity,
     };
     let planes = PlaneKind::ALL.into_iter().zip(map.plane_shares);
     let possible = planes.filter(|_| map.stream == "delta");

@@ -6,7 +6,7 @@ use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{LifeLine, Slot, Utility};
 use scenecast_protocol::mac::Access;
-use scenecast_protocol::map::{Cell, PlaneKind};
+use scenecast_protocol::map::{Cell, PlaneKind, PlaneScale, PlaneSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Class, Extra, SpendOrder};
 use std::time::Duration;
@@ -170,6 +170,23 @@ fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_n
     }
     assert!(sent(&pair, Class::Depth) > 500, "then it is its turn");
     assert_eq!(sent(&pair, Class::Confidence) / 100, 0, "but for what says that nothing was sent");
+    assert_budget(&pair, 4_000);
+}
+
+#[test]
+fn curiosity_is_told_where_the_operator_asks_for_it_and_nowhere_else() {
+    let mut pair = Pair::new(4, Setup::new(256, 4_000, Codec::Context), Water { loss: 0.2, ..CALM });
+    pair.vehicle.set_planes([(PlaneSource::new(PlaneScale::Curiosity, Codec::Context, Duration::ZERO), 0)]);
+    pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
+    let bits = (0..400).map(|i| (Cell::new(i % 20, i / 20), f64::from(i % 7) + f64::from(i / 80)));
+    pair.vehicle.set_plane(PlaneKind::Curiosity, bits, pair.now);
+    pair.run(pair.now + Duration::from_secs(200), true);
+    assert!(pair.is_converged(), "nobody waits for it");
+    assert_eq!(sent(&pair, Class::Curiosity), 0);
+    pair.vehicle.set_spend(SpendOrder::new(&[Extra::Curiosity]).unwrap());
+    assert!(!pair.is_converged());
+    pair.run(pair.now + Duration::from_secs(200), true);
+    assert!(pair.is_converged() && sent(&pair, Class::Curiosity) > 50);
     assert_budget(&pair, 4_000);
 }
 

@@ -6,7 +6,7 @@ use scenecast_protocol::directive::{
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement,
@@ -284,6 +284,8 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let utility =
         Utility { epoch: 1, exploration: 20, curiosity: 0, weights: [(3, 80), (5, -20)].into_iter().collect() };
     let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), spend: SpendOrder::default() };
+    let curious = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
+    let curious = Budget { spend: curious.unwrap(), ..budget };
     let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
     let requests = Requests {
         epoch: 1,
@@ -302,7 +304,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let settings = Settings {
         planner: Change::To(PlannerKind::Horizon),
         cells: Change::To(CellBand::Coarse),
-        planes: Change::To(PlaneSet { confidence: false, depth: true }),
+        planes: Change::To(PlaneSet { depth: true, ..PlaneSet::default() }),
         alpha: Change::To(Figure::new(0.01).unwrap()),
         gamma: Change::Configured,
         frames_per_s: Change::To(Figure::new(0.25).unwrap()),
@@ -352,6 +354,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "head of a plane chunk: a patch of depth, steps of 0.5 m, level 1 from 12 m on",
             plane(PlaneChunk::Patch(depth, &[])),
         ),
+        ("head of a plane chunk: a patch of curiosity", plane(PlaneChunk::Patch(PlaneScale::Curiosity, &[]))),
         ("plane chunk: the digest of confidence is 27A6", plane(PlaneChunk::Digest(PlaneKind::Confidence, 0x27A6))),
         (
             "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
@@ -406,6 +409,11 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, left-over bits to finer cells, depth, \
              exemplars, confidence",
             slot(3, Slot::Budget(budget)),
+        ),
+        (
+            "slot: series ABCD, version 3, the same budget, left-over bits to curiosity, finer cells, depth, exemplars, \
+             confidence",
+            slot(3, Slot::Budget(curious)),
         ),
         (
             "slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, picture 9 with an edge of \

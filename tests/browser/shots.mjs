@@ -38,6 +38,7 @@ const SCENES = {
   coarse: { scenario: "empty", steps: (page, steer) => steer({ coarse: true, loss: 0, advance: 100 }).then(() => page.waitForTimeout(500)) },
   two: { scenario: "two", sizes: ["wide"] },
   age: { scenario: "rich", sizes: ["wide"], steps: (page) => page.selectOption("#layer", "age") },
+  curiosity: { scenario: "rich", sizes: ["wide"], steps: curious },
   cloud: { scenario: "rich", sizes: ["wide"], steps: cloud },
 };
 
@@ -84,6 +85,15 @@ async function tuned(page, steer) {
   await page.locator("#fit-bps").fill("1000");
   await page.locator("#fit").click();
   await page.locator("#set-beta").fill("5000");
+}
+
+/** The layer that the operator asked for, and the level under the pointer. */
+async function curious(page, steer) {
+  await page.getByRole("checkbox", { name: "curiosity" }).check();
+  await steer({ planes: true, advance: 14 });
+  await page.locator("#layer option[value=curiosity]").waitFor({ state: "attached" });
+  await page.selectOption("#layer", "curiosity");
+  await page.mouse.move(820, 380);
 }
 
 async function cloud(page, steer) {

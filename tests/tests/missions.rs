@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use scenecast::config::{self, Config};
 use scenecast::rehearsal::{Mission, MissionOptions, World, report};
+use scenecast_protocol::map::PlaneScale;
 use scenecast_protocol::time::Instant;
 use serde_json::Value;
 use std::time::Duration;
@@ -74,7 +75,7 @@ fn whole_missions_pass_with_either_codec() {
 fn planes_arrive_and_labels_do_not_wait_for_them() {
     let without = fly(&["map.planes=[]"], 8);
     assert_eq!(without["map"]["planes"], serde_json::json!({}));
-    for sets in [&["map.plane_shares=[0, 0]"], &["map.plane_shares=[10, 5]"]] {
+    for sets in [&["map.plane_shares=[0, 0, 0]"], &["map.plane_shares=[10, 5, 0]"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
         for plane in ["confidence", "depth"] {
@@ -86,6 +87,36 @@ fn planes_arrive_and_labels_do_not_wait_for_them() {
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
         assert!(mean(&with) > mean(&without) - 0.02, "{} with planes, {} without", mean(&with), mean(&without));
     }
+}
+
+#[test]
+fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_differs() {
+    let without = fly(&[], 8);
+    assert_eq!(without.to_string(), fly(&[r#"map.planes=["confidence", "depth"]"#], 8).to_string());
+    assert_eq!(without["map"]["planes"]["curiosity"], Value::Null);
+    for sets in
+        [r#"link.spend=["finer", "depth", "exemplars", "confidence", "curiosity"]"#, "map.plane_shares=[0, 0, 10]"]
+    {
+        let with = fly(&[sets], 8);
+        assert_sound(&with);
+        let plane = &with["map"]["planes"]["curiosity"];
+        assert_eq!((&plane["agreement_final"], &plane["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
+        let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
+        assert!(mean(&with) > mean(&without) - 0.02, "{} with curiosity, {} without", mean(&with), mean(&without));
+    }
+}
+
+#[test]
+fn levels_of_curiosity_tell_the_cells_of_a_reef_apart() {
+    let config = config(&[r#"link.spend=["curiosity"]"#]);
+    let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 8, record: None }).unwrap();
+    mission.advance(Instant::from_secs_f64(119.0)).unwrap();
+    let vehicle = mission.vehicle();
+    let plane = vehicle.planes().find(|p| p.scale() == PlaneScale::Curiosity).unwrap();
+    let mut cells = [0; 17];
+    plane.target().iter().for_each(|(_, level)| cells[usize::from(level)] += 1);
+    let common = cells.iter().filter(|&&n| n * 20 > plane.target().explored()).count();
+    assert!((3..=6).contains(&common), "{cells:?}");
 }
 
 #[test]

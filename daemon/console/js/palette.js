@@ -15,9 +15,14 @@ export function rgb(hex) {
 }
 
 // Cividis (Nuñez, Anderton and Renslow 2018), nine knots: one reading order for every kind of sight.
-const CIVIDIS = [
+export const CIVIDIS = [
   [0, 34, 78], [33, 58, 112], [76, 83, 109], [108, 110, 114], [125, 124, 120],
   [150, 144, 118], [181, 170, 104], [217, 199, 77], [254, 232, 56],
+];
+
+// Inferno (van der Walt and Smith 2015) without its ends, which are as dark and as bright as the sea: a second such order.
+export const INFERNO = [
+  [33, 12, 74], [86, 16, 110], [137, 34, 106], [187, 55, 84], [227, 89, 50], [249, 140, 10], [249, 201, 50],
 ];
 
 /** Shades of red for the red theme: neighbouring ids get shades far apart (van der Corput). */
@@ -29,10 +34,10 @@ export function redShade(id) {
 
 const redLevel = (t) => [Math.round(255 * t), Math.round(50 * t * t), Math.round(36 * t * t)];
 
-/** Colour of t in 0..1 on the sequential scale, in shades of red if `red`. */
-export function ramp(t, red = false) {
+/** Colour of t in 0..1 on a sequential scale, in shades of red if `red`. */
+export function ramp(t, red = false, knots = CIVIDIS) {
   if (red) return redLevel(0.14 + 0.86 * Math.min(1, Math.max(0, t)));
-  const at = Math.min(1, Math.max(0, t)) * (CIVIDIS.length - 1);
-  const i = Math.min(CIVIDIS.length - 2, Math.floor(at));
-  return CIVIDIS[i].map((v, c) => Math.round(v + (CIVIDIS[i + 1][c] - v) * (at - i)));
+  const at = Math.min(1, Math.max(0, t)) * (knots.length - 1);
+  const i = Math.min(knots.length - 2, Math.floor(at));
+  return knots[i].map((v, c) => Math.round(v + (knots[i + 1][c] - v) * (at - i)));
 }

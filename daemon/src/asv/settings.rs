@@ -1,6 +1,7 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
 use scenecast_protocol::directive::{CellBand, Change, Figure, LifeLine, PlaneSet, PlannerKind, Settings};
+use scenecast_protocol::map::PlaneKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +15,7 @@ pub struct SettingsOrder {
     /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
     /// first where there is much to say. The cells of its model stay.
     pub cells: Option<String>,
-    /// Planes that it tells beside the labels: none, confidence, depth, both.
+    /// Planes that it tells beside the labels: none, or different ones of confidence, depth, curiosity with commas between.
     pub planes: Option<String>,
     /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
     pub alpha: Option<f64>,
@@ -28,21 +29,30 @@ pub struct SettingsOrder {
     pub frames_per_s: Option<f64>,
 }
 
-const PLANES: [(&str, PlaneSet); 4] = [
-    ("none", PlaneSet { confidence: false, depth: false }),
-    ("confidence", PlaneSet { confidence: true, depth: false }),
-    ("depth", PlaneSet { confidence: false, depth: true }),
-    ("both", PlaneSet { confidence: true, depth: true }),
-];
+/// The planes of these names, with commas between.
+fn plane_set(names: &str) -> Option<PlaneSet> {
+    let names: Vec<&str> = if names == "none" { Vec::new() } else { names.split(',').map(str::trim).collect() };
+    let set = PlaneSet::of(|kind| names.contains(&kind.name()));
+    (set.kinds().count() == names.len()).then_some(set)
+}
+
+fn plane_names(set: PlaneSet) -> String {
+    let names: Vec<&str> = set.kinds().map(PlaneKind::name).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(",") }
+}
 
 impl SettingsOrder {
     /// The slot's content.
     pub fn read(&self) -> Result<Settings, String> {
-        let plane_set = |name: &str| PLANES.iter().find(|(n, _)| *n == name).map(|(_, set)| *set);
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
-            planes: choice("planes", &self.planes, plane_set, "none, confidence, depth or both")?,
+            planes: choice(
+                "planes",
+                &self.planes,
+                plane_set,
+                "none, or different ones of confidence, depth, curiosity",
+            )?,
             ..Settings::default()
         };
         let given = [self.alpha, self.beta, self.gamma, self.refine_words_per_s, self.frames_per_s];
@@ -90,12 +100,11 @@ impl From<&Settings> for SettingsOrder {
             }
         }
         let text = |name: &str| name.to_owned();
-        let plane_set = |set| PLANES.iter().find(|(_, s)| *s == set).map_or(String::new(), |(name, _)| text(name));
         let figure = |change| told(change, 0.0, Figure::value);
         Self {
             planner: told(settings.planner, String::new(), |p| text(p.name())),
             cells: told(settings.cells, String::new(), |c| text(c.name())),
-            planes: told(settings.planes, String::new(), plane_set),
+            planes: told(settings.planes, String::new(), plane_names),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -172,7 +181,10 @@ mod tests {
             refused(r#"{"cells": "huge"}"#),
             "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
         );
-        assert!(refused(r#"{"planes": "perplexity"}"#).contains("none, confidence, depth or both"));
+        for planes in ["perplexity", "depth,depth", "depth,", "none,depth"] {
+            let said = refused(&format!(r#"{{"planes": "{planes}"}}"#));
+            assert!(said.contains("none, or different ones of confidence, depth, curiosity"), "{said}");
+        }
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
         assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));
     }
@@ -182,6 +194,9 @@ mod tests {
         let typed = r#"{"planner":"","cells":"coarse","planes":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
         assert_eq!(SettingsOrder::from(&order.read().unwrap()), order);
+        let planes = |names: &str| read(&format!(r#"{{"planes": "{names}"}}"#)).unwrap();
+        let told = |names: &str| SettingsOrder::from(&planes(names)).planes.unwrap();
+        assert_eq!(["none", "curiosity, depth"].map(told), ["none", "depth,curiosity"]);
         assert_eq!(read("{}").unwrap(), Settings::default());
     }
 
@@ -210,7 +225,7 @@ mod tests {
         send(&mut desk, r#"{"gamma": 0.1}"#, Some(LifeLine::Queued));
         desk.handle_settled(LifeLine::Applied);
         assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"planes": "both"}"#, Some(LifeLine::Applied));
+        send(&mut desk, r#"{"planes": "confidence,depth"}"#, Some(LifeLine::Applied));
         send(&mut desk, r#"{"beta": 1}"#, Some(LifeLine::Heard));
         assert_eq!(desk.in_force(), None, "the vehicle may follow the planes already");
         let refused = LifeLine::Refused(RefusalReason::OutOfRange);

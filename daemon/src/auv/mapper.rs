@@ -28,7 +28,7 @@ pub struct MapUpdate {
     pub epoch: u8,
     /// Labels of every explored cell.
     pub cells: Vec<(Cell, u8)>,
-    /// How sure the model is of these labels, 0 to 1, and the depths of the sea floor there, metres.
+    /// How sure the model is of these labels, 0 to 1, depths of the sea floor there, metres, and mean surprise of a word, bits.
     pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
     /// Labels given so far.
     pub labels: u8,
@@ -173,11 +173,14 @@ impl Mapper {
         let place = |c: &PublishedCell| Cell::new(c.x, c.y);
         let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
         let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
+        let curiosity = published.iter().map(|c| (place(c), f64::from(c.perplexity.max(1.0)).log2())).collect();
+        let planes =
+            [(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth), (PlaneKind::Curiosity, curiosity)];
         MapUpdate {
             t_s: self.last_s.unwrap_or(0.0),
             epoch: self.book.epoch(),
             cells: published.iter().map(|c| (place(c), c.label)).collect(),
-            planes: BTreeMap::from([(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth)]),
+            planes: BTreeMap::from(planes),
             perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
             labels: self.book.labels().count() as u8,
         }

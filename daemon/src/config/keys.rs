@@ -85,9 +85,9 @@ pub const KEYS: &[Key] = &[
     key(
         "link.spend",
         "",
-        Words(&["finer", "depth", "exemplars", "confidence"]),
+        Words(&["finer", "depth", "exemplars", "confidence", "curiosity"]),
         "asr",
-        "what bits that nobody else needs are spent on, in this order; finer: the cells between those of a coarse map; depth, confidence: planes without a share; exemplars: images of new labels that nobody asked for; what is not named gets none, but for finer cells, which then go before all others",
+        "what bits that nobody else needs are spent on, in this order; finer: the cells between those of a coarse map; depth, confidence, curiosity: planes without a share; exemplars: images of new labels that nobody asked for; what is not named gets none, but for finer cells, which then go before all others",
     ),
     key("link.status_period_s", "s", Range(1.0, 3600.0), "ar", "time between two statuses of the vehicle"),
     key("link.max_turn_s", "s", Range(1.0, 60.0), "sr", "longest turn that the surface grants"),
@@ -249,16 +249,16 @@ pub const KEYS: &[Key] = &[
     key(
         "map.planes",
         "",
-        Words(&["confidence", "depth"]),
+        Words(&["confidence", "depth", "curiosity"]),
         "ar",
-        "planes that are sent beside the labels: how sure the model is of a label in quarters, and the depth of the sea floor",
+        "planes that may be sent beside the labels: confidence, how sure the model is of a label, in quarters; depth of the sea floor; curiosity, how badly the model explains a cell, in whole bits a word; one without a share is sent where link.spend names it",
     ),
     key(
         "map.plane_shares",
         "%",
         Range(0.0, 100.0),
         "ar",
-        "least shares of confidence and depth in the map's share of link.shares while labels wait too, together at most 100; 0: only what nobody else needs",
+        "least shares of confidence, depth and curiosity in the map's share of link.shares while labels wait too, together at most 100; 0: only what nobody else needs",
     ),
     key(
         "map.depth_step_m",

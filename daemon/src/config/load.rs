@@ -302,13 +302,13 @@ mod tests {
     #[test]
     fn planes_are_named_each_once_and_their_shares_leave_something_to_labels() {
         let said = message(&["map.planes=[\"colour\"]"]);
-        assert!(said.ends_with("it takes a list of different ones of confidence, depth"), "{said}");
+        assert!(said.ends_with("it takes a list of different ones of confidence, depth, curiosity"), "{said}");
         assert!(message(&["map.planes=[\"depth\", \"depth\"]"]).contains("different ones"));
         assert!(message(&["map.planes=depth"]).contains("a list"));
-        let said = message(&["map.plane_shares=[60, 50]"]);
-        assert!(said.contains("map.plane_shares = [60, 50]") && said.contains("110 %"), "{said}");
-        let config = load(None, &["map.planes=[]".into(), "map.plane_shares=[20, 10]".into()]).unwrap();
-        assert_eq!((config.map.planes.len(), config.map.plane_shares), (0, [20, 10]));
+        let said = message(&["map.plane_shares=[60, 0, 50]"]);
+        assert!(said.contains("map.plane_shares = [60, 0, 50]") && said.contains("110 %"), "{said}");
+        let config = load(None, &["map.planes=[]".into(), "map.plane_shares=[20, 10, 0]".into()]).unwrap();
+        assert_eq!((config.map.planes.len(), config.map.plane_shares), (0, [20, 10, 0]));
     }
 
     #[test]

@@ -190,8 +190,8 @@ section! {
         cells: String = "fine".into(),
         /// Planes that are sent beside the labels.
         planes: Vec<String> = PlaneKind::ALL.map(|p| p.name().to_owned()).to_vec(),
-        /// Percent of the map's share for confidence and depth; 0 = what nobody else needs.
-        plane_shares: [u8; 2] = [0; 2],
+        /// Percent of the map's share for confidence, depth and curiosity; 0 = what nobody else needs.
+        plane_shares: [u8; 3] = [0; 3],
         /// Step of the plane of depths, metres.
         depth_step_m: f64 = 0.5,
     }

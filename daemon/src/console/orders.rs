@@ -73,8 +73,9 @@ pub struct BudgetOrder {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shares: Option<SharesOrder>,
     /// What bits that nobody else needs are spent on, in this order: different ones of finer (the cells between those of a
-    /// coarse map), depth and confidence (planes without a share), exemplars (images of new labels that nobody asked for).
-    /// What is not named gets none, but for finer cells, which then go before all others. Left out: as it was sent last.
+    /// coarse map), depth, confidence and curiosity (planes without a share), exemplars (images of new labels that nobody
+    /// asked for). What is not named gets none, but for finer cells, which then go before all others. Left out: as it was
+    /// sent last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spend: Option<Vec<String>>,
 }

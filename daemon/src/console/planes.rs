@@ -21,10 +21,10 @@ fn plane(kind: PlaneKind, replica: &PlaneReplica, bounds: Rect, now: Instant) ->
     let (scale, shown) = (replica.scale(), replica.levels().shown());
     let levels: Vec<u8> = bounds.cells().map(|cell| shown.get(cell)).collect();
     let known = || levels.iter().copied().filter(|&level| level > 0);
-    // A depth is shown on the scale of what there is, a confidence on its own.
+    // A confidence is shown on its own scale, the others on that of what there is.
     let (lowest, highest) = match kind {
         PlaneKind::Confidence => (1, scale.levels()),
-        PlaneKind::Depth => (known().min().unwrap_or(1), known().max().unwrap_or(1)),
+        PlaneKind::Depth | PlaneKind::Curiosity => (known().min().unwrap_or(1), known().max().unwrap_or(1)),
     };
     let middle = |level: u8| scale.bounds(level).map_or(0.0, |(low, high)| (low + high) / 2.0);
     let shade = |level: u8| match u32::from(level).checked_sub(u32::from(lowest)).filter(|_| level > 0) {
@@ -34,12 +34,20 @@ fn plane(kind: PlaneKind, replica: &PlaneReplica, bounds: Rect, now: Instant) ->
     let step = scale.bounds(1).map_or(0.0, |(low, high)| high - low);
     Plane {
         name: kind.name(),
-        unit: if kind == PlaneKind::Depth { "m" } else { "" },
+        unit: unit(kind),
         min: rounded(middle(lowest)),
         max: rounded(middle(highest)),
         step: rounded(step),
         shades: levels.iter().map(|&level| shade(level)).collect(),
         age_s: ages(replica.levels(), bounds, now),
+    }
+}
+
+fn unit(kind: PlaneKind) -> &'static str {
+    match kind {
+        PlaneKind::Confidence => "",
+        PlaneKind::Depth => "m",
+        PlaneKind::Curiosity => "bit",
     }
 }
 
@@ -80,5 +88,9 @@ mod tests {
         let told = plane(PlaneKind::Confidence, &confidence, bounds, Instant::from_secs_f64(13.0));
         assert_eq!((told.min, told.max, told.unit), (0.125, 0.875, ""));
         assert_eq!(told.shades, [169, 254, 255]);
+        let curiosity = heard(PlaneScale::Curiosity, &[(Cell::new(0, 0), 4.2), (Cell::new(1, 0), 8.0)]);
+        let told = plane(PlaneKind::Curiosity, &curiosity, bounds, Instant::from_secs_f64(13.0));
+        assert_eq!((told.min, told.max, told.step, told.unit), (4.5, 8.5, 1.0, "bit"));
+        assert_eq!((told.shades, told.age_s), (vec![0, 254, 255], vec![3, 3, u16::MAX]));
     }
 }

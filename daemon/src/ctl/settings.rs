@@ -93,13 +93,13 @@ fn table(vehicle: &Vehicle) -> String {
     let settings = &vehicle.settings;
     let unnamed = || "as it was".to_owned();
     let in_force = settings.in_force.as_ref().map(named);
-    let mut out = format!("{:<20} {:<16} in force\n", "setting", "asked for");
+    let mut out = format!("{:<20} {:<26} in force\n", "setting", "asked for");
     for (index, (name, asked)) in named(&settings.asked).into_iter().enumerate() {
         let in_force = match &in_force {
             Some(values) => values[index].1.clone().unwrap_or_else(unnamed),
             None => "not known".to_owned(),
         };
-        out += &format!("{name:<20} {:<16} {in_force}\n", asked.unwrap_or_else(unnamed));
+        out += &format!("{name:<20} {:<26} {in_force}\n", asked.unwrap_or_else(unnamed));
     }
     let slot = vehicle.directive.slots.iter().find(|s| s.slot == "settings");
     out + &slot.map_or("nothing sent by this surface yet\n".to_owned(), |s| format!("{}\n", figures::slot(s)))

@@ -62,8 +62,8 @@ impl PlannerKind {
 /// ```text
 /// bytes 0-2: budget in bits a second, 1..=16 777 215
 /// bytes 3-7: least shares in percent of directive, status, fix, map, exemplar; together at most 100
-/// bytes 8-9: what is left over goes to, in this order, four bits each: 1 finer cells, 2 depth, 3 exemplars, 4 confidence,
-///            0 nothing more
+/// bytes 8-9: a 0, then what is left over goes to, in this order, three bits each: 1 finer cells, 2 depth, 3 exemplars,
+///            4 confidence, 5 curiosity, 0 nothing more
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {

@@ -85,14 +85,31 @@ pub struct PlaneSet {
     pub confidence: bool,
     /// Depth of the sea floor.
     pub depth: bool,
+    /// How badly the model explains what it sees.
+    pub curiosity: bool,
 }
 
 impl PlaneSet {
+    /// The planes for which it holds.
+    pub fn of(has: impl Fn(PlaneKind) -> bool) -> Self {
+        Self {
+            confidence: has(PlaneKind::Confidence),
+            depth: has(PlaneKind::Depth),
+            curiosity: has(PlaneKind::Curiosity),
+        }
+    }
+
+    /// The planes among them, in wire order.
+    pub fn kinds(self) -> impl Iterator<Item = PlaneKind> {
+        PlaneKind::ALL.into_iter().filter(move |&kind| self.has(kind))
+    }
+
     /// Whether a plane is among them.
     pub fn has(self, kind: PlaneKind) -> bool {
         match kind {
             PlaneKind::Confidence => self.confidence,
             PlaneKind::Depth => self.depth,
+            PlaneKind::Curiosity => self.curiosity,
         }
     }
 }
@@ -116,13 +133,13 @@ pub struct SettingsFault {
 ///       +-----------+-----------+-------+
 /// byte 0| planner   | cells     | planes|
 ///       +---+---+---+---+---+---+---+---+
-/// byte 1| C | D | 0 | a | b | g | r | f |
+/// byte 1| C | D | Q | a | b | g | r | f |
 ///       +---+---+---+---+---+---+---+---+
 /// then 2 bytes, a figure, for each of a, b, g, r, f that is 1
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
-/// * planes: 0 stay, 1 as configured, 2 those of C (confidence) and D (depth).
+/// * planes: 0 stay, 1 as configured, 2 those of C (confidence), D (depth) and Q (curiosity).
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -200,7 +217,7 @@ impl Settings {
         let cells = self.cells.code(|c| c as u8);
         let planes = self.planes.code(|_| 0);
         let set = self.planes.value().unwrap_or_default();
-        let mut given = u8::from(set.confidence) << 7 | u8::from(set.depth) << 6;
+        let mut given = u8::from(set.confidence) << 7 | u8::from(set.depth) << 6 | u8::from(set.curiosity) << 5;
         let mut numbers = Vec::new();
         for (index, (_, change, _)) in self.figures().into_iter().enumerate() {
             if !matches!(change, Change::Keep) {
@@ -215,10 +232,7 @@ impl Settings {
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
         let (choices, given) = (r.u8()?, r.u8()?);
-        if given & 0x20 != 0 {
-            return Err(Truncated);
-        }
-        let set = PlaneSet { confidence: given & 0x80 != 0, depth: given & 0x40 != 0 };
+        let set = PlaneSet { confidence: given & 0x80 != 0, depth: given & 0x40 != 0, curiosity: given & 0x20 != 0 };
         let planes = Change::from_code(choices & 3, |code| (code == 0).then_some(set))?;
         if planes.value().is_none() && set != PlaneSet::default() {
             return Err(Truncated);
@@ -265,7 +279,11 @@ mod tests {
         let choices = (
             change(proptest::sample::select(PlannerKind::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
-            change((any::<bool>(), any::<bool>()).prop_map(|(confidence, depth)| PlaneSet { confidence, depth })),
+            change(any::<[bool; 3]>().prop_map(|[confidence, depth, curiosity]| PlaneSet {
+                confidence,
+                depth,
+                curiosity,
+            })),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
         (choices, figures).prop_map(|((planner, cells, planes), (alpha, beta, gamma, refine, frames))| Settings {
@@ -285,7 +303,7 @@ mod tests {
         let settings = Settings {
             planner: Change::To(PlannerKind::Horizon),
             cells: Change::To(CellBand::Coarse),
-            planes: Change::To(PlaneSet { confidence: false, depth: true }),
+            planes: Change::To(PlaneSet { depth: true, ..PlaneSet::default() }),
             alpha: to(0.01),
             gamma: Change::Configured,
             frames_per_s: to(0.25),
@@ -295,6 +313,8 @@ mod tests {
         assert_eq!(settings.to_bytes(), bytes);
         assert_eq!(Settings::from_bytes(&bytes), Some(settings));
         assert_eq!(Settings::default().to_bytes(), [0, 0]);
+        let curious = PlaneSet::of(|kind| kind == PlaneKind::Curiosity);
+        assert_eq!(Settings { planes: Change::To(curious), ..Settings::default() }.to_bytes(), [2, 0x20]);
     }
 
     #[test]

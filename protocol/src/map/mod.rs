@@ -9,6 +9,7 @@ mod dirty;
 mod grid;
 mod plane;
 mod replica;
+mod scale;
 mod settle;
 mod source;
 mod stream;
@@ -16,8 +17,9 @@ mod value;
 
 pub use digest::MapDigest;
 pub use grid::{Cell, LabelGrid, Rect, TILE};
-pub use plane::{PlaneChunk, PlaneKind, PlaneReplica, PlaneScale, PlaneSource};
+pub use plane::{PlaneChunk, PlaneReplica, PlaneSource};
 pub use replica::Replica;
+pub use scale::{PlaneKind, PlaneScale};
 pub use settle::MOST_CONFIDENT;
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};

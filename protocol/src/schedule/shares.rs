@@ -19,13 +19,15 @@ pub enum Class {
     Depth,
     /// How sure the model is of the labels.
     Confidence,
+    /// How badly the model explains what it sees.
+    Curiosity,
     /// Headers, acknowledgements, checks, padding.
     Overhead,
 }
 
 impl Class {
     /// Every class; what comes first goes first where no share says otherwise.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Directive,
         Self::Status,
         Self::Fix,
@@ -33,12 +35,13 @@ impl Class {
         Self::Exemplar,
         Self::Depth,
         Self::Confidence,
+        Self::Curiosity,
         Self::Overhead,
     ];
     /// The classes that have a share of what is sent.
     pub const SHARED: [Self; 5] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar];
     /// The classes that have a share of the map's share: its planes.
-    pub const PLANES: [Self; 2] = [Self::Confidence, Self::Depth];
+    pub const PLANES: [Self; 3] = [Self::Confidence, Self::Depth, Self::Curiosity];
 
     /// Name for people and reports.
     pub fn name(self) -> &'static str {
@@ -50,6 +53,7 @@ impl Class {
             Self::Exemplar => "exemplar",
             Self::Confidence => "confidence",
             Self::Depth => "depth",
+            Self::Curiosity => "curiosity",
             Self::Overhead => "overhead",
         }
     }
@@ -60,6 +64,7 @@ impl From<PlaneKind> for Class {
         match plane {
             PlaneKind::Confidence => Self::Confidence,
             PlaneKind::Depth => Self::Depth,
+            PlaneKind::Curiosity => Self::Curiosity,
         }
     }
 }
@@ -93,9 +98,9 @@ impl Shares {
 pub struct ClassShares {
     shares: Shares,
     /// Percent of the map's share for each of [`Class::PLANES`].
-    planes: [u8; 2],
+    planes: [u8; Class::PLANES.len()],
     /// Bytes that a class was owed and did not get while it waited.
-    owed: [f64; 7],
+    owed: [f64; Class::SHARED.len() + Class::PLANES.len()],
 }
 
 impl ClassShares {
@@ -104,12 +109,12 @@ impl ClassShares {
 
     /// Nothing is owed yet.
     pub fn new(shares: Shares) -> Self {
-        Self { shares, planes: [0; 2], owed: [0.0; 7] }
+        Self { shares, ..Self::default() }
     }
 
     /// Gives planes of the map a part of its share, percent; together 100 at most. A plane without one takes what nobody
     /// else needs.
-    pub fn set_planes(&mut self, planes: [u8; 2]) {
+    pub fn set_planes(&mut self, planes: [u8; Class::PLANES.len()]) {
         self.planes = planes;
     }
 
@@ -191,7 +196,7 @@ mod tests {
     fn a_plane_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
         let waiting = [Class::Map, Class::Confidence, Class::Depth];
         let mut keeper = ClassShares::new(Shares::default());
-        keeper.set_planes([0, 10]);
+        keeper.set_planes([0, 10, 0]);
         let mut sent = BTreeMap::<Class, usize>::new();
         for _ in 0..1000 {
             let class = keeper.next(&waiting).unwrap();

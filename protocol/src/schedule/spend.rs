@@ -14,11 +14,13 @@ pub enum Extra {
     Exemplars,
     /// How sure the model is of the labels, if that has no share.
     Confidence,
+    /// How badly the model explains what it sees, if that has no share.
+    Curiosity,
 }
 
 impl Extra {
-    /// Every extra, in the order of their numbers on the wire, from 1, and of the default.
-    pub const ALL: [Self; 4] = [Self::Finer, Self::Depth, Self::Exemplars, Self::Confidence];
+    /// Every extra, in the order of their numbers on the wire, from 1.
+    pub const ALL: [Self; 5] = [Self::Finer, Self::Depth, Self::Exemplars, Self::Confidence, Self::Curiosity];
 
     /// Name in files and in the API.
     pub fn name(self) -> &'static str {
@@ -27,6 +29,7 @@ impl Extra {
             Self::Depth => "depth",
             Self::Exemplars => "exemplars",
             Self::Confidence => "confidence",
+            Self::Curiosity => "curiosity",
         }
     }
 
@@ -37,6 +40,7 @@ impl Extra {
             Self::Depth => Class::Depth,
             Self::Exemplars => Class::Exemplar,
             Self::Confidence => Class::Confidence,
+            Self::Curiosity => Class::Curiosity,
         }
     }
 }
@@ -47,8 +51,9 @@ impl Extra {
 pub struct SpendOrder([Option<Extra>; Extra::ALL.len()]);
 
 impl Default for SpendOrder {
+    /// All but curiosity, which is for who asks for it.
     fn default() -> Self {
-        Self(Extra::ALL.map(Some))
+        Self(Extra::ALL.map(|extra| (extra != Extra::Curiosity).then_some(extra)))
     }
 }
 
@@ -86,15 +91,17 @@ impl SpendOrder {
         self.iter().any(|e| e == extra)
     }
 
-    /// As on the wire: four bits each, the first one highest; 0: no further one.
+    /// As on the wire: three bits each below a 0, the first one highest; 0: no further one.
     pub fn code(self) -> u16 {
-        self.0.into_iter().fold(0, |code, e| code << 4 | e.map_or(0, |e| e as u16 + 1))
+        self.0.into_iter().fold(0, |code, e| code << 3 | e.map_or(0, |e| e as u16 + 1))
     }
 
     /// The order of a code; `None` if it names what there is not, or one twice, or leaves a gap.
     pub fn from_code(code: u16) -> Option<Self> {
-        let number = |place: u16| usize::from(code >> (12 - 4 * place) & 15);
-        let numbers = [0, 1, 2, 3].map(number);
+        if code >> 15 != 0 {
+            return None;
+        }
+        let numbers = [12, 9, 6, 3, 0].map(|shift: u16| usize::from(code >> shift & 7));
         let named: Vec<usize> = numbers.into_iter().take_while(|&n| n > 0).collect();
         if numbers.into_iter().skip(named.len()).any(|n| n > 0) {
             return None;
@@ -110,22 +117,24 @@ mod tests {
 
     #[test]
     fn golden_codes_of_orders() {
-        assert_eq!(SpendOrder::default().code(), 0x1234);
+        assert_eq!(SpendOrder::default().code(), 0x14E0);
         let two = SpendOrder::new(&[Extra::Exemplars, Extra::Confidence]).unwrap();
-        assert_eq!((two.code(), SpendOrder::from_code(0x3400)), (0x3400, Some(two)));
+        assert_eq!((two.code(), SpendOrder::from_code(0x3800)), (0x3800, Some(two)));
         assert_eq!(SpendOrder::from_code(0), SpendOrder::new(&[]));
-        for wrong in [0x3300, 0x5000, 0x0300, 0x1203] {
+        let all = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
+        assert_eq!((all.unwrap().code(), SpendOrder::from_code(0x529C)), (0x529C, all));
+        for wrong in [0x3600, 0x6000, 0x0600, 0x1403, 0x94E0] {
             assert_eq!(SpendOrder::from_code(wrong), None, "{wrong:04x}");
         }
         let sound = (0..=u16::MAX).filter_map(SpendOrder::from_code).collect::<Vec<_>>();
-        assert_eq!(sound.len(), 1 + 4 + 12 + 24 + 24);
+        assert_eq!(sound.len(), 1 + 5 + 20 + 60 + 120 + 120);
         assert!(sound.iter().all(|order| SpendOrder::from_code(order.code()) == Some(*order)));
     }
 
     #[test]
     fn a_name_that_is_wrong_is_refused_with_what_is_allowed() {
         let said = SpendOrder::from_names(&["depth", "sonar"]).unwrap_err();
-        assert_eq!(said, "spend \"sonar\": it takes different ones of finer, depth, exemplars, confidence");
+        assert_eq!(said, "spend \"sonar\": it takes different ones of finer, depth, exemplars, confidence, curiosity");
         assert!(SpendOrder::from_names(&["depth", "depth"]).unwrap_err().contains("twice"));
         let order = SpendOrder::from_names(&["exemplars", "finer"]).unwrap();
         assert_eq!(order.names(), ["exemplars", "finer"]);

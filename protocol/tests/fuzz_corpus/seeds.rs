@@ -202,7 +202,8 @@ fn golden() -> Vec<Seed> {
         seed("plane_chunk", "digest", vec![0x81, 0x27, 0xA6]),
         seed("plane_chunk", "depth-without-a-patch", vec![2, 5, 0, 24]),
         seed("plane_chunk", "depth-without-a-step", vec![2, 0, 0, 24, 0x07, 0xF0]),
-        seed("plane_chunk", "unknown", vec![3, 0x07, 0xF0, 0x40]),
+        seed("plane_chunk", "curiosity", vec![3, 0x07, 0xF0, 0x40]),
+        seed("plane_chunk", "unknown", vec![4, 0x07, 0xF0, 0x40]),
         seed("status", "golden-pose", vec![0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]),
         seed(
             "status",

@@ -32,6 +32,13 @@ export function habitat(x, y) {
 /** Depth of the floor in metres, positive down. */
 export const floorDepth = (x, y) => 22 - 7 * fractal(x, y, 11);
 
+/** Mean surprise of a word in bits, 2 to 11: much at borders, and a few cells at random far off. */
+export function surprise(x, y) {
+  const odd = hash(Math.floor(4 * x), Math.floor(4 * y), 31);
+  if (odd < 0.015) return odd < 0.007 ? 2.5 : 10.5;
+  return Math.floor(4.2 + 4 * (1 - confidence(x, y)) + odd) + 0.5;
+}
+
 /** How sure the topic model is of the label, 0..1: low near borders. */
 export function confidence(x, y) {
   const here = habitat(x, y);

@@ -83,7 +83,7 @@ async function api(mock, req, res, path) {
   const [, id, what] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
   if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
-  if (what === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.planes));
+  if (what === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.planes ? mission.spend : []));
   if (what === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
   if (what === "map.png") return send(res, 200, "image/png", encodePng(vehicle.mapJson(mission.nowS, false), deflateSync));
   const [, label] = what.match(/^exemplars\/(\d+)(-\d+)?\.webp$/) ?? [];

@@ -1,6 +1,6 @@
 // One synthetic vehicle: flies legs over the scene, tells its map in turns, hears directives.
 
-import { habitat, confidence, floorDepth } from "./scene.mjs";
+import { habitat, confidence, floorDepth, surprise } from "./scene.mjs";
 import { Grid } from "./grid.mjs";
 import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
@@ -8,8 +8,8 @@ import { Settings } from "./settings.mjs";
 
 const PLANES = [
   { name: "confidence", unit: "", min: 0.125, max: 0.875, step: 0.25, at: confidence },
-  { name: "curiosity", unit: "nats", min: 0, max: 3, at: (x, y) => 3 * (1.2 - confidence(x, y)) },
   { name: "depth", unit: "m", min: 10, max: 25, at: floorDepth },
+  { name: "curiosity", unit: "bit", min: 2.5, max: 10.5, step: 1, at: surprise },
 ];
 
 export class Vehicle {
@@ -192,7 +192,7 @@ export class Vehicle {
     };
   }
 
-  mapJson(nowS, withPlanes) {
-    return this.heard.json(nowS, withPlanes ? PLANES : []);
+  mapJson(nowS, spend) {
+    return this.heard.json(nowS, PLANES.filter((p) => spend.includes(p.name)));
   }
 }

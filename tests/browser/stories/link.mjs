@@ -10,7 +10,7 @@ export default [
       const { link } = await s.get("/state");
       assert.equal(await s.page.locator("#budget").inputValue(), String(link.budget_bps));
       const rows = await s.page.locator(".classes tbody tr").allInnerTexts();
-      assert.deepEqual(rows.map((r) => r.trim().split(/\s/)[0]), ["map", "confidence", "depth", "status", "directive", "fix", "exemplar", "overhead"]);
+      assert.deepEqual(rows.map((r) => r.trim().split(/\s/)[0]), ["map", "confidence", "curiosity", "depth", "status", "directive", "fix", "exemplar", "overhead"]);
       const marked = await s.page.locator("#link canvas").evaluate((c) => {
         const { data } = c.getContext("2d").getImageData(0, 0, c.width, c.height);
         return data.some((v, i) => i % 4 === 3 && v > 0);

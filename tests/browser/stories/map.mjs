@@ -261,7 +261,7 @@ export default [
       const names = () => s.page.locator("#layer option").allInnerTexts();
       assert.deepEqual(await names(), ["label", "age"]);
       await s.steer({ planes: true, advance: 30 });
-      await s.until("more layers", async () => (await names()).join() === "label,age,confidence,curiosity,depth");
+      await s.until("more layers", async () => (await names()).join() === "label,age,confidence,depth");
       await s.page.selectOption("#layer", "depth");
       await s.shows("#legend", /depth.*10 m.*25 m/s);
       await s.page.selectOption("#layer", "confidence");
@@ -277,6 +277,41 @@ export default [
       const cell = await someCell(s);
       await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
       await s.shows("#readout", /confidence \d+.% to \d+.%, heard .* ago/s);
+    },
+  },
+  {
+    name: "curiosity is a layer once it is asked for, in its own colours, and grows old when the vehicle is silent",
+    scenario: "start",
+    async run(s) {
+      const names = () => s.page.locator("#layer option").allInnerTexts();
+      await s.steer({ planes: true, advance: 30 });
+      await s.page.getByRole("group", { name: "What left-over bits are spent on" }).getByRole("checkbox", { name: "curiosity" }).check();
+      await s.until("the order", () => s.posts.at(-1)?.body.spend?.at(-1) === "curiosity");
+      await s.until("the layer", async () => (await names()).join() === "label,age,confidence,curiosity,depth", { advance: 2 });
+      const cell = await someCell(s);
+      await s.page.selectOption("#layer", "curiosity");
+      await s.shows("#legend", /curiosity\s*up to \d bit\s*\d+ bit and more/);
+      const painted = await pixel(s, cell.px, cell.py);
+      const tone = await s.inPage(async ({ store }, { x, y }) => {
+        const { lookOf } = await import("/js/map/planes.js");
+        const { cellAt } = await import("/js/map/readout.js");
+        const told = cellAt(store.map, x, y).planes.find((p) => p.name === "curiosity");
+        const of = store.map.planes.find((p) => p.name === "curiosity");
+        return lookOf(of).tone(Math.round(((told.value - of.min) / (of.max - of.min)) * 254), false);
+      }, cell);
+      assert.deepEqual(painted, tone);
+      const ages = async () => {
+        await s.page.mouse.move(cell.left + cell.px - 40, cell.top + cell.py);
+        await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
+        await s.shows("#readout", /curiosity \d+ bit to \d+ bit, heard .* ago/);
+        return (await s.page.locator("#readout").innerText()).match(/curiosity [^·]*/)[0];
+      };
+      const young = await ages();
+      await s.steer({ mute: true, advance: 400 });
+      await s.until("an old level", async () => /heard \d+\smin/.test(await ages()));
+      assert.doesNotMatch(young, /min/);
+      const spread = ([r, , b]) => Math.abs(r - b);
+      await s.until("pale tones", async () => spread(await pixel(s, cell.px, cell.py)) < spread(painted) * 0.7);
     },
   },
   {

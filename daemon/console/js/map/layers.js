@@ -7,10 +7,11 @@ import { nice, span } from "../format.js";
 import { ramp } from "../palette.js";
 import { current as theme, onTheme } from "../theme.js";
 import { coarseBlocks, paintCoarse } from "./coarse.js";
+import { lookOf } from "./planes.js";
 import { labelTones, paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
-import { planeText } from "./readout.js";
 
 const AGE_REPAINT_S = 5;
+const HINTS = { curiosity: "How badly the scene model explains a cell: mean surprise of a word, the binary logarithm of the perplexity" };
 export const layer = { name: "label", highlight: null };
 const painted = new Map();
 let legendKey = "";
@@ -23,7 +24,7 @@ onTheme(() => {
 
 /** The layers that the chosen vehicle's map can show. */
 export function layerNames() {
-  return ["label", "age", ...(store.map?.planes.map((p) => p.name) ?? [])];
+  return ["label", "age", ...(store.map?.planes.map((p) => p.name).sort() ?? [])];
 }
 
 export function setLayer(name) {
@@ -79,7 +80,8 @@ export function drawLegend() {
   const plane = map?.planes.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
   const coarse = layer.name === "label" && Boolean(map) && coarseBlocks(map).length > 0;
-  const key = `${layer.name}.${top}.${plane?.min}.${plane?.max}.${coarse}`;
+  const look = plane ? lookOf(plane) : { at: ramp, low: "now", high: span(top) };
+  const key = `${layer.name}.${look.low}.${look.high}.${coarse}`;
   if (key === legendKey) return;
   legendKey = key;
   const box = $("legend");
@@ -90,15 +92,11 @@ export function drawLegend() {
     box.replaceChildren(h("span.pale", { "aria-hidden": "true" }), h("span", {}, words));
     return;
   }
-  const half = (plane?.step ?? 0) / 2;
-  const [title, low, high, flip] = plane
-    ? [plane.name, planeText(plane, plane.min - half), planeText(plane, plane.max + half), false]
-    : ["age of cells", "now", span(top), true];
   const bar = h("canvas", { width: 120, height: 8, "aria-hidden": "true" });
   const c = bar.getContext("2d");
   for (let x = 0; x < 120; x += 1) {
-    c.fillStyle = `rgb(${ramp(flip ? 1 - x / 119 : x / 119, theme() === "red").join(" ")})`;
+    c.fillStyle = `rgb(${look.at(plane ? x / 119 : 1 - x / 119, theme() === "red").join(" ")})`;
     c.fillRect(x, 0, 1, 8);
   }
-  box.replaceChildren(h("b", {}, title), h("span", {}, low.trim()), bar, h("span", {}, high.trim()));
+  box.replaceChildren(h("b", { title: HINTS[plane?.name] ?? "" }, plane?.name ?? "age of cells"), h("span", {}, look.low.trim()), bar, h("span", {}, look.high.trim()));
 }

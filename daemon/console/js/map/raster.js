@@ -2,6 +2,7 @@
 
 import { ramp } from "../palette.js";
 import { current as theme } from "../theme.js";
+import { lookOf } from "./planes.js";
 
 const shade = (t) => ramp(t, theme() === "red");
 
@@ -81,10 +82,11 @@ export function paintAge(map, sinceFetchS, top) {
 
 /** A plane the server offers: bytes 0..254 between its least and greatest value, 255 unknown; faint when stale. */
 export function paintPlane(map, plane, stale) {
+  const look = lookOf(plane);
   return paint(map, (at) => {
     const v = plane.data[at];
     if (v === 255) return [128, 128, 128, 90];
-    const full = shade(v / 254);
+    const full = look.tone(v, theme() === "red");
     return [...(stale ? mix(full, [128, 128, 128], 0.7) : full), 255];
   });
 }

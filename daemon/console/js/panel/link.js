@@ -6,7 +6,7 @@ import { ageOf, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
 
-const CLASSES = ["map", "confidence", "depth", "status", "directive", "fix", "exemplar", "overhead"];
+const CLASSES = ["map", "confidence", "curiosity", "depth", "status", "directive", "fix", "exemplar", "overhead"];
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};

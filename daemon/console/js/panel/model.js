@@ -16,7 +16,9 @@ const NUMBERS = [
 ];
 const SIDE = 4;
 const CELLS = { fine: (m) => `all, ${m(1)}`, "coarse-to-fine": (m) => `${m(SIDE)} first, then ${m(1)}`, coarse: (m) => `every fourth, ${m(SIDE)}` };
-const PLANES = { none: "none", confidence: "confidence", depth: "depth", both: "confidence and depth" };
+const KINDS = ["confidence", "depth", "curiosity"];
+const SETS = [...Array(2 ** KINDS.length).keys()].map((bits) => KINDS.filter((_, i) => (bits >> i) & 1)).sort((a, b) => a.length - b.length);
+const PLANES = Object.fromEntries(SETS.map((set) => [set.join() || "none", [set.slice(0, -1).join(", "), set.at(-1)].filter(Boolean).join(" and ") || "none"]));
 const KEYS = [...NUMBERS.map(([key]) => key), "cells", "planes"];
 const MOST_BPS = 1e7;
 const AS_IS = "as it is";

@@ -7,6 +7,7 @@ const WHAT = {
   depth: "depth",
   exemplars: "pictures of new labels",
   confidence: "confidence",
+  curiosity: "curiosity",
 };
 const KINDS = Object.keys(WHAT);
 

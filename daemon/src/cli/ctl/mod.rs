@@ -172,7 +172,7 @@ struct SettingsArgs {
     /// Cells that are told: fine, coarse-to-fine, coarse (every fourth both ways); "": as configured
     #[arg(long, value_name = "BAND")]
     cells: Option<String>,
-    /// Planes that are told: none, confidence, depth, both; "": as configured
+    /// Planes that are told: none, or different ones of confidence, depth, curiosity with commas between; "": as configured
     #[arg(long, value_name = "PLANES")]
     planes: Option<String>,
     /// lawnmower, greedy, horizon; "": as configured
@@ -231,7 +231,8 @@ enum BudgetCommand {
         /// Least shares in percent by class, together at most 100; those that are not named stay
         #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
         shares: Vec<(String, u8)>,
-        /// What left-over bits are spent on, in this order: different ones of finer, depth, exemplars, confidence, or none
+        /// What left-over bits are spent on, in this order: different ones of finer, depth, exemplars, confidence,
+        /// curiosity, or none
         #[arg(long, value_name = "WHAT,..", value_delimiter = ',')]
         spend: Option<Vec<String>>,
     },

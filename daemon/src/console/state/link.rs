@@ -13,7 +13,8 @@ pub struct Link {
     pub budget_window_s: f64,
     /// Least shares of the classes in percent.
     pub shares: BTreeMap<String, u8>,
-    /// What bits that nobody else needs are spent on, in this order: finer, depth, exemplars, confidence.
+    /// What bits that nobody else needs are spent on, in this order: finer, depth, exemplars, confidence,
+    /// curiosity.
     #[serde(default)]
     pub spend: Vec<String>,
     /// Frames of no known vehicle, or unreadable.
@@ -45,7 +46,7 @@ pub struct Direction {
     pub lost: u64,
     /// Useful bits a second.
     pub goodput_bps: f64,
-    /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, overhead.
+    /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, curiosity, overhead.
     pub bytes_by_class: BTreeMap<String, u64>,
 }
 

@@ -68,9 +68,11 @@ pub struct Map {
 /// then speaks of an earlier one; where a cell has no label it does not count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Plane {
-    /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor.
+    /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor;
+    /// `curiosity`: how badly the model explains what the cell shows, the mean surprise of a word in bits (the binary
+    /// logarithm of the perplexity).
     pub name: String,
-    /// `m`, or empty.
+    /// `m`, `bit`, or empty.
     pub unit: String,
     /// The middle of the lowest level.
     pub min: f64,

@@ -114,7 +114,7 @@ impl Grow for MapSource {
 
 /// The planes of a vehicle that has any.
 pub fn planes() -> impl Iterator<Item = (PlaneSource, u8)> {
-    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
+    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5), PlaneScale::Curiosity];
     scales.into_iter().map(|scale| (PlaneSource::new(scale, Codec::Png, Duration::from_secs(2)), 20))
 }
 

@@ -75,6 +75,7 @@ impl<S: Grow> End for Vehicle<S> {
             6 => {
                 let cells = (0..i32::from(with)).map(|i| (Cell::new(i % 9, i / 9), f64::from(i * 7 % 100) / 100.0));
                 self.set_plane(PlaneKind::Confidence, cells.clone(), now);
+                self.set_plane(PlaneKind::Curiosity, cells.clone().map(|(cell, x)| (cell, 20.0 * x)), now);
                 self.set_plane(PlaneKind::Depth, cells.map(|(cell, x)| (cell, 20.0 + 5.0 * x)), now);
             }
             _ => self.set_shares(Shares([with % 20; 5])),

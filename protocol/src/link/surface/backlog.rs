@@ -33,7 +33,7 @@ impl Told {
 /// Bytes that have come in so far; they come round after 4 GB.
 fn heard(stats: &LinkStats) -> Backlog {
     let of = |class| stats.heard_by_class.get(&class).copied().unwrap_or_default();
-    let other = of(Class::Confidence) + of(Class::Depth) + of(Class::Exemplar);
+    let other: u64 = Class::PLANES.into_iter().chain([Class::Exemplar]).map(of).sum();
     Backlog { map_bytes: of(Class::Map) as u32, other_bytes: other as u32 }
 }
 
@@ -47,7 +47,8 @@ mod tests {
         stats.hear(Class::Map, 900, now);
         let told = Told::new(Backlog { map_bytes: 500, other_bytes: 40 }, &stats, now);
         stats.hear(Class::Map, 200, now);
-        stats.hear(Class::Depth, 50, now);
+        stats.hear(Class::Depth, 30, now);
+        stats.hear(Class::Curiosity, 20, now);
         stats.hear(Class::Status, 50, now);
         assert_eq!(told.left(&stats), (Backlog { map_bytes: 300, other_bytes: 0 }, now));
     }

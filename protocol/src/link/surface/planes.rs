@@ -75,7 +75,7 @@ mod tests {
     fn a_plane_that_is_not_known_is_passed_over_and_one_on_another_scale_is_not() {
         let mut planes = Planes::default();
         let (chunk, carried) = depths(0).next_chunk(200, Instant::ZERO).unwrap();
-        assert_eq!(planes.handle_chunk(1, &[&[3], &chunk[1..]].concat(), Instant::ZERO), Heard::Unknown);
+        assert_eq!(planes.handle_chunk(1, &[&[4], &chunk[1..]].concat(), Instant::ZERO), Heard::Unknown);
         assert_eq!((planes.handle_chunk(1, &chunk, Instant::ZERO), planes.version()), (Heard::Taken, 1));
         let shown = planes.get(PlaneKind::Depth).unwrap().levels().shown();
         assert!(carried.iter().all(|&(cell, level)| shown.get(cell) == level));

@@ -44,7 +44,7 @@ impl<S: StateSource> VehicleLink<S> {
             Extra::Finer if self.is_refining() => self.source.backlog_bytes(),
             Extra::Finer => 0,
             Extra::Exemplars => self.objects.extra_backlog_bytes(),
-            Extra::Depth | Extra::Confidence => {
+            Extra::Depth | Extra::Confidence | Extra::Curiosity => {
                 let of_extra = |p: &&PlaneOut| p.is_told && !p.has_share && p.class() == extra.class();
                 self.planes.iter().find(of_extra).map_or(0, |p| p.source.backlog_bytes())
             }

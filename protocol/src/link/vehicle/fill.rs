@@ -50,7 +50,7 @@ impl<S: StateSource> VehicleLink<S> {
         match class {
             Class::Status => self.fill_status(builder, carried, now),
             Class::Exemplar => self.fill_object(is_extra, builder, carried),
-            Class::Confidence | Class::Depth => self.fill_plane(class, builder, carried, now),
+            Class::Confidence | Class::Depth | Class::Curiosity => self.fill_plane(class, builder, carried, now),
             _ => self.fill_map(builder, carried, now),
         }
         carried.iter().skip(before).map(|(_, n)| n).sum()

@@ -37,9 +37,10 @@ impl<S: StateSource> VehicleLink<S> {
         self.shares.set_planes(shares);
     }
 
-    /// The planes that are told.
+    /// The planes that are told: those that have a share or a place in the spending of left-over bits.
     pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
-        self.planes.iter().filter(|p| p.is_told).map(|p| &p.source)
+        let has_bits = |p: &&PlaneOut| p.has_share || self.spend.iter().any(|extra| extra.class() == p.class());
+        self.planes.iter().filter(|p| p.is_told).filter(has_bits).map(|p| &p.source)
     }
 
     /// Which of the planes are told from now on; the others rest, and go on from there when they are told again.
