@@ -10,7 +10,8 @@ use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement,
-    Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
+    PlannedPath, Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION,
+    unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -132,6 +133,7 @@ fn status() -> VehicleStatus {
         sigma_m: 1.25,
         fix_age_s: Some(8.0),
         waypoint: None,
+        path: PlannedPath::default(),
         explored_cells: 4000,
         epoch: 1,
         labels: 9,
@@ -273,8 +275,9 @@ fn parts_of_a_frame_are_those_of_the_document() {
         assert_eq!(VersionedSlot::decode(&bytes), Ok(read));
         bytes
     };
-    let pose = |waypoint: Option<(f64, f64)>| {
-        let bytes = VehicleStatus { waypoint, ..status() }.encode_pose(99);
+    let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], goes_on: bool| {
+        let path = PlannedPath { places: path.to_vec(), goes_on };
+        let bytes = VehicleStatus { waypoint, path, ..status() }.encode_pose(99);
         assert_eq!(VehicleStatus::default().read_pose(&bytes), Ok(()));
         bytes
     };
@@ -355,9 +358,14 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ("plane chunk: the digest of confidence is 27A6", plane(PlaneChunk::Digest(PlaneKind::Confidence, 0x27A6))),
         (
             "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
-            pose(None),
+            pose(None, &[], false),
         ),
-        ("the same with a waypoint at (1, -2) m", pose(Some((1.0, -2.0)))),
+        ("the same with a waypoint at (1, -2) m", pose(Some((1.0, -2.0)), &[], false)),
+        (
+            "the same with a path from there to (2.4, -3.4) and (-0.6, -3.4) m",
+            pose(Some((1.0, -2.0)), &[(2.4, -3.4), (-0.6, -3.4)], false),
+        ),
+        ("the same with a path of which nothing is told but that it goes on", pose(Some((1.0, -2.0)), &[], true)),
         (
             "the first pose with an autopilot that does not answer",
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),

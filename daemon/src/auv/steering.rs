@@ -1,5 +1,7 @@
 //! Where to go next.
 
+mod ahead;
+
 use super::planning::{
     Area, Bounds, Knowledge, Lattice, Node, Planner, Point, Question, Ways, Window, Worth, distance, planner,
 };

@@ -246,6 +246,8 @@ fn status(s: &VehicleStatus, at: Instant) -> state::Status {
         reason: s.reason.name().map(str::to_owned),
         doing: doing(s),
         waypoint: s.waypoint,
+        path: s.path.places.clone(),
+        path_goes_on: s.path.goes_on,
         cells: s.explored_cells,
         labels: u32::from(s.labels),
         fix_age_s: s.fix_age_s,

@@ -173,6 +173,11 @@ pub struct Status {
     pub doing: String,
     /// Where it is going, metres east and north on its own map.
     pub waypoint: Option<(f64, f64)>,
+    /// Where it plans to go from the waypoint, each at the end of a straight leg, metres east and north on its own map; at
+    /// most 7. Empty if it plans no further, or if its bits tell no more.
+    pub path: Vec<(f64, f64)>,
+    /// Whether its plan has more waypoints than these.
+    pub path_goes_on: bool,
     /// Cells that it has explored.
     pub cells: u32,
     /// Labels that it knows.

@@ -1,6 +1,6 @@
 //! The state as text for people.
 
-use crate::console::state::{Backlog, Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Vehicle};
+use crate::console::state::{Backlog, Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Status, Vehicle};
 use std::fmt::Write;
 
 /// Everything, or what concerns one vehicle.
@@ -33,6 +33,9 @@ fn vehicle(out: &mut String, v: &Vehicle, state: &State) {
         let place = format!("E {:.1} m  N {:.1} m  up {:.1} m  heading {:03.0}", s.x_m, s.y_m, s.z_m, s.heading_deg);
         let age = span(now - s.at_s);
         let _ = writeln!(out, "  {:<10} {place}  +-{:.1} m, said {age} ago", mode(s.mode), s.sigma_m);
+        if let Some(way) = way(s) {
+            let _ = writeln!(out, "  path       {way}");
+        }
     }
     let changed = v.map.updated_s.map_or("no cell yet".to_owned(), |at| format!("changed {} ago", span(now - at)));
     let cells = format!("version {}, {} cells, {} labels", v.map.version, v.map.explored_cells, v.labels.len());
@@ -46,6 +49,17 @@ fn vehicle(out: &mut String, v: &Vehicle, state: &State) {
     for s in &v.directive.slots {
         let _ = writeln!(out, "  {:<10} {}, {} ago", s.slot, slot(s), span(now - s.changed_s));
     }
+}
+
+/// How far it is over the waypoint and the path after it.
+fn way(s: &Status) -> Option<String> {
+    let waypoint = s.waypoint?;
+    let places = || std::iter::once(waypoint).chain(s.path.iter().copied());
+    let before = std::iter::once((s.x_m, s.y_m)).chain(places());
+    let metres: f64 = before.zip(places()).map(|(a, b)| (b.0 - a.0).hypot(b.1 - a.1)).sum();
+    let count = if s.path.is_empty() { "1 waypoint".to_owned() } else { format!("{} waypoints", 1 + s.path.len()) };
+    let further = if s.path_goes_on { ", and it goes on" } else { "" };
+    Some(format!("{count}, {metres:.1} m{further}"))
 }
 
 fn backlog(b: &Backlog, now_s: f64) -> String {
@@ -135,6 +149,44 @@ pub(super) fn span(seconds: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_is_told_from_the_vehicle_to_its_last_waypoint() {
+        let told = |waypoint, path: &[(f64, f64)], path_goes_on| {
+            let status = Status { path: path.to_vec(), path_goes_on, waypoint, ..standing() };
+            way(&status)
+        };
+        assert_eq!(told(None, &[], false), None);
+        assert_eq!(told(Some((3.0, 5.0)), &[], false).unwrap(), "1 waypoint, 5.0 m");
+        let on = told(Some((3.0, 5.0)), &[(3.0, 7.5), (1.0, 7.5)], true).unwrap();
+        assert_eq!(on, "3 waypoints, 9.5 m, and it goes on");
+    }
+
+    /// At (0, 1).
+    fn standing() -> Status {
+        Status {
+            at_s: 0.0,
+            x_m: 0.0,
+            y_m: 1.0,
+            z_m: 0.0,
+            heading_deg: 0.0,
+            sigma_m: 0.0,
+            mode: Mode::Survey,
+            autopilot_silent: false,
+            reason: None,
+            doing: String::new(),
+            waypoint: None,
+            path: Vec::new(),
+            path_goes_on: false,
+            cells: 0,
+            labels: 0,
+            fix_age_s: None,
+            budget_bps: 0,
+            refused_frames: 0,
+        }
+    }
+
     #[test]
     fn durations_are_told_in_the_two_units_that_matter() {
         let told: Vec<String> = [0.4, 59.6, 3599.0, 3661.0, -1.0].map(super::span).into();

@@ -1,6 +1,7 @@
 //! Where the vehicle may be.
 
 use super::polygon::{Place, Polygon, PolygonFault};
+use super::steps::{minus, plus, put_pair, take_pair, take_width, width_of};
 use crate::map_codec::bits::{BitReader, BitWriter};
 
 /// The outline that the vehicle stays in, those that it stays out of, and the place that it returns to.
@@ -178,36 +179,6 @@ fn take_outline(bits: &mut BitReader<'_>, anchor: Place, is_first: bool) -> Opti
         vertices.push(plus(before, take_pair(bits, width)?));
     }
     Some(Polygon(vertices))
-}
-
-fn take_width(bits: &mut BitReader<'_>) -> Option<u32> {
-    let width = bits.take(5)? as u32;
-    (1..=25).contains(&width).then_some(width)
-}
-
-fn put_pair(bits: &mut BitWriter, place: Place, width: u32) {
-    for v in [place.x_dm, place.y_dm] {
-        bits.put(v as u32 as u64, width);
-    }
-}
-
-fn take_pair(bits: &mut BitReader<'_>, width: u32) -> Option<Place> {
-    let mut signed = || bits.take(width).map(|v| ((v as u32) << (32 - width)) as i32 >> (32 - width));
-    Some(Place { x_dm: signed()?, y_dm: signed()? })
-}
-
-fn minus(a: Place, b: Place) -> Place {
-    Place { x_dm: a.x_dm.wrapping_sub(b.x_dm), y_dm: a.y_dm.wrapping_sub(b.y_dm) }
-}
-
-fn plus(a: Place, b: Place) -> Place {
-    Place { x_dm: a.x_dm.wrapping_add(b.x_dm), y_dm: a.y_dm.wrapping_add(b.y_dm) }
-}
-
-/// Bits that hold every number in two's complement, 1 to 25.
-fn width_of(steps: impl IntoIterator<Item = Place>) -> u32 {
-    let bits = |v: i32| 33 - (v ^ (v >> 31)).leading_zeros();
-    steps.into_iter().map(|s| bits(s.x_dm).max(bits(s.y_dm))).max().unwrap_or(1).min(25)
 }
 
 #[cfg(test)]

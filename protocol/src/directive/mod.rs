@@ -8,6 +8,7 @@ mod outbox;
 mod polygon;
 mod requests;
 mod settings;
+pub(crate) mod steps;
 mod tuning;
 mod utility;
 
@@ -70,6 +71,11 @@ impl SlotId {
     /// What its bits count as.
     pub fn class(self) -> Class {
         if self == Self::Fix { Class::Fix } else { Class::Directive }
+    }
+
+    /// Whether a vehicle that applies it chooses its way afresh.
+    pub fn steers(self) -> bool {
+        matches!(self, Self::Utility | Self::Constraints | Self::Settings | Self::Limits | Self::Fence)
     }
 
     /// Name for people.

@@ -2,6 +2,7 @@
 
 use super::backlog::Backlog;
 use super::cursor::{Reader, Truncated};
+use super::path::PlannedPath;
 use super::placement::Placement;
 use crate::directive::{RefusalReason, SLOTS, SlotId};
 
@@ -116,6 +117,7 @@ pub struct SlotReport {
 /// 11    8     age of the last fix   seconds, 254 = that or more, 255 = no fix yet
 /// 12-14 24    explored cells
 /// 15-20 48    [waypoint x, y]       decimetres, signed
+/// 21..        [what is planned after it, see `PlannedPath`]; only after a waypoint
 ///
 /// report
 ///  0    8     label epoch
@@ -151,6 +153,8 @@ pub struct VehicleStatus {
     pub fix_age_s: Option<f64>,
     /// Where it is going, metres east and north.
     pub waypoint: Option<(f64, f64)>,
+    /// Where it plans to go from there; told only with a waypoint.
+    pub path: PlannedPath,
     /// Explored cells on its map.
     pub explored_cells: u32,
     /// Epoch of its label ids.
@@ -209,10 +213,13 @@ fn decode_rate(code: u16) -> u32 {
 impl VehicleStatus {
     /// Bytes of a report without slots.
     const REPORT_HEAD: usize = 8 + Backlog::BYTES;
+    /// Bytes of a pose with a waypoint, without a path.
+    pub(crate) const POSE: usize = 21;
 
-    /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it.
+    /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it, and of
+    /// the path what does not fit.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
-        let waypoint = self.waypoint.filter(|_| room >= 21);
+        let waypoint = self.waypoint.filter(|_| room >= Self::POSE);
         let flags = u8::from(waypoint.is_some()) << 4 | u8::from(self.autopilot_silent) << 3;
         let mut out = vec![self.mode.code() << 5 | flags | self.reason as u8];
         put24(&mut out, decimetres(self.x_m) as u32);
@@ -225,6 +232,7 @@ impl VehicleStatus {
         if let Some((x, y)) = waypoint {
             put24(&mut out, decimetres(x) as u32);
             put24(&mut out, decimetres(y) as u32);
+            out.extend(self.path.encode((x, y), room - Self::POSE));
         }
         out
     }
@@ -273,11 +281,16 @@ impl VehicleStatus {
         read.sigma_m = f64::from(r.u8()?) / 4.0;
         read.fix_age_s = Some(r.u8()?).filter(|&age| age != 255).map(f64::from);
         read.explored_cells = r.u24()?;
-        read.waypoint = None;
-        if head & 0b1_0000 != 0 {
-            read.waypoint = Some((metres(r.i24()?), metres(r.i24()?)));
-        }
+        (read.waypoint, read.path) = (None, PlannedPath::default());
         read.autopilot_silent = head & 0b1000 != 0;
+        if head & 0b1_0000 != 0 {
+            let waypoint = (metres(r.i24()?), metres(r.i24()?));
+            read.waypoint = Some(waypoint);
+            if !r.rest().is_empty() {
+                let path = r.take(r.rest().len())?;
+                read.path = PlannedPath::decode(path, waypoint).ok_or(StatusError::BadField)?;
+            }
+        }
         if !r.rest().is_empty() {
             return Err(StatusError::Length);
         }

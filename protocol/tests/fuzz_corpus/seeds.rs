@@ -205,6 +205,14 @@ fn golden() -> Vec<Seed> {
         seed("plane_chunk", "curiosity", vec![3, 0x07, 0xF0, 0x40]),
         seed("plane_chunk", "unknown", vec![4, 0x07, 0xF0, 0x40]),
         seed("status", "golden-pose", vec![0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]),
+        seed(
+            "status",
+            "golden-pose-with-a-path",
+            vec![
+                0x31, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0, 0, 0, 10, 0xFF, 0xFF, 0xEC, 0xA3,
+                0x1D, 0x94, 0x40, 0,
+            ],
+        ),
         seed("slot", "utility", vec![12, 0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]),
         seed("slot", "requests", vec![10, 0x80, 0xAB, 0xCD, 0, 4, 1, 3, 1, 5, 2]),
         seed("slot", "budget", vec![13, 0x60, 0xAB, 0xCD, 0, 4, 0, 0x27, 0x10, 10, 5, 5, 50, 20]),

@@ -85,6 +85,8 @@ pub(crate) struct Pair {
     pub(crate) audits: [Audit; 2],
     /// Slots applied at the vehicle: series is constant a run of the surface, so versions must not repeat.
     pub(crate) applied: Vec<Slot>,
+    /// What the vehicle says of itself.
+    pub(crate) status: VehicleStatus,
     setup: Setup,
     random: u64,
     on_air: BTreeMap<(Instant, u64), Event>,
@@ -120,6 +122,7 @@ impl Pair {
             water,
             audits: [Audit::new(window), Audit::new(window)],
             applied: Vec::new(),
+            status: VehicleStatus { labels: 3, ..VehicleStatus::default() },
             setup,
             random: seed ^ 0xABCD,
             on_air: BTreeMap::new(),
@@ -248,7 +251,7 @@ impl Pair {
             }
         }
         while self.surface.poll_event().is_some() {}
-        self.vehicle.set_status(VehicleStatus { labels: 3, ..VehicleStatus::default() });
+        self.vehicle.set_status(self.status.clone());
         self.begin_cycle();
         while let Some(t) = self.vehicle.poll_transmit(self.now) {
             self.modems[1].0.push_back(t.bytes);

@@ -90,12 +90,11 @@ export class Vehicle {
     this.told = { at_s: nowS - 0.8, bits: this.pending.size * 8 + 1200 };
     this.heard.version += 1;
     this.updatedS = nowS;
-    const ahead = this.pose();
     this.status = {
       at_s: nowS - 0.8, x_m: p.x, y_m: p.y, z_m: -16.4 - 0.6 * Math.sin(nowS / 30),
       heading_deg: (p.heading + 360) % 360, sigma_m: 0.6 + 0.03 * (nowS - this.fixS),
       mode: this.aborted ? "abort" : this.hold ? "hold" : "survey",
-      waypoint: this.hold ? null : [p.heading > 180 ? this.legs.x : this.legs.x + this.legs.width, ahead.y],
+      ...this.way(),
       cells: this.own.cells.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
     };
     this.track.push([nowS, p.x, p.y]);
@@ -103,6 +102,20 @@ export class Vehicle {
     this.directive.acknowledge(nowS);
     if (exemplar) this.progress(exemplar, nowS);
     return true;
+  }
+
+  /** Waypoint and path: the corners of the pattern from here on, one fewer where the lane has ended. */
+  way() {
+    if (this.hold || this.aborted) return { waypoint: null, path: [], path_goes_on: false };
+    const { x, y, width, height } = this.legs;
+    const lane = 1.9;
+    const lanes = Math.floor(height / lane) + 1;
+    const n = Math.floor(this.alongM / (width + lane)) % lanes;
+    const at = (i) => [x + (i % 2 === 0 ? width : 0), y + i * lane];
+    const corners = [];
+    for (let i = n; i < lanes; i += 1) corners.push(at(i), ...(i + 1 < lanes ? [[at(i)[0], y + (i + 1) * lane]] : []));
+    if (this.alongM % (width + lane) > width && corners.length > 1) corners.shift();
+    return { waypoint: corners[0], path: corners.slice(1, 8), path_goes_on: corners.length > 8 };
   }
 
   progress(e, nowS) {

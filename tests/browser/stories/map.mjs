@@ -12,7 +12,13 @@ async function someCell(s) {
     for (let i = 0; i < m.labels.length; i += 1) {
       const x = (m.x0 + (i % m.width) + 0.5) * m.cell_m;
       const y = (m.y0 + Math.floor(i / m.width) + 0.5) * m.cell_m;
-      const near = store.vehicle.track.some(([, tx, ty]) => Math.hypot(tx - x, ty - y) < 0.2);
+      const way = [craft.waypoint ?? [craft.x_m, craft.y_m], ...(craft.path ?? [])];
+      const onWay = way.some(([bx, by], k) => {
+        const [ax, ay] = k === 0 ? [craft.x_m, craft.y_m] : way[k - 1];
+        const along = Math.min(1, Math.max(0, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / ((bx - ax) ** 2 + (by - ay) ** 2 || 1)));
+        return Math.hypot(ax + along * (bx - ax) - x, ay + along * (by - ay) - y) < 0.6;
+      });
+      const near = onWay || store.vehicle.track.some(([, tx, ty]) => Math.hypot(tx - x, ty - y) < 0.2);
       const [px, py] = v.toScreen(...inWorld(store.vehicle, x, y));
       const inside = px > 120 && py > 90 && px < v.width - 120 && py < v.height - 90;
       if (m.labels[i] === 0 || !inside || near || Math.hypot(craft.x_m - x, craft.y_m - y) < 3) continue;
@@ -24,6 +30,29 @@ async function someCell(s) {
 
 const pixel = (s, px, py) =>
   s.page.evaluate(([x, y]) => [...document.getElementById("chart").getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3), [Math.round(px), Math.round(py)]);
+
+/** What `check` says of waypoint and path. */
+const plan = (s, check, argument) =>
+  s.inPage(`({ store }, before) => {
+    const { waypoint, path } = store.vehicle.status ?? {};
+    return (${check})({ drawn: Boolean(path?.length), at: JSON.stringify([waypoint, path]) }, before);
+  }`, argument);
+
+/** Share of the longest leg of the path that has an ink of the map. */
+const onLeg = (s, ink) =>
+  s.inPage(({ store, view: v, inWorld }, name) => {
+    const { waypoint, path } = store.vehicle.status;
+    const corners = [waypoint, ...path].map((p) => v.toScreen(...inWorld(store.vehicle, ...p)));
+    const legs = corners.slice(1).map((to, i) => [corners[i], to, Math.hypot(to[0] - corners[i][0], to[1] - corners[i][1])]);
+    const [from, to, length] = legs.reduce((a, b) => (b[2] > a[2] ? b : a));
+    const wanted = getComputedStyle(document.documentElement).getPropertyValue(`--map-${name}`).match(/[0-9a-f]{2}/gi).map((x) => parseInt(x, 16));
+    const c = document.getElementById("chart").getContext("2d");
+    const is = (x, y) => wanted.every((w, n) => Math.abs(w - c.getImageData(x, y, 1, 1).data[n]) < 40);
+    // Past the cross at one end and the dot at the other.
+    const [begin, end] = [10 / length, 1 - 6 / length];
+    const places = Array.from({ length: 100 }, (_, i) => begin + ((end - begin) * i) / 99).map((t) => [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])]);
+    return places.filter(([x, y]) => [-1, 0].some((d) => is(x + d, y) || is(x, y + d))).length / places.length;
+  }, ink);
 
 async function pinch(s, from, to) {
   const cdp = await s.context.newCDPSession(s.page);
@@ -120,6 +149,45 @@ export default [
       const { fence } = await s.vehicle(1);
       assert.deepEqual(fence.fence[0], [-11, -8]);
       await s.steer({ placement: null });
+    },
+  },
+  {
+    name: "the planned path is drawn and told in metres",
+    async run(s) {
+      await s.button("Fit").click();
+      await s.shows("#vehicle", /Path\s*\d waypoints, [\d.]+\sm(, goes on)?/s);
+      await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
+    },
+  },
+  {
+    name: "the planned path follows the plan and goes with a hold",
+    scenario: "rich",
+    async run(s) {
+      await s.button("Fit").click();
+      const first = await s.until("the path", () => plan(s, (c) => c.drawn && c));
+      await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
+      assert.ok((await onLeg(s, "text")) < 0.95, "a dashed line");
+      await s.steer({ placement: { version: 1, east_m: 3, north_m: 2 } });
+      await s.until("the move", () => s.inPage(({ store }) => store.vehicle.map.placement));
+      await s.until("dashes where it lies now", async () => (await onLeg(s, "text")) > 0.3);
+      await s.steer({ placement: null, advance: 40 });
+      await s.until("the next plan", () => plan(s, (c, before) => c.drawn && c.at !== before.at, first));
+      await s.until("dashes on a leg", async () => (await onLeg(s, "text")) > 0.3);
+      await s.post("/vehicles/1/constraints", { hold: true, abort: false });
+      await s.until("no path", () => s.inPage(({ store }) => store.vehicle.status.path.length === 0), { advance: 15 });
+      await s.shows("#vehicle", /Path\s*–/s);
+      await s.post("/vehicles/1/constraints", { hold: false, abort: false });
+      await s.until("a path again", () => plan(s, (c) => c.drawn), { advance: 15 });
+    },
+  },
+  {
+    name: "the path of a vehicle that fell silent is grey",
+    scenario: "silent",
+    async run(s) {
+      await s.button("Fit").click();
+      await s.until("grey dashes", async () => (await onLeg(s, "stale")) > 0.3);
+      // The track may cross it.
+      assert.ok((await onLeg(s, "text")) < 0.15);
     },
   },
   {

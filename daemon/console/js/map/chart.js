@@ -17,6 +17,7 @@ import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { extent, rectangle } from "./raster.js";
 import { showReadout } from "./readout.js";
 import { View } from "./view.js";
+import { wayOf } from "./way.js";
 
 export const view = new View();
 export const options = { grid: recall("grid", true), rings: recall("rings", false) };
@@ -106,13 +107,13 @@ function extentOf(map) {
   return extents.get(map);
 }
 
-/** What "fit" shows: every map, every vehicle and its waypoint; fences and the surface too, unless the map would be lost. */
+/** What "fit" shows: every map, every vehicle and its way ahead; fences and the surface too, unless the map would be lost. */
 function bounds() {
   const boxes = [];
   for (const v of store.snapshot?.vehicles ?? []) {
     const s = v.status;
     const map = store.maps.get(v.id);
-    const own = [map && extentOf(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], s?.waypoint && [...s.waypoint, ...s.waypoint]];
+    const own = [map && extentOf(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], ...(s ? wayOf(s).map(([x, y]) => [x, y, x, y]) : [])];
     boxes.push(...own.filter(Boolean).map((box) => boxInWorld(v, box)));
   }
   if (boxes.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;

@@ -1,8 +1,9 @@
-// A vehicle on the map: track, uncertainty, waypoint, itself with heading.
+// A vehicle on the map: track, uncertainty, way ahead, itself with heading.
 
 import { FONT, haloText } from "./overlays.js";
 import { ageOf, isStale } from "../store.js";
 import { span } from "../format.js";
+import { drawWay } from "./way.js";
 
 export function drawCraft(c, view, ink, vehicle, chosen) {
   const stale = isStale(vehicle);
@@ -11,7 +12,7 @@ export function drawCraft(c, view, ink, vehicle, chosen) {
   if (vehicle.status) {
     const s = vehicle.status;
     const tone = stale ? ink.stale : ink.craft;
-    if (s.waypoint) drawWaypoint(c, view, ink, s);
+    drawWay(c, view, ink, s, stale);
     drawSigma(c, view, s, tone);
     drawHull(c, view, ink, s, tone);
     drawName(c, view, ink, vehicle, stale);
@@ -70,27 +71,6 @@ function drawSigma(c, view, s, tone) {
   c.setLineDash([5, 3]);
   c.stroke();
   c.setLineDash([]);
-}
-
-function drawWaypoint(c, view, ink, s) {
-  const [px, py] = view.toScreen(s.x_m, s.y_m);
-  const [wx, wy] = view.toScreen(...s.waypoint);
-  for (const [style, width] of [[ink.sea, 3.5], [ink.text, 1.5]]) {
-    c.strokeStyle = style;
-    c.lineWidth = width;
-    c.beginPath();
-    c.setLineDash([3, 4]);
-    c.moveTo(px, py);
-    c.lineTo(wx, wy);
-    c.stroke();
-    c.setLineDash([]);
-    c.beginPath();
-    c.moveTo(wx - 6, wy - 6);
-    c.lineTo(wx + 6, wy + 6);
-    c.moveTo(wx + 6, wy - 6);
-    c.lineTo(wx - 6, wy + 6);
-    c.stroke();
-  }
 }
 
 function drawHull(c, view, ink, s, tone) {

@@ -1,5 +1,5 @@
 // Two frames, both x east and y north in metres: the chart and all that people draw on it are of the world; what a vehicle
-// tells (cells, track, waypoint, itself) is of its own map, which lies in the world where the placement says.
+// tells (cells, track, waypoint, path, itself) is of its own map, which lies in the world where the placement says.
 
 /** Where the map of a vehicle lies: east and north, metres. */
 export function placed(vehicle) {

@@ -4,6 +4,7 @@ import { $, h, keyed, row, show, text } from "../dom.js";
 import { ago, count, degrees, metres, missionTime, none, span } from "../format.js";
 import { inWorld } from "../map/frames.js";
 import { bearing } from "../map/measure.js";
+import { lengthOf, wayOf } from "../map/way.js";
 import { ageOf, isStale, store } from "../store.js";
 import { describe, word } from "./lifeline.js";
 import { refreshStop, stopParts } from "./stop.js";
@@ -21,11 +22,12 @@ export function startVehicle() {
   for (const [key, name, hint] of [
     ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
     ["sigma", "Position \u03c3", "Standard deviation of its position; the ring on the map is twice this"],
-    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["cells", "Its own map"], ["contact", "Next contact"],
+    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "What it plans, from where it was over the waypoint to the last place that it tells; dashed on the map"], ["cells", "Its own map"], ["contact", "Next contact"],
     ["gps", "Surface GPS", "Where the surface knows itself to be, and fixes that it sent to vehicles"],
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;
+    node.classList.toggle("whole", key === "path");
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
@@ -49,6 +51,7 @@ function update() {
   values.sigma(s ? metres(s.sigma_m) : none);
   values.fix(s?.fix_age_s === null || !s ? "none" : `${span(s.fix_age_s + ageOf(s.at_s))} ago`);
   values.waypoint(s?.waypoint ? leg(s) : none);
+  values.path(s?.waypoint ? ahead(s) : none);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   values.gps(gps(store.snapshot.position));
@@ -71,6 +74,12 @@ const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s
 function leg(s) {
   const to = s.waypoint;
   return `${metres(Math.hypot(to[0] - s.x_m, to[1] - s.y_m))} at ${degrees(bearing([s.x_m, s.y_m], to))}`;
+}
+
+function ahead(s) {
+  const way = wayOf(s);
+  const n = way.length - 1;
+  return `${n} waypoint${n === 1 ? "" : "s"}, ${metres(lengthOf(way))}${s.path_goes_on ? ", goes on" : ""}`;
 }
 
 const makeSlot = () => h("li.slot", {}, h("span.what"), h("span.version"), h("span.state"), h("span.since"));

@@ -114,6 +114,21 @@ impl Lattice {
         by_distance.into_iter().find(|&n| bounds.allows_exit(from, self.place(n)))
     }
 
+    /// The places after `from` straight ahead to `to`, if that lies in one of the eight directions and every step is allowed.
+    pub fn straight(&self, from: Node, to: Node) -> Option<Vec<Node>> {
+        let steps = |a: usize, b: usize| b as i32 - a as i32;
+        let (x, y) = (steps(from % self.columns, to % self.columns), steps(from / self.columns, to / self.columns));
+        let m = MOVES.iter().position(|&step| step == (x.signum(), y.signum()))?;
+        let count = x.abs().max(y.abs());
+        let mut way = Vec::with_capacity(count as usize);
+        for _ in 0..count {
+            let at = way.last().copied().unwrap_or(from);
+            let next = self.moved(at, m).filter(|_| self.moves[at] & 1 << m != 0)?;
+            way.push(next);
+        }
+        (way.last() == Some(&to)).then_some(way)
+    }
+
     /// Shortest ways from a place to all others.
     pub fn ways(&self, from: Node) -> Ways {
         let mut ways = Ways { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
@@ -175,6 +190,26 @@ mod tests {
             assert!(bounds.allows_leg(at, lattice.place(node)));
             at = lattice.place(node);
         }
+    }
+
+    #[test]
+    fn a_straight_way_is_the_shortest_one_and_crosses_nothing() {
+        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let wall = Polygon(vec![place(9, -1), place(11, -1), place(11, 8), place(9, 8)]);
+        let bounds = Bounds::new(&Fence { keep_outs: vec![wall], ..Fence::default() }, 0.5);
+        let lattice = Lattice::new(AREA, &[], 1.0, &bounds);
+        let (columns, _) = lattice.size();
+        let mut straight = 0;
+        for from in [0, 2 * columns + 5, 9 * columns, 5 * columns + 15] {
+            let ways = lattice.ways(from);
+            for to in 0..lattice.places() {
+                let Some(way) = lattice.straight(from, to) else { continue };
+                assert_eq!(way, ways.to(to), "{from} to {to}");
+                straight += 1;
+            }
+        }
+        assert!(straight > 100);
+        assert_eq!(lattice.straight(2 * columns + 5, 2 * columns + 15), None, "the wall");
     }
 
     #[test]

@@ -40,6 +40,10 @@ impl Planner for Lawnmower {
         Vec::new()
     }
 
+    fn beyond(&self) -> Vec<Node> {
+        self.coming.iter().rev().copied().collect()
+    }
+
     fn handle_change(&mut self) {
         self.coming.clear();
     }

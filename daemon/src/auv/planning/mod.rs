@@ -51,6 +51,12 @@ pub trait Planner: std::fmt::Debug + Send {
     /// The way to go next.
     fn plan(&mut self, question: &Question<'_>) -> Vec<Node>;
 
+    /// Places that it will go to after its last answer, the next one first, each by the shortest way; empty where it decides
+    /// when it is there.
+    fn beyond(&self) -> Vec<Node> {
+        Vec::new()
+    }
+
     /// The lattice has changed: places have other numbers.
     fn handle_change(&mut self) {}
 }

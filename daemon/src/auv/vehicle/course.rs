@@ -5,7 +5,7 @@ use crate::auv::planning::{Point, distance};
 use crate::auv::steering::Course;
 use scenecast_protocol::directive::{Constraints, Fence, Limits, Reaction};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{ModeReason, VehicleMode, VehicleStatus};
+use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode, VehicleStatus};
 
 /// What the host was last asked to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,6 +63,9 @@ impl Vehicle {
             Some((Reaction::Surface, why)) => self.come_up(why),
             Some((Reaction::Return, why)) => self.go_home(at, why),
         }
+        if std::mem::take(&mut self.has_new_orders) {
+            self.link.owe_pose(now);
+        }
         self.record();
     }
 
@@ -72,7 +75,7 @@ impl Vehicle {
         let (east, north) = self.navigator.to_world((0.0, 0.0));
         if (east, north) != self.steering.placed() {
             self.steering.set_placement(east, north);
-            self.waypoint = None;
+            self.forget_way();
         }
         self.navigator.to_world(self.navigator.position())
     }
@@ -113,7 +116,10 @@ impl Vehicle {
         let left_m = self.guard.left_m();
         let (map, version) = (&self.telling.seen, self.telling.version);
         match self.steering.next(at, (map, version), self.utility.as_ref(), left_m) {
-            Course::Go(to) => self.go(to, VehicleMode::Survey, ModeReason::Survey),
+            Course::Go(to) => {
+                let path = self.steering.ahead(to, left_m - distance(at, to));
+                self.go((to, path), VehicleMode::Survey, ModeReason::Survey);
+            }
             Course::UsedUp => self.go_home(at, self.guard.tighter()),
             Course::There => self.stay(VehicleMode::Hold, ModeReason::NoWay),
             Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoWay),
@@ -126,17 +132,18 @@ impl Vehicle {
             return;
         }
         match self.steering.next_home(at) {
-            Course::Go(to) => self.go(to, VehicleMode::Return, why),
+            Course::Go(to) => self.go((to, self.steering.ahead_home(to)), VehicleMode::Return, why),
             Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoWay),
             Course::There | Course::UsedUp => self.stay(VehicleMode::Hold, why),
         }
     }
 
     /// Goes to a place of the world; the host goes by the vehicle's own reckoning.
-    fn go(&mut self, to: Point, mode: VehicleMode, reason: ModeReason) {
+    fn go(&mut self, (to, mut path): (Point, PlannedPath), mode: VehicleMode, reason: ModeReason) {
         self.course = Doing { motion: Motion::Going, mode, reason, ..self.course };
         let to = self.navigator.to_map(to);
-        self.waypoint = Some(to);
+        path.places.iter_mut().for_each(|place| *place = self.navigator.to_map(*place));
+        (self.waypoint, self.path) = (Some(to), path);
         self.outputs.push_back(VehicleOutput::Waypoint(to.0, to.1));
     }
 
@@ -146,7 +153,7 @@ impl Vehicle {
             self.outputs.push_back(VehicleOutput::Hold);
         }
         self.course = Doing { motion: Motion::Still, mode, reason, ..self.course };
-        self.waypoint = None;
+        self.forget_way();
     }
 
     fn come_up(&mut self, reason: ModeReason) {
@@ -154,19 +161,24 @@ impl Vehicle {
             self.outputs.push_back(VehicleOutput::Surface);
         }
         self.course = Doing { motion: Motion::Rising, mode: VehicleMode::Surface, reason, was_in_band: false };
-        self.waypoint = None;
+        self.forget_way();
+    }
+
+    /// It goes nowhere now.
+    fn forget_way(&mut self) {
+        (self.waypoint, self.path) = (None, PlannedPath::default());
     }
 
     /// The operator has decided anew: the way is chosen afresh.
     pub(super) fn reconsider(&mut self) {
-        self.waypoint = None;
+        self.forget_way();
         self.steering.replan();
     }
 
     /// The survey is over: stay, and keep telling.
     pub fn finish_survey(&mut self) {
         self.done = true;
-        self.waypoint = None;
+        self.forget_way();
         self.course = Doing { motion: Motion::Still, mode: VehicleMode::Done, ..Doing::default() };
         self.outputs.push_back(VehicleOutput::Hold);
     }
@@ -189,6 +201,7 @@ impl Vehicle {
             sigma_m: self.navigator.sigma_m(),
             fix_age_s: self.navigator.last_fix().map(|at| now.since(at).as_secs_f64()),
             waypoint: self.waypoint,
+            path: self.path.clone(),
             epoch: self.durable.epoch,
             labels: self.labels,
             explored_cells: self.explored,

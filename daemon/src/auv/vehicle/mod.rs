@@ -20,7 +20,7 @@ use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, 
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SlotState;
+use scenecast_protocol::wire::{PlannedPath, SlotState};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use tuning::Telling;
@@ -112,6 +112,10 @@ pub struct Vehicle {
     guard: Guard,
     course: Doing,
     waypoint: Option<(f64, f64)>,
+    /// What is planned after the waypoint.
+    path: PlannedPath,
+    /// An order was applied that may change the way; the surface is to hear what comes of it.
+    has_new_orders: bool,
     done: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
@@ -151,6 +155,8 @@ impl Vehicle {
             guard: Guard::new(habits, now),
             course: Doing::default(),
             waypoint: None,
+            path: PlannedPath::default(),
+            has_new_orders: false,
             done: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
@@ -325,6 +331,7 @@ impl Vehicle {
             Ok(()) => SlotState::Applied,
             Err(reason) => SlotState::Refused(reason),
         };
+        self.has_new_orders |= id.steers() && state == SlotState::Applied;
         self.link.decide(id, state, now);
         self.durable.inbox = self.link.persistent_state().clone();
         self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));

@@ -80,6 +80,7 @@ impl Sea {
                 VehicleOutput::Waypoint(x, y) => {
                     let navigator = self.vehicle.navigator();
                     self.check(navigator.to_world(at), navigator.to_world((x, y)));
+                    self.check_path();
                     self.motion.set_target(Some((x, y)));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
@@ -103,6 +104,20 @@ impl Sea {
         if let Some((limit, used)) = self.limit.filter(|_| !returns) {
             let leg = (to.0 - from.0).hypot(to.1 - from.1);
             assert!(used + leg <= limit, "{used} m and {leg} m more are beyond {limit} m");
+        }
+    }
+
+    /// What is told to come after the waypoint, too.
+    fn check_path(&self) {
+        let (vehicle, navigator) = (&self.vehicle, self.vehicle.navigator());
+        let waypoint = navigator.to_world(vehicle.waypoint().unwrap());
+        let path: Vec<(f64, f64)> = vehicle.path().places.iter().map(|&p| navigator.to_world(p)).collect();
+        let way: Vec<(f64, f64)> = std::iter::once(waypoint).chain(path).collect();
+        assert_eq!(stretches_outside(&way, &self.fence), 0, "{way:?} leaves {:?}", self.fence);
+        let returns = vehicle.mode().0 == VehicleMode::Return;
+        if let Some((limit, used)) = self.limit.filter(|_| !returns) {
+            let legs: f64 = way.windows(2).map(|w| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1)).sum();
+            assert!(used + legs <= limit, "{used} m and {legs} m more are beyond {limit} m");
         }
     }
 }
@@ -194,6 +209,28 @@ fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
     sea.tell(Slot::Constraints(Constraints::default()));
     sea.step();
     assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
+}
+
+#[test]
+fn an_order_takes_the_path_away_until_there_is_a_new_one_and_a_vehicle_that_stays_has_none() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.see(1);
+    sea.step();
+    let survey = sea.vehicle.path().clone();
+    assert!(survey.places.len() > 3 && sea.vehicle.waypoint().is_some(), "{survey:?}");
+    sea.tell(Slot::Fence(small_fence()));
+    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().places.len()), (None, 0), "not of the old plan");
+    sea.step();
+    assert!(!sea.vehicle.path().places.is_empty() && sea.vehicle.path() != &survey);
+    sea.tell(Slot::Constraints(Constraints { hold: true, abort: false }));
+    sea.step();
+    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().places.len()), (None, 0));
+    sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
+    sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Return), ..Limits::default() }));
+    sea.vehicle.navigator.set_pose(17.0, 17.0, 0.0, 16.0, sea.now);
+    sea.step();
+    assert_eq!(sea.vehicle.mode().0, VehicleMode::Return);
+    assert_eq!(sea.vehicle.path().places.last(), Some(&(5.0, 5.0)), "home");
 }
 
 #[test]

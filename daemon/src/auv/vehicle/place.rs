@@ -5,7 +5,7 @@ use crate::auv::Navigator;
 use crate::auv::planning::distance;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Placement;
+use scenecast_protocol::wire::{Placement, PlannedPath};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -85,6 +85,11 @@ impl Vehicle {
     /// Where it is going, east and north in the map's frame, metres.
     pub fn waypoint(&self) -> Option<(f64, f64)> {
         self.waypoint
+    }
+
+    /// Where it plans to go from there.
+    pub fn path(&self) -> &PlannedPath {
+        &self.path
     }
 
     /// Whether the autopilot does not answer; the status tells it.

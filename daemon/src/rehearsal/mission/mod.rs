@@ -4,6 +4,8 @@ mod anchored;
 mod carrier;
 mod events;
 #[cfg(test)]
+mod planned;
+#[cfg(test)]
 mod tuned;
 
 use super::docked::{self, Docked};

@@ -11,7 +11,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SlotState;
 use std::time::Duration;
 
-fn mission(sets: &[&str]) -> Mission {
+pub(super) fn mission(sets: &[&str]) -> Mission {
     let small = [
         "survey.duration_s=400",
         "camera.width_px=320",

@@ -9,7 +9,9 @@ use crate::map::{PlaneChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Envelope, Header, MissionId, Stamp, VehicleStatus};
+use crate::wire::{
+    Address, Chunk, ChunkKind, Envelope, Header, MissionId, PlannedPath, SlotReport, SlotState, Stamp, VehicleStatus,
+};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -20,7 +22,8 @@ pub(super) type Carried = Vec<(SlotId, u16, usize)>;
 #[derive(Debug, Default)]
 pub(super) struct StatusParts {
     status: VehicleStatus,
-    pose: Option<Instant>,
+    /// When the pose came in, and in which frame.
+    pose: Option<(Instant, FrameNumber)>,
     report: Option<Instant>,
     /// Both are here.
     pub(super) whole: Option<(VehicleStatus, Instant)>,
@@ -144,7 +147,7 @@ impl<R: StateReplica> Peer<R> {
             let sound = match chunk.kind {
                 ChunkKind::Map => self.replica.apply(number, chunk.payload, now),
                 ChunkKind::Pose | ChunkKind::Report => {
-                    self.status.read(chunk.kind, chunk.payload, now)
+                    self.status.read(chunk.kind, chunk.payload, number, now)
                         && Self::settle(&mut self.status, &mut self.outbox, vehicle, chunk.kind, now, events)
                 }
                 ChunkKind::Object => handle_object(&mut self.objects, vehicle, chunk.payload, events),
@@ -255,18 +258,42 @@ impl<R: StateReplica> Peer<R> {
 }
 
 impl StatusParts {
-    fn read(&mut self, kind: ChunkKind, payload: &[u8], now: Instant) -> bool {
-        let (read, at) = match kind {
-            ChunkKind::Pose => (self.status.read_pose(payload), &mut self.pose),
-            _ => (self.status.read_report(payload), &mut self.report),
+    fn read(&mut self, kind: ChunkKind, payload: &[u8], number: FrameNumber, now: Instant) -> bool {
+        let is_read = match kind {
+            ChunkKind::Pose => self.read_pose(payload, number, now),
+            _ => self.read_report(payload, now),
         };
-        if read.is_ok() {
-            *at = Some(now);
-        }
-        if let (Some(pose), Some(_)) = (self.pose, self.report) {
+        if let (Some((pose, _)), Some(_)) = (self.pose, self.report) {
             self.whole = Some((self.status.clone(), pose));
         }
-        read.is_ok()
+        is_read
+    }
+
+    /// A pose that a newer one has overtaken is of no use.
+    fn read_pose(&mut self, payload: &[u8], number: FrameNumber, now: Instant) -> bool {
+        let mut read = self.status.clone();
+        let is_read = read.read_pose(payload).is_ok();
+        if is_read && self.pose.is_none_or(|(_, before)| before < number) {
+            (self.status, self.pose) = (read, Some((now, number)));
+        }
+        is_read
+    }
+
+    fn read_report(&mut self, payload: &[u8], now: Instant) -> bool {
+        let before = self.status.slots;
+        let is_read = self.status.read_report(payload).is_ok();
+        if is_read {
+            self.report = Some(now);
+        }
+        let newly = |(id, before): (SlotId, SlotReport)| {
+            let slot = self.status.slot(id);
+            id.steers() && slot != before && slot.state == SlotState::Applied
+        };
+        if SlotId::ALL.into_iter().zip(before).any(newly) {
+            // The way was chosen before that; the pose that tells the new one is still to come.
+            (self.status.waypoint, self.status.path) = (None, PlannedPath::default());
+        }
+        is_read
     }
 }
 

@@ -4,7 +4,7 @@ use super::{Carried, Part, VehicleLink};
 use crate::map::StateSource;
 use crate::schedule::{Class, Extra};
 use crate::time::Instant;
-use crate::wire::{ChunkKind, FrameBuilder, room_for_payload};
+use crate::wire::{ChunkKind, FrameBuilder, VehicleStatus, room_for_payload};
 use std::time::Duration;
 
 impl<S: StateSource> VehicleLink<S> {
@@ -90,9 +90,13 @@ impl<S: StateSource> VehicleLink<S> {
             }
         }
         if now >= self.pose_due {
-            let bytes = status.encode_pose(room_for_payload(builder.room()));
+            let period = self.config.status_period.max(share(VehicleStatus::POSE));
+            // The path may take a hundredth of the budget.
+            let path = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
+            let room = room_for_payload(builder.room()).min(VehicleStatus::POSE.saturating_add(path));
+            let bytes = status.encode_pose(room);
             if builder.push(ChunkKind::Pose, &bytes) {
-                self.pose_due = now + self.config.status_period.max(share(bytes.len()));
+                self.pose_due = now + self.config.status_period.max(share(bytes.len().min(VehicleStatus::POSE)));
                 carried.push((Part::Pose, bytes.len()));
             }
         }

@@ -235,6 +235,11 @@ impl<S: StateSource> VehicleLink<S> {
         self.shares.shares()
     }
 
+    /// The vehicle does something else than it said: the next turn begins with a pose.
+    pub fn owe_pose(&mut self, now: Instant) {
+        self.pose_due = now;
+    }
+
     /// The surface does not know all that a report says.
     fn owe_report(&mut self, now: Instant) {
         (self.report_due, self.report_from) = (now, 0);

@@ -19,6 +19,7 @@ fn golden_bytes_of_a_status() {
         sigma_m: 1.25,
         fix_age_s: Some(8.0),
         waypoint: None,
+        path: PlannedPath::default(),
         explored_cells: 4000,
         epoch: 1,
         labels: 9,
@@ -40,6 +41,20 @@ fn golden_bytes_of_a_status() {
     assert_eq!((helpless[0], &helpless[1..]), (0x2A, &pose[1..]));
     back.read_pose(&helpless).unwrap();
     assert!(std::mem::take(&mut back.autopilot_silent));
+    let path = PlannedPath { places: vec![(3.0, 2.0), (3.0, 9.5)], goes_on: true };
+    let going = VehicleStatus { waypoint: Some((1.0, -2.0)), path, ..status.clone() };
+    let way = going.encode_pose(99);
+    let (place, then) = ([0, 0, 10, 0xFF, 0xFF, 0xEC], [0xA4, 0x0A, 0x14, 0x00, 0x25, 0x80]);
+    assert_eq!(way, [&[0x32], &pose[1..], &place, &then].concat());
+    assert_eq!(going.encode_pose(24), [&way[..21], &[0x93, 0x94, 0x50]].concat(), "room for one");
+    assert_eq!(going.encode_pose(22), [&way[..21], &[0x80]].concat(), "room to say that there is more");
+    assert_eq!(going.encode_pose(21), way[..21], "no room for it");
+    assert_eq!(VehicleStatus { waypoint: None, ..going.clone() }.encode_pose(99), pose, "no path to nowhere");
+    back.read_pose(&way).unwrap();
+    assert_eq!(back, going);
+    assert_eq!(back.read_pose(&[&way[..], &[0]].concat()), Err(StatusError::BadField));
+    back.read_pose(&pose).unwrap();
+    assert_eq!(back, status, "it is not kept without its waypoint");
     let placement = Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 });
     let placed = VehicleStatus { placement, ..status.clone() };
     let (long, _) = placed.encode_report(99, 0).unwrap();
@@ -55,7 +70,7 @@ fn golden_bytes_of_a_status() {
 
 proptest! {
     #[test]
-    fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..24)) {
+    fn any_bytes_decode_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..40)) {
         let mut status = VehicleStatus::default();
         if status.read_pose(&bytes).is_ok() {
             prop_assert_eq!(status.encode_pose(99), bytes.clone());
