@@ -31,6 +31,9 @@ pub use vehicle::run_vehicle;
 use crate::problem::Problem;
 use std::hash::{BuildHasher, Hasher, RandomState};
 
+/// Longest wait for other threads at the end.
+const LONGEST_END: std::time::Duration = std::time::Duration::from_secs(1);
+
 /// Random bits for sessions: not secret, only different each run.
 fn random_bits() -> u64 {
     RandomState::new().build_hasher().finish()
@@ -42,5 +45,9 @@ pub(crate) fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> R
     // A second command in the same process (as in tests) keeps the first one's log.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
-    runtime.map_err(|e| Problem::Failed(e.to_string()))?.block_on(future)
+    let runtime = runtime.map_err(|e| Problem::Failed(e.to_string()))?;
+    let result = runtime.block_on(future);
+    // A name that is being looked up would hold the end up for as long as the network likes.
+    runtime.shutdown_timeout(LONGEST_END);
+    result
 }
