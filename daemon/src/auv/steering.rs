@@ -69,7 +69,7 @@ pub struct Steering {
 
 /// Steps between two places of the lattice, in reaches of the camera: looks overlap by a tenth.
 const STEP: f64 = 0.9;
-/// Steps to one waypoint while the way may change with the map: with two, `horizon` collects 4 % less, for each step shows
+/// Steps to one waypoint while the way may change with the map: with two, `horizon` collects 2 % less, for each step shows
 /// something new.
 const STEPS_AHEAD: usize = 1;
 
