@@ -28,8 +28,13 @@ async function someCell(s) {
   });
 }
 
-const pixel = (s, px, py) =>
-  s.page.evaluate(([x, y]) => [...document.getElementById("chart").getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3), [Math.round(px), Math.round(py)]);
+/** Once what has changed is painted: the page draws in the next frame. */
+const painted = (s) => s.page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+
+const pixel = async (s, px, py) => {
+  await painted(s);
+  return s.page.evaluate(([x, y]) => [...document.getElementById("chart").getContext("2d").getImageData(x, y, 1, 1).data].slice(0, 3), [Math.round(px), Math.round(py)]);
+};
 
 /** What `check` says of waypoint and path. */
 const plan = (s, check, argument) =>
@@ -294,15 +299,17 @@ export default [
       const cell = await someCell(s);
       await s.page.selectOption("#layer", "curiosity");
       await s.shows("#legend", /curiosity\s*up to \d bit\s*\d+ bit and more/);
-      const painted = await pixel(s, cell.px, cell.py);
-      const tone = await s.inPage(async ({ store }, { x, y }) => {
+      const tone = () => s.inPage(async ({ store }, { x, y }) => {
         const { lookOf } = await import("/js/map/planes.js");
         const { cellAt } = await import("/js/map/readout.js");
         const told = cellAt(store.map, x, y).planes.find((p) => p.name === "curiosity");
         const of = store.map.planes.find((p) => p.name === "curiosity");
         return lookOf(of).tone(Math.round(((told.value - of.min) / (of.max - of.min)) * 254), false);
       }, cell);
-      assert.deepEqual(painted, tone);
+      const fresh = await s.until("its colour", async () => {
+        const seen = await pixel(s, cell.px, cell.py);
+        return seen.join() === (await tone()).join() && seen;
+      });
       const ages = async () => {
         await s.page.mouse.move(cell.left + cell.px - 40, cell.top + cell.py);
         await s.page.mouse.move(cell.left + cell.px, cell.top + cell.py);
@@ -314,7 +321,7 @@ export default [
       await s.until("an old level", async () => /heard \d+\smin/.test(await ages()));
       assert.doesNotMatch(young, /min/);
       const spread = ([r, , b]) => Math.abs(r - b);
-      await s.until("pale tones", async () => spread(await pixel(s, cell.px, cell.py)) < spread(painted) * 0.7);
+      await s.until("pale tones", async () => spread(await pixel(s, cell.px, cell.py)) < spread(fresh) * 0.7);
     },
   },
   {
@@ -331,6 +338,7 @@ export default [
           for (let i = 0; i < data.length; i += 4) most = Math.max(most, Math.abs(data[i] - data[i + 2]));
           return most;
         });
+      await painted(s);
       const live = await tones();
       await s.steer({ mute: true, advance: 400 });
       await s.until("pale tones", async () => (await tones()) < live * 0.7);
