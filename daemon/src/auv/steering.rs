@@ -256,6 +256,12 @@ impl Steering {
         !left_m.is_finite() || self.ways_home.as_ref().is_some_and(|w| gone_m + w.metres[node] <= left_m)
     }
 
+    /// Where a way home enters the lattice and where it leaves it, and the places after the first.
+    fn way_home(&self, from: Point) -> Option<(Node, Node, Vec<Node>)> {
+        let (at, end) = (self.lattice.entry(from, &self.bounds)?, self.lattice.entry(self.home(), &self.bounds)?);
+        Some((at, end, self.lattice.ways(at).to(end)))
+    }
+
     /// The next waypoint on the way home.
     pub fn next_home(&mut self, from: Point) -> Course {
         self.plan.clear();
@@ -263,11 +269,7 @@ impl Steering {
         if distance(from, home) <= self.arrival_m() {
             return Course::There;
         }
-        let (Some(at), Some(end)) = (self.lattice.entry(from, &self.bounds), self.lattice.entry(home, &self.bounds))
-        else {
-            return Course::NoWay;
-        };
-        let way = self.lattice.ways(at).to(end);
+        let Some((at, end, way)) = self.way_home(from) else { return Course::NoWay };
         if at != end && way.is_empty() {
             return Course::NoWay;
         }

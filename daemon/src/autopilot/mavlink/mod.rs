@@ -96,6 +96,7 @@ const BRIDGED: Duration = Duration::from_secs(3);
 const GPS_PERIOD: Duration = Duration::from_millis(200);
 /// A place on the Earth is passed on for so long after it was told.
 const PLACE_LASTS: Duration = Duration::from_secs(5);
+
 impl Mavlink {
     /// Toward an autopilot that has said nothing yet.
     pub fn new(config: MavlinkConfig, now: Instant) -> Self {

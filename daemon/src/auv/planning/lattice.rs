@@ -173,12 +173,18 @@ mod tests {
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 10.0 };
 
-    #[test]
-    fn ways_go_round_what_is_kept_out() {
+    /// A wall from the southern edge to two metres before the northern one.
+    fn walled() -> (Bounds, Lattice) {
         let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
         let wall = Polygon(vec![place(9, -1), place(11, -1), place(11, 8), place(9, 8)]);
         let bounds = Bounds::new(&Fence { keep_outs: vec![wall], ..Fence::default() }, 0.5);
         let lattice = Lattice::new(AREA, &[], 1.0, &bounds);
+        (bounds, lattice)
+    }
+
+    #[test]
+    fn ways_go_round_what_is_kept_out() {
+        let (bounds, lattice) = walled();
         let from = lattice.entry((5.0, 2.2), &bounds).unwrap();
         let to = lattice.entry((15.0, 2.0), &bounds).unwrap();
         let ways = lattice.ways(from);
@@ -194,10 +200,7 @@ mod tests {
 
     #[test]
     fn a_straight_way_is_the_shortest_one_and_crosses_nothing() {
-        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
-        let wall = Polygon(vec![place(9, -1), place(11, -1), place(11, 8), place(9, 8)]);
-        let bounds = Bounds::new(&Fence { keep_outs: vec![wall], ..Fence::default() }, 0.5);
-        let lattice = Lattice::new(AREA, &[], 1.0, &bounds);
+        let (_, lattice) = walled();
         let (columns, _) = lattice.size();
         let mut straight = 0;
         for from in [0, 2 * columns + 5, 9 * columns, 5 * columns + 15] {

@@ -81,9 +81,8 @@ impl Steering {
     pub fn ahead_home(&self, waypoint: Point) -> PlannedPath {
         let mut way = Corners::new(waypoint);
         let home = self.home();
-        let ends = (self.lattice.entry(waypoint, &self.bounds), self.lattice.entry(home, &self.bounds));
-        if let (Some(at), Some(end)) = ends {
-            self.lattice.ways(at).to(end).into_iter().for_each(|node| way.go(self.lattice.place(node)));
+        if let Some((_, end, nodes)) = self.way_home(waypoint) {
+            nodes.into_iter().for_each(|node| way.go(self.lattice.place(node)));
             if self.bounds.allows_exit(home, self.lattice.place(end)) {
                 way.go(home);
             }
