@@ -19,16 +19,6 @@ fn main() {
     table.push(']');
     let out = std::env::var_os("OUT_DIR").expect("set by cargo");
     std::fs::write(Path::new(&out).join("page.rs"), table).expect("OUT_DIR can be written");
-    std::fs::write(Path::new(&out).join("palette.rs"), palette(&root)).expect("OUT_DIR can be written");
-}
-
-/// The page's colours of the labels, for the pictures that the daemon writes.
-fn palette(root: &Path) -> String {
-    let script = std::fs::read_to_string(root.join("js/palette-table.js")).expect("the page has a palette");
-    let hex: String = script.split('"').skip(1).step_by(2).collect();
-    let colours: Vec<String> = hex.as_bytes().chunks(6).map(|c| format!("0x{}", String::from_utf8_lossy(c))).collect();
-    assert_eq!(colours.len(), 254, "a colour for each label");
-    format!("[{}]", colours.join(", "))
 }
 
 fn collect(dir: &Path, files: &mut Vec<std::path::PathBuf>) {

@@ -1,6 +1,7 @@
 //! `cargo bench -p scenecast --bench planning`: time of one plan on a map of 200 x 200 cells, half of it seen.
 
-use scenecast::auv::{Area, Footprint, Steering};
+use scenecast::auv::{Footprint, Steering};
+use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 

@@ -1,11 +1,12 @@
 //! From configuration to the two ends of the link.
 
 use crate::asv::Surface;
-use crate::auv::{Area, Durable, Footprint, Habits, Navigator, Steering, Vehicle, cell_m};
+use crate::auv::{Durable, Footprint, Habits, Navigator, Steering, Vehicle, cell_m};
 use crate::config::{Config, load_key};
 use crate::modem;
-use crate::problem::Problem;
-use crate::tuning::TuningTable;
+use scenecast_core::Area;
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::directive::{PlaneSet, PlannerKind, Reaction};
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
@@ -19,13 +20,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// The vehicle that a configuration speaks of.
-pub fn vehicle_address(config: &Config) -> Result<Address, Problem> {
+pub fn vehicle_address(config: &Config) -> Result<Address, UserError> {
     let number = config.vehicle.address;
-    Address::vehicle(number).ok_or_else(|| Problem::Input(format!("vehicle.address = {number}: allowed is 1 to 14")))
+    Address::vehicle(number).ok_or_else(|| UserError::Input(format!("vehicle.address = {number}: allowed is 1 to 14")))
 }
 
 /// The modem of an end's process.
-pub fn modem_of_process(config: &Config, end: Address) -> Result<ModemProfile, Problem> {
+pub fn modem_of_process(config: &Config, end: Address) -> Result<ModemProfile, UserError> {
     let mut profile = modem_profile(config, config.modem.bit_rate);
     if config.modem.kind == "transparent" {
         profile.overhead_bits += modem::PIPE_FRAMING_BITS;
@@ -57,7 +58,7 @@ pub fn footprint(config: &Config) -> Footprint {
 }
 
 /// How frames are made authentic, as both ends must have it; `None` without a key.
-fn authenticity(config: &Config) -> Result<Option<Authenticity>, Problem> {
+fn authenticity(config: &Config) -> Result<Option<Authenticity>, UserError> {
     let (all, encrypt) = (config.link.authenticate == "all", config.link.encrypt);
     Ok(load_key(config)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
 }
@@ -84,7 +85,7 @@ pub fn vehicle(
     durable: Durable,
     seed: u64,
     now: Instant,
-) -> Result<Vehicle, Problem> {
+) -> Result<Vehicle, UserError> {
     let link = VehicleConfig {
         address: vehicle_address(config)?,
         mission: MissionId(config.mission.id),
@@ -142,7 +143,7 @@ fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u
 }
 
 /// The vehicles that the surface speaks with from the beginning, by address and name.
-fn vehicles(config: &Config) -> Result<BTreeMap<Address, String>, Problem> {
+fn vehicles(config: &Config) -> Result<BTreeMap<Address, String>, UserError> {
     let own = vehicle_address(config)?;
     if config.link.vehicles.is_empty() {
         return Ok(BTreeMap::from([(own, config.vehicle.name.clone())]));
@@ -153,7 +154,7 @@ fn vehicles(config: &Config) -> Result<BTreeMap<Address, String>, Problem> {
 }
 
 /// A surface that speaks with the configured vehicles; `seed` is random for each run.
-pub fn surface(config: &Config, modem: ModemProfile, seed: u64, now: Instant) -> Result<Surface, Problem> {
+pub fn surface(config: &Config, modem: ModemProfile, seed: u64, now: Instant) -> Result<Surface, UserError> {
     let vehicles = vehicles(config)?;
     let link = SurfaceConfig {
         mission: MissionId(config.mission.id),

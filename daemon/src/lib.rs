@@ -8,16 +8,9 @@ pub mod config;
 pub mod console;
 pub mod ctl;
 mod ends;
-mod figures;
-mod imagery;
 pub mod modem;
 pub mod modem_sim;
-pub mod picture;
 pub mod port;
-mod problem;
 pub mod rehearsal;
 pub mod runtime;
 mod scene;
-pub mod tuning;
-
-pub use problem::Problem;

@@ -25,7 +25,7 @@ pub fn recorded() -> &'static (PathBuf, Vec<u8>) {
         fly(&["survey.duration_s=60".into()], Some(dir.clone()));
         let replay = fly(&["survey.duration_s=90".into(), format!("camera.source=frames:{}", dir.display())], None);
         assert!(replay.is_drained());
-        let map = scenecast::picture::encode(replay.vehicle().map()).expect("a map is a picture");
+        let map = scenecast_core::label_picture::encode(replay.vehicle().map()).expect("a map is a picture");
         (dir, map)
     })
 }

@@ -5,14 +5,14 @@ use std::path::Path;
 
 /// A problem that ends a command, with the exit code that tells which kind it is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Problem {
+pub enum UserError {
     /// Wrong usage or input: one line that says what, where and what is allowed. Exit code 2.
     Input(String),
     /// Right usage, but it could not be done. Exit code 1.
     Failed(String),
 }
 
-impl Problem {
+impl UserError {
     /// A problem with a file, as `FILE: what`.
     pub fn file(path: &Path, what: impl fmt::Display) -> Self {
         Self::Input(format!("{}: {what}", path.display()))
@@ -27,7 +27,7 @@ impl Problem {
     }
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for UserError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             // One line, whatever a library has put into its message.
@@ -38,4 +38,4 @@ impl fmt::Display for Problem {
     }
 }
 
-impl std::error::Error for Problem {}
+impl std::error::Error for UserError {}

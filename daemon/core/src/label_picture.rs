@@ -1,18 +1,7 @@
 //! Label maps as indexed PNG files.
 
-use crate::problem::Problem;
+use crate::palette::colour;
 use scenecast_protocol::map::{Cell, LabelGrid, Rect};
-use std::io::Write;
-use std::path::Path;
-
-/// Colours of the labels 1..=254, those of the operator's page.
-static PALETTE: [u32; 254] = include!(concat!(env!("OUT_DIR"), "/palette.rs"));
-
-/// Colour of a label: black where nothing was seen.
-pub fn colour(label: u8) -> [u8; 3] {
-    let rgb = usize::from(label).checked_sub(1).and_then(|i| PALETTE.get(i)).copied().unwrap_or(0);
-    [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]
-}
 
 /// Most cells of a map that is drawn or told as a rectangle: a few frames can claim two cells at the ends of the world.
 pub const MOST_CELLS: u64 = 1 << 23;
@@ -134,20 +123,6 @@ pub fn decode(bytes: &[u8], x0: i32, y0: i32) -> Result<LabelGrid, String> {
     Ok(grid)
 }
 
-/// Writes a file so that a reader sees the old or the new one, never half of one.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Problem> {
-    let failed = |e: std::io::Error| Problem::Failed(format!("{}: {e}", path.display()));
-    let part = path.with_extension("part");
-    let written = std::fs::File::create(&part)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&part, path));
-    if let Err(e) = written {
-        let _ = std::fs::remove_file(&part);
-        return Err(failed(e));
-    }
-    crate::runtime::sync_folder(path.parent().unwrap_or(Path::new(""))).map_err(failed)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -184,15 +159,5 @@ mod tests {
         );
         let beside = Rect { x: 0, y: 0, width: 1 << 12, height: (1 << 11) + 1 };
         assert!(matches!(encode_within(&far, beside), Err(PictureError::TooLarge(..))));
-    }
-
-    #[test]
-    fn the_first_labels_have_colours_far_apart() {
-        for a in 0..16u8 {
-            for b in 0..a {
-                let d: i32 = colour(a).iter().zip(colour(b)).map(|(&x, y)| (i32::from(x) - i32::from(y)).pow(2)).sum();
-                assert!(d > 800, "labels {a} and {b} look alike");
-            }
-        }
     }
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// What a packet of one rate carries, in a band of 5 kHz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rate {
+pub struct MicromodemRate {
     /// 0 to 5.
     pub number: u8,
     /// Most frames a packet.
@@ -15,11 +15,11 @@ pub struct Rate {
     packet_ms: u64,
 }
 
-const fn rate(number: u8, frames: u8, frame_bytes: usize, packet_ms: u64) -> Rate {
-    Rate { number, frames, frame_bytes, packet_ms }
+const fn rate(number: u8, frames: u8, frame_bytes: usize, packet_ms: u64) -> MicromodemRate {
+    MicromodemRate { number, frames, frame_bytes, packet_ms }
 }
 
-const RATES: [Rate; 6] = [
+const RATES: [MicromodemRate; 6] = [
     rate(0, 1, 32, 3200),
     rate(1, 3, 64, 3100),
     rate(2, 3, 64, 3100),
@@ -33,7 +33,7 @@ pub const CYCLE_INIT: Duration = Duration::from_millis(900);
 /// What a cycle init, and the head of a packet, count for in a frame: 21 bits and the address fields, generously.
 pub const OVERHEAD_BITS: u64 = 64;
 
-impl Rate {
+impl MicromodemRate {
     /// The rate of that number; the highest one beyond.
     pub fn of(number: u8) -> Self {
         RATES.into_iter().find(|rate| rate.number == number).unwrap_or(RATES[5])

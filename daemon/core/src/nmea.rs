@@ -5,7 +5,7 @@
 //! ```
 //! Source: the field lists of the u-blox M8 protocol specification (UBX-13003221) and of gpsd's "NMEA Revealed".
 
-use super::geodesy::LatLon;
+use crate::geodesy::LatLon;
 
 /// What a sentence says, in units of this program.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Where a modem or an instrument is.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum PortAddress {
     /// A serial device and its speed, bit/s.
     Serial(String, u32),
     /// An address to listen on.
@@ -19,7 +19,7 @@ pub enum Place {
     File(PathBuf),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for PortAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Serial(device, baud) => write!(f, "{device} at {baud} bit/s"),

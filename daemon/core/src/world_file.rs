@@ -1,6 +1,6 @@
 //! A map in the world: the file that geographic information systems look for beside a picture.
 
-use super::geodesy::TangentPlane;
+use crate::geodesy::TangentPlane;
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::wire::Placement;
 
@@ -30,8 +30,8 @@ pub fn world_file(plane: &TangentPlane, placement: Option<Placement>, bounds: Re
 
 #[cfg(test)]
 mod tests {
-    use super::super::geodesy::LatLon;
     use super::*;
+    use crate::geodesy::LatLon;
 
     #[test]
     fn a_pixel_of_the_picture_lies_where_its_cell_does() {

@@ -1,8 +1,9 @@
 //! A surface that calls for vehicles that it does not know.
 
-use crate::auv::{Area, Durable};
+use crate::auv::Durable;
 use crate::config;
 use crate::ends;
+use scenecast_core::Area;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::time::Duration;

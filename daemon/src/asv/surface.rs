@@ -5,9 +5,9 @@ use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use super::settings::SettingsOrder;
 use crate::auv::Exemplar;
-use crate::modem::UsblLine;
-use crate::picture;
-use crate::tuning::{Fit, NoRow, TuningTable};
+use scenecast_core::UsblLine;
+use scenecast_core::label_picture;
+use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, LifeLine, Slot, SlotId, Utility};
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
@@ -347,7 +347,7 @@ impl Surface {
             }
             SurfaceEvent::Object(vehicle, bytes) => {
                 let desk = self.desks.get_mut(&vehicle)?;
-                if let Some(whole) = picture::read_whole(&bytes) {
+                if let Some(whole) = label_picture::read_whole(&bytes) {
                     desk.whole = Some(whole);
                     desk.wholes += 1;
                     return Some(SurfaceOutput::MapChanged(vehicle));

@@ -18,7 +18,7 @@ pub use nmea::Nmea;
 pub use rehearsed::Rehearsed;
 pub use tray::Tray;
 
-use crate::asv::position::LatLon;
+use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;

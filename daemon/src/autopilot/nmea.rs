@@ -11,7 +11,8 @@
 //! surface (DBS).
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
-use crate::asv::position::{Gps, GpsLanguage, LatLon, Lines, TangentPlane, nmea};
+use scenecast_core::gps::{Gps, GpsLanguage};
+use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 

@@ -1,8 +1,8 @@
 //! A simulated vehicle as an autopilot.
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
-use crate::asv::position::LatLon;
 use crate::rehearsal::Motion;
+use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 

@@ -3,12 +3,12 @@
 use super::mapper::Mapper;
 use super::relief::Relief;
 use crate::config::Config;
-use crate::problem::Problem;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
 use scene_model::words::{Measures, WordExtractor};
+use scenecast_core::UserError;
 use serde::{Deserialize, Serialize};
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
@@ -30,7 +30,7 @@ pub enum NoCheckpoint {
     OtherParameters,
     /// The configuration itself is wrong.
     #[error(transparent)]
-    Config(#[from] Problem),
+    Config(#[from] UserError),
 }
 
 /// What is kept.

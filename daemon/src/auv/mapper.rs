@@ -3,14 +3,14 @@
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use crate::config::Config;
-use crate::problem::Problem;
-use crate::scene::read_vocabulary;
 use image::RgbImage;
 use scene_model::exemplars::{Exemplar, ExemplarStore};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_core::UserError;
+use scenecast_files::read_vocabulary;
 use scenecast_protocol::directive::{Change, Figure, Settings};
 use scenecast_protocol::map::{Cell, PlaneKind};
 use std::collections::BTreeMap;
@@ -72,7 +72,7 @@ pub fn cell_m(config: &Config) -> f64 {
 
 impl Mapper {
     /// A mapper that has seen nothing; its label ids begin at `epoch`.
-    pub fn new(config: &Config, epoch: u8, seed: u64) -> Result<Self, Problem> {
+    pub fn new(config: &Config, epoch: u8, seed: u64) -> Result<Self, UserError> {
         let extractor = match config.scene.vocabulary.as_str() {
             "" => WordExtractor::new(&WordConfig::default()),
             file => WordExtractor::from_measures(read_vocabulary(Path::new(file))?),
@@ -102,7 +102,7 @@ impl Mapper {
                 altitude_m: config.survey.altitude_m,
             },
             cell_m,
-            model: SceneModel::new(scene).map_err(|e| Problem::Input(format!("scene.{e}")))?,
+            model: SceneModel::new(scene).map_err(|e| UserError::Input(format!("scene.{e}")))?,
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),

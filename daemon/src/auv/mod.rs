@@ -19,6 +19,5 @@ pub use exemplar::Exemplar;
 pub use guard::{Guard, Habits};
 pub use mapper::{MapUpdate, Mapper, cell_m};
 pub use navigator::{FixVerdict, Navigator};
-pub use planning::Area;
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, LastPlace, Vehicle, VehicleOutput};

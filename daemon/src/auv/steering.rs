@@ -3,8 +3,9 @@
 mod ahead;
 
 use super::planning::{
-    Area, Bounds, Knowledge, Lattice, Node, Planner, Point, Question, Ways, Window, Worth, distance, planner,
+    Bounds, Knowledge, Lattice, Node, Planner, Point, Question, Ways, Window, Worth, distance, planner,
 };
+use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::VecDeque;

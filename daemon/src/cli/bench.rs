@@ -6,9 +6,9 @@ use super::bench_localisation::LocalisationBench;
 use super::bench_modem::Modem;
 use super::bench_planning::Planning;
 use super::sim::WorldArguments;
-use crate::problem::Problem;
 use crate::rehearsal::{FidelityRow, fidelity};
 use clap::{Args, Subcommand};
+use scenecast_core::UserError;
 
 /// Measurements.
 #[derive(Debug, Subcommand)]
@@ -40,7 +40,7 @@ pub(super) struct Fidelity {
 }
 
 impl Bench {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         match self {
             Self::Exemplar(e) => e.run(),
             Self::Fidelity(f) => f.run(),
@@ -53,7 +53,7 @@ impl Bench {
 }
 
 impl Fidelity {
-    fn run(mut self) -> Result<(), Problem> {
+    fn run(mut self) -> Result<(), UserError> {
         // What the rows have in common unless it is set otherwise: small frames suit small budgets.
         let defaults = ["channel.loss=0.1", "link.frame_bytes=64"].map(str::to_owned);
         self.world.sets.splice(0..0, defaults);
@@ -68,7 +68,7 @@ impl Fidelity {
             }
         })?;
         if self.json {
-            let text = serde_json::to_string_pretty(&rows).map_err(|e| Problem::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?;
             println!("{text}");
         }
         Ok(())

@@ -1,9 +1,9 @@
 //! `scenecast bench exemplar`
 
 use super::progress::Progress;
-use crate::problem::Problem;
 use crate::rehearsal::exemplar_bench::{Arrivals, Bytes, Setting, Source, Spread, arrivals, photos, sizes};
 use clap::Args;
+use scenecast_core::UserError;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -34,7 +34,7 @@ pub(super) struct ExemplarBench {
 }
 
 impl ExemplarBench {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let sources = match self.images.as_slice() {
             [] => (0..REEFS).map(|i| Source::Reef(self.seed + i)).collect(),
             dirs => dirs.iter().map(|dir| photos(dir)).collect::<Result<Vec<_>, _>>()?.concat(),
@@ -43,7 +43,7 @@ impl ExemplarBench {
         let (bytes, patches) = sizes(&sources, self.seed, &mut |share| progress.show(share))?;
         drop(progress);
         if patches.is_empty() {
-            return Err(Problem::Failed("no label held long enough to have an image".to_owned()));
+            return Err(UserError::Failed("no label held long enough to have an image".to_owned()));
         }
         let requests = self.requests as usize;
         let full = Setting { requests, loss: 0.1, loaded: true, larger: false };
@@ -62,7 +62,7 @@ impl ExemplarBench {
         if self.json {
             let arrivals: serde_json::Map<String, _> = rows.iter().map(|(n, a)| ((*n).to_owned(), json!(a))).collect();
             let text = serde_json::to_string_pretty(&json!({ "arrival": arrivals, "bytes": bytes }));
-            println!("{}", text.map_err(|e| Problem::Failed(e.to_string()))?);
+            println!("{}", text.map_err(|e| UserError::Failed(e.to_string()))?);
         } else {
             print(&rows, &bytes);
         }

@@ -1,9 +1,9 @@
 //! `scenecast bench link`
 
 use super::progress::Progress;
-use crate::problem::Problem;
 use crate::rehearsal::link_bench::{BudgetRow, FleetRow, LinkTable, RangingRow, Row, link_table, measure_speed};
 use clap::Args;
+use scenecast_core::UserError;
 
 /// The link in virtual time with opaque payload of which there is always more: 10 kbit/s half duplex, 0.2 s turn-around,
 /// turns granted by the surface. Takes less than a minute; the same seed gives the same table.
@@ -19,7 +19,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("link");
         let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(failed)?;
         drop(progress);
@@ -33,8 +33,8 @@ impl Link {
     }
 }
 
-fn failed(error: impl std::fmt::Display) -> Problem {
-    Problem::Failed(error.to_string())
+fn failed(error: impl std::fmt::Display) -> UserError {
+    UserError::Failed(error.to_string())
 }
 
 fn print_table(table: &LinkTable) {

@@ -1,10 +1,10 @@
 //! `scenecast bench localisation`
 
 use super::progress::Progress;
-use crate::picture::write_whole;
-use crate::problem::Problem;
 use crate::rehearsal::{Localisation, fly_with_outliers, localisation, picture};
 use clap::Args;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use std::path::PathBuf;
 
 /// How far off the vehicle's position is over 3 km, with a drift of 1 % of the way: by dead reckoning alone, with a fix
@@ -28,19 +28,19 @@ pub(super) struct LocalisationBench {
 }
 
 impl LocalisationBench {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("localisation");
         let found = localisation(self.seed, self.seeds, &mut |share| progress.show(share));
         drop(progress);
         if let Some(dir) = &self.out {
-            std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, e))?;
+            std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
             let (tracks, _) = fly_with_outliers(self.seed, 0.1);
             let title =
                 format!("3 km, drift 1 % of the way, a fix each 10 s, 10 % lost, 10 % outliers; seed {}", self.seed);
             write_whole(&dir.join("localisation.svg"), picture(&tracks, &title).as_bytes())?;
         }
         if self.json {
-            let text = serde_json::to_string_pretty(&found).map_err(|e| Problem::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&found).map_err(|e| UserError::Failed(e.to_string()))?;
             println!("{text}");
         } else {
             print(&found);

@@ -1,9 +1,9 @@
 //! `scenecast bench modem`
 
 use super::progress::Progress;
-use crate::problem::Problem;
 use crate::rehearsal::modem_bench::{ModemTable, modem_table};
 use clap::Args;
+use scenecast_core::UserError;
 
 /// Both ends' drivers at emulated modems, 1 km and 10 % loss, in virtual time: what an S2C in burst mode carries for the
 /// link and for a host that only keeps its pool full, how long directives take meanwhile, and surveys of 20 minutes
@@ -20,12 +20,12 @@ pub(super) struct Modem {
 }
 
 impl Modem {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("modems");
         let table = modem_table(self.seed, &mut |share| progress.show(share))?;
         drop(progress);
         if self.json {
-            let text = serde_json::to_string_pretty(&table).map_err(|e| Problem::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&table).map_err(|e| UserError::Failed(e.to_string()))?;
             println!("{text}");
         } else {
             print_table(&table);

@@ -1,10 +1,10 @@
 //! `scenecast bench planning`
 
 use super::progress::Progress;
-use crate::picture::write_whole;
-use crate::problem::Problem;
 use crate::rehearsal::planning_bench::{Trial, annotated_images, drive_all, picture};
 use clap::Args;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use std::path::PathBuf;
 
 /// Utility collected a metre by each planner, with a fence, keep-outs and 40 % of the distance that full coverage takes.
@@ -31,13 +31,13 @@ pub(super) struct Planning {
 }
 
 impl Planning {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let images = annotated_images(&self.scenes);
         if images.is_empty() {
             eprintln!("skipped: no annotated images in {}; procedural reefs only", self.scenes.display());
         }
         if let Some(dir) = &self.out {
-            std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, e))?;
+            std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         }
         if !self.json {
             println!(
@@ -54,7 +54,7 @@ impl Planning {
         })?;
         drop(progress);
         if self.json {
-            println!("{}", serde_json::to_string(&table).map_err(|e| Problem::Failed(e.to_string()))?);
+            println!("{}", serde_json::to_string(&table).map_err(|e| UserError::Failed(e.to_string()))?);
             return Ok(());
         }
         let m = table.median;
@@ -69,9 +69,9 @@ impl Planning {
         Ok(())
     }
 
-    fn paint(&self, trial: &Trial) -> Result<(), Problem> {
+    fn paint(&self, trial: &Trial) -> Result<(), UserError> {
         let Some(dir) = &self.out else { return Ok(()) };
-        let png = picture(trial).map_err(|e| Problem::Failed(e.to_string()))?;
+        let png = picture(trial).map_err(|e| UserError::Failed(e.to_string()))?;
         write_whole(&dir.join(format!("{}.png", trial.name)), &png)
     }
 }

@@ -1,10 +1,10 @@
 //! `scenecast demo`
 
 use super::sim::WorldArguments;
-use crate::problem::Problem;
 use crate::rehearsal::{Mission, MissionOptions};
 use crate::runtime;
 use clap::Args;
+use scenecast_core::UserError;
 
 /// Fly a simulated mission in real time and serve the operator's page.
 #[derive(Debug, Args)]
@@ -24,9 +24,9 @@ pub(super) struct Demo {
 }
 
 impl Demo {
-    pub(super) fn run(mut self) -> Result<(), Problem> {
+    pub(super) fn run(mut self) -> Result<(), UserError> {
         if !(0.01..=1000.0).contains(&self.speed) {
-            return Err(Problem::Input(format!("--speed {}: it takes 0.01 to 1000", self.speed)));
+            return Err(UserError::Input(format!("--speed {}: it takes 0.01 to 1000", self.speed)));
         }
         // The operator is the person at the page.
         self.world.sets.insert(0, "operator.script=none".to_owned());

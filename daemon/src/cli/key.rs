@@ -1,8 +1,8 @@
 //! `scenecast key`
 
 use crate::config;
-use crate::problem::Problem;
 use clap::{Args, Subcommand};
+use scenecast_core::UserError;
 use scenecast_protocol::seal::MissionKey;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -48,7 +48,7 @@ pub(super) struct Show {
 }
 
 impl Key {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         match self {
             Self::New(new) => {
                 let key = random_key()?;
@@ -74,34 +74,34 @@ impl Key {
 }
 
 /// A key from the operating system's random source.
-fn random_key() -> Result<MissionKey, Problem> {
+fn random_key() -> Result<MissionKey, UserError> {
     let mut bytes = Zeroizing::new([0; 16]);
-    getrandom::fill(&mut *bytes).map_err(|e| Problem::Failed(format!("no random bytes from the system: {e}")))?;
+    getrandom::fill(&mut *bytes).map_err(|e| UserError::Failed(format!("no random bytes from the system: {e}")))?;
     Ok(MissionKey::from_bytes(*bytes))
 }
 
 /// A token of 128 bits from the operating system's random source.
-fn random_token() -> Result<Zeroizing<String>, Problem> {
+fn random_token() -> Result<Zeroizing<String>, UserError> {
     let mut bytes = Zeroizing::new([0; 16]);
-    getrandom::fill(&mut *bytes).map_err(|e| Problem::Failed(format!("no random bytes from the system: {e}")))?;
+    getrandom::fill(&mut *bytes).map_err(|e| UserError::Failed(format!("no random bytes from the system: {e}")))?;
     Ok(Zeroizing::new(format!("{:032x}\n", u128::from_be_bytes(*bytes))))
 }
 
 /// Writes a secret to a file that does not exist yet, readable by its owner alone; leaves no half file.
-fn write_new(path: &Path, text: &str) -> Result<(), Problem> {
+fn write_new(path: &Path, text: &str) -> Result<(), UserError> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
     let mut file = options.open(path).map_err(|e| match e.kind() {
         ErrorKind::AlreadyExists => {
-            Problem::file(path, "it exists and is not overwritten; name another file with --out, or remove it")
+            UserError::file(path, "it exists and is not overwritten; name another file with --out, or remove it")
         }
-        _ => Problem::file(path, e),
+        _ => UserError::file(path, e),
     })?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(|e| {
         let _ = std::fs::remove_file(path);
-        Problem::Failed(format!("{}: {e}", path.display()))
+        UserError::Failed(format!("{}: {e}", path.display()))
     })
 }
 

@@ -20,8 +20,8 @@ mod sim;
 mod tune;
 mod vocabulary;
 
-use crate::problem::Problem;
 use clap::{Parser, Subcommand};
+use scenecast_core::UserError;
 
 /// Streams an underwater robot's scene map over an acoustic link to a scientist at the surface.
 #[derive(Debug, Parser)]
@@ -67,7 +67,7 @@ enum Command {
 }
 
 /// Carries out a command.
-pub fn run(arguments: Arguments) -> Result<(), Problem> {
+pub fn run(arguments: Arguments) -> Result<(), UserError> {
     match arguments.command {
         Command::Demo(demo) => demo.run(),
         Command::Sim(sim) => sim.run(),

@@ -1,8 +1,8 @@
 //! `scenecast modem-sim`
 
 use crate::modem_sim::{Options, run};
-use crate::problem::Problem;
 use clap::Args;
+use scenecast_core::UserError;
 use std::path::PathBuf;
 
 /// Emulate modems in one water, each on a serial device or a TCP port of its own.
@@ -29,9 +29,9 @@ pub(super) struct ModemSim {
 }
 
 impl ModemSim {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         if !(0.01..=1000.0).contains(&self.time_scale) {
-            return Err(Problem::Input(format!("--time-scale {}: it takes 0.01 to 1000", self.time_scale)));
+            return Err(UserError::Input(format!("--time-scale {}: it takes 0.01 to 1000", self.time_scale)));
         }
         let Self { scenario, link_dir, time_scale, seed } = self;
         run(Options { scenario, link_dir, time_scale, seed })

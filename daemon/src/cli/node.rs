@@ -1,9 +1,9 @@
 //! `scenecast auv`, `scenecast asv`, `scenecast config`
 
 use crate::config;
-use crate::problem::Problem;
 use crate::runtime;
 use clap::{Args, ValueEnum};
+use scenecast_core::UserError;
 use std::path::PathBuf;
 
 /// Run one end as a process.
@@ -21,11 +21,11 @@ pub(super) struct Node {
 }
 
 impl Node {
-    pub(super) fn run_vehicle(self) -> Result<(), Problem> {
+    pub(super) fn run_vehicle(self) -> Result<(), UserError> {
         runtime::run_vehicle(Box::new(move || config::load(Some(&self.config), &self.sets)))
     }
 
-    pub(super) fn run_surface(self) -> Result<(), Problem> {
+    pub(super) fn run_surface(self) -> Result<(), UserError> {
         runtime::run_surface(config::load(Some(&self.config), &self.sets)?)
     }
 }
@@ -47,7 +47,7 @@ pub(super) struct PrintConfig {
 }
 
 impl PrintConfig {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let role = match self.role {
             Role::Auv => 'a',
             Role::Asv => 's',

@@ -2,9 +2,9 @@
 
 use super::progress::Progress;
 use crate::config::{self, Config};
-use crate::problem::Problem;
 use crate::rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use clap::Args;
+use scenecast_core::UserError;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -37,19 +37,19 @@ pub(super) struct WorldArguments {
 
 impl WorldArguments {
     /// The configuration, all arguments applied.
-    pub fn config(&self) -> Result<Config, Problem> {
+    pub fn config(&self) -> Result<Config, UserError> {
         let mut sets = self.sets.clone();
         sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
         sets.extend(self.duration.map(|d| format!("survey.duration_s={d:?}")));
         let config = config::load(self.scenario.as_deref(), &sets)?;
         if config.survey.duration_s <= 0.0 {
-            return Err(Problem::Input("a rehearsal needs an end: survey.duration_s must be above 0".to_owned()));
+            return Err(UserError::Input("a rehearsal needs an end: survey.duration_s must be above 0".to_owned()));
         }
         Ok(config)
     }
 
     /// The sea floor.
-    pub fn world(&self, config: &Config) -> Result<World, Problem> {
+    pub fn world(&self, config: &Config) -> Result<World, UserError> {
         match &self.mosaic {
             Some(mosaic) => World::from_files(mosaic, self.annotations.as_deref(), config.camera.metres_per_pixel),
             None => Ok(World::procedural(self.seed, config.camera.metres_per_pixel)),
@@ -85,10 +85,10 @@ pub(super) struct Sim {
 }
 
 impl Sim {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let started = Instant::now();
         if !self.drain.is_finite() || self.drain < 0.0 {
-            return Err(Problem::Input(format!("--drain {}: it takes seconds, 0 or more", self.drain)));
+            return Err(UserError::Input(format!("--drain {}: it takes seconds, 0 or more", self.drain)));
         }
         let config = self.world.config()?;
         let world = self.world.world(&config)?;

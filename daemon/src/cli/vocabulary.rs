@@ -1,12 +1,12 @@
 //! `scenecast vocabulary`
 
 use super::progress::Progress;
-use crate::imagery::read_image;
-use crate::picture::write_whole;
-use crate::problem::Problem;
 use clap::{Args, Subcommand};
 use image::RgbImage;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_core::UserError;
+use scenecast_files::read_image;
+use scenecast_files::write_whole;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ pub(super) struct Train {
 }
 
 impl Vocabulary {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         match self {
             Self::Train(train) => train.run(),
         }
@@ -44,9 +44,9 @@ impl Vocabulary {
 }
 
 impl Train {
-    fn run(self) -> Result<(), Problem> {
+    fn run(self) -> Result<(), UserError> {
         if !(4.0..=1000.0).contains(&self.cell_px) {
-            return Err(Problem::Input(format!("--cell-px {}: it takes 4 to 1000 pixels", self.cell_px)));
+            return Err(UserError::Input(format!("--cell-px {}: it takes 4 to 1000 pixels", self.cell_px)));
         }
         let files = images_of(&self.images)?;
         let problem = RefCell::new(None);
@@ -72,20 +72,20 @@ impl Train {
     }
 }
 
-fn read_usable(file: &Path, cell_px: f32) -> Result<RgbImage, Problem> {
+fn read_usable(file: &Path, cell_px: f32) -> Result<RgbImage, UserError> {
     let image = read_image(file)?.to_rgb8();
     let (width, height) = image.dimensions();
     if (width.min(height) as f32) < cell_px {
-        return Err(Problem::file(file, format!("{width} x {height} pixels are less than a cell of {cell_px}")));
+        return Err(UserError::file(file, format!("{width} x {height} pixels are less than a cell of {cell_px}")));
     }
     Ok(image)
 }
 
 /// The images of a folder by name.
-fn images_of(dir: &Path) -> Result<Vec<PathBuf>, Problem> {
+fn images_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(dir).map_err(|e| Problem::file(dir, e))? {
-        let path = entry.map_err(|e| Problem::file(dir, e))?.path();
+    for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {
+        let path = entry.map_err(|e| UserError::file(dir, e))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let is_label = path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("_label"));
         if ["png", "jpg", "jpeg", "tif", "tiff"].contains(&extension.as_str()) && !is_label {
@@ -93,7 +93,7 @@ fn images_of(dir: &Path) -> Result<Vec<PathBuf>, Problem> {
         }
     }
     if files.is_empty() {
-        return Err(Problem::file(dir, "no PNG, JPEG or TIFF image"));
+        return Err(UserError::file(dir, "no PNG, JPEG or TIFF image"));
     }
     files.sort();
     Ok(files)

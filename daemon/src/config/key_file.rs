@@ -1,7 +1,7 @@
 //! The file of the mission key.
 
 use super::Config;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use scenecast_protocol::seal::MissionKey;
 use std::fs::File;
 use std::io::Read;
@@ -14,7 +14,7 @@ const MAX_BYTES: u64 = 64 * 1024;
 /// The key of `link.key_file`; `None` if it is empty: frames are then not authenticated.
 ///
 /// Warns in the log if others on this machine may read the file, so the log must have begun.
-pub fn load_key(config: &Config) -> Result<Option<MissionKey>, Problem> {
+pub fn load_key(config: &Config) -> Result<Option<MissionKey>, UserError> {
     let file = &config.link.key_file;
     if file.is_empty() {
         return Ok(None);
@@ -27,14 +27,14 @@ pub fn load_key(config: &Config) -> Result<Option<MissionKey>, Problem> {
 }
 
 /// The key in a file, and a warning if others on this machine may read it.
-pub fn read_key(path: &Path) -> Result<(MissionKey, Option<String>), Problem> {
-    let problem = |e: std::io::Error| Problem::file(path, format!("{e}; scenecast key new writes a key file"));
+pub fn read_key(path: &Path) -> Result<(MissionKey, Option<String>), UserError> {
+    let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key new writes a key file"));
     let file = File::open(path).map_err(problem)?;
     let warning = others_may_read(&file)
         .then(|| format!("{}: others may read this key; chmod 600 keeps it to its owner", path.display()));
     let mut text = Zeroizing::new(String::with_capacity(1024));
     file.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
-    let key = MissionKey::parse(&text).map_err(|e| Problem::file(path, e))?;
+    let key = MissionKey::parse(&text).map_err(|e| UserError::file(path, e))?;
     Ok((key, warning))
 }
 

@@ -1,7 +1,7 @@
 //! Reading of configuration files and `--set` options.
 
 use super::{Allowed, Config, KEYS, Key};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Table, Value};
@@ -16,16 +16,16 @@ struct Given {
 /// The defaults, changed by a file and then by `key=value` options.
 ///
 /// Every problem is one line that names the place, the key and what is allowed.
-pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, Problem> {
+pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, UserError> {
     let mut given = Vec::new();
     if let Some(path) = file {
-        let text = std::fs::read_to_string(path).map_err(|e| Problem::file(path, e))?;
+        let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
         read_file(path, &text, &mut given)?;
     }
     for set in sets {
         given.push(read_set(set)?);
     }
-    let mut table = Table::try_from(Config::default()).map_err(|e| Problem::Failed(e.to_string()))?;
+    let mut table = Table::try_from(Config::default()).map_err(|e| UserError::Failed(e.to_string()))?;
     for g in given {
         let value = check(&g)?;
         let (section, name) = g.key.split_once('.').unwrap_or((&g.key, ""));
@@ -33,19 +33,19 @@ pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, Problem> {
             section.insert(name.to_owned(), value);
         }
     }
-    let config: Config = table.try_into().map_err(|e: toml::de::Error| Problem::Input(e.message().to_owned()))?;
+    let config: Config = table.try_into().map_err(|e: toml::de::Error| UserError::Input(e.message().to_owned()))?;
     check_together(&config)?;
     Ok(config)
 }
 
 /// What no single value tells: an area has a size, a turn has room for a frame, a seal needs a key.
-fn check_together(config: &Config) -> Result<(), Problem> {
+fn check_together(config: &Config) -> Result<(), UserError> {
     const LONGEST_FRAME_S: f64 = 55.0;
     let [west, south, east, north] = config.survey.area_m;
     if config.survey.area_m != [0.0; 4] && !(east - west >= 1.0 && north - south >= 1.0) {
         let given = format!("survey.area_m = {:?}", config.survey.area_m);
         let rule = "west, south, east, north with east and north at least 1 m above west and south, or all 0";
-        return Err(Problem::Input(format!("{given} is not allowed: it takes {rule}")));
+        return Err(UserError::Input(format!("{given} is not allowed: it takes {rule}")));
     }
     let link = &config.link;
     check_shares("link.shares", &link.shares)?;
@@ -53,7 +53,7 @@ fn check_together(config: &Config) -> Result<(), Problem> {
     if link.key_file.is_empty() && (link.encrypt || link.authenticate == "all") {
         let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
         let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
-        return Err(Problem::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
+        return Err(UserError::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
     }
     crate::modem::check(config)?;
     super::place::check(config)?;
@@ -65,14 +65,14 @@ fn check_together(config: &Config) -> Result<(), Problem> {
             let frame = config.link.frame_bytes;
             let what =
                 format!("{key} = {rate}: a frame of link.frame_bytes = {frame} takes longer than {LONGEST_FRAME_S} s");
-            return Err(Problem::Input(format!("{what}; allowed is {least} bit/s or more, or a smaller frame")));
+            return Err(UserError::Input(format!("{what}; allowed is {least} bit/s or more, or a smaller frame")));
         }
     }
     Ok(())
 }
 
 /// Under a key a frame ends in a tag, beside which the longest thing that cannot be cut must fit.
-fn check_frame(config: &Config) -> Result<(), Problem> {
+fn check_frame(config: &Config) -> Result<(), UserError> {
     let link = &config.link;
     let (least, with, what) = match (link.key_file.as_str(), link.authenticate.as_str()) {
         ("", _) => return Ok(()),
@@ -88,22 +88,22 @@ fn check_frame(config: &Config) -> Result<(), Problem> {
         _ => format!("link.frame_bytes = {frame_bytes}"),
     };
     let why = format!("{what} does not fit a smaller frame beside the tag");
-    Err(Problem::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
+    Err(UserError::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
 }
 
-fn check_shares(key: &str, shares: &[u8]) -> Result<(), Problem> {
+fn check_shares(key: &str, shares: &[u8]) -> Result<(), UserError> {
     let sum: u32 = shares.iter().map(|&s| u32::from(s)).sum();
     if sum <= 100 {
         return Ok(());
     }
     let given = format!("{key} = {shares:?}");
-    Err(Problem::Input(format!("{given} is not allowed: they add up to {sum} %, and together they take 100 or less")))
+    Err(UserError::Input(format!("{given} is not allowed: they add up to {sum} %, and together they take 100 or less")))
 }
 
-fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), Problem> {
+fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), UserError> {
     let place = |at: usize| format!("{}:{}", path.display(), text.get(..at).map_or(1, |t| t.matches('\n').count() + 1));
     let table = DeTable::parse(text)
-        .map_err(|e| Problem::Input(format!("{}: {}", place(e.span().map_or(0, |s| s.start)), e.message())))?;
+        .map_err(|e| UserError::Input(format!("{}: {}", place(e.span().map_or(0, |s| s.start)), e.message())))?;
     for (section, value) in table.get_ref() {
         let DeValue::Table(keys) = value.get_ref() else {
             return Err(unknown(section.get_ref(), &place(section.span().start)));
@@ -114,7 +114,7 @@ fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), Prob
         for (name, value) in keys {
             let key = format!("{}.{}", section.get_ref(), name.get_ref());
             let place = place(name.span().start);
-            let value = plain(value).ok_or_else(|| Problem::Input(format!("{place}: {key} cannot be read")))?;
+            let value = plain(value).ok_or_else(|| UserError::Input(format!("{place}: {key} cannot be read")))?;
             given.push(Given { key, value, place });
         }
     }
@@ -133,20 +133,20 @@ fn plain(value: &Spanned<DeValue<'_>>) -> Option<Value> {
     })
 }
 
-fn read_set(set: &str) -> Result<Given, Problem> {
+fn read_set(set: &str) -> Result<Given, UserError> {
     let (key, text) = set
         .split_once('=')
-        .ok_or_else(|| Problem::Input(format!("--set {set}: expected KEY=VALUE, as in link.budget_bps=2000")))?;
+        .ok_or_else(|| UserError::Input(format!("--set {set}: expected KEY=VALUE, as in link.budget_bps=2000")))?;
     let parsed = format!("v = {text}").parse::<Table>().ok().and_then(|mut t| t.remove("v"));
     let value = parsed.unwrap_or_else(|| Value::String(text.to_owned()));
     Ok(Given { key: key.trim().to_owned(), value, place: format!("--set {set}") })
 }
 
-fn check(given: &Given) -> Result<Value, Problem> {
+fn check(given: &Given) -> Result<Value, UserError> {
     let Some(key) = KEYS.iter().find(|k| k.name == given.key) else { return Err(unknown(&given.key, &given.place)) };
     let default = default_of(key);
     fit(&given.value, &default, key).ok_or_else(|| {
-        Problem::Input(format!(
+        UserError::Input(format!(
             "{}: {} = {} is not allowed: it takes {}",
             given.place,
             key.name,
@@ -212,9 +212,9 @@ impl Key {
     }
 }
 
-fn unknown(key: &str, place: &str) -> Problem {
+fn unknown(key: &str, place: &str) -> UserError {
     let nearest = KEYS.iter().map(|k| k.name).min_by_key(|name| distance(name, key)).unwrap_or_default();
-    Problem::Input(format!(
+    UserError::Input(format!(
         "{place}: there is no key {key}; the nearest is {nearest} (scenecast config lists them all)"
     ))
 }

@@ -2,7 +2,7 @@
 
 use super::Config;
 use super::key_file::others_may_read;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -16,7 +16,7 @@ const LENGTH: std::ops::RangeInclusive<usize> = 16..=256;
 /// The token of `console.token_file`; `None` if it is empty.
 ///
 /// Warns in the log if others on this machine may read the file, so the log must have begun.
-pub fn load_token(config: &Config) -> Result<Option<Zeroizing<String>>, Problem> {
+pub fn load_token(config: &Config) -> Result<Option<Zeroizing<String>>, UserError> {
     let file = &config.console.token_file;
     if file.is_empty() {
         return Ok(None);
@@ -25,20 +25,20 @@ pub fn load_token(config: &Config) -> Result<Option<Zeroizing<String>>, Problem>
     if File::open(path).is_ok_and(|f| others_may_read(&f)) {
         tracing::warn!("{file}: others may read this token; chmod 600 keeps it to its owner");
     }
-    let named = |p: Problem| Problem::Input(format!("console.token_file = {p}"));
+    let named = |p: UserError| UserError::Input(format!("console.token_file = {p}"));
     read_token(path).map(Some).map_err(named)
 }
 
 /// The token in a file: its first line that is not empty and does not begin with `#`.
-pub fn read_token(path: &Path) -> Result<Zeroizing<String>, Problem> {
-    let problem = |e: std::io::Error| Problem::file(path, format!("{e}; scenecast key token writes a token file"));
+pub fn read_token(path: &Path) -> Result<Zeroizing<String>, UserError> {
+    let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key token writes a token file"));
     let mut text = Zeroizing::new(String::with_capacity(MAX_BYTES as usize));
     File::open(path).map_err(problem)?.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
     let mut lines = text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#'));
     let token = lines.next().unwrap_or_default();
     if !LENGTH.contains(&token.len()) || !token.bytes().all(|b| b.is_ascii_graphic()) {
         let rule = "one line of 16 to 256 letters, digits and signs of ASCII without blanks";
-        return Err(Problem::file(path, format!("no token: it takes {rule}; scenecast key token writes one")));
+        return Err(UserError::file(path, format!("no token: it takes {rule}; scenecast key token writes one")));
     }
     Ok(Zeroizing::new(token.to_owned()))
 }

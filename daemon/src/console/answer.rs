@@ -7,7 +7,7 @@ use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
 use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
-use crate::picture::MOST_CELLS;
+use scenecast_core::label_picture::MOST_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{Shares, SpendOrder};

@@ -31,3 +31,20 @@ pub(super) async fn page(uri: Uri, headers: HeaderMap) -> Response {
     let tag = format!("{:08x}", SUM.checksum(bytes));
     tagged(&headers, &tag, || ([(header::CONTENT_TYPE, content_type)], bytes).into_response())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_and_the_daemon_have_the_same_palette() {
+        let (_, script) = find("js/palette-table.js").unwrap();
+        let hex: String = std::str::from_utf8(script).unwrap().split('"').skip(1).step_by(2).collect();
+        let page: Vec<u32> = hex
+            .as_bytes()
+            .chunks(6)
+            .map(|c| u32::from_str_radix(std::str::from_utf8(c).unwrap(), 16).unwrap())
+            .collect();
+        assert_eq!(page, scenecast_core::palette::PALETTE);
+    }
+}

@@ -3,10 +3,10 @@
 use super::answer::Ask;
 use super::server::{Shared, VehicleId, refusal};
 use crate::asv::{SettingsOrder, Surface};
-use crate::tuning::{self, Row};
 use axum::extract::{Query, State};
 use axum::http::StatusCode;
 use axum::response::Response;
+use scenecast_core::tuning_table::{self, Row};
 use scenecast_protocol::wire::Address;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    fn new(fit: &tuning::Fit, row: &Row) -> Self {
+    fn new(fit: &tuning_table::Fit, row: &Row) -> Self {
         let (s, m) = (&row.setting, &row.measurement);
         Self {
             settings: SettingsOrder {

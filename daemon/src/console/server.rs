@@ -11,12 +11,12 @@ use super::state::Refusal;
 use super::token::Access;
 use super::{assets, compress, connections, events};
 use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
-use crate::problem::Problem;
 use axum::extract::{DefaultBodyLimit, FromRequestParts, Path, State};
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Json, Router};
+use scenecast_core::UserError;
 use scenecast_protocol::directive::Constraints;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -64,21 +64,21 @@ pub async fn bind(
     how_to_change: &str,
     token: Option<Zeroizing<String>>,
     name: &str,
-) -> Result<Entrance, Problem> {
+) -> Result<Entrance, UserError> {
     let addresses: Vec<_> = tokio::net::lookup_host(address)
         .await
-        .map_err(|e| Problem::Input(format!("{how_to_change}: {address} is no ADDRESS:PORT to listen on: {e}")))?
+        .map_err(|e| UserError::Input(format!("{how_to_change}: {address} is no ADDRESS:PORT to listen on: {e}")))?
         .collect();
     let is_loopback = addresses.iter().all(|a| a.ip().is_loopback());
     if !is_loopback && token.is_none() {
-        return Err(Problem::Input(format!(
+        return Err(UserError::Input(format!(
             "{how_to_change} = {address}: others than this machine could steer the vehicle there; set console.token_file to \
              a file that scenecast key token has written, or listen on a loopback address such as 127.0.0.1:8460"
         )));
     }
     let names = if is_loopback { Names::Loopback } else { Names::Network(name.to_owned()) };
     let problem =
-        |e| Problem::Input(format!("cannot listen on {address}: {e}; choose another port with {how_to_change}"));
+        |e| UserError::Input(format!("cannot listen on {address}: {e}; choose another port with {how_to_change}"));
     let listener = TcpListener::bind(address).await.map_err(problem)?;
     Ok(Entrance { listener, access: Access::new(names, token) })
 }

@@ -2,12 +2,12 @@
 
 use super::link_meter::LinkMeter;
 use super::{place, state};
-use crate::asv::position::LatLon;
 use crate::asv::{Album, AskState, Desk, Picture, Surface};
 use crate::auv::exemplar::edge_px;
 use crate::config::{self, Config};
-use crate::figures::dropped;
 use axum::body::Bytes;
+use scenecast_core::LatLon;
+use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::{LifeLine, PlannerKind, SlotId, SlotProgress};
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};

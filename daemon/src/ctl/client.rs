@@ -1,12 +1,12 @@
 //! Requests over HTTP.
 
 use crate::console::state::{Accepted, Refusal, State};
-use crate::problem::Problem;
 use axum::body::Bytes;
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Incoming;
 use hyper::{Method, Request, Response, StatusCode, Uri, header};
 use hyper_util::rt::TokioIo;
+use scenecast_core::UserError;
 use serde::Serialize;
 use std::time::Duration;
 use tokio::net::TcpStream;
@@ -30,8 +30,8 @@ pub struct Client {
 
 impl Client {
     /// A client of `http://HOST:PORT`, with a token if the surface has one.
-    pub fn new(url: &str, token: Option<Zeroizing<String>>) -> Result<Self, Problem> {
-        let problem = || Problem::Input(format!("--url {url}: it takes http://HOST:PORT"));
+    pub fn new(url: &str, token: Option<Zeroizing<String>>) -> Result<Self, UserError> {
+        let problem = || UserError::Input(format!("--url {url}: it takes http://HOST:PORT"));
         let parsed: Uri = url.parse().map_err(|_| problem())?;
         let is_plain =
             parsed.scheme_str() == Some("http") && matches!(parsed.path(), "" | "/") && parsed.query().is_none();
@@ -42,26 +42,26 @@ impl Client {
     }
 
     /// Fetches; gives the tag of the answer too.
-    pub(super) async fn get(&self, path: &str) -> Result<(Bytes, Option<String>), Problem> {
+    pub(super) async fn get(&self, path: &str) -> Result<(Bytes, Option<String>), UserError> {
         let answer = self.ask(Method::GET, path, Bytes::new()).await?;
         let tag = answer.headers().get(header::ETAG).and_then(|v| v.to_str().ok()).map(str::to_owned);
         Ok((self.whole(answer).await?, tag))
     }
 
     /// Sends an order.
-    pub(super) async fn post(&self, path: &str, order: &impl Serialize) -> Result<Accepted, Problem> {
-        let body = serde_json::to_vec(order).map_err(|e| Problem::Failed(e.to_string()))?;
+    pub(super) async fn post(&self, path: &str, order: &impl Serialize) -> Result<Accepted, UserError> {
+        let body = serde_json::to_vec(order).map_err(|e| UserError::Failed(e.to_string()))?;
         let answer = self.ask(Method::POST, path, body.into()).await?;
         serde_json::from_slice(&self.whole(answer).await?).map_err(|e| self.unlike(&e))
     }
 
     /// Listens to changes.
-    pub(super) async fn events(&self) -> Result<Events<'_>, Problem> {
+    pub(super) async fn events(&self) -> Result<Events<'_>, UserError> {
         let answer = self.ask(Method::GET, "/api/v1/events", Bytes::new()).await?;
         Ok(Events { client: self, body: answer.into_body(), buffer: Vec::new() })
     }
 
-    async fn ask(&self, method: Method, path: &str, body: Bytes) -> Result<Response<Incoming>, Problem> {
+    async fn ask(&self, method: Method, path: &str, body: Bytes) -> Result<Response<Incoming>, UserError> {
         let answer = tokio::time::timeout(PATIENCE, self.send(method, path, body));
         let answer = answer.await.map_err(|_| self.failed(&format!("no answer within {} s", PATIENCE.as_secs())))??;
         let status = answer.status();
@@ -75,11 +75,11 @@ impl Client {
                 self.failed("it does not take the token of --token-file")
             }
             StatusCode::UNAUTHORIZED => self.failed("it takes a token: name its file with --token-file"),
-            _ => Problem::Failed(format!("refused: {said}")),
+            _ => UserError::Failed(format!("refused: {said}")),
         })
     }
 
-    async fn send(&self, method: Method, path: &str, body: Bytes) -> Result<Response<Incoming>, Problem> {
+    async fn send(&self, method: Method, path: &str, body: Bytes) -> Result<Response<Incoming>, UserError> {
         let absent = |e: std::io::Error| self.failed(&format!("{e}; does scenecast asv or demo run there?"));
         let stream = TcpStream::connect(&self.authority).await.map_err(absent)?;
         let broken = |e: hyper::Error| self.failed(&format!("the connection broke: {e}"));
@@ -92,22 +92,22 @@ impl Client {
         if let Some(token) = &self.token {
             request = request.header(header::AUTHORIZATION, format!("Bearer {}", **token));
         }
-        let request = request.body(Full::new(body)).map_err(|e| Problem::Failed(e.to_string()))?;
+        let request = request.body(Full::new(body)).map_err(|e| UserError::Failed(e.to_string()))?;
         sender.send_request(request).await.map_err(broken)
     }
 
-    async fn whole(&self, answer: Response<Incoming>) -> Result<Bytes, Problem> {
+    async fn whole(&self, answer: Response<Incoming>) -> Result<Bytes, UserError> {
         let collected = tokio::time::timeout(PATIENCE, Limited::new(answer.into_body(), MOST_BYTES).collect()).await;
         let collected = collected.map_err(|_| self.failed("the answer does not end"))?;
         collected.map(|c| c.to_bytes()).map_err(|e| self.failed(&format!("the answer broke off: {e}")))
     }
 
-    fn failed(&self, what: &str) -> Problem {
-        Problem::Failed(format!("{}: {what}", self.url))
+    fn failed(&self, what: &str) -> UserError {
+        UserError::Failed(format!("{}: {what}", self.url))
     }
 
     /// An answer that this version does not understand.
-    pub(super) fn unlike(&self, e: &serde_json::Error) -> Problem {
+    pub(super) fn unlike(&self, e: &serde_json::Error) -> UserError {
         self.failed(&format!("the answer is none of scenecast {}: {e}", env!("CARGO_PKG_VERSION")))
     }
 }
@@ -122,7 +122,7 @@ pub(super) struct Events<'a> {
 
 impl Events<'_> {
     /// The next state.
-    pub(super) async fn state(&mut self) -> Result<State, Problem> {
+    pub(super) async fn state(&mut self) -> Result<State, UserError> {
         loop {
             if let Some(end) = self.buffer.windows(2).position(|w| w == b"\n\n") {
                 let event: Vec<u8> = self.buffer.drain(..end + 2).collect();

@@ -2,11 +2,11 @@
 
 use super::geojson::{self, Frame};
 use super::{Ctl, figures};
-use crate::asv::position::{LatLon, TangentPlane};
 use crate::asv::{FenceOrder, LimitsOrder};
 use crate::console::orders::ConstraintsOrder;
 use crate::console::state::{InForce, LifeLine, Slot, State, Vehicle};
-use crate::problem::Problem;
+use scenecast_core::UserError;
+use scenecast_core::{LatLon, TangentPlane};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -21,7 +21,7 @@ struct Told<'a, T> {
 
 impl Ctl {
     /// Prints the fence that was sent last, and the one in force.
-    pub async fn fence(&self) -> Result<(), Problem> {
+    pub async fn fence(&self) -> Result<(), UserError> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
         let told = Told { sent: &v.fence, slot: slot(v, "fence"), in_force: &v.fence_in_force };
@@ -29,7 +29,7 @@ impl Ctl {
     }
 
     /// Sends the fence, keep-outs and return point of a GeoJSON file in place of the last.
-    pub async fn set_fence(&self, file: &Path, metres: bool) -> Result<(), Problem> {
+    pub async fn set_fence(&self, file: &Path, metres: bool) -> Result<(), UserError> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
         let frame = if metres { Frame::Metres } else { frame(&state) };
@@ -37,22 +37,22 @@ impl Ctl {
     }
 
     /// Sends that there is no fence, no keep-out and no return point.
-    pub async fn clear_fence(&self) -> Result<(), Problem> {
+    pub async fn clear_fence(&self) -> Result<(), UserError> {
         let state = self.state().await?;
         self.order(self.choose(&state)?, "fence", &FenceOrder::default()).await
     }
 
     /// Moves the return point, in metres of the world, or takes it away; fence and keep-outs stay as sent last.
-    pub async fn set_return_point(&self, at: Option<[f64; 2]>) -> Result<(), Problem> {
+    pub async fn set_return_point(&self, at: Option<[f64; 2]>) -> Result<(), UserError> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
         let order = FenceOrder { return_point: at, ..v.fence.clone().unwrap_or_default() };
-        order.read().map_err(Problem::Input)?;
+        order.read().map_err(UserError::Input)?;
         self.order(v, "fence", &order).await
     }
 
     /// Prints the limits that were sent last, and those in force.
-    pub async fn limits(&self) -> Result<(), Problem> {
+    pub async fn limits(&self) -> Result<(), UserError> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
         let told = Told { sent: &v.limits, slot: slot(v, "limits"), in_force: &v.limits_in_force };
@@ -60,7 +60,7 @@ impl Ctl {
     }
 
     /// Sends limits in place of the last; with `keep` those that are not named stay as they were sent last.
-    pub async fn set_limits(&self, named: LimitsOrder, keep: bool) -> Result<(), Problem> {
+    pub async fn set_limits(&self, named: LimitsOrder, keep: bool) -> Result<(), UserError> {
         let state = self.state().await?;
         let v = self.choose(&state)?;
         let before = v.limits.clone().filter(|_| keep).unwrap_or_default();
@@ -74,17 +74,17 @@ impl Ctl {
             on_breach: named.on_breach.or(before.on_breach),
             on_abort: named.on_abort.or(before.on_abort),
         };
-        order.read().map_err(Problem::Input)?;
+        order.read().map_err(UserError::Input)?;
         self.order(v, "limits", &order).await
     }
 
     /// Tells the vehicle to stay, to abort, or to go on.
-    pub async fn constrain(&self, order: ConstraintsOrder) -> Result<(), Problem> {
+    pub async fn constrain(&self, order: ConstraintsOrder) -> Result<(), UserError> {
         let state = self.state().await?;
         self.order(self.choose(&state)?, "constraints", &order).await
     }
 
-    async fn order(&self, vehicle: &Vehicle, what: &str, order: &impl Serialize) -> Result<(), Problem> {
+    async fn order(&self, vehicle: &Vehicle, what: &str, order: &impl Serialize) -> Result<(), UserError> {
         let accepted = self.client.post(&format!("/api/v1/vehicles/{}/{what}", vehicle.id), order).await?;
         self.follow(accepted).await
     }

@@ -3,8 +3,8 @@
 use super::Ctl;
 use crate::console::orders::{ExemplarOrder, ExemplarWish};
 use crate::console::state::{Accepted, Exemplar, ExemplarState, State};
-use crate::picture::write_whole;
-use crate::problem::Problem;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -15,10 +15,10 @@ const IMAGE: Duration = Duration::from_secs(600);
 
 impl Ctl {
     /// Writes the map of a vehicle; the end of the name says in which format.
-    pub async fn map(&self, out: &Path) -> Result<(), Problem> {
+    pub async fn map(&self, out: &Path) -> Result<(), UserError> {
         let format = out.extension().and_then(|e| e.to_str()).unwrap_or_default();
         if !FORMATS.contains(&format) {
-            return Err(Problem::file(out, format!("the name ends in one of .{}", FORMATS.join(", ."))));
+            return Err(UserError::file(out, format!("the name ends in one of .{}", FORMATS.join(", ."))));
         }
         let state = self.state().await?;
         let base = format!("/api/v1/vehicles/{}/map", self.choose(&state)?.id);
@@ -39,7 +39,7 @@ impl Ctl {
     }
 
     /// Files of one version of the map.
-    async fn alike(&self, files: &[(String, PathBuf)]) -> Result<Vec<Vec<u8>>, Problem> {
+    async fn alike(&self, files: &[(String, PathBuf)]) -> Result<Vec<Vec<u8>>, UserError> {
         const TRIES: usize = 10;
         for _ in 0..TRIES {
             let (mut all, mut tags) = (Vec::new(), Vec::new());
@@ -53,11 +53,11 @@ impl Ctl {
                 return Ok(all);
             }
         }
-        Err(Problem::Failed(format!("the map has changed {TRIES} times while it was fetched; try again")))
+        Err(UserError::Failed(format!("the map has changed {TRIES} times while it was fetched; try again")))
     }
 
     /// Writes an image of a label. The vehicle is asked for it if there is none here, or for the one that is wished for.
-    pub async fn exemplar(&self, label: u8, out: &Path, wish: Option<ExemplarWish>) -> Result<(), Problem> {
+    pub async fn exemplar(&self, label: u8, out: &Path, wish: Option<ExemplarWish>) -> Result<(), UserError> {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?.id;
         let newest = find(&state, vehicle, label).and_then(|e| e.pictures.last()).map(|p| p.at_s);
@@ -73,19 +73,24 @@ impl Ctl {
     }
 
     /// Takes back what is asked of a label.
-    pub async fn cancel_exemplar(&self, label: u8) -> Result<(), Problem> {
+    pub async fn cancel_exemplar(&self, label: u8) -> Result<(), UserError> {
         let state = self.state().await?;
         let accepted = self.ask(self.choose(&state)?.id, label, ExemplarWish::Cancel).await?;
         self.follow(accepted).await
     }
 
-    async fn ask(&self, vehicle: u8, label: u8, what: ExemplarWish) -> Result<Accepted, Problem> {
+    async fn ask(&self, vehicle: u8, label: u8, what: ExemplarWish) -> Result<Accepted, UserError> {
         let order = ExemplarOrder { label, what, picture: None };
         self.client.post(&format!("/api/v1/vehicles/{vehicle}/exemplars"), &order).await
     }
 
     /// Waits for an image that is newer than the one of `before`.
-    async fn await_image(&self, (vehicle, label): (u8, u8), version: u16, before: Option<f64>) -> Result<(), Problem> {
+    async fn await_image(
+        &self,
+        (vehicle, label): (u8, u8),
+        version: u16,
+        before: Option<f64>,
+    ) -> Result<(), UserError> {
         let wait = self.wait.unwrap_or(IMAGE);
         let mut last = String::from("asked for");
         let coming = async {
@@ -98,19 +103,19 @@ impl Ctl {
                     continue;
                 }
                 let Some(image) = find(&state, vehicle, label) else {
-                    return Err(Problem::Failed(format!("label {label} is not on the map any more")));
+                    return Err(UserError::Failed(format!("label {label} is not on the map any more")));
                 };
                 match image.state {
                     ExemplarState::Here if image.pictures.last().map(|p| p.at_s) != before => return Ok(()),
                     ExemplarState::Refused => {
                         let why = request.and_then(|r| r.reason.clone()).unwrap_or_default();
-                        return Err(Problem::Failed(format!("refused: {why}")));
+                        return Err(UserError::Failed(format!("refused: {why}")));
                     }
                     ExemplarState::Coming => self.note(&mut last, format!("coming, {:.0} %", 100.0 * image.progress)),
                     ExemplarState::NoneYet => self.note(&mut last, "the vehicle has none yet".to_owned()),
                     ExemplarState::OnAir => self.note(&mut last, "on air".to_owned()),
                     ExemplarState::None | ExemplarState::Here => {
-                        return Err(Problem::Failed("it was cancelled".to_owned()));
+                        return Err(UserError::Failed("it was cancelled".to_owned()));
                     }
                     ExemplarState::Queued => self.note(&mut last, "queued".to_owned()),
                 }
@@ -118,7 +123,7 @@ impl Ctl {
         };
         match tokio::time::timeout(wait, coming).await {
             Ok(ended) => ended,
-            Err(_) => Err(Problem::Failed(format!(
+            Err(_) => Err(UserError::Failed(format!(
                 "the image of label {label} is not here after {:.0} s ({last}); it goes on coming, ask again later",
                 wait.as_secs_f64()
             ))),

@@ -1,8 +1,8 @@
 //! A fence from a GeoJSON file (RFC 7946), as a GIS writes it.
 
 use crate::asv::FenceOrder;
-use crate::asv::position::{LatLon, TangentPlane};
-use crate::problem::Problem;
+use scenecast_core::UserError;
+use scenecast_core::{LatLon, TangentPlane};
 use serde_json::Value;
 use std::path::Path;
 
@@ -27,8 +27,8 @@ enum Role {
 }
 
 /// Reads fence, keep-outs and return point.
-pub(super) fn read_fence(file: &Path, frame: Frame) -> Result<FenceOrder, Problem> {
-    let problem = |what: String| Problem::file(file, what);
+pub(super) fn read_fence(file: &Path, frame: Frame) -> Result<FenceOrder, UserError> {
+    let problem = |what: String| UserError::file(file, what);
     let size = std::fs::metadata(file).map_err(|e| problem(e.to_string()))?.len();
     if size > MOST_BYTES {
         return Err(problem(format!("it has {size} bytes: at most {MOST_BYTES} are read")));

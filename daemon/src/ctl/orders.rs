@@ -3,7 +3,7 @@
 use super::{Ctl, figures};
 use crate::console::orders::{BudgetOrder, SharesOrder, UtilityOrder};
 use crate::console::state::{Accepted, LifeLine, State};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -31,7 +31,7 @@ struct Outcome {
 
 impl Ctl {
     /// Prints the weights that were sent last.
-    pub async fn utility(&self) -> Result<(), Problem> {
+    pub async fn utility(&self) -> Result<(), UserError> {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?;
         let weights = vehicle.labels.iter().filter(|l| l.weight != 0.0).map(|l| (l.id.to_string(), l.weight)).collect();
@@ -49,7 +49,7 @@ impl Ctl {
         weights: BTreeMap<u8, f64>,
         exploration: Option<f64>,
         keep: bool,
-    ) -> Result<(), Problem> {
+    ) -> Result<(), UserError> {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?;
         let mut order =
@@ -66,7 +66,7 @@ impl Ctl {
     }
 
     /// Prints budget and shares.
-    pub async fn budget(&self) -> Result<(), Problem> {
+    pub async fn budget(&self) -> Result<(), UserError> {
         let state = self.state().await?;
         let link = &state.link;
         let value = serde_json::json!({ "budget_bps": link.budget_bps, "shares": link.shares, "spend": link.spend });
@@ -84,11 +84,11 @@ impl Ctl {
     }
 
     /// Changes budget and shares of the surface and of all vehicles.
-    pub async fn set_budget(&self, change: BudgetChange) -> Result<(), Problem> {
+    pub async fn set_budget(&self, change: BudgetChange) -> Result<(), UserError> {
         let link = self.state().await?.link;
         if let Some(unknown) = change.shares.keys().find(|class| !link.shares.contains_key(*class)) {
             let classes: Vec<&str> = link.shares.keys().map(String::as_str).collect();
-            return Err(Problem::Input(format!("--shares {unknown}: it takes {}", classes.join(", "))));
+            return Err(UserError::Input(format!("--shares {unknown}: it takes {}", classes.join(", "))));
         }
         let share = |class: &str| change.shares.get(class).or_else(|| link.shares.get(class)).copied().unwrap_or(0);
         let shares = SharesOrder {
@@ -106,7 +106,7 @@ impl Ctl {
     }
 
     /// Waits as long as is asked until an order is applied; refused is failed.
-    pub(super) async fn follow(&self, accepted: Accepted) -> Result<(), Problem> {
+    pub(super) async fn follow(&self, accepted: Accepted) -> Result<(), UserError> {
         let wait = self.wait.unwrap_or(Duration::ZERO);
         let mut outcomes: Vec<Outcome> = accepted
             .versions
@@ -134,14 +134,14 @@ impl Ctl {
         self.tell(&outcomes, || outcomes.iter().map(|o| format!("{}\n", o.text())).collect())?;
         match outcomes.iter().find(|o| o.state != Some(LifeLine::Applied)) {
             None => Ok(()),
-            Some(o) if o.is_settled() => Err(Problem::Failed(o.text())),
+            Some(o) if o.is_settled() => Err(UserError::Failed(o.text())),
             Some(o) => {
-                Err(Problem::Failed(format!("{} after {:.0} s; it goes on waiting", o.text(), wait.as_secs_f64())))
+                Err(UserError::Failed(format!("{} after {:.0} s; it goes on waiting", o.text(), wait.as_secs_f64())))
             }
         }
     }
 
-    async fn settle(&self, outcomes: &mut [Outcome]) -> Result<(), Problem> {
+    async fn settle(&self, outcomes: &mut [Outcome]) -> Result<(), UserError> {
         let mut events = self.client.events().await?;
         let mut last = String::new();
         while !outcomes.iter().all(Outcome::is_settled) {
@@ -158,13 +158,13 @@ impl Ctl {
 }
 
 impl Outcome {
-    fn see(&mut self, state: &State) -> Result<(), Problem> {
+    fn see(&mut self, state: &State) -> Result<(), UserError> {
         let vehicle = state.vehicles.iter().find(|v| v.id == self.vehicle);
         let slot = vehicle.and_then(|v| v.directive.slots.iter().find(|s| s.slot == self.slot));
         let Some(slot) = slot.filter(|s| s.version >= self.version) else { return Ok(()) };
         if slot.version > self.version {
             let what = "another order of this kind was given in the meantime and counts instead";
-            return Err(Problem::Failed(format!("vehicle {}: {what}", self.vehicle)));
+            return Err(UserError::Failed(format!("vehicle {}: {what}", self.vehicle)));
         }
         (self.state, self.reason) = (Some(slot.state), slot.reason.clone());
         Ok(())

@@ -4,7 +4,7 @@ use super::{Ctl, figures};
 use crate::asv::SettingsOrder;
 use crate::console::fit::{Fit, Fitted};
 use crate::console::state::Vehicle;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 
 /// What is to be sent.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -19,14 +19,14 @@ pub struct SettingsChange {
 
 impl Ctl {
     /// Sends settings, or prints those asked for and in force if there is nothing to send.
-    pub async fn settings(&self, change: SettingsChange) -> Result<(), Problem> {
+    pub async fn settings(&self, change: SettingsChange) -> Result<(), UserError> {
         let state = self.state().await?;
         let vehicle = self.choose(&state)?;
         if change == SettingsChange::default() {
             return self.tell(&vehicle.settings, || table(vehicle));
         }
         // The refusal of what no vehicle could obey needs no surface.
-        change.order.read().map_err(Problem::Input)?;
+        change.order.read().map_err(UserError::Input)?;
         let order = match change.fit {
             None => change.order,
             Some(bits_per_s) => {
@@ -42,11 +42,11 @@ impl Ctl {
         self.follow(accepted).await
     }
 
-    async fn fit(&self, vehicle: u8, bits_per_s: Option<f64>) -> Result<(Fit, Fitted), Problem> {
+    async fn fit(&self, vehicle: u8, bits_per_s: Option<f64>) -> Result<(Fit, Fitted), UserError> {
         let query = bits_per_s.map_or(String::new(), |b| format!("?bits_per_s={b}"));
         let (bytes, _) = self.client.get(&format!("/api/v1/vehicles/{vehicle}/fit{query}")).await?;
         let fit: Fit = serde_json::from_slice(&bytes).map_err(|e| self.client.unlike(&e))?;
-        let chosen = fit.chosen.clone().ok_or_else(|| Problem::Failed(fit.given_up.clone()))?;
+        let chosen = fit.chosen.clone().ok_or_else(|| UserError::Failed(fit.given_up.clone()))?;
         Ok((fit, chosen))
     }
 }

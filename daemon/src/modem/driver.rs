@@ -1,15 +1,13 @@
 //! What every driver of a modem is: bytes in, bytes out, no IO.
 
 use bytes::Bytes;
+use scenecast_core::{ModemAddress, UsblLine};
 use scenecast_protocol::link::Cycle;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
 
 /// Names a transmission from [`Driver::send`] to its end.
 pub type Token = u64;
-
-/// Address of a modem in the water, as its make counts them.
-pub type ModemAddress = u8;
 
 /// How urgent a transmission is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -64,21 +62,6 @@ pub struct Reception {
     pub quality: Option<i32>,
     /// Slant range to the sender, metres.
     pub range_m: Option<f64>,
-}
-
-/// What an ultra-short baseline told of another modem.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct UsblLine {
-    /// The other modem.
-    pub remote: ModemAddress,
-    /// Slant range, metres.
-    pub range_m: Option<f64>,
-    /// Clockwise from north, rad, -pi..=pi, and above the horizontal, rad; `None` if only the range is good.
-    pub direction_rad: Option<(f64, f64)>,
-    /// Expected error of the position, metres; of directions alone, rad.
-    pub accuracy: f64,
-    /// How long ago it was measured, seconds.
-    pub age_s: f64,
 }
 
 /// What a driver tells.

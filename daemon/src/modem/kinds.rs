@@ -1,13 +1,15 @@
 //! From configuration to a driver and a way to it.
 
-use super::driver::{Driver, ModemAddress};
-use super::micromodem::{Micromodem, MicromodemConfig, Rate};
+use super::driver::Driver;
+use super::micromodem::{Micromodem, MicromodemConfig};
 use super::paced::Paced;
 use super::s2c::{BURST_FRAME_BYTES, INSTANT_BYTES, S2c, S2cConfig, S2cMode};
 use super::station::AddressBook;
 use crate::config::{self, Config};
-use crate::port::Place;
-use crate::problem::Problem;
+use scenecast_core::MicromodemRate;
+use scenecast_core::ModemAddress;
+use scenecast_core::PortAddress;
+use scenecast_core::UserError;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::wire::Address;
 
@@ -21,7 +23,7 @@ pub fn full_frame_bytes(config: &Config) -> usize {
     match (config.modem.kind.as_str(), config.modem.s2c_mode.as_str()) {
         ("s2c", "im") => INSTANT_BYTES,
         ("s2c", _) => BURST_FRAME_BYTES,
-        ("micromodem", _) => Rate::of(config.modem.rate).frame_bytes,
+        ("micromodem", _) => MicromodemRate::of(config.modem.rate).frame_bytes,
         _ => config.link.frame_bytes as usize,
     }
 }
@@ -35,7 +37,7 @@ pub fn address_book(config: &Config) -> AddressBook {
 ///
 /// # Errors
 /// A line that names the key and what is allowed.
-pub fn check(config: &Config) -> Result<(), Problem> {
+pub fn check(config: &Config) -> Result<(), UserError> {
     let m = &config.modem;
     if !matches!(m.kind.as_str(), "s2c" | "micromodem") {
         return Ok(());
@@ -44,7 +46,7 @@ pub fn check(config: &Config) -> Result<(), Problem> {
     let vehicles = if config.link.vehicles.is_empty() { &own[..] } else { &config.link.vehicles[..] };
     if vehicles.contains(&m.surface_address) {
         let given = format!("modem.surface_address = {}", m.surface_address);
-        return Err(Problem::Input(format!(
+        return Err(UserError::Input(format!(
             "{given} is not allowed: it is a vehicle's address, and its modem has it too"
         )));
     }
@@ -52,12 +54,12 @@ pub fn check(config: &Config) -> Result<(), Problem> {
     let all = vehicles.iter().copied().chain([m.surface_address]);
     if let Some(beyond) = all.filter(|&a| a > highest).max() {
         let limit = if m.kind == "s2c" { "modem.highest_address" } else { "a Micromodem's highest address" };
-        return Err(Problem::Input(format!("address {beyond} is not allowed: {limit} is {highest}")));
+        return Err(UserError::Input(format!("address {beyond} is not allowed: {limit} is {highest}")));
     }
     const HIGHEST: [u8; 7] = [2, 6, 14, 30, 62, 126, 254];
     if m.kind == "s2c" && !HIGHEST.contains(&m.highest_address) {
         let given = format!("modem.highest_address = {}", m.highest_address);
-        return Err(Problem::Input(format!("{given} is not allowed: it takes one of 2, 6, 14, 30, 62, 126, 254")));
+        return Err(UserError::Input(format!("{given} is not allowed: it takes one of 2, 6, 14, 30, 62, 126, 254")));
     }
     Ok(())
 }
@@ -66,16 +68,16 @@ pub fn check(config: &Config) -> Result<(), Problem> {
 ///
 /// # Errors
 /// An end whose modem can have no address.
-pub fn driver(config: &Config, end: Address, profile: ModemProfile) -> Result<Box<dyn Driver>, Problem> {
+pub fn driver(config: &Config, end: Address, profile: ModemProfile) -> Result<Box<dyn Driver>, UserError> {
     let super::Destination::Modem(address) = address_book(config).modem_of(end) else {
-        return Err(Problem::Failed("everybody has no modem".to_owned()));
+        return Err(UserError::Failed("everybody has no modem".to_owned()));
     };
     let m = &config.modem;
     Ok(match m.kind.as_str() {
         "s2c" => Box::new(S2c::new(s2c_config(m, address, end))),
         "micromodem" => {
             let baud = is_serial(m).then_some(m.baud);
-            Box::new(Micromodem::new(MicromodemConfig { address, rate: Rate::of(m.rate), baud }))
+            Box::new(Micromodem::new(MicromodemConfig { address, rate: MicromodemRate::of(m.rate), baud }))
         }
         "udp" => Box::new(Paced::datagrams(profile, m.bit_rate)),
         "transparent" => {
@@ -109,19 +111,25 @@ fn is_serial(m: &config::Modem) -> bool {
 }
 
 /// Where the modem is.
-pub(super) fn place(config: &Config) -> Result<Place, Problem> {
+pub(super) fn place(config: &Config) -> Result<PortAddress, UserError> {
     let m = &config.modem;
     let kind = m.kind.as_str();
-    let missing = |what: &str| Err(Problem::Input(format!("modem kind {kind} needs {what}")));
+    let missing = |what: &str| Err(UserError::Input(format!("modem kind {kind} needs {what}")));
     match (kind, m.device.as_str(), m.listen.as_str(), m.connect.as_str()) {
         ("udp", _, "", "") => missing("modem.connect, modem.listen, or both"),
-        ("udp", _, listen, connect) => Ok(Place::Datagrams(listen.to_owned(), connect.to_owned())),
+        ("udp", _, listen, connect) => Ok(PortAddress::Datagrams(listen.to_owned(), connect.to_owned())),
         ("tcp", _, "", "") => missing("modem.listen or modem.connect"),
-        ("tcp", _, listen, "") | (_, "", listen, "") if !listen.is_empty() => Ok(Place::Listen(listen.to_owned())),
-        ("tcp", _, "", address) | (_, "", "", address) if !address.is_empty() => Ok(Place::Connect(address.to_owned())),
-        ("tcp", ..) => Err(Problem::Input("modem kind tcp takes modem.listen or modem.connect, not both".to_owned())),
+        ("tcp", _, listen, "") | (_, "", listen, "") if !listen.is_empty() => {
+            Ok(PortAddress::Listen(listen.to_owned()))
+        }
+        ("tcp", _, "", address) | (_, "", "", address) if !address.is_empty() => {
+            Ok(PortAddress::Connect(address.to_owned()))
+        }
+        ("tcp", ..) => Err(UserError::Input("modem kind tcp takes modem.listen or modem.connect, not both".to_owned())),
         (_, "", "", "") => missing("modem.device (a serial device) or modem.connect (ADDRESS:PORT)"),
-        (_, "", ..) => Err(Problem::Input(format!("modem kind {kind} takes modem.listen or modem.connect, not both"))),
-        (_, device, ..) => Ok(Place::Serial(device.to_owned(), m.baud)),
+        (_, "", ..) => {
+            Err(UserError::Input(format!("modem kind {kind} takes modem.listen or modem.connect, not both")))
+        }
+        (_, device, ..) => Ok(PortAddress::Serial(device.to_owned(), m.baud)),
     }
 }

@@ -20,14 +20,15 @@ mod conformance;
 #[cfg(test)]
 mod storm;
 
-pub use driver::{Class, Destination, Driver, Event, ModemAddress, Reception, Refusal, Token, UsblLine};
+pub use driver::{Class, Destination, Driver, Event, Reception, Refusal, Token};
 pub use kinds::{address_book, check, driver, full_frame_bytes};
 pub use station::{AddressBook, ModemEvent, PIPE_FRAMING_BITS, Station};
 
 use crate::config::Config;
-use crate::port::{FromPort, Place, Port};
-use crate::problem::Problem;
+use crate::port::{FromPort, Port};
 use crate::runtime::Clock;
+use scenecast_core::PortAddress;
+use scenecast_core::UserError;
 use scenecast_protocol::link::{Cycle, Transmit};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
@@ -95,7 +96,7 @@ impl Modem {
     }
 
     /// The next thing that happens; safe to abandon and to ask again.
-    pub async fn next(&mut self) -> Result<ModemEvent, Problem> {
+    pub async fn next(&mut self) -> Result<ModemEvent, UserError> {
         loop {
             if let Some(event) = self.station.poll_event() {
                 self.note(&event)?;
@@ -141,14 +142,14 @@ impl Modem {
     }
 
     /// Says what a person should know. A modem that refuses before it ever worked ends the run: somebody is still there.
-    fn note(&mut self, event: &ModemEvent) -> Result<(), Problem> {
+    fn note(&mut self, event: &ModemEvent) -> Result<(), UserError> {
         match event {
             ModemEvent::Ready => {
                 self.was_ready = true;
                 tracing::info!("modem: ready");
             }
             ModemEvent::Lost => tracing::warn!("modem: lost; it is set up again when it answers"),
-            ModemEvent::Refused(what) if !self.was_ready => return Err(Problem::Failed(format!("modem: {what}"))),
+            ModemEvent::Refused(what) if !self.was_ready => return Err(UserError::Failed(format!("modem: {what}"))),
             ModemEvent::Refused(what) => tracing::error!("modem: {what}"),
             _ => {}
         }
@@ -157,7 +158,7 @@ impl Modem {
 }
 
 /// Opens the modem that the configuration names, for this end.
-pub async fn open(config: &Config, end: Address, profile: ModemProfile, clock: Clock) -> Result<Modem, Problem> {
+pub async fn open(config: &Config, end: Address, profile: ModemProfile, clock: Clock) -> Result<Modem, UserError> {
     let driver = driver(config, end, profile)?;
     let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
     let window_bits = f64::from(config.link.budget_bps) * config.link.budget_window_s;
@@ -174,12 +175,12 @@ pub async fn open(config: &Config, end: Address, profile: ModemProfile, clock: C
     })
 }
 
-fn not_there(place: &Place, e: &std::io::Error) -> Problem {
-    Problem::Input(match place {
-        Place::Serial(device, _) => format!("modem.device: {device}: {e}"),
-        Place::Listen(address) => format!("modem.listen: cannot listen on {address}: {e}"),
-        Place::Connect(address) => format!("modem.connect: {address}: {e}"),
-        Place::Datagrams(..) => format!("modem.listen, modem.connect: {e}"),
-        Place::File(path) => format!("{}: {e}", path.display()),
+fn not_there(place: &PortAddress, e: &std::io::Error) -> UserError {
+    UserError::Input(match place {
+        PortAddress::Serial(device, _) => format!("modem.device: {device}: {e}"),
+        PortAddress::Listen(address) => format!("modem.listen: cannot listen on {address}: {e}"),
+        PortAddress::Connect(address) => format!("modem.connect: {address}: {e}"),
+        PortAddress::Datagrams(..) => format!("modem.listen, modem.connect: {e}"),
+        PortAddress::File(path) => format!("{}: {e}", path.display()),
     })
 }

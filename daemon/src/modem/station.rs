@@ -1,8 +1,9 @@
 //! One end's modem without IO: a driver, the addresses of the mission, and the account of what goes on air.
 
-use super::driver::{Class, Destination, Driver, Event, ModemAddress, Token, UsblLine};
+use super::driver::{Class, Destination, Driver, Event, Token};
 use super::framing;
 use bytes::Bytes;
+use scenecast_core::{ModemAddress, UsblLine};
 use scenecast_protocol::link::{Cycle, Transmit};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;

@@ -1,8 +1,9 @@
 //! Drivers under random and mutated lines: nothing panics, memory is bounded, and they still come back to work.
 
-use super::micromodem::{Micromodem, MicromodemConfig, Rate, SentenceParser, format_sentence};
+use super::micromodem::{Micromodem, MicromodemConfig, SentenceParser, format_sentence};
 use super::s2c::{LineParser, S2c, S2cConfig, S2cMode};
 use super::{Class, Destination, Driver};
+use scenecast_core::MicromodemRate;
 use scenecast_protocol::time::Instant;
 use sim_channel::Stream;
 use std::time::Duration;
@@ -86,7 +87,7 @@ fn drivers() -> [Box<dyn Driver>; 3] {
         burst_bps: 10_000.0,
         pool_frames: 16,
     };
-    let micromodem = MicromodemConfig { address: 10, rate: Rate::of(1), baud: None };
+    let micromodem = MicromodemConfig { address: 10, rate: MicromodemRate::of(1), baud: None };
     [
         Box::new(S2c::new(s2c(S2cMode::Burst))),
         Box::new(S2c::new(s2c(S2cMode::Instant))),

@@ -15,11 +15,11 @@ mod tcp;
 
 pub use scenario::Scenario;
 
-use crate::problem::Problem;
 use crate::runtime::Stop;
 use host::FromHost;
 use links::Links;
 use orders::Order;
+use scenecast_core::UserError;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tank::Tank;
@@ -39,7 +39,7 @@ pub struct Options {
 }
 
 /// Emulates until it is interrupted.
-pub fn run(options: Options) -> Result<(), Problem> {
+pub fn run(options: Options) -> Result<(), UserError> {
     let mut scenario = Scenario::load(&options.scenario)?;
     scenario.seed = options.seed.unwrap_or(scenario.seed);
     let links = Links::new(options.link_dir.as_deref())?;
@@ -75,7 +75,7 @@ impl Pace {
     }
 }
 
-async fn serve(tank: &mut Tank, mut from_hosts: mpsc::Receiver<FromHost>, pace: Pace) -> Result<(), Problem> {
+async fn serve(tank: &mut Tank, mut from_hosts: mpsc::Receiver<FromHost>, pace: Pace) -> Result<(), UserError> {
     let mut orders = orders::listen();
     loop {
         let due = tank.poll_timeout().map(|at| pace.wall(at));

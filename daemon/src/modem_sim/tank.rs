@@ -5,7 +5,7 @@ use super::links::Links;
 use super::orders::Order;
 use super::scenario::{Modem, Place, Scenario, Trouble, node};
 use super::{Pace, tcp};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use sim_channel::modem::{Basin, Fault, Host};
 use sim_channel::{Channel, NodeId, Talker};
 use std::collections::{BTreeMap, BTreeSet};
@@ -54,7 +54,12 @@ enum Act {
 
 impl Tank {
     /// The scenario, its ports open and printed.
-    pub fn new(scenario: Scenario, links: Links, pace: Pace, to_tank: mpsc::Sender<FromHost>) -> Result<Self, Problem> {
+    pub fn new(
+        scenario: Scenario,
+        links: Links,
+        pace: Pace,
+        to_tank: mpsc::Sender<FromHost>,
+    ) -> Result<Self, UserError> {
         let Scenario { seed, channel, links: losses, modems, strangers, faults } = scenario;
         let mut basin = Basin::new(Channel::new(channel, seed));
         let unix_s = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
@@ -88,7 +93,7 @@ impl Tank {
     }
 
     /// Does everything that is due, and tells the hosts.
-    pub fn advance(&mut self, now: Duration) -> Result<(), Problem> {
+    pub fn advance(&mut self, now: Duration) -> Result<(), UserError> {
         while let Some(entry) = self.plan.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((at, _), act) = entry.remove_entry();
             self.basin.advance(at);
@@ -173,7 +178,7 @@ impl Tank {
         self.plan.insert((at, self.planned), act);
     }
 
-    fn carry_out(&mut self, act: Act, now: Duration) -> Result<(), Problem> {
+    fn carry_out(&mut self, act: Act, now: Duration) -> Result<(), UserError> {
         match act {
             Act::Trouble(index, trouble) => {
                 tracing::info!("{:.1} s: {}: {trouble:?}", now.as_secs_f64(), self.modems[index].name);
@@ -232,7 +237,7 @@ impl Tank {
     }
 
     /// Opens a port and prints where it is.
-    fn plug(&mut self, index: usize) -> Result<(), Problem> {
+    fn plug(&mut self, index: usize) -> Result<(), UserError> {
         if self.ports[index].door.is_some() {
             return Ok(());
         }
@@ -242,10 +247,10 @@ impl Tank {
         }
     }
 
-    fn plug_tcp(&mut self, index: usize, address: SocketAddr) -> Result<(), Problem> {
+    fn plug_tcp(&mut self, index: usize, address: SocketAddr) -> Result<(), UserError> {
         let address = self.ports[index].bound.unwrap_or(address);
         let name = &self.modems[index].name;
-        let failed = |e| Problem::Failed(format!("modem {name}: tcp:{address}: {e}"));
+        let failed = |e| UserError::Failed(format!("modem {name}: tcp:{address}: {e}"));
         let listener = std::net::TcpListener::bind(address).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let bound = listener.local_addr().map_err(failed)?;
@@ -258,9 +263,9 @@ impl Tank {
     }
 
     #[cfg(unix)]
-    fn plug_pty(&mut self, index: usize) -> Result<(), Problem> {
+    fn plug_pty(&mut self, index: usize) -> Result<(), UserError> {
         let modem = &self.modems[index];
-        let pty = super::pty::Pty::open().map_err(|e| Problem::Failed(format!("modem {}: {e}", modem.name)))?;
+        let pty = super::pty::Pty::open().map_err(|e| UserError::Failed(format!("modem {}: {e}", modem.name)))?;
         let device = pty.device().display();
         match self.links.point(&modem.name, pty.device())? {
             Some(link) => print_line(&format!("{} {device} {}", modem.name, link.display())),
@@ -272,9 +277,9 @@ impl Tank {
     }
 
     #[cfg(not(unix))]
-    fn plug_pty(&mut self, index: usize) -> Result<(), Problem> {
+    fn plug_pty(&mut self, index: usize) -> Result<(), UserError> {
         let name = &self.modems[index].name;
-        Err(Problem::Input(format!(
+        Err(UserError::Input(format!(
             "modem {name}: there are no pseudo-terminals here: port takes \"tcp:ADDRESS:PORT\""
         )))
     }

@@ -1,7 +1,8 @@
 //! What keeps a port open.
 
 use super::carry::{append, carry};
-use super::{Ends, FromPort, Place, tcp, udp};
+use super::{Ends, FromPort, tcp, udp};
+use scenecast_core::PortAddress;
 use std::fs::File;
 use std::io;
 use std::time::Duration;
@@ -26,19 +27,19 @@ pub(super) enum Opened {
 }
 
 /// Opens it once.
-pub(super) async fn open(place: &Place) -> io::Result<Opened> {
+pub(super) async fn open(place: &PortAddress) -> io::Result<Opened> {
     Ok(match place {
-        Place::Serial(device, baud) => Opened::Serial(serial(device, *baud)?),
-        Place::Listen(address) => Opened::Listener(TcpListener::bind(address).await?),
-        Place::Connect(address) => {
+        PortAddress::Serial(device, baud) => Opened::Serial(serial(device, *baud)?),
+        PortAddress::Listen(address) => Opened::Listener(TcpListener::bind(address).await?),
+        PortAddress::Connect(address) => {
             let connection = tokio::time::timeout(CONNECT_LIMIT, TcpStream::connect(address)).await;
             Opened::Connection(connection.map_err(|_| io::Error::new(io::ErrorKind::TimedOut, "no answer"))??)
         }
-        Place::Datagrams(own, remote) => {
+        PortAddress::Datagrams(own, remote) => {
             let (socket, remote) = udp::open(own, remote).await?;
             Opened::Socket(socket, remote)
         }
-        Place::File(path) => Opened::File(File::options().create(true).append(true).open(path)?),
+        PortAddress::File(path) => Opened::File(File::options().create(true).append(true).open(path)?),
     })
 }
 
@@ -54,7 +55,7 @@ fn serial(device: &str, baud: u32) -> io::Result<SerialStream> {
 /// Keeps a port open until its host is gone: an unplugged adapter comes back under its stable path.
 pub(super) struct Keeper {
     pub(super) name: &'static str,
-    pub(super) place: Place,
+    pub(super) place: PortAddress,
     pub(super) quiet: Option<Duration>,
     pub(super) ends: Ends,
 }

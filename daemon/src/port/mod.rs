@@ -2,14 +2,12 @@
 
 mod carry;
 mod keeper;
-mod place;
 mod tcp;
 mod udp;
 
-pub use place::Place;
-
 use bytes::Bytes;
 use keeper::Keeper;
+use scenecast_core::PortAddress;
 use std::io;
 use std::time::Duration;
 use tokio::sync::mpsc;
@@ -52,9 +50,9 @@ impl Port {
     ///
     /// # Errors
     /// Why it cannot be opened. A peer that does not take a connection yet is waited for instead.
-    pub async fn open(name: &'static str, place: Place) -> io::Result<Self> {
+    pub async fn open(name: &'static str, place: PortAddress) -> io::Result<Self> {
         let first = match &place {
-            Place::Connect(_) => None,
+            PortAddress::Connect(_) => None,
             there => Some(keeper::open(there).await?),
         };
         let (port, ends) = Self::pair();
@@ -64,7 +62,7 @@ impl Port {
 
     /// Opens it as soon as it is there, and again for ever. An instrument that says nothing for `quiet` counts as gone, where
     /// that is given: an unplugged adapter or a half-open connection may never tell.
-    pub fn open_when_there(name: &'static str, place: Place, quiet: Option<Duration>) -> Self {
+    pub fn open_when_there(name: &'static str, place: PortAddress, quiet: Option<Duration>) -> Self {
         let (port, ends) = Self::pair();
         tokio::spawn(Keeper { name, place, quiet, ends }.run(None));
         port

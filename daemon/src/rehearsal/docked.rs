@@ -3,7 +3,7 @@
 use crate::config::Config;
 use crate::ends;
 use crate::modem::{self, ModemEvent, Station};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -40,7 +40,7 @@ impl Docked {
     ///
     /// # Errors
     /// A kind that is no modem.
-    pub fn new(config: &Config, channel: Channel, seed: u64, now: Instant) -> Result<Self, Problem> {
+    pub fn new(config: &Config, channel: Channel, seed: u64, now: Instant) -> Result<Self, UserError> {
         let vehicle = ends::vehicle_address(config)?.number();
         let surface = config.modem.surface_address;
         let modems = [emulator(config, vehicle, false, seed)?, emulator(config, surface, true, seed)?];
@@ -53,7 +53,7 @@ impl Docked {
         channel: Channel,
         modems: [Box<dyn Emulator>; 2],
         now: Instant,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, UserError> {
         let mut config = config.clone();
         // Emulated ports are serial ones.
         config.modem.device = "emulated".to_owned();
@@ -159,7 +159,7 @@ impl Docked {
 }
 
 /// An end's station, and its modem in the water.
-fn berth(config: &Config, end: Address, modem: Box<dyn Emulator>, basin: &mut Basin) -> Result<Berth, Problem> {
+fn berth(config: &Config, end: Address, modem: Box<dyn Emulator>, basin: &mut Basin) -> Result<Berth, UserError> {
     let number = if end == Address::SURFACE { config.modem.surface_address } else { end.number() };
     let driver = modem::driver(config, end, ends::modem_of_process(config, end)?)?;
     let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
@@ -169,7 +169,7 @@ fn berth(config: &Config, end: Address, modem: Box<dyn Emulator>, basin: &mut Ba
 }
 
 /// The modem of an end; the surface's has a head.
-fn emulator(config: &Config, address: u8, head: bool, seed: u64) -> Result<Box<dyn Emulator>, Problem> {
+fn emulator(config: &Config, address: u8, head: bool, seed: u64) -> Result<Box<dyn Emulator>, UserError> {
     let seed = seed ^ u64::from(address);
     let baud = Some(config.modem.baud);
     Ok(match config.modem.kind.as_str() {
@@ -182,6 +182,6 @@ fn emulator(config: &Config, address: u8, head: bool, seed: u64) -> Result<Box<d
             let bit_rate = config.modem.bit_rate as u32;
             Box::new(Transparent::new(TransparentConfig { baud, bit_rate, seed, ..TransparentConfig::default() }))
         }
-        other => return Err(Problem::Input(format!("modem.kind = \"{other}\" has no emulator"))),
+        other => return Err(UserError::Input(format!("modem.kind = \"{other}\" has no emulator"))),
     })
 }

@@ -4,7 +4,7 @@ use super::baseline::whole_png;
 use super::mission::{Mission, MissionOptions};
 use super::world::World;
 use crate::config::Config;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -37,7 +37,7 @@ pub fn fidelity(
     world: &World,
     seed: u64,
     progress: &mut dyn FnMut(&FidelityRow),
-) -> Result<Vec<FidelityRow>, Problem> {
+) -> Result<Vec<FidelityRow>, UserError> {
     let mut rows = Vec::new();
     for budget_bps in [100, 250, 1000, 10_000] {
         let mut delta = config.clone();
@@ -58,7 +58,7 @@ fn run(
     seed: u64,
     budget_bps: u32,
     stream: &'static str,
-) -> Result<FidelityRow, Problem> {
+) -> Result<FidelityRow, UserError> {
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
     mission.run(Duration::ZERO, &mut |_| {})?;
     let operator = mission.operator_map();

@@ -1,6 +1,6 @@
 //! GPS receiver and compass of a rehearsed surface vehicle: what they say of where it is.
 
-use crate::asv::position::{LatLon, TangentPlane, nmea};
+use scenecast_core::{LatLon, TangentPlane, nmea};
 use sim_channel::Stream;
 
 /// Standard deviation of the compass, degrees.

@@ -1,6 +1,6 @@
 //! How the vehicle of a rehearsal really moves, and what its own sensors make of it.
 
-use crate::asv::position::wrap_rad;
+use scenecast_core::wrap_rad;
 use sim_channel::Stream;
 
 /// What the vehicle's sensors tell of a step.

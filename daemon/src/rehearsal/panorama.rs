@@ -1,8 +1,8 @@
 //! A picture of a mission: the sea floor with the vehicle's way on the left, the operator's map of it on the right.
 
 use super::mission::Mission;
-use crate::picture::colour;
 use image::{ImageFormat, Rgb, RgbImage};
+use scenecast_core::palette::colour;
 use scenecast_protocol::map::Cell;
 use std::io::Cursor;
 

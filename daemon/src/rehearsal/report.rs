@@ -1,8 +1,8 @@
 //! The figures of a mission.
 
 use super::mission::Mission;
-use crate::figures::dropped;
 use scene_model::tuning::mutual_information_nats;
+use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::schedule::Class;

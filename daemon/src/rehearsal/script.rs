@@ -1,7 +1,7 @@
 //! The scripted operator of a rehearsal.
 
 use crate::asv::{FenceOrder, LimitsOrder, Surface, Wish};
-use crate::auv::Area;
+use scenecast_core::Area;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;

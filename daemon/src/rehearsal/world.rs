@@ -1,9 +1,9 @@
 //! The sea floor of a rehearsal.
 
-use crate::auv::Area;
-use crate::imagery::{read_classes, read_image};
-use crate::problem::Problem;
 use image::RgbImage;
+use scenecast_core::Area;
+use scenecast_core::UserError;
+use scenecast_files::{read_classes, read_image};
 use scenecast_protocol::map::Cell;
 use std::path::Path;
 
@@ -31,11 +31,11 @@ impl World {
     }
 
     /// A mosaic from a file, and its annotation from another of the same size.
-    pub fn from_files(mosaic: &Path, annotations: Option<&Path>, metres_per_pixel: f64) -> Result<Self, Problem> {
+    pub fn from_files(mosaic: &Path, annotations: Option<&Path>, metres_per_pixel: f64) -> Result<Self, UserError> {
         let image = read_image(mosaic)?.to_rgb8();
         if image.width() < 64 || image.height() < 64 {
             let (w, h) = image.dimensions();
-            return Err(Problem::file(
+            return Err(UserError::file(
                 mosaic,
                 format!("the image has {w} x {h} pixels; a mosaic needs at least 64 x 64"),
             ));

@@ -1,7 +1,7 @@
 //! The file of the scene model's checkpoints: the last one or the one before it, whole.
 
 use super::journal::Storage;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::io;
 
 /// The file's name.
@@ -25,12 +25,12 @@ impl<S: Storage> CheckpointFile<S> {
     }
 
     /// The last checkpoint that was kept; none before the first.
-    pub(super) fn read(&self) -> Result<Option<Vec<u8>>, Problem> {
+    pub(super) fn read(&self) -> Result<Option<Vec<u8>>, UserError> {
         self.storage.read(NAME).map_err(|e| self.failed(e))
     }
 
     /// Keeps a checkpoint: a power cut before this has returned leaves the last one or this one.
-    pub(super) fn keep(&mut self, bytes: &[u8]) -> Result<(), Problem> {
+    pub(super) fn keep(&mut self, bytes: &[u8]) -> Result<(), UserError> {
         self.write(bytes).map_err(|e| self.failed(e))
     }
 
@@ -42,7 +42,7 @@ impl<S: Storage> CheckpointFile<S> {
         self.storage.sync_folder()
     }
 
-    fn failed(&self, e: io::Error) -> Problem {
-        Problem::Failed(format!("{}: {e}", self.path().display()))
+    fn failed(&self, e: io::Error) -> UserError {
+        UserError::Failed(format!("{}: {e}", self.path().display()))
     }
 }

@@ -2,8 +2,8 @@
 
 use super::stop::Stop;
 use crate::console::{Console, LinkMeter, MissionFacts, answer, bind, snapshot, start};
-use crate::problem::Problem;
 use crate::rehearsal::Mission;
+use scenecast_core::UserError;
 use scenecast_protocol::time::Instant;
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,7 +19,7 @@ const PUBLISH: Duration = Duration::from_secs(1);
 
 /// Flies a mission at `speed` mission seconds a second and serves the operator's page on `port`, until it is interrupted;
 /// without a page, until the operator has everything.
-pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), Problem> {
+pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
         let console = match port {
@@ -49,7 +49,7 @@ impl Demo {
         Self { meter: LinkMeter::new(window), mission, facts, counted: [0; 2], published: None }
     }
 
-    async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), Problem> {
+    async fn run(mut self, mut console: Option<Console>, mut stop: Stop) -> Result<(), UserError> {
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let mut before = std::time::Instant::now();
@@ -73,7 +73,7 @@ impl Demo {
     }
 
     /// Flies the mission on to `until`, or as far as there is time for.
-    fn fly(&mut self, until: Instant) -> Result<(), Problem> {
+    fn fly(&mut self, until: Instant) -> Result<(), UserError> {
         let end = Instant::from_secs_f64(self.mission.config().survey.duration_s);
         let began = std::time::Instant::now();
         while self.mission.now() < until && began.elapsed() < STEP_LIMIT {

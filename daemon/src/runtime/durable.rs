@@ -2,7 +2,7 @@
 
 use super::journal::{Damage, Journal, JournalError, Storage};
 use crate::auv::{Durable, LastPlace};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::path::Path;
 
 /// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.
@@ -30,7 +30,7 @@ impl<S: Storage> Keeper<S> {
     /// if they are those of the last run the epoch goes on too, otherwise it is one that no run before has used.
     ///
     /// The first run of a mission has the given `lineage`, which is random.
-    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> Result<Run<S>, Problem> {
+    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> Result<Run<S>, UserError> {
         let place = storage.path(JOURNAL);
         let opened = Journal::open(storage, JOURNAL, MOST_BYTES);
         let (journal, state) = opened.map_err(|e| for_people(&place, e))?;
@@ -59,9 +59,9 @@ impl<S: Storage> Keeper<S> {
     }
 
     /// Makes the state durable: a power cut before this has returned leaves the last one or this one.
-    pub(super) fn save(&mut self, durable: &Durable) -> Result<(), Problem> {
+    pub(super) fn save(&mut self, durable: &Durable) -> Result<(), UserError> {
         let place = self.journal.storage().path(JOURNAL);
-        let state = postcard::to_allocvec(durable).map_err(|e| Problem::Failed(e.to_string()))?;
+        let state = postcard::to_allocvec(durable).map_err(|e| UserError::Failed(e.to_string()))?;
         self.journal.persist(&state).map_err(|e| for_people(&place, e))
     }
 }
@@ -73,22 +73,22 @@ fn decode(state: &[u8]) -> Option<Durable> {
     }
 }
 
-fn refuse_earlier_build(storage: &impl Storage) -> Result<(), Problem> {
+fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
     let place = storage.path(BEFORE);
     match storage.read(BEFORE) {
         Ok(None) => Ok(()),
-        Ok(Some(_)) => Err(Problem::file(
+        Ok(Some(_)) => Err(UserError::file(
             &place,
             "the state of an earlier build, which this one does not read; move it away to begin a new mission",
         )),
-        Err(e) => Err(Problem::Failed(format!("{}: {e}", place.display()))),
+        Err(e) => Err(UserError::Failed(format!("{}: {e}", place.display()))),
     }
 }
 
-fn for_people(place: &Path, error: JournalError) -> Problem {
+fn for_people(place: &Path, error: JournalError) -> UserError {
     match error {
-        JournalError::Damage(damage) => Problem::file(place, damage),
-        other => Problem::Failed(format!("{}: {other}", place.display())),
+        JournalError::Damage(damage) => UserError::file(place, damage),
+        other => UserError::Failed(format!("{}: {other}", place.display())),
     }
 }
 
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
     use scenecast_protocol::link::SlotInboxState;
 
-    fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), Problem> {
+    fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), UserError> {
         Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))
     }
 
@@ -175,7 +175,7 @@ mod tests {
             disk.put(name, content);
             begin(&disk).err().unwrap()
         };
-        let input = |text: &str| Problem::Input(text.to_owned());
+        let input = |text: &str| UserError::Input(text.to_owned());
         let other = "vehicle.journal: the file is of another version of scenecast; use that one, or move the file away to \
                      begin a new mission";
         assert_eq!(refused("vehicle.journal", b"scVJRN99"), input(other));

@@ -2,12 +2,12 @@
 
 use super::clock::Clock;
 use super::pilot::{Pilot, depth_m, next_of};
-use crate::asv::position::TangentPlane;
 use crate::autopilot::Goal;
 use crate::auv::Vehicle;
 use crate::config::{Config, origin};
-use crate::problem::Problem;
-use crate::rehearsal::RecordedFrame;
+use scenecast_core::TangentPlane;
+use scenecast_core::UserError;
+use scenecast_files::RecordedFrame;
 
 /// The autopilot, if there is one, and what it must know besides the vehicle's decisions.
 pub(super) struct Flight {
@@ -25,7 +25,7 @@ impl Flight {
     const OLDEST_FIX_S: f64 = 60.0;
 
     /// Opens the way to the autopilot that is configured.
-    pub(super) fn open(config: &Config, clock: Clock) -> Result<Self, Problem> {
+    pub(super) fn open(config: &Config, clock: Clock) -> Result<Self, UserError> {
         let plane = origin(config)?.map(TangentPlane::new);
         Ok(Self { pilot: Pilot::open(config, clock)?, plane, depth_m: depth_m(config), clock, is_rising: false })
     }

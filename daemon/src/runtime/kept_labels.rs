@@ -3,11 +3,12 @@
 use super::checkpoint::CheckpointFile;
 use super::durable::{Keeper, Run};
 use super::journal::disk::{Chance, Disk, Step};
-use crate::auv::{Area, MapUpdate, Vehicle, VehicleOutput};
+use crate::auv::{MapUpdate, Vehicle, VehicleOutput};
 use crate::config::{self, Config};
 use crate::ends;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, TopicId};
+use scenecast_core::Area;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use serde::{Deserialize, Serialize};

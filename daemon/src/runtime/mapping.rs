@@ -4,10 +4,10 @@ use super::checkpoint::CheckpointFile;
 use super::clock::Clock;
 use super::journal::Folder;
 use crate::auv::{MapUpdate, Mapper};
-use crate::problem::Problem;
-use crate::rehearsal::{RecordedFrame, Recording};
 use scene_model::exemplars::Exemplar;
 use scene_model::project::Pose;
+use scenecast_core::UserError;
+use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
 use std::collections::BTreeMap;
 use std::thread::JoinHandle;
@@ -28,7 +28,7 @@ pub(super) enum FromMapper {
     /// The map, after a camera frame or at the start.
     Seen(Seen),
     /// A camera frame that could not be read.
-    Missed(Problem),
+    Missed(UserError),
 }
 
 /// What the thread has made of a camera frame.
@@ -49,12 +49,12 @@ pub(super) struct MapperThread {
 
 impl MapperThread {
     /// Starts the thread.
-    pub(super) fn start(mapper: Mapper, keep: Keep) -> Result<Self, Problem> {
+    pub(super) fn start(mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
         let (orders, incoming) = mpsc::unbounded_channel();
         let (outgoing, seen) = mpsc::channel(4);
         let work = move || Work { mapper, keep, outgoing }.run(incoming);
         let thread = std::thread::Builder::new().name("scene-model".to_owned()).spawn(work);
-        let thread = thread.map_err(|e| Problem::Failed(format!("the scene model's thread did not start: {e}")))?;
+        let thread = thread.map_err(|e| UserError::Failed(format!("the scene model's thread did not start: {e}")))?;
         Ok(Self { orders, seen, thread })
     }
 

@@ -22,13 +22,12 @@ mod vehicle;
 
 pub use clock::Clock;
 pub use demo::run_demo;
-pub(crate) use journal::sync_folder;
 pub use reload::Load;
 pub(crate) use stop::Stop;
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 /// Longest wait for other threads at the end.
@@ -40,12 +39,12 @@ fn random_bits() -> u64 {
 }
 
 /// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
-pub(crate) fn block_on<T>(future: impl Future<Output = Result<T, Problem>>) -> Result<T, Problem> {
+pub(crate) fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     // A second command in the same process (as in tests) keeps the first one's log.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
-    let runtime = runtime.map_err(|e| Problem::Failed(e.to_string()))?;
+    let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
     let result = runtime.block_on(future);
     // A name that is being looked up would hold the end up for as long as the network likes.
     runtime.shutdown_timeout(LONGEST_END);

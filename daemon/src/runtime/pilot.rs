@@ -1,13 +1,13 @@
 //! An autopilot at its port.
 
 use super::clock::Clock;
-use crate::asv::position::LatLon;
 use crate::autopilot::mavlink::MavlinkConfig;
 use crate::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Rehearsed, Step};
 use crate::config::{Config, autopilot_place};
 use crate::port::{FromPort, Port};
-use crate::problem::Problem;
 use crate::rehearsal::Motion;
+use scenecast_core::LatLon;
+use scenecast_core::UserError;
 use std::time::Duration;
 
 /// A state machine and the port that its bytes go through, if it has one.
@@ -20,7 +20,7 @@ pub(super) struct Pilot {
 
 impl Pilot {
     /// The autopilot that is configured, if any.
-    pub(super) fn open(config: &Config, clock: Clock) -> Result<Option<Self>, Problem> {
+    pub(super) fn open(config: &Config, clock: Clock) -> Result<Option<Self>, UserError> {
         let a = &config.autopilot;
         let now = clock.now();
         let silence = Duration::from_secs_f64(a.silence_s);

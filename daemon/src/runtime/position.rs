@@ -3,11 +3,12 @@
 use super::clock::Clock;
 use super::pilot::{Pilot, next_of};
 use crate::asv::Surface;
-use crate::asv::position::{Follow, GpsLanguage, Mounting, Relay, RelayConfig};
+use crate::asv::position::{Follow, Mounting, Relay, RelayConfig};
 use crate::autopilot::Goal;
 use crate::config::{Config, is_gpsd, origin, position_places};
 use crate::port::{FromPort, Port};
-use crate::problem::Problem;
+use scenecast_core::UserError;
+use scenecast_core::gps::GpsLanguage;
 use scenecast_protocol::wire::Address;
 use std::time::Duration;
 
@@ -35,7 +36,7 @@ enum Told {
 
 impl Position {
     /// Opens what is configured, and gives the surface its relay.
-    pub(super) fn open(config: &Config, surface: &mut Surface, clock: Clock) -> Result<Self, Problem> {
+    pub(super) fn open(config: &Config, surface: &mut Surface, clock: Clock) -> Result<Self, UserError> {
         let p = &config.position;
         let [gps, compass] = position_places(config)?;
         let language = if is_gpsd(config) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
@@ -108,7 +109,7 @@ async fn next_of_port(port: &mut Option<Port>) -> FromPort {
     }
 }
 
-fn relay_config(config: &Config, language: GpsLanguage) -> Result<RelayConfig, Problem> {
+fn relay_config(config: &Config, language: GpsLanguage) -> Result<RelayConfig, UserError> {
     let p = &config.position;
     let sound_ratio = if p.sound_speed_m_s > 0.0 { p.sound_speed_m_s / MODEM_SOUND_M_S } else { 1.0 };
     Ok(RelayConfig {

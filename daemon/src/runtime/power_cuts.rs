@@ -3,11 +3,12 @@
 use super::durable::{Keeper, Run};
 use super::journal::disk::{Chance, Disk, Step};
 use crate::asv::Surface;
-use crate::auv::{Area, Durable, MapUpdate, Vehicle, VehicleOutput};
+use crate::auv::{Durable, MapUpdate, Vehicle, VehicleOutput};
 use crate::config::{self, Config};
 use crate::ends;
-use crate::problem::Problem;
 use proptest::prelude::*;
+use scenecast_core::Area;
+use scenecast_core::UserError;
 use scenecast_protocol::directive::{Fix, LifeLine, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
@@ -40,7 +41,7 @@ struct Onboard {
 #[derive(Debug)]
 enum End {
     PowerCut,
-    Problem(Problem),
+    UserError(UserError),
 }
 
 struct World {
@@ -62,7 +63,7 @@ struct World {
     /// Epochs that the surface was told, with the start of the vehicle in which.
     told: BTreeMap<u8, u32>,
     /// What ended a run of the vehicle besides power cuts; the disk is mended after it.
-    problems: Vec<Problem>,
+    problems: Vec<UserError>,
 }
 
 impl World {
@@ -164,7 +165,7 @@ impl World {
             Ok(None) => {}
             Ok(Some(bytes)) => self.transmit(bytes, true),
             Err(End::PowerCut) => self.restart(),
-            Err(End::Problem(problem)) => {
+            Err(End::UserError(problem)) => {
                 self.problems.push(problem);
                 self.disk.fail(None);
                 self.restart();
@@ -198,7 +199,7 @@ impl World {
     fn carry_out(&mut self, output: VehicleOutput) -> Result<(), End> {
         let Onboard { keeper, vehicle, saved, .. } = &mut self.onboard;
         if output == VehicleOutput::Persist {
-            let off = |problem| if self.disk.is_off() { End::PowerCut } else { End::Problem(problem) };
+            let off = |problem| if self.disk.is_off() { End::PowerCut } else { End::UserError(problem) };
             keeper.save(vehicle.durable()).map_err(off)?;
             *saved = vehicle.durable().clone();
             vehicle.handle_persisted();
@@ -315,6 +316,6 @@ fn a_disk_that_fails_ends_the_run_with_a_problem_and_the_next_run_applies_what_i
         world.run();
         let doing = if failing == Step::Sync { "syncing" } else { "writing" };
         let told = format!("vehicle.journal: {doing}: input/output error; check the disk, then start again");
-        assert_eq!(world.problems, [Problem::Failed(told)]);
+        assert_eq!(world.problems, [UserError::Failed(told)]);
     }
 }

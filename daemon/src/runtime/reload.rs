@@ -1,12 +1,12 @@
 //! SIGHUP: the configuration is read again.
 
 use crate::config::Config;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 #[cfg(unix)]
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 /// Reads a configuration, the same file and options each time.
-pub type Load = Box<dyn Fn() -> Result<Config, Problem>>;
+pub type Load = Box<dyn Fn() -> Result<Config, UserError>>;
 
 /// Reads the configuration again whenever SIGHUP asks for it.
 pub(super) struct Reload {
@@ -17,13 +17,13 @@ pub(super) struct Reload {
 
 impl Reload {
     #[cfg(unix)]
-    pub(super) fn new(load: Load) -> Result<Self, Problem> {
-        let hang_ups = signal(SignalKind::hangup()).map_err(|e| Problem::Failed(format!("SIGHUP: {e}")))?;
+    pub(super) fn new(load: Load) -> Result<Self, UserError> {
+        let hang_ups = signal(SignalKind::hangup()).map_err(|e| UserError::Failed(format!("SIGHUP: {e}")))?;
         Ok(Self { load, hang_ups })
     }
 
     #[cfg(not(unix))]
-    pub(super) fn new(load: Load) -> Result<Self, Problem> {
+    pub(super) fn new(load: Load) -> Result<Self, UserError> {
         Ok(Self { load })
     }
 

@@ -6,7 +6,7 @@ use super::journal::Folder;
 use super::mapping::Keep;
 use crate::auv::{Mapper, NoCheckpoint, Restored};
 use crate::config::Config;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::path::Path;
 
 /// What a run begins with.
@@ -20,8 +20,8 @@ pub(super) struct Start {
 ///
 /// A checkpoint that cannot be gone on from costs the map that was learnt, and nothing that was promised: labels begin a
 /// new epoch. So it is said in the log, and does not keep the vehicle from its mission.
-pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, Problem> {
-    let refused = |e: std::io::Error| Problem::file(dir, e);
+pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
+    let refused = |e: std::io::Error| UserError::file(dir, e);
     let folder = Folder::hold(dir).map_err(refused)?;
     let file = CheckpointFile::new(folder.share().map_err(refused)?);
     let restored = if config.scene.checkpoint_s > 0.0 { restore(config, &file)? } else { None };
@@ -50,7 +50,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, Problem> {
     Ok(Start { run, mapper, keep })
 }
 
-fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, Problem> {
+fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {
     let Some(bytes) = file.read()? else { return Ok(None) };
     match Mapper::restore(config, &bytes) {
         Ok(restored) => Ok(Some(restored)),

@@ -1,6 +1,6 @@
 //! Who asks a process to end: a person or the system.
 
-use crate::problem::Problem;
+use scenecast_core::UserError;
 
 /// Hears Ctrl-C and SIGTERM from its making on: one that comes while the process is at other work is not lost.
 pub(crate) struct Stop {
@@ -15,9 +15,9 @@ pub(crate) struct Stop {
 impl Stop {
     /// Listens from now on.
     #[cfg(unix)]
-    pub(crate) fn new() -> Result<Self, Problem> {
+    pub(crate) fn new() -> Result<Self, UserError> {
         use tokio::signal::unix::{SignalKind, signal};
-        let problem = |e| Problem::Failed(format!("the signals to end: {e}"));
+        let problem = |e| UserError::Failed(format!("the signals to end: {e}"));
         Ok(Self {
             interrupt: signal(SignalKind::interrupt()).map_err(problem)?,
             terminate: signal(SignalKind::terminate()).map_err(problem)?,
@@ -26,9 +26,9 @@ impl Stop {
 
     /// Listens from now on.
     #[cfg(not(unix))]
-    pub(crate) fn new() -> Result<Self, Problem> {
+    pub(crate) fn new() -> Result<Self, UserError> {
         let interrupt = tokio::signal::windows::ctrl_c();
-        Ok(Self { interrupt: interrupt.map_err(|e| Problem::Failed(format!("Ctrl-C: {e}")))? })
+        Ok(Self { interrupt: interrupt.map_err(|e| UserError::Failed(format!("Ctrl-C: {e}")))? })
     }
 
     /// Returns when the process is to end; safe to abandon.

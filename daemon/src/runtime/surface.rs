@@ -5,13 +5,13 @@ use super::journal::create_folder;
 use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
-use crate::asv::position::world_file;
 use crate::asv::{Surface, SurfaceOutput};
 use crate::config::{self, Config};
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use crate::modem::{self, Modem, ModemEvent};
-use crate::picture;
-use crate::problem::Problem;
+use scenecast_core::UserError;
+use scenecast_core::label_picture;
+use scenecast_core::world_file;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ use std::time::Duration;
 use tokio::sync::oneshot;
 
 /// Runs the surface until it is interrupted.
-pub fn run_surface(config: Config) -> Result<(), Problem> {
+pub fn run_surface(config: Config) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
         let entrance = match config.console.listen.as_str() {
@@ -32,7 +32,7 @@ pub fn run_surface(config: Config) -> Result<(), Problem> {
         };
         let dir = PathBuf::from(&config.runtime.state_dir);
         let is_again = dir.exists();
-        create_folder(&dir).map_err(|e| Problem::file(&dir, e))?;
+        create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
         let profile = crate::ends::modem_of_process(&config, Address::SURFACE)?;
         warn_without_key(&config);
@@ -72,7 +72,7 @@ struct Host {
 }
 
 impl Host {
-    async fn run(mut self, mut stop: Stop) -> Result<(), Problem> {
+    async fn run(mut self, mut stop: Stop) -> Result<(), UserError> {
         let mut second = tokio::time::interval(Duration::from_secs(1));
         second.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
@@ -130,7 +130,7 @@ impl Host {
     }
 
     /// Carries out what the surface asks for; says whether the page has something new to show.
-    fn pump(&mut self) -> Result<bool, Problem> {
+    fn pump(&mut self) -> Result<bool, UserError> {
         let now: Instant = self.clock.now();
         let mut changed = false;
         while let Some(output) = self.surface.poll_output() {
@@ -161,9 +161,9 @@ impl Host {
         Ok(changed)
     }
 
-    fn write_map(&self, vehicle: Address) -> Result<(), Problem> {
+    fn write_map(&self, vehicle: Address) -> Result<(), UserError> {
         let Some(map) = self.surface.map(vehicle) else { return Ok(()) };
-        let png = match picture::encode(map) {
+        let png = match label_picture::encode(map) {
             Ok(png) => png,
             // What came through the water ends no run.
             Err(e) => {
@@ -175,9 +175,9 @@ impl Host {
         if let (Some(plane), Some(bounds)) = (self.surface.relay().and_then(|r| r.plane()), map.bounds()) {
             let placement = self.surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
             let text = world_file(plane, placement, bounds, self.facts.cell_m);
-            picture::write_whole(&file("pgw"), text.as_bytes())?;
+            scenecast_files::write_whole(&file("pgw"), text.as_bytes())?;
         }
-        picture::write_whole(&file("png"), &png)
+        scenecast_files::write_whole(&file("png"), &png)
     }
 }
 

@@ -9,18 +9,19 @@ use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
-use crate::auv::{Area, Vehicle, VehicleOutput};
+use crate::auv::{Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::modem::{self, Modem, ModemEvent};
-use crate::problem::Problem;
-use crate::rehearsal::Recording;
+use scenecast_core::Area;
+use scenecast_core::UserError;
+use scenecast_files::Recording;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use std::path::Path;
 
 /// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
-pub fn run_vehicle(load: Load) -> Result<(), Problem> {
+pub fn run_vehicle(load: Load) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
         let config = load()?;
@@ -54,10 +55,10 @@ pub fn run_vehicle(load: Load) -> Result<(), Problem> {
     })
 }
 
-fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, Problem> {
+fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, UserError> {
     let area = crate::ends::configured_area(config).or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
-    area.ok_or_else(|| Problem::Input(missing.to_owned()))
+    area.ok_or_else(|| UserError::Input(missing.to_owned()))
 }
 
 struct Host {
@@ -79,7 +80,7 @@ struct Host {
 }
 
 impl Host {
-    async fn run(mut self, mut stop: Stop) -> Result<(), Problem> {
+    async fn run(mut self, mut stop: Stop) -> Result<(), UserError> {
         loop {
             self.pump()?;
             let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
@@ -102,7 +103,7 @@ impl Host {
                 seen = self.mapper.seen.recv() => match seen {
                     Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
                     Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
-                    None => return Err(Problem::Failed("the scene model's thread ended".to_owned())),
+                    None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
             }
         }
@@ -145,7 +146,7 @@ impl Host {
     }
 
     /// One bad frame does not end a mission.
-    fn handle_missed(&mut self, problem: &Problem) {
+    fn handle_missed(&mut self, problem: &UserError) {
         self.behind -= 1;
         self.missed += 1;
         tracing::error!("a camera frame was passed over, {} so far: {problem}", self.missed);
@@ -161,7 +162,7 @@ impl Host {
         }
     }
 
-    fn pump(&mut self) -> Result<(), Problem> {
+    fn pump(&mut self) -> Result<(), UserError> {
         let now: Instant = self.clock.now();
         self.vehicle.steer(now);
         while let Some(output) = self.vehicle.poll_output() {

@@ -1,9 +1,9 @@
 //! Classes that somebody has given to places or pixels.
 
 use super::lines::{Lines, number};
-use crate::imagery::read_classes;
-use crate::problem::Problem;
 use image::GrayImage;
+use scenecast_core::UserError;
+use scenecast_files::read_classes;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -27,20 +27,20 @@ pub(crate) enum Annotated {
 
 impl Annotated {
     /// Reads an indexed or grey image of a mosaic's size.
-    pub(crate) fn of_mosaic(path: &Path, size: (u32, u32), ignore: &[u8]) -> Result<Self, Problem> {
+    pub(crate) fn of_mosaic(path: &Path, size: (u32, u32), ignore: &[u8]) -> Result<Self, UserError> {
         let classes = read_classes(path, size)?;
         let ignore: Vec<u8> = ignore.iter().copied().chain([IGNORE]).collect();
         let Some(classes) = GrayImage::from_raw(size.0, size.1, classes) else {
-            return Err(Problem::file(path, "cut off"));
+            return Err(UserError::file(path, "cut off"));
         };
         if classes.as_raw().iter().all(|class| ignore.contains(class)) {
-            return Err(Problem::file(path, "nothing is annotated"));
+            return Err(UserError::file(path, "nothing is annotated"));
         }
         Ok(Self::Pixels { classes, ignore })
     }
 
     /// Reads lines `x,y,z,class` in metres, a class being a number or a name.
-    pub(crate) fn of_places(path: &Path, ignore: &[u8]) -> Result<Self, Problem> {
+    pub(crate) fn of_places(path: &Path, ignore: &[u8]) -> Result<Self, UserError> {
         let mut lines = Lines::open(path)?;
         let (mut places, mut names) = (Vec::new(), BTreeMap::new());
         while let Some(line) = lines.next()? {
@@ -61,7 +61,7 @@ impl Annotated {
             places.push((at, index as u8));
         }
         if places.is_empty() {
-            return Err(Problem::file(path, "nothing is annotated; lines are x,y,z,class"));
+            return Err(UserError::file(path, "nothing is annotated; lines are x,y,z,class"));
         }
         Ok(Self::Places(places))
     }
@@ -81,7 +81,7 @@ fn parse(text: &str) -> Result<([f64; 3], &str), String> {
 mod tests {
     use super::*;
 
-    fn read(name: &str, text: &str) -> Result<Vec<([f64; 3], u8)>, Problem> {
+    fn read(name: &str, text: &str) -> Result<Vec<([f64; 3], u8)>, UserError> {
         let path = std::env::temp_dir().join(format!("scenecast-{}-classes-{name}.csv", std::process::id()));
         std::fs::write(&path, text).unwrap();
         match Annotated::of_places(&path, &[7])? {

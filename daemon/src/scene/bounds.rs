@@ -1,7 +1,7 @@
 //! How far a map may reach: it is written as a picture.
 
-use crate::problem::Problem;
 use scene_model::topics::FlatCell;
+use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
 
 /// Most cells of the rectangle around a map.
@@ -19,12 +19,12 @@ pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<
 }
 
 /// The rectangle around a map; one cell if there is none.
-pub(super) fn around(map: &[FlatCell]) -> Result<Rect, Problem> {
+pub(super) fn around(map: &[FlatCell]) -> Result<Rect, UserError> {
     let Some(first) = map.first() else { return Ok(Rect { x: 0, y: 0, width: 1, height: 1 }) };
     let mut limits = (first.x, first.y, first.x, first.y);
     for cell in map {
         limits = (limits.0.min(cell.x), limits.1.min(cell.y), limits.2.max(cell.x), limits.3.max(cell.y));
     }
     let (west, south, east, north) = limits;
-    rectangle(west.into(), south.into(), east.into(), north.into()).map_err(Problem::Input)
+    rectangle(west.into(), south.into(), east.into(), north.into()).map_err(UserError::Input)
 }

@@ -1,10 +1,10 @@
 //! Words of a recorded survey: images from above with their poses.
 
 use super::{Sighting, Source};
-use crate::problem::Problem;
-use crate::rehearsal::Recording;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::words::WordExtractor;
+use scenecast_core::UserError;
+use scenecast_files::Recording;
 use std::path::Path;
 
 /// The frames of a recording; those that cannot be read are counted and passed over.
@@ -23,14 +23,14 @@ impl Frames {
         extractor: WordExtractor,
         metres_per_pixel: f64,
         cell_m: f64,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, UserError> {
         let recording = Recording::open(dir, metres_per_pixel)?;
         Ok(Self { recording, extractor, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new() })
     }
 }
 
 impl Source for Frames {
-    fn next(&mut self) -> Result<Option<Sighting>, Problem> {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         while let Some(frame) = self.recording.frames.get(self.next) {
             self.next += 1;
             let done = self.next as f64 / self.recording.frames.len() as f64;

@@ -2,8 +2,8 @@
 
 use super::process::cpu_seconds;
 use super::{Sighting, Source};
-use crate::problem::Problem;
 use scene_model::topics::{Inserted, SceneModel};
+use scenecast_core::UserError;
 use std::time::Instant;
 
 /// Longest time between two sightings that is refined for, seconds.
@@ -50,7 +50,7 @@ pub(crate) fn learn(
     source: &mut dyn Source,
     schedule: Schedule,
     progress: &mut dyn FnMut(f64),
-) -> Result<Effort, Problem> {
+) -> Result<Effort, UserError> {
     let mut effort = Effort::default();
     let (mut owed, mut last, mut gaps) = (0.0, None, (0.0, 0u64));
     let mut refine = |model: &mut SceneModel, effort: &mut Effort, words: f64| {

@@ -1,6 +1,6 @@
 //! Text files, line by line, however long a line or a file is.
 
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
@@ -30,11 +30,11 @@ pub(super) struct Line<'a> {
 }
 
 impl Lines {
-    pub(super) fn open(path: &Path) -> Result<Self, Problem> {
-        let file = File::open(path).map_err(|e| Problem::file(path, e))?;
-        let about = file.metadata().map_err(|e| Problem::file(path, e))?;
+    pub(super) fn open(path: &Path) -> Result<Self, UserError> {
+        let file = File::open(path).map_err(|e| UserError::file(path, e))?;
+        let about = file.metadata().map_err(|e| UserError::file(path, e))?;
         if !about.is_file() {
-            return Err(Problem::file(path, "a file is needed that can be read twice, no folder and no pipe"));
+            return Err(UserError::file(path, "a file is needed that can be read twice, no folder and no pipe"));
         }
         let reader = BufReader::with_capacity(1 << 16, file);
         let length = about.len();
@@ -47,30 +47,30 @@ impl Lines {
     }
 
     /// A problem with the line that was read last.
-    pub(super) fn problem(&self, what: impl Display) -> Problem {
-        Problem::Input(format!("{}:{}: {what}", self.path.display(), self.number))
+    pub(super) fn problem(&self, what: impl Display) -> UserError {
+        UserError::Input(format!("{}:{}: {what}", self.path.display(), self.number))
     }
 
     /// Goes to where a line begins.
-    pub(super) fn seek(&mut self, offset: u64, number: u64) -> Result<(), Problem> {
+    pub(super) fn seek(&mut self, offset: u64, number: u64) -> Result<(), UserError> {
         if offset != self.offset {
             let moved = match i64::try_from(i128::from(offset) - i128::from(self.offset)) {
                 Ok(by) => self.reader.seek_relative(by),
                 Err(_) => self.reader.seek(SeekFrom::Start(offset)).map(drop),
             };
-            moved.map_err(|e| Problem::file(&self.path, e))?;
+            moved.map_err(|e| UserError::file(&self.path, e))?;
         }
         (self.offset, self.number) = (offset, number - 1);
         Ok(())
     }
 
     /// The next line; none at the end of the file.
-    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, Problem> {
+    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, UserError> {
         loop {
             self.buffer.clear();
             let offset = self.offset;
             let read = (&mut self.reader).take(MOST_BYTES as u64 + 1).read_until(b'\n', &mut self.buffer);
-            let read = read.map_err(|e| Problem::file(&self.path, e))?;
+            let read = read.map_err(|e| UserError::file(&self.path, e))?;
             if read == 0 {
                 return Ok(None);
             }

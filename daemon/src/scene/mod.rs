@@ -10,7 +10,6 @@ mod outcome;
 mod process;
 mod quality;
 mod tum;
-mod vocabulary;
 mod words_file;
 
 pub(crate) use annotations::Annotated;
@@ -19,12 +18,12 @@ pub(crate) use learn::{Schedule, learn};
 pub(crate) use mosaic::Mosaic;
 pub(crate) use outcome::{Outcome, write};
 pub(crate) use quality::{Quality, quality};
+pub(crate) use scenecast_files::read_vocabulary;
 pub(crate) use tum::{Intrinsics, Tum};
-pub(crate) use vocabulary::read_vocabulary;
 pub(crate) use words_file::WordsFile;
 
-use crate::problem::Problem;
 use scene_model::project::Observation;
+use scenecast_core::UserError;
 
 /// What was seen at one time.
 pub(crate) struct Sighting {
@@ -39,7 +38,7 @@ pub(crate) struct Sighting {
 /// Where words come from.
 pub(crate) trait Source {
     /// The next sighting, in order of time; none at the end.
-    fn next(&mut self) -> Result<Option<Sighting>, Problem>;
+    fn next(&mut self) -> Result<Option<Sighting>, UserError>;
 
     /// What was passed over so far, for people; nothing if nothing was.
     fn skipped(&self) -> Option<String> {

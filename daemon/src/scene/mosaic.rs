@@ -1,10 +1,10 @@
 //! Words of a mosaic: one image of the ground from above.
 
 use super::{Sighting, Source};
-use crate::imagery::read_image;
-use crate::problem::Problem;
 use scene_model::project::Observation;
 use scene_model::words::WordExtractor;
+use scenecast_core::UserError;
+use scenecast_files::read_image;
 use std::path::Path;
 
 /// Least edge of a cell: with less there is nothing to see in one.
@@ -26,19 +26,19 @@ impl Mosaic {
         extractor: &mut WordExtractor,
         metres_per_pixel: f64,
         cell_m: f64,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, UserError> {
         let cell_px = cell_m / metres_per_pixel;
         let image = read_image(path)?.to_rgb8();
         let (width, height) = image.dimensions();
         if cell_px < LEAST_CELL_PX {
             let what =
                 format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {LEAST_CELL_PX} are needed");
-            return Err(Problem::Input(what));
+            return Err(UserError::Input(what));
         }
         if f64::from(width.min(height)) < cell_px {
             let what =
                 format!("the image has {width} x {height} pixels; a mosaic needs at least a cell of {cell_px:.1}");
-            return Err(Problem::file(path, what));
+            return Err(UserError::file(path, what));
         }
         let place = |word: &scene_model::words::Word| Observation {
             word: word.id,
@@ -54,7 +54,7 @@ impl Mosaic {
 }
 
 impl Source for Mosaic {
-    fn next(&mut self) -> Result<Option<Sighting>, Problem> {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         Ok(self.observations.take().map(|observations| Sighting { t_s: 0.0, observations, done: 1.0 }))
     }
 }

@@ -4,9 +4,10 @@ use super::Quality;
 use super::bounds::around;
 use super::learn::Effort;
 use super::process::peak_rss_bytes;
-use crate::picture::{encode_within, write_whole};
-use crate::problem::Problem;
 use scene_model::topics::{FlatCell, SceneModel, TopicId, centre_of};
+use scenecast_core::UserError;
+use scenecast_core::label_picture::encode_within;
+use scenecast_files::write_whole;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use serde::Serialize;
 use std::fmt::Write;
@@ -62,7 +63,7 @@ fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
 
 /// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions by y, x; of stacked cells the one
 /// that the map shows comes last.
-pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), Problem> {
+pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), UserError> {
     let (map, mut volume) = (model.label_map(), model.label_volume());
     // Painted in this order the rows make the flattened map.
     let shows =
@@ -72,14 +73,14 @@ pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), Problem> {
     let label = |topic| topics.binary_search(&topic).map_or(0, |index| (index + 1).min(254)) as u8;
     let bounds = around(&map)?;
     let grid: LabelGrid = map.iter().map(|cell| (Cell::new(cell.x, cell.y), label(cell.topic))).collect();
-    let png = encode_within(&grid, bounds).map_err(|e| Problem::Failed(e.to_string()))?;
+    let png = encode_within(&grid, bounds).map_err(|e| UserError::Failed(e.to_string()))?;
     let mut table = "x,y,z,label,confidence,perplexity\n".to_owned();
     for cell in &volume {
         let [x, y, z] = centre_of([cell.x, cell.y, cell.z], model.config().cell_m);
         let (label, FlatCell { confidence, perplexity, .. }) = (label(cell.topic), cell);
         let _ = writeln!(table, "{x:.6},{y:.6},{z:.6},{label},{confidence:.4},{perplexity:.4}");
     }
-    std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, e))?;
+    std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
     write_whole(&dir.join("labels.csv"), table.as_bytes())?;
     write_whole(&dir.join("labels.png"), &png)
 }

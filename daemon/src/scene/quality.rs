@@ -2,10 +2,10 @@
 
 use super::Annotated;
 use super::bounds::around;
-use crate::problem::Problem;
 use image::{GrayImage, Luma};
 use scene_model::score::{Annotations, LabelGrid, SceneScore, score};
 use scene_model::topics::{FlatCell, SceneModel, coord_of};
+use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
 use std::collections::BTreeMap;
 
@@ -20,8 +20,8 @@ const NONE: u8 = 255;
 /// Scores a model, cell by cell; a cell has the class that most of its pixels or places have, ties to the lowest.
 ///
 /// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
-pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, Problem> {
-    let refused = |e: scene_model::score::AnnotationError| Problem::Input(e.to_string());
+pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
+    let refused = |e: scene_model::score::AnnotationError| UserError::Input(e.to_string());
     match annotated {
         Annotated::Pixels { classes, ignore } => {
             let annotations = Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(refused)?;
@@ -45,7 +45,7 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn new(volume: &[FlatCell], places: &[([f64; 3], u8)]) -> Result<Self, Problem> {
+    fn new(volume: &[FlatCell], places: &[([f64; 3], u8)]) -> Result<Self, UserError> {
         let bounds = around(volume)?;
         let mut layers: Vec<i32> = volume.iter().map(|cell| cell.z).collect();
         layers.sort_unstable();
@@ -55,7 +55,7 @@ impl Sheet {
         if cells * classes > MOST_COUNTS {
             let what =
                 format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
-            return Err(Problem::Input(what));
+            return Err(UserError::Input(what));
         }
         Ok(Self { bounds, layers })
     }

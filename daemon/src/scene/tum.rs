@@ -5,11 +5,11 @@
 
 use super::lines::{Lines, number};
 use super::{Sighting, Source};
-use crate::imagery::read_image;
-use crate::problem::Problem;
 use image::{DynamicImage, RgbImage};
 use scene_model::project::{CameraPose, DepthImage, PinholeCamera};
 use scene_model::words::WordExtractor;
+use scenecast_core::UserError;
+use scenecast_files::read_image;
 use std::path::{Path, PathBuf};
 
 /// Longest time between an image and the depth or the pose that it is taken for, seconds.
@@ -64,7 +64,7 @@ impl Tum {
         intrinsics: Option<Intrinsics>,
         depth_scale: f64,
         cell_m: f64,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, UserError> {
         let images = read_list(&dir.join("rgb.txt"), file)?;
         let depths = read_list(&dir.join("depth.txt"), file)?;
         let poses = read_list(&dir.join("groundtruth.txt"), pose)?;
@@ -77,7 +77,7 @@ impl Tum {
         let without_partner = images.len() - frames.len();
         if frames.is_empty() {
             let what = format!("none of its {} images has a depth image and a pose within {APART_S} s", images.len());
-            return Err(Problem::file(&dir.join("rgb.txt"), what));
+            return Err(UserError::file(&dir.join("rgb.txt"), what));
         }
         Ok(Self {
             all: images.len(),
@@ -113,7 +113,7 @@ impl Tum {
 }
 
 impl Source for Tum {
-    fn next(&mut self) -> Result<Option<Sighting>, Problem> {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         while let Some(frame) = self.frames.next() {
             match self.see(&frame) {
                 Ok(observations) => {
@@ -143,7 +143,7 @@ impl Source for Tum {
 }
 
 /// Lines `time what`, by time; complaints name the line.
-fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<(f64, T)>, Problem> {
+fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<(f64, T)>, UserError> {
     let mut lines = Lines::open(path)?;
     let mut list = Vec::new();
     while let Some(line) = lines.next()? {
@@ -152,7 +152,7 @@ fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result
         list.push(entry.map_err(|what| lines.problem(what))?);
     }
     if list.is_empty() {
-        return Err(Problem::file(path, "there are no lines"));
+        return Err(UserError::file(path, "there are no lines"));
     }
     list.sort_by(|a, b| a.0.total_cmp(&b.0));
     Ok(list)

@@ -3,9 +3,9 @@
 use super::bounds::rectangle;
 use super::lines::{Line, Lines, number};
 use super::{Sighting, Source};
-use crate::problem::Problem;
 use scene_model::project::Observation;
 use scene_model::topics::coord_of;
+use scenecast_core::UserError;
 use std::path::Path;
 
 /// Words of one sighting at most; so much is held at once.
@@ -39,7 +39,12 @@ struct Mark {
 
 impl WordsFile {
     /// Checks a file; with `in_time` its lines come in order of time, otherwise as they are.
-    pub(crate) fn open(path: &Path, vocabulary: Option<u32>, cell_m: [f64; 3], in_time: bool) -> Result<Self, Problem> {
+    pub(crate) fn open(
+        path: &Path,
+        vocabulary: Option<u32>,
+        cell_m: [f64; 3],
+        in_time: bool,
+    ) -> Result<Self, UserError> {
         let mut lines = Lines::open(path)?;
         let mut extent = Extent::new(cell_m);
         let (mut marks, mut largest, mut words, mut begun) = (Vec::new(), 0, 0u64, 0);
@@ -67,7 +72,7 @@ impl WordsFile {
             }
         }
         if words == 0 {
-            return Err(Problem::file(path, "there are no words; lines are t,x,y,z,w1,w2,..."));
+            return Err(UserError::file(path, "there are no words; lines are t,x,y,z,w1,w2,..."));
         }
         let is_sorted = marks.is_sorted_by(|a, b| a.t_s <= b.t_s);
         marks.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -84,7 +89,7 @@ impl WordsFile {
     }
 
     /// The next line with its time; none at the end.
-    fn next_line(&mut self) -> Result<Option<(f64, Vec<Observation>)>, Problem> {
+    fn next_line(&mut self) -> Result<Option<(f64, Vec<Observation>)>, UserError> {
         if let Some(ahead) = self.ahead.take() {
             return Ok(Some(ahead));
         }
@@ -113,7 +118,7 @@ impl WordsFile {
 }
 
 impl Source for WordsFile {
-    fn next(&mut self) -> Result<Option<Sighting>, Problem> {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         let Some((t_s, mut observations)) = self.next_line()? else { return Ok(None) };
         while observations.len() < MOST_WORDS {
             let Some((later_s, more)) = self.next_line()? else { break };
@@ -170,7 +175,7 @@ impl Extent {
 mod tests {
     use super::*;
 
-    fn open(name: &str, text: &str, vocabulary: Option<u32>, in_time: bool) -> Result<WordsFile, Problem> {
+    fn open(name: &str, text: &str, vocabulary: Option<u32>, in_time: bool) -> Result<WordsFile, UserError> {
         let path = std::env::temp_dir().join(format!("scenecast-{}-{name}.csv", std::process::id()));
         std::fs::write(&path, text).unwrap();
         let opened = WordsFile::open(&path, vocabulary, [1.0; 3], in_time);

@@ -3,8 +3,8 @@
 //! gpsd greets with a `VERSION` object; [`WATCH`] asks for reports; each report is an object on a line of its own. Used
 //! are `TPV` (time, position, velocity) and the heading of `ATT`. Source: gpsd_json(5).
 
-use super::geodesy::LatLon;
-use super::nmea::Sentence;
+use crate::geodesy::LatLon;
+use crate::nmea::Sentence;
 use serde::Deserialize;
 
 /// What asks gpsd for reports.

@@ -1,8 +1,10 @@
 //! What a receiver says, made into positions that can be believed.
 
-use super::geodesy::LatLon;
-use super::nmea::Sentence;
-use super::{gpsd, line::Lines, nmea};
+use crate::geodesy::LatLon;
+use crate::nmea::Sentence;
+mod gpsd;
+
+use crate::{Lines, nmea};
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -45,7 +45,7 @@ impl TuningTable {
 }
 
 /// The row with the highest mutual information; of equals the one with the smaller stream.
-pub(crate) fn most<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
+pub fn most<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
     let key = |row: &Row| (row.measurement.mutual_information_nats, -row.measurement.stream_bps);
     rows.max_by(|a, b| {
         let ((a, lean), (b, leaner)) = (key(a), key(b));
@@ -54,7 +54,7 @@ pub(crate) fn most<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
 }
 
 /// The row with the smallest stream.
-pub(crate) fn least<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
+pub fn least<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
     rows.min_by(|a, b| a.measurement.stream_bps.total_cmp(&b.measurement.stream_bps))
 }
 

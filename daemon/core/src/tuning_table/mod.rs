@@ -4,5 +4,5 @@ mod fit;
 mod table;
 
 pub use fit::{Fit, NoRow};
-pub(crate) use fit::{least, most};
+pub use fit::{least, most};
 pub use table::{Measurement, Row, Setting, TuningTable};

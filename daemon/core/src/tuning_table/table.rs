@@ -1,6 +1,6 @@
 //! The table of `scenecast tune`: a line a setting, with what it reaches and what its stream takes.
 
-use crate::problem::Problem;
+use crate::UserError;
 use scenecast_protocol::directive::CellBand;
 use std::fmt;
 use std::path::Path;
@@ -82,15 +82,15 @@ impl TuningTable {
     }
 
     /// The table in a file, or the one that ships if no file is named.
-    pub fn load(file: &str) -> Result<Self, Problem> {
+    pub fn load(file: &str) -> Result<Self, UserError> {
         if file.is_empty() {
             return Ok(Self::shipped());
         }
         let path = Path::new(file);
-        let text = std::fs::read_to_string(path).map_err(|e| Problem::file(path, e))?;
-        let table = Self::read(&text).map_err(|(line, what)| Problem::Input(format!("{file}:{line}: {what}")))?;
+        let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+        let table = Self::read(&text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
         if table.rows.is_empty() {
-            return Err(Problem::Input(format!("{file}: the table has no line; scenecast tune writes them")));
+            return Err(UserError::Input(format!("{file}: the table has no line; scenecast tune writes them")));
         }
         Ok(table)
     }

@@ -6,20 +6,10 @@
 
 mod filter;
 mod follow;
-mod geodesy;
-mod gps;
-mod gpsd;
-mod line;
-pub mod nmea;
 mod relay;
 mod usbl;
-mod world_file;
 
 pub use filter::{Estimate, PlaneFilter, Verdict};
 pub use follow::Follow;
-pub use geodesy::{LatLon, TangentPlane, wrap_rad};
-pub use gps::{Gps, GpsFault, GpsFix, GpsLanguage};
-pub use line::Lines;
 pub use relay::{Relay, RelayConfig, RelayFault};
 pub use usbl::{Mounting, UsblFault, UsblSighting};
-pub use world_file::world_file;

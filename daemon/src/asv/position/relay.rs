@@ -1,9 +1,9 @@
 //! The relay: where the surface is, and where it sees the vehicles.
 
 use super::filter::{Estimate, PlaneFilter, Verdict};
-use super::geodesy::{LatLon, TangentPlane};
-use super::gps::{Gps, GpsLanguage};
 use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
+use scenecast_core::gps::{Gps, GpsLanguage};
+use scenecast_core::{LatLon, TangentPlane};
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -237,9 +237,9 @@ impl Relay {
 
 #[cfg(test)]
 mod tests {
-    use super::super::nmea;
     use super::*;
     use proptest::prelude::*;
+    use scenecast_core::nmea;
 
     const ORIGIN: LatLon = LatLon { lat_deg: 29.5, lon_deg: 34.92 };
 

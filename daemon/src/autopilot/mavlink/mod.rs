@@ -4,9 +4,9 @@ pub mod frame;
 pub mod message;
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
-use crate::asv::position::LatLon;
 use frame::{Deframer, Frame, encode};
 use message::{Heard, Said, heard_extra};
+use scenecast_core::LatLon;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -298,7 +298,7 @@ fn units(place: LatLon) -> (i32, i32) {
 
 /// A place so many metres further.
 fn moved(place: LatLon, east_m: f64, north_m: f64) -> LatLon {
-    crate::asv::position::TangentPlane::new(place).to_place(east_m, north_m)
+    scenecast_core::TangentPlane::new(place).to_place(east_m, north_m)
 }
 
 impl Autopilot for Mavlink {

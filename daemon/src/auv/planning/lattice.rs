@@ -1,6 +1,7 @@
 //! Places to plan over, and the ways between them.
 
-use super::bounds::{Area, Bounds, Point, distance};
+use super::bounds::{Bounds, Point, distance};
+use scenecast_core::Area;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

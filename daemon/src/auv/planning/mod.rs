@@ -9,7 +9,7 @@ mod lawnmower;
 mod way_back;
 mod worth;
 
-pub use bounds::{Area, Bounds, Point, distance};
+pub use bounds::{Bounds, Point, distance};
 pub use expect::{Expectation, Seen};
 pub use greedy::Greedy;
 pub use horizon::Horizon;
@@ -74,6 +74,7 @@ pub fn planner(kind: PlannerKind) -> Box<dyn Planner> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use scenecast_core::Area;
     use scenecast_protocol::directive::{Fence, Place, Polygon, Utility};
     use scenecast_protocol::map::{Cell, LabelGrid};
 

@@ -53,8 +53,9 @@ impl WayBack {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Area, Bounds, Knowledge, Lattice, Window, Worth};
+    use super::super::{Bounds, Knowledge, Lattice, Window, Worth};
     use super::*;
+    use scenecast_core::Area;
     use scenecast_protocol::directive::Utility;
     use scenecast_protocol::map::{Cell, LabelGrid};
 

@@ -111,7 +111,7 @@ const MOST_CELLS: f64 = 4e6;
 
 impl Window {
     /// The cells of an area; fewer where that would be too many.
-    pub fn new(area: super::bounds::Area, cell_m: f64) -> Self {
+    pub fn new(area: scenecast_core::Area, cell_m: f64) -> Self {
         let cell = |metres: f64| (metres / cell_m + 1e-9).floor().clamp(-1e9, 1e9) as i32;
         let (x, y) = (cell(area.west), cell(area.south));
         let count =

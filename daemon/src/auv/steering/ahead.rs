@@ -94,7 +94,8 @@ impl Steering {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::auv::{Area, Course, Footprint};
+    use crate::auv::{Course, Footprint};
+    use scenecast_core::Area;
     use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
     use scenecast_protocol::map::{Cell, LabelGrid};
 

@@ -1,12 +1,13 @@
 //! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
 
 use super::{Vehicle, VehicleOutput};
-use crate::auv::{Area, Durable, MapUpdate, Navigator};
+use crate::auv::{Durable, MapUpdate, Navigator};
 use crate::config::Config;
 use crate::ends;
 use crate::rehearsal::motion::Motion;
 use crate::rehearsal::witness::stretches_outside;
 use proptest::prelude::*;
+use scenecast_core::Area;
 use scenecast_protocol::directive::{
     CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason,
     Settings, Slot, Utility,

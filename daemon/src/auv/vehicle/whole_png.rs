@@ -1,6 +1,6 @@
 //! For comparison: the whole map as a PNG whenever it has changed, instead of what changed.
 
-use crate::picture;
+use scenecast_core::label_picture;
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::object::ObjectId;
@@ -40,8 +40,8 @@ impl WholePng {
         if self.outstanding.is_some() || self.sent == self.version {
             return;
         }
-        if let Ok(png) = picture::encode(&self.map) {
-            self.outstanding = link.push_object(picture::with_place(&self.map, &png));
+        if let Ok(png) = label_picture::encode(&self.map) {
+            self.outstanding = link.push_object(label_picture::with_place(&self.map, &png));
             self.sent = self.version;
         }
     }

@@ -3,8 +3,8 @@
 use crate::asv::LimitsOrder;
 use crate::console::orders::ConstraintsOrder;
 use crate::ctl::Ctl;
-use crate::problem::Problem;
 use clap::{Args, Subcommand};
+use scenecast_core::UserError;
 use std::path::PathBuf;
 
 const FILE: &str = "\
@@ -92,7 +92,7 @@ fn band(text: &str) -> Result<[f64; 2], String> {
     ends.ok_or_else(|| "it takes LOW..HIGH in metres, as in 5..30".to_owned())
 }
 
-pub(super) async fn fence(ctl: &Ctl, change: Option<FenceCommand>) -> Result<(), Problem> {
+pub(super) async fn fence(ctl: &Ctl, change: Option<FenceCommand>) -> Result<(), UserError> {
     match change {
         None => ctl.fence().await,
         Some(FenceCommand::Set { file, metres }) => ctl.set_fence(&file, metres).await,
@@ -100,14 +100,14 @@ pub(super) async fn fence(ctl: &Ctl, change: Option<FenceCommand>) -> Result<(),
     }
 }
 
-pub(super) async fn return_point(ctl: &Ctl, change: ReturnPointCommand) -> Result<(), Problem> {
+pub(super) async fn return_point(ctl: &Ctl, change: ReturnPointCommand) -> Result<(), UserError> {
     match change {
         ReturnPointCommand::Set { east_m, north_m } => ctl.set_return_point(Some([east_m, north_m])).await,
         ReturnPointCommand::Clear => ctl.set_return_point(None).await,
     }
 }
 
-pub(super) async fn limits(ctl: &Ctl, change: Option<LimitsCommand>) -> Result<(), Problem> {
+pub(super) async fn limits(ctl: &Ctl, change: Option<LimitsCommand>) -> Result<(), UserError> {
     let Some(LimitsCommand::Set(l)) = change else { return ctl.limits().await };
     let order = LimitsOrder {
         depth_m: l.depth,
@@ -123,13 +123,13 @@ pub(super) async fn limits(ctl: &Ctl, change: Option<LimitsCommand>) -> Result<(
 }
 
 /// Hold, or go on.
-pub(super) async fn hold(ctl: &Ctl, hold: bool) -> Result<(), Problem> {
+pub(super) async fn hold(ctl: &Ctl, hold: bool) -> Result<(), UserError> {
     ctl.constrain(ConstraintsOrder { hold, abort: false }).await
 }
 
-pub(super) async fn abort(ctl: &Ctl, yes: bool) -> Result<(), Problem> {
+pub(super) async fn abort(ctl: &Ctl, yes: bool) -> Result<(), UserError> {
     if !yes {
-        return Err(Problem::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
+        return Err(UserError::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
     }
     ctl.constrain(ConstraintsOrder { hold: false, abort: true }).await
 }

@@ -6,9 +6,9 @@ use crate::asv::SettingsOrder;
 use crate::config;
 use crate::console::orders::ExemplarWish;
 use crate::ctl::{self, BudgetChange, Client, SettingsChange};
-use crate::problem::Problem;
 use clap::{Args, Subcommand};
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
+use scenecast_core::UserError;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -256,10 +256,10 @@ fn class_percent(text: &str) -> Result<(String, u8), String> {
 }
 
 impl Ctl {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let wait = match self.wait {
             Some(s) if !(0.0..=1e6).contains(&s) => {
-                return Err(Problem::Input(format!("--wait {s}: it takes 0 to 1000000 seconds")));
+                return Err(UserError::Input(format!("--wait {s}: it takes 0 to 1000000 seconds")));
             }
             wait => wait.map(Duration::from_secs_f64),
         };

@@ -4,8 +4,8 @@ use super::Coding;
 use super::change::{Sizes, encode, refused, sizes};
 use super::files::{numbered, read_map, same_size};
 use crate::cli::progress::Progress;
-use crate::problem::Problem;
 use clap::Args;
+use scenecast_core::UserError;
 use scenecast_protocol::map_codec::Plane;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -44,7 +44,7 @@ struct Totals {
 }
 
 impl Bench {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let files = numbered(&self.series)?;
         let mut totals = Totals { frame_bytes: self.coding.frame_bytes, ..Totals::default() };
         totals.sizes.codec = self.coding.codec.to_string();
@@ -66,7 +66,7 @@ impl Bench {
         drop(progress);
         totals.finish();
         if self.json {
-            println!("{}", serde_json::to_string(&totals).map_err(|e| Problem::Failed(e.to_string()))?);
+            println!("{}", serde_json::to_string(&totals).map_err(|e| UserError::Failed(e.to_string()))?);
         } else {
             totals.print();
         }
@@ -75,13 +75,13 @@ impl Bench {
 }
 
 impl Totals {
-    fn add(&mut self, coding: &Coding, base: &Plane, target: &Plane) -> Result<(), Problem> {
+    fn add(&mut self, coding: &Coding, base: &Plane, target: &Plane) -> Result<(), UserError> {
         let started = Instant::now();
         let (file, cells_changed) = encode(coding, base, target)?;
         let decoded = file.apply(Some(base)).map_err(refused)?;
         let ms = started.elapsed().as_secs_f64() * 1000.0;
         if decoded != *target {
-            return Err(Problem::Failed(format!("step {} does not decode to its map", self.steps + 1)));
+            return Err(UserError::Failed(format!("step {} does not decode to its map", self.steps + 1)));
         }
         self.steps += 1;
         self.step_ms_mean += ms;

@@ -2,7 +2,7 @@
 
 use super::Coding;
 use super::zopfli_bytes::zopfli_bytes;
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, Plane};
 use serde::Serialize;
 
@@ -32,13 +32,13 @@ impl Sizes {
 }
 
 /// The chunks from `base` to `target`, and how many cells they change.
-pub(super) fn encode(coding: &Coding, base: &Plane, target: &Plane) -> Result<(ChunkFile, usize), Problem> {
+pub(super) fn encode(coding: &Coding, base: &Plane, target: &Plane) -> Result<(ChunkFile, usize), UserError> {
     ChunkFile::encode(coding.codec, base, target, coding.frame_bytes.into()).map_err(refused)
 }
 
 /// Wrong input, for the files were read before.
-pub(super) fn refused(error: ChunkFileError) -> Problem {
-    Problem::Input(error.to_string())
+pub(super) fn refused(error: ChunkFileError) -> UserError {
+    UserError::Input(error.to_string())
 }
 
 /// Sizes of an encoded change, beside those of the PNG files.

@@ -1,9 +1,9 @@
 //! `scenecast map decode`
 
 use super::files::read_map;
-use crate::picture::write_whole;
-use crate::problem::Problem;
 use clap::Args;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use scenecast_protocol::map_codec::ChunkFile;
 use std::path::PathBuf;
 
@@ -23,9 +23,9 @@ pub(crate) struct Decode {
 }
 
 impl Decode {
-    pub(super) fn run(self) -> Result<(), Problem> {
-        let refused = |e| Problem::file(&self.input, e);
-        let bytes = std::fs::read(&self.input).map_err(|e| Problem::file(&self.input, e))?;
+    pub(super) fn run(self) -> Result<(), UserError> {
+        let refused = |e| UserError::file(&self.input, e);
+        let bytes = std::fs::read(&self.input).map_err(|e| UserError::file(&self.input, e))?;
         let file = ChunkFile::from_bytes(&bytes).map_err(refused)?;
         let base = self.base.as_deref().map(read_map).transpose()?;
         let map = file.apply(base.as_ref()).map_err(refused)?;

@@ -3,9 +3,9 @@
 use super::Coding;
 use super::change::{encode, sizes};
 use super::files::{read_map, same_size};
-use crate::picture::write_whole;
-use crate::problem::Problem;
 use clap::Args;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use scenecast_protocol::map_codec::Plane;
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ pub(crate) struct Encode {
 }
 
 impl Encode {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let target = read_map(&self.target)?;
         let base = match &self.base {
             Some(path) => {
@@ -43,7 +43,7 @@ impl Encode {
         };
         let (file, cells_changed) = encode(&self.coding, &base, &target)?;
         let sizes = sizes(&self.coding, &base, &target, &file, cells_changed);
-        let text = serde_json::to_string(&sizes).map_err(|e| Problem::Failed(e.to_string()))?;
+        let text = serde_json::to_string(&sizes).map_err(|e| UserError::Failed(e.to_string()))?;
         write_whole(&self.out, &file.to_bytes())?;
         println!("{text}");
         Ok(())

@@ -8,8 +8,8 @@ mod files;
 mod train;
 mod zopfli_bytes;
 
-use crate::problem::Problem;
 use clap::{Args, Subcommand};
+use scenecast_core::UserError;
 use scenecast_protocol::map_codec::Codec;
 
 /// Code label maps as the stream does, and measure it.
@@ -26,7 +26,7 @@ pub(crate) enum Map {
 }
 
 impl Map {
-    pub(crate) fn run(self) -> Result<(), Problem> {
+    pub(crate) fn run(self) -> Result<(), UserError> {
         match self {
             Self::Encode(encode) => encode.run(),
             Self::Decode(decode) => decode.run(),

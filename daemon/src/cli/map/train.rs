@@ -1,9 +1,9 @@
 //! `scenecast map train-prior`
 
 use crate::cli::progress::Progress;
-use crate::picture::write_whole;
-use crate::problem::Problem;
 use clap::Args;
+use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use scenecast_protocol::map_codec::{PRIOR_SCENES, train_prior};
 use std::path::PathBuf;
 
@@ -26,7 +26,7 @@ pub(crate) struct TrainPrior {
 }
 
 impl TrainPrior {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("training");
         let table = train_prior(self.seed, self.scenes, &mut |done| progress.show(done as f64 / 1000.0));
         drop(progress);

@@ -5,8 +5,8 @@ mod run;
 mod sample;
 mod score;
 
-use crate::problem::Problem;
 use clap::Subcommand;
+use scenecast_core::UserError;
 
 /// Run the scene model over files.
 #[derive(Debug, Subcommand)]
@@ -18,7 +18,7 @@ pub(crate) enum Scene {
 }
 
 impl Scene {
-    pub(crate) fn run(self) -> Result<(), Problem> {
+    pub(crate) fn run(self) -> Result<(), UserError> {
         match self {
             Self::Run(run) => run.run(),
             Self::Sample(sample) => sample.run(),

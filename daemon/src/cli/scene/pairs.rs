@@ -1,6 +1,6 @@
 //! Images with their annotations beside them.
 
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,11 +15,11 @@ pub(super) struct Pair {
 }
 
 /// Every `NAME_label.png` of a folder with the image `NAME`, by name; one without an image or with two is refused.
-pub(super) fn pairs(dir: &Path) -> Result<Vec<Pair>, Problem> {
+pub(super) fn pairs(dir: &Path) -> Result<Vec<Pair>, UserError> {
     let mut images: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     let mut labels: BTreeMap<String, PathBuf> = BTreeMap::new();
-    for entry in std::fs::read_dir(dir).map_err(|e| Problem::file(dir, e))? {
-        let path = entry.map_err(|e| Problem::file(dir, e))?.path();
+    for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {
+        let path = entry.map_err(|e| UserError::file(dir, e))?.path();
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         if let Some(name) = file.strip_suffix(SUFFIX) {
@@ -30,14 +30,17 @@ pub(super) fn pairs(dir: &Path) -> Result<Vec<Pair>, Problem> {
         }
     }
     if labels.is_empty() {
-        return Err(Problem::file(dir, "no NAME_label.png; each belongs to an image NAME.jpg, .png or .tif beside it"));
+        return Err(UserError::file(
+            dir,
+            "no NAME_label.png; each belongs to an image NAME.jpg, .png or .tif beside it",
+        ));
     }
     let pair = |(name, classes): (String, PathBuf)| match images.remove(&name).unwrap_or_default().as_slice() {
         [image] => Ok(Pair { image: image.clone(), classes }),
-        [] => Err(Problem::file(&classes, format!("no image {name}.jpg, .png or .tif beside it"))),
+        [] => Err(UserError::file(&classes, format!("no image {name}.jpg, .png or .tif beside it"))),
         [one, other, ..] => {
             let (one, other) = (one.display(), other.display());
-            Err(Problem::file(&classes, format!("two images could be meant: {one} and {other}")))
+            Err(UserError::file(&classes, format!("two images could be meant: {one} and {other}")))
         }
     };
     labels.into_iter().map(pair).collect()

@@ -1,7 +1,6 @@
 //! `scenecast scene run`
 
 use crate::cli::progress::Progress;
-use crate::problem::Problem;
 use crate::scene::{
     Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, Outcome, Schedule, Source, Tum, WordsFile, learn, quality,
     read_vocabulary, write,
@@ -9,6 +8,7 @@ use crate::scene::{
 use clap::Args;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_core::UserError;
 use std::path::{Path, PathBuf};
 
 /// Label words, a mosaic or a sequence of images, and print what it took as one line of JSON.
@@ -143,9 +143,9 @@ struct Opened {
 }
 
 impl Run {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         if self.out.exists() && !self.out.is_dir() {
-            return Err(Problem::file(&self.out, "--out takes a folder, and this is a file"));
+            return Err(UserError::file(&self.out, "--out takes a folder, and this is a file"));
         }
         let schedule = self.schedule()?;
         let Opened { mut source, vocabulary, cell_m, cell_px, annotated } = self.open(schedule)?;
@@ -156,7 +156,7 @@ impl Run {
         let passed_over = source.skipped();
         if model.words() == 0 {
             let what = passed_over.unwrap_or_else(|| "the source gave none".to_owned());
-            return Err(Problem::Input(format!("there are no words to label: {what}")));
+            return Err(UserError::Input(format!("there are no words to label: {what}")));
         }
         if let Some(what) = passed_over {
             eprintln!("scenecast: {what}");
@@ -169,24 +169,24 @@ impl Run {
             eprintln!("scenecast: no cell of the map is annotated, so there is nothing to compare with");
         }
         let outcome = Outcome::new(&model, &effort, quality.as_ref());
-        let line = serde_json::to_string(&outcome).map_err(|e| Problem::Failed(e.to_string()))?;
+        let line = serde_json::to_string(&outcome).map_err(|e| UserError::Failed(e.to_string()))?;
         write(&model, &self.out)?;
         println!("{line}");
         Ok(())
     }
 
-    fn schedule(&self) -> Result<Schedule, Problem> {
+    fn schedule(&self) -> Result<Schedule, UserError> {
         match self.refine_rate {
             None => Ok(Schedule::Sweeps(self.sweeps)),
             Some(_) if self.input.which.mosaic.is_some() => {
-                Err(Problem::Input("--refine-rate: a mosaic is seen at one time; use --sweeps".to_owned()))
+                Err(UserError::Input("--refine-rate: a mosaic is seen at one time; use --sweeps".to_owned()))
             }
             Some(rate) if (0.0..=1e9).contains(&rate) => Ok(Schedule::Online(rate)),
-            Some(rate) => Err(Problem::Input(format!("--refine-rate {rate}: it takes 0 to 1e9 words a second"))),
+            Some(rate) => Err(UserError::Input(format!("--refine-rate {rate}: it takes 0 to 1e9 words a second"))),
         }
     }
 
-    fn open(&self, schedule: Schedule) -> Result<Opened, Problem> {
+    fn open(&self, schedule: Schedule) -> Result<Opened, UserError> {
         let Which { words, mosaic, source } = &self.input.which;
         if let Some(path) = words {
             return self.open_words(path, schedule);
@@ -203,7 +203,9 @@ impl Run {
             "tum" => {
                 let scale = self.input.depth_scale;
                 if !(1.0..=1e6).contains(&scale) {
-                    return Err(Problem::Input(format!("--depth-scale {scale}: it takes 1 to 1000000 units a metre")));
+                    return Err(UserError::Input(format!(
+                        "--depth-scale {scale}: it takes 1 to 1000000 units a metre"
+                    )));
                 }
                 let cell_m = self.cubes(0.25);
                 (Box::new(Tum::open(dir, extractor, self.input.intrinsics, scale, cell_m[0])?), cell_m)
@@ -213,12 +215,12 @@ impl Run {
                 let cell_m = self.columns(CELL_PX * metres_per_pixel);
                 (Box::new(Frames::open(dir, extractor, metres_per_pixel, cell_m[0])?), cell_m)
             }
-            _ => return Err(Problem::Input("--source: it takes tum:DIR or frames:DIR".to_owned())),
+            _ => return Err(UserError::Input("--source: it takes tum:DIR or frames:DIR".to_owned())),
         };
         Ok(Opened { source, vocabulary, cell_m, cell_px: 1.0, annotated })
     }
 
-    fn open_words(&self, path: &Path, schedule: Schedule) -> Result<Opened, Problem> {
+    fn open_words(&self, path: &Path, schedule: Schedule) -> Result<Opened, UserError> {
         let cell_m = self.cubes(1.0);
         let annotated = self.places()?;
         let in_time = matches!(schedule, Schedule::Online(_));
@@ -226,11 +228,11 @@ impl Run {
         Ok(Opened { vocabulary: file.vocabulary, source: Box::new(file), cell_m, cell_px: 1.0, annotated })
     }
 
-    fn open_mosaic(&self, path: &Path) -> Result<Opened, Problem> {
+    fn open_mosaic(&self, path: &Path) -> Result<Opened, UserError> {
         let metres_per_pixel = self.metres_per_pixel()?;
         let cell_m = self.columns(CELL_PX * metres_per_pixel);
         if cell_m[0] != cell_m[1] {
-            return Err(Problem::Input("--cell-size: cells of a mosaic are square".to_owned()));
+            return Err(UserError::Input("--cell-size: cells of a mosaic are square".to_owned()));
         }
         let mut extractor = self.extractor()?;
         let mosaic = Mosaic::open(path, &mut extractor, metres_per_pixel, cell_m[0])?;
@@ -240,23 +242,23 @@ impl Run {
         Ok(Opened { source: Box::new(mosaic), vocabulary, cell_m, cell_px, annotated })
     }
 
-    fn places(&self) -> Result<Option<Annotated>, Problem> {
+    fn places(&self) -> Result<Option<Annotated>, UserError> {
         self.annotations.as_ref().map(|path| Annotated::of_places(path, &self.ignore)).transpose()
     }
 
-    fn extractor(&self) -> Result<WordExtractor, Problem> {
+    fn extractor(&self) -> Result<WordExtractor, UserError> {
         match &self.input.vocabulary {
             Some(path) => Ok(WordExtractor::from_measures(read_vocabulary(path)?)),
             None => Ok(WordExtractor::new(&WordConfig::default())),
         }
     }
 
-    fn metres_per_pixel(&self) -> Result<f64, Problem> {
+    fn metres_per_pixel(&self) -> Result<f64, UserError> {
         let metres = self.input.metres_per_pixel.unwrap_or(0.01);
         if (1e-6..=1e3).contains(&metres) {
             return Ok(metres);
         }
-        Err(Problem::Input(format!("--metres-per-pixel {metres}: it takes metres from 0.000001 to 1000")))
+        Err(UserError::Input(format!("--metres-per-pixel {metres}: it takes metres from 0.000001 to 1000")))
     }
 
     /// Cells of a world with height.
@@ -271,7 +273,7 @@ impl Run {
         [edges.x, edges.y, edges.z.unwrap_or(FLAT_M)]
     }
 
-    fn model(&self, vocabulary: u32, cell_m: [f64; 3]) -> Result<SceneModel, Problem> {
+    fn model(&self, vocabulary: u32, cell_m: [f64; 3]) -> Result<SceneModel, UserError> {
         let birth = match self.parameters.birth.as_str() {
             "collapsed" => Birth::Collapsed,
             "rost" => Birth::Rost,
@@ -295,7 +297,7 @@ impl Run {
         let flag = |key: &str| format!("--{}", key.replace('_', "-"));
         let refused =
             |e: scene_model::topics::ConfigError| format!("{} {}: allowed is {}", flag(e.key), e.value, e.allowed);
-        let mut model = SceneModel::new(config).map_err(|e| Problem::Input(refused(e)))?;
+        let mut model = SceneModel::new(config).map_err(|e| UserError::Input(refused(e)))?;
         model.use_threads(usize::from(self.threads));
         Ok(model)
     }

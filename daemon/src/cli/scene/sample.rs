@@ -1,9 +1,10 @@
 //! `scenecast scene sample`
 
-use crate::picture::{colour, write_whole};
-use crate::problem::Problem;
 use clap::Args;
 use scene_model::generate::{LabelWorld, sample};
+use scenecast_core::UserError;
+use scenecast_core::palette::colour;
+use scenecast_files::write_whole;
 use std::path::PathBuf;
 
 /// Words in each cell of a world; the cell shows the label that most of them have.
@@ -52,10 +53,10 @@ fn pair(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl Sample {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         for (name, value) in [("--alpha", self.alpha), ("--gamma", self.gamma)] {
             if !(0.0..=1e9).contains(&value) {
-                return Err(Problem::Input(format!("{name} {value}: it takes a number from 0 to 1e9")));
+                return Err(UserError::Input(format!("{name} {value}: it takes a number from 0 to 1e9")));
             }
         }
         let sheet = Sheet::new(self.size, self.grid)?;
@@ -66,7 +67,7 @@ impl Sample {
             let world = sample(self.seed.wrapping_add(index), columns, rows, self.alpha, self.gamma, CUSTOMERS);
             sheet.draw(&world, index as u32, &mut pixels);
         }
-        let png = encode(sheet.width, sheet.height, &pixels).map_err(|e| Problem::Failed(e.to_string()))?;
+        let png = encode(sheet.width, sheet.height, &pixels).map_err(|e| UserError::Failed(e.to_string()))?;
         write_whole(&self.out, &png)
     }
 }
@@ -83,7 +84,7 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn new(size: (u32, u32), grid: (u32, u32)) -> Result<Self, Problem> {
+    fn new(size: (u32, u32), grid: (u32, u32)) -> Result<Self, UserError> {
         let cells = (size.0 * grid.0).max(size.1 * grid.1);
         let scale = (PICTURE_PX / cells).max(1);
         let gap = (PICTURE_PX / 80).max(1);
@@ -91,7 +92,7 @@ impl Sheet {
         let (width, height) = (length(size.0, grid.0), length(size.1, grid.1));
         if u64::from(width) * u64::from(height) > MOST_PIXELS {
             let what = format!("--size and --grid make {width} x {height} pixels, more than the {MOST_PIXELS} allowed");
-            return Err(Problem::Input(what));
+            return Err(UserError::Input(what));
         }
         Ok(Self { across: grid.0, size, scale, gap, width, height })
     }

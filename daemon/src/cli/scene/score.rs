@@ -2,12 +2,12 @@
 
 use super::pairs::{Pair, pairs};
 use crate::cli::progress::Progress;
-use crate::imagery::{read_classes, read_image};
-use crate::problem::Problem;
 use clap::Args;
 use image::GrayImage;
 use scene_model::score::{MeanScore, Method, Scene, Trial, TrialError};
 use scene_model::topics::Kernel;
+use scenecast_core::UserError;
+use scenecast_files::{read_classes, read_image};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -80,7 +80,7 @@ struct Gain {
 }
 
 impl Score {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let pairs = pairs(&self.dir)?;
         let trial =
             Trial { labels: self.max_labels, cells_across: self.cells_across, sweeps: self.sweeps, seeds: self.seeds };
@@ -88,7 +88,7 @@ impl Score {
         let json = self.json;
         let report = self.report(scenes);
         if json {
-            let text = serde_json::to_string_pretty(&report).map_err(|e| Problem::Failed(e.to_string()))?;
+            let text = serde_json::to_string_pretty(&report).map_err(|e| UserError::Failed(e.to_string()))?;
             println!("{text}");
         } else {
             report.print();
@@ -97,7 +97,7 @@ impl Score {
     }
 
     /// Scores of all scenes in the order of their names, on all cores; the first problem in that order if there is one.
-    fn scenes(&self, trial: Trial, pairs: &[Pair]) -> Result<Vec<SceneReport>, Problem> {
+    fn scenes(&self, trial: Trial, pairs: &[Pair]) -> Result<Vec<SceneReport>, UserError> {
         let (next, steps) = (AtomicUsize::new(0), pairs.len() * Method::ALL.len());
         let done = Mutex::new((BTreeMap::new(), Progress::new("scenes"), 0));
         let step = || {
@@ -149,15 +149,15 @@ impl Score {
     }
 }
 
-fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<SceneReport, Problem> {
+fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<SceneReport, UserError> {
     let image = read_image(&pair.image)?.to_rgb8();
     let (width_px, height_px) = image.dimensions();
     let classes = read_classes(&pair.classes, image.dimensions())?;
     let classes = GrayImage::from_raw(width_px, height_px, classes)
-        .ok_or_else(|| Problem::file(&pair.classes, "has another number of pixels than its head says"))?;
+        .ok_or_else(|| UserError::file(&pair.classes, "has another number of pixels than its head says"))?;
     let refused = |error: TrialError| {
         let of_classes = matches!(error, TrialError::Annotations(_) | TrialError::NoClasses);
-        Problem::file(if of_classes { &pair.classes } else { &pair.image }, error)
+        UserError::file(if of_classes { &pair.classes } else { &pair.image }, error)
     };
     let scene = Scene::new(trial, &image, &classes, ignore).map_err(refused)?;
     let mut methods = BTreeMap::new();

@@ -1,7 +1,7 @@
 //! The setting to take to sea.
 
 use crate::config::Config;
-use crate::tuning::{Measurement, Row};
+use scenecast_core::tuning_table::{Measurement, Row};
 
 /// The setting as a configuration file, with everything else of the scene model that it was found with.
 pub(super) fn toml(row: &Row, config: &Config, budget_bps: f64) -> String {
@@ -29,7 +29,7 @@ pub(super) fn toml(row: &Row, config: &Config, budget_bps: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tuning::TuningTable;
+    use scenecast_core::tuning_table::TuningTable;
     use scenecast_protocol::directive::CellBand;
 
     #[test]

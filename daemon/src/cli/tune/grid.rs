@@ -2,8 +2,8 @@
 
 use crate::auv::cell_m;
 use crate::config::Config;
-use crate::problem::Problem;
-use crate::tuning::Setting;
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::Setting;
 use scenecast_protocol::directive::CellBand;
 use serde::Deserialize;
 use std::path::Path;
@@ -42,12 +42,12 @@ const MOST: usize = 100_000;
 
 impl Grid {
     /// The grid in a file, or the paper's; what it does not name is as configured.
-    pub(super) fn load(path: Option<&Path>, config: &Config) -> Result<Self, Problem> {
+    pub(super) fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
         let mut grid = match path {
             None => Self::default(),
             Some(path) => {
-                let text = std::fs::read_to_string(path).map_err(|e| Problem::file(path, e))?;
-                Self::read(&text).map_err(|what| Problem::Input(format!("{}{what}", path.display())))?
+                let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+                Self::read(&text).map_err(|what| UserError::Input(format!("{}{what}", path.display())))?
             }
         };
         let every_frame = config.camera.rate_hz;

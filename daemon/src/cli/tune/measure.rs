@@ -1,27 +1,32 @@
 //! What a setting reaches and what its map takes.
 
 use super::survey::Survey;
-use crate::problem::Problem;
-use crate::tuning::{Measurement, Setting};
 use scene_model::publish::LabelBook;
 use scene_model::score::{LabelGrid, score};
 use scene_model::topics::{FlatCell, SceneModel};
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::{Measurement, Setting};
 use scenecast_protocol::directive::CellBand;
 use scenecast_protocol::map::{self, Cell};
 use scenecast_protocol::map_codec::{Codec, Stride, encode_all};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Flies the survey with a setting, then sweeps over all words.
-pub(super) fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, Problem> {
+pub(super) fn measure(
+    survey: &Survey<'_>,
+    setting: &Setting,
+    sweeps: u32,
+    seed: u64,
+) -> Result<Measurement, UserError> {
     let config = survey.config;
-    let codec: Codec = config.map.codec.parse().map_err(|_| Problem::Input("map.codec is unknown".to_owned()))?;
+    let codec: Codec = config.map.codec.parse().map_err(|_| UserError::Input("map.codec is unknown".to_owned()))?;
     let room = config.link.frame_bytes as usize;
     let bytes = |base: &map::LabelGrid, target: &map::LabelGrid| {
         let chunks = encode_all(codec, base, target, room);
-        let chunks = chunks.ok_or_else(|| Problem::Input(format!("link.frame_bytes = {room} holds no cell")))?;
-        Ok::<usize, Problem>(chunks.iter().map(|chunk| chunk.bytes.len()).sum())
+        let chunks = chunks.ok_or_else(|| UserError::Input(format!("link.frame_bytes = {room} holds no cell")))?;
+        Ok::<usize, UserError>(chunks.iter().map(|chunk| chunk.bytes.len()).sum())
     };
-    let mut model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| Problem::Input(format!("scene.{e}")))?;
+    let mut model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| UserError::Input(format!("scene.{e}")))?;
     let (mut book, mut sent, mut streamed) = (LabelBook::new(0), map::LabelGrid::default(), 0);
     let is_coarse = setting.cells == CellBand::Coarse;
     let interval = |index: usize| (index as f64 * survey.step_s * setting.frames_per_s + 1e-6).floor();

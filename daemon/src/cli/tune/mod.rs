@@ -8,12 +8,12 @@ mod survey;
 
 use crate::cli::progress::Progress;
 use crate::config::{self, Config};
-use crate::picture::write_whole;
-use crate::problem::Problem;
-use crate::tuning::{Measurement, Row, Setting, TuningTable, least, most};
 use clap::Args;
 use grid::Grid;
 use measure::{mean, measure};
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::{Measurement, Row, Setting, TuningTable, least, most};
+use scenecast_files::write_whole;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -72,15 +72,15 @@ pub(super) struct Tune {
 }
 
 impl Tune {
-    pub(super) fn run(self) -> Result<(), Problem> {
+    pub(super) fn run(self) -> Result<(), UserError> {
         let config = self.config()?;
         let budget_bps = self.budget.unwrap_or(f64::from(config.link.budget_bps));
         if !(budget_bps > 0.0 && budget_bps.is_finite()) {
-            return Err(Problem::Input(format!("--budget {budget_bps}: it takes bits a second, above 0")));
+            return Err(UserError::Input(format!("--budget {budget_bps}: it takes bits a second, above 0")));
         }
         let grid = Grid::load(self.grid.as_deref(), &config)?;
         let sites = self.sites(&config)?;
-        std::fs::create_dir_all(&self.out).map_err(|e| Problem::file(&self.out, e))?;
+        std::fs::create_dir_all(&self.out).map_err(|e| UserError::file(&self.out, e))?;
         let inputs = Site::fingerprint(&sites, &format!("{} sweeps, seed {}", self.sweeps, self.seed));
         let path = self.out.join("tuning.csv");
         let mut table = Growing { table: open(&path, &inputs)?, path, inputs };
@@ -94,13 +94,13 @@ impl Tune {
         self.conclude(&config, &rows, budget_bps)
     }
 
-    fn config(&self) -> Result<Config, Problem> {
+    fn config(&self) -> Result<Config, UserError> {
         let mut sets = self.sets.clone();
         sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
         config::load(self.config.as_deref(), &sets)
     }
 
-    fn sites<'a>(&'a self, config: &'a Config) -> Result<Vec<Site<'a>>, Problem> {
+    fn sites<'a>(&'a self, config: &'a Config) -> Result<Vec<Site<'a>>, UserError> {
         match (&self.mosaic, &self.annotations) {
             (Some(mosaic), Some(annotations)) => Ok(vec![Site::load(mosaic, annotations, &self.ignore, config)?]),
             _ => Ok(self.procedural.iter().map(|&seed| Site::procedural(seed, config)).collect()),
@@ -108,14 +108,14 @@ impl Tune {
     }
 
     /// Measures settings, those with one size of cells after another, each written down as soon as it is known.
-    fn search(&self, sites: &[Site<'_>], settings: &[Setting], table: &mut Growing) -> Result<(), Problem> {
+    fn search(&self, sites: &[Site<'_>], settings: &[Setting], table: &mut Growing) -> Result<(), UserError> {
         let progress = Mutex::new((Progress::new("settings"), 0));
         let table = Mutex::new(table);
         for same_cells in settings.chunk_by(|a, b| a.cell_m == b.cell_m) {
             let surveys = sites.iter().map(|site| Survey::new(site, same_cells[0].cell_m));
             let surveys: Vec<Survey<'_>> = surveys.collect::<Result<_, _>>()?;
             let next = AtomicUsize::new(0);
-            let work = || -> Result<(), Problem> {
+            let work = || -> Result<(), UserError> {
                 while let Some(setting) = same_cells.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let measured = surveys.iter().map(|survey| measure(survey, setting, self.sweeps, self.seed));
                     let measurement = mean(&measured.collect::<Result<Vec<_>, _>>()?);
@@ -129,7 +129,7 @@ impl Tune {
             };
             let threads = self.threads.map(usize::from);
             let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
-            let failed = |_| Problem::Failed("a measuring thread ended early".to_owned());
+            let failed = |_| UserError::Failed("a measuring thread ended early".to_owned());
             std::thread::scope(|scope| {
                 let threads: Vec<_> = (0..threads.min(same_cells.len())).map(|_| scope.spawn(work)).collect();
                 threads.into_iter().try_for_each(|thread| thread.join().map_err(failed)?)
@@ -138,7 +138,7 @@ impl Tune {
         Ok(())
     }
 
-    fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), Problem> {
+    fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), UserError> {
         let best = most(rows.iter().filter(|row| row.measurement.stream_bps <= budget_bps));
         let figure = picture::Figure::new(rows, best);
         write_whole(&self.out.join("tuning.svg"), figure.svg().as_bytes())?;
@@ -147,12 +147,12 @@ impl Tune {
         let Some(best) = best else {
             // One of an earlier run would pass for the answer.
             match std::fs::remove_file(&path) {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Problem::file(&path, e)),
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(UserError::file(&path, e)),
                 _ => {}
             }
             let least = least(rows.iter()).map_or(f64::INFINITY, |row| row.measurement.stream_bps);
             let what = format!("the stream of no setting fits --budget {budget_bps} bit/s: the least is {least:.0}");
-            return Err(Problem::Failed(what));
+            return Err(UserError::Failed(what));
         };
         write_whole(&path, best::toml(best, config, budget_bps).as_bytes())?;
         let Measurement { mutual_information_nats, map_bytes, stream_bps, .. } = best.measurement;
@@ -174,21 +174,21 @@ struct Growing {
 }
 
 impl Growing {
-    fn add(&mut self, setting: Setting, measurement: Measurement) -> Result<(), Problem> {
+    fn add(&mut self, setting: Setting, measurement: Measurement) -> Result<(), UserError> {
         self.table.insert(self.inputs.clone(), Row { setting, measurement });
         write_whole(&self.path, self.table.text().as_bytes())
     }
 }
 
 /// The table of an earlier run with the same inputs, or an empty one.
-fn open(path: &Path, inputs: &str) -> Result<TuningTable, Problem> {
-    let refused = |line: usize, what: String| Problem::Input(format!("{}:{line}: {what}", path.display()));
+fn open(path: &Path, inputs: &str) -> Result<TuningTable, UserError> {
+    let refused = |line: usize, what: String| UserError::Input(format!("{}:{line}: {what}", path.display()));
     let table = match std::fs::read_to_string(path) {
         Ok(text) => {
             TuningTable::read(&text).map_err(|(line, what)| refused(line, format!("{what}; give another --out")))?
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => TuningTable::default(),
-        Err(e) => return Err(Problem::file(path, e)),
+        Err(e) => return Err(UserError::file(path, e)),
     };
     let what = "was measured with another sea floor, annotations or options than this run's";
     match table.line_of_others(inputs) {

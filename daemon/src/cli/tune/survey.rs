@@ -1,14 +1,14 @@
 //! The mosaic with its annotations, and a virtual survey over it.
 
 use crate::config::Config;
-use crate::imagery::{read_classes, read_image};
-use crate::problem::Problem;
-use crate::tuning::Setting;
 use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::score::{Annotations, mosaic_classes};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::Setting;
+use scenecast_files::{read_classes, read_image};
 use std::path::Path;
 
 /// Part of a frame by which neighbouring lines, and frames along a line, overlap at least.
@@ -34,23 +34,23 @@ impl<'a> Site<'a> {
         annotations: &Path,
         ignore: &'a [u8],
         config: &'a Config,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, UserError> {
         let image = read_image(mosaic)?.to_rgb8();
         let (width, height) = image.dimensions();
         if width.min(height) < LEAST_PX {
             let what = format!("the image has {width} x {height} pixels; a mosaic needs at least 64 x 64");
-            return Err(Problem::file(mosaic, what));
+            return Err(UserError::file(mosaic, what));
         }
         let classes = read_classes(annotations, image.dimensions())?;
         if classes.iter().all(|class| ignore.contains(class)) {
-            return Err(Problem::file(annotations, "no pixel is annotated with a class that counts (see --ignore)"));
+            return Err(UserError::file(annotations, "no pixel is annotated with a class that counts (see --ignore)"));
         }
         let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
         let mut digest = sum.digest();
         digest.update(image.as_raw());
         digest.update(&classes);
         let classes = GrayImage::from_raw(width, height, classes)
-            .ok_or_else(|| Problem::file(annotations, "has another number of pixels than its head says"))?;
+            .ok_or_else(|| UserError::file(annotations, "has another number of pixels than its head says"))?;
         Ok(Self { image, classes, ignore, config, crc: digest.finalize() })
     }
 
@@ -100,7 +100,7 @@ pub(super) struct Survey<'a> {
 }
 
 impl<'a> Survey<'a> {
-    pub(super) fn new(site: &Site<'a>, cell_m: f64) -> Result<Self, Problem> {
+    pub(super) fn new(site: &Site<'a>, cell_m: f64) -> Result<Self, UserError> {
         let config = site.config;
         let mpp = config.camera.metres_per_pixel;
         let cell_px = (cell_m / mpp) as f32;
@@ -108,7 +108,7 @@ impl<'a> Survey<'a> {
         if !(1.0..=width.min(height) as f32 / 4.0).contains(&cell_px) {
             let what = format!("cells of {cell_m} m are {cell_px} pixels of {mpp} m");
             let allowed = format!("1 to {} pixels are allowed with this mosaic", width.min(height) / 4);
-            return Err(Problem::Input(format!(
+            return Err(UserError::Input(format!(
                 "{what}; {allowed} (--metres-per-pixel, scene.cell_m, the grid's cell_m)"
             )));
         }
@@ -119,7 +119,7 @@ impl<'a> Survey<'a> {
         let per_frame = f64::from(size.0) * f64::from(size.1) / f64::from(cell_px).powi(2) * per_cell;
         if per_frame * corners.len() as f64 > MOST_WORDS {
             let what = format!("a survey of {} frames with {per_frame:.0} words each is too long", corners.len());
-            return Err(Problem::Input(format!(
+            return Err(UserError::Input(format!(
                 "{what}; raise survey.speed_m_s, lower camera.rate_hz or take larger cells"
             )));
         }
@@ -134,7 +134,7 @@ impl<'a> Survey<'a> {
         let annotations = Annotations::new(&site.classes, site.image.dimensions(), cell_px, site.ignore);
         Ok(Self {
             config,
-            annotations: annotations.map_err(|e| Problem::Input(e.to_string()))?,
+            annotations: annotations.map_err(|e| UserError::Input(e.to_string()))?,
             colours: mosaic_classes(&site.image, cell_px),
             camera: DownCamera { metres_per_pixel: mpp, altitude_m: 0.0 },
             size,

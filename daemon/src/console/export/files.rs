@@ -4,7 +4,7 @@ use super::place::{lon_lat, well_known_text};
 use super::regions::{Polygon, regions};
 use super::{Cells, Explored};
 use crate::console::state::Origin;
-use crate::picture;
+use scenecast_core::label_picture;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -12,7 +12,7 @@ use std::fmt::Write;
 /// An indexed PNG, north up, pixel value = label.
 pub(in crate::console) fn indexed_png(cells: &Cells) -> Option<Vec<u8>> {
     let grid: LabelGrid = cells.bounds.cells().zip(cells.labels.iter().copied()).collect();
-    picture::encode(&grid).ok()
+    label_picture::encode(&grid).ok()
 }
 
 /// The six lines of a world file: size of a pixel, and the middle of the north-west one.
@@ -71,7 +71,7 @@ pub(in crate::console) fn ply(cells: &Cells) -> String {
     );
     let depth = cells.planes.iter().find(|p| p.name == PlaneKind::Depth.name());
     for Explored { at, x, y, label, .. } in cells.explored() {
-        let [red, green, blue] = picture::colour(label);
+        let [red, green, blue] = scenecast_core::palette::colour(label);
         let up = depth.and_then(|plane| plane.value(at)).map_or(0.0, |depth| -depth);
         let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
     }

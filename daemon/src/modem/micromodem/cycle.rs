@@ -1,8 +1,9 @@
 //! Cycles: who fills the next packet, and what became of it.
 
-use super::{EVERYBODY, Micromodem, Sentence, from_hex, rate, to_hex};
-use crate::modem::driver::{Event, ModemAddress, Reception, Token};
+use super::{EVERYBODY, Micromodem, Sentence, from_hex, to_hex};
+use crate::modem::driver::{Event, Reception, Token};
 use bytes::Bytes;
+use scenecast_core::ModemAddress;
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -111,7 +112,7 @@ impl Micromodem {
         let rate = self.config.rate;
         let ours = from == self.config.address;
         let travel = if ours { Duration::ZERO } else { TRAVEL * 2 };
-        let most = rate::CYCLE_INIT + travel + self.fill_time() + rate.packet() + SLACK;
+        let most = scenecast_core::CYCLE_INIT + travel + self.fill_time() + rate.packet() + SLACK;
         let wait = self.cycles.patience(now).filter(|_| !ours).map_or(most, |patience| patience.min(most));
         self.cycles.begun = Some(Begun { from, to, frames, ours, at: now, until: now + wait, tries });
         self.cycles.polled = false;
@@ -232,8 +233,7 @@ impl Micromodem {
         let travel = s.number::<f64>(2).filter(|t| t.is_finite() && (0.0..60.0).contains(t));
         if let (Some(remote), Some(travel)) = (s.number(0), travel) {
             let range_m = Some(travel * 1500.0);
-            let line =
-                crate::modem::driver::UsblLine { remote, range_m, direction_rad: None, accuracy: 1.0, age_s: travel };
+            let line = scenecast_core::UsblLine { remote, range_m, direction_rad: None, accuracy: 1.0, age_s: travel };
             self.events.push_back(Event::Usbl(line));
         }
     }

@@ -4,14 +4,14 @@
 //! data packets are not used: they ask for another packet header on all modems, which then cannot have cycles.
 
 mod cycle;
-mod rate;
 mod sentence;
 
-pub use rate::Rate;
 pub use sentence::{Sentence, SentenceParser, format_sentence, from_hex, to_hex};
 
-use super::driver::{Class, Destination, Driver, Event, ModemAddress, Refusal, Token, check_length};
+use super::driver::{Class, Destination, Driver, Event, Refusal, Token, check_length};
 use cycle::{Cycles, Given};
+use scenecast_core::MicromodemRate;
+use scenecast_core::ModemAddress;
 use scenecast_protocol::link::Cycle;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::time::Instant;
@@ -41,7 +41,7 @@ pub struct MicromodemConfig {
     /// The address that the modem must have.
     pub address: ModemAddress,
     /// Of its packets.
-    pub rate: Rate,
+    pub rate: MicromodemRate,
     /// Speed of the serial line, bit/s.
     pub baud: Option<u32>,
 }
@@ -233,7 +233,7 @@ impl Driver for Micromodem {
         ModemProfile {
             frame_bytes: self.config.rate.frame_bytes,
             bit_rate_bps: self.config.rate.bits_per_s(),
-            overhead_bits: rate::OVERHEAD_BITS,
+            overhead_bits: scenecast_core::OVERHEAD_BITS,
             turn_around: Duration::from_millis(300),
             access: Access::Polled,
         }

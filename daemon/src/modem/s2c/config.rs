@@ -1,6 +1,6 @@
 //! What an S2C modem is to be.
 
-use crate::modem::driver::ModemAddress;
+use scenecast_core::ModemAddress;
 use std::time::Duration;
 
 /// How bulk goes.

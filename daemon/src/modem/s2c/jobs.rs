@@ -1,6 +1,7 @@
 //! What waits for an S2C modem, and what it holds.
 
-use crate::modem::driver::{Class, ModemAddress, Token};
+use crate::modem::driver::{Class, Token};
+use scenecast_core::ModemAddress;
 use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 

@@ -15,9 +15,10 @@ mod setup;
 pub use config::{BURST_FRAME_BYTES, INSTANT_BYTES, S2cConfig, S2cMode, instant_airtime};
 pub use line::{Line, LineParser};
 
-use super::driver::{Class, Destination, Driver, Event, ModemAddress, Refusal, Token, check_length};
+use super::driver::{Class, Destination, Driver, Event, Refusal, Token, check_length};
 use super::framing::Deframer;
 use jobs::{Job, Jobs};
+use scenecast_core::ModemAddress;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::time::Instant;
 use setup::{Step, Verdict};

@@ -2,9 +2,10 @@
 
 use super::notice::{Heard, Notice, Place, Position, Service};
 use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, LONGEST_WAIT, Line, PATIENCE, Phase, S2c};
-use crate::modem::driver::{Event, ModemAddress, Reception, Token, UsblLine};
+use crate::modem::driver::{Event, Reception, Token};
 use crate::modem::framing::Deframer;
 use bytes::Bytes;
+use scenecast_core::{ModemAddress, UsblLine};
 use scenecast_protocol::time::Instant;
 
 /// Metres that sound makes in a second, where only its time is told.

@@ -11,8 +11,8 @@ pub use modem::{Modem, Place};
 pub use trouble::Trouble;
 pub use water::Stranger;
 
-use crate::problem::Problem;
 use reader::{Reader, Source};
+use scenecast_core::UserError;
 use sim_channel::{ChannelConfig, LossModel, NodeId};
 use std::path::Path;
 use std::time::Duration;
@@ -40,12 +40,12 @@ pub struct Scenario {
 
 impl Scenario {
     /// Reads a file; whatever is wrong is told with file, line, key and what is allowed.
-    pub fn load(path: &Path) -> Result<Self, Problem> {
-        let text = std::fs::read_to_string(path).map_err(|e| Problem::file(path, e))?;
+    pub fn load(path: &Path) -> Result<Self, UserError> {
+        let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
         Self::read(Source { path, text: &text })
     }
 
-    fn read(source: Source<'_>) -> Result<Self, Problem> {
+    fn read(source: Source<'_>) -> Result<Self, UserError> {
         let table = DeTable::parse(source.text)
             .map_err(|e| source.problem(e.span().map_or(0, |span| span.start), e.message()))?;
         let file = Reader::new(source, String::new(), 0, table.get_ref());
@@ -80,7 +80,7 @@ pub fn node(index: usize) -> NodeId {
     NodeId(u8::try_from(index + 1).unwrap_or(u8::MAX))
 }
 
-fn check_modems(source: &Source<'_>, modems: &[Modem]) -> Result<(), Problem> {
+fn check_modems(source: &Source<'_>, modems: &[Modem]) -> Result<(), UserError> {
     if modems.is_empty() {
         return Err(source.problem(0, "there is no [[modem]]: at least one is needed"));
     }
@@ -99,7 +99,7 @@ fn check_modems(source: &Source<'_>, modems: &[Modem]) -> Result<(), Problem> {
 }
 
 /// The index of a modem's name.
-fn index_of(table: &Reader<'_>, key: &'static str, names: &[&str]) -> Result<usize, Problem> {
+fn index_of(table: &Reader<'_>, key: &'static str, names: &[&str]) -> Result<usize, UserError> {
     let words: Vec<(&str, usize)> = names.iter().enumerate().map(|(index, name)| (*name, index)).collect();
     let takes = format!("one of {}", names.join(", "));
     table.choice(key, &words)?.ok_or_else(|| table.missing(key, takes))

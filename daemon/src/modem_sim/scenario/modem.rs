@@ -3,7 +3,7 @@
 use super::reader::Reader;
 use super::seconds;
 use super::water::{FARTHEST_M, LONGEST_S};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use sim_channel::modem::Emulator;
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
@@ -74,13 +74,13 @@ impl Make {
 }
 
 /// A modem of `[[modem]]`.
-pub(super) fn read(table: Reader<'_>, seed: u64) -> Result<Modem, Problem> {
+pub(super) fn read(table: Reader<'_>, seed: u64) -> Result<Modem, UserError> {
     const NAME: &str = "a name of letters, digits, - and _";
     let name = table.text("name")?.ok_or_else(|| table.missing("name", NAME))?;
     if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_')) {
         return Err(table.wrong("name", NAME));
     }
-    type Read = fn(&Reader<'_>, Option<u32>) -> Result<Make, Problem>;
+    type Read = fn(&Reader<'_>, Option<u32>) -> Result<Make, UserError>;
     let kinds: [(&str, Read); 3] = [("s2c", s2c), ("micromodem", micromodem), ("transparent", transparent)];
     let kind =
         table.choice("kind", &kinds)?.ok_or_else(|| table.missing("kind", "one of s2c, micromodem, transparent"))?;
@@ -108,7 +108,7 @@ fn seed_with(make: &mut Make, seed: u64, name: &str) {
     }
 }
 
-fn read_place(table: &Reader<'_>) -> Result<Place, Problem> {
+fn read_place(table: &Reader<'_>) -> Result<Place, UserError> {
     const TAKES: &str = "\"pty\" or \"tcp:ADDRESS:PORT\", as in \"tcp:127.0.0.1:9200\"";
     match table.text("port")?.as_deref() {
         None | Some("pty") => Ok(Place::Pty),
@@ -119,7 +119,7 @@ fn read_place(table: &Reader<'_>) -> Result<Place, Problem> {
     }
 }
 
-fn read_track(table: &Reader<'_>) -> Result<Track, Problem> {
+fn read_track(table: &Reader<'_>) -> Result<Track, UserError> {
     const TAKES: &str = "rows [time in s, metres east, metres north, metres down], times growing";
     let range = -FARTHEST_M..=LONGEST_S;
     let place = |[x, y, z]: [f64; 3]| Position::new(x, y, z);
@@ -137,14 +137,14 @@ fn read_track(table: &Reader<'_>) -> Result<Track, Problem> {
     Ok(Track::new(rows.into_iter().map(|[t, x, y, z]| (seconds(t), place([x, y, z]))).collect()))
 }
 
-fn address(table: &Reader<'_>, least: u64, most: u64) -> Result<u8, Problem> {
+fn address(table: &Reader<'_>, least: u64, most: u64) -> Result<u8, UserError> {
     let given = table.whole("address", least..=most, "")?;
     given
         .map(|address| address as u8)
         .ok_or_else(|| table.missing("address", format!("a whole number from {least} to {most}")))
 }
 
-fn s2c(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, Problem> {
+fn s2c(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
     let mut config = S2cConfig { baud, ..S2cConfig::new(address(table, 1, 254)?) };
     let interpreters = [("NET", Interpreter::Net), ("AT", Interpreter::At)];
     config.interpreter = table.choice("interpreter", &interpreters)?.unwrap_or(config.interpreter);
@@ -160,7 +160,7 @@ fn s2c(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, Problem> {
     Ok(Make::S2c(config))
 }
 
-fn usbl(table: &Reader<'_>) -> Result<UsblConfig, Problem> {
+fn usbl(table: &Reader<'_>) -> Result<UsblConfig, UserError> {
     let usual = UsblConfig::default();
     let latency = table.number("latency_s", 0.0..=60.0, "s")?;
     Ok(UsblConfig {
@@ -176,7 +176,7 @@ fn usbl(table: &Reader<'_>) -> Result<UsblConfig, Problem> {
     })
 }
 
-fn micromodem(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, Problem> {
+fn micromodem(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
     let address = address(table, 0, 127)?;
     let usual = match table.whole("generation", 1..=2, "")? {
         Some(1) => MicromodemConfig::first_generation(address),
@@ -190,11 +190,12 @@ fn micromodem(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, Problem> {
     Ok(Make::Micromodem(MicromodemConfig { baud, version, ..usual }))
 }
 
-fn transparent(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, Problem> {
+fn transparent(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
     let usual = TransparentConfig::default();
-    let whole =
-        |key, range, unit, usual: usize| Ok::<_, Problem>(table.whole(key, range, unit)?.map_or(usual, |n| n as usize));
-    let time = |key, usual| Ok::<_, Problem>(table.number(key, 0.0..=10.0, "s")?.map_or(usual, seconds));
+    let whole = |key, range, unit, usual: usize| {
+        Ok::<_, UserError>(table.whole(key, range, unit)?.map_or(usual, |n| n as usize))
+    };
+    let time = |key, usual| Ok::<_, UserError>(table.number(key, 0.0..=10.0, "s")?.map_or(usual, seconds));
     Ok(Make::Transparent(TransparentConfig {
         baud,
         bit_rate: whole("bit_rate", 10..=1_000_000, "bit/s", usual.bit_rate as usize)? as u32,

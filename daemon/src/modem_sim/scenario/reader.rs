@@ -1,6 +1,6 @@
 //! Reading of a scenario's tables: every value with its place, range and unit, and no key unread.
 
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::cell::RefCell;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -17,9 +17,9 @@ pub struct Source<'a> {
 
 impl Source<'_> {
     /// A problem at a byte of the text, as `FILE:LINE: what`.
-    pub fn problem(&self, at: usize, what: impl Display) -> Problem {
+    pub fn problem(&self, at: usize, what: impl Display) -> UserError {
         let line = self.text.get(..at).map_or(1, |before| before.matches('\n').count() + 1);
-        Problem::Input(format!("{}:{line}: {what}", self.path.display()))
+        UserError::Input(format!("{}:{line}: {what}", self.path.display()))
     }
 }
 
@@ -32,7 +32,7 @@ pub struct Reader<'a> {
     known: RefCell<Vec<&'static str>>,
 }
 
-type Found<T> = Result<Option<T>, Problem>;
+type Found<T> = Result<Option<T>, UserError>;
 
 impl<'a> Reader<'a> {
     /// A table called `name` (empty for the whole file) that begins at a byte of the text.
@@ -62,7 +62,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Refuses what a key was given.
-    pub fn wrong(&self, key: &'static str, takes: impl Display) -> Problem {
+    pub fn wrong(&self, key: &'static str, takes: impl Display) -> UserError {
         let at = self.value(key).map_or(self.at, |(_, at)| at);
         let given = self.value(key).map(|(value, _)| value.span());
         let given = given.and_then(|span| self.source.text.get(span)).unwrap_or("nothing");
@@ -70,7 +70,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Refuses the table for want of a key.
-    pub fn missing(&self, key: &'static str, takes: impl Display) -> Problem {
+    pub fn missing(&self, key: &'static str, takes: impl Display) -> UserError {
         self.source.problem(self.at, format!("{} is missing: it takes {takes}", self.full(key)))
     }
 
@@ -159,7 +159,7 @@ impl<'a> Reader<'a> {
     }
 
     /// All tables of that name.
-    pub fn tables(&self, key: &'static str) -> Result<Vec<Reader<'a>>, Problem> {
+    pub fn tables(&self, key: &'static str) -> Result<Vec<Reader<'a>>, UserError> {
         let Some((value, _)) = self.value(key) else { return Ok(Vec::new()) };
         let tables = match value.get_ref() {
             DeValue::Array(tables) => tables.iter().map(|value| self.entry(key, value)).collect::<Option<Vec<_>>>(),
@@ -176,7 +176,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Refuses keys that nobody asked for.
-    pub fn finish(self) -> Result<(), Problem> {
+    pub fn finish(self) -> Result<(), UserError> {
         let known = self.known.borrow();
         match self.table.iter().find(|(name, _)| !known.iter().any(|key| name.get_ref() == key)) {
             None => Ok(()),

@@ -1,6 +1,6 @@
 use super::*;
 
-fn read(text: &str) -> Result<Scenario, Problem> {
+fn read(text: &str) -> Result<Scenario, UserError> {
     Scenario::read(Source { path: Path::new("x.toml"), text })
 }
 

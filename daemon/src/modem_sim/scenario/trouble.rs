@@ -3,7 +3,7 @@
 use super::reader::Reader;
 use super::water::LONGEST_S;
 use super::{index_of, seconds};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use std::time::Duration;
 
 /// What can be made to go wrong with a modem.
@@ -80,7 +80,7 @@ impl Trouble {
 }
 
 /// A fault of `[[fault]]`: when, to which modem, what.
-pub(super) fn read(table: Reader<'_>, names: &[&str]) -> Result<(Duration, usize, Trouble), Problem> {
+pub(super) fn read(table: Reader<'_>, names: &[&str]) -> Result<(Duration, usize, Trouble), UserError> {
     let at = table.number("at_s", 0.0..=LONGEST_S, "s")?;
     let at = at.ok_or_else(|| table.missing("at_s", format!("a number from 0 to {LONGEST_S} s")))?;
     let modem = index_of(&table, "modem", names)?;

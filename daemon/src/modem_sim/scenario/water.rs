@@ -2,7 +2,7 @@
 
 use super::reader::Reader;
 use super::{index_of, node, seconds};
-use crate::problem::Problem;
+use scenecast_core::UserError;
 use sim_channel::acoustics::noise::wind_of_sea_state;
 use sim_channel::loss::{GilbertElliott, RangeTable, Snr, ThreeState, Trace};
 use sim_channel::{ChannelConfig, LossModel, NodeId, Outage, OutageScope, Position, presets};
@@ -27,7 +27,7 @@ pub(super) const LONGEST_S: f64 = 1e7;
 pub(super) const FARTHEST_M: f64 = 1e6;
 
 /// A preset, and what is said beside it.
-pub(super) fn read_channel(table: Reader<'_>) -> Result<ChannelConfig, Problem> {
+pub(super) fn read_channel(table: Reader<'_>) -> Result<ChannelConfig, UserError> {
     let mut channel = table.choice("preset", &presets::ALL)?.map_or_else(ChannelConfig::default, |preset| preset());
     if let Some(loss) = table.table("loss")? {
         channel.loss = read_loss(loss)?;
@@ -50,7 +50,7 @@ fn set<T>(place: &mut T, given: Option<T>) {
 }
 
 /// `from`, `to` and a loss of its own.
-pub(super) fn read_link(table: Reader<'_>, names: &[&str]) -> Result<(NodeId, NodeId, LossModel), Problem> {
+pub(super) fn read_link(table: Reader<'_>, names: &[&str]) -> Result<(NodeId, NodeId, LossModel), UserError> {
     let (from, to) = (index_of(&table, "from", names)?, index_of(&table, "to", names)?);
     let loss =
         table.table("loss")?.ok_or_else(|| table.missing("loss", "a table, as in loss = { model = \"none\" }"))?;
@@ -60,13 +60,13 @@ pub(super) fn read_link(table: Reader<'_>, names: &[&str]) -> Result<(NodeId, No
 }
 
 /// A silence of everything, of a `modem`, or of one direction `from` .. `to`.
-pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, Problem> {
+pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, UserError> {
     let from = table.number("from_s", 0.0..=LONGEST_S, "s")?.map_or(Duration::ZERO, seconds);
     let until = table.number("until_s", 0.0..=LONGEST_S, "s")?.map_or(Duration::MAX, seconds);
     if until <= from {
         return Err(table.wrong("until_s", "a time after from_s"));
     }
-    let given = |key| Ok::<_, Problem>(table.text(key)?.is_some());
+    let given = |key| Ok::<_, UserError>(table.text(key)?.is_some());
     let scope = if given("modem")? {
         OutageScope::Node(node(index_of(&table, "modem", names)?))
     } else if given("from")? || given("to")? {
@@ -79,7 +79,7 @@ pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, P
 }
 
 /// Somebody else on the same water.
-pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, Problem> {
+pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, UserError> {
     let position = table.numbers("position_m", -FARTHEST_M..=FARTHEST_M, "m")?;
     let stranger = Stranger {
         position: position.map_or_else(Position::default, |[x, y, z]| Position::new(x, y, z)),
@@ -91,7 +91,7 @@ pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, Problem> {
     Ok(stranger)
 }
 
-type ReadModel = fn(&Reader<'_>) -> Result<LossModel, Problem>;
+type ReadModel = fn(&Reader<'_>) -> Result<LossModel, UserError>;
 
 const MODELS: [(&str, ReadModel); 8] = [
     ("none", |_| Ok(LossModel::None)),
@@ -104,7 +104,7 @@ const MODELS: [(&str, ReadModel); 8] = [
     ("fit", fit),
 ];
 
-fn read_loss(table: Reader<'_>) -> Result<LossModel, Problem> {
+fn read_loss(table: Reader<'_>) -> Result<LossModel, UserError> {
     let names = MODELS.map(|(name, _)| name).join(", ");
     let read = table.choice("model", &MODELS)?.ok_or_else(|| table.missing("model", format!("one of {names}")))?;
     let model = read(&table)?;
@@ -112,20 +112,20 @@ fn read_loss(table: Reader<'_>) -> Result<LossModel, Problem> {
     Ok(model)
 }
 
-fn probability(table: &Reader<'_>, key: &'static str) -> Result<f64, Problem> {
+fn probability(table: &Reader<'_>, key: &'static str) -> Result<f64, UserError> {
     table.number(key, 0.0..=1.0, "")?.ok_or_else(|| table.missing(key, "a number from 0 to 1"))
 }
 
-fn dwell(table: &Reader<'_>, key: &'static str) -> Result<Duration, Problem> {
+fn dwell(table: &Reader<'_>, key: &'static str) -> Result<Duration, UserError> {
     let given = table.number(key, 0.001..=LONGEST_S, "s")?;
     given.map(seconds).ok_or_else(|| table.missing(key, format!("a number from 0.001 to {LONGEST_S} s")))
 }
 
-fn independent(table: &Reader<'_>) -> Result<LossModel, Problem> {
+fn independent(table: &Reader<'_>) -> Result<LossModel, UserError> {
     Ok(LossModel::Independent { probability: probability(table, "probability")? })
 }
 
-fn gilbert_elliott(table: &Reader<'_>) -> Result<LossModel, Problem> {
+fn gilbert_elliott(table: &Reader<'_>) -> Result<LossModel, UserError> {
     let model = GilbertElliott {
         dwell_good: dwell(table, "good_s")?,
         dwell_bad: dwell(table, "bad_s")?,
@@ -135,8 +135,8 @@ fn gilbert_elliott(table: &Reader<'_>) -> Result<LossModel, Problem> {
     Ok(model.into())
 }
 
-fn three_state(table: &Reader<'_>) -> Result<LossModel, Problem> {
-    let half = |key| Ok::<_, Problem>(table.number(key, 0.0..=1.0, "")?.unwrap_or(0.5));
+fn three_state(table: &Reader<'_>) -> Result<LossModel, UserError> {
+    let half = |key| Ok::<_, UserError>(table.number(key, 0.0..=1.0, "")?.unwrap_or(0.5));
     let model = ThreeState {
         dwell: [dwell(table, "good_s")?, dwell(table, "medium_s")?, dwell(table, "bad_s")?],
         loss: [probability(table, "loss_good")?, probability(table, "loss_medium")?, probability(table, "loss_bad")?],
@@ -147,7 +147,7 @@ fn three_state(table: &Reader<'_>) -> Result<LossModel, Problem> {
     Ok(model.into())
 }
 
-fn snr(table: &Reader<'_>) -> Result<LossModel, Problem> {
+fn snr(table: &Reader<'_>) -> Result<LossModel, UserError> {
     let mut model = Snr::default();
     set(&mut model.source_level_db, table.number("source_level_db", 100.0..=230.0, "dB re 1 uPa at 1 m")?);
     set(&mut model.frequency_khz, table.number("frequency_khz", 0.1..=100.0, "kHz")?);
@@ -165,7 +165,7 @@ fn snr(table: &Reader<'_>) -> Result<LossModel, Problem> {
 }
 
 /// A file beside the scenario.
-fn file(table: &Reader<'_>) -> Result<(std::path::PathBuf, String), Problem> {
+fn file(table: &Reader<'_>) -> Result<(std::path::PathBuf, String), UserError> {
     let name =
         table.text("file")?.ok_or_else(|| table.missing("file", "the name of a file, relative to the scenario"))?;
     let path = table.path().parent().unwrap_or(std::path::Path::new(".")).join(name);
@@ -174,22 +174,22 @@ fn file(table: &Reader<'_>) -> Result<(std::path::PathBuf, String), Problem> {
     Ok((path, text))
 }
 
-fn range(table: &Reader<'_>) -> Result<LossModel, Problem> {
+fn range(table: &Reader<'_>) -> Result<LossModel, UserError> {
     let (path, text) = file(table)?;
-    RangeTable::from_csv(&text).map(LossModel::from).map_err(|e| Problem::file(&path, e))
+    RangeTable::from_csv(&text).map(LossModel::from).map_err(|e| UserError::file(&path, e))
 }
 
 /// A CSV of time and delivered, or a `frames.log` of ours; `direction` picks `up` or `down` from the latter.
-fn trace(table: &Reader<'_>) -> Result<LossModel, Problem> {
+fn trace(table: &Reader<'_>) -> Result<LossModel, UserError> {
     let (path, text) = file(table)?;
     let direction = table.choice("direction", &[("up", "up"), ("down", "down")])?;
     let is_log = direction.is_some() || path.extension().is_some_and(|extension| extension == "log");
     let trace = if is_log { Trace::from_frames_log(&text, direction) } else { Trace::from_csv(&text) };
-    trace.map(LossModel::from).map_err(|e| Problem::file(&path, e))
+    trace.map(LossModel::from).map_err(|e| UserError::file(&path, e))
 }
 
 /// One link of a table of Markov fits, two or three states, a step taken as `step_s`.
-fn fit(table: &Reader<'_>) -> Result<LossModel, Problem> {
+fn fit(table: &Reader<'_>) -> Result<LossModel, UserError> {
     let (path, text) = file(table)?;
     let step = dwell(table, "step_s")?;
     let states = table.whole("states", 2..=3, "")?.unwrap_or(3);
@@ -198,7 +198,7 @@ fn fit(table: &Reader<'_>) -> Result<LossModel, Problem> {
         let count = models.len();
         models.into_iter().nth(row - 1).ok_or_else(|| table.wrong("row", format!("a whole number from 1 to {count}")))
     };
-    let bad = |e| Problem::file(&path, e);
+    let bad = |e| UserError::file(&path, e);
     if states == 2 {
         let links = GilbertElliott::from_csv(&text, step).map_err(bad)?;
         return pick(links.into_iter().map(|link| link.model.into()).collect());

@@ -3,13 +3,14 @@
 use super::Spread;
 use crate::asv::{Page, Surface, Wish};
 use crate::auv::exemplar::edge_px;
-use crate::auv::{Area, Durable, MapUpdate, Vehicle, VehicleOutput};
+use crate::auv::{Durable, MapUpdate, Vehicle, VehicleOutput};
 use crate::config::Config;
 use crate::ends;
-use crate::problem::Problem;
 use crate::rehearsal::VirtualTime;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar as Picture;
+use scenecast_core::Area;
+use scenecast_core::UserError;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
@@ -73,7 +74,7 @@ pub fn arrivals(
     patches: &[RgbImage],
     seed: u64,
     progress: &mut dyn FnMut(f64),
-) -> Result<Arrivals, Problem> {
+) -> Result<Arrivals, UserError> {
     let mut water = Water::new(setting, patches, seed)?;
     water.run_until(Instant::from_secs_f64(WARM_UP_S), |_| false);
     let (began, before) = (water.now, water.sent_bits);
@@ -117,7 +118,7 @@ pub(super) struct Water {
 }
 
 impl Water {
-    pub(super) fn new(setting: Setting, patches: &[RgbImage], seed: u64) -> Result<Self, Problem> {
+    pub(super) fn new(setting: Setting, patches: &[RgbImage], seed: u64) -> Result<Self, UserError> {
         let mut config = Config::default();
         // Noise has nothing that the other coder could take: it need not be tried.
         config.map.codec = "context".to_owned();
@@ -160,11 +161,11 @@ impl Water {
     }
 
     /// Asks for an image; seconds and bytes that it took, if it came.
-    pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, Problem> {
+    pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, UserError> {
         let asked = self.now;
-        self.surface.request_exemplar(self.address, label, wish, asked).map_err(Problem::Failed)?;
+        self.surface.request_exemplar(self.address, label, wish, asked).map_err(UserError::Failed)?;
         if !self.run_until(asked + GIVE_UP, |w| w.is_met(label)) {
-            self.surface.cancel_exemplar(self.address, label, self.now).map_err(Problem::Failed)?;
+            self.surface.cancel_exemplar(self.address, label, self.now).map_err(UserError::Failed)?;
             return Ok(None);
         }
         let bytes = self.page(label).and_then(|page| page.picture(None)).map(|p| p.sent_bytes);

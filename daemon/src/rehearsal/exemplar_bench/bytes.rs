@@ -4,11 +4,11 @@ use super::Spread;
 use crate::auv::exemplar::{GOOD_SSIM, HEAD, compress, compress_to, middle, most_bytes};
 use crate::auv::{Mapper, exemplar::edge_px};
 use crate::config::Config;
-use crate::problem::Problem;
 use crate::rehearsal::World;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar;
 use scene_model::project::Pose;
+use scenecast_core::UserError;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -56,8 +56,8 @@ pub struct Bytes {
 }
 
 /// The photos in a folder, sorted by name; pictures of labels are passed over.
-pub fn photos(dir: &Path) -> Result<Vec<Source>, Problem> {
-    let entries = std::fs::read_dir(dir).map_err(|e| Problem::file(dir, e))?;
+pub fn photos(dir: &Path) -> Result<Vec<Source>, UserError> {
+    let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
     let is_photo = |path: &PathBuf| {
         let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
         let kind = ["jpg", "jpeg", "png"].iter().any(|e| name.ends_with(&format!(".{e}")));
@@ -66,13 +66,13 @@ pub fn photos(dir: &Path) -> Result<Vec<Source>, Problem> {
     let mut found: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(is_photo).collect();
     found.sort();
     if found.is_empty() {
-        return Err(Problem::file(dir, "there is no .jpg or .png in it"));
+        return Err(UserError::file(dir, "there is no .jpg or .png in it"));
     }
     Ok(found.into_iter().map(Source::Photo).collect())
 }
 
 /// The patches that the vehicle picks on a flight over a source.
-pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, Problem> {
+pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
     let config = Config::default();
     let mpp = config.camera.metres_per_pixel;
     let world = match source {
@@ -94,7 +94,11 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, Problem> {
 }
 
 /// Measures the patches of all sources; the patches too.
-pub fn sizes(sources: &[Source], seed: u64, progress: &mut dyn FnMut(f64)) -> Result<(Bytes, Vec<RgbImage>), Problem> {
+pub fn sizes(
+    sources: &[Source],
+    seed: u64,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(Bytes, Vec<RgbImage>), UserError> {
     let mut all = Vec::new();
     for (i, source) in sources.iter().enumerate() {
         all.extend(patches(source, seed)?);

@@ -1,7 +1,9 @@
 //! The surface vehicle of a rehearsed localisation: its instruments, its relay, and its way above the vehicle.
 
-use crate::asv::position::{Follow, GpsLanguage, LatLon, Mounting, Relay, RelayConfig, UsblSighting};
+use crate::asv::position::{Follow, Mounting, Relay, RelayConfig, UsblSighting};
 use crate::rehearsal::instruments::{Instruments, Receiver};
+use scenecast_core::LatLon;
+use scenecast_core::gps::GpsLanguage;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;

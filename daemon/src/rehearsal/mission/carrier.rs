@@ -3,14 +3,14 @@
 use super::{Mission, channel_config};
 use crate::config::Config;
 use crate::modem::ModemEvent;
-use crate::problem::Problem;
 use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
+use scenecast_core::UserError;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
 use sim_channel::Channel;
 
 /// The modems, if the configuration names a make; TCP and UDP are no modems: there the water is bare.
-pub(super) fn docked(config: &Config, seed: u64, now: Instant) -> Result<Option<Docked>, Problem> {
+pub(super) fn docked(config: &Config, seed: u64, now: Instant) -> Result<Option<Docked>, UserError> {
     match config.modem.kind.as_str() {
         "tcp" | "udp" => Ok(None),
         _ => Docked::new(config, Channel::new(channel_config(config), seed), seed, now).map(Some),

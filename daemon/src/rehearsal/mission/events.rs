@@ -3,10 +3,10 @@
 use super::{Mission, STEP_S, SURFACE, VEHICLE, pose_of};
 use crate::asv::SurfaceOutput;
 use crate::auv::VehicleOutput;
-use crate::problem::Problem;
 use crate::rehearsal::docked::{self, Docked};
 use crate::rehearsal::motion::Motion;
-use crate::rehearsal::recording::RecordedFrame;
+use scenecast_core::UserError;
+use scenecast_files::RecordedFrame;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
@@ -36,7 +36,7 @@ impl Mission {
             .min()
     }
 
-    pub(super) fn handle_timeouts(&mut self) -> Result<(), Problem> {
+    pub(super) fn handle_timeouts(&mut self) -> Result<(), UserError> {
         let now = self.now;
         for (node, ends_at) in self.transmitting.into_iter().enumerate() {
             if ends_at.is_some_and(|at| at <= now) {
@@ -179,7 +179,7 @@ impl Mission {
         self.recording.is_none() && self.vehicle.navigator().depth_m() < self.survey_depth_m() - 1.0
     }
 
-    fn camera(&mut self) -> Result<(), Problem> {
+    fn camera(&mut self) -> Result<(), UserError> {
         if self.ended.is_some() {
             self.times.frame = self.now + Duration::from_secs(3600);
             return Ok(());
@@ -212,7 +212,7 @@ impl Mission {
         self.see(&image, scale)
     }
 
-    fn see(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), Problem> {
+    fn see(&mut self, image: &image::RgbImage, scale: f64) -> Result<(), UserError> {
         let t_s = self.now.as_secs_f64();
         let pose = pose_of(&self.vehicle);
         if let Some(recorder) = &mut self.recorder {
@@ -231,7 +231,8 @@ impl Mission {
         self.vehicle.handle_exemplars(self.mapper.gallery());
         if self.vehicle.map_version() != self.map_version {
             self.map_version = self.vehicle.map_version();
-            self.png_full_bytes += crate::picture::encode(self.vehicle.map()).map_or(0, |png| png.len() as u64);
+            self.png_full_bytes +=
+                scenecast_core::label_picture::encode(self.vehicle.map()).map_or(0, |png| png.len() as u64);
         }
         self.update = Some(update);
         Ok(())

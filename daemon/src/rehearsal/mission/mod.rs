@@ -12,16 +12,17 @@ use super::docked::{self, Docked};
 use super::frames_log::FramesLog;
 use super::meter::Meter;
 use super::motion::Motion;
-use super::recording::{Recorder, Recording};
 use super::script::Script;
 use super::world::World;
 use crate::asv::{Surface, SurfaceOutput};
-use crate::auv::{AppliedSlot, Area, Durable, MapUpdate, Mapper, Vehicle, cell_m};
+use crate::auv::{AppliedSlot, Durable, MapUpdate, Mapper, Vehicle, cell_m};
 use crate::config::{self, Config};
 use crate::ends;
-use crate::problem::Problem;
 use anchored::Anchored;
 use scene_model::project::Pose;
+use scenecast_core::Area;
+use scenecast_core::UserError;
+use scenecast_files::{Recorder, Recording};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::PlaneKind;
@@ -104,7 +105,7 @@ pub struct Mission {
 
 impl Mission {
     /// A mission at its start.
-    pub fn new(config: Config, options: MissionOptions) -> Result<Self, Problem> {
+    pub fn new(config: Config, options: MissionOptions) -> Result<Self, UserError> {
         let MissionOptions { world, seed, record } = options;
         let now = Instant::ZERO;
         let mut docked = carrier::docked(&config, seed, now)?;
@@ -118,7 +119,7 @@ impl Mission {
         if recording.is_none() && !overlap(&area, &world.area()) {
             let a = world.area();
             let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);
-            return Err(Problem::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
+            return Err(UserError::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
         }
         let vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
         let mut surface = ends::surface(&config, surface_modem, seed ^ 0x5EA, now)?;
@@ -249,7 +250,7 @@ impl Mission {
     }
 
     /// Runs until `until`, or a little beyond the last event before it.
-    pub fn advance(&mut self, until: Instant) -> Result<(), Problem> {
+    pub fn advance(&mut self, until: Instant) -> Result<(), UserError> {
         while let Some(next) = self.next_event().filter(|&at| at <= until) {
             self.now = self.now.max(next);
             self.handle_timeouts()?;
@@ -261,7 +262,7 @@ impl Mission {
     }
 
     /// Flies the survey to its end, then lets the channel drain for at most `drain`.
-    pub fn run(&mut self, drain: Duration, progress: &mut dyn FnMut(f64)) -> Result<(), Problem> {
+    pub fn run(&mut self, drain: Duration, progress: &mut dyn FnMut(f64)) -> Result<(), UserError> {
         let end = Instant::from_secs_f64(self.config.survey.duration_s);
         while self.now < end {
             self.advance((self.now + Duration::from_secs(10)).min(end))?;

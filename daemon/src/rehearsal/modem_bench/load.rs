@@ -3,10 +3,10 @@
 use crate::config::Config;
 use crate::ends;
 use crate::modem::ModemEvent;
-use crate::problem::Problem;
 use crate::rehearsal::VirtualTime;
 use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
 use crate::rehearsal::link_bench::{OpaqueReplica, OpaqueSource, Summary};
+use scenecast_core::UserError;
 use scenecast_protocol::directive::{Slot, SlotId, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
@@ -70,20 +70,20 @@ pub struct Dock {
 
 impl Dock {
     /// Ends that have not met.
-    pub fn new(setting: &DockSetting, seed: u64) -> Result<Self, Problem> {
+    pub fn new(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let docked = Docked::new(&setting.config, Channel::new(setting.water(), seed), seed, now)?;
         Self::at(setting, docked, seed, now)
     }
 
     /// The same at these modems.
-    pub fn with_modems(setting: &DockSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, Problem> {
+    pub fn with_modems(setting: &DockSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let docked = Docked::with_modems(&setting.config, Channel::new(setting.water(), seed), modems, now)?;
         Self::at(setting, docked, seed, now)
     }
 
-    fn at(setting: &DockSetting, mut docked: Docked, seed: u64, now: Instant) -> Result<Self, Problem> {
+    fn at(setting: &DockSetting, mut docked: Docked, seed: u64, now: Instant) -> Result<Self, UserError> {
         let config = &setting.config;
         docked.place(VEHICLE, Position::new(0.0, 0.0, 10.0));
         docked.place(SURFACE, Position::new(setting.range_m, 0.0, 10.0));
@@ -127,7 +127,7 @@ impl Dock {
     }
 
     /// Ends under load that know each other.
-    pub fn under_load(setting: &DockSetting, seed: u64) -> Result<Self, Problem> {
+    pub fn under_load(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
         let mut dock = Self::new(setting, seed)?;
         dock.load = Some(LOAD);
         dock.run(Duration::from_secs(180));

@@ -7,8 +7,8 @@ pub use load::{Dock, DockSetting};
 pub use pusher::push;
 
 use crate::config::{self, Config};
-use crate::problem::Problem;
 use crate::rehearsal::{Mission, MissionOptions, World, report};
+use scenecast_core::UserError;
 use serde::Serialize;
 use std::time::Duration;
 
@@ -65,7 +65,7 @@ const RANGE_M: f64 = 1000.0;
 const LOSS: f64 = 0.1;
 
 /// Measures everything; takes about a minute.
-pub fn modem_table(seed: u64, progress: &mut dyn FnMut(f64)) -> Result<ModemTable, Problem> {
+pub fn modem_table(seed: u64, progress: &mut dyn FnMut(f64)) -> Result<ModemTable, UserError> {
     progress(0.0);
     let burst = measure_burst(seed, Duration::from_secs(1200), 60)?;
     let mut surveys = Vec::new();
@@ -86,14 +86,14 @@ pub fn modem_table(seed: u64, progress: &mut dyn FnMut(f64)) -> Result<ModemTabl
 }
 
 /// The default scenario at the range and loss of every row, changed by `sets`.
-pub fn scenario(sets: &[&str]) -> Result<Config, Problem> {
+pub fn scenario(sets: &[&str]) -> Result<Config, UserError> {
     let mut all = vec![format!("channel.loss={LOSS}"), format!("channel.range_m={RANGE_M}")];
     all.extend(sets.iter().map(|s| (*s).to_owned()));
     config::load(None, &all)
 }
 
 /// Throughput against a raw pusher, and latency of `directives` directives meanwhile.
-pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<BurstRow, Problem> {
+pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<BurstRow, UserError> {
     // A budget that does not bind: the modem is what is measured.
     let config = scenario(&["modem.kind=s2c", "link.budget_bps=40000"])?;
     let setting = DockSetting { config, range_m: RANGE_M, loss: LOSS };
@@ -114,7 +114,7 @@ pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<Bur
 }
 
 /// A survey of `duration_s` through modems, and what the link takes after it.
-pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<SurveyRow, Problem> {
+pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<SurveyRow, UserError> {
     let mut config = scenario(sets)?;
     config.survey.duration_s = duration_s;
     let options = MissionOptions { world: World::procedural(seed, config.camera.metres_per_pixel), seed, record: None };

@@ -1,8 +1,9 @@
 //! One planner on one scene.
 
 use super::scene::{CELL_M, Scene};
-use crate::auv::{Area, Course, Footprint, Steering};
+use crate::auv::{Course, Footprint, Steering};
 use crate::rehearsal::witness::{length_m, stretches_outside};
+use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use sim_channel::Stream;

@@ -4,10 +4,10 @@ mod drive;
 mod picture;
 mod scene;
 
-use crate::problem::Problem;
 use drive::{Drive, Task, Told};
 pub use picture::picture;
 use scene::Scene;
+use scenecast_core::UserError;
 use scenecast_protocol::directive::PlannerKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -73,8 +73,8 @@ pub fn annotated_images(dir: &Path) -> Vec<(PathBuf, PathBuf)> {
 pub fn drive_all(
     seed: u64,
     images: &[(PathBuf, PathBuf)],
-    each: &mut dyn FnMut(f64, &Trial) -> Result<(), Problem>,
-) -> Result<PlanningTable, Problem> {
+    each: &mut dyn FnMut(f64, &Trial) -> Result<(), UserError>,
+) -> Result<PlanningTable, UserError> {
     let real = images.iter().map(|(i, l)| Scene::from_files(i, l, seed)).collect::<Result<Vec<_>, _>>()?;
     let (mut found, mut told_all) = (Vec::new(), Vec::new());
     let mut violations = 0;

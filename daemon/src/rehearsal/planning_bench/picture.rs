@@ -2,8 +2,8 @@
 
 use super::Trial;
 use super::scene::CELL_M;
-use crate::picture::colour;
 use image::{ImageFormat, Rgb, RgbImage};
+use scenecast_core::palette::colour;
 use scenecast_protocol::map::Cell;
 use std::io::Cursor;
 

@@ -1,14 +1,14 @@
 //! Label maps to drive over.
 
-use crate::auv::Area;
 use crate::config::Config;
-use crate::problem::Problem;
 use crate::rehearsal::World;
 use image::RgbImage;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_core::Area;
+use scenecast_core::UserError;
 use scenecast_protocol::directive::Utility;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::BTreeMap;
@@ -37,8 +37,8 @@ pub(crate) struct Scene {
 
 impl Scene {
     /// An annotated image.
-    pub fn from_files(image: &Path, annotations: &Path, seed: u64) -> Result<Self, Problem> {
-        let rgb = image::open(image).map_err(|e| Problem::file(image, e))?.to_rgb8();
+    pub fn from_files(image: &Path, annotations: &Path, seed: u64) -> Result<Self, UserError> {
+        let rgb = image::open(image).map_err(|e| UserError::file(image, e))?.to_rgb8();
         let px = (f64::from(rgb.width()) / CELLS).floor().max(4.0);
         let world = World::from_files(image, Some(annotations), CELL_M / px)?;
         let name = image.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();

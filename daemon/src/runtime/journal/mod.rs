@@ -9,7 +9,7 @@ mod cuts;
 pub(super) mod disk;
 
 pub(super) use record::Damage;
-pub(crate) use storage::{Folder, Storage, create_folder, sync_folder};
+pub(crate) use storage::{Folder, Storage, create_folder};
 
 use std::io;
 

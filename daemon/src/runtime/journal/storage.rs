@@ -69,14 +69,8 @@ pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
     create_folder(above)?;
     match fs::create_dir(path) {
         Err(e) if e.kind() != ErrorKind::AlreadyExists || !path.is_dir() => Err(e),
-        _ => sync_folder(above),
+        _ => scenecast_files::sync_folder(above),
     }
-}
-
-/// Makes the names of a folder safe; the empty path is the working folder.
-pub(crate) fn sync_folder(path: &Path) -> io::Result<()> {
-    let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
-    File::open(path)?.sync_all()
 }
 
 impl Storage for Folder {

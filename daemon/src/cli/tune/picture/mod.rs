@@ -4,10 +4,10 @@ mod axis;
 mod raster;
 mod svg;
 
-use crate::problem::Problem;
-use crate::tuning::{Measurement, Row};
 use axis::Axis;
 use raster::Raster;
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::{Measurement, Row};
 use svg::Svg;
 
 pub(super) const WIDTH: u32 = 1240;
@@ -78,10 +78,10 @@ impl<'a> Figure<'a> {
         svg.finish()
     }
 
-    pub(super) fn png(&self) -> Result<Vec<u8>, Problem> {
+    pub(super) fn png(&self) -> Result<Vec<u8>, UserError> {
         let mut raster = Raster::new(WIDTH, HEIGHT);
         self.draw(&mut raster);
-        raster.finish().map_err(|e| Problem::Failed(e.to_string()))
+        raster.finish().map_err(|e| UserError::Failed(e.to_string()))
     }
 
     fn draw(&self, canvas: &mut dyn Canvas) {
@@ -168,12 +168,12 @@ fn front(rows: &[Row], told: impl Fn(&Row) -> f64) -> Vec<&Row> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tuning::TuningTable;
+    use scenecast_core::tuning_table::TuningTable;
 
     fn rows() -> Vec<Row> {
         let setting = TuningTable::shipped().rows().next().unwrap().setting;
         let row = |(map_bytes, mutual_information_nats)| Row {
-            setting: crate::tuning::Setting { alpha: mutual_information_nats, ..setting },
+            setting: scenecast_core::tuning_table::Setting { alpha: mutual_information_nats, ..setting },
             measurement: Measurement {
                 mutual_information_nats,
                 normalised_mutual_information: 0.0,

@@ -1,8 +1,8 @@
 //! Recorded missions: images and where they were taken.
 
-use crate::auv::Area;
-use crate::problem::Problem;
 use image::RgbImage;
+use scenecast_core::Area;
+use scenecast_core::UserError;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -27,8 +27,8 @@ pub struct RecordedFrame {
 
 impl RecordedFrame {
     /// Reads the image.
-    pub fn image(&self) -> Result<RgbImage, Problem> {
-        Ok(crate::imagery::read_image(&self.file)?.to_rgb8())
+    pub fn image(&self) -> Result<RgbImage, UserError> {
+        Ok(crate::read_image(&self.file)?.to_rgb8())
     }
 }
 
@@ -45,9 +45,9 @@ pub struct Recording {
 
 impl Recording {
     /// Reads the table of a folder; complaints name the line. A pixel of a mosaic is `metres_per_pixel` wide.
-    pub fn open(dir: &Path, metres_per_pixel: f64) -> Result<Self, Problem> {
+    pub fn open(dir: &Path, metres_per_pixel: f64) -> Result<Self, UserError> {
         let path = table(dir)?;
-        let text = std::fs::read_to_string(&path).map_err(|e| Problem::file(&path, e))?;
+        let text = std::fs::read_to_string(&path).map_err(|e| UserError::file(&path, e))?;
         let in_pixels = text.lines().next().is_some_and(|head| head.split(',').any(|name| name.trim() == "x_px"));
         let mut frames: Vec<RecordedFrame> = Vec::new();
         for (i, line) in text.lines().enumerate().skip(1).filter(|(_, l)| !l.trim().is_empty()) {
@@ -61,14 +61,14 @@ impl Recording {
                 false => (parse(dir, line), "t_s,file,x_m,y_m,depth_m,heading_deg"),
             };
             let what = format!("{place}: expected {columns} with finite numbers");
-            let frame = frame.ok_or(Problem::Input(what))?;
+            let frame = frame.ok_or(UserError::Input(what))?;
             if frames.last().is_some_and(|last| last.t_s > frame.t_s) {
-                return Err(Problem::Input(format!("{place}: the time goes back")));
+                return Err(UserError::Input(format!("{place}: the time goes back")));
             }
             frames.push(frame);
         }
         if frames.is_empty() {
-            return Err(Problem::file(&path, "there are no frames"));
+            return Err(UserError::file(&path, "there are no frames"));
         }
         // A time of the day says nothing of the mission's.
         let began_s = if in_pixels { frames[0].t_s } else { 0.0 };
@@ -77,9 +77,9 @@ impl Recording {
     }
 
     /// The folder of a `frames:DIR` source.
-    pub fn folder(source: &str) -> Result<&Path, Problem> {
+    pub fn folder(source: &str) -> Result<&Path, UserError> {
         let dir = source.strip_prefix("frames:").filter(|d| !d.is_empty());
-        dir.map(Path::new).ok_or_else(|| Problem::Input(format!("camera.source = {source:?}: it takes frames:DIR")))
+        dir.map(Path::new).ok_or_else(|| UserError::Input(format!("camera.source = {source:?}: it takes frames:DIR")))
     }
 
     /// Limits of the places in the recording.
@@ -142,23 +142,23 @@ fn after(frame: RecordedFrame, midnight: f64, last: Option<&RecordedFrame>) -> R
 }
 
 /// The table of a folder's poses.
-fn table(dir: &Path) -> Result<PathBuf, Problem> {
+fn table(dir: &Path) -> Result<PathBuf, UserError> {
     let usual = dir.join("poses.csv");
     if usual.is_file() {
         return Ok(usual);
     }
     let mut tables = Vec::new();
-    for entry in std::fs::read_dir(dir).map_err(|e| Problem::file(dir, e))? {
-        let name = entry.map_err(|e| Problem::file(dir, e))?.file_name();
+    for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {
+        let name = entry.map_err(|e| UserError::file(dir, e))?.file_name();
         let name = name.to_string_lossy().into_owned();
         if name.starts_with("poses") && name.ends_with(".csv") {
             tables.push(name);
         }
     }
     match tables.as_slice() {
-        [] => Err(Problem::file(&usual, "there is no such file; it tells where the images were taken")),
+        [] => Err(UserError::file(&usual, "there is no such file; it tells where the images were taken")),
         [only] => Ok(dir.join(only)),
-        _ => Err(Problem::file(dir, format!("which of {} counts? name it poses.csv", tables.join(", ")))),
+        _ => Err(UserError::file(dir, format!("which of {} counts? name it poses.csv", tables.join(", ")))),
     }
 }
 
@@ -172,18 +172,18 @@ pub struct Recorder {
 
 impl Recorder {
     /// Records into a folder, which is made.
-    pub fn new(dir: &Path) -> Result<Self, Problem> {
-        std::fs::create_dir_all(dir).map_err(|e| Problem::file(dir, e))?;
+    pub fn new(dir: &Path) -> Result<Self, UserError> {
+        std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
         let poses = "t_s,file,x_m,y_m,depth_m,heading_deg\n".to_owned();
         Ok(Self { dir: dir.to_owned(), poses, frames: 0 })
     }
 
     /// Keeps a frame and where the vehicle believes to have taken it; returns the pose as it will be read back.
-    pub fn push(&mut self, image: &RgbImage, frame: &RecordedFrame) -> Result<(), Problem> {
+    pub fn push(&mut self, image: &RgbImage, frame: &RecordedFrame) -> Result<(), UserError> {
         let name = format!("frame-{:06}.png", self.frames);
         self.frames += 1;
         let path = self.dir.join(&name);
-        image.save(&path).map_err(|e| Problem::Failed(format!("{}: {e}", path.display())))?;
+        image.save(&path).map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))?;
         let RecordedFrame { t_s, x_m, y_m, depth_m, heading_rad, .. } = frame;
         let heading = heading_rad.to_degrees();
         let _ = writeln!(self.poses, "{t_s},{name},{x_m},{y_m},{depth_m},{heading}");
@@ -191,8 +191,8 @@ impl Recorder {
     }
 
     /// Writes `poses.csv`.
-    pub fn finish(&self) -> Result<(), Problem> {
-        crate::picture::write_whole(&self.dir.join("poses.csv"), self.poses.as_bytes())
+    pub fn finish(&self) -> Result<(), UserError> {
+        crate::write_whole(&self.dir.join("poses.csv"), self.poses.as_bytes())
     }
 }
 
@@ -200,7 +200,7 @@ impl Recorder {
 mod tests {
     use super::*;
 
-    fn open(name: &str, table: &str, text: &str) -> Result<Recording, Problem> {
+    fn open(name: &str, table: &str, text: &str) -> Result<Recording, UserError> {
         let dir = std::env::temp_dir().join(format!("scenecast-{}-recording-{name}", std::process::id()));
         let _ = std::fs::remove_dir_all(&dir);
         std::fs::create_dir_all(&dir).unwrap();
