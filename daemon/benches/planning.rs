@@ -1,9 +1,9 @@
 //! `cargo bench -p scenecast --bench planning`: time of one plan on a map of 200 x 200 cells, half of it seen.
 
-use scenecast::auv::{Footprint, Steering};
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_vehicle::{Footprint, Steering};
 
 const CELL_M: f64 = 0.25;
 const SIDE: i32 = 200;

@@ -8,6 +8,7 @@
 )]
 
 pub mod directive;
+pub mod exemplar;
 pub mod link;
 pub mod mac;
 pub mod map;

@@ -1,15 +1,21 @@
 //! One configuration for the sea and for rehearsal.
 
+mod derived;
 mod key_file;
 mod keys;
 mod load;
+mod modem;
 mod place;
 mod print;
 mod token_file;
 
+pub use derived::{
+    authenticity, background, cell_m, modem_profile, survey_area, tuning_table, vehicle_address, vehicle_names,
+};
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};
 pub use load::load;
+pub use modem::{full_frame_bytes, modem_port};
 pub use place::{autopilot_place, is_gpsd, origin, position_places};
 pub use print::print;
 pub use token_file::{load_token, read_token};

@@ -79,7 +79,7 @@ fn check_frame(config: &Config) -> Result<(), UserError> {
         (_, "all") => (48, "link.authenticate = \"all\"", "the vehicle's report"),
         _ => (36, "a link.key_file", "a position fix"),
     };
-    let frame_bytes = crate::modem::full_frame_bytes(config);
+    let frame_bytes = crate::full_frame_bytes(config);
     if frame_bytes >= least {
         return Ok(());
     }

@@ -9,5 +9,5 @@ mod whole;
 
 pub use images::{read_classes, read_image};
 pub use recording::{RecordedFrame, Recorder, Recording};
-pub use vocabulary::read_vocabulary;
+pub use vocabulary::{configured_vocabulary, read_vocabulary};
 pub use whole::{sync_folder, write_whole};

@@ -16,3 +16,11 @@ pub fn read_vocabulary(path: &Path) -> Result<Measures, UserError> {
     let advice = "make one with scenecast vocabulary train";
     scene_model::vocabulary::load(&bytes).map_err(|e| UserError::file(path, format!("{e}; {advice}")))
 }
+
+/// The vocabulary of `scene.vocabulary`; `None` for the one that ships.
+///
+/// # Errors
+/// As [`read_vocabulary`].
+pub fn configured_vocabulary(file: &str) -> Result<Option<Measures>, UserError> {
+    (!file.is_empty()).then(|| read_vocabulary(Path::new(file))).transpose()
+}

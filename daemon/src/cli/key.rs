@@ -1,6 +1,5 @@
 //! `scenecast key`
 
-use crate::config;
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
 use scenecast_protocol::seal::MissionKey;
@@ -62,7 +61,7 @@ impl Key {
                 println!("Set console.token_file of the surface to its path, and give a copy to those who may steer.");
             }
             Self::Show(show) => {
-                let (key, warning) = config::read_key(&show.file)?;
+                let (key, warning) = scenecast_config::read_key(&show.file)?;
                 println!("{}: fingerprint {:08x}", show.file.display(), key.fingerprint());
                 if let Some(warning) = warning {
                     eprintln!("scenecast: {warning}");
@@ -119,7 +118,7 @@ mod tests {
     fn a_new_key_is_its_owners_alone_and_is_read_again() {
         let (path, key) = (fresh("new"), random_key().unwrap());
         write_new(&path, &key.to_text()).unwrap();
-        let (read, warning) = config::read_key(&path).unwrap();
+        let (read, warning) = scenecast_config::read_key(&path).unwrap();
         assert_eq!((read.fingerprint(), warning), (key.fingerprint(), None));
         #[cfg(unix)]
         {

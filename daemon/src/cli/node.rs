@@ -1,6 +1,5 @@
 //! `scenecast auv`, `scenecast asv`, `scenecast config`
 
-use crate::config;
 use crate::runtime;
 use clap::{Args, ValueEnum};
 use scenecast_core::UserError;
@@ -22,11 +21,11 @@ pub(super) struct Node {
 
 impl Node {
     pub(super) fn run_vehicle(self) -> Result<(), UserError> {
-        runtime::run_vehicle(Box::new(move || config::load(Some(&self.config), &self.sets)))
+        runtime::run_vehicle(Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)))
     }
 
     pub(super) fn run_surface(self) -> Result<(), UserError> {
-        runtime::run_surface(config::load(Some(&self.config), &self.sets)?)
+        runtime::run_surface(scenecast_config::load(Some(&self.config), &self.sets)?)
     }
 }
 
@@ -53,7 +52,7 @@ impl PrintConfig {
             Role::Asv => 's',
             Role::Scenario => 'r',
         };
-        print!("{}", config::print(role));
+        print!("{}", scenecast_config::print(role));
         Ok(())
     }
 }

@@ -1,9 +1,9 @@
 //! `scenecast sim`
 
 use super::progress::Progress;
-use crate::config::{self, Config};
 use crate::rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use clap::Args;
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde_json::json;
 use std::path::PathBuf;
@@ -41,7 +41,7 @@ impl WorldArguments {
         let mut sets = self.sets.clone();
         sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
         sets.extend(self.duration.map(|d| format!("survey.duration_s={d:?}")));
-        let config = config::load(self.scenario.as_deref(), &sets)?;
+        let config = scenecast_config::load(self.scenario.as_deref(), &sets)?;
         if config.survey.duration_s <= 0.0 {
             return Err(UserError::Input("a rehearsal needs an end: survey.duration_s must be above 0".to_owned()));
         }

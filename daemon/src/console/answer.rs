@@ -6,13 +6,13 @@ use super::orders::{BudgetOrder, ExemplarOrder, ExemplarWish};
 use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
-use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
 use scenecast_core::label_picture::MOST_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
 use std::collections::BTreeMap;
 
 /// A question or an order.

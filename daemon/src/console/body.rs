@@ -45,7 +45,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Order<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asv::SettingsOrder;
+    use scenecast_surface::SettingsOrder;
 
     #[test]
     fn an_order_is_an_object_and_no_list() {

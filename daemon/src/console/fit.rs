@@ -2,12 +2,12 @@
 
 use super::answer::Ask;
 use super::server::{Shared, VehicleId, refusal};
-use crate::asv::{SettingsOrder, Surface};
 use axum::extract::{Query, State};
 use axum::http::StatusCode;
 use axum::response::Response;
 use scenecast_core::tuning_table::{self, Row};
 use scenecast_protocol::wire::Address;
+use scenecast_surface::{SettingsOrder, Surface};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

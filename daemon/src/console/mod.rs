@@ -1,6 +1,6 @@
 //! The operator's page and its HTTP API.
 //!
-//! The host's loop owns the [`Surface`](crate::asv::Surface). It pushes a [`Snapshot`] whenever something has changed, and
+//! The host's loop owns the [`Surface`](scenecast_surface::Surface). It pushes a [`Snapshot`] whenever something has changed, and
 //! answers the [`Ask`]s of browsers between two steps, so no client can hold the link up.
 
 mod answer;

@@ -5,10 +5,10 @@ use super::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
 use super::server::{self, Shared, VehicleId};
 use super::state::{Accepted, Map, State as Everything};
 use super::{events, fit, metrics, openapi, token};
-use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
 use axum::extract::State;
 use axum::http::{HeaderMap, Method};
 use axum::routing::{MethodRouter, get, post};
+use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 /// The schema of a type.

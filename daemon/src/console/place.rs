@@ -1,9 +1,9 @@
 //! Where things are in the world, for the page.
 
 use super::state;
-use crate::asv::Surface;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
+use scenecast_surface::Surface;
 
 /// Where x = y = 0 of the world is on the Earth; nothing while the surface's instruments do not know, and of a rehearsal that
 /// is nowhere: both 0 is no place, as in the configuration.

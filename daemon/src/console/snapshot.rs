@@ -2,18 +2,18 @@
 
 use super::link_meter::LinkMeter;
 use super::{place, state};
-use crate::asv::{Album, AskState, Desk, Picture, Surface};
-use crate::auv::exemplar::edge_px;
-use crate::config::{self, Config};
 use axum::body::Bytes;
+use scenecast_config::Config;
 use scenecast_core::LatLon;
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::{LifeLine, PlannerKind, SlotId, SlotProgress};
+use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Backlog, Stamp, VehicleMode, VehicleStatus};
+use scenecast_surface::{Album, AskState, Desk, Picture, Surface};
 use std::collections::BTreeMap;
 
 /// Facts of the mission that the surface itself does not know.
@@ -47,7 +47,7 @@ impl MissionFacts {
             run: format!("{:08x}", run as u32),
             speed,
             ended: false,
-            cell_m: crate::auv::cell_m(config),
+            cell_m: scenecast_config::cell_m(config),
             idle_s: config.link.max_idle_s,
             first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
             frame_bits: modem.bits_on_air(modem.frame_bytes),
@@ -59,7 +59,7 @@ impl MissionFacts {
 /// The origin that is configured, if any is.
 fn origin(config: &Config) -> Option<state::Origin> {
     // At a pole there is no east.
-    let LatLon { lat_deg, lon_deg } = config::origin(config).ok()?.filter(|o| o.lat_deg.abs() < 90.0)?;
+    let LatLon { lat_deg, lon_deg } = scenecast_config::origin(config).ok()?.filter(|o| o.lat_deg.abs() < 90.0)?;
     Some(state::Origin { lat_deg, lon_deg })
 }
 

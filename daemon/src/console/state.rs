@@ -6,7 +6,7 @@ mod map;
 pub use link::{Backlog, Direction, Link, Rates, VehicleLink, Water};
 pub use map::{Map, MapEvent, MapSummary, Placement, Plane};
 
-use crate::asv::{FenceOrder, LimitsOrder, SettingsOrder};
+use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -2,11 +2,11 @@
 
 use super::geojson::{self, Frame};
 use super::{Ctl, figures};
-use crate::asv::{FenceOrder, LimitsOrder};
 use crate::console::orders::ConstraintsOrder;
 use crate::console::state::{InForce, LifeLine, Slot, State, Vehicle};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
+use scenecast_surface::{FenceOrder, LimitsOrder};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;

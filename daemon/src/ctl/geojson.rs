@@ -1,8 +1,8 @@
 //! A fence from a GeoJSON file (RFC 7946), as a GIS writes it.
 
-use crate::asv::FenceOrder;
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
+use scenecast_surface::FenceOrder;
 use serde_json::Value;
 use std::path::Path;
 

@@ -1,10 +1,10 @@
 //! Settings of a vehicle: shown, sent, or picked to fit a budget.
 
 use super::{Ctl, figures};
-use crate::asv::SettingsOrder;
 use crate::console::fit::{Fit, Fitted};
 use crate::console::state::Vehicle;
 use scenecast_core::UserError;
+use scenecast_surface::SettingsOrder;
 
 /// What is to be sent.
 #[derive(Debug, Clone, PartialEq, Default)]

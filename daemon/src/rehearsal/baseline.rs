@@ -1,6 +1,6 @@
 //! The comparison: send the whole PNG again whenever the map has changed.
 
-use crate::config::Config;
+use scenecast_config::Config;
 
 /// The same mission with the whole map as a PNG object, newest first, in place of the delta stream.
 ///

@@ -1,9 +1,10 @@
 //! What every driver must do, each at its emulator, in virtual time.
 
-use crate::config::{self, Config};
-use crate::modem::{self, Class, Destination, Driver, Event, Refusal, Token};
 use crate::rehearsal::VirtualTime;
 use crate::rehearsal::modem_bench::{Dock, DockSetting};
+use scenecast_config::Config;
+use scenecast_drivers::modem;
+use scenecast_drivers::modem::{Class, Destination, Driver, Event, Refusal, Token};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::Cycle;
 use scenecast_protocol::mac::Access;
@@ -40,7 +41,7 @@ const KINDS: [(&str, &[&str]); 6] = [
 
 fn config(sets: &[&str]) -> Config {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
-    config::load(None, &sets).unwrap()
+    scenecast_config::load(None, &sets).unwrap()
 }
 
 fn setting(sets: &[&str], loss: f64) -> DockSetting {
@@ -50,7 +51,7 @@ fn setting(sets: &[&str], loss: f64) -> DockSetting {
 fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
     let mut config = config.clone();
     config.modem.device = "emulated".into();
-    let profile = crate::ends::modem_of_process(&config, end).unwrap();
+    let profile = scenecast_drivers::modem::modem_of_process(&config, end).unwrap();
     modem::driver(&config, end, profile).unwrap()
 }
 

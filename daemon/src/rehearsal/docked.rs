@@ -1,9 +1,9 @@
 //! Both ends' drivers at emulated modems in one simulated water, in virtual time.
 
-use crate::config::Config;
-use crate::ends;
-use crate::modem::{self, ModemEvent, Station};
+use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_drivers::modem;
+use scenecast_drivers::modem::{ModemEvent, Station};
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -41,7 +41,7 @@ impl Docked {
     /// # Errors
     /// A kind that is no modem.
     pub fn new(config: &Config, channel: Channel, seed: u64, now: Instant) -> Result<Self, UserError> {
-        let vehicle = ends::vehicle_address(config)?.number();
+        let vehicle = scenecast_config::vehicle_address(config)?.number();
         let surface = config.modem.surface_address;
         let modems = [emulator(config, vehicle, false, seed)?, emulator(config, surface, true, seed)?];
         Self::with_modems(config, channel, modems, now)
@@ -57,7 +57,7 @@ impl Docked {
         let mut config = config.clone();
         // Emulated ports are serial ones.
         config.modem.device = "emulated".to_owned();
-        let vehicle = ends::vehicle_address(&config)?;
+        let vehicle = scenecast_config::vehicle_address(&config)?;
         let mut basin = Basin::new(channel);
         basin.advance(now.into());
         let [of_vehicle, of_surface] = modems;
@@ -161,7 +161,7 @@ impl Docked {
 /// An end's station, and its modem in the water.
 fn berth(config: &Config, end: Address, modem: Box<dyn Emulator>, basin: &mut Basin) -> Result<Berth, UserError> {
     let number = if end == Address::SURFACE { config.modem.surface_address } else { end.number() };
-    let driver = modem::driver(config, end, ends::modem_of_process(config, end)?)?;
+    let driver = modem::driver(config, end, scenecast_drivers::modem::modem_of_process(config, end)?)?;
     let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
     let station = Station::new(driver, modem::address_book(config), audit);
     basin.add(NodeId(number), modem);

@@ -3,7 +3,7 @@
 use super::baseline::whole_png;
 use super::mission::{Mission, MissionOptions};
 use super::world::World;
-use crate::config::Config;
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::Serialize;
 use std::time::Duration;

@@ -218,7 +218,7 @@ impl Mission {
     /// where a fix has shown the vehicle to be outside.
     pub fn legs_outside_fence(&self) -> usize {
         let Some(fence) = self.surface.desk(self.address).and_then(|d| d.fence.as_ref()) else { return 0 };
-        let outside = |from, to| super::witness::stretches_outside(&[from, to], fence) > 0;
+        let outside = |from, to| scenecast_motion::stretches_outside(&[from, to], fence) > 0;
         let is_out = |&&(from, to): &&super::mission::Leg| {
             if outside(from, from) { outside(to, to) } else { outside(from, to) }
         };

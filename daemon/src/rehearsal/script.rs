@@ -1,9 +1,9 @@
 //! The scripted operator of a rehearsal.
 
-use crate::asv::{FenceOrder, LimitsOrder, Surface, Wish};
 use scenecast_core::Area;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::{FenceOrder, LimitsOrder, Surface, Wish};
 use std::collections::BTreeMap;
 use std::collections::VecDeque;
 

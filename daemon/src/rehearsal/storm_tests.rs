@@ -1,9 +1,9 @@
 //! Drivers under random and mutated lines: nothing panics, memory is bounded, and they still come back to work.
 
-use super::micromodem::{Micromodem, MicromodemConfig, SentenceParser, format_sentence};
-use super::s2c::{LineParser, S2c, S2cConfig, S2cMode};
-use super::{Class, Destination, Driver};
 use scenecast_core::MicromodemRate;
+use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser, format_sentence};
+use scenecast_drivers::modem::s2c::{LineParser, S2c, S2cConfig, S2cMode};
+use scenecast_drivers::modem::{Class, Destination, Driver};
 use scenecast_protocol::time::Instant;
 use sim_channel::Stream;
 use std::time::Duration;

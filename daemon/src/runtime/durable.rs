@@ -1,8 +1,8 @@
 //! The vehicle's durable state: what is read of it at the start, and kept while it runs.
 
 use super::journal::{Damage, Journal, JournalError, Storage};
-use crate::auv::{Durable, LastPlace};
 use scenecast_core::UserError;
+use scenecast_vehicle::{Durable, LastPlace};
 use std::path::Path;
 
 /// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.

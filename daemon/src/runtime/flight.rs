@@ -2,12 +2,12 @@
 
 use super::clock::Clock;
 use super::pilot::{Pilot, depth_m, next_of};
-use crate::autopilot::Goal;
-use crate::auv::Vehicle;
-use crate::config::{Config, origin};
+use scenecast_config::{Config, origin};
 use scenecast_core::TangentPlane;
 use scenecast_core::UserError;
+use scenecast_drivers::autopilot::Goal;
 use scenecast_files::RecordedFrame;
+use scenecast_vehicle::Vehicle;
 
 /// The autopilot, if there is one, and what it must know besides the vehicle's decisions.
 pub(super) struct Flight {

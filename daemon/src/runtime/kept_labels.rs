@@ -3,14 +3,13 @@
 use super::checkpoint::CheckpointFile;
 use super::durable::{Keeper, Run};
 use super::journal::disk::{Chance, Disk, Step};
-use crate::auv::{MapUpdate, Vehicle, VehicleOutput};
-use crate::config::{self, Config};
-use crate::ends;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, TopicId};
+use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
+use scenecast_vehicle::{MapUpdate, Vehicle, VehicleOutput};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -91,7 +90,7 @@ struct World {
 
 impl World {
     fn new(seed: u64) -> Self {
-        let config = config::load(None, &[]).unwrap();
+        let config = scenecast_config::load(None, &[]).unwrap();
         let (told, epochs) = (BTreeMap::new(), Vec::new());
         Self { config, disk: Disk::default(), chance: Chance::new(seed), born: 0, told, epochs }
     }
@@ -116,8 +115,13 @@ impl World {
         };
         self.epochs.push(durable.epoch);
         let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-        let profile = ends::modem_of_process(&self.config, ends::vehicle_address(&self.config).unwrap()).unwrap();
-        let mut vehicle = ends::vehicle(&self.config, profile, area, durable, 1, Instant::ZERO).unwrap();
+        let profile = scenecast_drivers::modem::modem_of_process(
+            &self.config,
+            scenecast_config::vehicle_address(&self.config).unwrap(),
+        )
+        .unwrap();
+        let mut vehicle =
+            scenecast_vehicle::assemble(&self.config, None, profile, area, durable, 1, Instant::ZERO).unwrap();
         for frame in 1..=FRAMES {
             self.disk.step(Step::Host).ok()?;
             let update = scene.see(&mut self.chance, &mut self.born);

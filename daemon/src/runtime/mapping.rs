@@ -3,12 +3,12 @@
 use super::checkpoint::CheckpointFile;
 use super::clock::Clock;
 use super::journal::Folder;
-use crate::auv::{MapUpdate, Mapper};
 use scene_model::exemplars::Exemplar;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
+use scenecast_vehicle::{MapUpdate, Mapper};
 use std::collections::BTreeMap;
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;

@@ -9,6 +9,7 @@ mod journal;
 #[cfg(test)]
 mod kept_labels;
 mod mapping;
+pub mod modem;
 mod pilot;
 mod position;
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! An autopilot at its port.
 
 use super::clock::Clock;
-use crate::autopilot::mavlink::MavlinkConfig;
-use crate::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Rehearsed, Step};
-use crate::config::{Config, autopilot_place};
+use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
+use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Step};
+
 use crate::port::{FromPort, Port};
-use crate::rehearsal::Motion;
+use crate::rehearsal::SimulatedAutopilot;
+use scenecast_config::{Config, autopilot_place};
 use scenecast_core::LatLon;
 use scenecast_core::UserError;
+use scenecast_motion::Motion;
 use std::time::Duration;
 
 /// A state machine and the port that its bytes go through, if it has one.
@@ -31,7 +33,7 @@ impl Pilot {
             }
             "nmea" => Box::new(Nmea::new(true, silence, now)),
             "log" => Box::new(Nmea::new(false, silence, now)),
-            "rehearsal" => Box::new(Rehearsed::new(motion(config), depth_m(config), now)),
+            "rehearsal" => Box::new(SimulatedAutopilot::new(motion(config), depth_m(config), now)),
             _ => return Ok(None),
         };
         let place = autopilot_place(config)?;

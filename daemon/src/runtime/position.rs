@@ -2,14 +2,14 @@
 
 use super::clock::Clock;
 use super::pilot::{Pilot, next_of};
-use crate::asv::Surface;
-use crate::asv::position::{Follow, Mounting, Relay, RelayConfig};
-use crate::autopilot::Goal;
-use crate::config::{Config, is_gpsd, origin, position_places};
 use crate::port::{FromPort, Port};
+use scenecast_config::{Config, is_gpsd, origin, position_places};
 use scenecast_core::UserError;
 use scenecast_core::gps::GpsLanguage;
+use scenecast_drivers::autopilot::Goal;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::Surface;
+use scenecast_surface::position::{Follow, Mounting, Relay, RelayConfig};
 use std::time::Duration;
 
 /// Speed of sound that modems reckon with, m/s.

@@ -2,17 +2,17 @@
 
 use super::durable::{Keeper, Run};
 use super::journal::disk::{Chance, Disk, Step};
-use crate::asv::Surface;
-use crate::auv::{Durable, MapUpdate, Vehicle, VehicleOutput};
-use crate::config::{self, Config};
-use crate::ends;
 use proptest::prelude::*;
+use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
+use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::directive::{Fix, LifeLine, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::Surface;
+use scenecast_vehicle::{Durable, MapUpdate, Vehicle, VehicleOutput};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -69,11 +69,18 @@ struct World {
 impl World {
     fn new(seed: u64, loss: usize, mut cuts: Vec<usize>) -> Self {
         let sets = ["link.max_idle_s=4", "link.status_period_s=4", "link.max_range_m=300"].map(str::to_owned);
-        let config = config::load(None, &sets).unwrap();
+        let config = scenecast_config::load(None, &sets).unwrap();
         let disk = Disk::default();
         let mut chance = Chance::new(seed);
-        let surface =
-            ends::surface(&config, ends::modem_profile(&config, config.modem.bit_rate), seed, Instant::ZERO).unwrap();
+        let surface = scenecast_surface::assemble(
+            &config,
+            None,
+            TuningTable::shipped(),
+            scenecast_config::modem_profile(&config, config.modem.bit_rate),
+            seed,
+            Instant::ZERO,
+        )
+        .unwrap();
         cuts.reverse();
         let onboard = start(&config, &disk, &mut chance, &mut cuts, 0, Instant::ZERO);
         let (on_air, acted, told) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
@@ -101,7 +108,7 @@ impl World {
     }
 
     fn auv(&self) -> Address {
-        ends::vehicle_address(&self.config).unwrap()
+        scenecast_config::vehicle_address(&self.config).unwrap()
     }
 
     /// Runs until all is told and heard.
@@ -238,7 +245,8 @@ impl World {
     }
 
     fn transmit(&mut self, bytes: Vec<u8>, by_vehicle: bool) {
-        let end = self.now() + ends::modem_profile(&self.config, self.config.modem.bit_rate).airtime(bytes.len());
+        let end =
+            self.now() + scenecast_config::modem_profile(&self.config, self.config.modem.bit_rate).airtime(bytes.len());
         self.schedule(end, Event::Sent { by_vehicle });
         if self.chance.below(100) >= self.loss {
             self.schedule(end + PROPAGATION, Event::Arrives { at_vehicle: !by_vehicle, bytes });
@@ -270,9 +278,10 @@ fn start(
         match Keeper::begin_run(disk.clone(), 1, None) {
             Ok(Run { keeper, durable, .. }) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-                let profile = ends::modem_profile(config, config.modem.bit_rate);
+                let profile = scenecast_config::modem_profile(config, config.modem.bit_rate);
                 let seed = chance.below(1 << 30) as u64;
-                let vehicle = ends::vehicle(config, profile, area, durable.clone(), seed, now).unwrap();
+                let vehicle =
+                    scenecast_vehicle::assemble(config, None, profile, area, durable.clone(), seed, now).unwrap();
                 let book_epoch = durable.epoch;
                 return Onboard { keeper, vehicle, saved: durable, book_epoch };
             }

@@ -1,6 +1,6 @@
 //! What is said in the log of keys and of frames that are not authentic.
 
-use crate::config::Config;
+use scenecast_config::Config;
 use scenecast_protocol::link::{DropReason, LinkStats};
 
 /// Says in the log what it means to have no key.

@@ -1,6 +1,6 @@
 //! SIGHUP: the configuration is read again.
 
-use crate::config::Config;
+use scenecast_config::Config;
 use scenecast_core::UserError;
 #[cfg(unix)]
 use tokio::signal::unix::{Signal, SignalKind, signal};

@@ -4,9 +4,10 @@ use super::checkpoint::CheckpointFile;
 use super::durable::{Keeper, Run};
 use super::journal::Folder;
 use super::mapping::Keep;
-use crate::auv::{Mapper, NoCheckpoint, Restored};
-use crate::config::Config;
+use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_files::configured_vocabulary;
+use scenecast_vehicle::{Mapper, NoCheckpoint, Restored};
 use std::path::Path;
 
 /// What a run begins with.
@@ -42,7 +43,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
             if other.is_some() {
                 tracing::warn!("the checkpoint of the scene model is of another mission: it begins anew");
             }
-            Mapper::new(config, durable.epoch, config.runtime.seed)?
+            Mapper::new(config, configured_vocabulary(&config.scene.vocabulary)?, durable.epoch, config.runtime.seed)?
         }
     };
     let last_s = mapper.last_s();
@@ -52,7 +53,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
 
 fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {
     let Some(bytes) = file.read()? else { return Ok(None) };
-    match Mapper::restore(config, &bytes) {
+    match Mapper::restore(config, configured_vocabulary(&config.scene.vocabulary)?, &bytes) {
         Ok(restored) => Ok(Some(restored)),
         Err(NoCheckpoint::Config(problem)) => Err(problem),
         Err(why) => {

@@ -2,18 +2,19 @@
 
 use super::clock::Clock;
 use super::journal::create_folder;
+use super::modem::Modem;
 use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
-use crate::asv::{Surface, SurfaceOutput};
-use crate::config::{self, Config};
 use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
-use crate::modem::{self, Modem, ModemEvent};
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_core::world_file;
+use scenecast_drivers::modem::ModemEvent;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::{Surface, SurfaceOutput};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -26,7 +27,7 @@ pub fn run_surface(config: Config) -> Result<(), UserError> {
         let entrance = match config.console.listen.as_str() {
             "" => None,
             address => {
-                let token = config::load_token(&config)?;
+                let token = scenecast_config::load_token(&config)?;
                 Some(bind(address, "console.listen", token, &config.console.host).await?)
             }
         };
@@ -34,9 +35,16 @@ pub fn run_surface(config: Config) -> Result<(), UserError> {
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
-        let profile = crate::ends::modem_of_process(&config, Address::SURFACE)?;
+        let profile = scenecast_drivers::modem::modem_of_process(&config, Address::SURFACE)?;
         warn_without_key(&config);
-        let mut surface = crate::ends::surface(&config, profile, super::random_bits(), clock.now())?;
+        let mut surface = scenecast_surface::assemble(
+            &config,
+            scenecast_config::authenticity(&config)?,
+            scenecast_config::tuning_table(&config)?,
+            profile,
+            super::random_bits(),
+            clock.now(),
+        )?;
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
@@ -46,9 +54,9 @@ pub fn run_surface(config: Config) -> Result<(), UserError> {
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
-        let modem = modem::open(&config, Address::SURFACE, profile, clock).await?;
+        let modem = super::modem::open(&config, Address::SURFACE, profile, clock).await?;
         let position = Position::open(&config, &mut surface, clock)?;
-        let vehicle = crate::ends::vehicle_address(&config)?;
+        let vehicle = scenecast_config::vehicle_address(&config)?;
         let refusals = Refusals::default();
         Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }
             .run(stop)

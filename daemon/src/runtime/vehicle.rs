@@ -5,19 +5,20 @@ use super::durable::{Keeper, Run};
 use super::flight::Flight;
 use super::journal::Folder;
 use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
+use super::modem::Modem;
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
-use crate::auv::{Vehicle, VehicleOutput};
-use crate::config::Config;
-use crate::modem::{self, Modem, ModemEvent};
+use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
+use scenecast_drivers::modem::ModemEvent;
 use scenecast_files::Recording;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
+use scenecast_vehicle::{Vehicle, VehicleOutput};
 use std::path::Path;
 
 /// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
@@ -30,14 +31,22 @@ pub fn run_vehicle(load: Load) -> Result<(), UserError> {
         let Start { run, mut mapper, keep } = start(&config, dir)?;
         let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
-        let address = crate::ends::vehicle_address(&config)?;
-        let profile = crate::ends::modem_of_process(&config, address)?;
+        let address = scenecast_config::vehicle_address(&config)?;
+        let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
         let recording = match config.camera.source.as_str() {
             "" => None,
             source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
-        let mut vehicle = crate::ends::vehicle(&config, profile, area, durable, super::random_bits(), clock.now())?;
+        let mut vehicle = scenecast_vehicle::assemble(
+            &config,
+            scenecast_config::authenticity(&config)?,
+            profile,
+            area,
+            durable,
+            super::random_bits(),
+            clock.now(),
+        )?;
         if is_again {
             vehicle.assume_budget_spent(clock.now());
         }
@@ -45,7 +54,7 @@ pub fn run_vehicle(load: Load) -> Result<(), UserError> {
         let camera = Camera::new(recording, clock, mapper.last_s());
         mapper.tune(vehicle.settings());
         let mapper = MapperThread::start(mapper, keep)?;
-        let modem = modem::open(&config, address, profile, clock).await?;
+        let modem = super::modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
         let flight = Flight::open(&config, clock)?;
         let (behind, missed) = (0, 0);
@@ -56,7 +65,7 @@ pub fn run_vehicle(load: Load) -> Result<(), UserError> {
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, UserError> {
-    let area = crate::ends::configured_area(config).or_else(|| recording.map(Recording::area));
+    let area = scenecast_config::survey_area(config).or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
     area.ok_or_else(|| UserError::Input(missing.to_owned()))
 }
@@ -125,7 +134,7 @@ impl Host {
 
     /// Budget and shares of the configuration are in force, whatever the surface said before.
     fn follow(&mut self, config: &Config) {
-        let spend = crate::ends::spend(config);
+        let spend = scenecast_config::background(config);
         let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), spend };
         let extras = budget.spend.names().join(", ");
         tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {extras}", budget.bits_per_s, budget.shares.0);

@@ -1,8 +1,8 @@
 //! Images of a vehicle's labels: those that are here, and those that are asked for.
 
-use crate::auv::Exemplar;
-use crate::auv::exemplar::edge_px;
 use scenecast_protocol::directive::{Request, Requests};
+use scenecast_protocol::exemplar::Exemplar;
+use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 

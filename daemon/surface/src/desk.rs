@@ -3,9 +3,9 @@
 use super::album::Album;
 use super::pauses::Pauses;
 use super::settings::SettingsDesk;
-use crate::auv::Exemplar;
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{Fence, Limits, Requests, SlotId, Utility};
+use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;

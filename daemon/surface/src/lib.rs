@@ -1,8 +1,7 @@
 //! The surface: holds the operator's map of each vehicle, sends each its directive.
 
 mod album;
-#[cfg(test)]
-mod calls;
+mod assemble;
 mod desk;
 mod orders;
 mod pauses;
@@ -12,6 +11,7 @@ mod settings;
 mod surface;
 
 pub use album::{Album, AskState, Asked, Page, Picture, Wish};
+pub use assemble::assemble;
 pub use desk::Desk;
 pub use orders::{FenceOrder, LimitsOrder};
 pub use settings::{SettingsDesk, SettingsOrder};

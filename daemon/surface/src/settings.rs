@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn what_is_allowed_is_what_the_configuration_allows() {
-        use crate::config::{Allowed, KEYS};
+        use scenecast_config::{Allowed, KEYS};
         let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
         for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().figures()) {
             let key = KEYS.iter().find(|k| k.name == name).unwrap();

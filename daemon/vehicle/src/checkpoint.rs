@@ -2,12 +2,12 @@
 
 use super::mapper::Mapper;
 use super::relief::Relief;
-use crate::config::Config;
 use scene_model::envelope::{Envelope, EnvelopeError};
 use scene_model::exemplars::ExemplarStore;
 use scene_model::publish::LabelBook;
 use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
 use scene_model::words::{Measures, WordExtractor};
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::{Deserialize, Serialize};
 
@@ -70,12 +70,12 @@ impl Mapper {
 
     /// Goes on from a checkpoint, if it was made with the parameters that are configured. Priors may differ: they are those
     /// of the checkpoint until [`Mapper::tune`] says which are in force.
-    pub fn restore(config: &Config, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
+    pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
         let content = ENVELOPE.open(bytes)?;
         let kept: Kept<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
             postcard::from_bytes(content).map_err(|_| NoCheckpoint::Inconsistent)?;
         let model = SceneModel::load(&kept.model)?;
-        let fresh = Mapper::new(config, kept.book.epoch(), config.runtime.seed)?;
+        let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
         let (words, configured_words) = (kept.words.config(), fresh.extractor.measures());
@@ -107,7 +107,7 @@ mod tests {
 
     fn config(sets: &[&str]) -> Config {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-        crate::config::load(None, &sets).unwrap()
+        scenecast_config::load(None, &sets).unwrap()
     }
 
     fn frame(mapper: &mut Mapper, at: u32) -> super::super::MapUpdate {
@@ -122,10 +122,10 @@ mod tests {
     #[test]
     fn a_restored_mapper_goes_on_as_the_one_that_was_saved() {
         let config = config(&[]);
-        let mut whole = Mapper::new(&config, 3, 1).unwrap();
+        let mut whole = Mapper::new(&config, None, 3, 1).unwrap();
         (0..12).for_each(|at| drop(frame(&mut whole, at)));
         let shown = whole.current();
-        let Restored { mapper: mut restored, lineage } = Mapper::restore(&config, &whole.save(77)).unwrap();
+        let Restored { mapper: mut restored, lineage } = Mapper::restore(&config, None, &whole.save(77)).unwrap();
         assert_eq!((lineage, restored.epoch(), restored.last_s()), (77, 3, Some(22.0)));
         assert_eq!(restored.current(), shown);
         assert!(shown.cells.len() > 20 && shown.labels > 1);
@@ -141,21 +141,21 @@ mod tests {
     fn other_priors_do_not_cost_the_checkpoint_and_those_in_force_go_on() {
         let figure = |value: f64| Change::To(Figure::new(value).unwrap());
         let settings = Settings { gamma: figure(0.2), alpha: figure(0.5), ..Settings::default() };
-        let mut whole = Mapper::new(&config(&[]), 3, 1).unwrap();
+        let mut whole = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..4).for_each(|at| drop(frame(&mut whole, at)));
         whole.tune(&settings);
         (4..9).for_each(|at| drop(frame(&mut whole, at)));
         assert_eq!(whole.priors(), [0.5, 0.1, 0.2]);
         for sets in [&[][..], &["scene.gamma=0.01", "scene.alpha=3"]] {
-            let mut again = Mapper::restore(&config(sets), &whole.save(7)).unwrap().mapper;
+            let mut again = Mapper::restore(&config(sets), None, &whole.save(7)).unwrap().mapper;
             assert_eq!((again.priors(), again.current()), (whole.priors(), whole.current()));
             again.tune(&settings);
             assert_eq!(again.current(), whole.current());
-            let mut went_on = Mapper::restore(&config(&[]), &whole.save(7)).unwrap().mapper;
+            let mut went_on = Mapper::restore(&config(&[]), None, &whole.save(7)).unwrap().mapper;
             went_on.tune(&settings);
             assert_eq!(frame(&mut again, 9), frame(&mut went_on, 9));
         }
-        let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), &whole.save(7)).unwrap().mapper;
+        let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), None, &whole.save(7)).unwrap().mapper;
         other.tune(&Settings::default());
         assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured where nobody says otherwise");
         assert_eq!(frame(&mut other, 9).epoch, 3);
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_frame_rate_takes_the_first_frame_of_each_interval() {
-        let mut mapper = Mapper::new(&config(&[]), 0, 1).unwrap();
+        let mut mapper = Mapper::new(&config(&[]), None, 0, 1).unwrap();
         let taken = |mapper: &mut Mapper| {
             (0..20).filter(|at| mapper.takes(f64::from(*at) * 2.0).then(|| frame(mapper, *at)).is_some()).count()
         };
@@ -177,10 +177,11 @@ mod tests {
 
     #[test]
     fn other_parameters_and_damage_are_refused_by_name() {
-        let mut mapper = Mapper::new(&config(&[]), 0, 1).unwrap();
+        let mut mapper = Mapper::new(&config(&[]), None, 0, 1).unwrap();
         frame(&mut mapper, 0);
         let bytes = mapper.save(1);
-        let said = |sets: &[&str], bytes: &[u8]| Mapper::restore(&config(sets), bytes).err().map(|e| e.to_string());
+        let said =
+            |sets: &[&str], bytes: &[u8]| Mapper::restore(&config(sets), None, bytes).err().map(|e| e.to_string());
         assert_eq!(said(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
         let other = Some("it was made with other parameters of the scene model".to_owned());
         assert_eq!(said(&["scene.max_labels=20"], &bytes), other);
@@ -190,7 +191,7 @@ mod tests {
         for at in (20..bytes.len() - 4).step_by(bytes.len() / 200) {
             let mut content = bytes[20..bytes.len() - 4].to_vec();
             content[at - 20] ^= 0x41;
-            drop(Mapper::restore(&config(&[]), &ENVELOPE.seal(&content)));
+            drop(Mapper::restore(&config(&[]), None, &ENVELOPE.seal(&content)));
         }
     }
 }

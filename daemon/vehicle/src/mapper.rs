@@ -2,19 +2,18 @@
 
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
-use crate::config::Config;
 use image::RgbImage;
 use scene_model::exemplars::{Exemplar, ExemplarStore};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
-use scene_model::words::{WordConfig, WordExtractor};
+use scene_model::words::{Measures, WordConfig, WordExtractor};
+use scenecast_config::Config;
+use scenecast_config::cell_m;
 use scenecast_core::UserError;
-use scenecast_files::read_vocabulary;
 use scenecast_protocol::directive::{Change, Figure, Settings};
 use scenecast_protocol::map::{Cell, PlaneKind};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Representative images kept a label.
 const EXEMPLARS_KEPT: usize = 4;
@@ -65,18 +64,11 @@ fn every_frame_or(rate: f64) -> Option<f64> {
     (rate > 0.0).then_some(rate)
 }
 
-/// Edge of a cell in metres.
-pub fn cell_m(config: &Config) -> f64 {
-    if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }
-}
-
 impl Mapper {
     /// A mapper that has seen nothing; its label ids begin at `epoch`.
-    pub fn new(config: &Config, epoch: u8, seed: u64) -> Result<Self, UserError> {
-        let extractor = match config.scene.vocabulary.as_str() {
-            "" => WordExtractor::new(&WordConfig::default()),
-            file => WordExtractor::from_measures(read_vocabulary(Path::new(file))?),
-        };
+    pub fn new(config: &Config, vocabulary: Option<Measures>, epoch: u8, seed: u64) -> Result<Self, UserError> {
+        let extractor =
+            vocabulary.map_or_else(|| WordExtractor::new(&WordConfig::default()), WordExtractor::from_measures);
         let cell_m = cell_m(config);
         let birth = match config.scene.birth.as_str() {
             "collapsed" => Birth::Collapsed,

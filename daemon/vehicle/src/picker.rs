@@ -1,10 +1,10 @@
 //! Which patches of a camera frame show best what a label means.
 
-use super::exemplar::edge_px;
 use scene_model::exemplars::ExemplarStore;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::topics::{FlatCell, TopicId};
 use scene_model::words::Word;
+use scenecast_protocol::exemplar::edge_px;
 
 /// Edge of a patch in pixels: the largest that is sent.
 pub(super) const PATCH_PX: u32 = 128;
@@ -118,7 +118,7 @@ mod tests {
         for (topic, shade) in [(1, 10), (2, 200)] {
             let best = store.best(TopicId(topic)).unwrap();
             assert!(best.score > 0.85, "{}", best.score);
-            let small = crate::auv::exemplar::middle(&best.patch, 0).unwrap().1;
+            let small = crate::exemplar::middle(&best.patch, 0).unwrap().1;
             assert!(small.pixels().all(|p| p.0[0] == shade), "topic {topic} at {:?}", best.place);
         }
         assert!(store.all(TopicId(1)).len() > 1, "there are others to show");

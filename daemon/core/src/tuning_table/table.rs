@@ -3,7 +3,6 @@
 use crate::UserError;
 use scenecast_protocol::directive::CellBand;
 use std::fmt;
-use std::path::Path;
 
 /// The first line. A change of the columns is another version.
 const TITLE: &str = "# scenecast tuning table 2";
@@ -81,14 +80,12 @@ impl TuningTable {
         Self::read(include_str!("default.csv")).unwrap_or_default()
     }
 
-    /// The table in a file, or the one that ships if no file is named.
-    pub fn load(file: &str) -> Result<Self, UserError> {
-        if file.is_empty() {
-            return Ok(Self::shipped());
-        }
-        let path = Path::new(file);
-        let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
-        let table = Self::read(&text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
+    /// Reads the text of `file`.
+    ///
+    /// # Errors
+    /// The file, the line and what is wrong with it; a table without a row.
+    pub fn parse(file: &str, text: &str) -> Result<Self, UserError> {
+        let table = Self::read(text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
         if table.rows.is_empty() {
             return Err(UserError::Input(format!("{file}: the table has no line; scenecast tune writes them")));
         }

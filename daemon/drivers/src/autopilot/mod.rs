@@ -10,12 +10,10 @@
 
 pub mod mavlink;
 mod nmea;
-mod rehearsed;
 mod tray;
 
 pub use mavlink::Mavlink;
 pub use nmea::Nmea;
-pub use rehearsed::Rehearsed;
 pub use tray::Tray;
 
 use scenecast_core::LatLon;

@@ -24,7 +24,7 @@ impl Tray {
     }
 
     /// A stretch of way. None is lost: where too many wait, it is added to the last one.
-    pub(super) fn walk(&mut self, step: Step) {
+    pub fn walk(&mut self, step: Step) {
         let is_full = self.steps.len() >= Self::MOST;
         match self.steps.back_mut() {
             Some(last) if is_full => {

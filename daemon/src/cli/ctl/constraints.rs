@@ -1,10 +1,10 @@
 //! `scenecast ctl fence`, `return-point`, `limits`, `hold`, `resume`, `abort`
 
-use crate::asv::LimitsOrder;
 use crate::console::orders::ConstraintsOrder;
 use crate::ctl::Ctl;
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
+use scenecast_surface::LimitsOrder;
 use std::path::PathBuf;
 
 const FILE: &str = "\

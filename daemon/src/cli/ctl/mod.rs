@@ -2,13 +2,12 @@
 
 mod constraints;
 
-use crate::asv::SettingsOrder;
-use crate::config;
 use crate::console::orders::ExemplarWish;
 use crate::ctl::{self, BudgetChange, Client, SettingsChange};
 use clap::{Args, Subcommand};
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
 use scenecast_core::UserError;
+use scenecast_surface::SettingsOrder;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -263,7 +262,7 @@ impl Ctl {
             }
             wait => wait.map(Duration::from_secs_f64),
         };
-        let token = self.token_file.as_deref().map(config::read_token).transpose()?;
+        let token = self.token_file.as_deref().map(scenecast_config::read_token).transpose()?;
         let client = Client::new(&self.url, token)?;
         let ctl = ctl::Ctl { client, json: self.json, vehicle: self.vehicle, wait };
         ctl::block_on(async move {

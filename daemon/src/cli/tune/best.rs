@@ -1,6 +1,6 @@
 //! The setting to take to sea.
 
-use crate::config::Config;
+use scenecast_config::Config;
 use scenecast_core::tuning_table::{Measurement, Row};
 
 /// The setting as a configuration file, with everything else of the scene model that it was found with.
@@ -38,7 +38,7 @@ mod tests {
         let shipped = TuningTable::shipped();
         let row = shipped.rows().find(|row| row.setting.cells == CellBand::Coarse).unwrap();
         std::fs::write(&path, toml(row, &Config::default(), 1e4)).unwrap();
-        let config = crate::config::load(Some(&path), &[]).unwrap();
+        let config = scenecast_config::load(Some(&path), &[]).unwrap();
         let (found, setting) = (&config.scene, row.setting);
         assert_eq!((found.alpha, found.gamma, found.cell_m), (setting.alpha, setting.gamma, setting.cell_m));
         assert_eq!((found.frames_per_s, config.map.cells.as_str()), (setting.frames_per_s, "coarse"));

@@ -1,7 +1,7 @@
 //! The settings that are tried.
 
-use crate::auv::cell_m;
-use crate::config::Config;
+use scenecast_config::Config;
+use scenecast_config::cell_m;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_protocol::directive::CellBand;

@@ -7,10 +7,10 @@ mod picture;
 mod survey;
 
 use crate::cli::progress::Progress;
-use crate::config::{self, Config};
 use clap::Args;
 use grid::Grid;
 use measure::{mean, measure};
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::{Measurement, Row, Setting, TuningTable, least, most};
 use scenecast_files::write_whole;
@@ -97,7 +97,7 @@ impl Tune {
     fn config(&self) -> Result<Config, UserError> {
         let mut sets = self.sets.clone();
         sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
-        config::load(self.config.as_deref(), &sets)
+        scenecast_config::load(self.config.as_deref(), &sets)
     }
 
     fn sites<'a>(&'a self, config: &'a Config) -> Result<Vec<Site<'a>>, UserError> {

@@ -1,11 +1,11 @@
 //! The mosaic with its annotations, and a virtual survey over it.
 
-use crate::config::Config;
 use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::score::{Annotations, mosaic_classes};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};

@@ -1,21 +1,20 @@
 //! How long an image takes from the order to the last bit, while the map takes all that it can get.
 
 use super::Spread;
-use crate::asv::{Page, Surface, Wish};
-use crate::auv::exemplar::edge_px;
-use crate::auv::{Durable, MapUpdate, Vehicle, VehicleOutput};
-use crate::config::Config;
-use crate::ends;
 use crate::rehearsal::VirtualTime;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar as Picture;
+use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Fix;
+use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::{Page, Surface, Wish};
+use scenecast_vehicle::{Durable, MapUpdate, Vehicle, VehicleOutput};
 use serde::Serialize;
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
 use std::collections::BTreeMap;
@@ -123,7 +122,7 @@ impl Water {
         // Noise has nothing that the other coder could take: it need not be tried.
         config.map.codec = "context".to_owned();
         let now = Instant::ZERO;
-        let modem = ends::modem_profile(&config, config.channel.bit_rate);
+        let modem = scenecast_config::modem_profile(&config, config.channel.bit_rate);
         let area = Area { west: 0.0, south: 0.0, east: 16.0, north: 16.0 };
         let mut channel = Channel::new(
             ChannelConfig {
@@ -135,14 +134,29 @@ impl Water {
         );
         channel.place(SURFACE, Position::default());
         channel.place(VEHICLE, Position::new(config.channel.range_m, 0.0, -16.0));
-        let mut vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
+        let mut vehicle = scenecast_vehicle::assemble(
+            &config,
+            scenecast_config::authenticity(&config)?,
+            modem,
+            area,
+            Durable::default(),
+            seed ^ 0x0A0B,
+            now,
+        )?;
         vehicle.handle_exemplars(gallery(patches));
         Ok(Self {
             setting,
             now,
             vehicle,
-            surface: ends::surface(&config, modem, seed ^ 0x5EA, now)?,
-            address: ends::vehicle_address(&config)?,
+            surface: scenecast_surface::assemble(
+                &config,
+                scenecast_config::authenticity(&config)?,
+                scenecast_config::tuning_table(&config)?,
+                modem,
+                seed ^ 0x5EA,
+                now,
+            )?,
+            address: scenecast_config::vehicle_address(&config)?,
             modem,
             channel,
             transmitting: [None; 2],

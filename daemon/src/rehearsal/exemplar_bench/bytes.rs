@@ -1,14 +1,16 @@
 //! How many bytes an image needs to look like its patch, and how many the vehicle sends.
 
 use super::Spread;
-use crate::auv::exemplar::{GOOD_SSIM, HEAD, compress, compress_to, middle, most_bytes};
-use crate::auv::{Mapper, exemplar::edge_px};
-use crate::config::Config;
 use crate::rehearsal::World;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar;
 use scene_model::project::Pose;
+use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_protocol::exemplar::edge_px;
+use scenecast_protocol::exemplar::{HEAD, most_bytes};
+use scenecast_vehicle::Mapper;
+use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -79,7 +81,7 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
         Source::Reef(seed) => World::procedural(*seed, mpp),
         Source::Photo(path) => World::from_files(path, None, mpp)?,
     };
-    let mut mapper = Mapper::new(&config, 0, seed)?;
+    let mut mapper = Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?;
     let (area, camera) = (world.area(), &config.camera);
     for i in 0..FRAMES.0 * FRAMES.1 {
         let along = |k: u32, n: u32, low: f64, high: f64| low + (high - low) * (f64::from(k) + 0.5) / f64::from(n);

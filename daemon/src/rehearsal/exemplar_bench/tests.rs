@@ -1,12 +1,12 @@
 //! Images of labels between a vehicle and a surface on a lossy link.
 
 use super::arrival::{LABELS, Setting, Water};
-use crate::asv::{AskState, Wish};
 use crate::rehearsal::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::{Class, Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
+use scenecast_surface::{AskState, Wish};
 
 const IDLE: Setting = Setting { requests: 0, loss: 0.1, loaded: false, larger: false };
 
@@ -84,7 +84,8 @@ fn what_is_cancelled_costs_no_more_bits() {
 #[test]
 fn a_vehicle_without_an_image_says_so_and_sends_it_when_it_has_one() {
     let mut water = water(IDLE, 3);
-    let gallery = water.vehicle.take_pictures();
+    let gallery = water.vehicle.exemplars().clone();
+    water.vehicle.handle_exemplars(Default::default());
     water.surface.request_exemplar(water.address, 2, Wish::Another, water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
     assert!(water.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));

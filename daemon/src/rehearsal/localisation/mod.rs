@@ -9,10 +9,10 @@ mod ship;
 
 pub use picture::picture;
 
-use crate::asv::position::UsblSighting;
-use crate::auv::{FixVerdict, Navigator};
 use scenecast_protocol::directive::{Fix, Slot, VersionedSlot};
 use scenecast_protocol::time::Instant;
+use scenecast_surface::position::UsblSighting;
+use scenecast_vehicle::{FixVerdict, Navigator};
 use serde::Serialize;
 use ship::Ship;
 use sim_channel::usbl::{UsblConfig, UsblHead};

@@ -1,12 +1,12 @@
 //! The surface vehicle of a rehearsed localisation: its instruments, its relay, and its way above the vehicle.
 
-use crate::asv::position::{Follow, Mounting, Relay, RelayConfig, UsblSighting};
 use crate::rehearsal::instruments::{Instruments, Receiver};
 use scenecast_core::LatLon;
 use scenecast_core::gps::GpsLanguage;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::position::{Follow, Mounting, Relay, RelayConfig, UsblSighting};
 use std::time::Duration;
 
 /// Where the rehearsal lies; any place would do.

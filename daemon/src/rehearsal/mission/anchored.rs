@@ -1,11 +1,11 @@
 //! The surface vehicle at anchor: GPS, compass and USBL head, from which the relay makes the fixes.
 
-use crate::asv::position::{Mounting, Relay, RelayConfig, UsblSighting};
-use crate::config::Config;
 use crate::rehearsal::instruments::{Instruments, Receiver};
+use scenecast_config::Config;
 use scenecast_core::LatLon;
 use scenecast_core::gps::GpsLanguage;
 use scenecast_protocol::time::Instant;
+use scenecast_surface::position::{Mounting, Relay, RelayConfig, UsblSighting};
 use sim_channel::Position;
 use sim_channel::usbl::{UsblConfig, UsblFix, UsblHead};
 use std::time::Duration;

@@ -1,10 +1,10 @@
 //! A mission through drivers and emulated modems instead of bare water.
 
 use super::{Mission, channel_config};
-use crate::config::Config;
-use crate::modem::ModemEvent;
 use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
+use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_drivers::modem::ModemEvent;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
 use sim_channel::Channel;

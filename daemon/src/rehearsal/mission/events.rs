@@ -1,15 +1,15 @@
 //! What happens in a mission, event by event.
 
 use super::{Mission, STEP_S, SURFACE, VEHICLE, pose_of};
-use crate::asv::SurfaceOutput;
-use crate::auv::VehicleOutput;
 use crate::rehearsal::docked::{self, Docked};
-use crate::rehearsal::motion::Motion;
 use scenecast_core::UserError;
 use scenecast_files::RecordedFrame;
+use scenecast_motion::Motion;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
+use scenecast_surface::SurfaceOutput;
+use scenecast_vehicle::VehicleOutput;
 use sim_channel::{Outcome, Position};
 use std::time::Duration;
 

@@ -11,24 +11,24 @@ mod tuned;
 use super::docked::{self, Docked};
 use super::frames_log::FramesLog;
 use super::meter::Meter;
-use super::motion::Motion;
 use super::script::Script;
 use super::world::World;
-use crate::asv::{Surface, SurfaceOutput};
-use crate::auv::{AppliedSlot, Durable, MapUpdate, Mapper, Vehicle, cell_m};
-use crate::config::{self, Config};
-use crate::ends;
 use anchored::Anchored;
 use scene_model::project::Pose;
+use scenecast_config::Config;
+use scenecast_config::cell_m;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_files::{Recorder, Recording};
+use scenecast_motion::Motion;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::PlaneKind;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
+use scenecast_surface::{Surface, SurfaceOutput};
+use scenecast_vehicle::{AppliedSlot, Durable, MapUpdate, Mapper, Vehicle};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Position};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -109,7 +109,7 @@ impl Mission {
         let MissionOptions { world, seed, record } = options;
         let now = Instant::ZERO;
         let mut docked = carrier::docked(&config, seed, now)?;
-        let water = ends::modem_profile(&config, config.channel.bit_rate);
+        let water = scenecast_config::modem_profile(&config, config.channel.bit_rate);
         let [modem, surface_modem] = docked.as_mut().map_or([water; 2], carrier::profiles);
         let recording = match config.camera.source.as_str() {
             "" => None,
@@ -121,8 +121,23 @@ impl Mission {
             let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);
             return Err(UserError::Input(format!("survey.area_m lies outside the image, which covers {limits}")));
         }
-        let vehicle = ends::vehicle(&config, modem, area, Durable::default(), seed ^ 0x0A0B, now)?;
-        let mut surface = ends::surface(&config, surface_modem, seed ^ 0x5EA, now)?;
+        let vehicle = scenecast_vehicle::assemble(
+            &config,
+            scenecast_config::authenticity(&config)?,
+            modem,
+            area,
+            Durable::default(),
+            seed ^ 0x0A0B,
+            now,
+        )?;
+        let mut surface = scenecast_surface::assemble(
+            &config,
+            scenecast_config::authenticity(&config)?,
+            scenecast_config::tuning_table(&config)?,
+            surface_modem,
+            seed ^ 0x5EA,
+            now,
+        )?;
         let (x, y) = vehicle.navigator().position();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
@@ -133,7 +148,7 @@ impl Mission {
         if let Some(docked) = &mut docked {
             docked.place(docked::SURFACE, surface_place);
         }
-        let (anchored, relay) = Anchored::new(&config, surface_place, config::origin(&config)?, seed ^ 0x6B5);
+        let (anchored, relay) = Anchored::new(&config, surface_place, scenecast_config::origin(&config)?, seed ^ 0x6B5);
         surface.set_relay(relay);
         let script = match config.operator.script.as_str() {
             "scripted" => Script::of_survey(config.survey.duration_s),
@@ -143,8 +158,8 @@ impl Mission {
         let fix_period = Instant::from_secs_f64(config.navigation.fix_period_s);
         let window = Duration::from_secs_f64(config.link.budget_window_s);
         let mut mission = Self {
-            mapper: Mapper::new(&config, 0, seed)?,
-            address: ends::vehicle_address(&config)?,
+            mapper: Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?,
+            address: scenecast_config::vehicle_address(&config)?,
             recorder: record.as_deref().map(Recorder::new).transpose()?,
             times: Timetable { step: now, frame: now, fix: fix_period, look: now },
             audits: [Audit::new(window), Audit::new(window)],
@@ -310,7 +325,7 @@ pub(crate) fn pose_of(vehicle: &Vehicle) -> Pose {
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>, world: &World) -> Area {
-    ends::configured_area(config).unwrap_or_else(|| recording.map_or_else(|| world.area(), Recording::area))
+    scenecast_config::survey_area(config).unwrap_or_else(|| recording.map_or_else(|| world.area(), Recording::area))
 }
 
 fn overlap(a: &Area, b: &Area) -> bool {

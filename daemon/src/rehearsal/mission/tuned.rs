@@ -1,14 +1,13 @@
 //! The operator tunes a vehicle that is under way: the map follows, both maps agree, labels keep their meaning.
 
 use super::{Mission, MissionOptions};
-use crate::asv::SettingsOrder;
-use crate::config;
 use crate::rehearsal::World;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::SlotState;
+use scenecast_surface::SettingsOrder;
 use std::time::Duration;
 
 pub(super) fn mission(sets: &[&str]) -> Mission {
@@ -20,7 +19,8 @@ pub(super) fn mission(sets: &[&str]) -> Mission {
         "operator.script=none",
         "channel.loss=0.2",
     ];
-    let config = config::load(None, &small.iter().chain(sets).map(|s| (*s).to_owned()).collect::<Vec<_>>()).unwrap();
+    let config =
+        scenecast_config::load(None, &small.iter().chain(sets).map(|s| (*s).to_owned()).collect::<Vec<_>>()).unwrap();
     static REEF: std::sync::OnceLock<World> = std::sync::OnceLock::new();
     let world = REEF.get_or_init(|| World::procedural(5, 0.01)).clone();
     Mission::new(config, MissionOptions { world, seed: 3, record: None }).unwrap()
@@ -67,7 +67,8 @@ impl Mission {
     }
 
     fn settings_applied(&self) -> usize {
-        let of_settings = |a: &&crate::auv::AppliedSlot| a.id == SlotId::Settings && a.state == SlotState::Applied;
+        let of_settings =
+            |a: &&scenecast_vehicle::AppliedSlot| a.id == SlotId::Settings && a.state == SlotState::Applied;
         self.applied.iter().filter(of_settings).count()
     }
 }

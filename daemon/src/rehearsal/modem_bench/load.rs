@@ -1,12 +1,11 @@
 //! The link under load of opaque bytes through drivers and emulated modems.
 
-use crate::config::Config;
-use crate::ends;
-use crate::modem::ModemEvent;
 use crate::rehearsal::VirtualTime;
 use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
 use crate::rehearsal::link_bench::{OpaqueReplica, OpaqueSource, Summary};
+use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_drivers::modem::ModemEvent;
 use scenecast_protocol::directive::{Slot, SlotId, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
@@ -87,7 +86,7 @@ impl Dock {
         let config = &setting.config;
         docked.place(VEHICLE, Position::new(0.0, 0.0, 10.0));
         docked.place(SURFACE, Position::new(setting.range_m, 0.0, 10.0));
-        let address = ends::vehicle_address(config)?;
+        let address = scenecast_config::vehicle_address(config)?;
         let (mission, window) = (MissionId(7), Duration::from_secs_f64(config.link.budget_window_s));
         let vehicle = VehicleConfig {
             address,

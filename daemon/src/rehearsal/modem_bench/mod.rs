@@ -6,8 +6,8 @@ mod pusher;
 pub use load::{Dock, DockSetting};
 pub use pusher::push;
 
-use crate::config::{self, Config};
 use crate::rehearsal::{Mission, MissionOptions, World, report};
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::Serialize;
 use std::time::Duration;
@@ -89,7 +89,7 @@ pub fn modem_table(seed: u64, progress: &mut dyn FnMut(f64)) -> Result<ModemTabl
 pub fn scenario(sets: &[&str]) -> Result<Config, UserError> {
     let mut all = vec![format!("channel.loss={LOSS}"), format!("channel.range_m={RANGE_M}")];
     all.extend(sets.iter().map(|s| (*s).to_owned()));
-    config::load(None, &all)
+    scenecast_config::load(None, &all)
 }
 
 /// Throughput against a raw pusher, and latency of `directives` directives meanwhile.

@@ -1,7 +1,7 @@
 //! What an emulated S2C modem itself can carry: a host that does nothing but keep its pool full.
 
 use super::DockSetting;
-use crate::modem::s2c::{Line, LineParser};
+use scenecast_drivers::modem::s2c::{Line, LineParser};
 use sim_channel::modem::Basin;
 use sim_channel::modem::s2c::{S2c, S2cConfig};
 use sim_channel::{Channel, NodeId, Position};

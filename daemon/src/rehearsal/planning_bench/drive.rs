@@ -1,11 +1,11 @@
 //! One planner on one scene.
 
 use super::scene::{CELL_M, Scene};
-use crate::auv::{Course, Footprint, Steering};
-use crate::rehearsal::witness::{length_m, stretches_outside};
 use scenecast_core::Area;
+use scenecast_motion::{length_m, stretches_outside};
 use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon};
 use scenecast_protocol::map::{Cell, LabelGrid};
+use scenecast_vehicle::{Course, Footprint, Steering};
 use sim_channel::Stream;
 
 /// Edge of what the camera sees, metres: eight cells.
@@ -63,7 +63,7 @@ impl Task {
             })
             .collect();
         let fence = Fence { fence: Some(fence), keep_outs, return_point: None };
-        let clear = |p: (f64, f64)| crate::auv::planning::Bounds::new(&fence, SIGHT_M / 2.0).allows(p);
+        let clear = |p: (f64, f64)| scenecast_vehicle::planning::Bounds::new(&fence, SIGHT_M / 2.0).allows(p);
         let mut start = (east / 2.0, north / 2.0);
         for _ in 0..1000 {
             start = (dice.uniform() * east, dice.uniform() * north);
@@ -71,7 +71,7 @@ impl Task {
                 break;
             }
         }
-        let bounds = crate::auv::planning::Bounds::new(&fence, 0.0);
+        let bounds = scenecast_vehicle::planning::Bounds::new(&fence, 0.0);
         let inside: Vec<Cell> = cells(scene.area).filter(|&c| bounds.holds(middle(c))).collect();
         let area = inside.len() as f64 * CELL_M * CELL_M;
         let utility: f64 = inside.iter().map(|&c| scene.utility.weight(scene.labels.get(c))).sum();

@@ -1,12 +1,12 @@
 //! Label maps to drive over.
 
-use crate::config::Config;
 use crate::rehearsal::World;
 use image::RgbImage;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::Utility;

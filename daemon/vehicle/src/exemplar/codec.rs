@@ -2,12 +2,7 @@
 
 use super::ssim::Luma;
 use image::RgbImage;
-
-/// Bytes of a VP8 key frame before its size: frame tag and start code.
-const TAG: usize = 3;
-const START_CODE: [u8; 3] = [0x9D, 0x01, 0x2A];
-/// Bytes of the frame that say nothing of a square image of known edge: start code and size.
-const CONSTANT: usize = 7;
+use scenecast_protocol::exemplar::{strip, unstrip};
 
 /// A compressed patch.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,36 +54,6 @@ fn is_better(a: &Compressed, b: &Compressed, ssim: f64, most: usize) -> bool {
         (false, false) => a.bytes.len() < b.bytes.len(),
         (fits, _) => fits,
     }
-}
-
-/// The frame of a WebP file without its constant bytes; `None` if it is not a single lossy frame.
-fn strip(file: &[u8]) -> Option<Vec<u8>> {
-    let frame = file.strip_prefix(b"RIFF")?.get(4..)?.strip_prefix(b"WEBPVP8 ")?;
-    let (length, frame) = frame.split_first_chunk::<4>()?;
-    let frame = frame.get(..u32::from_le_bytes(*length) as usize)?;
-    let (tag, rest) = frame.split_first_chunk::<TAG>()?;
-    rest.starts_with(&START_CODE).then(|| [&tag[..], rest.get(CONSTANT..).unwrap_or_default()].concat())
-}
-
-/// The WebP file of a square image of `edge` pixels; `None` if the bytes cannot be a key frame that is shown.
-pub fn unstrip(bytes: &[u8], edge: u16) -> Option<Vec<u8>> {
-    let (tag, rest) = bytes.split_first_chunk::<TAG>()?;
-    let bits = u32::from_le_bytes([tag[0], tag[1], tag[2], 0]);
-    let (is_other, version, is_shown, first_part) = (bits & 1 != 0, bits >> 1 & 7, bits >> 4 & 1 != 0, bits >> 5);
-    if is_other || version > 3 || !is_shown || first_part as usize > rest.len() {
-        return None;
-    }
-    let edge = edge.to_le_bytes();
-    let frame = [&tag[..], &START_CODE[..], &edge[..], &edge[..], rest].concat();
-    let length = u32::try_from(frame.len()).ok().filter(|&n| n < 1 << 24)?;
-    let padding = frame.len() % 2;
-    let mut file = b"RIFF".to_vec();
-    file.extend((length + 12 + padding as u32).to_le_bytes());
-    file.extend(b"WEBPVP8 ");
-    file.extend(length.to_le_bytes());
-    file.extend(&frame);
-    file.extend(&[0][..padding]);
-    Some(file)
 }
 
 /// The image of a WebP file.

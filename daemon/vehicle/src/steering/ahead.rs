@@ -1,7 +1,7 @@
 //! What is planned after the waypoint, as people are told it.
 
 use super::Steering;
-use crate::auv::planning::{Point, distance};
+use crate::planning::{Point, distance};
 use scenecast_protocol::wire::PlannedPath;
 
 /// A way as its corners.
@@ -94,7 +94,7 @@ impl Steering {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::auv::{Course, Footprint};
+    use crate::{Course, Footprint};
     use scenecast_core::Area;
     use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
     use scenecast_protocol::map::{Cell, LabelGrid};

@@ -1,8 +1,8 @@
 //! What the vehicle does next, and what it says of it.
 
 use super::{Vehicle, VehicleOutput};
-use crate::auv::planning::{Point, distance};
-use crate::auv::steering::Course;
+use crate::planning::{Point, distance};
+use crate::steering::Course;
 use scenecast_protocol::directive::{Constraints, Fence, Limits, Reaction};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode, VehicleStatus};

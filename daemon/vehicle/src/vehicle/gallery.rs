@@ -1,9 +1,10 @@
 //! Pictures of labels: what the vehicle has, what the surface was shown of it, and what is asked for.
 
-use crate::auv::exemplar::{Exemplar, GOOD_SSIM, compress_to, middle, most_bytes};
+use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use image::RgbImage;
 use scene_model::exemplars::Exemplar as Picture;
 use scenecast_protocol::directive::{Request, Requests};
+use scenecast_protocol::exemplar::{Exemplar, most_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::Extra;
@@ -63,9 +64,8 @@ impl Gallery {
         self.pictures = pictures;
     }
 
-    #[cfg(test)]
-    pub(super) fn take_pictures(&mut self) -> BTreeMap<u8, Vec<Picture>> {
-        std::mem::take(&mut self.pictures)
+    pub(super) fn pictures(&self) -> &BTreeMap<u8, Vec<Picture>> {
+        &self.pictures
     }
 
     /// What is wanted from now on, by the surface's run `series`; what is not wanted any more is not sent to its end, and what

@@ -3,7 +3,7 @@
 mod course;
 mod gallery;
 #[cfg(test)]
-mod obedience;
+mod obedience_tests;
 mod obey;
 mod place;
 mod tuning;
@@ -281,10 +281,9 @@ impl Vehicle {
         self.tend_gallery();
     }
 
-    /// Takes the images away, as if nothing had been seen.
-    #[cfg(test)]
-    pub(crate) fn take_pictures(&mut self) -> BTreeMap<u8, Vec<Picture>> {
-        self.gallery.take_pictures()
+    /// The best patches of each label, as [`Self::handle_exemplars`] got them.
+    pub fn exemplars(&self) -> &BTreeMap<u8, Vec<Picture>> {
+        self.gallery.pictures()
     }
 
     fn tend_gallery(&mut self) {

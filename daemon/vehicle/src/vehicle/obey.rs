@@ -2,7 +2,7 @@
 
 use super::gallery::Gallery;
 use super::{LastPlace, Vehicle, VehicleOutput};
-use crate::auv::FixVerdict;
+use crate::FixVerdict;
 use scenecast_protocol::directive::{
     Budget, Constraints, Fence, Limits, LimitsFault, Place, RefusalReason, Slot, Utility,
 };

@@ -1,8 +1,8 @@
 //! Where the vehicle is, through a restart.
 
 use super::Vehicle;
-use crate::auv::Navigator;
-use crate::auv::planning::distance;
+use crate::Navigator;
+use crate::planning::distance;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Placement, PlannedPath};

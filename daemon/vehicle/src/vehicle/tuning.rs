@@ -1,7 +1,7 @@
 //! What the operator's settings change on the vehicle: which cells and planes it tells, and how it chooses its way.
 
 use super::{Vehicle, VehicleOutput};
-use crate::auv::MapUpdate;
+use crate::MapUpdate;
 use scenecast_protocol::directive::{CellBand, PlaneSet, RefusalReason, Settings};
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneKind, UNEXPLORED};
 use scenecast_protocol::map_codec::Stride;

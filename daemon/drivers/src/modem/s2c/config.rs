@@ -1,6 +1,7 @@
 //! What an S2C modem is to be.
 
 use scenecast_core::ModemAddress;
+pub use scenecast_core::{S2C_BURST_FRAME_BYTES as BURST_FRAME_BYTES, S2C_INSTANT_BYTES as INSTANT_BYTES};
 use std::time::Duration;
 
 /// How bulk goes.
@@ -37,12 +38,6 @@ pub struct S2cConfig {
     pub pool_frames: u32,
 }
 
-/// Most bytes of an instant message.
-pub const INSTANT_BYTES: usize = 64;
-/// Most bytes of a record of burst data.
-pub const RECORD_BYTES: usize = 1000;
-/// Bytes of a frame that still fits a record between its delimiters.
-pub const BURST_FRAME_BYTES: usize = RECORD_BYTES - 8;
 /// An instant message takes 161 ms and 10.9 ms a byte: bits a second, and what the beginning takes in bits.
 ///
 /// Source: a fit to the table of measured durations shipped with a fielded driver.

@@ -1,21 +1,21 @@
 //! A simulated vehicle as an autopilot.
 
-use super::{Autopilot, Counters, Goal, Health, Step, Tray};
-use crate::rehearsal::Motion;
 use scenecast_core::LatLon;
+use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step, Tray};
+use scenecast_motion::Motion;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
 /// Kinematics that are stepped twice a second of mission time.
 #[derive(Debug)]
-pub struct Rehearsed {
+pub struct SimulatedAutopilot {
     motion: Motion,
     depth_m: f64,
     next: Instant,
     tray: Tray,
 }
 
-impl Rehearsed {
+impl SimulatedAutopilot {
     /// Seconds between two steps.
     const STEP_S: f64 = 0.5;
     /// Dives and rises so fast, m/s.
@@ -27,7 +27,7 @@ impl Rehearsed {
     }
 }
 
-impl Autopilot for Rehearsed {
+impl Autopilot for SimulatedAutopilot {
     fn handle_open(&mut self, _now: Instant) {}
 
     fn handle_bytes(&mut self, _bytes: &[u8], _now: Instant) {}

@@ -1,13 +1,12 @@
 //! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
 
 use super::{Vehicle, VehicleOutput};
-use crate::auv::{Durable, MapUpdate, Navigator};
-use crate::config::Config;
-use crate::ends;
-use crate::rehearsal::motion::Motion;
-use crate::rehearsal::witness::stretches_outside;
+use crate::{Durable, MapUpdate, Navigator};
 use proptest::prelude::*;
+use scenecast_config::Config;
 use scenecast_core::Area;
+use scenecast_motion::Motion;
+use scenecast_motion::stretches_outside;
 use scenecast_protocol::directive::{
     CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason,
     Settings, Slot, Utility,
@@ -33,7 +32,7 @@ struct Sea {
 }
 
 fn profile(config: &Config) -> ModemProfile {
-    ends::modem_of_process(config, ends::vehicle_address(config).unwrap()).unwrap()
+    scenecast_config::modem_profile(config, config.modem.bit_rate)
 }
 
 impl Sea {
@@ -43,7 +42,7 @@ impl Sea {
         config.camera.height_px = 240;
         let profile = profile(&config);
         let now = Instant::ZERO;
-        let vehicle = ends::vehicle(&config, profile, AREA, Durable::default(), seed, now).unwrap();
+        let vehicle = crate::assemble(&config, None, profile, AREA, Durable::default(), seed, now).unwrap();
         let (x, y) = vehicle.navigator().position();
         Self { vehicle, motion: Motion::new(x, y, 0.5, drift, seed), now, fence: Fence::default(), limit: None }
     }
@@ -286,7 +285,7 @@ fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
     assert_eq!(sea.fence, small_fence(), "a fence that the vehicle is outside of is refused");
     let config = Config::default();
     let durable = sea.vehicle.durable().clone();
-    let again = ends::vehicle(&config, profile(&config), AREA, durable, 1, sea.now).unwrap();
+    let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
     assert!(!again.steering.bounds().holds((25.0, 5.0)));
     assert!(again.steering.bounds().holds((15.0, 5.0)));
     assert_eq!(again.steering.home(), (5.0, 5.0));
@@ -321,6 +320,6 @@ fn settings_out_of_range_are_refused_and_those_in_force_survive_a_restart() {
     assert_eq!(sea.vehicle.apply(Slot::Settings(more), sea.now), Ok(()));
     let config = Config::default();
     let durable = sea.vehicle.durable().clone();
-    let again = ends::vehicle(&config, profile(&config), AREA, durable, 1, sea.now).unwrap();
+    let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
     assert_eq!(again.settings(), &asked.then(&more));
 }
