@@ -6,7 +6,7 @@ use std::path::Path;
 fn main() {
     // Asked when it runs: a build script that was compiled in another checkout must not read that one's page.
     let manifest = std::env::var_os("CARGO_MANIFEST_DIR").expect("set by cargo");
-    let root = Path::new(&manifest).join("console");
+    let root = Path::new(&manifest).join("page");
     println!("cargo:rerun-if-changed={}", root.display());
     let mut files = Vec::new();
     collect(&root, &mut files);

@@ -1,7 +1,7 @@
 //! A recorded mission for processes whose camera plays it.
 
 use crate::scratch;
-use scenecast::rehearsal::{Mission, MissionOptions, World};
+use scenecast_rehearsal::{Mission, MissionOptions, World};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Duration;

@@ -1,10 +1,10 @@
 //! Rehearsed missions.
 
 use proptest::prelude::*;
-use scenecast::rehearsal::{Mission, MissionOptions, World, report};
 use scenecast_config::Config;
 use scenecast_protocol::map::PlaneScale;
 use scenecast_protocol::time::Instant;
+use scenecast_rehearsal::{Mission, MissionOptions, World, report};
 use serde_json::Value;
 use std::time::Duration;
 

@@ -35,6 +35,11 @@ pub fn survey_area(config: &Config) -> Option<Area> {
     (east > west && north > south).then_some(Area { west, south, east, north })
 }
 
+/// The depth at which the survey is flown, metres.
+pub fn survey_depth_m(config: &Config) -> f64 {
+    (config.survey.depth_m - config.survey.altitude_m).max(0.0)
+}
+
 /// The edge of a map cell, metres.
 pub fn cell_m(config: &Config) -> f64 {
     if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }

@@ -10,7 +10,8 @@ mod print;
 mod token_file;
 
 pub use derived::{
-    authenticity, background, cell_m, modem_profile, survey_area, tuning_table, vehicle_address, vehicle_names,
+    authenticity, background, cell_m, modem_profile, survey_area, survey_depth_m, tuning_table, vehicle_address,
+    vehicle_names,
 };
 pub use key_file::{load_key, read_key};
 pub use keys::{Allowed, KEYS, Key};

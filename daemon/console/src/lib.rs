@@ -7,6 +7,7 @@ mod answer;
 mod assets;
 mod base64;
 mod body;
+pub mod client;
 mod compress;
 mod connections;
 mod events;

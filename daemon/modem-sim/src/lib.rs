@@ -15,11 +15,11 @@ mod tcp;
 
 pub use scenario::Scenario;
 
-use crate::runtime::Stop;
 use host::FromHost;
 use links::Links;
 use orders::Order;
 use scenecast_core::UserError;
+use scenecast_runtime::Stop;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tank::Tank;
@@ -44,7 +44,7 @@ pub fn run(options: Options) -> Result<(), UserError> {
     scenario.seed = options.seed.unwrap_or(scenario.seed);
     let links = Links::new(options.link_dir.as_deref())?;
     let pace = Pace { began: Instant::now(), scale: options.time_scale };
-    crate::runtime::block_on(async move {
+    scenecast_runtime::block_on(async move {
         let mut stop = Stop::new()?;
         let (to_tank, from_hosts) = mpsc::channel(256);
         let mut tank = Tank::new(scenario, links, pace, to_tank)?;

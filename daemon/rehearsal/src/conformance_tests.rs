@@ -1,7 +1,7 @@
 //! What every driver must do, each at its emulator, in virtual time.
 
-use crate::rehearsal::VirtualTime;
-use crate::rehearsal::modem_bench::{Dock, DockSetting};
+use crate::VirtualTime;
+use crate::modem_bench::{Dock, DockSetting};
 use scenecast_config::Config;
 use scenecast_drivers::modem;
 use scenecast_drivers::modem::{Class, Destination, Driver, Event, Refusal, Token};

@@ -33,6 +33,6 @@ pub use meter::Delays;
 pub use mission::{Mission, MissionOptions};
 pub use outputs::write_outputs;
 pub use report::{Report, report};
-pub use simulated_autopilot::SimulatedAutopilot;
+pub use simulated_autopilot::{SimulatedAutopilot, simulated_autopilot};
 pub use virtual_time::VirtualTime;
 pub use world::World;

@@ -1,5 +1,6 @@
 //! A simulated vehicle as an autopilot.
 
+use scenecast_config::{Config, survey_depth_m};
 use scenecast_core::LatLon;
 use scenecast_drivers::autopilot::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_motion::Motion;
@@ -25,6 +26,16 @@ impl SimulatedAutopilot {
     pub fn new(motion: Motion, depth_m: f64, now: Instant) -> Self {
         Self { motion, depth_m, next: now, tray: Tray::default() }
     }
+}
+
+/// The simulated vehicle of a configuration, at the start of its survey.
+pub fn simulated_autopilot(config: &Config, now: Instant) -> Box<dyn Autopilot> {
+    let drift = config.navigation.drift_percent / 100.0;
+    let [east, north] = config.autopilot.current_m_s;
+    let motion = Motion::new(0.0, 0.0, config.survey.speed_m_s, drift, config.runtime.seed)
+        .with_turn_rate(config.autopilot.turn_rate_deg_s.to_radians())
+        .with_current(east, north);
+    Box::new(SimulatedAutopilot::new(motion, survey_depth_m(config), now))
 }
 
 impl Autopilot for SimulatedAutopilot {

@@ -1,8 +1,8 @@
 //! The vehicle and what flies it.
 
 use super::clock::Clock;
-use super::pilot::{Pilot, depth_m, next_of};
-use scenecast_config::{Config, origin};
+use super::pilot::{Pilot, SimulatedAutopilot, next_of};
+use scenecast_config::{Config, origin, survey_depth_m};
 use scenecast_core::TangentPlane;
 use scenecast_core::UserError;
 use scenecast_drivers::autopilot::Goal;
@@ -25,9 +25,19 @@ impl Flight {
     const OLDEST_FIX_S: f64 = 60.0;
 
     /// Opens the way to the autopilot that is configured.
-    pub(super) fn open(config: &Config, clock: Clock) -> Result<Self, UserError> {
+    pub(super) fn open(
+        config: &Config,
+        simulated: Option<SimulatedAutopilot>,
+        clock: Clock,
+    ) -> Result<Self, UserError> {
         let plane = origin(config)?.map(TangentPlane::new);
-        Ok(Self { pilot: Pilot::open(config, clock)?, plane, depth_m: depth_m(config), clock, is_rising: false })
+        Ok(Self {
+            pilot: Pilot::open(config, simulated, clock)?,
+            plane,
+            depth_m: survey_depth_m(config),
+            clock,
+            is_rising: false,
+        })
     }
 
     /// Come up where it is, or no longer.

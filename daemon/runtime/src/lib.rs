@@ -2,7 +2,6 @@
 
 mod checkpoint;
 mod clock;
-mod demo;
 mod durable;
 mod flight;
 mod journal;
@@ -11,20 +10,24 @@ mod kept_labels;
 mod mapping;
 pub mod modem;
 mod pilot;
+mod port;
+#[cfg(feature = "surface")]
 mod position;
-#[cfg(test)]
+#[cfg(all(test, feature = "surface"))]
 mod power_cuts;
 mod refusals;
 mod reload;
 mod restore;
 mod stop;
+#[cfg(feature = "surface")]
 mod surface;
 mod vehicle;
 
 pub use clock::Clock;
-pub use demo::run_demo;
+pub use pilot::SimulatedAutopilot;
 pub use reload::Load;
-pub(crate) use stop::Stop;
+pub use stop::Stop;
+#[cfg(feature = "surface")]
 pub use surface::run_surface;
 pub use vehicle::run_vehicle;
 
@@ -35,12 +38,12 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 const LONGEST_END: std::time::Duration = std::time::Duration::from_secs(1);
 
 /// Random bits for sessions: not secret, only different each run.
-fn random_bits() -> u64 {
+pub fn random_bits() -> u64 {
     RandomState::new().build_hasher().finish()
 }
 
 /// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
-pub(crate) fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {
+pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     // A second command in the same process (as in tests) keeps the first one's log.
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();

@@ -1,7 +1,7 @@
 //! A modem of a process: a station at a port.
 
+use crate::Clock;
 use crate::port::{FromPort, Port};
-use crate::runtime::Clock;
 use scenecast_config::Config;
 use scenecast_core::PortAddress;
 use scenecast_core::UserError;

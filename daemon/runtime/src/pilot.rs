@@ -5,12 +5,14 @@ use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
 use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Step};
 
 use crate::port::{FromPort, Port};
-use crate::rehearsal::SimulatedAutopilot;
 use scenecast_config::{Config, autopilot_place};
 use scenecast_core::LatLon;
 use scenecast_core::UserError;
-use scenecast_motion::Motion;
+use scenecast_protocol::time::Instant;
 use std::time::Duration;
+
+/// Makes the autopilot of kind `rehearsal`, a simulated vehicle; builds without the simulator have none.
+pub type SimulatedAutopilot = fn(&Config, Instant) -> Box<dyn Autopilot>;
 
 /// A state machine and the port that its bytes go through, if it has one.
 pub(super) struct Pilot {
@@ -22,7 +24,11 @@ pub(super) struct Pilot {
 
 impl Pilot {
     /// The autopilot that is configured, if any.
-    pub(super) fn open(config: &Config, clock: Clock) -> Result<Option<Self>, UserError> {
+    pub(super) fn open(
+        config: &Config,
+        simulated: Option<SimulatedAutopilot>,
+        clock: Clock,
+    ) -> Result<Option<Self>, UserError> {
         let a = &config.autopilot;
         let now = clock.now();
         let silence = Duration::from_secs_f64(a.silence_s);
@@ -33,7 +39,13 @@ impl Pilot {
             }
             "nmea" => Box::new(Nmea::new(true, silence, now)),
             "log" => Box::new(Nmea::new(false, silence, now)),
-            "rehearsal" => Box::new(SimulatedAutopilot::new(motion(config), depth_m(config), now)),
+            "rehearsal" => match simulated {
+                Some(make) => make(config, now),
+                None => {
+                    let what = "autopilot.kind = \"rehearsal\" is not allowed: this build has no simulator";
+                    return Err(UserError::Input(format!("{what}; it takes none, mavlink, nmea or log")));
+                }
+            },
             _ => return Ok(None),
         };
         let place = autopilot_place(config)?;
@@ -116,17 +128,4 @@ pub(super) async fn next_of(pilot: &mut Option<Pilot>) {
         Some(pilot) => pilot.next().await,
         None => std::future::pending().await,
     }
-}
-
-/// Depth at which the survey is flown, metres.
-pub(super) fn depth_m(config: &Config) -> f64 {
-    (config.survey.depth_m - config.survey.altitude_m).max(0.0)
-}
-
-fn motion(config: &Config) -> Motion {
-    let drift = config.navigation.drift_percent / 100.0;
-    let [east, north] = config.autopilot.current_m_s;
-    Motion::new(0.0, 0.0, config.survey.speed_m_s, drift, config.runtime.seed)
-        .with_turn_rate(config.autopilot.turn_rate_deg_s.to_radians())
-        .with_current(east, north)
 }

@@ -1,7 +1,7 @@
 //! GPS, compass and autopilot of the surface vehicle.
 
 use super::clock::Clock;
-use super::pilot::{Pilot, next_of};
+use super::pilot::{Pilot, SimulatedAutopilot, next_of};
 use crate::port::{FromPort, Port};
 use scenecast_config::{Config, is_gpsd, origin, position_places};
 use scenecast_core::UserError;
@@ -36,7 +36,12 @@ enum Told {
 
 impl Position {
     /// Opens what is configured, and gives the surface its relay.
-    pub(super) fn open(config: &Config, surface: &mut Surface, clock: Clock) -> Result<Self, UserError> {
+    pub(super) fn open(
+        config: &Config,
+        surface: &mut Surface,
+        simulated: Option<SimulatedAutopilot>,
+        clock: Clock,
+    ) -> Result<Self, UserError> {
         let p = &config.position;
         let [gps, compass] = position_places(config)?;
         let language = if is_gpsd(config) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
@@ -46,7 +51,7 @@ impl Position {
         Ok(Self {
             gps: gps.map(|place| Port::open_when_there("GPS", place, Some(QUIET))),
             compass: compass.map(|place| Port::open_when_there("compass", place, Some(QUIET))),
-            pilot: Pilot::open(config, clock)?,
+            pilot: Pilot::open(config, simulated, clock)?,
             follow: p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m)),
             target: None,
             clock,

@@ -3,7 +3,7 @@
 use scenecast_core::UserError;
 
 /// Hears Ctrl-C and SIGTERM from its making on: one that comes while the process is at other work is not lost.
-pub(crate) struct Stop {
+pub struct Stop {
     #[cfg(unix)]
     interrupt: tokio::signal::unix::Signal,
     #[cfg(unix)]
@@ -15,7 +15,7 @@ pub(crate) struct Stop {
 impl Stop {
     /// Listens from now on.
     #[cfg(unix)]
-    pub(crate) fn new() -> Result<Self, UserError> {
+    pub fn new() -> Result<Self, UserError> {
         use tokio::signal::unix::{SignalKind, signal};
         let problem = |e| UserError::Failed(format!("the signals to end: {e}"));
         Ok(Self {
@@ -26,13 +26,13 @@ impl Stop {
 
     /// Listens from now on.
     #[cfg(not(unix))]
-    pub(crate) fn new() -> Result<Self, UserError> {
+    pub fn new() -> Result<Self, UserError> {
         let interrupt = tokio::signal::windows::ctrl_c();
         Ok(Self { interrupt: interrupt.map_err(|e| UserError::Failed(format!("Ctrl-C: {e}")))? })
     }
 
     /// Returns when the process is to end; safe to abandon.
-    pub(crate) async fn asked(&mut self) {
+    pub async fn asked(&mut self) {
         #[cfg(unix)]
         tokio::select! {
             _ = self.interrupt.recv() => {}

@@ -3,11 +3,12 @@
 use super::clock::Clock;
 use super::journal::create_folder;
 use super::modem::Modem;
+use super::pilot::SimulatedAutopilot;
 use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
-use crate::console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use scenecast_config::Config;
+use scenecast_console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_core::world_file;
@@ -21,7 +22,7 @@ use std::time::Duration;
 use tokio::sync::oneshot;
 
 /// Runs the surface until it is interrupted.
-pub fn run_surface(config: Config) -> Result<(), UserError> {
+pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
         let entrance = match config.console.listen.as_str() {
@@ -55,7 +56,7 @@ pub fn run_surface(config: Config) -> Result<(), UserError> {
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = super::modem::open(&config, Address::SURFACE, profile, clock).await?;
-        let position = Position::open(&config, &mut surface, clock)?;
+        let position = Position::open(&config, &mut surface, simulated, clock)?;
         let vehicle = scenecast_config::vehicle_address(&config)?;
         let refusals = Refusals::default();
         Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }

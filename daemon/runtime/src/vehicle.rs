@@ -6,6 +6,7 @@ use super::flight::Flight;
 use super::journal::Folder;
 use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
 use super::modem::Modem;
+use super::pilot::SimulatedAutopilot;
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
@@ -22,7 +23,7 @@ use scenecast_vehicle::{Vehicle, VehicleOutput};
 use std::path::Path;
 
 /// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
-pub fn run_vehicle(load: Load) -> Result<(), UserError> {
+pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
         let config = load()?;
@@ -56,7 +57,7 @@ pub fn run_vehicle(load: Load) -> Result<(), UserError> {
         let mapper = MapperThread::start(mapper, keep)?;
         let modem = super::modem::open(&config, address, profile, clock).await?;
         let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        let flight = Flight::open(&config, clock)?;
+        let flight = Flight::open(&config, simulated, clock)?;
         let (behind, missed) = (0, 0);
         let host =
             Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind, missed };

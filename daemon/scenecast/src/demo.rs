@@ -1,10 +1,10 @@
 //! A rehearsal at the pace of the world, with the operator's page.
 
-use super::stop::Stop;
-use crate::console::{Console, LinkMeter, MissionFacts, answer, bind, snapshot, start};
-use crate::rehearsal::Mission;
+use scenecast_console::{Console, LinkMeter, MissionFacts, answer, bind, snapshot, start};
 use scenecast_core::UserError;
 use scenecast_protocol::time::Instant;
+use scenecast_rehearsal::Mission;
+use scenecast_runtime::{Stop, block_on, random_bits};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ const PUBLISH: Duration = Duration::from_secs(1);
 /// Flies a mission at `speed` mission seconds a second and serves the operator's page on `port`, until it is interrupted;
 /// without a page, until the operator has everything.
 pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), UserError> {
-    super::block_on(async move {
+    block_on(async move {
         let stop = Stop::new()?;
         let console = match port {
             Some(port) => {
@@ -44,7 +44,7 @@ struct Demo {
 
 impl Demo {
     fn new(mission: Mission, speed: f64) -> Self {
-        let facts = MissionFacts::new(mission.config(), mission.modem(), super::random_bits(), speed);
+        let facts = MissionFacts::new(mission.config(), mission.modem(), random_bits(), speed);
         let window = Duration::from_secs_f64(mission.config().link.budget_window_s);
         Self { meter: LinkMeter::new(window), mission, facts, counted: [0; 2], published: None }
     }

@@ -1,10 +1,5 @@
-//! The scenecast daemon: the roles at sea, their drivers and runtime, the operator's console, the rehearsal and the tools.
+//! The `scenecast` command: one binary for the vehicle, the surface, rehearsals and offline work.
 
-pub mod cli;
-pub mod console;
-pub mod ctl;
-pub mod modem_sim;
-pub mod port;
-pub mod rehearsal;
-pub mod runtime;
-mod scene;
+pub mod commands;
+#[cfg(feature = "rehearsal")]
+mod demo;

@@ -4,7 +4,7 @@ use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let arguments = match scenecast::cli::Arguments::try_parse() {
+    let arguments = match scenecast::commands::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(e) if !e.use_stderr() => e.exit(),
         Err(e) => {
@@ -15,7 +15,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match scenecast::cli::run(arguments) {
+    match scenecast::commands::run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(problem) => {
             eprintln!("scenecast: {problem}");

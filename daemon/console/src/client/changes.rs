@@ -1,7 +1,7 @@
 //! What is new between two states.
 
 use super::figures::{self, is_silent, mode, slot, span};
-use crate::console::state::{ExemplarState, Picture, State, Vehicle};
+use crate::state::{ExemplarState, Picture, State, Vehicle};
 use serde::Serialize;
 
 /// A change.

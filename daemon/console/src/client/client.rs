@@ -1,6 +1,6 @@
 //! Requests over HTTP.
 
-use crate::console::state::{Accepted, Refusal, State};
+use crate::state::{Accepted, Refusal, State};
 use axum::body::Bytes;
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::Incoming;

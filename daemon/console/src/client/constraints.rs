@@ -2,8 +2,8 @@
 
 use super::geojson::{self, Frame};
 use super::{Ctl, figures};
-use crate::console::orders::ConstraintsOrder;
-use crate::console::state::{InForce, LifeLine, Slot, State, Vehicle};
+use crate::orders::ConstraintsOrder;
+use crate::state::{InForce, LifeLine, Slot, State, Vehicle};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
 use scenecast_surface::{FenceOrder, LimitsOrder};

@@ -1,6 +1,6 @@
 //! The state as text for people.
 
-use crate::console::state::{Backlog, Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Status, Vehicle};
+use crate::state::{Backlog, Exemplar, ExemplarState, LifeLine, Link, Mode, Slot, State, Status, Vehicle};
 use std::fmt::Write;
 
 /// Everything, or what concerns one vehicle.

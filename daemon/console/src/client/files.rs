@@ -1,8 +1,8 @@
 //! Maps and images as files.
 
 use super::Ctl;
-use crate::console::orders::{ExemplarOrder, ExemplarWish};
-use crate::console::state::{Accepted, Exemplar, ExemplarState, State};
+use crate::orders::{ExemplarOrder, ExemplarWish};
+use crate::state::{Accepted, Exemplar, ExemplarState, State};
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ pub use client::Client;
 pub use orders::BudgetChange;
 pub use settings::SettingsChange;
 
-use crate::console::state::{State, Vehicle};
+use crate::state::{State, Vehicle};
 use scenecast_core::UserError;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};

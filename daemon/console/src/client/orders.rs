@@ -1,8 +1,8 @@
 //! Orders, and what becomes of them.
 
 use super::{Ctl, figures};
-use crate::console::orders::{BudgetOrder, SharesOrder, UtilityOrder};
-use crate::console::state::{Accepted, LifeLine, State};
+use crate::orders::{BudgetOrder, SharesOrder, UtilityOrder};
+use crate::state::{Accepted, LifeLine, State};
 use scenecast_core::UserError;
 use serde::Serialize;
 use std::collections::BTreeMap;

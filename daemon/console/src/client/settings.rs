@@ -1,8 +1,8 @@
 //! Settings of a vehicle: shown, sent, or picked to fit a budget.
 
 use super::{Ctl, figures};
-use crate::console::fit::{Fit, Fitted};
-use crate::console::state::Vehicle;
+use crate::fit::{Fit, Fitted};
+use crate::state::Vehicle;
 use scenecast_core::UserError;
 use scenecast_surface::SettingsOrder;
 

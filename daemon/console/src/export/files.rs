@@ -3,20 +3,20 @@
 use super::place::{lon_lat, well_known_text};
 use super::regions::{Polygon, regions};
 use super::{Cells, Explored};
-use crate::console::state::Origin;
+use crate::state::Origin;
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// An indexed PNG, north up, pixel value = label.
-pub(in crate::console) fn indexed_png(cells: &Cells) -> Option<Vec<u8>> {
+pub(crate) fn indexed_png(cells: &Cells) -> Option<Vec<u8>> {
     let grid: LabelGrid = cells.bounds.cells().zip(cells.labels.iter().copied()).collect();
     label_picture::encode(&grid).ok()
 }
 
 /// The six lines of a world file: size of a pixel, and the middle of the north-west one.
-pub(in crate::console) fn world_file(cells: &Cells) -> String {
+pub(crate) fn world_file(cells: &Cells) -> String {
     let (west, _) = cells.corner_m(0, 0);
     let (_, north) = cells.corner_m(0, cells.bounds.height.max(1));
     let (cell, half) = (cells.cell_m, cells.cell_m / 2.0);
@@ -24,13 +24,13 @@ pub(in crate::console) fn world_file(cells: &Cells) -> String {
 }
 
 /// The `.aux.xml` file beside a PNG, where GDAL and QGIS look for the projection.
-pub(in crate::console) fn projection(origin: Option<Origin>) -> String {
+pub(crate) fn projection(origin: Option<Origin>) -> String {
     let text = well_known_text(origin).replace('"', "&quot;");
     format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n</PAMDataset>\n")
 }
 
 /// Regions of equal label: WGS 84 if the mission has an origin, else metres east and north of it.
-pub(in crate::console) fn geojson(cells: &Cells, origin: Option<Origin>) -> String {
+pub(crate) fn geojson(cells: &Cells, origin: Option<Origin>) -> String {
     let corner = |&(column, row): &(u32, u32)| {
         let (x, y) = cells.corner_m(column, row);
         let Some(origin) = origin else { return json!([x, y]) };
@@ -62,7 +62,7 @@ fn tidy(degrees: f64) -> f64 {
 }
 
 /// ASCII PLY: the middle of each explored cell in metres east, north and up (0: no depth is known), colour, label.
-pub(in crate::console) fn ply(cells: &Cells) -> String {
+pub(crate) fn ply(cells: &Cells) -> String {
     let count = cells.explored().count();
     let mut out = format!(
         "ply\nformat ascii 1.0\ncomment scenecast map, metres east, north, up\nelement vertex {count}\n\
@@ -79,7 +79,7 @@ pub(in crate::console) fn ply(cells: &Cells) -> String {
 }
 
 /// A line for each explored cell: the middle in metres, label, age in seconds, what is known of each plane.
-pub(in crate::console) fn csv(cells: &Cells) -> String {
+pub(crate) fn csv(cells: &Cells) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
     cells.planes.iter().for_each(|plane| out.extend([",", plane.name]));
     for Explored { at, x, y, label, age_s } in cells.explored() {

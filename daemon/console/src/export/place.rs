@@ -1,6 +1,6 @@
 //! From metres of the mission to latitude and longitude, and the projection that says so.
 
-use crate::console::state::Origin;
+use crate::state::Origin;
 
 /// Semi-major axis of WGS 84, metres.
 const A: f64 = 6_378_137.0;

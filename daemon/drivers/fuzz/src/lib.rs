@@ -1,8 +1,8 @@
 //! Fuzz targets of the modem drivers: what must hold for any bytes of a port.
 
-use scenecast::modem::micromodem::{Micromodem, MicromodemConfig, Rate, SentenceParser};
-use scenecast::modem::s2c::{LineParser, S2c, S2cConfig, S2cMode};
-use scenecast::modem::{Class, Destination, Driver};
+use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser};
+use scenecast_drivers::modem::s2c::{LineParser, S2c, S2cConfig, S2cMode};
+use scenecast_drivers::modem::{Class, Destination, Driver};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 

@@ -1,7 +1,7 @@
 //! How long an image takes from the order to the last bit, while the map takes all that it can get.
 
 use super::Spread;
-use crate::rehearsal::VirtualTime;
+use crate::VirtualTime;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar as Picture;
 use scenecast_config::Config;

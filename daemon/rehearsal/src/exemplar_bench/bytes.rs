@@ -1,7 +1,7 @@
 //! How many bytes an image needs to look like its patch, and how many the vehicle sends.
 
 use super::Spread;
-use crate::rehearsal::World;
+use crate::World;
 use image::RgbImage;
 use scene_model::exemplars::Exemplar;
 use scene_model::project::Pose;

@@ -1,7 +1,7 @@
 //! Images of labels between a vehicle and a surface on a lossy link.
 
 use super::arrival::{LABELS, Setting, Water};
-use crate::rehearsal::VirtualTime;
+use crate::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::{Class, Shares, SpendOrder};

@@ -2,7 +2,7 @@
 
 use super::table::{budget_use, round};
 use super::water::{Setting, Water};
-use crate::rehearsal::VirtualTime;
+use crate::VirtualTime;
 use scenecast_protocol::time::Instant;
 use serde::Serialize;
 use sim_channel::LossModel;

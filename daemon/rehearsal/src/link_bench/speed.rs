@@ -2,7 +2,7 @@
 
 use super::opaque::OpaqueReplica;
 use super::water::{Setting, Vehicle, Water, auv, surface_config};
-use crate::rehearsal::VirtualTime;
+use crate::VirtualTime;
 use scenecast_protocol::link::SurfaceLink;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;

@@ -2,7 +2,7 @@
 
 use super::summary::Summary;
 use super::water::{Setting, Water, auv};
-use crate::rehearsal::VirtualTime;
+use crate::VirtualTime;
 use scenecast_protocol::directive::{Fix, LifeLine, Slot, SlotId, Utility};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::map::StateReplica;

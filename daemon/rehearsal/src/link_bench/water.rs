@@ -2,7 +2,7 @@
 
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
-use crate::rehearsal::VirtualTime;
+use crate::VirtualTime;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, Transmit, VehicleConfig, VehicleEvent,

@@ -1,6 +1,6 @@
 //! The surface vehicle of a rehearsed localisation: its instruments, its relay, and its way above the vehicle.
 
-use crate::rehearsal::instruments::{Instruments, Receiver};
+use crate::instruments::{Instruments, Receiver};
 use scenecast_core::LatLon;
 use scenecast_core::gps::GpsLanguage;
 use scenecast_protocol::directive::Fix;

@@ -1,6 +1,6 @@
 //! The surface vehicle at anchor: GPS, compass and USBL head, from which the relay makes the fixes.
 
-use crate::rehearsal::instruments::{Instruments, Receiver};
+use crate::instruments::{Instruments, Receiver};
 use scenecast_config::Config;
 use scenecast_core::LatLon;
 use scenecast_core::gps::GpsLanguage;

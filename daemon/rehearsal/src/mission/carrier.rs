@@ -1,7 +1,7 @@
 //! A mission through drivers and emulated modems instead of bare water.
 
 use super::{Mission, channel_config};
-use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
+use crate::docked::{Docked, SURFACE, VEHICLE};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::ModemEvent;

@@ -1,7 +1,7 @@
 //! What happens in a mission, event by event.
 
 use super::{Mission, STEP_S, SURFACE, VEHICLE, pose_of};
-use crate::rehearsal::docked::{self, Docked};
+use crate::docked::{self, Docked};
 use scenecast_core::UserError;
 use scenecast_files::RecordedFrame;
 use scenecast_motion::Motion;

@@ -1,7 +1,7 @@
 //! The operator tunes a vehicle that is under way: the map follows, both maps agree, labels keep their meaning.
 
 use super::{Mission, MissionOptions};
-use crate::rehearsal::World;
+use crate::World;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use scenecast_protocol::map_codec::Stride;

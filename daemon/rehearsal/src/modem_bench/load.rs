@@ -1,8 +1,8 @@
 //! The link under load of opaque bytes through drivers and emulated modems.
 
-use crate::rehearsal::VirtualTime;
-use crate::rehearsal::docked::{Docked, SURFACE, VEHICLE};
-use crate::rehearsal::link_bench::{OpaqueReplica, OpaqueSource, Summary};
+use crate::VirtualTime;
+use crate::docked::{Docked, SURFACE, VEHICLE};
+use crate::link_bench::{OpaqueReplica, OpaqueSource, Summary};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::ModemEvent;

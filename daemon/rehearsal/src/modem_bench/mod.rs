@@ -6,7 +6,7 @@ mod pusher;
 pub use load::{Dock, DockSetting};
 pub use pusher::push;
 
-use crate::rehearsal::{Mission, MissionOptions, World, report};
+use crate::{Mission, MissionOptions, World, report};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! Label maps to drive over.
 
-use crate::rehearsal::World;
+use crate::World;
 use image::RgbImage;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::LabelBook;

@@ -9,7 +9,9 @@ mod cuts;
 pub(super) mod disk;
 
 pub(super) use record::Damage;
-pub(crate) use storage::{Folder, Storage, create_folder};
+#[cfg(feature = "surface")]
+pub(crate) use storage::create_folder;
+pub(crate) use storage::{Folder, Storage};
 
 use std::io;
 

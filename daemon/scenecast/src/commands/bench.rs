@@ -6,9 +6,9 @@ use super::bench_localisation::LocalisationBench;
 use super::bench_modem::Modem;
 use super::bench_planning::Planning;
 use super::sim::WorldArguments;
-use crate::rehearsal::{FidelityRow, fidelity};
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
+use scenecast_rehearsal::{FidelityRow, fidelity};
 
 /// Measurements.
 #[derive(Debug, Subcommand)]

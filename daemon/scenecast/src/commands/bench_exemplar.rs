@@ -1,9 +1,9 @@
 //! `scenecast bench exemplar`
 
-use super::progress::Progress;
-use crate::rehearsal::exemplar_bench::{Arrivals, Bytes, Setting, Source, Spread, arrivals, photos, sizes};
 use clap::Args;
 use scenecast_core::UserError;
+use scenecast_rehearsal::exemplar_bench::{Arrivals, Bytes, Setting, Source, Spread, arrivals, photos, sizes};
+use scenecast_tools::Progress;
 use serde_json::json;
 use std::path::PathBuf;
 

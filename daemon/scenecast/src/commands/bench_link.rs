@@ -1,9 +1,9 @@
 //! `scenecast bench link`
 
-use super::progress::Progress;
-use crate::rehearsal::link_bench::{BudgetRow, FleetRow, LinkTable, RangingRow, Row, link_table, measure_speed};
 use clap::Args;
 use scenecast_core::UserError;
+use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkTable, RangingRow, Row, link_table, measure_speed};
+use scenecast_tools::Progress;
 
 /// The link in virtual time with opaque payload of which there is always more: 10 kbit/s half duplex, 0.2 s turn-around,
 /// turns granted by the surface. Takes less than a minute; the same seed gives the same table.

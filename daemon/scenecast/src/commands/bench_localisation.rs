@@ -1,10 +1,10 @@
 //! `scenecast bench localisation`
 
-use super::progress::Progress;
-use crate::rehearsal::{Localisation, fly_with_outliers, localisation, picture};
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
+use scenecast_rehearsal::{Localisation, fly_with_outliers, localisation, picture};
+use scenecast_tools::Progress;
 use std::path::PathBuf;
 
 /// How far off the vehicle's position is over 3 km, with a drift of 1 % of the way: by dead reckoning alone, with a fix

@@ -1,9 +1,9 @@
 //! `scenecast bench modem`
 
-use super::progress::Progress;
-use crate::rehearsal::modem_bench::{ModemTable, modem_table};
 use clap::Args;
 use scenecast_core::UserError;
+use scenecast_rehearsal::modem_bench::{ModemTable, modem_table};
+use scenecast_tools::Progress;
 
 /// Both ends' drivers at emulated modems, 1 km and 10 % loss, in virtual time: what an S2C in burst mode carries for the
 /// link and for a host that only keeps its pool full, how long directives take meanwhile, and surveys of 20 minutes

@@ -1,10 +1,10 @@
 //! `scenecast bench planning`
 
-use super::progress::Progress;
-use crate::rehearsal::planning_bench::{Trial, annotated_images, drive_all, picture};
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
+use scenecast_rehearsal::planning_bench::{Trial, annotated_images, drive_all, picture};
+use scenecast_tools::Progress;
 use std::path::PathBuf;
 
 /// Utility collected a metre by each planner, with a fence, keep-outs and 40 % of the distance that full coverage takes.

@@ -1,10 +1,9 @@
 //! `scenecast demo`
 
 use super::sim::WorldArguments;
-use crate::rehearsal::{Mission, MissionOptions};
-use crate::runtime;
 use clap::Args;
 use scenecast_core::UserError;
+use scenecast_rehearsal::{Mission, MissionOptions};
 
 /// Fly a simulated mission in real time and serve the operator's page.
 #[derive(Debug, Args)]
@@ -33,6 +32,6 @@ impl Demo {
         let config = self.world.config()?;
         let world = self.world.world(&config)?;
         let mission = Mission::new(config, MissionOptions { world, seed: self.world.seed, record: None })?;
-        runtime::run_demo(mission, self.speed, (!self.no_console).then_some(self.port))
+        crate::demo::run_demo(mission, self.speed, (!self.no_console).then_some(self.port))
     }
 }

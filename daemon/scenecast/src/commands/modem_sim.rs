@@ -1,8 +1,8 @@
 //! `scenecast modem-sim`
 
-use crate::modem_sim::{Options, run};
 use clap::Args;
 use scenecast_core::UserError;
+use scenecast_modem_sim::{Options, run};
 use std::path::PathBuf;
 
 /// Emulate modems in one water, each on a serial device or a TCP port of its own.

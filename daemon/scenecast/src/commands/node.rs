@@ -1,6 +1,5 @@
 //! `scenecast auv`, `scenecast asv`, `scenecast config`
 
-use crate::runtime;
 use clap::{Args, ValueEnum};
 use scenecast_core::UserError;
 use std::path::PathBuf;
@@ -21,12 +20,24 @@ pub(super) struct Node {
 
 impl Node {
     pub(super) fn run_vehicle(self) -> Result<(), UserError> {
-        runtime::run_vehicle(Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)))
+        scenecast_runtime::run_vehicle(
+            Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)),
+            simulator(),
+        )
     }
 
+    #[cfg(feature = "surface")]
     pub(super) fn run_surface(self) -> Result<(), UserError> {
-        runtime::run_surface(scenecast_config::load(Some(&self.config), &self.sets)?)
+        scenecast_runtime::run_surface(scenecast_config::load(Some(&self.config), &self.sets)?, simulator())
     }
+}
+
+/// The simulated vehicle of `autopilot.kind = "rehearsal"`, in builds that have it.
+fn simulator() -> Option<scenecast_runtime::SimulatedAutopilot> {
+    #[cfg(feature = "rehearsal")]
+    return Some(scenecast_rehearsal::simulated_autopilot);
+    #[cfg(not(feature = "rehearsal"))]
+    None
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -1,10 +1,10 @@
 //! `scenecast sim`
 
-use super::progress::Progress;
-use crate::rehearsal::{Mission, MissionOptions, World, report, write_outputs};
 use clap::Args;
 use scenecast_config::Config;
 use scenecast_core::UserError;
+use scenecast_rehearsal::{Mission, MissionOptions, World, report, write_outputs};
+use scenecast_tools::Progress;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

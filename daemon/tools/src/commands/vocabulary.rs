@@ -1,6 +1,6 @@
 //! `scenecast vocabulary`
 
-use super::progress::Progress;
+use crate::progress::Progress;
 use clap::{Args, Subcommand};
 use image::RgbImage;
 use scene_model::words::{WordConfig, WordExtractor};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// Make the vocabularies that images are put into words with.
 #[derive(Debug, Subcommand)]
-pub(super) enum Vocabulary {
+pub enum Vocabulary {
     Train(Train),
 }
 
@@ -23,7 +23,7 @@ pub(super) enum Vocabulary {
 /// scene.vocabulary of a vehicle, or with scenecast scene run --vocabulary. Images named *_label are passed over.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast vocabulary train --images last-dive --out reef.vocabulary")]
-pub(super) struct Train {
+pub struct Train {
     /// Folder of PNG, JPEG or TIFF images
     #[arg(long, value_name = "DIR")]
     images: PathBuf,
@@ -36,7 +36,7 @@ pub(super) struct Train {
 }
 
 impl Vocabulary {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         match self {
             Self::Train(train) => train.run(),
         }

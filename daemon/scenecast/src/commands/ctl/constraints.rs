@@ -1,8 +1,8 @@
 //! `scenecast ctl fence`, `return-point`, `limits`, `hold`, `resume`, `abort`
 
-use crate::console::orders::ConstraintsOrder;
-use crate::ctl::Ctl;
 use clap::{Args, Subcommand};
+use scenecast_console::client::Ctl;
+use scenecast_console::orders::ConstraintsOrder;
 use scenecast_core::UserError;
 use scenecast_surface::LimitsOrder;
 use std::path::PathBuf;

@@ -2,10 +2,10 @@
 
 mod constraints;
 
-use crate::console::orders::ExemplarWish;
-use crate::ctl::{self, BudgetChange, Client, SettingsChange};
 use clap::{Args, Subcommand};
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
+use scenecast_console::client::{self as ctl, BudgetChange, Client, SettingsChange};
+use scenecast_console::orders::ExemplarWish;
 use scenecast_core::UserError;
 use scenecast_surface::SettingsOrder;
 use std::collections::BTreeMap;

@@ -3,7 +3,7 @@
 use super::Coding;
 use super::change::{Sizes, encode, refused, sizes};
 use super::files::{numbered, read_map, same_size};
-use crate::cli::progress::Progress;
+use crate::progress::Progress;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_protocol::map_codec::Plane;
@@ -17,7 +17,7 @@ use std::time::Instant;
 /// smaller of delta image and dirty box. They are deflated by zopfli, which takes nearly all of the time.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map bench --series steps --frame-bytes 256")]
-pub(crate) struct Bench {
+pub struct Bench {
     /// Folder of indexed PNG files of one size, in the order of the last number in their names
     #[arg(long, value_name = "DIR")]
     series: PathBuf,
@@ -44,7 +44,7 @@ struct Totals {
 }
 
 impl Bench {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         let files = numbered(&self.series)?;
         let mut totals = Totals { frame_bytes: self.coding.frame_bytes, ..Totals::default() };
         totals.sizes.codec = self.coding.codec.to_string();

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 /// Sizes of one change or of several.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub(super) struct Sizes {
+pub struct Sizes {
     /// Bytes of all chunks, their heads included.
     pub(super) bytes: usize,
     /// Frames that the chunks fill one after another, no chunk in two.
@@ -22,7 +22,7 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    pub(super) fn add(&mut self, other: &Self) {
+    pub fn add(&mut self, other: &Self) {
         self.bytes += other.bytes;
         self.frames += other.frames;
         self.cells_changed += other.cells_changed;
@@ -32,17 +32,17 @@ impl Sizes {
 }
 
 /// The chunks from `base` to `target`, and how many cells they change.
-pub(super) fn encode(coding: &Coding, base: &Plane, target: &Plane) -> Result<(ChunkFile, usize), UserError> {
+pub fn encode(coding: &Coding, base: &Plane, target: &Plane) -> Result<(ChunkFile, usize), UserError> {
     ChunkFile::encode(coding.codec, base, target, coding.frame_bytes.into()).map_err(refused)
 }
 
 /// Wrong input, for the files were read before.
-pub(super) fn refused(error: ChunkFileError) -> UserError {
+pub fn refused(error: ChunkFileError) -> UserError {
     UserError::Input(error.to_string())
 }
 
 /// Sizes of an encoded change, beside those of the PNG files.
-pub(super) fn sizes(coding: &Coding, base: &Plane, target: &Plane, file: &ChunkFile, cells_changed: usize) -> Sizes {
+pub fn sizes(coding: &Coding, base: &Plane, target: &Plane, file: &ChunkFile, cells_changed: usize) -> Sizes {
     Sizes {
         bytes: file.chunks.iter().map(Vec::len).sum(),
         frames: frames(file.chunks.iter().map(Vec::len), coding.frame_bytes.into()),

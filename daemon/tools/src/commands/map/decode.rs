@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Read chunks back into a map: an indexed PNG, pixel value = label, 0 = unexplored.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map decode --base yesterday.png --in change.scmc --out today.png")]
-pub(crate) struct Decode {
+pub struct Decode {
     /// The map that the chunks were made against; without it, nothing
     #[arg(long, value_name = "B.png")]
     base: Option<PathBuf>,
@@ -23,7 +23,7 @@ pub(crate) struct Decode {
 }
 
 impl Decode {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         let refused = |e| UserError::file(&self.input, e);
         let bytes = std::fs::read(&self.input).map_err(|e| UserError::file(&self.input, e))?;
         let file = ChunkFile::from_bytes(&bytes).map_err(refused)?;

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// a whole image or cut to its box).
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map encode --base yesterday.png --target today.png --out change.scmc")]
-pub(crate) struct Encode {
+pub struct Encode {
     /// The map as it becomes
     #[arg(long, value_name = "T.png")]
     target: PathBuf,
@@ -31,7 +31,7 @@ pub(crate) struct Encode {
 }
 
 impl Encode {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         let target = read_map(&self.target)?;
         let base = match &self.base {
             Some(path) => {

@@ -5,13 +5,13 @@ use scenecast_protocol::map_codec::Plane;
 use std::path::{Path, PathBuf};
 
 /// The map in an indexed PNG.
-pub(super) fn read_map(path: &Path) -> Result<Plane, UserError> {
+pub fn read_map(path: &Path) -> Result<Plane, UserError> {
     let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
     Plane::from_png(&bytes).map_err(|e| UserError::file(path, e))
 }
 
 /// Refuses a map of another size than that of `base`.
-pub(super) fn same_size(base: (&Path, &Plane), map: (&Path, &Plane)) -> Result<(), UserError> {
+pub fn same_size(base: (&Path, &Plane), map: (&Path, &Plane)) -> Result<(), UserError> {
     if (base.1.width, base.1.height) == (map.1.width, map.1.height) {
         return Ok(());
     }
@@ -20,7 +20,7 @@ pub(super) fn same_size(base: (&Path, &Plane), map: (&Path, &Plane)) -> Result<(
 }
 
 /// The PNG files of a folder by the number in their names.
-pub(super) fn numbered(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
+pub fn numbered(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {
         let path = entry.map_err(|e| UserError::file(dir, e))?.path();

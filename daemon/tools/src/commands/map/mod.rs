@@ -14,7 +14,7 @@ use scenecast_protocol::map_codec::Codec;
 
 /// Code label maps as the stream does, and measure it.
 #[derive(Debug, Subcommand)]
-pub(crate) enum Map {
+pub enum Map {
     /// Write the chunks that turn one map into another, and print what they take.
     Encode(encode::Encode),
     /// Read such chunks back into a map.
@@ -26,7 +26,7 @@ pub(crate) enum Map {
 }
 
 impl Map {
-    pub(crate) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         match self {
             Self::Encode(encode) => encode.run(),
             Self::Decode(decode) => decode.run(),

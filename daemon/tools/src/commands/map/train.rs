@@ -1,6 +1,6 @@
 //! `scenecast map train-prior`
 
-use crate::cli::progress::Progress;
+use crate::progress::Progress;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// same, so this is to check it, or to begin another wire format.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map train-prior --seed 1 --out prior.bin")]
-pub(crate) struct TrainPrior {
+pub struct TrainPrior {
     /// Seed of the procedural maps
     #[arg(long)]
     seed: u64,
@@ -26,7 +26,7 @@ pub(crate) struct TrainPrior {
 }
 
 impl TrainPrior {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("training");
         let table = train_prior(self.seed, self.scenes, &mut |done| progress.show(done as f64 / 1000.0));
         drop(progress);

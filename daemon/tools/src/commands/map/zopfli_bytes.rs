@@ -1,7 +1,7 @@
 //! Deflate streams of the reference PNG files.
 
 /// Bytes of `data` as zopfli deflates it.
-pub(super) fn zopfli_bytes(data: &[u8]) -> usize {
+pub fn zopfli_bytes(data: &[u8]) -> usize {
     let mut counted = Counted(0);
     // Neither memory nor counting fails.
     let _ = zopfli::compress(zopfli::Options::default(), zopfli::Format::Deflate, data, &mut counted);

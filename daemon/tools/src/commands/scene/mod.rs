@@ -10,7 +10,7 @@ use scenecast_core::UserError;
 
 /// Run the scene model over files.
 #[derive(Debug, Subcommand)]
-pub(crate) enum Scene {
+pub enum Scene {
     Run(Box<run::Run>),
     Sample(sample::Sample),
     /// Score the scene model and two baselines on annotated images.
@@ -18,7 +18,7 @@ pub(crate) enum Scene {
 }
 
 impl Scene {
-    pub(crate) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         match self {
             Self::Run(run) => run.run(),
             Self::Sample(sample) => sample.run(),

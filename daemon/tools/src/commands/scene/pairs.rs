@@ -9,13 +9,13 @@ const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 
 /// An image and the classes of its pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Pair {
+pub struct Pair {
     pub(super) image: PathBuf,
     pub(super) classes: PathBuf,
 }
 
 /// Every `NAME_label.png` of a folder with the image `NAME`, by name; one without an image or with two is refused.
-pub(super) fn pairs(dir: &Path) -> Result<Vec<Pair>, UserError> {
+pub fn pairs(dir: &Path) -> Result<Vec<Pair>, UserError> {
     let mut images: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     let mut labels: BTreeMap<String, PathBuf> = BTreeMap::new();
     for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {

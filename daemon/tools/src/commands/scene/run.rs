@@ -1,6 +1,6 @@
 //! `scenecast scene run`
 
-use crate::cli::progress::Progress;
+use crate::progress::Progress;
 use crate::scene::{
     Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, Outcome, Schedule, Source, Tum, WordsFile, learn, quality,
     read_vocabulary, write,
@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Example: scenecast scene run --mosaic reef.jpg --annotations classes.png --out run1
 Example: scenecast scene run --words words.csv --cell-size 0.5 --refine-rate 100000 --out run2
 Example: scenecast scene run --source tum:rgbd_dataset_freiburg1_desk --cell-size 0.1 --out run3")]
-pub(crate) struct Run {
+pub struct Run {
     #[command(flatten)]
     input: Input,
     /// Classes. For a mosaic a grey or indexed image of its size, pixel = class; otherwise lines x,y,z,class. 255 does not
@@ -143,7 +143,7 @@ struct Opened {
 }
 
 impl Run {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         if self.out.exists() && !self.out.is_dir() {
             return Err(UserError::file(&self.out, "--out takes a folder, and this is a file"));
         }

@@ -24,7 +24,7 @@ const PAPER: u8 = 255;
 #[command(
     after_help = "Example: scenecast scene sample --alpha 0.001 --gamma 0.3 --size 64x64 --grid 3x3 --seed 1 --out worlds.png"
 )]
-pub(crate) struct Sample {
+pub struct Sample {
     /// Weight of each label that exists, anywhere: 0 or above
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: f64,
@@ -53,7 +53,7 @@ fn pair(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl Sample {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         for (name, value) in [("--alpha", self.alpha), ("--gamma", self.gamma)] {
             if !(0.0..=1e9).contains(&value) {
                 return Err(UserError::Input(format!("{name} {value}: it takes a number from 0 to 1e9")));

@@ -1,7 +1,7 @@
 //! `scenecast scene score`
 
 use super::pairs::{Pair, pairs};
-use crate::cli::progress::Progress;
+use crate::progress::Progress;
 use clap::Args;
 use image::GrayImage;
 use scene_model::score::{MeanScore, Method, Scene, Trial, TrialError};
@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// map with such patches shares with such annotations. The excess over it is what the map owes to the image.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene score --dir reefs --seeds 3 --json")]
-pub(crate) struct Score {
+pub struct Score {
     /// Folder of images with NAME_label.png beside them
     #[arg(long, value_name = "DIR")]
     dir: PathBuf,
@@ -80,7 +80,7 @@ struct Gain {
 }
 
 impl Score {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         let pairs = pairs(&self.dir)?;
         let trial =
             Trial { labels: self.max_labels, cells_across: self.cells_across, sweeps: self.sweeps, seeds: self.seeds };

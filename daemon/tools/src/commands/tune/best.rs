@@ -4,7 +4,7 @@ use scenecast_config::Config;
 use scenecast_core::tuning_table::{Measurement, Row};
 
 /// The setting as a configuration file, with everything else of the scene model that it was found with.
-pub(super) fn toml(row: &Row, config: &Config, budget_bps: f64) -> String {
+pub fn toml(row: &Row, config: &Config, budget_bps: f64) -> String {
     let Measurement { mutual_information_nats, normalised_mutual_information, map_bytes, stream_bps, .. } =
         row.measurement;
     let (setting, scene) = (row.setting, &config.scene);

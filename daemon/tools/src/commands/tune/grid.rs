@@ -11,7 +11,7 @@ use std::path::Path;
 /// The values of each parameter.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub(super) struct Grid {
+pub struct Grid {
     alpha: Vec<f64>,
     beta: Vec<f64>,
     gamma: Vec<f64>,
@@ -42,7 +42,7 @@ const MOST: usize = 100_000;
 
 impl Grid {
     /// The grid in a file, or the paper's; what it does not name is as configured.
-    pub(super) fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
+    pub fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
         let mut grid = match path {
             None => Self::default(),
             Some(path) => {
@@ -120,7 +120,7 @@ impl Grid {
     }
 
     /// All settings, those with the same cells one after another, none twice.
-    pub(super) fn settings(&self) -> Vec<Setting> {
+    pub fn settings(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
         for &cell_m in &self.cell_m {
             for &alpha in &self.alpha {

@@ -12,12 +12,7 @@ use scenecast_protocol::map_codec::{Codec, Stride, encode_all};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Flies the survey with a setting, then sweeps over all words.
-pub(super) fn measure(
-    survey: &Survey<'_>,
-    setting: &Setting,
-    sweeps: u32,
-    seed: u64,
-) -> Result<Measurement, UserError> {
+pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, UserError> {
     let config = survey.config;
     let codec: Codec = config.map.codec.parse().map_err(|_| UserError::Input("map.codec is unknown".to_owned()))?;
     let room = config.link.frame_bytes as usize;
@@ -85,7 +80,7 @@ fn blocks(map: &[FlatCell]) -> Vec<FlatCell> {
 }
 
 /// The mean of the figures of several sites.
-pub(super) fn mean(of: &[Measurement]) -> Measurement {
+pub fn mean(of: &[Measurement]) -> Measurement {
     let n = of.len().max(1) as f64;
     let mean = |figure: fn(&Measurement) -> f64| of.iter().map(figure).sum::<f64>() / n;
     Measurement {

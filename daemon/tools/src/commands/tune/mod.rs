@@ -6,7 +6,7 @@ mod measure;
 mod picture;
 mod survey;
 
-use crate::cli::progress::Progress;
+use crate::progress::Progress;
 use clap::Args;
 use grid::Grid;
 use measure::{mean, measure};
@@ -29,7 +29,7 @@ use survey::{Site, Survey};
     after_help = "Example: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
          scenecast tune --procedural 1,2,3 --grid grid.toml --out tuning"
 )]
-pub(super) struct Tune {
+pub struct Tune {
     /// Image of the sea floor
     #[arg(long, value_name = "IMG", requires = "annotations", required_unless_present = "procedural")]
     mosaic: Option<PathBuf>,
@@ -72,7 +72,7 @@ pub(super) struct Tune {
 }
 
 impl Tune {
-    pub(super) fn run(self) -> Result<(), UserError> {
+    pub fn run(self) -> Result<(), UserError> {
         let config = self.config()?;
         let budget_bps = self.budget.unwrap_or(f64::from(config.link.budget_bps));
         if !(budget_bps > 0.0 && budget_bps.is_finite()) {

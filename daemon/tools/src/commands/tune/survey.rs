@@ -20,7 +20,7 @@ const LEAST_PX: u32 = 64;
 const REEF_PX: (u32, u32, u32) = (2600, 1800, 100);
 
 /// What all settings have in common.
-pub(super) struct Site<'a> {
+pub struct Site<'a> {
     image: RgbImage,
     classes: GrayImage,
     ignore: &'a [u8],
@@ -29,12 +29,7 @@ pub(super) struct Site<'a> {
 }
 
 impl<'a> Site<'a> {
-    pub(super) fn load(
-        mosaic: &Path,
-        annotations: &Path,
-        ignore: &'a [u8],
-        config: &'a Config,
-    ) -> Result<Self, UserError> {
+    pub fn load(mosaic: &Path, annotations: &Path, ignore: &'a [u8], config: &'a Config) -> Result<Self, UserError> {
         let image = read_image(mosaic)?.to_rgb8();
         let (width, height) = image.dimensions();
         if width.min(height) < LEAST_PX {
@@ -55,7 +50,7 @@ impl<'a> Site<'a> {
     }
 
     /// A sea floor that is drawn, with every pixel annotated.
-    pub(super) fn procedural(seed: u64, config: &'a Config) -> Self {
+    pub fn procedural(seed: u64, config: &'a Config) -> Self {
         let reef = scene_model::generate::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
         let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(reef.image.as_raw());
@@ -63,7 +58,7 @@ impl<'a> Site<'a> {
     }
 
     /// 16 hexadecimal digits over everything but the setting that a measurement of these sites depends on.
-    pub(super) fn fingerprint(sites: &[Self], options: &str) -> String {
+    pub fn fingerprint(sites: &[Self], options: &str) -> String {
         let Some(Self { config, ignore, .. }) = sites.first() else { return String::new() };
         let Config { camera, scene, survey, link, map, .. } = config;
         let rest = format!(
@@ -87,7 +82,7 @@ impl<'a> Site<'a> {
 }
 
 /// The frames of a survey as words, with cells of one size.
-pub(super) struct Survey<'a> {
+pub struct Survey<'a> {
     pub(super) config: &'a Config,
     /// The annotations on the map's cells, and the colours of the mosaic as if they were some.
     pub(super) annotations: Annotations,
@@ -100,7 +95,7 @@ pub(super) struct Survey<'a> {
 }
 
 impl<'a> Survey<'a> {
-    pub(super) fn new(site: &Site<'a>, cell_m: f64) -> Result<Self, UserError> {
+    pub fn new(site: &Site<'a>, cell_m: f64) -> Result<Self, UserError> {
         let config = site.config;
         let mpp = config.camera.metres_per_pixel;
         let cell_px = (cell_m / mpp) as f32;
@@ -144,17 +139,17 @@ impl<'a> Survey<'a> {
     }
 
     /// What the camera sees, frame after frame; the mosaic's north-west corner is the origin of the world.
-    pub(super) fn frames(&self) -> impl Iterator<Item = Vec<Observation>> {
+    pub fn frames(&self) -> impl Iterator<Item = Vec<Observation>> {
         self.frames.iter().map(|(pose, words)| self.camera.project(self.size.0, self.size.1, pose, words))
     }
 
     /// Time of the whole survey, seconds.
-    pub(super) fn duration_s(&self) -> f64 {
+    pub fn duration_s(&self) -> f64 {
         self.frames.len() as f64 * self.step_s
     }
 
     /// The scene model with a setting.
-    pub(super) fn scene(&self, setting: &Setting, seed: u64) -> SceneConfig {
+    pub fn scene(&self, setting: &Setting, seed: u64) -> SceneConfig {
         let scene = &self.config.scene;
         let birth = match scene.birth.as_str() {
             "collapsed" => Birth::Collapsed,

@@ -2,7 +2,7 @@
 
 /// An axis from a lowest to a highest value between two places.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Axis {
+pub struct Axis {
     low: f64,
     high: f64,
     step: f64,
@@ -15,7 +15,7 @@ const TICKS: f64 = 5.0;
 
 impl Axis {
     /// An axis that has room for all of the values, from 0 if they are far from equal.
-    pub(super) fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+    pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
         let low = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low };
@@ -25,12 +25,12 @@ impl Axis {
         Self { low: first * step, high: last * step, step, from, to }
     }
 
-    pub(super) fn place(&self, value: f64) -> f64 {
+    pub fn place(&self, value: f64) -> f64 {
         self.from + (self.to - self.from) * (value - self.low) / (self.high - self.low)
     }
 
     /// Places and texts of the ticks.
-    pub(super) fn ticks(&self) -> Vec<(f64, String)> {
+    pub fn ticks(&self) -> Vec<(f64, String)> {
         let decimals = (-self.step.log10().floor()).max(0.0) as usize;
         let count = ((self.high - self.low) / self.step).round() as u32;
         let tick = |i| {

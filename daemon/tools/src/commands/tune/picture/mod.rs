@@ -27,7 +27,7 @@ pub(super) type Colour = [u8; 3];
 
 /// Where a text stands from its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub enum Anchor {
     Start,
     Middle,
     End,
@@ -43,7 +43,7 @@ pub(super) trait Canvas {
 }
 
 /// Everything that is shown.
-pub(super) struct Figure<'a> {
+pub struct Figure<'a> {
     rows: &'a [Row],
     best: Option<&'a Row>,
     alphas: Vec<f64>,
@@ -65,20 +65,20 @@ const BOTTOM: f64 = 540.0;
 const LEGEND: f64 = 1040.0;
 
 impl<'a> Figure<'a> {
-    pub(super) fn new(rows: &'a [Row], best: Option<&'a Row>) -> Self {
+    pub fn new(rows: &'a [Row], best: Option<&'a Row>) -> Self {
         let mut alphas: Vec<f64> = rows.iter().map(|row| row.setting.alpha).collect();
         alphas.sort_by(|a, b| b.total_cmp(a));
         alphas.dedup();
         Self { rows, best, alphas }
     }
 
-    pub(super) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         let mut svg = Svg::new(WIDTH, HEIGHT);
         self.draw(&mut svg);
         svg.finish()
     }
 
-    pub(super) fn png(&self) -> Result<Vec<u8>, UserError> {
+    pub fn png(&self) -> Result<Vec<u8>, UserError> {
         let mut raster = Raster::new(WIDTH, HEIGHT);
         self.draw(&mut raster);
         raster.finish().map_err(|e| UserError::Failed(e.to_string()))

@@ -12,16 +12,16 @@ use std::io::Cursor;
 
 /// Pixels in the making.
 #[derive(Debug)]
-pub(super) struct Raster {
+pub struct Raster {
     image: RgbImage,
 }
 
 impl Raster {
-    pub(super) fn new(width: u32, height: u32) -> Self {
+    pub fn new(width: u32, height: u32) -> Self {
         Self { image: RgbImage::from_pixel(width, height, Rgb([255; 3])) }
     }
 
-    pub(super) fn finish(self) -> image::ImageResult<Vec<u8>> {
+    pub fn finish(self) -> image::ImageResult<Vec<u8>> {
         let mut png = Cursor::new(Vec::new());
         self.image.write_to(&mut png, ImageFormat::Png)?;
         Ok(png.into_inner())

@@ -4,19 +4,19 @@ use super::{Anchor, Canvas, Colour};
 
 /// An SVG document in the making.
 #[derive(Debug)]
-pub(super) struct Svg {
+pub struct Svg {
     text: String,
 }
 
 impl Svg {
-    pub(super) fn new(width: u32, height: u32) -> Self {
+    pub fn new(width: u32, height: u32) -> Self {
         let head = format!("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\"");
         let font = "font-family=\"sans-serif\" font-size=\"15\"";
         let text = format!("{head} {font}>\n<rect width=\"{width}\" height=\"{height}\" fill=\"#fff\"/>\n");
         Self { text }
     }
 
-    pub(super) fn finish(mut self) -> String {
+    pub fn finish(mut self) -> String {
         self.text.push_str("</svg>\n");
         self.text
     }
