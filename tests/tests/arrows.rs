@@ -92,7 +92,8 @@ fn sans_io_crates_depend_on_no_io_crate() {
         let found: Vec<_> = all[name].iter().filter(|d| IO_CRATES.contains(&d.as_str())).collect();
         assert!(found.is_empty(), "{name} depends on {found:?}");
         let folder = ["", "daemon/"].map(|above| format!("{above}{}", name.trim_start_matches("scenecast-")));
-        let guard = folder.iter().map(|f| scenecast_tests::workspace().join(f).join("clippy.toml")).find(|f| f.exists());
+        let guard =
+            folder.iter().map(|f| scenecast_tests::workspace().join(f).join("clippy.toml")).find(|f| f.exists());
         let guard = std::fs::read_to_string(guard.unwrap_or_else(|| panic!("{name} has no clippy.toml"))).unwrap();
         for banned in ["Instant::now", "SystemTime::now", "thread::sleep", "HashMap", "fs::", "net::"] {
             assert!(guard.contains(banned), "clippy.toml of {name} does not ban {banned}");
