@@ -8,7 +8,7 @@ const RECORD_LIMIT: usize = 4096;
 
 /// One direction of a connection, at its receiver.
 #[derive(Debug, Default)]
-pub(in super::super) struct Receiver {
+pub(super) struct Receiver {
     next: u32,
     held: BTreeMap<u32, Vec<u8>>,
     partial: Vec<u8>,
@@ -16,13 +16,13 @@ pub(in super::super) struct Receiver {
 
 impl Receiver {
     /// First packet missing, and a bit for each packet held beyond it.
-    pub(in super::super) fn state(&self) -> (u32, u64) {
+    pub(super) fn state(&self) -> (u32, u64) {
         let bit = |seq: &u32| u64::from(*seq) - u64::from(self.next) - 1;
         (self.next, self.held.keys().map(bit).filter(|bit| *bit < 64).fold(0, |map, bit| map | 1 << bit))
     }
 
     /// Takes a packet; returns the records complete by it, each with its protocol id, in order.
-    pub(in super::super) fn accept(&mut self, seq: u32, bytes: Vec<u8>) -> Vec<(u8, Vec<u8>)> {
+    pub(super) fn accept(&mut self, seq: u32, bytes: Vec<u8>) -> Vec<(u8, Vec<u8>)> {
         if (self.next..self.next.saturating_add(WINDOW)).contains(&seq) {
             self.held.insert(seq, bytes);
         }
@@ -52,13 +52,13 @@ impl Receiver {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Record;
+    use super::super::pool::BurstRecord;
     use super::super::sender::Sender;
     use super::*;
     use std::collections::VecDeque;
 
-    fn records() -> VecDeque<Record> {
-        let record = |count: u16| Record {
+    fn records() -> VecDeque<BurstRecord> {
+        let record = |count: u16| BurstRecord {
             count,
             dst: 2,
             pid: 0,
@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn packets_are_full_and_keep_to_their_peer() {
         let mut queue = records();
-        queue.push_front(Record { count: 0, dst: 9, pid: 0, raw: false, data: vec![0; 10] });
+        queue.push_front(BurstRecord { count: 0, dst: 9, pid: 0, raw: false, data: vec![0; 10] });
         let train = Sender::default().train(&mut queue, 2, 700, 3);
         assert!(train.iter().all(|(_, bytes)| bytes.len() > 690 && bytes.len() <= 700));
         assert_eq!(queue.front().map(|record| record.dst), Some(9));

@@ -1,4 +1,4 @@
-//! What S2C emulators say to each other. The layout is this crate's own; real S2C waveforms are not public.
+//! The frames between S2C emulators. The layout is this crate's own; real S2C waveforms are not public.
 //!
 //! ```text
 //! byte 0     magic 0xE5
@@ -15,10 +15,9 @@
 
 use crate::modem::crc::crc16;
 
-/// Who a frame is for, what it is, and what it carries.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Frame {
-    pub kind: Kind,
+pub(crate) struct S2cFrame {
+    pub kind: FrameKind,
     pub src: u8,
     pub dst: u8,
     pub network: Network,
@@ -31,58 +30,75 @@ pub(super) struct Frame {
     pub payload: Vec<u8>,
 }
 
-/// What must be equal, or fit, for two modems to hear each other.
+/// Two modems receive each other if these properties match.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Network {
+pub(crate) struct Network {
     pub highest: u8,
     pub carrier: u8,
     pub packet_ms: u16,
 }
 
 impl Network {
-    /// Carriers go 0 with 1, 2 with 2, 3 with 3.
-    pub(super) fn hears(&self, other: &Network) -> bool {
+    /// Carrier 0 pairs with 1, 2 with 2, 3 with 3.
+    pub(crate) fn receives(&self, other: &Network) -> bool {
         let carriers = matches!((self.carrier, other.carrier), (0, 1) | (1, 0) | (2, 2) | (3, 3));
         carriers && self.highest == other.highest && self.packet_ms == other.packet_ms
     }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Kind {
+pub(crate) enum FrameKind {
     /// Instant message: tag 0 ack, 1 noack, 2 force.
     Instant,
     /// Acknowledges an instant message.
     InstantAck,
     /// Synchronous instant message: seq is the sender's clock, us.
     Synchronous,
-    /// Asks for a connection: tag is the session.
+    /// Requests a connection: tag is the session.
     Request,
-    /// Grants it.
-    Answer,
+    /// Grants the connection.
+    Grant,
     /// A data packet of a train.
     Packet,
     /// Opens a turn: seq is the first packet missing, held those beyond it.
     Turn,
     /// Ends the connection.
-    Close,
+    Disconnect,
 }
 
-const KINDS: [Kind; 8] = [
-    Kind::Instant,
-    Kind::InstantAck,
-    Kind::Synchronous,
-    Kind::Request,
-    Kind::Answer,
-    Kind::Packet,
-    Kind::Turn,
-    Kind::Close,
+const KINDS: [FrameKind; 8] = [
+    FrameKind::Instant,
+    FrameKind::InstantAck,
+    FrameKind::Synchronous,
+    FrameKind::Request,
+    FrameKind::Grant,
+    FrameKind::Packet,
+    FrameKind::Turn,
+    FrameKind::Disconnect,
 ];
 
 const MAGIC: u8 = 0xE5;
 const HEADER_BYTES: usize = 27;
 
-impl Frame {
-    pub(super) fn encode(&self) -> Vec<u8> {
+impl S2cFrame {
+    /// A frame without payload; all other fields are 0.
+    pub(crate) fn new(kind: FrameKind, src: u8, dst: u8, network: Network) -> Self {
+        Self {
+            kind,
+            src,
+            dst,
+            network,
+            pid: 0,
+            tag: 0,
+            follow: 0,
+            seq: 0,
+            held: 0,
+            piggyback: None,
+            payload: Vec::new(),
+        }
+    }
+
+    pub(crate) fn encode(&self) -> Vec<u8> {
         let kind = KINDS.iter().position(|kind| *kind == self.kind).unwrap_or_default() as u8;
         let Network { highest, carrier, packet_ms } = self.network;
         let (pbm_pid, pbm) = self.piggyback.as_ref().map_or((0, &[][..]), |(pid, bytes)| (*pid, &bytes[..]));
@@ -98,8 +114,8 @@ impl Frame {
         out
     }
 
-    /// `None` if the header is not whole.
-    pub(super) fn decode(bytes: &[u8]) -> Option<Self> {
+    /// `None` if the header is damaged.
+    pub(crate) fn decode(bytes: &[u8]) -> Option<Self> {
         let (header, rest) = bytes.split_at_checked(HEADER_BYTES)?;
         let (checked, crc) = header.split_at_checked(HEADER_BYTES - 2)?;
         if crc != crc16(checked).to_be_bytes() {
@@ -132,9 +148,9 @@ impl Frame {
 mod tests {
     use super::*;
 
-    fn frame() -> Frame {
-        Frame {
-            kind: Kind::Turn,
+    fn frame() -> S2cFrame {
+        S2cFrame {
+            kind: FrameKind::Turn,
             src: 3,
             dst: 9,
             network: Network { highest: 14, carrier: 2, packet_ms: 750 },
@@ -151,8 +167,8 @@ mod tests {
     #[test]
     fn every_kind_comes_back() {
         for kind in KINDS {
-            let frame = Frame { kind, ..frame() };
-            assert_eq!(Frame::decode(&frame.encode()), Some(frame));
+            let frame = S2cFrame { kind, ..frame() };
+            assert_eq!(S2cFrame::decode(&frame.encode()), Some(frame));
         }
     }
 
@@ -162,18 +178,18 @@ mod tests {
         for byte in 0..HEADER_BYTES {
             let mut bad = bytes.clone();
             bad[byte] ^= 4;
-            assert_eq!(Frame::decode(&bad), None);
+            assert_eq!(S2cFrame::decode(&bad), None);
         }
         let mut bad = bytes.clone();
         bad[HEADER_BYTES] ^= 4;
-        assert!(Frame::decode(&bad).is_some());
-        assert!((0..bytes.len()).all(|len| Frame::decode(&bytes[..len]).is_none_or(|f| f.payload.len() < 3)));
+        assert!(S2cFrame::decode(&bad).is_some());
+        assert!((0..bytes.len()).all(|len| S2cFrame::decode(&bytes[..len]).is_none_or(|f| f.payload.len() < 3)));
     }
 
     #[test]
     fn carriers_pair_as_the_manual_says() {
         let on = |carrier| Network { highest: 14, carrier, packet_ms: 500 };
-        assert!(on(0).hears(&on(1)) && on(2).hears(&on(2)) && !on(0).hears(&on(0)) && !on(2).hears(&on(3)));
-        assert!(!on(2).hears(&Network { highest: 30, ..on(2) }));
+        assert!(on(0).receives(&on(1)) && on(2).receives(&on(2)) && !on(0).receives(&on(0)) && !on(2).receives(&on(3)));
+        assert!(!on(2).receives(&Network { highest: 30, ..on(2) }));
     }
 }

@@ -1,18 +1,22 @@
 //! What the host wrote, cut into commands, messages and data. Counts payload bytes, never searches them.
 
-use super::send_command::{Header, HeaderError, Problem, SendCommand, parse_header};
+mod send_command;
+
+pub(crate) use send_command::{HeaderErrorKind, InstantFlag, SendCommand, SendService};
+
 use crate::Duration;
+use send_command::{HeaderError, HeaderParse, parse_header};
 
 /// The longest command line without payload; longer ones are answered `ERROR WRONG FORMAT`.
 const LINE_LIMIT: usize = 512;
 /// Silence before and after `+++` that makes it an escape.
-pub(super) const GUARD: Duration = Duration::from_secs(1);
+pub(crate) const GUARD: Duration = Duration::from_secs(1);
 const ESCAPE: &[u8] = b"+++";
 const TIES: &[u8] = b"+++AT";
 
 /// One thing the host wrote.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) enum Input {
+pub(crate) enum HostInput {
     /// A command, without `AT` and terminator.
     Command(String),
     /// A message to send, payload complete and terminated; or what is wrong with it.
@@ -27,7 +31,7 @@ pub(super) enum Input {
 
 /// What a byte stream is read as.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Reading {
+pub(crate) enum ReadMode {
     /// Raw data with `+++AT` commands in it.
     Data,
     /// `AT` commands only.
@@ -36,7 +40,7 @@ pub(super) enum Reading {
 
 /// Keeps what is not yet complete; bounded by the longest message.
 #[derive(Debug, Default)]
-pub(super) struct InputParser {
+pub(crate) struct InputParser {
     buffer: Vec<u8>,
     after_cr: bool,
     skip_line: bool,
@@ -46,7 +50,7 @@ pub(super) struct InputParser {
 
 impl InputParser {
     /// Takes bytes that came at `now`.
-    pub(super) fn push(&mut self, bytes: &[u8], now: Duration) {
+    pub(crate) fn push(&mut self, bytes: &[u8], now: Duration) {
         let silent = self.last_byte.is_none_or(|last| now.saturating_sub(last) >= GUARD);
         if self.buffer.is_empty() {
             self.guard_before = silent;
@@ -56,20 +60,20 @@ impl InputParser {
     }
 
     /// When silence gives what is kept another meaning.
-    pub(super) fn timeout(&self, reading: Reading) -> Option<Duration> {
-        let waits = reading == Reading::Data && !self.buffer.is_empty() && TIES.starts_with(&self.buffer);
+    pub(crate) fn timeout(&self, mode: ReadMode) -> Option<Duration> {
+        let waits = mode == ReadMode::Data && !self.buffer.is_empty() && TIES.starts_with(&self.buffer);
         self.last_byte.filter(|_| waits).map(|last| last + GUARD)
     }
 
     /// Silence passed: a lone `+++` is an escape, another piece of one is data.
-    pub(super) fn handle_timeout(&mut self, now: Duration, reading: Reading) -> Option<Input> {
-        self.timeout(reading).filter(|at| *at <= now)?;
+    pub(crate) fn handle_timeout(&mut self, now: Duration, mode: ReadMode) -> Option<HostInput> {
+        self.timeout(mode).filter(|at| *at <= now)?;
         let kept = std::mem::take(&mut self.buffer);
-        Some(if kept == ESCAPE && self.guard_before { Input::Escape } else { Input::Data(kept) })
+        Some(if kept == ESCAPE && self.guard_before { HostInput::Escape } else { HostInput::Data(kept) })
     }
 
-    /// The next complete thing; `reading` may change between calls.
-    pub(super) fn next(&mut self, reading: Reading) -> Option<Input> {
+    /// The next complete thing; `mode` may change between calls.
+    pub(crate) fn next(&mut self, mode: ReadMode) -> Option<HostInput> {
         loop {
             let first = *self.buffer.first()?;
             if std::mem::take(&mut self.after_cr) && first == b'\n' {
@@ -81,9 +85,9 @@ impl InputParser {
                 self.skip_line = false;
                 continue;
             }
-            return match reading {
-                Reading::Data => self.next_in_data(),
-                Reading::Commands => match self.next_command(0)? {
+            return match mode {
+                ReadMode::Data => self.next_in_data(),
+                ReadMode::Commands => match self.next_command(0)? {
                     Some(input) => Some(input),
                     None => continue,
                 },
@@ -91,49 +95,49 @@ impl InputParser {
         }
     }
 
-    fn next_in_data(&mut self) -> Option<Input> {
+    fn next_in_data(&mut self) -> Option<HostInput> {
         let start = escape_start(&self.buffer);
         if start > 0 {
-            return Some(Input::Data(self.buffer.drain(..start).collect()));
+            return Some(HostInput::Data(self.buffer.drain(..start).collect()));
         }
         if self.buffer.len() < TIES.len() {
             return None;
         }
-        self.next_command(ESCAPE.len()).map(|input| input.unwrap_or(Input::WrongFormat))
+        self.next_command(ESCAPE.len()).map(|input| input.unwrap_or(HostInput::WrongFormat))
     }
 
     /// A command after `prefix` bytes of escape: `None` if incomplete, `Some(None)` for an empty line.
-    fn next_command(&mut self, prefix: usize) -> Option<Option<Input>> {
+    fn next_command(&mut self, prefix: usize) -> Option<Option<HostInput>> {
         let text = self.buffer.get(prefix..).unwrap_or_default();
         match parse_header(text) {
-            Header::Incomplete if text.len() <= LINE_LIMIT => None,
-            Header::Message(command, header_bytes) => self.take_message(command, prefix + header_bytes).map(Some),
-            Header::Wrong(error) => {
+            HeaderParse::Incomplete if text.len() <= LINE_LIMIT => None,
+            HeaderParse::Message(command, header_bytes) => self.take_message(command, prefix + header_bytes).map(Some),
+            HeaderParse::Wrong(error) => {
                 self.skip_line = self.take_line().is_none();
-                Some(Some(Input::Send(Err(error))))
+                Some(Some(HostInput::Send(Err(error))))
             }
-            Header::Incomplete | Header::NoSend => self.take_plain(prefix),
+            HeaderParse::Incomplete | HeaderParse::NoSend => self.take_plain(prefix),
         }
     }
 
     /// The payload by its count, then the terminator.
-    fn take_message(&mut self, mut command: SendCommand, header_bytes: usize) -> Option<Input> {
+    fn take_message(&mut self, mut command: SendCommand, header_bytes: usize) -> Option<HostInput> {
         let end = header_bytes + command.length;
         let terminator = *self.buffer.get(end)?;
         command.data = self.buffer.get(header_bytes..end).unwrap_or_default().to_vec();
         if matches!(terminator, b'\r' | b'\n') {
             self.after_cr = terminator == b'\r';
             self.buffer.drain(..=end);
-            return Some(Input::Send(command.check_length()));
+            return Some(HostInput::Send(command.check_length()));
         }
         self.buffer.drain(..end);
         self.skip_line = self.take_line().is_none();
-        Some(Input::Send(Err(HeaderError { name: command.service.name(), problem: Problem::Format })))
+        Some(HostInput::Send(Err(HeaderError { name: command.service.name(), kind: HeaderErrorKind::Format })))
     }
 
-    fn take_plain(&mut self, prefix: usize) -> Option<Option<Input>> {
+    fn take_plain(&mut self, prefix: usize) -> Option<Option<HostInput>> {
         let too_long = self.buffer.len() > LINE_LIMIT;
-        let Some(line) = self.take_line() else { return too_long.then_some(Some(Input::WrongFormat)) };
+        let Some(line) = self.take_line() else { return too_long.then_some(Some(HostInput::WrongFormat)) };
         let text = line.get(prefix..).unwrap_or_default();
         if line.is_empty() {
             return Some(None);
@@ -141,8 +145,8 @@ impl InputParser {
         let command =
             text.strip_prefix(b"AT").filter(|command| command.iter().all(|byte| (b' '..=b'~').contains(byte)));
         Some(Some(match command {
-            Some(command) => Input::Command(command.iter().map(|byte| char::from(*byte)).collect()),
-            None => Input::WrongFormat,
+            Some(command) => HostInput::Command(command.iter().map(|byte| char::from(*byte)).collect()),
+            None => HostInput::WrongFormat,
         }))
     }
 
@@ -172,5 +176,5 @@ fn escape_start(bytes: &[u8]) -> usize {
 }
 
 #[cfg(test)]
-#[path = "input_tests.rs"]
+#[path = "parser_tests.rs"]
 mod tests;

@@ -7,8 +7,8 @@ const FIELD_LIMIT: usize = 12;
 
 /// A message to send.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct SendCommand {
-    pub service: Service,
+pub(crate) struct SendCommand {
+    pub service: SendService,
     pub pid: Option<u8>,
     pub length: usize,
     pub dst: u8,
@@ -17,9 +17,9 @@ pub(super) struct SendCommand {
 
 /// How it is to be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Service {
+pub(crate) enum SendService {
     Burst,
-    Instant(Flag),
+    Instant(InstantFlag),
     /// At a time of the modem's clock in us, or as soon as possible.
     Synchronous(Option<u32>),
     Piggyback,
@@ -27,20 +27,20 @@ pub(super) enum Service {
 
 /// Whether an instant message is acknowledged, and whether it is sent in back-off.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Flag {
+pub(crate) enum InstantFlag {
     Ack,
     NoAck,
     Force,
 }
 
-impl Flag {
-    pub(super) const ALL: [Flag; 3] = [Flag::Ack, Flag::NoAck, Flag::Force];
+impl InstantFlag {
+    pub(crate) const ALL: [InstantFlag; 3] = [InstantFlag::Ack, InstantFlag::NoAck, InstantFlag::Force];
 
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
-            Flag::Ack => "ack",
-            Flag::NoAck => "noack",
-            Flag::Force => "force",
+            InstantFlag::Ack => "ack",
+            InstantFlag::NoAck => "noack",
+            InstantFlag::Force => "force",
         }
     }
 
@@ -49,38 +49,38 @@ impl Flag {
     }
 }
 
-impl Service {
+impl SendService {
     /// The command's name, as TIES replies repeat it.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
-            Service::Burst => "*SEND",
-            Service::Instant(_) => "*SENDIM",
-            Service::Synchronous(_) => "*SENDIMS",
-            Service::Piggyback => "*SENDPBM",
+            SendService::Burst => "*SEND",
+            SendService::Instant(_) => "*SENDIM",
+            SendService::Synchronous(_) => "*SENDIMS",
+            SendService::Piggyback => "*SENDPBM",
         }
     }
 
     fn max_length(self) -> usize {
-        if self == Service::Burst { 1024 } else { 64 }
+        if self == SendService::Burst { 1024 } else { 64 }
     }
 }
 
 /// What is wrong with a message, and the command's name for the reply.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct HeaderError {
+pub(crate) struct HeaderError {
     pub name: &'static str,
-    pub problem: Problem,
+    pub kind: HeaderErrorKind,
 }
 
 /// How a message can be wrong.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Problem {
+pub(crate) enum HeaderErrorKind {
     Format,
     Range,
 }
 
 /// How far the fields were understood.
-pub(super) enum Header {
+pub(crate) enum HeaderParse {
     /// Not a message command at all.
     NoSend,
     Incomplete,
@@ -91,23 +91,25 @@ pub(super) enum Header {
 
 impl SendCommand {
     /// Refuses a payload that is empty or longer than the service carries.
-    pub(super) fn check_length(self) -> Result<Self, HeaderError> {
+    pub(crate) fn check_length(self) -> Result<Self, HeaderError> {
         let fits = (1..=self.service.max_length()).contains(&self.length);
-        if fits { Ok(self) } else { Err(HeaderError { name: self.service.name(), problem: Problem::Range }) }
+        if fits { Ok(self) } else { Err(HeaderError { name: self.service.name(), kind: HeaderErrorKind::Range }) }
     }
 }
 
 /// Reads `AT*SEND..` up to the comma before the payload.
-pub(super) fn parse_header(text: &[u8]) -> Header {
+pub(crate) fn parse_header(text: &[u8]) -> HeaderParse {
     const START: &[u8] = b"AT*SEND";
     if !text.starts_with(START) {
-        return if START.starts_with(text) { Header::Incomplete } else { Header::NoSend };
+        return if START.starts_with(text) { HeaderParse::Incomplete } else { HeaderParse::NoSend };
     }
-    let mut fields = Fields { rest: text.get(2..).unwrap_or_default() };
+    let mut fields = HeaderFields { rest: text.get(2..).unwrap_or_default() };
     match message(&mut fields) {
-        Ok(command) => Header::Message(command, text.len() - fields.rest.len()),
-        Err(Stop::Incomplete) => Header::Incomplete,
-        Err(Stop::Wrong) => Header::Wrong(HeaderError { name: name_of(text), problem: Problem::Format }),
+        Ok(command) => HeaderParse::Message(command, text.len() - fields.rest.len()),
+        Err(FieldError::Incomplete) => HeaderParse::Incomplete,
+        Err(FieldError::Wrong) => {
+            HeaderParse::Wrong(HeaderError { name: name_of(text), kind: HeaderErrorKind::Format })
+        }
     }
 }
 
@@ -120,32 +122,32 @@ fn name_of(text: &[u8]) -> &'static str {
         .unwrap_or("*SEND")
 }
 
-enum Stop {
+enum FieldError {
     Incomplete,
     Wrong,
 }
 
-/// Fields that end in a comma.
-struct Fields<'a> {
+/// HeaderFields that end in a comma.
+struct HeaderFields<'a> {
     rest: &'a [u8],
 }
 
-impl<'a> Fields<'a> {
-    fn next(&mut self) -> Result<&'a str, Stop> {
+impl<'a> HeaderFields<'a> {
+    fn next(&mut self) -> Result<&'a str, FieldError> {
         let end = self.rest.iter().position(|byte| matches!(byte, b',' | b'\r' | b'\n'));
         match end {
             Some(end) if self.rest.get(end) == Some(&b',') && end <= FIELD_LIMIT => {
-                let (field, rest) = self.rest.split_at_checked(end).ok_or(Stop::Wrong)?;
+                let (field, rest) = self.rest.split_at_checked(end).ok_or(FieldError::Wrong)?;
                 self.rest = rest.get(1..).unwrap_or_default();
-                std::str::from_utf8(field).map_err(|_| Stop::Wrong)
+                std::str::from_utf8(field).map_err(|_| FieldError::Wrong)
             }
-            None if self.rest.len() <= FIELD_LIMIT => Err(Stop::Incomplete),
-            _ => Err(Stop::Wrong),
+            None if self.rest.len() <= FIELD_LIMIT => Err(FieldError::Incomplete),
+            _ => Err(FieldError::Wrong),
         }
     }
 
-    fn number<N: std::str::FromStr>(&mut self) -> Result<N, Stop> {
-        digits(self.next()?).ok_or(Stop::Wrong)
+    fn number<N: std::str::FromStr>(&mut self) -> Result<N, FieldError> {
+        digits(self.next()?).ok_or(FieldError::Wrong)
     }
 }
 
@@ -154,25 +156,25 @@ fn digits<N: std::str::FromStr>(text: &str) -> Option<N> {
     text.parse().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
-fn message(fields: &mut Fields<'_>) -> Result<SendCommand, Stop> {
+fn message(fields: &mut HeaderFields<'_>) -> Result<SendCommand, FieldError> {
     let name = fields.next()?;
     let mut length = fields.next()?;
     let mut pid = None;
     if let Some(id) = length.strip_prefix('p') {
-        pid = Some(digits(id).filter(|id| *id <= 7).ok_or(Stop::Wrong)?);
+        pid = Some(digits(id).filter(|id| *id <= 7).ok_or(FieldError::Wrong)?);
         length = fields.next()?;
     }
-    let length = digits(length).filter(|length| *length <= COUNTED_LIMIT).ok_or(Stop::Wrong)?;
+    let length = digits(length).filter(|length| *length <= COUNTED_LIMIT).ok_or(FieldError::Wrong)?;
     let dst = fields.number()?;
     let service = match name {
-        "*SEND" => Service::Burst,
-        "*SENDPBM" => Service::Piggyback,
-        "*SENDIM" => Service::Instant(Flag::parse(fields.next()?).ok_or(Stop::Wrong)?),
-        "*SENDIMS" => Service::Synchronous(match fields.next()? {
+        "*SEND" => SendService::Burst,
+        "*SENDPBM" => SendService::Piggyback,
+        "*SENDIM" => SendService::Instant(InstantFlag::parse(fields.next()?).ok_or(FieldError::Wrong)?),
+        "*SENDIMS" => SendService::Synchronous(match fields.next()? {
             "" => None,
-            time => Some(digits(time).ok_or(Stop::Wrong)?),
+            time => Some(digits(time).ok_or(FieldError::Wrong)?),
         }),
-        _ => return Err(Stop::Wrong),
+        _ => return Err(FieldError::Wrong),
     };
     Ok(SendCommand { service, pid, length, dst, data: Vec::new() })
 }

@@ -3,29 +3,29 @@
 use crate::Duration;
 
 /// From the end of a signal until its content is known, and from there until an answer begins.
-pub(super) const PROCESSING: Duration = Duration::from_millis(90);
+pub(crate) const PROCESSING: Duration = Duration::from_millis(90);
 /// An acknowledgement of an instant message or of a train.
-pub(super) const ACK: Duration = Duration::from_millis(139);
+pub(crate) const ACK: Duration = Duration::from_millis(139);
 /// A connection request, its answer, or a disconnection.
-pub(super) const HEADER: Duration = Duration::from_millis(250);
+pub(crate) const HEADER: Duration = Duration::from_millis(250);
 /// Listening before a turn of a connection begins.
-pub(super) const TURN_ROUND: Duration = Duration::from_millis(130);
+pub(crate) const TURN_ROUND: Duration = Duration::from_millis(130);
 
 /// Air time of an instant message of `bytes`: 161 ms + 10.9 ms a byte.
 ///
 /// Source: a fit to the table of measured durations shipped with a fielded driver.
-pub(super) fn instant(bytes: usize) -> Duration {
+pub(crate) fn instant(bytes: usize) -> Duration {
     Duration::from_micros(161_000 + 10_900 * bytes as u64)
 }
 
 /// Bytes that one data packet carries: nine tenths of the raw bits, at least one byte.
-pub(super) fn packet_capacity(bit_rate: u32, packet_ms: u32) -> usize {
+pub(crate) fn packet_capacity(bit_rate: u32, packet_ms: u32) -> usize {
     let raw_bits = u64::from(bit_rate) * u64::from(packet_ms) / 1000;
     usize::try_from(raw_bits * 9 / 80).unwrap_or(usize::MAX).max(1)
 }
 
 /// Air time of a data packet that carries `bytes` of its `capacity`; at least 50 ms.
-pub(super) fn packet(bytes: usize, capacity: usize, packet_ms: u32) -> Duration {
+pub(crate) fn packet(bytes: usize, capacity: usize, packet_ms: u32) -> Duration {
     let full = Duration::from_millis(u64::from(packet_ms));
     full.mul_f64((bytes as f64 / capacity as f64).min(1.0)).max(Duration::from_millis(50))
 }
