@@ -11,7 +11,7 @@ use crate::modem::crc::crc16;
 
 /// A packet on air.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Packet {
+pub(crate) struct Packet {
     pub kind: Kind,
     pub src: u8,
     pub dst: u8,
@@ -19,7 +19,7 @@ pub(super) struct Packet {
     pub ack: bool,
     pub ascii: bool,
     /// For a cycle init, the number of frames asked for; else the number that follows.
-    pub frames_told: u8,
+    pub frame_count: u8,
     pub header_version: u8,
     pub number: u8,
     /// `None` for a frame whose bytes were damaged.
@@ -27,7 +27,7 @@ pub(super) struct Packet {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// Minipacket before an FSK packet, or a request for an uplink.
     CycleInit,
     /// Frames of data.
@@ -56,7 +56,7 @@ impl Packet {
             rate: 0,
             ack: false,
             ascii: false,
-            frames_told: 0,
+            frame_count: 0,
             header_version: 0,
             number: 0,
             frames: Vec::new(),
@@ -79,7 +79,7 @@ impl Packet {
     pub(super) fn encode(&self) -> Vec<u8> {
         let kind = KINDS.iter().position(|kind| *kind == self.kind).unwrap_or_default() as u8;
         let flags = u8::from(self.ack) | u8::from(self.ascii) << 1;
-        let mut out = vec![MAGIC, kind, self.src, self.dst, self.rate, flags, self.frames_told];
+        let mut out = vec![MAGIC, kind, self.src, self.dst, self.rate, flags, self.frame_count];
         out.extend([self.header_version, self.number]);
         out.extend(crc16(&out).to_be_bytes());
         for frame in self.frames.iter().flatten() {
@@ -94,7 +94,7 @@ impl Packet {
     pub(super) fn decode(bytes: &[u8]) -> Option<Self> {
         let (header, mut rest) = bytes.split_at_checked(HEADER_BYTES)?;
         let (checked, crc) = header.split_at_checked(HEADER_BYTES - 2)?;
-        let [MAGIC, kind, src, dst, rate, flags, frames_told, header_version, number] = checked else { return None };
+        let [MAGIC, kind, src, dst, rate, flags, frame_count, header_version, number] = checked else { return None };
         if crc != crc16(checked).to_be_bytes() {
             return None;
         }
@@ -113,7 +113,7 @@ impl Packet {
             rate: *rate,
             ack: flags & 1 != 0,
             ascii: flags & 2 != 0,
-            frames_told: *frames_told,
+            frame_count: *frame_count,
             header_version: *header_version,
             number: *number,
             frames,
@@ -130,7 +130,7 @@ mod tests {
         Packet {
             rate: 5,
             ack: true,
-            frames_told: 3,
+            frame_count: 3,
             header_version: 1,
             number: 7,
             frames,

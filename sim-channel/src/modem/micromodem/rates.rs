@@ -4,7 +4,7 @@ use crate::Duration;
 
 /// What a packet of one rate carries; air times for a band of 5 kHz.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Rate {
+pub(super) struct PacketRate {
     pub number: u8,
     pub max_frames: u8,
     pub frame_bytes: usize,
@@ -12,11 +12,11 @@ pub(super) struct Rate {
     full_ms: u64,
 }
 
-const fn rate(number: u8, max_frames: u8, frame_bytes: usize, full_ms: u64) -> Rate {
-    Rate { number, max_frames, frame_bytes, full_ms }
+const fn rate(number: u8, max_frames: u8, frame_bytes: usize, full_ms: u64) -> PacketRate {
+    PacketRate { number, max_frames, frame_bytes, full_ms }
 }
 
-const RATES: [Rate; 7] = [
+const RATES: [PacketRate; 7] = [
     rate(0, 1, 32, 3200),
     rate(1, 3, 64, 3100),
     rate(2, 3, 64, 3100),
@@ -33,7 +33,7 @@ pub(super) const FSK_MINI: Duration = Duration::from_millis(900);
 /// An acknowledgement after a PSK packet.
 pub(super) const PSK_MINI: Duration = Duration::from_millis(500);
 
-impl Rate {
+impl PacketRate {
     /// `None` above 6.
     pub(super) fn of(number: u8) -> Option<Self> {
         RATES.get(usize::from(number)).copied()
@@ -91,15 +91,16 @@ mod tests {
 
     #[test]
     fn frames_are_those_of_the_table() {
-        let frames: Vec<_> = (0..7).filter_map(Rate::of).map(|rate| (rate.max_frames, rate.frame_bytes)).collect();
+        let frames: Vec<_> =
+            (0..7).filter_map(PacketRate::of).map(|rate| (rate.max_frames, rate.frame_bytes)).collect();
         assert_eq!(frames, [(1, 32), (3, 64), (3, 64), (2, 256), (2, 256), (8, 256), (6, 32)]);
-        assert_eq!(Rate::of(7), None);
+        assert_eq!(PacketRate::of(7), None);
     }
 
     #[test]
     fn full_packets_take_about_three_seconds() {
         for number in 0..7 {
-            let rate = Rate::of(number).expect("rate");
+            let rate = PacketRate::of(number).expect("rate");
             assert!((2900..3500).contains(&rate.airtime(rate.max_frames).as_millis()), "{number}");
         }
     }

@@ -5,7 +5,7 @@ const LINE_LIMIT: usize = 6 * 1024;
 
 /// A sentence from the host, `$`, checksum and line end taken off.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Sentence {
+pub(super) struct NmeaSentence {
     /// The five letters.
     pub name: String,
     pub fields: Vec<String>,
@@ -13,13 +13,13 @@ pub(super) struct Sentence {
 
 /// What a line from the host turned out to be.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) enum Line {
-    Sentence(Sentence),
+pub(super) enum HostLine {
+    Sentence(NmeaSentence),
     BadChecksum,
     NotUnderstood,
 }
 
-impl Sentence {
+impl NmeaSentence {
     /// The field at `index` as a number; `None` if it is missing or none.
     pub(super) fn number<N: std::str::FromStr>(&self, index: usize) -> Option<N> {
         self.fields.get(index)?.parse().ok()
@@ -48,17 +48,17 @@ pub(super) fn line(body: &str) -> String {
 
 /// Collects bytes to lines; bounded.
 #[derive(Debug, Default)]
-pub(super) struct Collector {
+pub(super) struct LineCollector {
     buffer: Vec<u8>,
 }
 
-impl Collector {
+impl LineCollector {
     pub(super) fn push(&mut self, bytes: &[u8]) {
         self.buffer.extend_from_slice(bytes);
     }
 
     /// The next complete line that holds anything; begins anew at every `$`.
-    pub(super) fn next(&mut self) -> Option<Line> {
+    pub(super) fn next(&mut self) -> Option<HostLine> {
         loop {
             let Some(end) = self.buffer.iter().position(|byte| matches!(byte, b'\r' | b'\n')) else {
                 if self.buffer.len() > LINE_LIMIT {
@@ -72,29 +72,29 @@ impl Collector {
                 return Some(parse(text));
             }
             if !raw.is_empty() {
-                return Some(Line::NotUnderstood);
+                return Some(HostLine::NotUnderstood);
             }
         }
     }
 }
 
 /// Reads what stands between `$` and the line end; the checksum may be missing.
-fn parse(text: &[u8]) -> Line {
-    let Ok(text) = std::str::from_utf8(text) else { return Line::NotUnderstood };
+fn parse(text: &[u8]) -> HostLine {
+    let Ok(text) = std::str::from_utf8(text) else { return HostLine::NotUnderstood };
     if text.bytes().any(|byte| byte.is_ascii_control()) || text.len() > LINE_LIMIT {
-        return Line::NotUnderstood;
+        return HostLine::NotUnderstood;
     }
     let body = match text.rsplit_once('*') {
         Some((body, sum)) if u8::from_str_radix(sum.trim(), 16) == Ok(checksum(body.as_bytes())) => body,
-        Some(_) => return Line::BadChecksum,
+        Some(_) => return HostLine::BadChecksum,
         None => text,
     };
     let mut fields = body.split(',').map(str::to_string);
     match fields.next() {
         Some(name) if name.len() == 5 && name.bytes().all(|byte| byte.is_ascii_uppercase()) => {
-            Line::Sentence(Sentence { name, fields: fields.collect() })
+            HostLine::Sentence(NmeaSentence { name, fields: fields.collect() })
         }
-        _ => Line::NotUnderstood,
+        _ => HostLine::NotUnderstood,
     }
 }
 
@@ -115,15 +115,15 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn read(bytes: &[u8]) -> Vec<Line> {
-        let mut collector = Collector::default();
+    fn read(bytes: &[u8]) -> Vec<HostLine> {
+        let mut collector = LineCollector::default();
         collector.push(bytes);
         std::iter::from_fn(|| collector.next()).collect()
     }
 
-    fn sentence(text: &str) -> Line {
+    fn sentence(text: &str) -> HostLine {
         let mut fields = text.split(',').map(str::to_string);
-        Line::Sentence(Sentence { name: fields.next().expect("name"), fields: fields.collect() })
+        HostLine::Sentence(NmeaSentence { name: fields.next().expect("name"), fields: fields.collect() })
     }
 
     #[test]
@@ -143,20 +143,20 @@ mod tests {
     fn a_checksum_may_be_missing_but_not_wrong() {
         assert_eq!(read(b"$CCCFG,SRC,1\r\n"), [sentence("CCCFG,SRC,1")]);
         assert_eq!(read(b"$CCCFG,SRC,1*31\r\n"), [sentence("CCCFG,SRC,1")]);
-        assert_eq!(read(b"$CCCFG,SRC,1*32\r\n"), [Line::BadChecksum]);
-        assert_eq!(read(b"$CCCFG,SRC,1*\r\n"), [Line::BadChecksum]);
+        assert_eq!(read(b"$CCCFG,SRC,1*32\r\n"), [HostLine::BadChecksum]);
+        assert_eq!(read(b"$CCCFG,SRC,1*\r\n"), [HostLine::BadChecksum]);
     }
 
     #[test]
     fn a_new_start_ends_what_came_before() {
         assert_eq!(read(b"garbage$CCTM$CCTMQ,0\r\n"), [sentence("CCTMQ,0")]);
-        assert_eq!(read(b"garbage\r\n\r\n"), [Line::NotUnderstood]);
-        assert_eq!(read(b"$CC\r\n"), [Line::NotUnderstood]);
+        assert_eq!(read(b"garbage\r\n\r\n"), [HostLine::NotUnderstood]);
+        assert_eq!(read(b"$CC\r\n"), [HostLine::NotUnderstood]);
     }
 
     #[test]
     fn an_echo_keeps_every_field() {
-        let Line::Sentence(sentence) = sentence("CCCYC,0,1,2,1,1,3") else { panic!("sentence") };
+        let HostLine::Sentence(sentence) = sentence("CCCYC,0,1,2,1,1,3") else { panic!("sentence") };
         assert_eq!(sentence.echo(), "CACYC,0,1,2,1,1,3");
     }
 
@@ -174,7 +174,7 @@ mod tests {
         fn any_bytes_are_survived_in_bounded_memory(
             pieces in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..300), 0..60),
         ) {
-            let mut collector = Collector::default();
+            let mut collector = LineCollector::default();
             for piece in pieces {
                 collector.push(&piece);
                 while collector.next().is_some() {}

@@ -1,88 +1,89 @@
-//! Packets on their way out: `CATXP`, `CATXF`, `CAXST`.
+//! The transducer and the packets that wait for it.
 
-use super::packet::Packet;
-use super::{Event, Micromodem};
+use super::packet::{Kind, Packet};
+use super::rates::{FSK_MINI, PSK_MINI};
 use crate::Duration;
-use crate::modem::Transmission;
 use std::collections::VecDeque;
 
-/// A packet that waits for the transducer.
+const MAX_QUEUED_PACKETS: usize = 8;
+
 #[derive(Clone, Debug)]
-pub(super) struct Outgoing {
+pub(crate) struct QueuedPacket {
     pub packet: Packet,
     pub airtime: Duration,
-    /// Bytes that `CATXP` tells: whole frames, however full they are.
+    /// Bytes in `CATXP`: whole frames, however full they are.
     pub bytes: usize,
     /// 1 FSK, 2 FSK mini, 3 PSK, 4 PSK mini, 5 flexible.
     pub packet_type: u8,
-    /// Frames asked for by the cycle init.
+    /// Frames that the cycle init requested.
     pub expected: u8,
-    /// Answers that the modem gives by itself are not told to its host.
-    pub told: bool,
-    /// Begin to ask the host for data when it has been sent.
-    pub then_ask: bool,
+    /// The host gets no report of replies that the modem sends by itself.
+    pub reported: bool,
+    /// Request data from the host after this packet.
+    pub then_request_data: bool,
+}
+
+impl QueuedPacket {
+    /// A minipacket that the host has ordered.
+    pub(super) fn mini(packet: Packet) -> Self {
+        let bytes = packet.bytes();
+        Self { packet, airtime: FSK_MINI, bytes, packet_type: 2, expected: 0, reported: true, then_request_data: false }
+    }
+
+    /// A reply that the modem sends by itself.
+    pub(super) fn reply(packet: Packet) -> Self {
+        let airtime = if packet.kind == Kind::Ack && packet.rate > 0 { PSK_MINI } else { FSK_MINI };
+        let packet_type = if packet.is_psk() { 4 } else { 2 };
+        Self { airtime, packet_type, reported: false, ..Self::mini(packet) }
+    }
 }
 
 /// A packet that has left.
 #[derive(Clone, Debug)]
-pub(super) struct Sent {
-    pub out: Outgoing,
+pub(crate) struct SentPacket {
+    pub out: QueuedPacket,
     pub began: Duration,
 }
 
-/// The transducer.
 #[derive(Debug, Default)]
-pub(super) struct Air {
-    pub queue: VecDeque<Outgoing>,
-    pub busy_until: Duration,
+pub(super) struct Transmitter {
+    queue: VecDeque<QueuedPacket>,
+    busy_until: Duration,
+    /// Number of the last packet; continues over restarts.
+    last_number: u8,
 }
 
-impl Micromodem {
-    pub(super) fn begin_transmission(&mut self, now: Duration) -> Option<Transmission> {
-        if now < self.air.busy_until || !self.awake {
+impl Transmitter {
+    pub(super) fn push(&mut self, out: QueuedPacket) {
+        self.queue.push_back(out);
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.queue.len() >= MAX_QUEUED_PACKETS
+    }
+
+    pub(super) fn is_busy(&self, now: Duration) -> bool {
+        now < self.busy_until
+    }
+
+    pub(super) fn next_number(&self) -> u8 {
+        self.last_number.wrapping_add(1)
+    }
+
+    /// Numbers the next packet and occupies the transducer for its air time; `None` while it is occupied.
+    pub(super) fn begin(&mut self, now: Duration) -> Option<QueuedPacket> {
+        if self.is_busy(now) {
             return None;
         }
-        let mut out = self.air.queue.pop_front()?;
-        self.unique = self.unique.wrapping_add(1);
-        out.packet.number = self.unique;
-        out.packet.header_version = u8::from(self.nvram.is_on("psk.packet.mod_hdr_version"));
-        self.air.busy_until = now + out.airtime;
-        if out.told {
-            self.tell(&format!("CATXP,{}", out.bytes), now);
-        }
-        let transmission = Transmission { bytes: out.packet.encode(), airtime: out.airtime };
-        self.board.plan(self.air.busy_until, Event::Sent(Box::new(Sent { out, began: now })));
-        Some(transmission)
+        let mut out = self.queue.pop_front()?;
+        self.last_number = self.next_number();
+        out.packet.number = self.last_number;
+        self.busy_until = now + out.airtime;
+        Some(out)
     }
 
-    pub(super) fn on_sent(&mut self, sent: &Sent, now: Duration) {
-        if sent.out.told {
-            self.tell(&format!("CATXF,{}", sent.out.bytes), now);
-            if self.nvram.is_on("XST") {
-                self.tell_transmit_statistics(sent, now);
-            }
-        }
-        if sent.out.then_ask {
-            self.ask_for_data(now);
-        }
-    }
-
-    /// `CAXST`, version 6; without the version on a Micromodem 1.
-    fn tell_transmit_statistics(&mut self, sent: &Sent, now: Duration) {
-        const CLOCK_MODE: u8 = 6;
-        const GOOD: u8 = 0;
-        const PROBE: u32 = 200;
-        let Outgoing { packet, bytes, packet_type, expected, .. } = &sent.out;
-        let when = self.clock.date_and_time(sent.began);
-        let version = self.statistics_version();
-        let (bandwidth, carrier) = (self.nvram.number("BW0"), self.nvram.number("FC0"));
-        let route = format!("{},{},{},{}", packet.rate, packet.src, packet.dst, u8::from(packet.ack));
-        let frames = packet.frames.len();
-        self.tell(
-            &format!(
-                "CAXST,{version}{when},{CLOCK_MODE},{GOOD},{PROBE},{bandwidth},{carrier},{route},{expected},{frames},{packet_type},{bytes}"
-            ),
-            now,
-        );
+    pub(super) fn clear(&mut self) {
+        self.queue.clear();
+        self.busy_until = Duration::ZERO;
     }
 }
