@@ -30,18 +30,13 @@ pub mod acoustics;
 mod channel;
 pub mod loss;
 pub mod modem;
-mod node;
-pub mod presets;
+mod nodes;
 mod random;
-mod talker;
-mod track;
 pub mod usbl;
 
 pub use std::time::Duration;
 
-pub use channel::{Arrival, Channel, ChannelConfig, LossReason, Onset, Outage, OutageScope, Outcome};
+pub use channel::{Arrival, Channel, ChannelConfig, LossReason, Onset, Outage, OutageScope, Outcome, Talker, presets};
 pub use loss::LossModel;
-pub use node::{NodeId, Position};
+pub use nodes::{NodeId, Position, Track};
 pub use random::Stream;
-pub use talker::Talker;
-pub use track::Track;

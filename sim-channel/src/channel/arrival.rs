@@ -1,7 +1,8 @@
 //! What a receiver learns of a transmission, and what only the simulator knows.
 
-use crate::{Duration, NodeId, Position};
+use crate::nodes::{NodeId, Position};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The end of one reception (or of its duplicate) at one receiver.
 #[derive(Clone, PartialEq, Debug)]

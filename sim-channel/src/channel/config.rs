@@ -1,7 +1,8 @@
 //! What the water does.
 
 use super::Outage;
-use crate::{Duration, LossModel};
+use crate::loss::LossModel;
+use std::time::Duration;
 
 /// The conditions of a channel; may be changed while it runs with `set_config`.
 #[derive(Clone, PartialEq, Debug)]

@@ -1,8 +1,10 @@
 //! One direction between two nodes: its loss model instance and its own chance.
 
 use super::ChannelConfig;
+use crate::loss::LossModel;
 use crate::loss::{Frame, LinkLoss, Verdict};
-use crate::{LossModel, NodeId, Stream};
+use crate::nodes::NodeId;
+use crate::random::Stream;
 
 /// What was drawn for one transmission on one link, before collisions are known.
 #[derive(Clone, Debug)]

@@ -4,18 +4,23 @@ mod arrival;
 mod config;
 mod link;
 mod outage;
+pub mod presets;
 mod reception;
+mod talker;
 
 pub use arrival::{Arrival, LossReason, Onset, Outcome};
 pub use config::ChannelConfig;
 pub use outage::{Outage, OutageScope};
+pub use talker::Talker;
 
+use crate::loss::LossModel;
 use crate::loss::{Frame, Verdict};
-use crate::{Duration, LossModel, NodeId, Position, Track};
+use crate::nodes::{NodeId, Position, Track};
 use link::Link;
 use reception::{Reception, Span};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// An acoustic channel between placed nodes, in virtual time.
 ///

@@ -1,6 +1,7 @@
 //! Times at which nothing gets through.
 
-use crate::{Duration, NodeId};
+use crate::nodes::NodeId;
+use std::time::Duration;
 
 /// A scheduled silence of the whole channel, of a node, or of one direction of a link.
 #[derive(Clone, PartialEq, Debug)]

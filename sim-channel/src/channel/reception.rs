@@ -4,8 +4,9 @@ use super::link::Draws;
 use super::{Arrival, LossReason, Outcome};
 use crate::channel::link::flip_bits;
 use crate::loss::Verdict;
-use crate::{Duration, NodeId, Position};
+use crate::nodes::{NodeId, Position};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A span of time at one place; touching spans do not overlap.
 #[derive(Clone, Copy, PartialEq, Debug)]

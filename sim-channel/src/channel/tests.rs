@@ -281,7 +281,8 @@ fn a_node_on_a_track_is_heard_from_where_it_is() {
 
 #[test]
 fn an_hour_of_fifteen_talkative_nodes_passes_quickly() {
-    let mut channel = Channel::new(ChannelConfig { duplication: 0.05, reordering: 0.05, ..crate::presets::storm() }, 1);
+    let mut channel =
+        Channel::new(ChannelConfig { duplication: 0.05, reordering: 0.05, ..crate::channel::presets::storm() }, 1);
     for n in 0..15u8 {
         channel.place(NodeId(n), Position::new(200.0 * f64::from(n), 0.0, 0.0));
     }
@@ -333,7 +334,7 @@ proptest! {
         places in proptest::collection::vec((0.0..5000.0f64, 0.0..5000.0f64), 1..7),
         talk in proptest::collection::vec((0usize..7, 0u64..3000, 1u64..2000), 1..60),
     ) {
-        let config = ChannelConfig { duplication: 0.1, reordering: 0.1, ..crate::presets::under_ice() };
+        let config = ChannelConfig { duplication: 0.1, reordering: 0.1, ..crate::channel::presets::under_ice() };
         let mut channel = Channel::new(config, seed);
         for (node, (x_m, y_m)) in (0u8..).zip(&places) {
             channel.place(NodeId(node), Position::new(*x_m, *y_m, 0.0));

@@ -1,6 +1,7 @@
 //! A continuous-time Markov chain over a few states, told by how long it dwells in each.
 
-use crate::{Duration, Stream};
+use crate::random::Stream;
+use std::time::Duration;
 
 /// Mean dwell in each of `N` states, and where it goes from there.
 #[derive(Clone, PartialEq, Debug)]

@@ -2,7 +2,8 @@
 
 use super::dwell_chain::{DwellChain, Walk};
 use super::{Frame, LinkLoss, Verdict};
-use crate::{Duration, Stream};
+use crate::random::Stream;
+use std::time::Duration;
 
 /// Gilbert-Elliott loss, its dwell in seconds rather than in packets.
 ///

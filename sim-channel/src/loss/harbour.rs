@@ -3,7 +3,8 @@
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
 use super::{GilbertElliott, ThreeState};
-use crate::{Duration, NodeId};
+use crate::nodes::NodeId;
+use std::time::Duration;
 use thiserror::Error;
 
 /// One directed link of a fitted campaign.

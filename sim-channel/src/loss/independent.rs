@@ -1,7 +1,7 @@
 //! Each frame is lost by itself, with one probability.
 
 use super::{Frame, LinkLoss, Verdict};
-use crate::Stream;
+use crate::random::Stream;
 
 #[derive(Debug)]
 pub(super) struct Independent {

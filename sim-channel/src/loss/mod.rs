@@ -18,8 +18,9 @@ pub use snr::Snr;
 pub use three_state::ThreeState;
 pub use trace::{Trace, TraceError};
 
-use crate::{Duration, Stream};
+use crate::random::Stream;
 use std::fmt::Debug;
+use std::time::Duration;
 
 /// A description of loss, the same for every link that is given it.
 #[derive(Clone, PartialEq, Debug, Default)]

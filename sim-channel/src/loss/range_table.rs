@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
 use super::{Frame, LinkLoss, Verdict};
-use crate::Stream;
+use crate::random::Stream;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -72,8 +72,8 @@ fn point(line: &str) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Duration;
     use crate::loss::tests::{losses, share};
+    use std::time::Duration;
 
     const TABLE: &str = "# range_m delivery\n500\t0.9\n1500,0.5\n2000 0\n";
 

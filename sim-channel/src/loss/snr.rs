@@ -2,7 +2,8 @@
 
 use super::{Frame, LinkLoss, Verdict};
 use crate::acoustics::{frame_error, noise, spreading};
-use crate::{Duration, Stream};
+use crate::random::Stream;
+use std::time::Duration;
 
 /// The sonar equation, slow fading and uncorrelated bit errors.
 ///

@@ -3,7 +3,8 @@
 use super::LinkLoss;
 use super::dwell_chain::{DwellChain, Walk};
 use super::gilbert_elliott::Fading;
-use crate::{Duration, Stream};
+use crate::random::Stream;
+use std::time::Duration;
 
 /// Three-state Markov loss in continuous time; states are good, medium, bad.
 ///

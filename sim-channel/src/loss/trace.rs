@@ -3,8 +3,9 @@
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
 use super::{Frame, LinkLoss, Verdict};
-use crate::{Duration, Stream};
+use crate::random::Stream;
 use std::sync::Arc;
+use std::time::Duration;
 use thiserror::Error;
 
 /// A record of when frames got through.

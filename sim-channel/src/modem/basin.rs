@@ -1,8 +1,10 @@
 //! Modems in one water: moves bytes between emulators and channel in order of time.
 
 use super::{Emulator, Fault, Host, ModemEvent};
-use crate::{Channel, Duration, NodeId, Talker};
+use crate::channel::{Channel, Talker};
+use crate::nodes::NodeId;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// A channel and the emulated modems in it.
 pub struct Basin {

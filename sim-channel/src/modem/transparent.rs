@@ -3,10 +3,12 @@
 //! No frames, no addresses, no acknowledgement, no word of what was lost. Bytes are sent when enough of them wait or when
 //! the host pauses. The pipe may eat `+++AT` up to the end of its line, as modems that listen for an escape do.
 
-use super::board::{Board, Machine};
-use super::{Fault, Host, Transmission};
-use crate::{Arrival, Duration, Outcome, Stream};
+use crate::channel::{Arrival, Outcome};
+use crate::modem::emulator::board::{ModemBoard, ModemLogic};
+use crate::modem::emulator::{Fault, Host, ModemEvent, Transmission};
+use crate::random::Stream;
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// The make of a pipe.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -49,7 +51,7 @@ impl Default for TransparentConfig {
 #[derive(Debug)]
 pub struct Transparent {
     config: TransparentConfig,
-    board: Board<Event>,
+    board: ModemBoard<TransparentTask>,
     waiting: VecDeque<u8>,
     last_byte: Duration,
     eating: bool,
@@ -59,7 +61,7 @@ pub struct Transparent {
 
 /// What the pipe plans.
 #[derive(Debug)]
-pub(super) enum Event {
+pub(crate) enum TransparentTask {
     /// Look whether a packet can go.
     Look,
 }
@@ -73,7 +75,7 @@ impl Transparent {
     pub fn new(config: TransparentConfig) -> Self {
         const PURPOSE: u64 = 0x7a9e;
         Self {
-            board: Board::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
+            board: ModemBoard::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
             waiting: VecDeque::new(),
             last_byte: Duration::ZERO,
             eating: false,
@@ -93,7 +95,7 @@ impl Transparent {
 
     fn reboot(&mut self, now: Duration) {
         if now < self.on_air_until {
-            self.board.cut_short();
+            self.board.emit(ModemEvent::CutShort);
         }
         self.waiting.clear();
         self.eating = false;
@@ -103,18 +105,18 @@ impl Transparent {
 
     fn be_quiet(&mut self, length: Duration, now: Duration) {
         self.quiet_until = now + length;
-        self.board.plan(self.quiet_until, Event::Look);
+        self.board.schedule(self.quiet_until, TransparentTask::Look);
     }
 }
 
-impl Machine for Transparent {
-    type Event = Event;
+impl ModemLogic for Transparent {
+    type Task = TransparentTask;
 
-    fn board(&self) -> &Board<Event> {
+    fn board(&self) -> &ModemBoard<TransparentTask> {
         &self.board
     }
 
-    fn board_mut(&mut self) -> &mut Board<Event> {
+    fn board_mut(&mut self) -> &mut ModemBoard<TransparentTask> {
         &mut self.board
     }
 
@@ -124,22 +126,22 @@ impl Machine for Transparent {
             if self.eating {
                 self.eating = !matches!(byte, b'\r' | b'\n');
                 if !self.eating {
-                    self.board.tell(host, b"OK\r\n", at);
+                    self.board.write_to(host, b"OK\r\n", at);
                 }
             } else if self.waiting.len() < self.config.buffer_bytes {
                 self.waiting.push_back(*byte);
                 self.look_for_escape();
             }
         }
-        self.board.plan(at + self.config.gap, Event::Look);
+        self.board.schedule(at + self.config.gap, TransparentTask::Look);
     }
 
     /// `next_transmission`, which is asked after every call, does what there is to do.
-    fn on_event(&mut self, _event: Event, _at: Duration) {}
+    fn on_task(&mut self, _task: TransparentTask, _at: Duration) {}
 
     fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
         if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
-            self.board.tell_all(bytes, now);
+            self.board.write_to_all(bytes, now);
         }
     }
 
@@ -154,7 +156,7 @@ impl Machine for Transparent {
         let bytes: Vec<u8> = self.waiting.drain(..count).collect();
         let airtime = self.config.preamble + Duration::from_secs(1) * (8 * count as u32) / self.config.bit_rate.max(1);
         self.on_air_until = now + airtime;
-        self.board.plan(self.on_air_until, Event::Look);
+        self.board.schedule(self.on_air_until, TransparentTask::Look);
         Some(Transmission { bytes, airtime })
     }
 
@@ -174,9 +176,9 @@ impl Machine for Transparent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ChannelConfig;
+    use crate::channel::ChannelConfig;
     use crate::modem::Emulator;
-    use crate::modem::bench::{Bench, SECOND};
+    use crate::modem::tests::rig::{Bench, SECOND};
 
     fn bench(config: ChannelConfig) -> Bench {
         let boxed = |node| (node, Box::new(Transparent::new(TransparentConfig::default())) as Box<dyn Emulator>);
@@ -216,7 +218,7 @@ mod tests {
     #[test]
     fn too_much_is_lost_without_a_word() {
         let mut bench = bench(ChannelConfig::default());
-        bench.basin.inject(crate::NodeId(1), Fault::Busy(30 * SECOND), Duration::ZERO);
+        bench.basin.inject(crate::nodes::NodeId(1), Fault::Busy(30 * SECOND), Duration::ZERO);
         bench.write(1, &[7; 10_000]);
         bench.run(60 * SECOND);
         assert_eq!(bench.told[&2].len(), 4096);

@@ -10,9 +10,10 @@ use super::sentence;
 use super::signal::PacketSignal;
 use super::transmitter::{SentPacket, Transmitter};
 use super::{Generation, MicromodemConfig};
-use crate::modem::Transmission;
-use crate::modem::board::Board;
-use crate::{Duration, Stream};
+use crate::modem::emulator::board::ModemBoard;
+use crate::modem::emulator::{ModemEvent, Transmission};
+use crate::random::Stream;
+use std::time::Duration;
 
 /// Period of the revision sentence `CAREV`.
 const REVISION_INTERVAL: Duration = Duration::from_secs(30);
@@ -34,7 +35,7 @@ pub(crate) enum MicromodemTask {
 #[derive(Debug)]
 pub(super) struct MicromodemBase {
     pub config: MicromodemConfig,
-    pub board: Board<MicromodemTask>,
+    pub board: ModemBoard<MicromodemTask>,
     pub nvram: Nvram,
     pub clock: Clock,
     pub transmitter: Transmitter,
@@ -46,8 +47,8 @@ pub(super) struct MicromodemBase {
 impl MicromodemBase {
     pub(super) fn new(config: MicromodemConfig) -> Self {
         const PURPOSE: u64 = 0x3d3;
-        let mut board = Board::new(config.baud, Stream::new(config.seed, &[PURPOSE]));
-        board.plan(REVISION_INTERVAL, MicromodemTask::Revision);
+        let mut board = ModemBoard::new(config.baud, Stream::new(config.seed, &[PURPOSE]));
+        board.schedule(REVISION_INTERVAL, MicromodemTask::Revision);
         Self {
             board,
             nvram: Nvram::factory(config.address),
@@ -81,12 +82,12 @@ impl MicromodemBase {
     /// Drops all packets and scheduled work; only the revision sentences continue.
     pub(super) fn fall_asleep(&mut self, now: Duration) {
         if self.transmitter.is_busy(now) {
-            self.board.cut_short();
+            self.board.emit(ModemEvent::CutShort);
         }
         self.awake = false;
         self.transmitter.clear();
         self.board.restart();
-        self.board.plan(now + REVISION_INTERVAL, MicromodemTask::Revision);
+        self.board.schedule(now + REVISION_INTERVAL, MicromodemTask::Revision);
     }
 
     pub(super) fn refuse_until(&mut self, until: Duration) {
@@ -100,7 +101,7 @@ impl MicromodemBase {
 
     /// Sends a sentence to every host; `body` is without `$` and checksum.
     pub(super) fn report(&mut self, body: &str, now: Duration) {
-        self.board.tell_all(sentence::line(body).as_bytes(), now);
+        self.board.write_to_all(sentence::line(body).as_bytes(), now);
     }
 
     /// `CAERR`: a sentence was not understood, or cannot be carried out.
@@ -120,7 +121,7 @@ impl MicromodemBase {
         if self.awake && self.nvram.is_on("REV") {
             self.report_revision("AUV", now);
         }
-        self.board.plan(now + REVISION_INTERVAL, MicromodemTask::Revision);
+        self.board.schedule(now + REVISION_INTERVAL, MicromodemTask::Revision);
     }
 
     /// The next packet, if the transducer is free and the modem awake.
@@ -134,7 +135,7 @@ impl MicromodemBase {
             self.report(&format!("CATXP,{}", out.bytes), now);
         }
         let transmission = Transmission { bytes: out.packet.encode(), airtime: out.airtime };
-        self.board.plan(now + out.airtime, MicromodemTask::Sent(Box::new(SentPacket { out, began: now })));
+        self.board.schedule(now + out.airtime, MicromodemTask::Sent(Box::new(SentPacket { out, began: now })));
         Some(transmission)
     }
 }

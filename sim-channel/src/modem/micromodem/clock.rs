@@ -1,6 +1,6 @@
 //! The modem's calendar clock, in the spellings of its sentences.
 
-use crate::Duration;
+use std::time::Duration;
 
 /// Seconds since 1970 at the start of the run; set by `CCTMS` and `CCCLK`.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -8,7 +8,7 @@ use super::sentence::{NmeaSentence, from_hex};
 use super::signal::PacketSignal;
 use super::statistics;
 use super::transmitter::QueuedPacket;
-use crate::Duration;
+use std::time::Duration;
 
 /// A packet that the host is filling.
 #[derive(Clone, Debug)]
@@ -96,7 +96,7 @@ impl CycleService {
         let (bytes, frame) = (cycle.rate.frame_bytes, cycle.packet.frames.len() + 1);
         base.report(&format!("CADRQ,{time},{src},{dst},{ack},{bytes},{frame}"), now);
         let timeout = Duration::from_secs(u64::from(base.nvram.number("DTO").max(1)));
-        base.board.plan(now + timeout, MicromodemTask::DataTimeout { request: self.requests });
+        base.board.schedule(now + timeout, MicromodemTask::DataTimeout { request: self.requests });
     }
 
     /// `$CCTXD,<src>,<dst>,<ack>,<hex>`, or `$CCTXA` with text.

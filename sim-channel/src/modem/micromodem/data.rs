@@ -5,7 +5,7 @@ use super::packet::{Kind, Packet};
 use super::sentence::to_hex;
 use super::signal::PacketSignal;
 use super::statistics;
-use crate::Duration;
+use std::time::Duration;
 
 /// From a packet's content to the reply that the modem sends by itself.
 pub(super) const TURN_ROUND: Duration = Duration::from_millis(300);
@@ -37,7 +37,7 @@ pub(super) fn on_data_packet(base: &mut MicromodemBase, packet: &Packet, signal:
         let mut ack = Packet::new(Kind::Ack, own, packet.src);
         ack.rate = packet.rate;
         ack.frames.push(Some(good));
-        base.board.plan(now + TURN_ROUND, MicromodemTask::Reply(Box::new(ack)));
+        base.board.schedule(now + TURN_ROUND, MicromodemTask::Reply(Box::new(ack)));
     }
 }
 

@@ -4,8 +4,9 @@ use super::base::{MicromodemBase, MicromodemTask};
 use super::packet::{Kind, Packet};
 use super::signal::PacketSignal;
 use super::statistics;
-use crate::{Arrival, Duration, LossReason, Onset, Outcome};
+use crate::channel::{Arrival, LossReason, Onset, Outcome};
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 /// Demodulation and decoding after the end of a packet.
 const DECODING_TIME: Duration = Duration::from_millis(200);
@@ -51,7 +52,7 @@ impl Detector {
             }
             Some(packet) if notices(base, &packet) => {
                 self.report(base, arrival.transmission, packet.is_psk(), now);
-                base.board.plan(now + DECODING_TIME, MicromodemTask::Received(Box::new((packet, signal))));
+                base.board.schedule(now + DECODING_TIME, MicromodemTask::Received(Box::new((packet, signal))));
             }
             Some(_) => {}
         }

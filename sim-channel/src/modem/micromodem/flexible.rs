@@ -7,7 +7,7 @@ use super::sentence::{NmeaSentence, from_hex, to_hex};
 use super::signal::PacketSignal;
 use super::statistics;
 use super::transmitter::QueuedPacket;
-use crate::Duration;
+use std::time::Duration;
 
 /// `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`
 pub(super) fn on_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {

@@ -4,7 +4,7 @@ use super::base::{MicromodemBase, MicromodemTask};
 use super::clock::Civil;
 use super::nvram::Nvram;
 use super::sentence::NmeaSentence;
-use crate::Duration;
+use std::time::Duration;
 
 /// How long the modem sleeps.
 pub(super) enum Sleep {
@@ -21,7 +21,7 @@ pub(super) fn on_sentence(base: &mut MicromodemBase, sentence: &NmeaSentence, no
         "CCTMQ" => {
             // The reply takes half a second and holds the time of the query.
             let reply = format!("CATMQ,{},USER_CMD,RTC", base.clock.iso(now));
-            base.board.plan(now + Duration::from_millis(500), MicromodemTask::Report(reply));
+            base.board.schedule(now + Duration::from_millis(500), MicromodemTask::Report(reply));
         }
         "CCALQ" => base.report("CAALQ,MICROMODEM2,16", now),
         "CCMEC" | "CCRSP" | "CCPDT" | "CCPNT" | "CCPGT" | "CCSWP" | "CCMSQ" | "CCCFR" => {
@@ -73,7 +73,7 @@ pub(super) fn on_sleep(base: &mut MicromodemBase, sentence: &NmeaSentence, now: 
     }
     match u64::try_from(minutes) {
         Ok(0) => {
-            base.board.plan(now, MicromodemTask::Reboot);
+            base.board.schedule(now, MicromodemTask::Reboot);
             None
         }
         Ok(minutes) => Some(Sleep::Until(now + Duration::from_secs(60 * minutes))),

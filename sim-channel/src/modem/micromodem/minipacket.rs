@@ -7,7 +7,7 @@ use super::sentence::NmeaSentence;
 use super::signal::PacketSignal;
 use super::statistics;
 use super::transmitter::QueuedPacket;
-use crate::Duration;
+use std::time::Duration;
 
 /// `$CCMPC,<src>,<dst>`
 pub(super) fn on_ping_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
@@ -35,7 +35,7 @@ pub(super) fn on_ping(base: &mut MicromodemBase, packet: &Packet, signal: &Packe
     base.report(&format!("CAMPA,{},{}", packet.src, packet.dst), now);
     statistics::report_reception(base, packet, signal, 2, now);
     let reply = Packet::new(Kind::PingReply, packet.dst, packet.src);
-    base.board.plan(now + TURN_ROUND, MicromodemTask::Reply(Box::new(reply)));
+    base.board.schedule(now + TURN_ROUND, MicromodemTask::Reply(Box::new(reply)));
 }
 
 /// `$CAMPR,<src>,<dst>,<one-way travel time, s>`

@@ -19,9 +19,9 @@ mod signal;
 mod statistics;
 mod transmitter;
 
-use super::board::{Board, Machine};
-use super::{Fault, Host, Transmission};
-use crate::{Arrival, Duration, Onset};
+use crate::channel::{Arrival, Onset};
+use crate::modem::emulator::board::{ModemBoard, ModemLogic};
+use crate::modem::emulator::{Fault, Host, Transmission};
 use base::{MicromodemBase, MicromodemTask};
 use cycle::CycleService;
 use detector::Detector;
@@ -32,6 +32,7 @@ use rates::PacketRate;
 use sentence::{HostLine, LineCollector, NmeaSentence};
 use signal::PacketSignal;
 use std::collections::BTreeMap;
+use std::time::Duration;
 use transmitter::{QueuedPacket, SentPacket};
 
 /// Which of the two Micromodems.
@@ -168,14 +169,14 @@ impl Micromodem {
     /// Restarts; the configuration and the clock stay, packets and cycles are gone.
     fn reboot(&mut self, now: Duration) {
         self.fall_asleep(now);
-        self.base.board.plan(now + BOOT_STEP, MicromodemTask::Init);
-        self.base.board.plan(now + 2 * BOOT_STEP, MicromodemTask::Awake);
+        self.base.board.schedule(now + BOOT_STEP, MicromodemTask::Init);
+        self.base.board.schedule(now + 2 * BOOT_STEP, MicromodemTask::Awake);
     }
 
     fn sleep(&mut self, sleep: Sleep, now: Duration) {
         self.fall_asleep(now);
         match sleep {
-            Sleep::Until(at) => self.base.board.plan(at, MicromodemTask::Reboot),
+            Sleep::Until(at) => self.base.board.schedule(at, MicromodemTask::Reboot),
             Sleep::UntilHostWrites => self.wakes_on_host = true,
         }
     }
@@ -188,14 +189,14 @@ impl Micromodem {
     }
 }
 
-impl Machine for Micromodem {
-    type Event = MicromodemTask;
+impl ModemLogic for Micromodem {
+    type Task = MicromodemTask;
 
-    fn board(&self) -> &Board<MicromodemTask> {
+    fn board(&self) -> &ModemBoard<MicromodemTask> {
         &self.base.board
     }
 
-    fn board_mut(&mut self) -> &mut Board<MicromodemTask> {
+    fn board_mut(&mut self) -> &mut ModemBoard<MicromodemTask> {
         &mut self.base.board
     }
 
@@ -216,7 +217,7 @@ impl Machine for Micromodem {
         self.collectors.remove(&host);
     }
 
-    fn on_event(&mut self, task: MicromodemTask, at: Duration) {
+    fn on_task(&mut self, task: MicromodemTask, at: Duration) {
         let Self { base, cycles, .. } = self;
         match task {
             MicromodemTask::Sent(sent) => self.on_sent(&sent, at),

@@ -7,7 +7,7 @@
 //! then for each frame: 2 bytes length, bytes, 2 bytes CRC-16 of the bytes
 //! ```
 
-use crate::modem::crc::crc16;
+use crate::modem::emulator::crc::crc16;
 
 /// A packet on air.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -1,6 +1,6 @@
 //! Packets of each rate: how many frames of how many bytes, and how long they are on air.
 
-use crate::Duration;
+use std::time::Duration;
 
 /// What a packet of one rate carries; air times for a band of 5 kHz.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,6 +1,7 @@
 //! Measurements of a received packet.
 
-use crate::{Arrival, Duration};
+use crate::channel::Arrival;
+use std::time::Duration;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PacketSignal {

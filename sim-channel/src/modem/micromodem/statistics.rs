@@ -4,7 +4,7 @@ use super::base::MicromodemBase;
 use super::packet::{Kind, Packet};
 use super::signal::PacketSignal;
 use super::transmitter::{QueuedPacket, SentPacket};
-use crate::Duration;
+use std::time::Duration;
 
 /// The field with the version of the layout, which a Micromodem 1 does not have.
 fn version(base: &MicromodemBase) -> &'static str {

@@ -1,9 +1,11 @@
 //! Transcripts and behaviour at the host's port.
 
-use super::super::bench::{Bench, SECOND, keywords};
 use super::*;
+use crate::channel::{ChannelConfig, Outage};
+use crate::loss::LossModel;
 use crate::modem::Emulator;
-use crate::{ChannelConfig, LossModel, NodeId, Outage};
+use crate::modem::tests::rig::{Bench, SECOND, keywords};
+use crate::nodes::NodeId;
 use proptest::prelude::*;
 
 fn bench_in(modems: u8, config: ChannelConfig) -> Bench {

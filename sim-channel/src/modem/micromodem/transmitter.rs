@@ -2,8 +2,8 @@
 
 use super::packet::{Kind, Packet};
 use super::rates::{FSK_MINI, PSK_MINI};
-use crate::Duration;
 use std::collections::VecDeque;
+use std::time::Duration;
 
 const MAX_QUEUED_PACKETS: usize = 8;
 

@@ -3,7 +3,7 @@
 use super::S2c;
 use super::base::{Interpreter, PortMode, ReceiverMode, S2cTask, SettingError, Settings};
 use super::input::{HeaderErrorKind, HostInput, SendCommand, SendService};
-use crate::Duration;
+use std::time::Duration;
 
 const UNKNOWN_COMMAND: &str = "ERROR UNKNOWN COMMAND";
 const WRONG_FORMAT: &str = "ERROR WRONG FORMAT";
@@ -128,7 +128,7 @@ impl S2c {
     fn noise(&mut self) -> Vec<u8> {
         const SAMPLES: usize = 64;
         let mut out = format!("NOISE,{SAMPLES},1,0,0,").into_bytes();
-        out.extend((0..SAMPLES).map(|_| self.base.board.chance.below(256) as u8));
+        out.extend((0..SAMPLES).map(|_| self.base.board.rng.below(256) as u8));
         out
     }
 
@@ -237,16 +237,16 @@ impl S2c {
             ("I1", "") => "phy:S2C PHY 0.9, mac:D-MAC v1.8".into(),
             ("I7", "") => "EvoLogics GmbH (emulated)".into(),
             ("Z0", "") => {
-                self.base.board.plan(now, S2cTask::Reboot);
+                self.base.board.schedule(now, S2cTask::Reboot);
                 Reply::None
             }
             ("Z1", "") => self.drop_bursts(now).into(),
             ("Z3", "") => {
-                self.base.board.plan(now, S2cTask::CancelMessages);
+                self.base.board.schedule(now, S2cTask::CancelMessages);
                 "OK".into()
             }
             ("Z4", "") => {
-                self.base.board.plan(now, S2cTask::CancelMessages);
+                self.base.board.schedule(now, S2cTask::CancelMessages);
                 self.drop_bursts(now).into()
             }
             ("H", "0" | "1" | "") => {
@@ -270,7 +270,7 @@ impl S2c {
     fn drop_bursts(&mut self, now: Duration) -> &'static str {
         let bytes = self.bursts.drop_all(&mut self.base, &mut self.messages, now);
         if bytes > 0 {
-            self.base.board.plan(now, S2cTask::Notify(format!("DROPCNT,{bytes}")));
+            self.base.board.schedule(now, S2cTask::Notify(format!("DROPCNT,{bytes}")));
         }
         "OK"
     }

@@ -4,7 +4,7 @@ use super::S2c;
 use super::base::{AfterSending, FrameKind, QueuedFrame, ReceivedSignal, S2cFrame, timing};
 use super::input::InstantFlag;
 use super::receiver::notices;
-use crate::Duration;
+use std::time::Duration;
 
 /// Bit of an instant message's sequence number that marks the opening of a turn.
 const OPENS_TURN: u32 = 0x100;

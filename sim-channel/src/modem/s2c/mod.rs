@@ -18,14 +18,15 @@ mod receiver;
 
 pub use base::{Interpreter, S2cConfig};
 
-use super::board::{Board, Machine};
-use super::{Fault, Host, ModemEvent, Transmission};
+use crate::channel::{Arrival, Onset};
+use crate::modem::emulator::board::{ModemBoard, ModemLogic};
+use crate::modem::emulator::{Fault, Host, ModemEvent, Transmission};
 use crate::usbl::UsblHead;
-use crate::{Arrival, Duration, Onset};
 use base::{AfterSending, Condition, S2cBase, S2cTask};
 use burst::BurstService;
 use messages::Messages;
 use receiver::{Reception, UsblReporter};
+use std::time::Duration;
 
 /// Air time of an instant message of `bytes` (1..=64), for schedules and budgets.
 ///
@@ -117,7 +118,7 @@ impl S2c {
     /// Restarts with the stored settings; the host's connection ends, messages and data are gone.
     fn reboot(&mut self, now: Duration) {
         if self.base.transmitter.is_busy(now) {
-            self.base.board.cut_short();
+            self.base.board.emit(ModemEvent::CutShort);
         }
         let mut base = S2cBase::new(self.base.config.clone());
         std::mem::swap(&mut base.board, &mut self.base.board);
@@ -125,8 +126,8 @@ impl S2c {
         base.settings = self.base.stored.clone();
         base.stored = self.base.stored.clone();
         base.condition = Condition::booting();
-        base.board.events.push_back(ModemEvent::HangUp);
-        base.board.plan(now + Duration::from_millis(u64::from(base.config.boot_ms)), S2cTask::Booted);
+        base.board.emit(ModemEvent::HangUp);
+        base.board.schedule(now + Duration::from_millis(u64::from(base.config.boot_ms)), S2cTask::Booted);
         *self = Self {
             base,
             reception: Reception::default(),
@@ -137,14 +138,14 @@ impl S2c {
     }
 }
 
-impl Machine for S2c {
-    type Event = S2cTask;
+impl ModemLogic for S2c {
+    type Task = S2cTask;
 
-    fn board(&self) -> &Board<S2cTask> {
+    fn board(&self) -> &ModemBoard<S2cTask> {
         &self.base.board
     }
 
-    fn board_mut(&mut self) -> &mut Board<S2cTask> {
+    fn board_mut(&mut self) -> &mut ModemBoard<S2cTask> {
         &mut self.base.board
     }
 
@@ -157,7 +158,7 @@ impl Machine for S2c {
             self.on_input(input, at);
         }
         if let Some(end) = self.base.port.timeout(host) {
-            self.base.board.plan(end, S2cTask::Silence(host));
+            self.base.board.schedule(end, S2cTask::Silence(host));
         }
     }
 
@@ -165,7 +166,7 @@ impl Machine for S2c {
         self.base.port.forget(host);
     }
 
-    fn on_event(&mut self, task: S2cTask, at: Duration) {
+    fn on_task(&mut self, task: S2cTask, at: Duration) {
         self.run(task, at);
     }
 

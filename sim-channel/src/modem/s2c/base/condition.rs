@@ -1,6 +1,6 @@
 //! Whether the modem runs, receives and accepts messages.
 
-use crate::Duration;
+use std::time::Duration;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum ReceiverMode {

@@ -13,7 +13,7 @@
 //!     27-    piggyback message, then payload; unprotected, so that corruption can slip past
 //! ```
 
-use crate::modem::crc::crc16;
+use crate::modem::emulator::crc::crc16;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct S2cFrame {

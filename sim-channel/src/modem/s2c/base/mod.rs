@@ -24,15 +24,16 @@ pub(crate) use signal::{PendingFix, ReceivedSignal, VELOCITY};
 pub(crate) use task::S2cTask;
 pub(crate) use transmitter::{AfterSending, QueuedFrame, Transmitter};
 
-use crate::modem::Transmission;
-use crate::modem::board::Board;
-use crate::{Duration, Stream};
+use crate::modem::emulator::Transmission;
+use crate::modem::emulator::board::ModemBoard;
+use crate::random::Stream;
+use std::time::Duration;
 
 /// Settings, port, transmitter and clock of one emulated S2C.
 #[derive(Debug)]
 pub(crate) struct S2cBase {
     pub config: S2cConfig,
-    pub board: Board<S2cTask>,
+    pub board: ModemBoard<S2cTask>,
     pub port: CommandPort,
     pub settings: Settings,
     /// The settings that `AT&W` saved; a restart loads them.
@@ -49,7 +50,7 @@ impl S2cBase {
         const PURPOSE: u64 = 0x52c;
         let settings = Settings::factory(config.address, config.remote);
         Self {
-            board: Board::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
+            board: ModemBoard::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
             port: CommandPort::new(config.interpreter),
             stored: settings.clone(),
             settings,
@@ -113,18 +114,18 @@ impl S2cBase {
     /// Replies to the command `name` (without its parameters); only the host that wrote it receives the reply.
     pub(crate) fn reply(&mut self, name: &str, body: impl AsRef<[u8]>, now: Duration) {
         let line = self.port.line(name, body.as_ref());
-        self.board.tell(self.port.requester(), &line, now);
+        self.board.write_to(self.port.requester(), &line, now);
     }
 
     /// A reply that is never wrapped: `ERROR WRONG FORMAT` in command mode, and the `OK` of an escape.
     pub(crate) fn reply_unwrapped(&mut self, body: &str, now: Duration) {
-        self.board.tell(self.port.requester(), format!("{body}\r\n").as_bytes(), now);
+        self.board.write_to(self.port.requester(), format!("{body}\r\n").as_bytes(), now);
     }
 
     /// Sends a notification to every host.
     pub(crate) fn notify(&mut self, body: impl AsRef<[u8]>, now: Duration) {
         let line = self.port.line("", body.as_ref());
-        self.board.tell_all(&line, now);
+        self.board.write_to_all(&line, now);
     }
 
     /// Sends a notification if `@ZX1` has switched the extended ones on.
@@ -146,7 +147,7 @@ impl S2cBase {
         }
         let QueuedFrame { frame, airtime, label, then } = self.transmitter.begin(now)?;
         self.notify_extended(format!("SENDSTART,{},{label},{},0", frame.dst, airtime.as_micros()), now);
-        self.board.plan(now + airtime, S2cTask::Sent { dst: frame.dst, label, airtime, then });
+        self.board.schedule(now + airtime, S2cTask::Sent { dst: frame.dst, label, airtime, then });
         Some(Transmission { bytes: frame.encode(), airtime })
     }
 }

@@ -1,10 +1,10 @@
 //! The command port: the input of each host, the mode of the port, and the form of the lines it writes.
 
 use super::Interpreter;
-use crate::Duration;
-use crate::modem::Host;
+use crate::modem::emulator::Host;
 use crate::modem::s2c::input::{HostInput, InputParser, ReadMode};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// Whether a port of the `AT` interpreter passes raw data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,7 +1,9 @@
 //! Measurements of a received frame.
 
+use crate::channel::Arrival;
+use crate::nodes::Position;
 use crate::usbl::UsblFix;
-use crate::{Arrival, Duration, Position};
+use std::time::Duration;
 
 /// Relative velocity in m/s: the emulator does not differentiate tracks.
 pub(crate) const VELOCITY: &str = "0.0000";

@@ -1,8 +1,8 @@
 //! Work that the modem has scheduled for later.
 
 use super::{AfterSending, PendingFix, ReceivedSignal, S2cFrame};
-use crate::Duration;
-use crate::modem::Host;
+use crate::modem::emulator::Host;
+use std::time::Duration;
 
 /// Numbers (`attempt`, `epoch`, `number`) name the state that a timer belongs to: an old timer finds another number and
 /// has no effect.

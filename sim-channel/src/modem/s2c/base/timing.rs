@@ -1,6 +1,6 @@
 //! How long things take on air.
 
-use crate::Duration;
+use std::time::Duration;
 
 /// From the end of a signal until its content is known, and from there until an answer begins.
 pub(crate) const PROCESSING: Duration = Duration::from_millis(90);

@@ -1,8 +1,8 @@
 //! The transducer and the frames that wait for it, one at a time.
 
 use super::{FrameKind, S2cFrame};
-use crate::Duration;
 use std::collections::VecDeque;
+use std::time::Duration;
 
 #[derive(Clone, Debug)]
 pub(crate) struct QueuedFrame {

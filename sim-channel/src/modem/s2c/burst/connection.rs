@@ -2,8 +2,8 @@
 
 use super::receiver::Receiver;
 use super::sender::Sender;
-use crate::Duration;
 use crate::modem::s2c::base::{QueuedFrame, ReceivedSignal, S2cFrame};
+use std::time::Duration;
 
 #[derive(Debug, Default)]
 pub(super) enum AcousticLink {

@@ -3,11 +3,11 @@
 use super::BurstService;
 use super::connection::{AcousticLink, Connection, TurnState};
 use super::pool::BurstRecord;
-use crate::Duration;
 use crate::modem::s2c::base::{
     AfterSending, FrameKind, ReceivedSignal, ReceiverMode, S2cBase, S2cFrame, S2cTask, timing,
 };
 use crate::modem::s2c::messages::Messages;
+use std::time::Duration;
 
 /// A connection whose peer was silent for so long does not keep others out.
 const STALE_TIMEOUT: Duration = Duration::from_secs(15);
@@ -20,10 +20,10 @@ impl BurstService {
         let Some(next) = self.pool.queue.front().map(|record| record.dst) else { return };
         match &self.link {
             AcousticLink::Listen if now < self.backoff_until => {
-                base.board.plan(self.backoff_until, S2cTask::ServePool);
+                base.board.schedule(self.backoff_until, S2cTask::ServePool);
             }
             AcousticLink::Listen if base.condition.receiver() == ReceiverMode::Listen => {
-                let session = (base.board.chance.uniform() * 256.0) as u8;
+                let session = (base.board.rng.uniform() * 256.0) as u8;
                 self.link = AcousticLink::Establishing { peer: next, session, attempts: 0 };
                 self.request(base, messages);
             }
@@ -51,7 +51,7 @@ impl BurstService {
     /// `!RT` is the wait for a grant to begin; the grant then takes its own time.
     pub(crate) fn on_request_sent(&mut self, base: &mut S2cBase, epoch: u32, now: Duration) {
         let wait = Duration::from_millis(u64::from(base.settings.get("RT")));
-        base.board.plan(now + wait + timing::HEADER + timing::PROCESSING, S2cTask::RequestTimeout { epoch });
+        base.board.schedule(now + wait + timing::HEADER + timing::PROCESSING, S2cTask::RequestTimeout { epoch });
     }
 
     pub(crate) fn on_request_timeout(
@@ -215,6 +215,6 @@ impl BurstService {
         if messages.instant.waits_for_turn() {
             self.offer_air(base, messages, now);
         }
-        base.board.plan(now, S2cTask::ServePool);
+        base.board.schedule(now, S2cTask::ServePool);
     }
 }

@@ -16,9 +16,9 @@ mod turns;
 use super::base::{QueuedFrame, ReceiverMode, S2cBase, S2cTask};
 use super::input::SendCommand;
 use super::messages::Messages;
-use crate::Duration;
 use connection::{AcousticLink, TurnState};
 use pool::{BurstPool, BurstRecord};
+use std::time::Duration;
 
 /// The pool of burst data, the connection that carries it, and the back-off while others own the channel.
 #[derive(Debug, Default)]
@@ -60,7 +60,7 @@ impl BurstService {
     fn enqueue(&mut self, base: &mut S2cBase, record: BurstRecord, now: Duration) -> bool {
         let fits = self.pool.push(record, base.settings.pool);
         if fits {
-            base.board.plan(now, S2cTask::ServePool);
+            base.board.schedule(now, S2cTask::ServePool);
         }
         fits
     }

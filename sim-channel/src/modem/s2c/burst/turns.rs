@@ -2,10 +2,10 @@
 
 use super::BurstService;
 use super::connection::TurnState;
-use crate::Duration;
 use crate::modem::s2c::base::{AfterSending, FrameKind, ReceivedSignal, S2cBase, S2cFrame, S2cTask, timing};
 use crate::modem::s2c::messages::Messages;
 use crate::modem::s2c::receiver::notices;
+use std::time::Duration;
 
 /// Time for an acknowledgement beyond two ways of travel: turn-round, an instant message, the acknowledgement, a margin.
 const ACK_ALLOWANCE: Duration = Duration::from_millis(1600);
@@ -17,7 +17,7 @@ impl BurstService {
     pub(super) fn begin_turn_after(&mut self, base: &mut S2cBase, delay: Duration, owes_ack: bool, now: Duration) {
         if let Some(connection) = self.link.connection_mut() {
             let number = connection.enter(TurnState::Sending);
-            base.board.plan(now + delay, S2cTask::Turn { number, owes_ack });
+            base.board.schedule(now + delay, S2cTask::Turn { number, owes_ack });
         }
     }
 
@@ -25,7 +25,7 @@ impl BurstService {
     pub(crate) fn listen_at_most(&mut self, base: &mut S2cBase, timeout: Duration, now: Duration) {
         if let Some(connection) = self.link.connection_mut() {
             let number = connection.enter(TurnState::Receiving);
-            base.board.plan(now + timeout, S2cTask::Turn { number, owes_ack: true });
+            base.board.schedule(now + timeout, S2cTask::Turn { number, owes_ack: true });
         }
     }
 
@@ -96,7 +96,7 @@ impl BurstService {
         if let Some(connection) = self.link.connection_in_turn(number) {
             let number = connection.enter(TurnState::Receiving);
             let timeout = 2 * connection.travel() + Duration::from_secs(1);
-            base.board.plan(now + timeout, S2cTask::Rest { number });
+            base.board.schedule(now + timeout, S2cTask::Rest { number });
         }
     }
 
@@ -113,9 +113,9 @@ impl BurstService {
         if let Some(connection) = self.link.connection_mut() {
             let number = connection.enter(TurnState::Idle);
             let allowance = if connection.initiator { Duration::ZERO } else { ACCEPTOR_ALLOWANCE };
-            base.board.plan(now + idle + allowance, S2cTask::Idle { number });
+            base.board.schedule(now + idle + allowance, S2cTask::Idle { number });
         }
-        base.board.plan(now, S2cTask::ServePool);
+        base.board.schedule(now, S2cTask::ServePool);
     }
 
     /// The idle time has passed without a turn.
@@ -130,7 +130,7 @@ impl BurstService {
         if let Some(connection) = self.link.connection_in_turn(number) {
             let number = connection.enter(TurnState::AwaitingAck);
             let deadline = now + 2 * connection.travel() + ACK_ALLOWANCE;
-            base.board.plan(deadline, S2cTask::AckTimeout { number });
+            base.board.schedule(deadline, S2cTask::AckTimeout { number });
         }
     }
 

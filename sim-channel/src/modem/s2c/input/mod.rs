@@ -4,8 +4,8 @@ mod send_command;
 
 pub(crate) use send_command::{HeaderErrorKind, InstantFlag, SendCommand, SendService};
 
-use crate::Duration;
 use send_command::{HeaderError, HeaderParse, parse_header};
+use std::time::Duration;
 
 /// The longest command line without payload; longer ones are answered `ERROR WRONG FORMAT`.
 const LINE_LIMIT: usize = 512;

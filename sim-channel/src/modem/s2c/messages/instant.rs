@@ -1,9 +1,9 @@
 //! Instant messages: one at a time, acknowledged and repeated if the host wants.
 
 use super::{BACKOFF, WRONG_ADDRESS};
-use crate::Duration;
 use crate::modem::s2c::base::{AfterSending, FrameKind, S2cBase, S2cTask, timing};
 use crate::modem::s2c::input::{InstantFlag, SendCommand};
+use std::time::Duration;
 
 /// `!RI` with this value repeats without limit.
 const UNLIMITED_RETRIES: u32 = 255;
@@ -59,7 +59,7 @@ impl InstantSlot {
             data: command.data,
             retries_left: base.settings.get("RI"),
         });
-        base.board.plan(now, S2cTask::Instant);
+        base.board.schedule(now, S2cTask::Instant);
         "OK"
     }
 
@@ -106,7 +106,7 @@ impl InstantSlot {
         self.attempt += 1;
         let travel = Duration::from_micros(u64::from(base.config.max_propagation_us)) * 2;
         let deadline = now + travel + timing::ACK + Duration::from_millis(200) + turn_allowance;
-        base.board.plan(deadline, S2cTask::InstantTimeout { attempt: self.attempt });
+        base.board.schedule(deadline, S2cTask::InstantTimeout { attempt: self.attempt });
     }
 
     /// No acknowledgement came in time; true if the message must be sent again.

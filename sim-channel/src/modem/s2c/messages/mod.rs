@@ -13,7 +13,7 @@ pub(crate) use synchronous::SynchronousSlot;
 
 use super::base::S2cBase;
 use super::input::SendCommand;
-use crate::Duration;
+use std::time::Duration;
 
 const WRONG_ADDRESS: &str = "ERROR WRONG DESTINATION ADDRESS";
 const BACKOFF: &str = "BUSY BACKOFF STATE";

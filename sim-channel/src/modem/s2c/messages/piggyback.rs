@@ -1,9 +1,9 @@
 //! A piggyback message waits for a frame to its destination and travels with it.
 
 use super::{WRONG_ADDRESS, WaitingMessage};
-use crate::Duration;
 use crate::modem::s2c::base::{S2cBase, S2cFrame, S2cTask};
 use crate::modem::s2c::input::SendCommand;
+use std::time::Duration;
 
 #[derive(Debug, Default)]
 pub(crate) struct PiggybackSlot {
@@ -17,7 +17,7 @@ impl PiggybackSlot {
             return WRONG_ADDRESS;
         }
         if let Some(old) = self.waiting.replace(WaitingMessage::new(base, command)) {
-            base.board.plan(now, S2cTask::Notify(format!("CANCELEDPBM,{}", old.dst)));
+            base.board.schedule(now, S2cTask::Notify(format!("CANCELEDPBM,{}", old.dst)));
         }
         "OK"
     }

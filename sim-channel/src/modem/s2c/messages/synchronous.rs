@@ -1,9 +1,9 @@
 //! A synchronous message leaves at a time of the modem's clock, or expires.
 
 use super::{BACKOFF, WRONG_ADDRESS, WaitingMessage};
-use crate::Duration;
 use crate::modem::s2c::base::{AfterSending, FrameKind, QueuedFrame, S2cBase, S2cTask, timing};
 use crate::modem::s2c::input::SendCommand;
+use std::time::Duration;
 
 #[derive(Debug, Default)]
 pub(crate) struct SynchronousSlot {
@@ -31,14 +31,14 @@ impl SynchronousSlot {
             return BACKOFF;
         }
         if let Some(old) = self.waiting.replace(WaitingMessage::new(base, command)) {
-            base.board.plan(now, S2cTask::Notify(format!("CANCELEDIMS,{}", old.dst)));
+            base.board.schedule(now, S2cTask::Notify(format!("CANCELEDIMS,{}", old.dst)));
         }
         self.number += 1;
         // Half of the clock's range ahead is the future, the other half the past.
         let wait = time.map_or(0, |time| time.wrapping_sub(base.clock_us(now)));
         let late = wait > u32::MAX / 2;
         let at = if late { now } else { now + Duration::from_micros(u64::from(wait)) };
-        base.board.plan(at, S2cTask::Synchronous { number: self.number, late });
+        base.board.schedule(at, S2cTask::Synchronous { number: self.number, late });
         "OK"
     }
 

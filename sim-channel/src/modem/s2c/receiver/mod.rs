@@ -6,8 +6,9 @@ mod usbl;
 pub(crate) use usbl::UsblReporter;
 
 use super::base::{ReceivedSignal, S2cBase, S2cFrame, S2cTask, VELOCITY, timing};
-use crate::{Arrival, Duration, LossReason, Onset, Outcome};
+use crate::channel::{Arrival, LossReason, Onset, Outcome};
 use std::collections::BTreeSet;
+use std::time::Duration;
 
 /// The last signal addressed to this modem, as `?E`, `?I` and `?T` report it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -56,7 +57,7 @@ impl Reception {
             Some(frame) if !base.network().receives(&frame.network) => {}
             Some(frame) => {
                 self.report_end(base, arrival.transmission, &signal, now);
-                base.board.plan(now + timing::PROCESSING, S2cTask::Received(Box::new((frame, signal))));
+                base.board.schedule(now + timing::PROCESSING, S2cTask::Received(Box::new((frame, signal))));
             }
         }
     }

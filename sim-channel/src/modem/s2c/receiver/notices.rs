@@ -1,8 +1,8 @@
 //! The notifications that carry received messages and data.
 
-use crate::Duration;
 use crate::modem::s2c::base::{Interpreter, ReceivedSignal, S2cBase, S2cFrame, VELOCITY};
 use crate::modem::s2c::input::InstantFlag;
+use std::time::Duration;
 
 /// `RECVIM`
 pub(crate) fn instant(base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
@@ -39,7 +39,7 @@ pub(crate) fn piggyback(base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedS
 /// `RECV`, or raw bytes on a port of the AT interpreter.
 pub(crate) fn record(base: &mut S2cBase, src: u8, pid: u8, data: &[u8], signal: &ReceivedSignal, now: Duration) {
     if base.config.interpreter == Interpreter::At {
-        base.board.tell_all(data, now);
+        base.board.write_to_all(data, now);
         return;
     }
     let len = length_field(base, pid, data.len());

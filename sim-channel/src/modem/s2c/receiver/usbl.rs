@@ -1,9 +1,9 @@
 //! Positions from the USBL head: `USBLLONG` and its companions, after an exchange that was answered.
 
-use crate::Duration;
 use crate::modem::s2c::base::{PendingFix, ReceivedSignal, S2cBase, S2cTask};
 use crate::usbl::UsblHead;
 use std::f64::consts::PI;
+use std::time::Duration;
 
 /// A delay between hydrophones that could not be measured.
 const INVALID_DELAY: u32 = 16_777_215;
@@ -29,7 +29,7 @@ impl UsblReporter {
         let Some(head) = self.head.as_mut().filter(|_| base.options.usbl()) else { return };
         let fix = head.measure(&signal.receiver, &signal.sender, signal.received_at);
         let pending = PendingFix { remote, fix, travel: signal.travel, rssi: signal.rssi, integrity: signal.integrity };
-        base.board.plan(fix.ready_at.max(now), S2cTask::UsblFix(Box::new(pending)));
+        base.board.schedule(fix.ready_at.max(now), S2cTask::UsblFix(Box::new(pending)));
     }
 
     /// The head has computed a fix.

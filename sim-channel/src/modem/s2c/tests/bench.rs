@@ -1,8 +1,8 @@
 //! Hosts at S2C modems in one water.
 
-pub(super) use crate::modem::bench::{Bench, SECOND, keywords};
+pub(super) use crate::modem::tests::rig::{Bench, SECOND, keywords};
 
-use crate::ChannelConfig;
+use crate::channel::ChannelConfig;
 use crate::modem::Emulator;
 use crate::modem::s2c::{S2c, S2cConfig};
 

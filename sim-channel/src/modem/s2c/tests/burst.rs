@@ -1,8 +1,11 @@
 //! Burst data over a connection.
 
 use super::bench::{Bench, SECOND, keywords};
+use crate::channel::ChannelConfig;
+use crate::loss::LossModel;
 use crate::modem::s2c::{Interpreter, S2cConfig};
-use crate::{ChannelConfig, Duration, LossModel, NodeId};
+use crate::nodes::NodeId;
+use std::time::Duration;
 
 const KILOMETRE: f64 = 1000.0;
 

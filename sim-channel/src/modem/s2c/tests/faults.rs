@@ -1,9 +1,11 @@
 //! Faults on demand, pacing, and bytes that are no commands.
 
 use super::bench::{Bench, SECOND};
+use crate::channel::ChannelConfig;
 use crate::modem::{Emulator, Fault, s2c::S2c, s2c::S2cConfig};
-use crate::{ChannelConfig, Duration, NodeId};
+use crate::nodes::NodeId;
 use proptest::prelude::*;
+use std::time::Duration;
 
 const ONE: NodeId = NodeId(1);
 
@@ -97,7 +99,7 @@ fn serial_time_is_real_on_the_way_in() {
 #[test]
 fn runs_repeat_bit_for_bit() {
     let run = || {
-        let mut bench = Bench::new(3, 700.0, crate::presets::shallow_harbour());
+        let mut bench = Bench::new(3, 700.0, crate::channel::presets::shallow_harbour());
         for n in 0..20u8 {
             bench.write(1, format!("AT*SEND,300,2,{}\rAT@ZX1\r", "x".repeat(300)).as_bytes());
             bench.write(3, b"AT*SENDIM,4,1,ack,abcd\r");
@@ -110,7 +112,7 @@ fn runs_repeat_bit_for_bit() {
 
 #[test]
 fn an_hour_of_fifteen_modems_passes_quickly() {
-    let mut bench = Bench::new(15, 200.0, crate::presets::shallow_harbour());
+    let mut bench = Bench::new(15, 200.0, crate::channel::presets::shallow_harbour());
     for minute in 0..60u32 {
         for node in 1..=14u8 {
             let line = format!("AT*SENDIM,32,{},ack,{}\r", node + 1, "x".repeat(32));
@@ -137,9 +139,9 @@ proptest! {
         let mut modem = S2c::new(S2cConfig::new(2));
         for bytes in frames {
             let now = bench.basin.now();
-            let place = crate::Position::default();
-            let outcome = crate::Outcome::Delivered { bytes, copy: 0, corrupted: true };
-            let arrival = crate::Arrival {
+            let place = crate::nodes::Position::default();
+            let outcome = crate::channel::Outcome::Delivered { bytes, copy: 0, corrupted: true };
+            let arrival = crate::channel::Arrival {
                 transmission: 1, from: ONE, to: NodeId(2), at: now, sent_at: now, range_m: 1.0,
                 sender: place, receiver: place, airtime: SECOND, outcome,
             };

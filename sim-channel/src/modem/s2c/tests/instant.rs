@@ -1,9 +1,12 @@
 //! Instant, synchronous and piggyback messages, and positions.
 
 use super::bench::{Bench, SECOND, keywords};
+use crate::channel::{ChannelConfig, Outage, Talker};
+use crate::loss::LossModel;
 use crate::modem::s2c::S2cConfig;
+use crate::nodes::{NodeId, Position};
 use crate::usbl::UsblConfig;
-use crate::{ChannelConfig, Duration, LossModel, NodeId, Outage, Position, Talker};
+use std::time::Duration;
 
 #[test]
 fn an_acknowledged_message_is_told_in_order_at_both_ends() {

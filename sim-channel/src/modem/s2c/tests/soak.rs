@@ -1,9 +1,11 @@
 //! Hours of mixed traffic in bad water: nothing hangs, everything is accounted for.
 
 use super::bench::{Bench, SECOND};
+use crate::channel::ChannelConfig;
 use crate::modem::s2c::S2cConfig;
-use crate::{ChannelConfig, Duration, Stream};
+use crate::random::Stream;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// What one host was told, by keyword up to the comma or space.
 fn tally(text: &str) -> BTreeMap<&str, usize> {
@@ -56,12 +58,12 @@ fn soak(config: ChannelConfig, seed: u64) {
 
 #[test]
 fn everything_is_reported_once_in_a_harbour() {
-    (1..=4).for_each(|seed| soak(crate::presets::shallow_harbour(), seed));
+    (1..=4).for_each(|seed| soak(crate::channel::presets::shallow_harbour(), seed));
 }
 
 #[test]
 fn everything_is_reported_once_under_ice() {
-    (1..=4).for_each(|seed| soak(crate::presets::under_ice(), seed));
+    (1..=4).for_each(|seed| soak(crate::channel::presets::under_ice(), seed));
 }
 
 #[test]

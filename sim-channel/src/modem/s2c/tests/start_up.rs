@@ -1,7 +1,7 @@
 //! Start-up sequences of the clients that are known, line by line.
 
 use super::bench::{Bench, SECOND};
-use crate::ChannelConfig;
+use crate::channel::ChannelConfig;
 use crate::modem::s2c::{Interpreter, S2cConfig};
 
 fn at_port() -> Bench {
@@ -45,7 +45,7 @@ fn evins_asks_for_numbers_and_switches_options_on() {
 fn dune_reboots_then_sets_everything() {
     let mut bench = Bench::calm(1);
     assert_eq!(bench.ask(1, "ATZ0\n"), "");
-    assert_eq!(bench.basin.poll_hang_up(), Some(crate::NodeId(1)));
+    assert_eq!(bench.basin.poll_hang_up(), Some(crate::nodes::NodeId(1)));
     bench.run(5 * SECOND);
     for line in ["ATZ1\n", "ATZ3\n", "ATZ4\n"] {
         assert_eq!(bench.ask(1, line), "OK\r\n");

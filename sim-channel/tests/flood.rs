@@ -1,9 +1,9 @@
 //! Ten million random and mutated lines, for a night or before a release: `cargo test -p sim-channel -- --ignored`.
 
-use super::micromodem::{Micromodem, MicromodemConfig};
-use super::s2c::{Interpreter, S2c, S2cConfig};
-use super::{Emulator, Host};
-use crate::{Duration, Stream};
+use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
+use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
+use sim_channel::modem::{Emulator, Host};
+use sim_channel::{Duration, Stream};
 
 const LINES: u32 = 10_000_000;
 

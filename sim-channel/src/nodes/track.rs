@@ -1,6 +1,7 @@
 //! A node that moves: places at times, straight lines between.
 
-use crate::{Duration, Position};
+use crate::nodes::Position;
+use std::time::Duration;
 
 /// Waypoints in order of time; before the first and after the last the node stands still.
 #[derive(Clone, PartialEq, Debug, Default)]

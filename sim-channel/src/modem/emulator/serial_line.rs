@@ -1,8 +1,9 @@
 //! The line between host and modem: baud rate in both directions, and its faults.
 
 use super::Fault;
-use crate::{Duration, Stream};
+use crate::random::Stream;
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// What the host may have written without the modem having read it.
 const INPUT_LIMIT: usize = 64 * 1024;
@@ -13,7 +14,7 @@ const BURST: u32 = 16;
 
 /// A serial line or TCP connection as the modem has it: paced, bounded, and breakable.
 #[derive(Debug)]
-pub(super) struct Port {
+pub(super) struct SerialLine {
     byte_time: Duration,
     output: VecDeque<u8>,
     output_from: Duration,
@@ -23,7 +24,7 @@ pub(super) struct Port {
     frozen_until: Duration,
 }
 
-impl Port {
+impl SerialLine {
     /// A line of `baud`, ten bits a byte; `None` for one without pacing.
     pub(super) fn new(baud: Option<u32>) -> Self {
         Self {
@@ -129,7 +130,7 @@ mod tests {
 
     #[test]
     fn bytes_take_ten_bits_each_in_both_directions() {
-        let mut port = Port::new(Some(19200));
+        let mut port = SerialLine::new(Some(19200));
         port.accept(&[0; 192], SECOND);
         assert_eq!(port.next_input(), Some(SECOND + Duration::from_nanos(520_833 * 192)));
         assert!(port.take_input(Duration::from_millis(1099)).is_none());
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn without_pacing_all_is_there_at_once() {
-        let mut port = Port::new(None);
+        let mut port = SerialLine::new(None);
         port.write(&[1; 5000], SECOND);
         assert_eq!(port.next_output(), Some(SECOND));
         assert_eq!(port.poll_output(SECOND).len(), 5000);
@@ -148,7 +149,7 @@ mod tests {
 
     #[test]
     fn a_frozen_port_keeps_what_it_has() {
-        let mut port = Port::new(None);
+        let mut port = SerialLine::new(None);
         port.freeze(SECOND * 3);
         port.accept(b"AT", SECOND);
         port.write(b"OK", SECOND);
@@ -159,7 +160,7 @@ mod tests {
 
     #[test]
     fn memory_is_bounded_in_both_directions() {
-        let mut port = Port::new(Some(300));
+        let mut port = SerialLine::new(Some(300));
         for _ in 0..100 {
             port.accept(&[0; 4096], SECOND);
             port.write(&[0; 40_960], SECOND);

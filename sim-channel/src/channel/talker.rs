@@ -1,6 +1,8 @@
 //! A stranger on the same water: sends at random and listens to nobody.
 
-use crate::{Duration, NodeId, Stream};
+use crate::nodes::NodeId;
+use crate::random::Stream;
+use std::time::Duration;
 
 /// A third talker with Poisson traffic; place its node and put on air what it offers.
 #[derive(Debug)]

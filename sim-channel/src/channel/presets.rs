@@ -3,8 +3,10 @@
 //! Each states where its figures come from. They are for rehearsal, not predictions for a place.
 
 use crate::acoustics::noise::wind_of_sea_state;
+use crate::channel::{ChannelConfig, Outage};
+use crate::loss::LossModel;
 use crate::loss::{GilbertElliott, Snr, ThreeState};
-use crate::{ChannelConfig, Duration, LossModel, Outage};
+use std::time::Duration;
 
 /// Makes a preset's conditions.
 pub type Preset = fn() -> ChannelConfig;
@@ -133,7 +135,8 @@ fn bursts(delivery: f64, period: Duration) -> ChannelConfig {
 mod tests {
     use super::*;
     use crate::acoustics::sound_speed::mackenzie_m_s;
-    use crate::{Channel, NodeId, Outcome, Position};
+    use crate::channel::{Channel, Outcome};
+    use crate::nodes::{NodeId, Position};
 
     /// Share of 64-byte frames lost over `range_m`, one each 3 s.
     fn measured_loss(config: ChannelConfig, range_m: f64) -> f64 {

@@ -1,6 +1,6 @@
 //! What can go wrong with a modem, on demand.
 
-use crate::Duration;
+use std::time::Duration;
 
 /// Something to break; times are lengths from the moment of injection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

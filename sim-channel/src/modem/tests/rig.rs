@@ -1,19 +1,21 @@
 //! Hosts at emulated modems in one water.
 
-use super::{Basin, Emulator};
-use crate::{Channel, ChannelConfig, Duration, NodeId, Position};
+use crate::channel::{Channel, ChannelConfig};
+use crate::modem::{Basin, Emulator};
+use crate::nodes::{NodeId, Position};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
-pub(super) const SECOND: Duration = Duration::from_secs(1);
+pub(crate) const SECOND: Duration = Duration::from_secs(1);
 
 /// Modems 1, 2, .. on a line, `range_m` apart, and everything that their hosts were told.
-pub(super) struct Bench {
+pub(crate) struct Bench {
     pub basin: Basin,
     pub told: BTreeMap<u8, Vec<u8>>,
 }
 
 impl Bench {
-    pub(super) fn join(modems: Vec<(u8, Box<dyn Emulator>)>, range_m: f64, config: ChannelConfig) -> Self {
+    pub(crate) fn join(modems: Vec<(u8, Box<dyn Emulator>)>, range_m: f64, config: ChannelConfig) -> Self {
         let mut basin = Basin::new(Channel::new(config, 1));
         let mut told = BTreeMap::new();
         for (index, (node, modem)) in modems.into_iter().enumerate() {
@@ -25,18 +27,18 @@ impl Bench {
     }
 
     /// Puts the modems so many metres apart.
-    pub(super) fn channel_range(&mut self, range_m: f64) {
+    pub(crate) fn channel_range(&mut self, range_m: f64) {
         for (index, node) in self.told.keys().enumerate() {
             self.basin.channel().place(NodeId(*node), Position::new(range_m * index as f64, 0.0, 0.0));
         }
     }
 
-    pub(super) fn write(&mut self, node: u8, bytes: &[u8]) {
+    pub(crate) fn write(&mut self, node: u8, bytes: &[u8]) {
         let now = self.basin.now();
         self.basin.handle_host_bytes(NodeId(node), bytes, now);
     }
 
-    pub(super) fn run(&mut self, length: Duration) {
+    pub(crate) fn run(&mut self, length: Duration) {
         let end = self.basin.now() + length;
         while let Some(at) = self.basin.poll_timeout().filter(|at| *at <= end) {
             self.basin.advance(at.max(self.basin.now()));
@@ -53,17 +55,17 @@ impl Bench {
     }
 
     /// All that was told to a host since last asked, as text.
-    pub(super) fn take(&mut self, node: u8) -> String {
+    pub(crate) fn take(&mut self, node: u8) -> String {
         let bytes = std::mem::take(self.told.get_mut(&node).expect("node"));
         bytes.iter().map(|byte| char::from(*byte)).collect()
     }
 
-    pub(super) fn lines(&mut self, node: u8) -> Vec<String> {
+    pub(crate) fn lines(&mut self, node: u8) -> Vec<String> {
         self.take(node).split_terminator("\r\n").map(str::to_string).collect()
     }
 
     /// Writes a line and gives the answer time to come, but nothing acoustic.
-    pub(super) fn ask(&mut self, node: u8, line: &str) -> String {
+    pub(crate) fn ask(&mut self, node: u8, line: &str) -> String {
         self.take(node);
         self.write(node, line.as_bytes());
         self.run(Duration::from_millis(80) + Duration::from_millis(line.len() as u64));
@@ -72,6 +74,6 @@ impl Bench {
 }
 
 /// The first words of lines.
-pub(super) fn keywords(lines: &[String]) -> Vec<&str> {
+pub(crate) fn keywords(lines: &[String]) -> Vec<&str> {
     lines.iter().map(|line| line.split(',').next().unwrap_or_default()).collect()
 }

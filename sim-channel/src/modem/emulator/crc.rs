@@ -1,7 +1,7 @@
 //! The check that emulators put on what they send each other.
 
 /// CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF.
-pub(super) fn crc16(bytes: &[u8]) -> u16 {
+pub(crate) fn crc16(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0xFFFF, |crc, byte| {
         (0..8)
             .fold(crc ^ (u16::from(*byte) << 8), |crc, _| if crc & 0x8000 == 0 { crc << 1 } else { crc << 1 ^ 0x1021 })

@@ -1,4 +1,8 @@
-//! Who takes part, and where.
+//! The participants of a channel, their positions and their tracks.
+
+mod track;
+
+pub use track::Track;
 
 /// A participant of the channel; also its modem address where a modem is emulated (1..=254).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]

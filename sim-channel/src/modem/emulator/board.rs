@@ -1,59 +1,57 @@
-//! What every emulated modem has, and the one way in which all of them are driven.
+//! The state that every emulated modem has, and the one implementation of [`Emulator`] on top of it.
 
-use super::agenda::Agenda;
-use super::port::Port;
+use super::serial_line::SerialLine;
+use super::task_queue::TaskQueue;
 use super::{Emulator, Fault, Host, ModemEvent, Transmission};
-use crate::{Arrival, Duration, Onset, Stream};
+use crate::channel::{Arrival, Onset};
+use crate::random::Stream;
 use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
 
-/// More hosts than that at one modem share the first one's line.
-const HOST_LIMIT: usize = 64;
+/// Further hosts share the line of the first one.
+const MAX_HOSTS: usize = 64;
 
-/// Lines to the hosts, things to do at known times, chance, and what the surroundings must do.
+/// The lines to the hosts, the scheduled tasks, the random stream, and the events for the surroundings.
 #[derive(Debug)]
-pub(super) struct Board<Event> {
+pub(crate) struct ModemBoard<Task> {
     baud: Option<u32>,
-    lines: BTreeMap<Host, Port>,
-    agenda: Agenda<Event>,
-    pub(super) chance: Stream,
-    pub(super) events: VecDeque<ModemEvent>,
+    lines: BTreeMap<Host, SerialLine>,
+    tasks: TaskQueue<Task>,
+    pub(crate) rng: Stream,
+    events: VecDeque<ModemEvent>,
 }
 
-impl<Event> Board<Event> {
-    pub(super) fn new(baud: Option<u32>, chance: Stream) -> Self {
-        let lines = BTreeMap::from([(Host::FIRST, Port::new(baud))]);
-        Self { baud, lines, agenda: Agenda::new(), chance, events: VecDeque::new() }
+impl<Task> ModemBoard<Task> {
+    pub(crate) fn new(baud: Option<u32>, rng: Stream) -> Self {
+        let lines = BTreeMap::from([(Host::FIRST, SerialLine::new(baud))]);
+        Self { baud, lines, tasks: TaskQueue::new(), rng, events: VecDeque::new() }
     }
 
-    /// Has something to do at a time.
-    pub(super) fn plan(&mut self, at: Duration, event: impl Into<Event>) {
-        self.agenda.add(at, event.into());
+    pub(crate) fn schedule(&mut self, at: Duration, task: Task) {
+        self.tasks.add(at, task);
     }
 
-    /// Tells one host.
-    pub(super) fn tell(&mut self, host: Host, bytes: &[u8], now: Duration) {
+    pub(crate) fn write_to(&mut self, host: Host, bytes: &[u8], now: Duration) {
         if let Some(line) = self.lines.get_mut(&host) {
             line.write(bytes, now);
         }
     }
 
-    /// Tells every host.
-    pub(super) fn tell_all(&mut self, bytes: &[u8], now: Duration) {
+    pub(crate) fn write_to_all(&mut self, bytes: &[u8], now: Duration) {
         self.lines.values_mut().for_each(|line| line.write(bytes, now));
     }
 
-    /// Forgets what was planned; the hosts stay, and hear what was already said.
-    pub(super) fn restart(&mut self) {
-        self.agenda = Agenda::new();
+    /// Drops the scheduled tasks; the hosts stay, and bytes already written still reach them.
+    pub(crate) fn restart(&mut self) {
+        self.tasks = TaskQueue::new();
     }
 
-    /// The transmission on air ends in the middle.
-    pub(super) fn cut_short(&mut self) {
-        self.events.push_back(ModemEvent::CutShort);
+    pub(crate) fn emit(&mut self, event: ModemEvent) {
+        self.events.push_back(event);
     }
 
     fn next_input(&self) -> Option<Duration> {
-        self.lines.values().filter_map(Port::next_input).min()
+        self.lines.values().filter_map(SerialLine::next_input).min()
     }
 
     fn take_input(&mut self, now: Duration) -> Option<(Host, Duration, Vec<u8>)> {
@@ -64,58 +62,51 @@ impl<Event> Board<Event> {
         })
     }
 
-    /// Does those faults that are the lines' own; true if this was one.
+    /// Injects a fault of the lines; false if it is none.
     fn inject(&mut self, fault: Fault, now: Duration) -> bool {
-        let Self { lines, chance, .. } = self;
+        let Self { lines, rng, .. } = self;
         let mut done = false;
         for line in lines.values_mut() {
-            done |= line.inject(fault, chance, now);
+            done |= line.inject(fault, rng, now);
         }
         done
     }
 }
 
-/// What one make of modem does; everything else is the same for all.
-pub(super) trait Machine: Send {
-    /// What it plans.
-    type Event: Send;
+/// The behaviour of one make of modem.
+pub(crate) trait ModemLogic: Send {
+    type Task: Send;
 
-    /// What it has in common with others.
-    fn board(&self) -> &Board<Self::Event>;
+    fn board(&self) -> &ModemBoard<Self::Task>;
 
-    /// What it has in common with others.
-    fn board_mut(&mut self) -> &mut Board<Self::Event>;
+    fn board_mut(&mut self) -> &mut ModemBoard<Self::Task>;
 
-    /// Bytes of a host have come.
+    /// Bytes of a host have come over its line.
     fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration);
 
-    /// A host is gone.
     fn forget_host(&mut self, _host: Host) {}
 
-    /// The time of a plan has come.
-    fn on_event(&mut self, event: Self::Event, at: Duration);
+    /// The time of a scheduled task has come.
+    fn on_task(&mut self, task: Self::Task, at: Duration);
 
-    /// A signal begins.
     fn on_onset(&mut self, _onset: &Onset, _now: Duration) {}
 
-    /// A signal has ended.
     fn on_arrival(&mut self, arrival: &Arrival, now: Duration);
 
-    /// What goes on air now.
     fn next_transmission(&mut self, now: Duration) -> Option<Transmission>;
 
-    /// Breaks what is not the lines'.
+    /// Injects a fault that is not one of the lines.
     fn break_down(&mut self, fault: Fault, now: Duration);
 }
 
-impl<M: Machine> Emulator for M {
+impl<M: ModemLogic> Emulator for M {
     fn attach(&mut self) -> Host {
         let board = self.board_mut();
         let number = (1..).find(|number| !board.lines.contains_key(&Host(*number))).unwrap_or_default();
-        if board.lines.len() >= HOST_LIMIT || number == 0 {
+        if board.lines.len() >= MAX_HOSTS || number == 0 {
             return Host::FIRST;
         }
-        board.lines.insert(Host(number), Port::new(board.baud));
+        board.lines.insert(Host(number), SerialLine::new(board.baud));
         Host(number)
     }
 
@@ -133,7 +124,7 @@ impl<M: Machine> Emulator for M {
     }
 
     fn host_room(&self, host: Host) -> usize {
-        self.board().lines.get(&host).map_or(0, Port::room)
+        self.board().lines.get(&host).map_or(0, SerialLine::room)
     }
 
     fn poll_host_bytes(&mut self, host: Host, now: Duration) -> Vec<u8> {
@@ -141,7 +132,7 @@ impl<M: Machine> Emulator for M {
     }
 
     fn poll_host_timeout(&self) -> Option<Duration> {
-        self.board().lines.values().filter_map(Port::next_output).min()
+        self.board().lines.values().filter_map(SerialLine::next_output).min()
     }
 
     fn handle_onset(&mut self, onset: &Onset, now: Duration) {
@@ -164,13 +155,13 @@ impl<M: Machine> Emulator for M {
 
     fn poll_timeout(&self) -> Option<Duration> {
         let board = self.board();
-        [board.agenda.next(), board.next_input()].into_iter().flatten().min()
+        [board.tasks.next(), board.next_input()].into_iter().flatten().min()
     }
 
     fn handle_timeout(&mut self, now: Duration) {
         while let Some(due) = self.poll_timeout().filter(|due| *due <= now) {
-            if let Some((at, event)) = self.board_mut().agenda.pop(due) {
-                self.on_event(event, at);
+            if let Some((at, task)) = self.board_mut().tasks.pop(due) {
+                self.on_task(task, at);
             } else if let Some((host, at, bytes)) = self.board_mut().take_input(due) {
                 self.read_host(host, &bytes, at);
             }

@@ -1,7 +1,9 @@
 //! Ultra-short baseline positioning: what a head learns of the node that answered it.
 
-use crate::{Duration, Position, Stream};
+use crate::nodes::Position;
+use crate::random::Stream;
 use std::f64::consts::TAU;
+use std::time::Duration;
 
 /// How good the head is.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -1,0 +1,3 @@
+//! Tools for the tests of all emulators.
+
+pub(crate) mod rig;
