@@ -1,4 +1,5 @@
-//! Ten million random and mutated lines, for a night or before a release: `cargo test -p sim-channel -- --ignored`.
+//! Emulators under floods of random and mutated lines. The long test (ten million lines) is for the night or a release:
+//! `cargo test -p sim-channel --test flood -- --ignored`.
 
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
@@ -35,16 +36,16 @@ const MICROMODEM_LINES: [&[u8]; 10] = [
     b"$CCALQ,0\r\n",
 ];
 
-/// One of `lines` with up to three bytes changed, dropped or doubled, or else up to 40 random bytes.
-fn mutated(lines: &[&[u8]], chance: &mut Stream) -> Vec<u8> {
-    if chance.chance(0.2) {
-        return (0..chance.below(40)).map(|_| chance.below(256) as u8).collect();
+/// One of `lines` with up to three bytes changed, dropped or doubled, or up to 40 random bytes.
+fn mutated(lines: &[&[u8]], rng: &mut Stream) -> Vec<u8> {
+    if rng.bernoulli(0.2) {
+        return (0..rng.below(40)).map(|_| rng.below(256) as u8).collect();
     }
-    let mut line = lines[chance.below(lines.len())].to_vec();
-    for _ in 0..chance.below(4) {
-        let at = chance.below(line.len());
-        match chance.below(3) {
-            0 => line[at] = chance.below(256) as u8,
+    let mut line = lines[rng.below(lines.len())].to_vec();
+    for _ in 0..rng.below(4) {
+        let at = rng.below(line.len());
+        match rng.below(3) {
+            0 => line[at] = rng.below(256) as u8,
             1 => line.truncate(line.len().max(2) - 1),
             _ => line.insert(at, line[at]),
         }
@@ -52,19 +53,19 @@ fn mutated(lines: &[&[u8]], chance: &mut Stream) -> Vec<u8> {
     line
 }
 
-/// Bytes of answers.
+/// Sends `count` lines to a modem; returns the number of bytes that it wrote.
 fn flood(mut modem: impl Emulator, lines: &[&[u8]], seed: u64, count: u32) -> usize {
-    let mut chance = Stream::new(seed, &[]);
+    let mut rng = Stream::new(seed, &[]);
     let mut now = Duration::ZERO;
-    let mut told = 0;
+    let mut received = 0;
     for _ in 0..count {
-        now += Duration::from_micros(chance.below(20_000) as u64);
-        modem.handle_host_bytes(Host::FIRST, &mutated(lines, &mut chance), now);
+        now += Duration::from_micros(rng.below(20_000) as u64);
+        modem.handle_host_bytes(Host::FIRST, &mutated(lines, &mut rng), now);
         while modem.poll_transmit(now).is_some() {}
         while modem.poll_event().is_some() {}
-        told += modem.poll_host_bytes(Host::FIRST, now).len();
+        received += modem.poll_host_bytes(Host::FIRST, now).len();
     }
-    told
+    received
 }
 
 fn s2c(interpreter: Interpreter) -> S2c {
@@ -76,12 +77,12 @@ fn micromodem() -> Micromodem {
 }
 
 fn flood_all(lines: u32) {
-    let told = [
+    let received = [
         flood(s2c(Interpreter::Net), &S2C_LINES, 1, lines / 5 * 2),
         flood(s2c(Interpreter::At), &S2C_LINES, 2, lines / 5),
         flood(micromodem(), &MICROMODEM_LINES, 3, lines / 5 * 2),
     ];
-    assert!(told.iter().all(|bytes| *bytes > lines as usize), "they stay awake and answer: {told:?}");
+    assert!(received.iter().all(|bytes| *bytes > lines as usize), "they stay awake and reply: {received:?}");
 }
 
 #[test]

@@ -12,15 +12,15 @@ pub struct Talker {
     airtime: Duration,
     mean_gap: Duration,
     next: Duration,
-    chance: Stream,
+    rng: Stream,
 }
 
 impl Talker {
     /// A talker as `node` whose frames of `bytes` random bytes take `airtime`, `mean_gap` apart in the mean.
     pub fn new(node: NodeId, bytes: usize, airtime: Duration, mean_gap: Duration, seed: u64) -> Self {
         const PURPOSE: u64 = 0x7a1c;
-        let chance = Stream::new(seed, &[PURPOSE, u64::from(node.0)]);
-        let mut talker = Self { node, bytes, airtime, mean_gap, next: Duration::ZERO, chance };
+        let rng = Stream::new(seed, &[PURPOSE, u64::from(node.0)]);
+        let mut talker = Self { node, bytes, airtime, mean_gap, next: Duration::ZERO, rng };
         talker.schedule(Duration::ZERO);
         talker
     }
@@ -41,11 +41,11 @@ impl Talker {
             return None;
         }
         self.schedule(now.saturating_add(self.airtime));
-        Some(((0..self.bytes).map(|_| self.chance.below(256) as u8).collect(), self.airtime))
+        Some(((0..self.bytes).map(|_| self.rng.below(256) as u8).collect(), self.airtime))
     }
 
     fn schedule(&mut self, free: Duration) {
-        let gap = self.chance.exponential(self.mean_gap.as_secs_f64());
+        let gap = self.rng.exponential(self.mean_gap.as_secs_f64());
         self.next = free.saturating_add(Duration::try_from_secs_f64(gap).unwrap_or(Duration::MAX));
     }
 }
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn speaks_at_its_mean_rate_and_never_over_itself() {
+    fn transmits_at_its_mean_rate_without_overlap() {
         let airtime = Duration::from_millis(500);
         let mut talker = Talker::new(NodeId(9), 16, airtime, Duration::from_secs(10), 1);
         let hour = Duration::from_secs(36_000);

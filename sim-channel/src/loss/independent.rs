@@ -1,6 +1,6 @@
-//! Each frame is lost by itself, with one probability.
+//! Independent loss: each frame is lost with the same probability.
 
-use super::{Frame, LinkLoss, Verdict};
+use super::{FrameContext, FrameFate, LinkLoss};
 use crate::random::Stream;
 
 #[derive(Debug)]
@@ -15,7 +15,7 @@ impl Independent {
 }
 
 impl LinkLoss for Independent {
-    fn judge(&mut self, _frame: &Frame, chance: &mut Stream) -> Verdict {
-        Verdict::lost_if(chance.chance(self.probability))
+    fn draw_fate(&mut self, _frame: &FrameContext, rng: &mut Stream) -> FrameFate {
+        FrameFate::lost_if(rng.bernoulli(self.probability))
     }
 }

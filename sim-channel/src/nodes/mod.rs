@@ -4,11 +4,11 @@ mod track;
 
 pub use track::Track;
 
-/// A participant of the channel; also its modem address where a modem is emulated (1..=254).
+/// A participant of the channel. Where a modem is emulated, the number usually is its address (1..=254) as well.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub struct NodeId(pub u8);
 
-/// A place in the water, in metres: x east, y north, z down from the surface.
+/// A position in metres: x east, y north, z down from the surface.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Position {
     /// Metres east of the origin.
@@ -20,12 +20,12 @@ pub struct Position {
 }
 
 impl Position {
-    /// A place at `x_m`, `y_m`, `z_m` metres.
+    /// The position `x_m` east and `y_m` north of the origin, `z_m` below the surface.
     pub const fn new(x_m: f64, y_m: f64, z_m: f64) -> Self {
         Self { x_m, y_m, z_m }
     }
 
-    /// Slant distance in metres along a straight ray.
+    /// Slant range along a straight ray, m.
     pub fn range_m(&self, other: &Position) -> f64 {
         let (dx, dy, dz) = (self.x_m - other.x_m, self.y_m - other.y_m, self.z_m - other.z_m);
         (dx * dx + dy * dy + dz * dz).sqrt()

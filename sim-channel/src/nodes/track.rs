@@ -1,22 +1,34 @@
-//! A node that moves: places at times, straight lines between.
+//! The track of a moving node.
 
 use crate::nodes::Position;
 use std::time::Duration;
 
-/// Waypoints in order of time; before the first and after the last the node stands still.
+/// Waypoints with times. The node moves on straight lines between them, and stands still before the first and after the
+/// last.
+///
+/// ```
+/// use sim_channel::{Duration, Position, Track};
+///
+/// let track = Track::new(vec![
+///     (Duration::ZERO, Position::new(0.0, 0.0, 10.0)),
+///     (Duration::from_secs(100), Position::new(150.0, 0.0, 30.0)),
+/// ]);
+/// assert_eq!(track.at(Duration::from_secs(50)), Some(Position::new(75.0, 0.0, 20.0)));
+/// assert_eq!(track.at(Duration::from_secs(999)), Some(Position::new(150.0, 0.0, 30.0)));
+/// ```
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Track {
     waypoints: Vec<(Duration, Position)>,
 }
 
 impl Track {
-    /// A track through `waypoints`, which are put in order of time.
+    /// A track through `waypoints`, which may come in any order.
     pub fn new(mut waypoints: Vec<(Duration, Position)>) -> Self {
         waypoints.sort_by_key(|(at, _)| *at);
         Self { waypoints }
     }
 
-    /// Where the node is at `now`; `None` if there is no waypoint.
+    /// Position of the node at `now`; `None` if the track has no waypoint.
     pub fn at(&self, now: Duration) -> Option<Position> {
         let after = self.waypoints.partition_point(|(at, _)| *at <= now);
         let next = self.waypoints.get(after);
@@ -38,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moves_straight_between_waypoints_and_stands_outside_them() {
+    fn position_is_interpolated_and_clamped_at_the_ends() {
         let at = |s: u64, x: f64| (Duration::from_secs(s), Position::new(x, 0.0, 5.0));
         let track = Track::new(vec![at(20, 100.0), at(10, 0.0)]);
         let x = |s| track.at(Duration::from_secs(s)).map(|p| p.x_m);

@@ -1,12 +1,20 @@
-//! Seeded streams of chance; nothing in the crate draws from anywhere else.
+//! Seeded random streams, the only source of random numbers in this crate.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{RngCore, SeedableRng};
 use std::f64::consts::TAU;
 
-/// One independent random stream, named by a seed and a path of numbers.
+/// One random stream (xoshiro256++), named by a seed and a path of numbers.
 ///
-/// Streams with different paths do not influence each other, so that a draw on one link never shifts another link's.
+/// Streams with different paths are independent, so that a draw on one link never shifts the draws of another.
+///
+/// ```
+/// use sim_channel::Stream;
+///
+/// let (mut a, mut b) = (Stream::new(7, &[1, 2]), Stream::new(7, &[1, 2]));
+/// assert_eq!(a.uniform(), b.uniform());
+/// assert!((0..1000).all(|_| a.below(6) < 6));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Stream(Xoshiro256PlusPlus);
 
@@ -17,13 +25,13 @@ impl Stream {
         Self(Xoshiro256PlusPlus::seed_from_u64(mixed))
     }
 
-    /// Uniform in [0, 1), 53 bits.
+    /// Uniform in [0, 1), with 53 random bits.
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// True with the given probability; exactly one draw whatever the probability is.
-    pub fn chance(&mut self, probability: f64) -> bool {
+    /// True with the given probability; takes exactly one draw for any probability.
+    pub fn bernoulli(&mut self, probability: f64) -> bool {
         self.uniform() < probability
     }
 
@@ -38,7 +46,7 @@ impl Stream {
         radius * (TAU * self.uniform()).cos()
     }
 
-    /// Exponential with the given mean.
+    /// Exponentially distributed with the given mean, in its unit.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         -mean * (1.0 - self.uniform()).ln()
     }

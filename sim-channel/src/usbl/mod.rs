@@ -1,22 +1,22 @@
-//! Ultra-short baseline positioning: what a head learns of the node that answered it.
+//! Ultra-short baseline positioning: a head measures range and direction to a node from its acoustic reply.
 
 use crate::nodes::Position;
 use crate::random::Stream;
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-/// How good the head is.
+/// The accuracy of a USBL head.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct UsblConfig {
     /// Standard deviation of the slant range, m. Default 0.1, of the order of data sheets.
     pub range_std_m: f64,
     /// Standard deviation of bearing and elevation each, rad. Default 0.0175 (1 degree).
     pub angle_std_rad: f64,
-    /// Probability 0..=1 that the angles are those of an echo, anywhere. Default 0.02.
+    /// Probability 0..=1 that the angles are those of an echo, in any direction. Default 0.02.
     pub outlier_probability: f64,
-    /// Probability 0..=1 that there is range but no direction. Default 0.02.
+    /// Probability 0..=1 of a fix with a range but no direction. Default 0.02.
     pub range_only_probability: f64,
-    /// From the end of the answer to the fix. Default 0.45 s, as between the two times of a logged `USBLLONG`.
+    /// Time from the end of the reply to the fix. Default 0.45 s, as between the two times of a logged `USBLLONG`.
     pub latency: Duration,
 }
 
@@ -32,20 +32,20 @@ impl Default for UsblConfig {
     }
 }
 
-/// One measurement, in the frame of a head that is level and looks north.
+/// One measurement, in the frame of a head that is level and faces north.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct UsblFix {
-    /// When the answer arrived at the head.
+    /// Arrival of the reply at the head.
     pub measured_at: Duration,
-    /// When the head tells it.
+    /// Time at which the head reports the fix.
     pub ready_at: Duration,
     /// Slant range, m; >= 0.
     pub range_m: f64,
-    /// Clockwise from north, rad, 0..2 pi.
+    /// Bearing clockwise from north, rad, 0..2 pi.
     pub bearing_rad: f64,
-    /// Above the horizontal, rad; negative for a deeper target.
+    /// Elevation above the horizontal, rad; negative for a deeper target.
     pub elevation_rad: f64,
-    /// Expected error of the position, m; about the range if only the range is good.
+    /// Expected error of the position, m; equal to the range if only the range is good.
     pub accuracy_m: f64,
 }
 
@@ -57,33 +57,46 @@ impl UsblFix {
     }
 }
 
-/// A head with its own chance.
+/// A USBL head with its own random stream.
+///
+/// ```
+/// use sim_channel::usbl::{UsblConfig, UsblHead};
+/// use sim_channel::{Duration, Position};
+///
+/// let mut head = UsblHead::new(UsblConfig::default(), 42);
+/// let (ship, vehicle) = (Position::new(0.0, 0.0, 2.0), Position::new(300.0, 400.0, 52.0));
+/// let fix = head.measure(&ship, &vehicle, Duration::from_secs(5));
+/// assert!((fix.range_m - ship.range_m(&vehicle)).abs() < 1.0);
+/// assert_eq!(fix.ready_at, Duration::from_millis(5450));
+/// ```
 #[derive(Debug)]
 pub struct UsblHead {
     config: UsblConfig,
-    chance: Stream,
+    rng: Stream,
 }
 
 impl UsblHead {
-    /// A head whose noise comes from `seed`.
+    /// A head that draws its errors from `seed`.
     pub fn new(config: UsblConfig, seed: u64) -> Self {
         const PURPOSE: u64 = 0x05b1;
-        Self { config, chance: Stream::new(seed, &[PURPOSE]) }
+        Self { config, rng: Stream::new(seed, &[PURPOSE]) }
     }
 
-    /// The fix that an answer from `target`, heard by a head at `head`, gives; always the same number of draws.
-    pub fn measure(&mut self, head: &Position, target: &Position, heard_at: Duration) -> UsblFix {
+    /// The fix from a reply of `target` that a head at `head` received at `received_at`.
+    ///
+    /// Each call takes the same number of draws.
+    pub fn measure(&mut self, head: &Position, target: &Position, received_at: Duration) -> UsblFix {
         let config = self.config;
-        let [range_noise, bearing_noise, elevation_noise] = [(); 3].map(|()| self.chance.normal());
-        let outlier = self.chance.chance(config.outlier_probability);
-        let range_only = self.chance.chance(config.range_only_probability);
-        let (stray_bearing, stray_elevation) = (self.chance.uniform(), self.chance.uniform());
+        let [range_noise, bearing_noise, elevation_noise] = [(); 3].map(|()| self.rng.normal());
+        let outlier = self.rng.bernoulli(config.outlier_probability);
+        let range_only = self.rng.bernoulli(config.range_only_probability);
+        let (stray_bearing, stray_elevation) = (self.rng.uniform(), self.rng.uniform());
         let (range, bearing, elevation) = polar(head, target);
         let range_m = (range + config.range_std_m * range_noise).max(0.0);
         let stray = outlier || range_only;
         UsblFix {
-            measured_at: heard_at,
-            ready_at: heard_at.saturating_add(config.latency),
+            measured_at: received_at,
+            ready_at: received_at.saturating_add(config.latency),
             range_m,
             bearing_rad: if stray { stray_bearing * TAU } else { bearing + config.angle_std_rad * bearing_noise }
                 .rem_euclid(TAU),
@@ -97,9 +110,9 @@ impl UsblHead {
     }
 }
 
-/// Time that one two-way exchange keeps the water busy: question, way there, turn-round, answer, way back.
-pub fn exchange_time(question: Duration, turn_round: Duration, answer: Duration, one_way: Duration) -> Duration {
-    question + turn_round + answer + 2 * one_way
+/// Time that one two-way exchange occupies the channel: airtime of query and reply, turn-around, two ways of travel.
+pub fn exchange_time(query: Duration, turn_around: Duration, reply: Duration, one_way: Duration) -> Duration {
+    query + turn_around + reply + 2 * one_way
 }
 
 /// Slant range in m, bearing clockwise from north and elevation above the horizontal in rad.
@@ -159,14 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn range_only_says_so_by_its_accuracy() {
+    fn range_only_fix_has_the_range_as_accuracy() {
         let config = UsblConfig { range_only_probability: 1.0, ..clean() };
         let fix = UsblHead::new(config, 1).measure(&HEAD, &TARGET, Duration::ZERO);
         assert_eq!(fix.accuracy_m, fix.range_m);
     }
 
     #[test]
-    fn an_exchange_at_a_kilometre_costs_its_air_time_twice_over() {
+    fn exchange_time_adds_both_ways_and_the_turn_around() {
         let ms = Duration::from_millis;
         assert_eq!(exchange_time(ms(182), ms(90), ms(139), ms(667)), ms(1745));
     }

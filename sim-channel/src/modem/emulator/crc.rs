@@ -1,4 +1,4 @@
-//! The check that emulators put on what they send each other.
+//! The integrity check of the frames between emulators.
 
 /// CRC-16/CCITT-FALSE: polynomial 0x1021, start 0xFFFF.
 pub(crate) fn crc16(bytes: &[u8]) -> u16 {
@@ -13,7 +13,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_check_value_of_the_crc() {
+    fn crc_matches_its_check_value() {
         assert_eq!(crc16(b"123456789"), 0x29B1);
     }
 }

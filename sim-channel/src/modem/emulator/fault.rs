@@ -1,24 +1,24 @@
-//! What can go wrong with a modem, on demand.
+//! Faults of a modem, injected on demand.
 
 use std::time::Duration;
 
-/// Something to break; times are lengths from the moment of injection.
+/// A fault to inject; durations count from the moment of injection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Fault {
-    /// Refuses every message with BUSY (S2C) or an error (Micromodem) for so long.
+    /// Refuses every message for this long, with `BUSY` (S2C) or an error (Micromodem).
     Busy(Duration),
-    /// Restarts; settings that were not stored are lost, queued messages too.
+    /// Restarts; settings that were not stored and queued messages are lost.
     Reboot,
-    /// Sends so many bytes of garbage to the host.
+    /// Sends this many bytes of noise to each host.
     Garbage(u16),
-    /// Cuts what the host is being told at half a line.
+    /// Drops the rear half of the bytes that are on their way to each host.
     HalfLine,
-    /// Neither reads nor writes for so long; what waits comes afterwards.
+    /// Neither reads nor writes for this long; the bytes that wait come afterwards.
     Freeze(Duration),
-    /// Answers to another address than it was given.
+    /// Uses this address instead of the configured one.
     WrongAddress(u8),
     /// The supply fails: a transmission is cut short, then the modem restarts.
     BrownOut,
-    /// Takes up to a megabyte of data before it says that it is full.
+    /// Accepts up to a megabyte of data before it reports a full buffer.
     BigBuffer,
 }

@@ -11,71 +11,92 @@ pub use fault::Fault;
 use crate::channel::{Arrival, Onset};
 use std::time::Duration;
 
-/// One of the hosts at a modem: a TCP port takes several, a serial line has the first alone.
+/// One of the hosts at a modem. A TCP port takes several hosts, a serial line only the first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub struct Host(u32);
 
 impl Host {
-    /// The host that is always there.
+    /// The host that is always attached.
     pub const FIRST: Host = Host(0);
 }
 
-/// An emulated modem.
+/// An emulated modem, driven by its host, by the channel and by time.
+///
+/// ```text
+///   host bytes  -> handle_host_bytes   +----------+   poll_host_bytes -> host bytes
+///   arrivals    -> handle_arrival      | Emulator |   poll_transmit   -> channel
+///   time        -> handle_timeout      +----------+   poll_timeout    -> next call
+/// ```
+///
+/// Every `now` is the time since the start of the run and never goes back. [`Basin`](super::Basin) drives several
+/// emulators on one channel.
+///
+/// ```
+/// use sim_channel::Duration;
+/// use sim_channel::modem::s2c::{S2c, S2cConfig};
+/// use sim_channel::modem::{Emulator, Host};
+///
+/// let mut modem = S2c::new(S2cConfig { baud: None, ..S2cConfig::new(5) });
+/// modem.handle_host_bytes(Host::FIRST, b"AT?AL\r", Duration::ZERO);
+/// assert_eq!(modem.poll_host_bytes(Host::FIRST, Duration::ZERO), b"5\r\n");
+/// ```
 pub trait Emulator: Send {
-    /// Another host at the same port: it gets every notification, and the answers to what it asks itself.
+    /// Attaches another host to the port. It receives every notification, and the replies to its own commands.
     fn attach(&mut self) -> Host;
 
-    /// The host is gone.
+    /// Detaches a host; the first host always stays.
     fn detach(&mut self, host: Host);
 
-    /// Takes what a host wrote. What does not fit into `host_room` is lost, as on a line without flow control.
+    /// Takes bytes that a host wrote. Bytes beyond [`host_room`](Self::host_room) are lost, as on a line without flow
+    /// control.
     fn handle_host_bytes(&mut self, host: Host, bytes: &[u8], now: Duration);
 
-    /// How many bytes a host may write now.
+    /// Number of bytes that a host may write now.
     fn host_room(&self, host: Host) -> usize;
 
-    /// What has reached a host by `now`, paced by the baud rate.
+    /// Takes the bytes that have reached a host by `now`, paced by the baud rate.
     fn poll_host_bytes(&mut self, host: Host, now: Duration) -> Vec<u8>;
 
-    /// When `poll_host_bytes` has something to give for any host.
+    /// Time at which more bytes will have reached any host; `None` if none are on their way.
     fn poll_host_timeout(&self) -> Option<Duration>;
 
-    /// Takes the beginning of a signal at this modem. Without it the beginning is told together with the end.
+    /// Takes the beginning of a signal at this modem. Without this call the modem reports the beginning together with the
+    /// end.
     fn handle_onset(&mut self, onset: &Onset, now: Duration);
 
-    /// Takes the end of a reception at this modem, heard or not.
+    /// Takes the end of a reception at this modem, delivered or lost.
     fn handle_arrival(&mut self, arrival: &Arrival, now: Duration);
 
-    /// What the modem puts on air at `now`; call until `None`, after every other call.
+    /// The next transmission that the modem puts on air at `now`; call until `None`, after every other call.
     fn poll_transmit(&mut self, now: Duration) -> Option<Transmission>;
 
-    /// What the surroundings of the modem must do; call until `None`, after every other call.
+    /// The next event for the owner of port and transducer; call until `None`, after every other call.
     fn poll_event(&mut self) -> Option<ModemEvent>;
 
-    /// When `handle_timeout` has something to do.
+    /// Time at which [`handle_timeout`](Self::handle_timeout) must be called; `None` if no task is scheduled.
     fn poll_timeout(&self) -> Option<Duration>;
 
-    /// Lets time pass.
+    /// Passes time up to `now` and runs the tasks that are due.
     fn handle_timeout(&mut self, now: Duration);
 
-    /// Breaks something.
+    /// Injects a fault at `now`.
     fn inject(&mut self, fault: Fault, now: Duration);
 }
 
-/// Bytes to put on air, and how long they take.
+/// A frame to put on air.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Transmission {
-    /// What the other emulators of this kind understand.
+    /// The frame, in the layout that emulators of the same kind share.
     pub bytes: Vec<u8>,
-    /// From the first wave to the last.
+    /// Length of the signal, from its first wave to its last.
     pub airtime: Duration,
 }
 
-/// What an emulator asks of whoever holds its port and its transducer.
+/// An action that an emulator requests from the owner of its port and transducer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ModemEvent {
-    /// Close the TCP connection of the host; a serial line stays open.
+    /// Close the TCP connections of the hosts; a serial line stays open.
     HangUp,
-    /// The transmission on air ended in the middle: nobody can read it.
+    /// The transmission on air has ended in the middle; no receiver can decode it.
     CutShort,
 }

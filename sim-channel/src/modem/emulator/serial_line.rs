@@ -5,14 +5,14 @@ use crate::random::Stream;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// What the host may have written without the modem having read it.
-const INPUT_LIMIT: usize = 64 * 1024;
-/// What the modem may have written without the host having read it; more is lost.
-const OUTPUT_LIMIT: usize = 1024 * 1024;
-/// So many bytes at a time reach the host, so that its reads split lines anywhere.
-const BURST: u32 = 16;
+/// Bytes from the host that the modem has not read yet.
+const MAX_INPUT_BYTES: usize = 64 * 1024;
+/// Bytes to the host that the host has not read yet; more are lost.
+const MAX_OUTPUT_BYTES: usize = 1024 * 1024;
+/// Bytes that reach the host at a time, so that its reads split lines anywhere.
+const OUTPUT_CHUNK: u32 = 16;
 
-/// A serial line or TCP connection as the modem has it: paced, bounded, and breakable.
+/// The modem's end of a serial line or TCP connection: paced, bounded, and open to faults.
 #[derive(Debug)]
 pub(super) struct SerialLine {
     byte_time: Duration,
@@ -25,7 +25,7 @@ pub(super) struct SerialLine {
 }
 
 impl SerialLine {
-    /// A line of `baud`, ten bits a byte; `None` for one without pacing.
+    /// A line of `baud` with ten bits a byte; `None` for a line without pacing.
     pub(super) fn new(baud: Option<u32>) -> Self {
         Self {
             byte_time: baud.map_or(Duration::ZERO, |baud| Duration::from_secs(10) / baud.max(1)),
@@ -39,10 +39,10 @@ impl SerialLine {
     }
 
     pub(super) fn room(&self) -> usize {
-        INPUT_LIMIT - self.input_bytes.min(INPUT_LIMIT)
+        MAX_INPUT_BYTES - self.input_bytes.min(MAX_INPUT_BYTES)
     }
 
-    /// Bytes from the host; they will have come over the line one byte time after another.
+    /// Takes bytes from the host, which come over the line one byte time after another.
     pub(super) fn accept(&mut self, bytes: &[u8], now: Duration) {
         let taken = bytes.get(..self.room().min(bytes.len())).unwrap_or_default();
         if taken.is_empty() {
@@ -53,12 +53,12 @@ impl SerialLine {
         self.input.push_back((self.input_free, taken.to_vec()));
     }
 
-    /// When the next bytes from the host will have come.
+    /// Time at which the next bytes from the host will have come.
     pub(super) fn next_input(&self) -> Option<Duration> {
         self.input.front().map(|(at, _)| (*at).max(self.frozen_until))
     }
 
-    /// The next bytes from the host that have come by `now`, and when.
+    /// The next bytes from the host that have come by `now`, with their time.
     pub(super) fn take_input(&mut self, now: Duration) -> Option<(Duration, Vec<u8>)> {
         let at = self.next_input().filter(|at| *at <= now)?;
         let (_, bytes) = self.input.pop_front()?;
@@ -66,18 +66,17 @@ impl SerialLine {
         Some((at, bytes))
     }
 
-    /// Bytes to the host.
     pub(super) fn write(&mut self, bytes: &[u8], now: Duration) {
         if self.output.is_empty() {
             self.output_from = self.output_from.max(now);
         }
-        let room = OUTPUT_LIMIT - self.output.len();
+        let room = MAX_OUTPUT_BYTES - self.output.len();
         self.output.extend(bytes.iter().take(room));
     }
 
-    /// When more bytes will have reached the host.
+    /// Time at which more bytes will have reached the host.
     pub(super) fn next_output(&self) -> Option<Duration> {
-        let waiting = u32::try_from(self.output.len()).unwrap_or(u32::MAX).min(BURST);
+        let waiting = u32::try_from(self.output.len()).unwrap_or(u32::MAX).min(OUTPUT_CHUNK);
         (waiting > 0).then(|| (self.output_from + self.byte_time * waiting).max(self.frozen_until))
     }
 
@@ -99,10 +98,10 @@ impl SerialLine {
         self.frozen_until = self.frozen_until.max(until);
     }
 
-    /// Does those faults that are the line's own; true if this was one.
-    pub(super) fn inject(&mut self, fault: Fault, chance: &mut Stream, now: Duration) -> bool {
+    /// Injects a fault of the line; false if it is none.
+    pub(super) fn inject(&mut self, fault: Fault, rng: &mut Stream, now: Duration) -> bool {
         match fault {
-            Fault::Garbage(bytes) => self.garble(bytes, chance, now),
+            Fault::Garbage(bytes) => self.garble(bytes, rng, now),
             Fault::HalfLine => self.cut(),
             Fault::Freeze(length) => self.freeze(now + length),
             _ => return false,
@@ -110,14 +109,13 @@ impl SerialLine {
         true
     }
 
-    /// Drops the rear half of what waits for the host.
+    /// Drops the rear half of the bytes that wait for the host.
     fn cut(&mut self) {
         self.output.truncate(self.output.len() / 2);
     }
 
-    /// Noise of the line.
-    fn garble(&mut self, bytes: u16, chance: &mut Stream, now: Duration) {
-        let noise: Vec<u8> = (0..bytes).map(|_| chance.below(256) as u8).collect();
+    fn garble(&mut self, bytes: u16, rng: &mut Stream, now: Duration) {
+        let noise: Vec<u8> = (0..bytes).map(|_| rng.below(256) as u8).collect();
         self.write(&noise, now);
     }
 }
@@ -140,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn without_pacing_all_is_there_at_once() {
+    fn bytes_without_pacing_arrive_at_once() {
         let mut port = SerialLine::new(None);
         port.write(&[1; 5000], SECOND);
         assert_eq!(port.next_output(), Some(SECOND));
@@ -148,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frozen_port_keeps_what_it_has() {
+    fn frozen_line_keeps_its_bytes() {
         let mut port = SerialLine::new(None);
         port.freeze(SECOND * 3);
         port.accept(b"AT", SECOND);
@@ -166,6 +164,6 @@ mod tests {
             port.write(&[0; 40_960], SECOND);
         }
         assert_eq!(port.room(), 0);
-        assert_eq!(port.output.len(), OUTPUT_LIMIT);
+        assert_eq!(port.output.len(), MAX_OUTPUT_BYTES);
     }
 }

@@ -3,7 +3,7 @@
 //! A service (cycles, flexible data, minipackets, detection) borrows this base for the length of one call. The base never
 //! calls a service.
 
-use super::clock::Clock;
+use super::clock::ModemClock;
 use super::nvram::Nvram;
 use super::packet::Packet;
 use super::sentence;
@@ -37,10 +37,10 @@ pub(super) struct MicromodemBase {
     pub config: MicromodemConfig,
     pub board: ModemBoard<MicromodemTask>,
     pub nvram: Nvram,
-    pub clock: Clock,
+    pub clock: ModemClock,
     pub transmitter: Transmitter,
     awake: bool,
-    /// The fault `Busy` lasts until then.
+    /// End of the fault `Busy`.
     refuses_until: Duration,
 }
 
@@ -52,7 +52,7 @@ impl MicromodemBase {
         Self {
             board,
             nvram: Nvram::factory(config.address),
-            clock: Clock::new(config.unix_s),
+            clock: ModemClock::new(config.unix_s),
             transmitter: Transmitter::default(),
             awake: true,
             refuses_until: Duration::ZERO,

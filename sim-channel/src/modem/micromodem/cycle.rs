@@ -2,7 +2,7 @@
 
 use super::base::{MicromodemBase, MicromodemTask};
 use super::data;
-use super::packet::{Kind, Packet};
+use super::packet::{Packet, PacketKind};
 use super::rates::{FSK_MINI, PacketRate};
 use super::sentence::{NmeaSentence, from_hex};
 use super::signal::PacketSignal;
@@ -46,7 +46,7 @@ impl CycleService {
             return base.report_error("NMEA", 1, "CCCYC: out of range", now);
         };
         base.report(&sentence.echo(), now);
-        let mut init = Packet::new(Kind::CycleInit, src, dst);
+        let mut init = Packet::new(PacketKind::CycleInit, src, dst);
         (init.rate, init.ack, init.frame_count) = (rate.number, ack == 1, frames);
         let ours = src == base.address();
         if ours {
@@ -80,7 +80,7 @@ impl CycleService {
     /// Begins to fill the packet that a cycle init, of this host or received, requests from this modem.
     fn open(&mut self, init: &Packet) {
         let Some(rate) = PacketRate::of(init.rate) else { return };
-        let mut packet = Packet::new(Kind::Data, init.src, init.dst);
+        let mut packet = Packet::new(PacketKind::Data, init.src, init.dst);
         packet.rate = init.rate;
         let requested_frames = init.frame_count.clamp(1, rate.max_frames);
         self.cycle = Some(OpenCycle { packet, rate, requested_frames, request: 0, ack_wanted: init.ack });

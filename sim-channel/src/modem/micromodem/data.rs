@@ -1,14 +1,14 @@
 //! Received data packets and acknowledgements: `CACYC`, `CARXD`, `CAACK`.
 
 use super::base::{MicromodemBase, MicromodemTask};
-use super::packet::{Kind, Packet};
+use super::packet::{Packet, PacketKind};
 use super::sentence::to_hex;
 use super::signal::PacketSignal;
 use super::statistics;
 use std::time::Duration;
 
 /// From a packet's content to the reply that the modem sends by itself.
-pub(super) const TURN_ROUND: Duration = Duration::from_millis(300);
+pub(super) const TURN_AROUND: Duration = Duration::from_millis(300);
 
 /// `$CACYC,0,<src>,<dst>,<rate>,<ack>,<nframes>`
 pub(super) fn report_cycle(base: &mut MicromodemBase, packet: &Packet, ack: bool, now: Duration) {
@@ -34,10 +34,10 @@ pub(super) fn on_data_packet(base: &mut MicromodemBase, packet: &Packet, signal:
     statistics::report_reception(base, packet, signal, if packet.rate == 0 { 1 } else { 3 }, now);
     let own = base.address();
     if packet.ack && own != 0 && packet.dst == own && !good.is_empty() {
-        let mut ack = Packet::new(Kind::Ack, own, packet.src);
+        let mut ack = Packet::new(PacketKind::Ack, own, packet.src);
         ack.rate = packet.rate;
         ack.frames.push(Some(good));
-        base.board.schedule(now + TURN_ROUND, MicromodemTask::Reply(Box::new(ack)));
+        base.board.schedule(now + TURN_AROUND, MicromodemTask::Reply(Box::new(ack)));
     }
 }
 

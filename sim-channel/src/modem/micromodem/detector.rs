@@ -1,7 +1,7 @@
 //! Detection of packets: `CARXP` at the beginning, a timeout if the packet is never decoded.
 
 use super::base::{MicromodemBase, MicromodemTask};
-use super::packet::{Kind, Packet};
+use super::packet::{Packet, PacketKind};
 use super::signal::PacketSignal;
 use super::statistics;
 use crate::channel::{Arrival, LossReason, Onset, Outcome};
@@ -70,6 +70,6 @@ impl Detector {
 fn notices(base: &MicromodemBase, packet: &Packet) -> bool {
     let header_version = u8::from(base.nvram.is_on("psk.packet.mod_hdr_version"));
     let foreign = packet.is_psk() && packet.header_version != header_version;
-    let private = matches!(packet.kind, Kind::Ping | Kind::PingReply) && packet.dst != base.address();
+    let private = matches!(packet.kind, PacketKind::Ping | PacketKind::PingReply) && packet.dst != base.address();
     !foreign && !private
 }

@@ -1,7 +1,7 @@
 //! `CCTDP`, `CARDP`: the flexible data protocol.
 
 use super::base::MicromodemBase;
-use super::packet::{Kind, Packet};
+use super::packet::{Packet, PacketKind};
 use super::rates::{flexible_airtime, flexible_data, flexible_mini_bytes};
 use super::sentence::{NmeaSentence, from_hex, to_hex};
 use super::signal::PacketSignal;
@@ -23,7 +23,7 @@ pub(super) fn on_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now
     };
     let number = base.transmitter.next_number();
     base.report(&format!("CATDP,0,{number},{dst},{rate},{ack},{reserved},{mini},{rest}"), now);
-    let mut packet = Packet::new(Kind::Flexible, base.address(), dst);
+    let mut packet = Packet::new(PacketKind::Flexible, base.address(), dst);
     (packet.rate, packet.ack) = (rate, ack == "1");
     let (head, tail) = data.split_at(mini);
     packet.frames.push(Some(head.to_vec()));

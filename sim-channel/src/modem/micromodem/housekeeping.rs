@@ -1,12 +1,11 @@
 //! Configuration, clock, sleep and reboot, and the sentences that are only repeated.
 
 use super::base::{MicromodemBase, MicromodemTask};
-use super::clock::Civil;
+use super::clock::CivilTime;
 use super::nvram::Nvram;
 use super::sentence::NmeaSentence;
 use std::time::Duration;
 
-/// How long the modem sleeps.
 pub(super) enum Sleep {
     Until(Duration),
     UntilHostWrites,
@@ -33,7 +32,7 @@ pub(super) fn on_sentence(base: &mut MicromodemBase, sentence: &NmeaSentence, no
     }
 }
 
-/// `$CCCFG,<name>,<value>`, repeated literally; `ALL,0` restores the factory's values but for `SRC`.
+/// `$CCCFG,<name>,<value>`, repeated literally; `ALL,0` restores the factory values except `SRC`.
 fn on_configure(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let (name, value) = (sentence.text(0), sentence.text(1));
     if name.is_empty() || value.is_empty() {
@@ -89,7 +88,7 @@ fn on_set_clock(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duratio
         *slot = number.unwrap_or_default();
         number.is_some()
     });
-    match Civil::new(numbers).filter(|_| whole) {
+    match CivilTime::new(numbers).filter(|_| whole) {
         Some(civil) => {
             base.clock.set(civil, now);
             base.report(&sentence.echo(), now);
@@ -101,7 +100,7 @@ fn on_set_clock(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duratio
 /// `$CCTMS,<time>,<0 now, 1 at the next pulse>`
 fn on_set_time(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let text = sentence.text(0);
-    let civil = Civil::parse_iso(text);
+    let civil = CivilTime::parse_iso(text);
     if let Some(civil) = civil {
         base.clock.set(civil, now);
     }

@@ -1,8 +1,8 @@
-//! `CCMPC`, `CAMPA`, `CAMPR`: two-way pings. `CCMUC`, `CAMUA`: 13 bits of the user.
+//! `CCMPC`, `CAMPA`, `CAMPR`: two-way pings. `CCMUC`, `CAMUA`: 13 bits of user data.
 
 use super::base::{MicromodemBase, MicromodemTask};
-use super::data::TURN_ROUND;
-use super::packet::{Kind, Packet};
+use super::data::TURN_AROUND;
+use super::packet::{Packet, PacketKind};
 use super::sentence::NmeaSentence;
 use super::signal::PacketSignal;
 use super::statistics;
@@ -15,7 +15,7 @@ pub(super) fn on_ping_command(base: &mut MicromodemBase, sentence: &NmeaSentence
         return base.report_error("NMEA", 1, "CCMPC: wrong field", now);
     };
     base.report(&sentence.echo(), now);
-    base.transmitter.push(QueuedPacket::mini(Packet::new(Kind::Ping, src, dst)));
+    base.transmitter.push(QueuedPacket::mini(Packet::new(PacketKind::Ping, src, dst)));
 }
 
 /// `$CCMUC,<src>,<dst>,<HHHH>`, up to 1FFF.
@@ -25,17 +25,17 @@ pub(super) fn on_user_command(base: &mut MicromodemBase, sentence: &NmeaSentence
         return base.report_error("NMEA", 1, "CCMUC: wrong field", now);
     };
     base.report(&sentence.echo(), now);
-    let mut packet = Packet::new(Kind::User, src, dst);
+    let mut packet = Packet::new(PacketKind::User, src, dst);
     packet.frames.push(Some(bits.to_be_bytes().to_vec()));
     base.transmitter.push(QueuedPacket::mini(packet));
 }
 
-/// `$CAMPA,<src>,<dst>`; the modem answers by itbase.
+/// `$CAMPA,<src>,<dst>`; the modem replies by itself.
 pub(super) fn on_ping(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
     base.report(&format!("CAMPA,{},{}", packet.src, packet.dst), now);
     statistics::report_reception(base, packet, signal, 2, now);
-    let reply = Packet::new(Kind::PingReply, packet.dst, packet.src);
-    base.board.schedule(now + TURN_ROUND, MicromodemTask::Reply(Box::new(reply)));
+    let reply = Packet::new(PacketKind::PingReply, packet.dst, packet.src);
+    base.board.schedule(now + TURN_AROUND, MicromodemTask::Reply(Box::new(reply)));
 }
 
 /// `$CAMPR,<src>,<dst>,<one-way travel time, s>`

@@ -1,7 +1,7 @@
 //! WHOI Micromodem 1 and 2: NMEA sentences over an emulated acoustic layer.
 //!
-//! Cycle inits, data at rates 0 to 6, acknowledgements, flexible data, pings, user minipackets, statistics of version 6,
-//! configuration, clock and reboot, in the sequences that fielded drivers wait for.
+//! The emulator knows cycle inits, data at rates 0 to 6, acknowledgements, flexible data, pings, user minipackets,
+//! statistics of version 6, configuration, clock and reboot, in the sequences that fielded drivers expect.
 
 mod base;
 mod clock;
@@ -27,7 +27,7 @@ use cycle::CycleService;
 use detector::Detector;
 use housekeeping::Sleep;
 use nvram::Nvram;
-use packet::{Kind, Packet};
+use packet::{Packet, PacketKind};
 use rates::PacketRate;
 use sentence::{HostLine, LineCollector, NmeaSentence};
 use signal::PacketSignal;
@@ -35,34 +35,34 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 use transmitter::{QueuedPacket, SentPacket};
 
-/// Which of the two Micromodems.
+/// The generation of a Micromodem.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Generation {
-    /// Statistics without version; no flexible data, no `CCTMS`, `CCTMQ`, `CCALQ`.
+    /// Micromodem 1: statistics without version; no flexible data, `CCTMS`, `CCTMQ` or `CCALQ`.
     One,
-    /// Statistics of version 6.
+    /// Micromodem 2: statistics of version 6, and all sentences.
     Two,
 }
 
-/// The make of an emulated Micromodem.
+/// The properties of an emulated Micromodem; fixed while it runs.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MicromodemConfig {
-    /// The sentences it knows and the layout of its statistics.
+    /// Decides the sentences that the modem knows and the layout of its statistics.
     pub generation: Generation,
-    /// `SRC` after the first start; 0 for one that was never set and so never acknowledges.
+    /// `SRC` after the first start; 0 for an unset address, with which the modem never acknowledges.
     pub address: u8,
-    /// Baud rate, 8N1; `None` without pacing. At 19200 rate 5 cannot be kept fed.
+    /// Baud rate, 8N1; `None` without pacing. 19200 baud are too slow to keep rate 5 supplied.
     pub baud: Option<u32>,
-    /// What its clock shows at the start of the run, seconds since 1970.
+    /// Time of its clock at the start of the run, seconds since 1970.
     pub unix_s: u64,
     /// Firmware version, three or four numbers with dots.
     pub version: String,
-    /// Seeds the noise of the line.
+    /// Seed of the noise that `Fault::Garbage` writes.
     pub seed: u64,
 }
 
 impl MicromodemConfig {
-    /// A Micromodem 2 of that address at 19200 baud, its clock at the start of 2025.
+    /// A Micromodem 2 with `address` at 19200 baud, its clock at the start of 2025.
     pub fn new(address: u8) -> Self {
         Self {
             generation: Generation::Two,
@@ -74,31 +74,48 @@ impl MicromodemConfig {
         }
     }
 
-    /// A Micromodem 1 of that address, otherwise the same.
+    /// A Micromodem 1 with `address`, otherwise as [`new`](Self::new).
     pub fn first_generation(address: u8) -> Self {
         Self { generation: Generation::One, version: "0.94.0.04".to_string(), ..Self::new(address) }
     }
 }
 
-/// Air time of a packet of `frames` at a rate, for schedules and budgets; `None` for a rate above 6 or frames that do not
-/// fit.
+/// Airtime of a packet of `frames` frames at `rate` (0..=6), for schedules and budgets.
 ///
-/// Source: fixed time for each frame, from packet sizes and nominal bit rates in a band of 5 kHz.
+/// `None` for a rate above 6, and for a number of frames that a packet cannot hold. Source: a fixed time for each frame,
+/// from packet sizes and nominal bit rates in a band of 5 kHz.
+///
+/// ```
+/// use sim_channel::modem::micromodem::packet_airtime;
+///
+/// assert_eq!(packet_airtime(1, 3).unwrap().as_millis(), 3100);
+/// assert_eq!(packet_airtime(1, 4), None);
+/// ```
 pub fn packet_airtime(rate: u8, frames: u8) -> Option<Duration> {
     PacketRate::of(rate).filter(|rate| (1..=rate.max_frames).contains(&frames)).map(|rate| rate.airtime(frames))
 }
 
-/// From reset to `INIT`, and from there to the main firmware.
+/// Time from a reset to `INIT`, and from there to the main firmware.
 const BOOT_STEP: Duration = Duration::from_millis(500);
 
-/// An emulated Micromodem.
+/// An emulated Micromodem with one port, at which there may be several hosts.
+///
+/// ```
+/// use sim_channel::Duration;
+/// use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
+/// use sim_channel::modem::{Emulator, Host};
+///
+/// let mut modem = Micromodem::new(MicromodemConfig { baud: None, ..MicromodemConfig::new(4) });
+/// modem.handle_host_bytes(Host::FIRST, b"$CCCFQ,SRC\r\n", Duration::ZERO);
+/// assert_eq!(modem.poll_host_bytes(Host::FIRST, Duration::ZERO), b"$CACFG,SRC,4*36\r\n");
+/// ```
 #[derive(Debug)]
 pub struct Micromodem {
     base: MicromodemBase,
     collectors: BTreeMap<Host, LineCollector>,
     cycles: CycleService,
     detector: Detector,
-    /// Asleep until a host writes.
+    /// The modem sleeps until a host writes.
     wakes_on_host: bool,
 }
 
@@ -149,13 +166,13 @@ impl Micromodem {
     fn on_packet(&mut self, packet: &Packet, signal: &PacketSignal, now: Duration) {
         let Self { base, cycles, .. } = self;
         match packet.kind {
-            Kind::CycleInit => cycles.on_init(base, packet, signal, now),
-            Kind::Data => data::on_data_packet(base, packet, signal, now),
-            Kind::Ack => data::on_ack(base, packet, signal, now),
-            Kind::Flexible => flexible::on_packet(base, packet, signal, now),
-            Kind::Ping => minipacket::on_ping(base, packet, signal, now),
-            Kind::PingReply => minipacket::on_ping_reply(base, packet, signal, now),
-            Kind::User => minipacket::on_user(base, packet, signal, now),
+            PacketKind::CycleInit => cycles.on_init(base, packet, signal, now),
+            PacketKind::Data => data::on_data_packet(base, packet, signal, now),
+            PacketKind::Ack => data::on_ack(base, packet, signal, now),
+            PacketKind::Flexible => flexible::on_packet(base, packet, signal, now),
+            PacketKind::Ping => minipacket::on_ping(base, packet, signal, now),
+            PacketKind::PingReply => minipacket::on_ping_reply(base, packet, signal, now),
+            PacketKind::User => minipacket::on_user(base, packet, signal, now),
         }
     }
 
@@ -253,7 +270,7 @@ impl ModemLogic for Micromodem {
             }
             Fault::BrownOut => self.reboot(now),
             Fault::WrongAddress(address) => self.base.nvram.set("SRC", &address.to_string()),
-            // Done by the line.
+            // These are faults of the line.
             Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             // It requests each frame and has no buffer that could be too big.
             Fault::BigBuffer => {}

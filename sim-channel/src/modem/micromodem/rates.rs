@@ -1,14 +1,14 @@
-//! Packets of each rate: how many frames of how many bytes, and how long they are on air.
+//! Packets of each rate: number and size of their frames, and their airtime.
 
 use std::time::Duration;
 
-/// What a packet of one rate carries; air times for a band of 5 kHz.
+/// Frames and airtime of a packet at one rate, in a band of 5 kHz.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct PacketRate {
     pub number: u8,
     pub max_frames: u8,
     pub frame_bytes: usize,
-    /// Air time of a packet with all its frames, ms.
+    /// Airtime of a packet with all its frames, ms.
     full_ms: u64,
 }
 
@@ -26,15 +26,15 @@ const RATES: [PacketRate; 7] = [
     rate(6, 6, 32, 3250),
 ];
 
-/// Probe and header of a PSK packet.
-const PSK_START: u64 = 250;
+/// Probe and header of a PSK packet, ms.
+const PSK_START_MS: u64 = 250;
 /// A cycle-init, ping or user minipacket, FH-FSK.
 pub(super) const FSK_MINI: Duration = Duration::from_millis(900);
 /// An acknowledgement after a PSK packet.
 pub(super) const PSK_MINI: Duration = Duration::from_millis(500);
 
 impl PacketRate {
-    /// `None` above 6.
+    /// `None` for a number above 6.
     pub(super) fn of(number: u8) -> Option<Self> {
         RATES.get(usize::from(number)).copied()
     }
@@ -43,14 +43,14 @@ impl PacketRate {
         self.number == 0
     }
 
-    /// Air time of a packet of so many frames: fixed for each frame, however full it is.
+    /// Airtime of a packet of `frames` frames; a frame takes the same time however full it is.
     pub(super) fn airtime(&self, frames: u8) -> Duration {
-        let start = if self.is_fsk() { 0 } else { PSK_START };
+        let start = if self.is_fsk() { 0 } else { PSK_START_MS };
         let per_frame = (self.full_ms - start) / u64::from(self.max_frames);
         Duration::from_millis(start + per_frame * u64::from(frames))
     }
 
-    /// How the statistics name a packet: 1 FSK, 3 PSK.
+    /// Packet type in the statistics: 1 FSK, 3 PSK.
     pub(super) fn packet_type(&self) -> u8 {
         if self.is_fsk() { 1 } else { 3 }
     }
@@ -66,7 +66,7 @@ pub(super) fn flexible_mini_bytes(rate: u8) -> Option<usize> {
     }
 }
 
-/// Most bytes of a flexible data packet beyond its minipacket, and the bytes of each frame there.
+/// Maximal bytes of a flexible data packet beyond its minipacket, and the bytes of each frame there.
 pub(super) fn flexible_data(rate: u8) -> (usize, usize) {
     match rate {
         1 => (192, 64),
@@ -75,14 +75,14 @@ pub(super) fn flexible_data(rate: u8) -> (usize, usize) {
     }
 }
 
-/// Air time of a flexible data packet: start, minipacket, and what follows in proportion to its length.
+/// Airtime of a flexible data packet: start, and minipacket and data in proportion to their length.
 pub(super) fn flexible_airtime(rate: u8, mini: usize, data: usize) -> Duration {
     let bits_per_second = match rate {
         1 => 500,
         3 => 1200,
         _ => 5300,
     };
-    Duration::from_millis(PSK_START + (mini + data) as u64 * 8000 / bits_per_second)
+    Duration::from_millis(PSK_START_MS + (mini + data) as u64 * 8000 / bits_per_second)
 }
 
 #[cfg(test)]

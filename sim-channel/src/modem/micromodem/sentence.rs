@@ -1,17 +1,15 @@
 //! NMEA sentences: `$` + five letters + comma fields + `*` + two upper-case hex digits + CR LF.
 
-/// The longest sentence that is kept: the largest frame in hex, and room.
-const LINE_LIMIT: usize = 6 * 1024;
+/// Longest sentence that is kept: the largest frame in hex, and a margin.
+const MAX_LINE_BYTES: usize = 6 * 1024;
 
-/// A sentence from the host, `$`, checksum and line end taken off.
+/// A sentence from the host without `$`, checksum and line end.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct NmeaSentence {
-    /// The five letters.
     pub name: String,
     pub fields: Vec<String>,
 }
 
-/// What a line from the host turned out to be.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum HostLine {
     Sentence(NmeaSentence),
@@ -20,7 +18,7 @@ pub(super) enum HostLine {
 }
 
 impl NmeaSentence {
-    /// The field at `index` as a number; `None` if it is missing or none.
+    /// The field at `index` as a number; `None` if it is missing or not a number.
     pub(super) fn number<N: std::str::FromStr>(&self, index: usize) -> Option<N> {
         self.fields.get(index)?.parse().ok()
     }
@@ -29,7 +27,7 @@ impl NmeaSentence {
         self.fields.get(index).map_or("", String::as_str)
     }
 
-    /// The same sentence as the modem repeats it: `CA` for `CC`.
+    /// The sentence as the modem repeats it, with `CA` for `CC`.
     pub(super) fn echo(&self) -> String {
         let name = self.name.strip_prefix("CC").unwrap_or(&self.name);
         std::iter::once(format!("CA{name}")).chain(self.fields.iter().cloned()).collect::<Vec<_>>().join(",")
@@ -41,12 +39,12 @@ pub(super) fn checksum(body: &[u8]) -> u8 {
     body.iter().fold(0, |sum, byte| sum ^ byte)
 }
 
-/// A whole line for a body such as `CATXF,192`.
+/// The complete line for a body such as `CATXF,192`.
 pub(super) fn line(body: &str) -> String {
     format!("${body}*{:02X}\r\n", checksum(body.as_bytes()))
 }
 
-/// Collects bytes to lines; bounded.
+/// Collects bytes to lines, in bounded memory.
 #[derive(Debug, Default)]
 pub(super) struct LineCollector {
     buffer: Vec<u8>,
@@ -57,11 +55,11 @@ impl LineCollector {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The next complete line that holds anything; begins anew at every `$`.
+    /// The next complete line that is not empty; every `$` starts a new sentence.
     pub(super) fn next(&mut self) -> Option<HostLine> {
         loop {
             let Some(end) = self.buffer.iter().position(|byte| matches!(byte, b'\r' | b'\n')) else {
-                if self.buffer.len() > LINE_LIMIT {
+                if self.buffer.len() > MAX_LINE_BYTES {
                     self.buffer.clear();
                 }
                 return None;
@@ -78,10 +76,10 @@ impl LineCollector {
     }
 }
 
-/// Reads what stands between `$` and the line end; the checksum may be missing.
+/// Reads the text between `$` and the line end; the checksum may be missing.
 fn parse(text: &[u8]) -> HostLine {
     let Ok(text) = std::str::from_utf8(text) else { return HostLine::NotUnderstood };
-    if text.bytes().any(|byte| byte.is_ascii_control()) || text.len() > LINE_LIMIT {
+    if text.bytes().any(|byte| byte.is_ascii_control()) || text.len() > MAX_LINE_BYTES {
         return HostLine::NotUnderstood;
     }
     let body = match text.rsplit_once('*') {
@@ -98,14 +96,14 @@ fn parse(text: &[u8]) -> HostLine {
     }
 }
 
-/// Bytes of hex digits in either case; `None` if they are odd in number or no digits.
+/// Bytes from hex digits in either case; `None` for an odd number of digits and for other characters.
 pub(super) fn from_hex(text: &str) -> Option<Vec<u8>> {
     let digits: Option<Vec<u8>> = text.chars().map(|c| c.to_digit(16).and_then(|d| u8::try_from(d).ok())).collect();
     let digits = digits.filter(|digits| digits.len() % 2 == 0)?;
     Some(digits.chunks_exact(2).map(|pair| pair.iter().fold(0, |byte, digit| byte << 4 | digit)).collect())
 }
 
-/// Upper-case hex digits, as the modem writes.
+/// Upper-case hex digits, as the modem writes them.
 pub(super) fn to_hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02X}")).collect()
 }
@@ -178,7 +176,7 @@ mod tests {
             for piece in pieces {
                 collector.push(&piece);
                 while collector.next().is_some() {}
-                prop_assert!(collector.buffer.len() <= LINE_LIMIT);
+                prop_assert!(collector.buffer.len() <= MAX_LINE_BYTES);
             }
         }
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 pub(crate) struct PacketSignal {
     /// Start of the reception.
     pub began: Duration,
-    /// One way.
+    /// One-way travel time.
     pub travel: Duration,
     /// Input signal-to-noise ratio, dB; falls with range.
     pub snr_db: f64,

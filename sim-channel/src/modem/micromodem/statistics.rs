@@ -1,7 +1,7 @@
 //! `CACST` and `CAXST`: statistics of each reception and each transmission.
 
 use super::base::MicromodemBase;
-use super::packet::{Kind, Packet};
+use super::packet::{Packet, PacketKind};
 use super::signal::PacketSignal;
 use super::transmitter::{QueuedPacket, SentPacket};
 use std::time::Duration;
@@ -29,7 +29,7 @@ pub(super) fn report_reception(
     let (version, arrived) = (version(base), arrival_time(base, signal.began));
     let Packet { src, dst, rate, .. } = packet;
     let bad = packet.frames.iter().filter(|frame| frame.is_none()).count();
-    let frames = if packet.kind == Kind::CycleInit { 0 } else { packet.frames.len() };
+    let frames = if packet.kind == PacketKind::CycleInit { 0 } else { packet.frames.len() };
     let psk_error = u8::from(bad > 0);
     let snr = signal.snr_db;
     let detector = "06,32767,45,0102,0123,07,00,00,00,00";

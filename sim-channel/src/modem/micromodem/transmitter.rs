@@ -1,6 +1,6 @@
 //! The transducer and the packets that wait for it.
 
-use super::packet::{Kind, Packet};
+use super::packet::{Packet, PacketKind};
 use super::rates::{FSK_MINI, PSK_MINI};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -17,14 +17,14 @@ pub(crate) struct QueuedPacket {
     pub packet_type: u8,
     /// Frames that the cycle init requested.
     pub expected: u8,
-    /// The host gets no report of replies that the modem sends by itself.
+    /// False for replies that the modem sends by itself: the host gets no report of them.
     pub reported: bool,
-    /// Request data from the host after this packet.
+    /// Whether the modem requests data from the host after this packet.
     pub then_request_data: bool,
 }
 
 impl QueuedPacket {
-    /// A minipacket that the host has ordered.
+    /// A minipacket by order of the host.
     pub(super) fn mini(packet: Packet) -> Self {
         let bytes = packet.bytes();
         Self { packet, airtime: FSK_MINI, bytes, packet_type: 2, expected: 0, reported: true, then_request_data: false }
@@ -32,7 +32,7 @@ impl QueuedPacket {
 
     /// A reply that the modem sends by itself.
     pub(super) fn reply(packet: Packet) -> Self {
-        let airtime = if packet.kind == Kind::Ack && packet.rate > 0 { PSK_MINI } else { FSK_MINI };
+        let airtime = if packet.kind == PacketKind::Ack && packet.rate > 0 { PSK_MINI } else { FSK_MINI };
         let packet_type = if packet.is_psk() { 4 } else { 2 };
         Self { airtime, packet_type, reported: false, ..Self::mini(packet) }
     }
@@ -70,7 +70,7 @@ impl Transmitter {
         self.last_number.wrapping_add(1)
     }
 
-    /// Numbers the next packet and occupies the transducer for its air time; `None` while it is occupied.
+    /// Numbers the next packet and occupies the transducer for its airtime; `None` while it is occupied.
     pub(super) fn begin(&mut self, now: Duration) -> Option<QueuedPacket> {
         if self.is_busy(now) {
             return None;

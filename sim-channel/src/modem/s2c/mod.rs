@@ -5,7 +5,7 @@
 //!
 //! ```text
 //!   host -> base::CommandPort -> commands -> messages, burst -> base::Transmitter -> channel
-//!   host <- base::CommandPort <- receiver <- dispatch        <- Reception         <- channel
+//!   host <- base::CommandPort <- receiver <- dispatch        <- ReceptionLog         <- channel
 //! ```
 
 mod base;
@@ -25,21 +25,37 @@ use crate::usbl::UsblHead;
 use base::{AfterSending, Condition, S2cBase, S2cTask};
 use burst::BurstService;
 use messages::Messages;
-use receiver::{Reception, UsblReporter};
+use receiver::{ReceptionLog, UsblReporter};
 use std::time::Duration;
 
-/// Air time of an instant message of `bytes` (1..=64), for schedules and budgets.
+/// Airtime of an instant message of `bytes` (1..=64), for schedules and budgets.
 ///
 /// Source: a fit to the table of measured durations shipped with a fielded driver, 161 ms + 10.9 ms a byte.
+///
+/// ```
+/// assert_eq!(sim_channel::modem::s2c::instant_airtime(64).as_millis(), 858);
+/// ```
 pub fn instant_airtime(bytes: usize) -> Duration {
     base::timing::instant(bytes)
 }
 
 /// An emulated S2C modem with one port, at which there may be several hosts.
+///
+/// ```
+/// use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
+/// use sim_channel::modem::{Emulator, Host};
+/// use sim_channel::Duration;
+///
+/// let config = S2cConfig { interpreter: Interpreter::At, baud: None, ..S2cConfig::new(7) };
+/// let mut modem = S2c::new(config);
+/// // In data mode, commands and replies are wrapped.
+/// modem.handle_host_bytes(Host::FIRST, b"+++AT?MODE\r", Duration::ZERO);
+/// assert_eq!(modem.poll_host_bytes(Host::FIRST, Duration::ZERO), b"+++AT?MODE:2:AT\r\n");
+/// ```
 #[derive(Debug)]
 pub struct S2c {
     base: S2cBase,
-    reception: Reception,
+    reception: ReceptionLog,
     usbl: UsblReporter,
     messages: Messages,
     bursts: BurstService,
@@ -49,7 +65,7 @@ impl S2c {
     /// A modem that has just been switched on and is ready.
     pub fn new(config: S2cConfig) -> Self {
         Self {
-            reception: Reception::default(),
+            reception: ReceptionLog::default(),
             usbl: UsblReporter::new(config.usbl.map(|usbl| UsblHead::new(usbl, config.seed))),
             messages: Messages::default(),
             bursts: BurstService::default(),
@@ -57,7 +73,7 @@ impl S2c {
         }
     }
 
-    /// The local address in force.
+    /// The present local address, `?AL`.
     pub fn address(&self) -> u8 {
         self.base.address()
     }
@@ -130,7 +146,7 @@ impl S2c {
         base.board.schedule(now + Duration::from_millis(u64::from(base.config.boot_ms)), S2cTask::Booted);
         *self = Self {
             base,
-            reception: Reception::default(),
+            reception: ReceptionLog::default(),
             usbl: self.usbl.restarted(),
             messages: Messages::default(),
             bursts: BurstService::default(),
@@ -192,7 +208,7 @@ impl ModemLogic for S2c {
                     let _ = settings.set("AL", &address.to_string(), false);
                 }
             }
-            // Done by the line.
+            // These are faults of the line.
             Fault::Garbage(_) | Fault::HalfLine | Fault::Freeze(_) => {}
             Fault::BigBuffer => self.base.settings.pool = 1024 * 1024,
         }

@@ -1,4 +1,4 @@
-//! Hosts at emulated modems in one water.
+//! Hosts at emulated modems in one basin.
 
 use crate::channel::{Channel, ChannelConfig};
 use crate::modem::{Basin, Emulator};
@@ -8,27 +8,27 @@ use std::time::Duration;
 
 pub(crate) const SECOND: Duration = Duration::from_secs(1);
 
-/// Modems 1, 2, .. on a line, `range_m` apart, and everything that their hosts were told.
-pub(crate) struct Bench {
+/// Modems 1, 2, .. on a line, `range_m` apart, and the bytes that their hosts have received.
+pub(crate) struct EmulatorRig {
     pub basin: Basin,
-    pub told: BTreeMap<u8, Vec<u8>>,
+    pub received: BTreeMap<u8, Vec<u8>>,
 }
 
-impl Bench {
+impl EmulatorRig {
     pub(crate) fn join(modems: Vec<(u8, Box<dyn Emulator>)>, range_m: f64, config: ChannelConfig) -> Self {
         let mut basin = Basin::new(Channel::new(config, 1));
-        let mut told = BTreeMap::new();
+        let mut received = BTreeMap::new();
         for (index, (node, modem)) in modems.into_iter().enumerate() {
             basin.channel().place(NodeId(node), Position::new(range_m * index as f64, 0.0, 0.0));
             basin.add(NodeId(node), modem);
-            told.insert(node, Vec::new());
+            received.insert(node, Vec::new());
         }
-        Self { basin, told }
+        Self { basin, received }
     }
 
-    /// Puts the modems so many metres apart.
-    pub(crate) fn channel_range(&mut self, range_m: f64) {
-        for (index, node) in self.told.keys().enumerate() {
+    /// Places the modems `range_m` metres apart.
+    pub(crate) fn set_spacing(&mut self, range_m: f64) {
+        for (index, node) in self.received.keys().enumerate() {
             self.basin.channel().place(NodeId(*node), Position::new(range_m * index as f64, 0.0, 0.0));
         }
     }
@@ -49,14 +49,14 @@ impl Bench {
     }
 
     fn collect(&mut self) {
-        for (node, told) in &mut self.told {
-            told.extend(self.basin.poll_host_bytes(NodeId(*node)));
+        for (node, received) in &mut self.received {
+            received.extend(self.basin.poll_host_bytes(NodeId(*node)));
         }
     }
 
-    /// All that was told to a host since last asked, as text.
+    /// Takes the bytes that a host has received since the last call, as text.
     pub(crate) fn take(&mut self, node: u8) -> String {
-        let bytes = std::mem::take(self.told.get_mut(&node).expect("node"));
+        let bytes = std::mem::take(self.received.get_mut(&node).expect("node"));
         bytes.iter().map(|byte| char::from(*byte)).collect()
     }
 
@@ -64,8 +64,8 @@ impl Bench {
         self.take(node).split_terminator("\r\n").map(str::to_string).collect()
     }
 
-    /// Writes a line and gives the answer time to come, but nothing acoustic.
-    pub(crate) fn ask(&mut self, node: u8, line: &str) -> String {
+    /// Writes a line and returns the reply, after a time too short for anything acoustic.
+    pub(crate) fn request(&mut self, node: u8, line: &str) -> String {
         self.take(node);
         self.write(node, line.as_bytes());
         self.run(Duration::from_millis(80) + Duration::from_millis(line.len() as u64));
@@ -73,7 +73,7 @@ impl Bench {
     }
 }
 
-/// The first words of lines.
+/// The first field of each line.
 pub(crate) fn keywords(lines: &[String]) -> Vec<&str> {
     lines.iter().map(|line| line.split(',').next().unwrap_or_default()).collect()
 }

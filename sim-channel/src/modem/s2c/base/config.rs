@@ -1,45 +1,45 @@
-//! What kind of S2C modem is emulated.
+//! The properties of the emulated modem.
 
 use crate::usbl::UsblConfig;
 
-/// Which of the two command interpreters a port has.
+/// The command interpreter of a port.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Interpreter {
-    /// `AT`: raw burst data between commands, which are escaped by `+++`.
+    /// `AT`: raw burst data, with commands escaped by `+++` between them.
     At,
-    /// `NET`: commands only.
+    /// `NET`: commands only, and messages as `RECV..` lines.
     Net,
 }
 
-/// The make of an emulated modem, fixed while it runs.
+/// The properties of an emulated S2C modem; fixed while it runs.
 #[derive(Clone, PartialEq, Debug)]
 pub struct S2cConfig {
     /// Local address after the first start, 1..=254.
     pub address: u8,
-    /// Remote address of raw data after the first start, 0..=254; 0 for none.
+    /// Remote address of raw data after the first start, 1..=254; 0 for none.
     pub remote: u8,
-    /// The interpreter of the port.
+    /// The command interpreter of the port.
     pub interpreter: Interpreter,
-    /// Baud rate, 8N1; `None` for TCP.
+    /// Baud rate, 8N1; `None` without pacing, as over TCP.
     pub baud: Option<u32>,
     /// Raw acoustic bit rate of bursts, bit/s.
     pub bit_rate: u32,
-    /// A USBL head with that accuracy, or none.
+    /// Accuracy of the USBL head; `None` for a modem without a head.
     pub usbl: Option<UsblConfig>,
-    /// A head that cannot range tells `USBLANGLES` instead of `USBLLONG`.
+    /// Whether the head measures angles only: it then reports `USBLANGLES` instead of `USBLLONG`.
     pub angles_only: bool,
-    /// Farthest that is waited for, as one-way travel in microseconds.
+    /// Longest one-way travel time for which the modem waits, microseconds.
     pub max_propagation_us: u32,
-    /// Whether settings need `AT@CTRL` first, as newer firmware asks.
+    /// Whether settings need `AT@CTRL` first, as newer firmware requires.
     pub needs_control: bool,
-    /// Time from reset to the first byte.
+    /// Time from a reset until the modem accepts bytes, ms.
     pub boot_ms: u32,
-    /// Seeds the noise of the head and of the line.
+    /// Seed of the errors of the head and of the noise that `Fault::Garbage` writes.
     pub seed: u64,
 }
 
 impl S2cConfig {
-    /// A modem of that address on a NET port at 19200 baud, without a USBL head.
+    /// A modem with `address` on a NET port at 19200 baud, without a USBL head.
     pub fn new(address: u8) -> Self {
         Self {
             address,

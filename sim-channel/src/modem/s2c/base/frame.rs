@@ -3,14 +3,14 @@
 //! ```text
 //! byte 0     magic 0xE5
 //!      1     kind
-//!      2     source address          3     destination address (255: everybody)
+//!      2     source address          3     destination address (255: all modems)
 //!      4     highest address         5     carrier waveform
 //!      6- 7  packet time, ms         8     protocol id
 //!      9     flag or session        10     packets that follow
 //!     11-14  sequence number         15-22 bit map of packets held beyond the sequence number
 //!     23     protocol id and 24 length of a piggyback message (0: none)
 //!     25-26  CRC-16 of bytes 0..25
-//!     27-    piggyback message, then payload; unprotected, so that corruption can slip past
+//!     27-    piggyback message, then payload; unprotected, so that corruption can pass
 //! ```
 
 use crate::modem::emulator::crc::crc16;

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-/// One numeric setting.
 struct SettingRule {
     key: &'static str,
     allowed: AllowedValues,
@@ -77,12 +76,12 @@ pub(crate) enum SettingError {
 pub(crate) struct Settings {
     values: BTreeMap<&'static str, u32>,
     pending: BTreeMap<&'static str, u32>,
-    /// Bytes of burst data that are kept; `@ZL`.
+    /// Capacity of the burst pool, bytes; `@ZL`.
     pub pool: usize,
 }
 
 impl Settings {
-    /// The factory's values, but for the local and the remote address.
+    /// The factory values, with the given local and remote address.
     pub(crate) fn factory(address: u8, remote: u8) -> Self {
         let mut values: BTreeMap<_, _> = RULES.iter().map(|rule| (rule.key, rule.default)).collect();
         values.insert("AL", u32::from(address));
@@ -95,7 +94,7 @@ impl Settings {
         self.values.get(key).copied().unwrap_or_default()
     }
 
-    /// A value that fits a byte by its range.
+    /// The value of a setting whose range fits a byte.
     pub(crate) fn byte(&self, key: &str) -> u8 {
         u8::try_from(self.get(key)).unwrap_or(u8::MAX)
     }
@@ -146,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_are_kept() {
+    fn values_out_of_range_are_refused() {
         let mut settings = Settings::factory(7, 0);
         assert_eq!(settings.get("AL"), 7);
         assert_eq!(settings.set("L", "4", false), Err(SettingError::OutOfRange));
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_is_marked_until_it_takes_effect() {
+    fn pending_value_is_marked_until_it_takes_effect() {
         let mut settings = Settings::factory(1, 0);
         assert_eq!(settings.set("ZP", "765", true), Ok(false));
         assert_eq!((settings.get("ZP"), settings.shown("ZP")), (750, Some("[*]765".to_string())));

@@ -109,7 +109,7 @@ impl BurstService {
         let AcousticLink::Establishing { peer, session, .. } = self.link else { return };
         if (peer, session) == (frame.src, frame.tag) {
             self.connect(base, peer, session, true, signal, now);
-            self.begin_turn_after(base, timing::TURN_ROUND - timing::PROCESSING, false, now);
+            self.begin_turn_after(base, timing::TURN_AROUND - timing::PROCESSING, false, now);
         }
     }
 

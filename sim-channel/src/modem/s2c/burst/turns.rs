@@ -167,7 +167,7 @@ impl BurstService {
         let owes =
             connection.is_some_and(|connection| connection.sender.has_unacked() || !connection.deferred.is_empty());
         if self.pool.holds_record_to(frame.src) || owes || messages.instant.waits_for_turn_to(frame.src) {
-            self.begin_turn_after(base, timing::TURN_ROUND.saturating_sub(timing::PROCESSING), false, now);
+            self.begin_turn_after(base, timing::TURN_AROUND.saturating_sub(timing::PROCESSING), false, now);
         } else {
             self.rest(base, now);
         }
@@ -184,7 +184,7 @@ impl BurstService {
             notices::record(base, frame.src, pid, &data, signal, now);
         }
         if frame.follow == 0 {
-            self.begin_turn_after(base, timing::TURN_ROUND.saturating_sub(timing::PROCESSING), true, now);
+            self.begin_turn_after(base, timing::TURN_AROUND.saturating_sub(timing::PROCESSING), true, now);
         } else {
             self.listen_at_most(base, base.packet_time(frame.follow) + Duration::from_millis(100), now);
         }

@@ -1,4 +1,4 @@
-//! What the host wrote, cut into commands, messages and data. Counts payload bytes, never searches them.
+//! Cuts the bytes of a host into commands, messages and data. A payload is counted, never searched.
 
 mod send_command;
 
@@ -7,29 +7,27 @@ pub(crate) use send_command::{HeaderErrorKind, InstantFlag, SendCommand, SendSer
 use send_command::{HeaderError, HeaderParse, parse_header};
 use std::time::Duration;
 
-/// The longest command line without payload; longer ones are answered `ERROR WRONG FORMAT`.
-const LINE_LIMIT: usize = 512;
+/// Longest command line without payload; the reply to a longer one is `ERROR WRONG FORMAT`.
+const MAX_LINE_BYTES: usize = 512;
 /// Silence before and after `+++` that makes it an escape.
-pub(crate) const GUARD: Duration = Duration::from_secs(1);
+const GUARD_TIME: Duration = Duration::from_secs(1);
 const ESCAPE: &[u8] = b"+++";
 const TIES: &[u8] = b"+++AT";
 
-/// One thing the host wrote.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum HostInput {
     /// A command, without `AT` and terminator.
     Command(String),
-    /// A message to send, payload complete and terminated; or what is wrong with it.
+    /// A message to send, with its payload complete and terminated, or the error in it.
     Send(Result<SendCommand, HeaderError>),
-    /// A line that is none.
+    /// A line that is not a command.
     WrongFormat,
-    /// Raw burst data of the data mode.
+    /// Raw burst data, in data mode.
     Data(Vec<u8>),
-    /// `+++` between silences.
+    /// `+++` between two silences.
     Escape,
 }
 
-/// What a byte stream is read as.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum ReadMode {
     /// Raw data with `+++AT` commands in it.
@@ -38,7 +36,7 @@ pub(crate) enum ReadMode {
     Commands,
 }
 
-/// Keeps what is not yet complete; bounded by the longest message.
+/// Keeps incomplete input, at most the longest message.
 #[derive(Debug, Default)]
 pub(crate) struct InputParser {
     buffer: Vec<u8>,
@@ -51,7 +49,7 @@ pub(crate) struct InputParser {
 impl InputParser {
     /// Takes bytes that came at `now`.
     pub(crate) fn push(&mut self, bytes: &[u8], now: Duration) {
-        let silent = self.last_byte.is_none_or(|last| now.saturating_sub(last) >= GUARD);
+        let silent = self.last_byte.is_none_or(|last| now.saturating_sub(last) >= GUARD_TIME);
         if self.buffer.is_empty() {
             self.guard_before = silent;
         }
@@ -59,20 +57,20 @@ impl InputParser {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// When silence gives what is kept another meaning.
+    /// Time at which silence gives the incomplete input another meaning.
     pub(crate) fn timeout(&self, mode: ReadMode) -> Option<Duration> {
         let waits = mode == ReadMode::Data && !self.buffer.is_empty() && TIES.starts_with(&self.buffer);
-        self.last_byte.filter(|_| waits).map(|last| last + GUARD)
+        self.last_byte.filter(|_| waits).map(|last| last + GUARD_TIME)
     }
 
-    /// Silence passed: a lone `+++` is an escape, another piece of one is data.
+    /// A silence has passed: a lone `+++` is an escape, a part of it is data.
     pub(crate) fn handle_timeout(&mut self, now: Duration, mode: ReadMode) -> Option<HostInput> {
         self.timeout(mode).filter(|at| *at <= now)?;
         let kept = std::mem::take(&mut self.buffer);
         Some(if kept == ESCAPE && self.guard_before { HostInput::Escape } else { HostInput::Data(kept) })
     }
 
-    /// The next complete thing; `mode` may change between calls.
+    /// The next complete input; `mode` may change between calls.
     pub(crate) fn next(&mut self, mode: ReadMode) -> Option<HostInput> {
         loop {
             let first = *self.buffer.first()?;
@@ -110,7 +108,7 @@ impl InputParser {
     fn next_command(&mut self, prefix: usize) -> Option<Option<HostInput>> {
         let text = self.buffer.get(prefix..).unwrap_or_default();
         match parse_header(text) {
-            HeaderParse::Incomplete if text.len() <= LINE_LIMIT => None,
+            HeaderParse::Incomplete if text.len() <= MAX_LINE_BYTES => None,
             HeaderParse::Message(command, header_bytes) => self.take_message(command, prefix + header_bytes).map(Some),
             HeaderParse::Wrong(error) => {
                 self.skip_line = self.take_line().is_none();
@@ -120,7 +118,7 @@ impl InputParser {
         }
     }
 
-    /// The payload by its count, then the terminator.
+    /// Takes the payload by its length, then the terminator.
     fn take_message(&mut self, mut command: SendCommand, header_bytes: usize) -> Option<HostInput> {
         let end = header_bytes + command.length;
         let terminator = *self.buffer.get(end)?;
@@ -136,7 +134,7 @@ impl InputParser {
     }
 
     fn take_plain(&mut self, prefix: usize) -> Option<Option<HostInput>> {
-        let too_long = self.buffer.len() > LINE_LIMIT;
+        let too_long = self.buffer.len() > MAX_LINE_BYTES;
         let Some(line) = self.take_line() else { return too_long.then_some(Some(HostInput::WrongFormat)) };
         let text = line.get(prefix..).unwrap_or_default();
         if line.is_empty() {
@@ -150,10 +148,10 @@ impl InputParser {
         }))
     }
 
-    /// The bytes up to the next terminator, which is dropped; nothing is kept of a line being skipped without its end.
+    /// Takes the bytes up to the next terminator, which is dropped. A skipped line without end is not kept.
     fn take_line(&mut self) -> Option<Vec<u8>> {
         let Some(end) = self.buffer.iter().position(|byte| matches!(byte, b'\r' | b'\n')) else {
-            if self.skip_line || self.buffer.len() > LINE_LIMIT {
+            if self.skip_line || self.buffer.len() > MAX_LINE_BYTES {
                 self.buffer.clear();
                 self.skip_line = true;
             }
@@ -165,7 +163,7 @@ impl InputParser {
     }
 }
 
-/// Where `+++AT`, or what may become it, begins; the length if nowhere.
+/// Index of `+++AT` or of a beginning of it at the end of `bytes`; the length if there is neither.
 fn escape_start(bytes: &[u8]) -> usize {
     (0..bytes.len())
         .find(|start| {

@@ -26,7 +26,7 @@ fn commands_end_in_cr_or_lf_or_both() {
 }
 
 #[test]
-fn empty_lines_say_nothing_and_other_lines_are_wrong() {
+fn empty_lines_are_ignored_and_other_lines_refused() {
     assert_eq!(read(b"\r\n\r\rhello\r", ReadMode::Commands), [HostInput::WrongFormat]);
     assert_eq!(read(b"+++AT?MODE\r", ReadMode::Commands), [HostInput::WrongFormat]);
 }
@@ -41,7 +41,7 @@ fn payload_is_counted_not_searched() {
 }
 
 #[test]
-fn bytes_may_come_one_by_one() {
+fn commands_may_come_byte_by_byte() {
     let mut parser = InputParser::default();
     let line = b"AT*SENDIM,p3,3,9,noack,a\rb\nAT?MODE\n";
     let inputs: Vec<_> = line.iter().flat_map(|byte| read_all(&mut parser, &[*byte], ReadMode::Commands)).collect();
@@ -75,7 +75,7 @@ fn every_message_command_is_read() {
 }
 
 #[test]
-fn a_wrong_count_is_refused_and_the_next_line_read() {
+fn wrong_length_is_refused_and_the_next_line_read() {
     let wrong = HostInput::Send(Err(HeaderError { name: "*SENDIM", kind: HeaderErrorKind::Format }));
     assert_eq!(read(b"AT*SENDIM,3,2,ack,abcdef\rAT?T\r", ReadMode::Commands), [wrong.clone(), command("?T")]);
     assert_eq!(read(b"AT*SENDIM,3,2,maybe,abc\rAT?T\r", ReadMode::Commands), [wrong.clone(), command("?T")]);
@@ -83,7 +83,7 @@ fn a_wrong_count_is_refused_and_the_next_line_read() {
 }
 
 #[test]
-fn a_payload_too_long_or_empty_is_out_of_range_and_counted_out() {
+fn payload_of_wrong_size_is_refused_and_skipped() {
     let mut line = b"AT*SENDIM,65,2,ack,".to_vec();
     line.extend([b'\r'; 65]);
     line.extend(b"\rAT*SENDIM,0,2,ack,\rAT?T\r");
@@ -99,7 +99,7 @@ fn data_mode_separates_commands_from_data() {
 }
 
 #[test]
-fn a_piece_of_an_escape_waits_for_what_follows() {
+fn partial_escape_waits_for_more_bytes() {
     let mut parser = InputParser::default();
     assert_eq!(read_all(&mut parser, b"ab++", ReadMode::Data), [HostInput::Data(b"ab".to_vec())]);
     assert_eq!(read_all(&mut parser, b"+A", ReadMode::Data), []);
@@ -129,7 +129,7 @@ fn plus_signs_without_silence_before_are_data() {
 }
 
 #[test]
-fn a_line_too_long_is_refused_once_in_whatever_pieces_it_comes() {
+fn overlong_line_is_refused_once() {
     for piece in [7, 600, 2000] {
         let mut parser = InputParser::default();
         let inputs: Vec<_> =
@@ -140,7 +140,7 @@ fn a_line_too_long_is_refused_once_in_whatever_pieces_it_comes() {
 }
 
 #[test]
-fn a_flood_without_terminator_is_not_kept() {
+fn endless_line_is_not_kept() {
     let mut parser = InputParser::default();
     for mode in [ReadMode::Commands, ReadMode::Data] {
         for _ in 0..200 {
@@ -154,7 +154,7 @@ fn a_flood_without_terminator_is_not_kept() {
 
 proptest! {
     #[test]
-    fn any_bytes_in_any_pieces_are_survived_in_bounded_memory(
+    fn any_bytes_are_survived_in_bounded_memory(
         pieces in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..200), 0..40),
         data in any::<bool>(),
     ) {
@@ -167,7 +167,7 @@ proptest! {
     }
 
     #[test]
-    fn mutated_lines_are_survived_and_the_next_command_is_understood(
+    fn next_command_is_read_after_a_mutated_line(
         at in 0usize..40, byte in any::<u8>(), cut in 0usize..40, data in any::<bool>(),
     ) {
         let mode = if data { ReadMode::Data } else { ReadMode::Commands };

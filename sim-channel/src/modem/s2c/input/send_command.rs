@@ -1,11 +1,10 @@
 //! `*SEND`, `*SENDIM`, `*SENDIMS`, `*SENDPBM`: the fields before the payload.
 
-/// The longest payload that is still counted out when it is too long to send.
-const COUNTED_LIMIT: usize = 8192;
-/// The longest field before a comma: `*SENDIMS` and 32-bit times fit.
-const FIELD_LIMIT: usize = 12;
+/// Longest payload that is counted and skipped although it is too long to send.
+const MAX_COUNTED_BYTES: usize = 8192;
+/// Longest field before a comma; `*SENDIMS` and 32-bit times fit.
+const MAX_FIELD_BYTES: usize = 12;
 
-/// A message to send.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct SendCommand {
     pub service: SendService,
@@ -15,12 +14,11 @@ pub(crate) struct SendCommand {
     pub data: Vec<u8>,
 }
 
-/// How it is to be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum SendService {
     Burst,
     Instant(InstantFlag),
-    /// At a time of the modem's clock in us, or as soon as possible.
+    /// At this time of the modem's clock, us, or as soon as possible.
     Synchronous(Option<u32>),
     Piggyback,
 }
@@ -65,27 +63,25 @@ impl SendService {
     }
 }
 
-/// What is wrong with a message, and the command's name for the reply.
+/// An error in a message, with the name of the command for the reply.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct HeaderError {
     pub name: &'static str,
     pub kind: HeaderErrorKind,
 }
 
-/// How a message can be wrong.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum HeaderErrorKind {
     Format,
     Range,
 }
 
-/// How far the fields were understood.
 pub(crate) enum HeaderParse {
-    /// Not a message command at all.
+    /// The line is not a message command.
     NoSend,
     Incomplete,
     Wrong(HeaderError),
-    /// The fields, and how many bytes they took.
+    /// The fields and their length in bytes.
     Message(SendCommand, usize),
 }
 
@@ -127,7 +123,7 @@ enum FieldError {
     Wrong,
 }
 
-/// HeaderFields that end in a comma.
+/// The rest of a header, of which each field ends in a comma.
 struct HeaderFields<'a> {
     rest: &'a [u8],
 }
@@ -136,12 +132,12 @@ impl<'a> HeaderFields<'a> {
     fn next(&mut self) -> Result<&'a str, FieldError> {
         let end = self.rest.iter().position(|byte| matches!(byte, b',' | b'\r' | b'\n'));
         match end {
-            Some(end) if self.rest.get(end) == Some(&b',') && end <= FIELD_LIMIT => {
+            Some(end) if self.rest.get(end) == Some(&b',') && end <= MAX_FIELD_BYTES => {
                 let (field, rest) = self.rest.split_at_checked(end).ok_or(FieldError::Wrong)?;
                 self.rest = rest.get(1..).unwrap_or_default();
                 std::str::from_utf8(field).map_err(|_| FieldError::Wrong)
             }
-            None if self.rest.len() <= FIELD_LIMIT => Err(FieldError::Incomplete),
+            None if self.rest.len() <= MAX_FIELD_BYTES => Err(FieldError::Incomplete),
             _ => Err(FieldError::Wrong),
         }
     }
@@ -151,7 +147,7 @@ impl<'a> HeaderFields<'a> {
     }
 }
 
-/// A number of decimal digits and nothing else.
+/// A number that consists of decimal digits only.
 fn digits<N: std::str::FromStr>(text: &str) -> Option<N> {
     text.parse().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))
 }
@@ -164,7 +160,7 @@ fn message(fields: &mut HeaderFields<'_>) -> Result<SendCommand, FieldError> {
         pid = Some(digits(id).filter(|id| *id <= 7).ok_or(FieldError::Wrong)?);
         length = fields.next()?;
     }
-    let length = digits(length).filter(|length| *length <= COUNTED_LIMIT).ok_or(FieldError::Wrong)?;
+    let length = digits(length).filter(|length| *length <= MAX_COUNTED_BYTES).ok_or(FieldError::Wrong)?;
     let dst = fields.number()?;
     let service = match name {
         "*SEND" => SendService::Burst,

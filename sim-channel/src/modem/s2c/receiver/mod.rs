@@ -1,4 +1,4 @@
-//! Reception: the notifications of each signal, the last signal received, and positions from the USBL head.
+//! ReceptionLog: the notifications of each signal, the last signal received, and positions from the USBL head.
 
 pub(crate) mod notices;
 mod usbl;
@@ -20,13 +20,13 @@ struct LastSignal {
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Reception {
+pub(crate) struct ReceptionLog {
     /// Transmissions whose `RECVSTART` has been sent.
     begun: BTreeSet<u64>,
     last: LastSignal,
 }
 
-impl Reception {
+impl ReceptionLog {
     /// The beginning of a signal; one of another network is not noticed.
     pub(crate) fn on_onset(&mut self, base: &mut S2cBase, onset: &Onset, now: Duration) {
         let foreign = S2cFrame::decode(&onset.bytes).is_some_and(|frame| !base.network().receives(&frame.network));

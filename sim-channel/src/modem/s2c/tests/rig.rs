@@ -1,12 +1,12 @@
-//! Hosts at S2C modems in one water.
+//! Hosts at S2C modems in one basin.
 
-pub(super) use crate::modem::tests::rig::{Bench, SECOND, keywords};
+pub(super) use crate::modem::tests::rig::{EmulatorRig, SECOND, keywords};
 
 use crate::channel::ChannelConfig;
 use crate::modem::Emulator;
 use crate::modem::s2c::{S2c, S2cConfig};
 
-impl Bench {
+impl EmulatorRig {
     pub(super) fn new(modems: u8, range_m: f64, config: ChannelConfig) -> Self {
         Self::of((1..=modems).map(S2cConfig::new).collect(), range_m, config)
     }

@@ -1,4 +1,4 @@
-//! Reading Markov fits of measured links from CSV, one step of the chain being one packet.
+//! Reads Markov fits of measured links from CSV. One step of a fitted chain is one packet.
 
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
@@ -7,55 +7,61 @@ use crate::nodes::NodeId;
 use std::time::Duration;
 use thiserror::Error;
 
-/// One directed link of a fitted campaign.
+/// One directed link of a measurement campaign, with a Markov chain fitted to its losses.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FittedLink<Model> {
-    /// Which deployment it belongs to.
+    /// Number of the deployment in the campaign.
     pub topology: u8,
-    /// The sender.
+    /// The sender of the measured packets.
     pub from: NodeId,
-    /// The receiver.
+    /// The receiver of the measured packets.
     pub to: NodeId,
-    /// The fit, its dwell scaled to seconds.
+    /// The fitted chain, its dwells in seconds.
     pub model: Model,
 }
 
-/// What is wrong with a table of fitted links; lines count from 1.
+/// An error in a table of fitted links; lines count from 1.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
 pub enum FitError {
     /// A line does not have the columns of this layout.
     #[error("line {line}: {found} columns, expected {expected}")]
     Columns {
-        /// Where.
+        /// Number of the line in the table.
         line: usize,
-        /// How many there are.
+        /// Number of columns of the line.
         found: usize,
-        /// How many there should be.
+        /// Number of columns of the layout.
         expected: usize,
     },
     /// A node or topology is not a number 0..=255.
     #[error("line {line}: not a node number: {text}")]
     Node {
-        /// Where.
+        /// Number of the line in the table.
         line: usize,
-        /// What stands there.
+        /// Text of the wrong field.
         text: String,
     },
-    /// A probability is not a number in 0..=1, or the ways out of a state sum to more than 1.
+    /// A probability is not a number in 0..=1, or the probabilities to leave a state sum to more than 1.
     #[error("line {line}: not a probability: {text}")]
     Probability {
-        /// Where.
+        /// Number of the line in the table.
         line: usize,
-        /// What stands there.
+        /// Text of the wrong field.
         text: String,
     },
-    /// There is no link in it.
+    /// The table contains no link.
     #[error("no link found")]
     Empty,
 }
 
 impl GilbertElliott {
-    /// Reads `topology,from,to,p_succ_good,p_succ_bad,p_gb,p_bg`, a header line allowed; a step of the chain lasts `step`.
+    /// Reads lines `topology,from,to,p_succ_good,p_succ_bad,p_gb,p_bg`; a step of the chain lasts `step`.
+    ///
+    /// A header line is allowed.
+    ///
+    /// # Errors
+    ///
+    /// The first wrong line, or [`FitError::Empty`].
     pub fn from_csv(text: &str, step: Duration) -> Result<Vec<FittedLink<Self>>, FitError> {
         rows::<4>(text)?
             .into_iter()
@@ -73,8 +79,14 @@ impl GilbertElliott {
 }
 
 impl ThreeState {
-    /// Reads `topology,from,to,p_succ_good,p_succ_medium,p_succ_bad,p_gb,p_gm,p_mg,p_mb,p_bg,p_bm`, a header line allowed;
-    /// a step of the chain lasts `step`.
+    /// Reads lines `topology,from,to,p_succ_good,p_succ_medium,p_succ_bad,p_gb,p_gm,p_mg,p_mb,p_bg,p_bm`; a step of the
+    /// chain lasts `step`.
+    ///
+    /// A header line is allowed.
+    ///
+    /// # Errors
+    ///
+    /// The first wrong line, or [`FitError::Empty`].
     pub fn from_csv(text: &str, step: Duration) -> Result<Vec<FittedLink<Self>>, FitError> {
         rows::<9>(text)?
             .into_iter()
@@ -93,17 +105,17 @@ impl ThreeState {
     }
 }
 
-/// Topology, sender and receiver.
-struct Ends([u8; 3]);
+/// Topology, sender and receiver of a row.
+struct LinkEnds([u8; 3]);
 
-impl Ends {
+impl LinkEnds {
     fn with<Model>(self, model: Model) -> FittedLink<Model> {
         let Self([topology, from, to]) = self;
         FittedLink { topology, from: NodeId(from), to: NodeId(to), model }
     }
 }
 
-/// Mean time until a step of probability `leave` happens; for ever if it never does.
+/// Mean time until a step of probability `leave`; `Duration::MAX` if the probability is 0.
 fn dwell(step: Duration, leave: f64, line: usize) -> Result<Duration, FitError> {
     if leave > 1.0 + 1e-9 {
         return Err(FitError::Probability { line, text: leave.to_string() });
@@ -112,7 +124,7 @@ fn dwell(step: Duration, leave: f64, line: usize) -> Result<Duration, FitError> 
 }
 
 /// Line number, ends and `N` probabilities of each line that is neither empty nor the header.
-fn rows<const N: usize>(text: &str) -> Result<Vec<(usize, Ends, [f64; N])>, FitError> {
+fn rows<const N: usize>(text: &str) -> Result<Vec<(usize, LinkEnds, [f64; N])>, FitError> {
     let lines = (1..).zip(text.lines().map(str::trim));
     let rows: Result<Vec<_>, _> = lines
         .filter(|(_, line)| !line.is_empty() && !line.starts_with("topology"))
@@ -121,13 +133,13 @@ fn rows<const N: usize>(text: &str) -> Result<Vec<(usize, Ends, [f64; N])>, FitE
     rows.and_then(|rows| if rows.is_empty() { Err(FitError::Empty) } else { Ok(rows) })
 }
 
-fn row<const N: usize>(line: usize, text: &str) -> Result<(usize, Ends, [f64; N]), FitError> {
+fn row<const N: usize>(line: usize, text: &str) -> Result<(usize, LinkEnds, [f64; N]), FitError> {
     let fields: Vec<&str> = text.split(',').map(str::trim).collect();
     if fields.len() != 3 + N {
         return Err(FitError::Columns { line, found: fields.len(), expected: 3 + N });
     }
     let (ends, numbers) = fields.split_at(3);
-    let mut row = (line, Ends([0; 3]), [0.0; N]);
+    let mut row = (line, LinkEnds([0; 3]), [0.0; N]);
     for (slot, text) in row.1.0.iter_mut().zip(ends) {
         *slot = text.parse().map_err(|_| FitError::Node { line, text: text.to_string() })?;
     }
