@@ -5,7 +5,7 @@
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{S2c, S2cConfig};
 use sim_channel::modem::{Basin, Emulator};
-use sim_channel::{Channel, Duration, NodeId, Position, presets};
+use sim_channel::{Channel, Duration, NodeId, NodePosition, presets};
 
 const HOUR: Duration = Duration::from_secs(3600);
 const NODES: u8 = 15;
@@ -55,7 +55,7 @@ fn hour_of_fifteen_micromodems() -> usize {
 fn run(modem: impl Fn(u8) -> Box<dyn Emulator>, host_bytes: impl Fn(u64, u8) -> Vec<u8>) -> usize {
     let mut basin = Basin::new(Channel::new(presets::shallow_harbour(), 1));
     for address in 1..=NODES {
-        basin.channel().place(NodeId(address), Position::new(120.0 * f64::from(address), 0.0, 5.0));
+        basin.channel().place(NodeId(address), NodePosition::new(120.0 * f64::from(address), 0.0, 5.0));
         basin.add(NodeId(address), modem(address));
     }
     let mut received = 0;

@@ -3,8 +3,8 @@
 
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
-use sim_channel::modem::{Emulator, Host};
-use sim_channel::{Duration, Stream};
+use sim_channel::modem::{Emulator, HostId};
+use sim_channel::{Duration, RandomStream};
 
 const LINES: u32 = 10_000_000;
 
@@ -37,7 +37,7 @@ const MICROMODEM_LINES: [&[u8]; 10] = [
 ];
 
 /// One of `lines` with up to three bytes changed, dropped or doubled, or up to 40 random bytes.
-fn mutated(lines: &[&[u8]], rng: &mut Stream) -> Vec<u8> {
+fn mutated(lines: &[&[u8]], rng: &mut RandomStream) -> Vec<u8> {
     if rng.bernoulli(0.2) {
         return (0..rng.below(40)).map(|_| rng.below(256) as u8).collect();
     }
@@ -55,15 +55,15 @@ fn mutated(lines: &[&[u8]], rng: &mut Stream) -> Vec<u8> {
 
 /// Sends `count` lines to a modem; returns the number of bytes that it wrote.
 fn flood(mut modem: impl Emulator, lines: &[&[u8]], seed: u64, count: u32) -> usize {
-    let mut rng = Stream::new(seed, &[]);
+    let mut rng = RandomStream::new(seed, &[]);
     let mut now = Duration::ZERO;
     let mut received = 0;
     for _ in 0..count {
         now += Duration::from_micros(rng.below(20_000) as u64);
-        modem.handle_host_bytes(Host::FIRST, &mutated(lines, &mut rng), now);
+        modem.handle_host_bytes(HostId::FIRST, &mutated(lines, &mut rng), now);
         while modem.poll_transmit(now).is_some() {}
         while modem.poll_event().is_some() {}
-        received += modem.poll_host_bytes(Host::FIRST, now).len();
+        received += modem.poll_host_bytes(HostId::FIRST, now).len();
     }
     received
 }

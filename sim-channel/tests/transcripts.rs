@@ -4,7 +4,7 @@ use sim_channel::modem::Basin;
 use sim_channel::modem::Emulator;
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
-use sim_channel::{Channel, ChannelConfig, Duration, NodeId, Position};
+use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -72,7 +72,7 @@ impl Replay {
         };
         let node = NodeId(self.received.len() as u8 + 1);
         let x_m = keys.get("at").map_or(0.0, |metres| metres.parse().expect("metres"));
-        self.basin.channel().place(node, Position::new(x_m, 0.0, 0.0));
+        self.basin.channel().place(node, NodePosition::new(x_m, 0.0, 0.0));
         self.basin.add(node, modem);
         self.received.insert(node.0, Vec::new());
     }

@@ -1,7 +1,7 @@
 //! Fuzz targets of sim-channel: emulators accept any bytes from hosts and from the channel.
 
-use sim_channel::modem::{Emulator, Host};
-use sim_channel::{Arrival, Duration, NodeId, Outcome, Position};
+use sim_channel::modem::{Emulator, HostId};
+use sim_channel::{Arrival, Duration, NodeId, ReceptionOutcome, NodePosition};
 
 /// Feeds bytes of a host in pieces; the data also decide the lengths of the pieces and the pauses between them.
 pub fn host(mut modem: impl Emulator, data: &[u8]) {
@@ -10,7 +10,7 @@ pub fn host(mut modem: impl Emulator, data: &[u8]) {
     while let Some((control, tail)) = rest.split_first() {
         let (piece, tail) = tail.split_at(tail.len().min(usize::from(control & 63) + 1));
         now += Duration::from_millis(u64::from(control >> 6) * 400);
-        modem.handle_host_bytes(Host::FIRST, piece, now);
+        modem.handle_host_bytes(HostId::FIRST, piece, now);
         drain(&mut modem, now);
         rest = tail;
     }
@@ -20,8 +20,8 @@ pub fn host(mut modem: impl Emulator, data: &[u8]) {
 /// Feeds a frame from the channel.
 pub fn channel(mut modem: impl Emulator, data: &[u8]) {
     let now = Duration::from_secs(5);
-    let place = Position::default();
-    let outcome = Outcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };
+    let place = NodePosition::default();
+    let outcome = ReceptionOutcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };
     let arrival = Arrival {
         transmission: 1,
         from: NodeId(1),
@@ -42,5 +42,5 @@ fn drain(modem: &mut impl Emulator, now: Duration) {
     modem.handle_timeout(now);
     while modem.poll_transmit(now).is_some() {}
     while modem.poll_event().is_some() {}
-    modem.poll_host_bytes(Host::FIRST, now);
+    modem.poll_host_bytes(HostId::FIRST, now);
 }

@@ -4,7 +4,7 @@
 
 mod absorption;
 mod frame_error;
-pub mod noise;
+mod noise;
 mod sound_speed;
 mod spreading;
 

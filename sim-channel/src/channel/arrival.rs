@@ -3,7 +3,7 @@
 //! A modem may use the bytes, the times and the outcome; the positions and the reason of a loss are for the simulation
 //! alone.
 
-use crate::nodes::{NodeId, Position};
+use crate::nodes::{NodeId, NodePosition};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -25,13 +25,13 @@ pub struct Arrival {
     /// Slant range when the transmission began, m.
     pub range_m: f64,
     /// Position of the sender when the transmission began.
-    pub sender: Position,
+    pub sender: NodePosition,
     /// Position of the receiver when the transmission began.
-    pub receiver: Position,
+    pub receiver: NodePosition,
     /// Length of the signal, from its first wave to its last.
     pub airtime: Duration,
     /// Whether the bytes got through, and why not.
-    pub outcome: Outcome,
+    pub outcome: ReceptionOutcome,
 }
 
 /// The beginning of a signal at a receiver, whatever its outcome will be.
@@ -54,7 +54,7 @@ pub struct Onset {
 
 /// Whether the bytes got through.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub enum Outcome {
+pub enum ReceptionOutcome {
     /// The receiver has the bytes.
     Delivered {
         /// The bytes, with flipped bits if `corrupted`.

@@ -4,7 +4,7 @@ use super::ChannelConfig;
 use crate::loss::LossModel;
 use crate::loss::{FrameContext, FrameFate, LinkLoss};
 use crate::nodes::NodeId;
-use crate::random::Stream;
+use crate::random::RandomStream;
 
 /// The random draws for one transmission on one link, before collisions are known.
 #[derive(Clone, Debug)]
@@ -15,14 +15,14 @@ pub(super) struct FrameDraws {
     /// Whether the frame itself and its duplicate are handed over late.
     pub late: [bool; 2],
     /// The stream that chooses the bits to flip.
-    pub flips: Stream,
+    pub flips: RandomStream,
 }
 
 #[derive(Debug)]
 pub(super) struct DirectedLink {
     loss: Box<dyn LinkLoss>,
-    loss_rng: Stream,
-    fault_rng: Stream,
+    loss_rng: RandomStream,
+    fault_rng: RandomStream,
     flip_path: [u64; 3],
     seed: u64,
     frames: u64,
@@ -31,11 +31,11 @@ pub(super) struct DirectedLink {
 impl DirectedLink {
     pub(super) fn new(seed: u64, from: NodeId, to: NodeId, model: &LossModel) -> Self {
         let path = |purpose: u64| [u64::from(from.0), u64::from(to.0), purpose];
-        let mut loss_rng = Stream::new(seed, &path(0));
+        let mut loss_rng = RandomStream::new(seed, &path(0));
         Self {
             loss: model.instance(&mut loss_rng),
             loss_rng,
-            fault_rng: Stream::new(seed, &path(1)),
+            fault_rng: RandomStream::new(seed, &path(1)),
             flip_path: path(2),
             seed,
             frames: 0,
@@ -51,7 +51,7 @@ impl DirectedLink {
     /// probability does not shift later draws.
     pub(super) fn draw(&mut self, frame: &FrameContext, config: &ChannelConfig) -> FrameDraws {
         let [from, to, purpose] = self.flip_path;
-        let flips = Stream::new(self.seed, &[from, to, purpose, self.frames]);
+        let flips = RandomStream::new(self.seed, &[from, to, purpose, self.frames]);
         self.frames += 1;
         FrameDraws {
             fate: self.loss.draw_fate(frame, &mut self.loss_rng),
@@ -64,7 +64,7 @@ impl DirectedLink {
 }
 
 /// Flips one to eight bits at random places; false if `bytes` is empty.
-pub(super) fn flip_bits(bytes: &mut [u8], rng: &mut Stream) -> bool {
+pub(super) fn flip_bits(bytes: &mut [u8], rng: &mut RandomStream) -> bool {
     let flips = 1 + rng.below(8);
     let mut flipped = std::collections::BTreeSet::new();
     for _ in 0..flips {

@@ -2,20 +2,20 @@
 
 mod arrival;
 mod config;
+mod interferer;
 mod link;
 mod outage;
 pub mod presets;
 mod reception;
-mod talker;
 
-pub use arrival::{Arrival, LossReason, Onset, Outcome};
+pub use arrival::{Arrival, LossReason, Onset, ReceptionOutcome};
 pub use config::ChannelConfig;
+pub use interferer::Interferer;
 pub use outage::{Outage, OutageScope};
-pub use talker::Talker;
 
 use crate::loss::LossModel;
 use crate::loss::{FrameContext, FrameFate};
-use crate::nodes::{NodeId, Position, Track};
+use crate::nodes::{NodeId, NodePosition, Track};
 use link::DirectedLink;
 use reception::{Reception, Span};
 use std::collections::BTreeMap;
@@ -28,11 +28,11 @@ use std::time::Duration;
 /// arrivals are polled at that time, because it may collide with them.
 ///
 /// ```
-/// use sim_channel::{Channel, ChannelConfig, Duration, NodeId, Position};
+/// use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
 ///
 /// let mut channel = Channel::new(ChannelConfig::default(), 7);
-/// channel.place(NodeId(1), Position::new(0.0, 0.0, 0.0));
-/// channel.place(NodeId(2), Position::new(1500.0, 0.0, 0.0));
+/// channel.place(NodeId(1), NodePosition::new(0.0, 0.0, 0.0));
+/// channel.place(NodeId(2), NodePosition::new(1500.0, 0.0, 0.0));
 /// channel.transmit(NodeId(1), vec![1, 2, 3], Duration::from_millis(500), Duration::from_secs(10));
 ///
 /// // 1500 m at 1500 m/s take one second, the frame itself half a second.
@@ -45,7 +45,7 @@ use std::time::Duration;
 pub struct Channel {
     config: ChannelConfig,
     seed: u64,
-    positions: BTreeMap<NodeId, Position>,
+    positions: BTreeMap<NodeId, NodePosition>,
     tracks: BTreeMap<NodeId, Track>,
     links: BTreeMap<(NodeId, NodeId), DirectedLink>,
     own_loss: BTreeMap<(NodeId, NodeId), LossModel>,
@@ -107,14 +107,14 @@ impl Channel {
     /// Adds a node, or moves it; signals under way keep the delay they started with.
     ///
     /// A node on a track leaves the track.
-    pub fn place(&mut self, node: NodeId, position: Position) {
+    pub fn place(&mut self, node: NodeId, position: NodePosition) {
         self.tracks.remove(&node);
         self.positions.insert(node, position);
     }
 
     /// Adds a node that moves along a track; [`advance`](Self::advance) and every [`transmit`](Self::transmit) bring its
     /// position up to date.
-    pub fn follow(&mut self, node: NodeId, track: Track, now: Duration) {
+    pub fn follow_track(&mut self, node: NodeId, track: Track, now: Duration) {
         self.tracks.insert(node, track);
         self.advance(now);
     }
@@ -135,7 +135,7 @@ impl Channel {
     }
 
     /// Position of a node as of the last update; `None` if it is not placed.
-    pub fn position(&self, node: NodeId) -> Option<Position> {
+    pub fn position(&self, node: NodeId) -> Option<NodePosition> {
         self.positions.get(&node).copied()
     }
 
@@ -192,7 +192,7 @@ impl Channel {
     }
 
     /// Switches reports of onsets on, for transmissions from now on; [`poll_onset`](Self::poll_onset) must then be called.
-    pub fn tell_onsets(&mut self) {
+    pub fn report_onsets(&mut self) {
         self.reports_onsets = true;
     }
 
@@ -232,8 +232,8 @@ impl Channel {
         spans.retain(|span| span.end > now);
         spans.push(span);
         if self.config.half_duplex {
-            let heard = self.underway.values_mut().filter(|other| other.to == node && other.span.overlaps(&span));
-            heard.for_each(|other| other.self_deaf = true);
+            let missed = self.underway.values_mut().filter(|other| other.to == node && other.span.overlaps(&span));
+            missed.for_each(|other| other.self_deaf = true);
         }
     }
 

@@ -6,16 +6,16 @@ use std::time::Duration;
 /// A scheduled silence of the whole channel, of a node, or of one direction of a link.
 ///
 /// ```
-/// use sim_channel::{Channel, ChannelConfig, Duration, LossReason, NodeId, Outage, Outcome, Position};
+/// use sim_channel::{Channel, ChannelConfig, Duration, LossReason, NodeId, Outage, ReceptionOutcome, NodePosition};
 ///
 /// let outages = vec![Outage::all(Duration::ZERO, Duration::from_secs(60))];
 /// let mut channel = Channel::new(ChannelConfig { outages, ..ChannelConfig::default() }, 1);
-/// channel.place(NodeId(1), Position::new(0.0, 0.0, 0.0));
-/// channel.place(NodeId(2), Position::new(300.0, 0.0, 0.0));
+/// channel.place(NodeId(1), NodePosition::new(0.0, 0.0, 0.0));
+/// channel.place(NodeId(2), NodePosition::new(300.0, 0.0, 0.0));
 /// channel.transmit(NodeId(1), vec![0; 8], Duration::from_millis(100), Duration::from_secs(30));
 ///
 /// let arrival = channel.poll_arrival(Duration::MAX).unwrap();
-/// assert!(matches!(arrival.outcome, Outcome::Lost { reason: LossReason::Outage, .. }));
+/// assert!(matches!(arrival.outcome, ReceptionOutcome::Lost { reason: LossReason::Outage, .. }));
 /// ```
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outage {

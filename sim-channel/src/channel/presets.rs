@@ -145,22 +145,22 @@ fn bursts(delivery: f64, period: Duration) -> ChannelConfig {
 mod tests {
     use super::*;
     use crate::acoustics::mackenzie_m_s;
-    use crate::channel::{Channel, Outcome};
-    use crate::nodes::{NodeId, Position};
+    use crate::channel::{Channel, ReceptionOutcome};
+    use crate::nodes::{NodeId, NodePosition};
 
     /// Share of 64-byte frames, one every 3 s, that are lost over `range_m`.
     fn measured_loss(config: ChannelConfig, range_m: f64) -> f64 {
         let (a, b) = (NodeId(1), NodeId(2));
         let mut channel = Channel::new(config, 3);
-        channel.place(a, Position::default());
-        channel.place(b, Position::new(range_m, 0.0, 0.0));
+        channel.place(a, NodePosition::default());
+        channel.place(b, NodePosition::new(range_m, 0.0, 0.0));
         let (mut frames, mut lost) = (0, 0);
         for n in 0..28_000 {
             let now = Duration::from_secs(3 * n);
             channel.transmit(a, vec![0; 64], Duration::from_millis(860), now);
             while let Some(arrival) = channel.poll_arrival(now) {
                 frames += 1u32;
-                lost += u32::from(matches!(arrival.outcome, Outcome::Lost { .. }));
+                lost += u32::from(matches!(arrival.outcome, ReceptionOutcome::Lost { .. }));
             }
         }
         f64::from(lost) / f64::from(frames)

@@ -1,10 +1,10 @@
 //! One signal at one receiver: its overlap with others and with the receiver's own transmission.
 
 use super::link::FrameDraws;
-use super::{Arrival, LossReason, Outcome};
+use super::{Arrival, LossReason, ReceptionOutcome};
 use crate::channel::link::flip_bits;
 use crate::loss::FrameFate;
-use crate::nodes::{NodeId, Position};
+use crate::nodes::{NodeId, NodePosition};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,7 +31,7 @@ pub(super) struct Reception {
     pub from: NodeId,
     pub to: NodeId,
     /// Sender, then receiver.
-    pub positions: [Position; 2],
+    pub positions: [NodePosition; 2],
     pub span: Span,
     pub sent_at: Duration,
     pub range_m: f64,
@@ -68,10 +68,10 @@ impl Reception {
         .find_map(|(holds, reason)| holds.then_some(reason))
     }
 
-    fn delivery(&self, copy: u8) -> Outcome {
+    fn delivery(&self, copy: u8) -> ReceptionOutcome {
         let mut bytes = self.bytes.to_vec();
         let corrupted = self.draws.corrupted && flip_bits(&mut bytes, &mut self.draws.flips.clone());
-        Outcome::Delivered { bytes, copy, corrupted }
+        ReceptionOutcome::Delivered { bytes, copy, corrupted }
     }
 
     /// The arrivals of this reception: one, or two if it is delivered and duplicated.
@@ -91,7 +91,7 @@ impl Reception {
                 receiver: self.positions[1],
                 airtime: self.span.end.saturating_sub(self.span.start),
                 outcome: match reason {
-                    Some(reason) => Outcome::Lost { bytes_len: self.bytes.len(), reason },
+                    Some(reason) => ReceptionOutcome::Lost { bytes_len: self.bytes.len(), reason },
                     None => self.delivery(copy),
                 },
             }

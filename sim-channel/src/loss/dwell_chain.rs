@@ -1,6 +1,6 @@
 //! A continuous-time Markov chain over a few states, described by its mean dwell in each.
 
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::time::Duration;
 
 /// Mean dwell in each of `N` states, and the probabilities of the next state.
@@ -46,7 +46,7 @@ pub(super) struct ChainWalk<const N: usize> {
 
 impl<const N: usize> ChainWalk<N> {
     /// Starts in a state drawn from the stationary distribution.
-    pub(super) fn new(chain: DwellChain<N>, rng: &mut Stream) -> Self {
+    pub(super) fn new(chain: DwellChain<N>, rng: &mut RandomStream) -> Self {
         let longest = chain.dwell.iter().max().copied().unwrap_or_default();
         let stationary = chain.stationary();
         let forget_after = longest.saturating_mul(MEMORY_DWELLS);
@@ -56,7 +56,7 @@ impl<const N: usize> ChainWalk<N> {
     }
 
     /// The state at `at`, which never goes back.
-    pub(super) fn state_at(&mut self, at: Duration, rng: &mut Stream) -> usize {
+    pub(super) fn state_at(&mut self, at: Duration, rng: &mut RandomStream) -> usize {
         if at.saturating_sub(self.until) > self.forget_after {
             self.restart(at, rng);
         }
@@ -68,21 +68,21 @@ impl<const N: usize> ChainWalk<N> {
         self.state
     }
 
-    fn restart(&mut self, at: Duration, rng: &mut Stream) {
+    fn restart(&mut self, at: Duration, rng: &mut RandomStream) {
         self.state = pick(&self.stationary, rng);
         let stay = self.dwell(rng);
         self.until = at.saturating_add(stay);
     }
 
     /// Draws a dwell of at least a microsecond, so that the walk always advances.
-    fn dwell(&self, rng: &mut Stream) -> Duration {
+    fn dwell(&self, rng: &mut RandomStream) -> Duration {
         let mean = self.chain.dwell[self.state].as_secs_f64();
         Duration::try_from_secs_f64(rng.exponential(mean)).unwrap_or(Duration::MAX).max(Duration::from_micros(1))
     }
 }
 
 /// An index drawn with the given weights; the last one with a positive weight if rounding leaves a rest.
-fn pick<const N: usize>(weights: &[f64; N], rng: &mut Stream) -> usize {
+fn pick<const N: usize>(weights: &[f64; N], rng: &mut RandomStream) -> usize {
     let mut rest = rng.uniform() * weights.iter().sum::<f64>();
     let mut last = 0;
     for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn walk_matches_the_stationary_shares_and_dwell() {
-        let mut rng = Stream::new(1, &[]);
+        let mut rng = RandomStream::new(1, &[]);
         let mut walk = ChainWalk::new(chain(), &mut rng);
         let states: Vec<_> =
             (0..1_000_000u64).map(|n| walk.state_at(Duration::from_millis(200 * n), &mut rng)).collect();
@@ -135,14 +135,14 @@ mod tests {
 
     #[test]
     fn long_pause_is_skipped_in_constant_time() {
-        let mut rng = Stream::new(1, &[]);
+        let mut rng = RandomStream::new(1, &[]);
         let mut walk = ChainWalk::new(chain(), &mut rng);
         walk.state_at(Duration::from_secs(1 << 40), &mut rng);
     }
 
     #[test]
     fn zero_dwells_do_not_hang() {
-        let mut rng = Stream::new(1, &[]);
+        let mut rng = RandomStream::new(1, &[]);
         let chain = DwellChain { dwell: [Duration::ZERO; 2], jump: [[0.0, 1.0], [1.0, 0.0]] };
         ChainWalk::new(chain, &mut rng).state_at(Duration::from_secs(3600), &mut rng);
     }

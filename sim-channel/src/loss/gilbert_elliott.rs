@@ -2,7 +2,7 @@
 
 use super::dwell_chain::{ChainWalk, DwellChain};
 use super::{FrameContext, FrameFate, LinkLoss};
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::time::Duration;
 
 /// Gilbert-Elliott loss: a good and a bad state with dwells in seconds.
@@ -55,7 +55,7 @@ impl GilbertElliott {
         1.0 / leaves
     }
 
-    pub(super) fn instance(&self, rng: &mut Stream) -> Box<dyn LinkLoss> {
+    pub(super) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
         let chain = DwellChain { dwell: [self.dwell_good, self.dwell_bad], jump: [[0.0, 1.0], [1.0, 0.0]] };
         Box::new(MarkovFading { walk: ChainWalk::new(chain, rng), loss: [self.loss_good, self.loss_bad] })
     }
@@ -68,7 +68,7 @@ pub(super) struct MarkovFading<const N: usize> {
 }
 
 impl<const N: usize> LinkLoss for MarkovFading<N> {
-    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut Stream) -> FrameFate {
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
         let state = self.walk.state_at(frame.at, rng);
         FrameFate::lost_if(rng.bernoulli(self.loss[state]))
     }

@@ -1,7 +1,7 @@
 //! Independent loss: each frame is lost with the same probability.
 
 use super::{FrameContext, FrameFate, LinkLoss};
-use crate::random::Stream;
+use crate::random::RandomStream;
 
 #[derive(Debug)]
 pub(super) struct Independent {
@@ -15,7 +15,7 @@ impl Independent {
 }
 
 impl LinkLoss for Independent {
-    fn draw_fate(&mut self, _frame: &FrameContext, rng: &mut Stream) -> FrameFate {
+    fn draw_fate(&mut self, _frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
         FrameFate::lost_if(rng.bernoulli(self.probability))
     }
 }

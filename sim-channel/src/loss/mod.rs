@@ -18,7 +18,7 @@ pub use snr::Snr;
 pub use three_state::ThreeState;
 pub use trace::{Trace, TraceError};
 
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::fmt::Debug;
 use std::time::Duration;
 
@@ -58,7 +58,7 @@ pub enum LossModel {
 
 impl LossModel {
     /// A new instance for one link; draws its first state from `rng`.
-    pub(crate) fn instance(&self, rng: &mut Stream) -> Box<dyn LinkLoss> {
+    pub(crate) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
         match self {
             LossModel::None => Box::new(independent::Independent::new(0.0)),
             LossModel::Independent { probability } => Box::new(independent::Independent::new(*probability)),
@@ -127,7 +127,7 @@ impl FrameFate {
 
 /// An instance of a loss model on one directed link; frames come in order of time.
 pub(crate) trait LinkLoss: Debug + Send {
-    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut Stream) -> FrameFate;
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate;
 }
 
 #[cfg(test)]
@@ -136,7 +136,7 @@ mod tests {
 
     /// For each of `frames` frames, `spacing` apart, whether a new instance loses it.
     pub(super) fn losses(model: &LossModel, spacing: Duration, frames: u32) -> Vec<bool> {
-        let mut rng = Stream::new(11, &[]);
+        let mut rng = RandomStream::new(11, &[]);
         let mut instance = model.instance(&mut rng);
         let frame = |n| FrameContext { at: spacing * n, airtime: spacing / 2, bytes: 64, range_m: 1000.0 };
         (0..frames).map(|n| instance.draw_fate(&frame(n), &mut rng) != FrameFate::Received).collect()

@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
 use super::{FrameContext, FrameFate, LinkLoss};
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -70,7 +70,7 @@ impl RangeTable {
 }
 
 impl LinkLoss for RangeTable {
-    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut Stream) -> FrameFate {
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
         FrameFate::lost_if(rng.bernoulli(1.0 - self.delivery(frame.range_m)))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{FrameContext, FrameFate, LinkLoss};
 use crate::acoustics::{frame_error_rate, transmission_loss_db, wenz_db, wind_of_sea_state};
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::time::Duration;
 
 /// The sonar equation, slow fading and uncorrelated bit errors.
@@ -112,7 +112,7 @@ struct SnrLink {
 
 impl SnrLink {
     /// The next value of an Ornstein-Uhlenbeck process, exact for any step.
-    fn fade(&mut self, at: Duration, rng: &mut Stream) -> f64 {
+    fn fade(&mut self, at: Duration, rng: &mut RandomStream) -> f64 {
         let innovation = rng.normal();
         let value = match self.fading {
             None => innovation,
@@ -128,7 +128,7 @@ impl SnrLink {
 }
 
 impl LinkLoss for SnrLink {
-    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut Stream) -> FrameFate {
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
         let fading_db = self.model.fading_std_db * self.fade(frame.at, rng);
         let snr_db = self.model.snr_db(frame.range_m) + fading_db;
         let lost = rng.bernoulli(self.model.frame_loss(snr_db, frame.bytes, frame.airtime));
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn too_faint_is_out_of_range() {
         let model = Snr { fading_std_db: 0.0, ..Snr::default() };
-        let mut rng = Stream::new(1, &[]);
+        let mut rng = RandomStream::new(1, &[]);
         let frame = FrameContext { at: Duration::ZERO, airtime: SPACING, bytes: 8, range_m: 50_000.0 };
         assert_eq!(model.instance().draw_fate(&frame, &mut rng), FrameFate::OutOfRange);
     }

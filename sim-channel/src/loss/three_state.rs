@@ -3,7 +3,7 @@
 use super::LinkLoss;
 use super::dwell_chain::{ChainWalk, DwellChain};
 use super::gilbert_elliott::MarkovFading;
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::time::Duration;
 
 /// Three-state Markov loss; the states are good, medium and bad.
@@ -35,7 +35,7 @@ impl ThreeState {
         self.shares().iter().zip(&self.loss).map(|(share, loss)| share * loss).sum()
     }
 
-    pub(super) fn instance(&self, rng: &mut Stream) -> Box<dyn LinkLoss> {
+    pub(super) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
         Box::new(MarkovFading { walk: ChainWalk::new(self.chain(), rng), loss: self.loss })
     }
 

@@ -3,7 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
 use super::{FrameContext, FrameFate, LinkLoss};
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::sync::Arc;
 use std::time::Duration;
 use thiserror::Error;
@@ -118,7 +118,7 @@ impl Trace {
 }
 
 impl LinkLoss for Trace {
-    fn draw_fate(&mut self, frame: &FrameContext, _chance: &mut Stream) -> FrameFate {
+    fn draw_fate(&mut self, frame: &FrameContext, _chance: &mut RandomStream) -> FrameFate {
         FrameFate::lost_if(!self.delivered_at(frame.at))
     }
 }

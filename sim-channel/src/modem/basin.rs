@@ -1,7 +1,7 @@
 //! A test basin: several emulated modems on one channel.
 
-use super::{Emulator, Fault, Host, ModemEvent};
-use crate::channel::{Channel, Talker};
+use super::{Emulator, Fault, HostId, ModemEvent};
+use crate::channel::{Channel, Interferer};
 use crate::nodes::NodeId;
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -15,11 +15,11 @@ use std::time::Duration;
 /// ```
 /// use sim_channel::modem::Basin;
 /// use sim_channel::modem::transparent::{Transparent, TransparentConfig};
-/// use sim_channel::{Channel, ChannelConfig, Duration, NodeId, Position};
+/// use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
 ///
 /// let mut basin = Basin::new(Channel::new(ChannelConfig::default(), 1));
 /// for node in [1, 2] {
-///     basin.channel().place(NodeId(node), Position::new(750.0 * f64::from(node), 0.0, 0.0));
+///     basin.channel().place(NodeId(node), NodePosition::new(750.0 * f64::from(node), 0.0, 0.0));
 ///     basin.add(NodeId(node), Box::new(Transparent::new(TransparentConfig::default())));
 /// }
 /// basin.handle_host_bytes(NodeId(1), b"hello", Duration::ZERO);
@@ -34,7 +34,7 @@ use std::time::Duration;
 pub struct Basin {
     channel: Channel,
     modems: BTreeMap<NodeId, Box<dyn Emulator>>,
-    talkers: Vec<Talker>,
+    interferers: Vec<Interferer>,
     on_air: BTreeMap<NodeId, u64>,
     hung_up: Vec<NodeId>,
     now: Duration,
@@ -43,11 +43,11 @@ pub struct Basin {
 impl Basin {
     /// A basin without modems. Place the nodes in the channel before their modems transmit.
     pub fn new(mut channel: Channel) -> Self {
-        channel.tell_onsets();
+        channel.report_onsets();
         Self {
             channel,
             modems: BTreeMap::new(),
-            talkers: Vec::new(),
+            interferers: Vec::new(),
             on_air: BTreeMap::new(),
             hung_up: Vec::new(),
             now: Duration::ZERO,
@@ -60,8 +60,8 @@ impl Basin {
     }
 
     /// Adds an interferer; its node must be placed in the channel.
-    pub fn add_talker(&mut self, talker: Talker) {
-        self.talkers.push(talker);
+    pub fn add_interferer(&mut self, interferer: Interferer) {
+        self.interferers.push(interferer);
     }
 
     /// The channel, to place nodes or to change its conditions.
@@ -75,12 +75,12 @@ impl Basin {
     }
 
     /// Attaches another host to the modem of `node`; returns the first host if the node has no modem.
-    pub fn attach(&mut self, node: NodeId) -> Host {
-        self.modems.get_mut(&node).map_or(Host::FIRST, |modem| modem.attach())
+    pub fn attach(&mut self, node: NodeId) -> HostId {
+        self.modems.get_mut(&node).map_or(HostId::FIRST, |modem| modem.attach())
     }
 
     /// Detaches a host from the modem of `node`; the first host always stays.
-    pub fn detach(&mut self, node: NodeId, host: Host) {
+    pub fn detach(&mut self, node: NodeId, host: HostId) {
         if let Some(modem) = self.modems.get_mut(&node) {
             modem.detach(host);
         }
@@ -88,11 +88,11 @@ impl Basin {
 
     /// Takes the bytes that the first host of `node` wrote at `now`. They are dropped if the node has no modem.
     pub fn handle_host_bytes(&mut self, node: NodeId, bytes: &[u8], now: Duration) {
-        self.handle_bytes_of(node, Host::FIRST, bytes, now);
+        self.handle_bytes_from(node, HostId::FIRST, bytes, now);
     }
 
     /// Takes the bytes that `host` of `node` wrote at `now`. They are dropped if the node has no modem.
-    pub fn handle_bytes_of(&mut self, node: NodeId, host: Host, bytes: &[u8], now: Duration) {
+    pub fn handle_bytes_from(&mut self, node: NodeId, host: HostId, bytes: &[u8], now: Duration) {
         self.advance(now);
         if let Some(modem) = self.modems.get_mut(&node) {
             modem.handle_host_bytes(host, bytes, now);
@@ -102,16 +102,16 @@ impl Basin {
 
     /// Number of bytes that the first host of `node` may write now; more would be lost.
     pub fn host_room(&self, node: NodeId) -> usize {
-        self.modems.get(&node).map_or(0, |modem| modem.host_room(Host::FIRST))
+        self.modems.get(&node).map_or(0, |modem| modem.host_room(HostId::FIRST))
     }
 
     /// Takes the bytes that have reached the first host of `node` by [`now`](Self::now).
     pub fn poll_host_bytes(&mut self, node: NodeId) -> Vec<u8> {
-        self.poll_bytes_for(node, Host::FIRST)
+        self.poll_bytes_for(node, HostId::FIRST)
     }
 
     /// Takes the bytes that have reached `host` of `node` by [`now`](Self::now).
-    pub fn poll_bytes_for(&mut self, node: NodeId, host: Host) -> Vec<u8> {
+    pub fn poll_bytes_for(&mut self, node: NodeId, host: HostId) -> Vec<u8> {
         let now = self.now;
         self.modems.get_mut(&node).map(|modem| modem.poll_host_bytes(host, now)).unwrap_or_default()
     }
@@ -148,17 +148,17 @@ impl Basin {
 
     /// Time of the next event of a modem, an interferer or the channel.
     fn next_due(&self) -> Option<Duration> {
-        let talkers = self.talkers.iter().filter_map(Talker::poll_timeout);
+        let interferers = self.interferers.iter().filter_map(Interferer::poll_timeout);
         let modems = self.modems.values().filter_map(|modem| modem.poll_timeout());
-        modems.chain(self.channel.poll_timeout()).chain(talkers).min()
+        modems.chain(self.channel.poll_timeout()).chain(interferers).min()
     }
 
     /// Runs all events that are due at `now`, and those that they cause.
     fn run_due(&mut self, now: Duration) {
         self.now = self.now.max(now);
-        for talker in &mut self.talkers {
-            if let Some((bytes, airtime)) = talker.poll_transmit(now) {
-                self.channel.transmit(talker.node(), bytes, airtime, now);
+        for interferer in &mut self.interferers {
+            if let Some((bytes, airtime)) = interferer.poll_transmit(now) {
+                self.channel.transmit(interferer.node(), bytes, airtime, now);
             }
         }
         loop {

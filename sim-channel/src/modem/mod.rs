@@ -20,4 +20,4 @@ mod tests;
 pub mod transparent;
 
 pub use basin::Basin;
-pub use emulator::{Emulator, Fault, Host, ModemEvent, Transmission};
+pub use emulator::{Emulator, Fault, HostId, ModemEvent, Transmission};

@@ -3,10 +3,10 @@
 //! The pipe has no frames, no addresses and no acknowledgements, and it does not report losses. It sends when enough bytes
 //! wait or when the host pauses. It may remove `+++AT` up to the end of the line, as modems do that listen for an escape.
 
-use crate::channel::{Arrival, Outcome};
+use crate::channel::{Arrival, ReceptionOutcome};
 use crate::modem::emulator::board::{ModemBoard, ModemLogic};
-use crate::modem::emulator::{Fault, Host, ModemEvent, Transmission};
-use crate::random::Stream;
+use crate::modem::emulator::{Fault, HostId, ModemEvent, Transmission};
+use crate::random::RandomStream;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -74,7 +74,7 @@ impl Transparent {
     pub fn new(config: TransparentConfig) -> Self {
         const PURPOSE: u64 = 0x7a9e;
         Self {
-            board: ModemBoard::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
+            board: ModemBoard::new(config.baud, RandomStream::new(config.seed, &[PURPOSE])),
             waiting: VecDeque::new(),
             last_byte: Duration::ZERO,
             in_escape: false,
@@ -119,7 +119,7 @@ impl ModemLogic for Transparent {
         &mut self.board
     }
 
-    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration) {
+    fn read_host(&mut self, host: HostId, bytes: &[u8], at: Duration) {
         self.last_byte = at;
         for byte in bytes {
             if self.in_escape {
@@ -139,7 +139,7 @@ impl ModemLogic for Transparent {
     fn on_task(&mut self, _task: TransparentTask, _at: Duration) {}
 
     fn on_arrival(&mut self, arrival: &Arrival, now: Duration) {
-        if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
+        if let ReceptionOutcome::Delivered { bytes, .. } = &arrival.outcome {
             self.board.write_to_all(bytes, now);
         }
     }

@@ -9,16 +9,16 @@ use std::f64::consts::TAU;
 /// Streams with different paths are independent, so that a draw on one link never shifts the draws of another.
 ///
 /// ```
-/// use sim_channel::Stream;
+/// use sim_channel::RandomStream;
 ///
-/// let (mut a, mut b) = (Stream::new(7, &[1, 2]), Stream::new(7, &[1, 2]));
+/// let (mut a, mut b) = (RandomStream::new(7, &[1, 2]), RandomStream::new(7, &[1, 2]));
 /// assert_eq!(a.uniform(), b.uniform());
 /// assert!((0..1000).all(|_| a.below(6) < 6));
 /// ```
 #[derive(Clone, Debug)]
-pub struct Stream(Xoshiro256PlusPlus);
+pub struct RandomStream(Xoshiro256PlusPlus);
 
-impl Stream {
+impl RandomStream {
     /// The stream of `seed` at `path`; equal arguments give equal streams.
     pub fn new(seed: u64, path: &[u64]) -> Self {
         let mixed = path.iter().fold(split_mix(seed), |state, step| split_mix(state ^ split_mix(*step)));
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn equal_paths_repeat_and_different_paths_differ() {
         let take = |path: &[u64]| {
-            let mut stream = Stream::new(7, path);
+            let mut stream = RandomStream::new(7, path);
             (0..4).map(|_| stream.uniform()).collect::<Vec<_>>()
         };
         assert_eq!(take(&[1, 2]), take(&[1, 2]));
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn moments_match_the_distributions() {
-        let mut stream = Stream::new(3, &[]);
+        let mut stream = RandomStream::new(3, &[]);
         assert!((mean(200_000, || stream.uniform()) - 0.5).abs() < 0.003);
         assert!((mean(200_000, || stream.exponential(4.0)) - 4.0).abs() < 0.04);
         assert!(mean(200_000, || stream.normal()).abs() < 0.01);
@@ -89,6 +89,6 @@ mod tests {
 
     #[test]
     fn below_zero_is_zero() {
-        assert_eq!(Stream::new(1, &[]).below(0), 0);
+        assert_eq!(RandomStream::new(1, &[]).below(0), 0);
     }
 }

@@ -1,7 +1,7 @@
 //! Ultra-short baseline positioning: a head measures range and direction to a node from its acoustic reply.
 
-use crate::nodes::Position;
-use crate::random::Stream;
+use crate::nodes::NodePosition;
+use crate::random::RandomStream;
 use std::f64::consts::TAU;
 use std::time::Duration;
 
@@ -61,10 +61,10 @@ impl UsblFix {
 ///
 /// ```
 /// use sim_channel::usbl::{UsblConfig, UsblHead};
-/// use sim_channel::{Duration, Position};
+/// use sim_channel::{Duration, NodePosition};
 ///
 /// let mut head = UsblHead::new(UsblConfig::default(), 42);
-/// let (ship, vehicle) = (Position::new(0.0, 0.0, 2.0), Position::new(300.0, 400.0, 52.0));
+/// let (ship, vehicle) = (NodePosition::new(0.0, 0.0, 2.0), NodePosition::new(300.0, 400.0, 52.0));
 /// let fix = head.measure(&ship, &vehicle, Duration::from_secs(5));
 /// assert!((fix.range_m - ship.range_m(&vehicle)).abs() < 1.0);
 /// assert_eq!(fix.ready_at, Duration::from_millis(5450));
@@ -72,20 +72,20 @@ impl UsblFix {
 #[derive(Debug)]
 pub struct UsblHead {
     config: UsblConfig,
-    rng: Stream,
+    rng: RandomStream,
 }
 
 impl UsblHead {
     /// A head that draws its errors from `seed`.
     pub fn new(config: UsblConfig, seed: u64) -> Self {
         const PURPOSE: u64 = 0x05b1;
-        Self { config, rng: Stream::new(seed, &[PURPOSE]) }
+        Self { config, rng: RandomStream::new(seed, &[PURPOSE]) }
     }
 
     /// The fix from a reply of `target` that a head at `head` received at `received_at`.
     ///
     /// Each call takes the same number of draws.
-    pub fn measure(&mut self, head: &Position, target: &Position, received_at: Duration) -> UsblFix {
+    pub fn measure(&mut self, head: &NodePosition, target: &NodePosition, received_at: Duration) -> UsblFix {
         let config = self.config;
         let [range_noise, bearing_noise, elevation_noise] = [(); 3].map(|()| self.rng.normal());
         let outlier = self.rng.bernoulli(config.outlier_probability);
@@ -116,7 +116,7 @@ pub fn exchange_time(query: Duration, turn_around: Duration, reply: Duration, on
 }
 
 /// Slant range in m, bearing clockwise from north and elevation above the horizontal in rad.
-fn polar(head: &Position, target: &Position) -> (f64, f64, f64) {
+fn polar(head: &NodePosition, target: &NodePosition) -> (f64, f64, f64) {
     let (east, north, down) = (target.x_m - head.x_m, target.y_m - head.y_m, target.z_m - head.z_m);
     (head.range_m(target), east.atan2(north), (0.0 - down).atan2(east.hypot(north)))
 }
@@ -125,8 +125,8 @@ fn polar(head: &Position, target: &Position) -> (f64, f64, f64) {
 mod tests {
     use super::*;
 
-    const HEAD: Position = Position::new(10.0, 20.0, 2.0);
-    const TARGET: Position = Position::new(310.0, 420.0, 52.0);
+    const HEAD: NodePosition = NodePosition::new(10.0, 20.0, 2.0);
+    const TARGET: NodePosition = NodePosition::new(310.0, 420.0, 52.0);
 
     fn clean() -> UsblConfig {
         UsblConfig {

@@ -2,9 +2,9 @@
 
 use super::serial_line::SerialLine;
 use super::task_queue::TaskQueue;
-use super::{Emulator, Fault, Host, ModemEvent, Transmission};
+use super::{Emulator, Fault, HostId, ModemEvent, Transmission};
 use crate::channel::{Arrival, Onset};
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -15,15 +15,15 @@ const MAX_HOSTS: usize = 64;
 #[derive(Debug)]
 pub(crate) struct ModemBoard<Task> {
     baud: Option<u32>,
-    lines: BTreeMap<Host, SerialLine>,
+    lines: BTreeMap<HostId, SerialLine>,
     tasks: TaskQueue<Task>,
-    pub(crate) rng: Stream,
+    pub(crate) rng: RandomStream,
     events: VecDeque<ModemEvent>,
 }
 
 impl<Task> ModemBoard<Task> {
-    pub(crate) fn new(baud: Option<u32>, rng: Stream) -> Self {
-        let lines = BTreeMap::from([(Host::FIRST, SerialLine::new(baud))]);
+    pub(crate) fn new(baud: Option<u32>, rng: RandomStream) -> Self {
+        let lines = BTreeMap::from([(HostId::FIRST, SerialLine::new(baud))]);
         Self { baud, lines, tasks: TaskQueue::new(), rng, events: VecDeque::new() }
     }
 
@@ -31,7 +31,7 @@ impl<Task> ModemBoard<Task> {
         self.tasks.add(at, task);
     }
 
-    pub(crate) fn write_to(&mut self, host: Host, bytes: &[u8], now: Duration) {
+    pub(crate) fn write_to(&mut self, host: HostId, bytes: &[u8], now: Duration) {
         if let Some(line) = self.lines.get_mut(&host) {
             line.write(bytes, now);
         }
@@ -54,7 +54,7 @@ impl<Task> ModemBoard<Task> {
         self.lines.values().filter_map(SerialLine::next_input).min()
     }
 
-    fn take_input(&mut self, now: Duration) -> Option<(Host, Duration, Vec<u8>)> {
+    fn take_input(&mut self, now: Duration) -> Option<(HostId, Duration, Vec<u8>)> {
         let due = self.next_input().filter(|at| *at <= now)?;
         self.lines.iter_mut().find_map(|(host, line)| {
             let (at, bytes) = line.take_input(due)?;
@@ -82,9 +82,9 @@ pub(crate) trait ModemLogic: Send {
     fn board_mut(&mut self) -> &mut ModemBoard<Self::Task>;
 
     /// Bytes of a host have come over its line.
-    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration);
+    fn read_host(&mut self, host: HostId, bytes: &[u8], at: Duration);
 
-    fn forget_host(&mut self, _host: Host) {}
+    fn forget_host(&mut self, _host: HostId) {}
 
     /// The time of a scheduled task has come.
     fn on_task(&mut self, task: Self::Task, at: Duration);
@@ -100,34 +100,34 @@ pub(crate) trait ModemLogic: Send {
 }
 
 impl<M: ModemLogic> Emulator for M {
-    fn attach(&mut self) -> Host {
+    fn attach(&mut self) -> HostId {
         let board = self.board_mut();
-        let number = (1..).find(|number| !board.lines.contains_key(&Host(*number))).unwrap_or_default();
+        let number = (1..).find(|number| !board.lines.contains_key(&HostId(*number))).unwrap_or_default();
         if board.lines.len() >= MAX_HOSTS || number == 0 {
-            return Host::FIRST;
+            return HostId::FIRST;
         }
-        board.lines.insert(Host(number), SerialLine::new(board.baud));
-        Host(number)
+        board.lines.insert(HostId(number), SerialLine::new(board.baud));
+        HostId(number)
     }
 
-    fn detach(&mut self, host: Host) {
-        if host != Host::FIRST && self.board_mut().lines.remove(&host).is_some() {
+    fn detach(&mut self, host: HostId) {
+        if host != HostId::FIRST && self.board_mut().lines.remove(&host).is_some() {
             self.forget_host(host);
         }
     }
 
-    fn handle_host_bytes(&mut self, host: Host, bytes: &[u8], now: Duration) {
+    fn handle_host_bytes(&mut self, host: HostId, bytes: &[u8], now: Duration) {
         if let Some(line) = self.board_mut().lines.get_mut(&host) {
             line.accept(bytes, now);
         }
         self.handle_timeout(now);
     }
 
-    fn host_room(&self, host: Host) -> usize {
+    fn host_room(&self, host: HostId) -> usize {
         self.board().lines.get(&host).map_or(0, SerialLine::room)
     }
 
-    fn poll_host_bytes(&mut self, host: Host, now: Duration) -> Vec<u8> {
+    fn poll_host_bytes(&mut self, host: HostId, now: Duration) -> Vec<u8> {
         self.board_mut().lines.get_mut(&host).map(|line| line.poll_output(now)).unwrap_or_default()
     }
 

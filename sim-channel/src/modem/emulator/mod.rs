@@ -13,11 +13,11 @@ use std::time::Duration;
 
 /// One of the hosts at a modem. A TCP port takes several hosts, a serial line only the first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
-pub struct Host(u32);
+pub struct HostId(u32);
 
-impl Host {
+impl HostId {
     /// The host that is always attached.
-    pub const FIRST: Host = Host(0);
+    pub const FIRST: HostId = HostId(0);
 }
 
 /// An emulated modem, driven by its host, by the channel and by time.
@@ -34,28 +34,28 @@ impl Host {
 /// ```
 /// use sim_channel::Duration;
 /// use sim_channel::modem::s2c::{S2c, S2cConfig};
-/// use sim_channel::modem::{Emulator, Host};
+/// use sim_channel::modem::{Emulator, HostId};
 ///
 /// let mut modem = S2c::new(S2cConfig { baud: None, ..S2cConfig::new(5) });
-/// modem.handle_host_bytes(Host::FIRST, b"AT?AL\r", Duration::ZERO);
-/// assert_eq!(modem.poll_host_bytes(Host::FIRST, Duration::ZERO), b"5\r\n");
+/// modem.handle_host_bytes(HostId::FIRST, b"AT?AL\r", Duration::ZERO);
+/// assert_eq!(modem.poll_host_bytes(HostId::FIRST, Duration::ZERO), b"5\r\n");
 /// ```
 pub trait Emulator: Send {
     /// Attaches another host to the port. It receives every notification, and the replies to its own commands.
-    fn attach(&mut self) -> Host;
+    fn attach(&mut self) -> HostId;
 
     /// Detaches a host; the first host always stays.
-    fn detach(&mut self, host: Host);
+    fn detach(&mut self, host: HostId);
 
     /// Takes bytes that a host wrote. Bytes beyond [`host_room`](Self::host_room) are lost, as on a line without flow
     /// control.
-    fn handle_host_bytes(&mut self, host: Host, bytes: &[u8], now: Duration);
+    fn handle_host_bytes(&mut self, host: HostId, bytes: &[u8], now: Duration);
 
     /// Number of bytes that a host may write now.
-    fn host_room(&self, host: Host) -> usize;
+    fn host_room(&self, host: HostId) -> usize;
 
     /// Takes the bytes that have reached a host by `now`, paced by the baud rate.
-    fn poll_host_bytes(&mut self, host: Host, now: Duration) -> Vec<u8>;
+    fn poll_host_bytes(&mut self, host: HostId, now: Duration) -> Vec<u8>;
 
     /// Time at which more bytes will have reached any host; `None` if none are on their way.
     fn poll_host_timeout(&self) -> Option<Duration>;

@@ -1,7 +1,7 @@
 //! The line between host and modem: baud rate in both directions, and its faults.
 
 use super::Fault;
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -99,7 +99,7 @@ impl SerialLine {
     }
 
     /// Injects a fault of the line; false if it is none.
-    pub(super) fn inject(&mut self, fault: Fault, rng: &mut Stream, now: Duration) -> bool {
+    pub(super) fn inject(&mut self, fault: Fault, rng: &mut RandomStream, now: Duration) -> bool {
         match fault {
             Fault::Garbage(bytes) => self.garble(bytes, rng, now),
             Fault::HalfLine => self.cut(),
@@ -114,7 +114,7 @@ impl SerialLine {
         self.output.truncate(self.output.len() / 2);
     }
 
-    fn garble(&mut self, bytes: u16, rng: &mut Stream, now: Duration) {
+    fn garble(&mut self, bytes: u16, rng: &mut RandomStream, now: Duration) {
         let noise: Vec<u8> = (0..bytes).map(|_| rng.below(256) as u8).collect();
         self.write(&noise, now);
     }

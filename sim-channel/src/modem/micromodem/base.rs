@@ -12,7 +12,7 @@ use super::transmitter::{SentPacket, Transmitter};
 use super::{Generation, MicromodemConfig};
 use crate::modem::emulator::board::ModemBoard;
 use crate::modem::emulator::{ModemEvent, Transmission};
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::time::Duration;
 
 /// Period of the revision sentence `CAREV`.
@@ -47,7 +47,7 @@ pub(super) struct MicromodemBase {
 impl MicromodemBase {
     pub(super) fn new(config: MicromodemConfig) -> Self {
         const PURPOSE: u64 = 0x3d3;
-        let mut board = ModemBoard::new(config.baud, Stream::new(config.seed, &[PURPOSE]));
+        let mut board = ModemBoard::new(config.baud, RandomStream::new(config.seed, &[PURPOSE]));
         board.schedule(REVISION_INTERVAL, MicromodemTask::Revision);
         Self {
             board,

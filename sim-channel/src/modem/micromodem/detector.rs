@@ -4,7 +4,7 @@ use super::base::{MicromodemBase, MicromodemTask};
 use super::packet::{Packet, PacketKind};
 use super::signal::PacketSignal;
 use super::statistics;
-use crate::channel::{Arrival, LossReason, Onset, Outcome};
+use crate::channel::{Arrival, LossReason, Onset, ReceptionOutcome};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -41,9 +41,9 @@ impl Detector {
     fn on_end(&mut self, base: &mut MicromodemBase, arrival: &Arrival, now: Duration) {
         let signal = PacketSignal::of(arrival);
         let packet = match &arrival.outcome {
-            Outcome::Delivered { bytes, .. } => Packet::decode(bytes),
-            Outcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => None,
-            Outcome::Lost { .. } => return,
+            ReceptionOutcome::Delivered { bytes, .. } => Packet::decode(bytes),
+            ReceptionOutcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => None,
+            ReceptionOutcome::Lost { .. } => return,
         };
         match packet {
             None => {

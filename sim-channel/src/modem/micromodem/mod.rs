@@ -21,7 +21,7 @@ mod transmitter;
 
 use crate::channel::{Arrival, Onset};
 use crate::modem::emulator::board::{ModemBoard, ModemLogic};
-use crate::modem::emulator::{Fault, Host, Transmission};
+use crate::modem::emulator::{Fault, HostId, Transmission};
 use base::{MicromodemBase, MicromodemTask};
 use cycle::CycleService;
 use detector::Detector;
@@ -103,16 +103,16 @@ const BOOT_STEP: Duration = Duration::from_millis(500);
 /// ```
 /// use sim_channel::Duration;
 /// use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
-/// use sim_channel::modem::{Emulator, Host};
+/// use sim_channel::modem::{Emulator, HostId};
 ///
 /// let mut modem = Micromodem::new(MicromodemConfig { baud: None, ..MicromodemConfig::new(4) });
-/// modem.handle_host_bytes(Host::FIRST, b"$CCCFQ,SRC\r\n", Duration::ZERO);
-/// assert_eq!(modem.poll_host_bytes(Host::FIRST, Duration::ZERO), b"$CACFG,SRC,4*36\r\n");
+/// modem.handle_host_bytes(HostId::FIRST, b"$CCCFQ,SRC\r\n", Duration::ZERO);
+/// assert_eq!(modem.poll_host_bytes(HostId::FIRST, Duration::ZERO), b"$CACFG,SRC,4*36\r\n");
 /// ```
 #[derive(Debug)]
 pub struct Micromodem {
     base: MicromodemBase,
-    collectors: BTreeMap<Host, LineCollector>,
+    collectors: BTreeMap<HostId, LineCollector>,
     cycles: CycleService,
     detector: Detector,
     /// The modem sleeps until a host writes.
@@ -217,7 +217,7 @@ impl ModemLogic for Micromodem {
         &mut self.base.board
     }
 
-    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration) {
+    fn read_host(&mut self, host: HostId, bytes: &[u8], at: Duration) {
         if std::mem::take(&mut self.wakes_on_host) && !self.base.is_awake() {
             self.reboot(at);
         }
@@ -230,7 +230,7 @@ impl ModemLogic for Micromodem {
         }
     }
 
-    fn forget_host(&mut self, host: Host) {
+    fn forget_host(&mut self, host: HostId) {
         self.collectors.remove(&host);
     }
 

@@ -265,7 +265,7 @@ fn header_versions_do_not_mix() {
 fn lost_packet_times_out_and_damaged_frame_fails_its_crc() {
     let lossy = ChannelConfig { loss: LossModel::Independent { probability: 1.0 }, ..Default::default() };
     let damaged = ChannelConfig { corruption: 1.0, ..Default::default() };
-    let hear = |config| {
+    let receive = |config| {
         let mut rig = rig_in(2, config);
         request(&mut rig, 1, "CCCYC,0,1,2,5,0,2");
         request(&mut rig, 1, &format!("CCTXD,1,2,0,{}", "00".repeat(256)));
@@ -273,10 +273,10 @@ fn lost_packet_times_out_and_damaged_frame_fails_its_crc() {
         rig.run(10 * SECOND);
         bodies(&mut rig, 2)
     };
-    let received = hear(lossy);
+    let received = receive(lossy);
     assert_eq!(received[..2], ["CARXP,1", "CAMSG,PACKET_TIMEOUT,0"]);
     assert!(received[2].starts_with("CACST,6,2,202501010000"));
-    let received = hear(damaged);
+    let received = receive(damaged);
     assert!(received.contains(&"CAMSG,BAD_CRC,0".to_string()), "{received:?}");
     assert_eq!(keywords(&received).last(), Some(&"CACST"));
 }

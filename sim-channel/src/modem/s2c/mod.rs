@@ -20,7 +20,7 @@ pub use base::{Interpreter, S2cConfig};
 
 use crate::channel::{Arrival, Onset};
 use crate::modem::emulator::board::{ModemBoard, ModemLogic};
-use crate::modem::emulator::{Fault, Host, ModemEvent, Transmission};
+use crate::modem::emulator::{Fault, HostId, ModemEvent, Transmission};
 use crate::usbl::UsblHead;
 use base::{AfterSending, Condition, S2cBase, S2cTask};
 use burst::BurstService;
@@ -43,14 +43,14 @@ pub fn instant_airtime(bytes: usize) -> Duration {
 ///
 /// ```
 /// use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
-/// use sim_channel::modem::{Emulator, Host};
+/// use sim_channel::modem::{Emulator, HostId};
 /// use sim_channel::Duration;
 ///
 /// let config = S2cConfig { interpreter: Interpreter::At, baud: None, ..S2cConfig::new(7) };
 /// let mut modem = S2c::new(config);
 /// // In data mode, commands and replies are wrapped.
-/// modem.handle_host_bytes(Host::FIRST, b"+++AT?MODE\r", Duration::ZERO);
-/// assert_eq!(modem.poll_host_bytes(Host::FIRST, Duration::ZERO), b"+++AT?MODE:2:AT\r\n");
+/// modem.handle_host_bytes(HostId::FIRST, b"+++AT?MODE\r", Duration::ZERO);
+/// assert_eq!(modem.poll_host_bytes(HostId::FIRST, Duration::ZERO), b"+++AT?MODE:2:AT\r\n");
 /// ```
 #[derive(Debug)]
 pub struct S2c {
@@ -125,7 +125,7 @@ impl S2c {
     }
 
     /// A host has been silent: its unfinished input may have another meaning now.
-    fn on_silence(&mut self, host: Host, at: Duration) {
+    fn on_silence(&mut self, host: HostId, at: Duration) {
         if let Some(input) = self.base.port.handle_timeout(host, at) {
             self.on_input(input, at);
         }
@@ -165,7 +165,7 @@ impl ModemLogic for S2c {
         &mut self.base.board
     }
 
-    fn read_host(&mut self, host: Host, bytes: &[u8], at: Duration) {
+    fn read_host(&mut self, host: HostId, bytes: &[u8], at: Duration) {
         if self.base.condition.is_booting() {
             return;
         }
@@ -178,7 +178,7 @@ impl ModemLogic for S2c {
         }
     }
 
-    fn forget_host(&mut self, host: Host) {
+    fn forget_host(&mut self, host: HostId) {
         self.base.port.forget(host);
     }
 

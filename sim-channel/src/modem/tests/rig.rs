@@ -2,7 +2,7 @@
 
 use crate::channel::{Channel, ChannelConfig};
 use crate::modem::{Basin, Emulator};
-use crate::nodes::{NodeId, Position};
+use crate::nodes::{NodeId, NodePosition};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ impl EmulatorRig {
         let mut basin = Basin::new(Channel::new(config, 1));
         let mut received = BTreeMap::new();
         for (index, (node, modem)) in modems.into_iter().enumerate() {
-            basin.channel().place(NodeId(node), Position::new(range_m * index as f64, 0.0, 0.0));
+            basin.channel().place(NodeId(node), NodePosition::new(range_m * index as f64, 0.0, 0.0));
             basin.add(NodeId(node), modem);
             received.insert(node, Vec::new());
         }
@@ -29,7 +29,7 @@ impl EmulatorRig {
     /// Places the modems `range_m` metres apart.
     pub(crate) fn set_spacing(&mut self, range_m: f64) {
         for (index, node) in self.received.keys().enumerate() {
-            self.basin.channel().place(NodeId(*node), Position::new(range_m * index as f64, 0.0, 0.0));
+            self.basin.channel().place(NodeId(*node), NodePosition::new(range_m * index as f64, 0.0, 0.0));
         }
     }
 

@@ -26,7 +26,7 @@ pub(crate) use transmitter::{AfterSending, QueuedFrame, Transmitter};
 
 use crate::modem::emulator::Transmission;
 use crate::modem::emulator::board::ModemBoard;
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::time::Duration;
 
 /// Settings, port, transmitter and clock of one emulated S2C.
@@ -50,7 +50,7 @@ impl S2cBase {
         const PURPOSE: u64 = 0x52c;
         let settings = Settings::factory(config.address, config.remote);
         Self {
-            board: ModemBoard::new(config.baud, Stream::new(config.seed, &[PURPOSE])),
+            board: ModemBoard::new(config.baud, RandomStream::new(config.seed, &[PURPOSE])),
             port: CommandPort::new(config.interpreter),
             stored: settings.clone(),
             settings,

@@ -1,7 +1,7 @@
 //! The command port: the input of each host, the mode of the port, and the form of the lines it writes.
 
 use super::Interpreter;
-use crate::modem::emulator::Host;
+use crate::modem::emulator::HostId;
 use crate::modem::s2c::input::{HostInput, InputParser, ReadMode};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -17,17 +17,17 @@ pub(crate) enum PortMode {
 pub(crate) struct CommandPort {
     interpreter: Interpreter,
     mode: PortMode,
-    parsers: BTreeMap<Host, InputParser>,
+    parsers: BTreeMap<HostId, InputParser>,
     /// The host whose command is being carried out.
-    requester: Host,
+    requester: HostId,
 }
 
 impl CommandPort {
     pub(crate) fn new(interpreter: Interpreter) -> Self {
-        Self { interpreter, mode: PortMode::Data, parsers: BTreeMap::new(), requester: Host::FIRST }
+        Self { interpreter, mode: PortMode::Data, parsers: BTreeMap::new(), requester: HostId::FIRST }
     }
 
-    pub(crate) fn requester(&self) -> Host {
+    pub(crate) fn requester(&self) -> HostId {
         self.requester
     }
 
@@ -40,29 +40,29 @@ impl CommandPort {
     }
 
     /// Takes bytes of a host, which becomes the requester.
-    pub(crate) fn push(&mut self, host: Host, bytes: &[u8], at: Duration) {
+    pub(crate) fn push(&mut self, host: HostId, bytes: &[u8], at: Duration) {
         self.requester = host;
         self.parsers.entry(host).or_default().push(bytes, at);
     }
 
     /// The next complete input of a host; a command may change how the rest is read.
-    pub(crate) fn next_input(&mut self, host: Host) -> Option<HostInput> {
+    pub(crate) fn next_input(&mut self, host: HostId) -> Option<HostInput> {
         let mode = self.read_mode();
         self.parsers.get_mut(&host)?.next(mode)
     }
 
     /// The time at which silence gives the unfinished input of a host another meaning.
-    pub(crate) fn timeout(&self, host: Host) -> Option<Duration> {
+    pub(crate) fn timeout(&self, host: HostId) -> Option<Duration> {
         self.parsers.get(&host).and_then(|parser| parser.timeout(self.read_mode()))
     }
 
-    pub(crate) fn handle_timeout(&mut self, host: Host, at: Duration) -> Option<HostInput> {
+    pub(crate) fn handle_timeout(&mut self, host: HostId, at: Duration) -> Option<HostInput> {
         let mode = self.read_mode();
         self.requester = host;
         self.parsers.get_mut(&host).and_then(|parser| parser.handle_timeout(at, mode))
     }
 
-    pub(crate) fn forget(&mut self, host: Host) {
+    pub(crate) fn forget(&mut self, host: HostId) {
         self.parsers.remove(&host);
     }
 

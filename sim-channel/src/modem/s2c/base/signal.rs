@@ -1,7 +1,7 @@
 //! Measurements of a received frame.
 
 use crate::channel::Arrival;
-use crate::nodes::Position;
+use crate::nodes::NodePosition;
 use crate::usbl::UsblFix;
 use std::time::Duration;
 
@@ -19,8 +19,8 @@ pub(crate) struct ReceivedSignal {
     /// Received level, dB; -20 within 10 m, -85 at the least.
     pub rssi: i32,
     pub integrity: i32,
-    pub sender: Position,
-    pub receiver: Position,
+    pub sender: NodePosition,
+    pub receiver: NodePosition,
 }
 
 impl ReceivedSignal {

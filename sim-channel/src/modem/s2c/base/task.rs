@@ -1,7 +1,7 @@
 //! Work that the modem has scheduled for later.
 
 use super::{AfterSending, PendingFix, ReceivedSignal, S2cFrame};
-use crate::modem::emulator::Host;
+use crate::modem::emulator::HostId;
 use std::time::Duration;
 
 /// Numbers (`attempt`, `epoch`, `number`) name the state that a timer belongs to: an old timer finds another number and
@@ -49,7 +49,7 @@ pub(crate) enum S2cTask {
     },
     UsblFix(Box<PendingFix>),
     /// A host may have been silent for the guard time of an escape.
-    Silence(Host),
+    Silence(HostId),
     Reboot,
     Booted,
 }

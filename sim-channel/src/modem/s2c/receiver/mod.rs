@@ -6,7 +6,7 @@ mod usbl;
 pub(crate) use usbl::UsblReporter;
 
 use super::base::{ReceivedSignal, S2cBase, S2cFrame, S2cTask, VELOCITY, timing};
-use crate::channel::{Arrival, LossReason, Onset, Outcome};
+use crate::channel::{Arrival, LossReason, Onset, ReceptionOutcome};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
@@ -46,11 +46,11 @@ impl ReceptionLog {
     fn on_end(&mut self, base: &mut S2cBase, arrival: &Arrival, now: Duration) {
         let signal = ReceivedSignal::of(arrival);
         let bytes = match &arrival.outcome {
-            Outcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => {
+            ReceptionOutcome::Lost { reason: LossReason::Noise | LossReason::Collision, .. } => {
                 return self.report_failure(base, arrival.transmission, &signal, now);
             }
-            Outcome::Lost { .. } => return,
-            Outcome::Delivered { bytes, .. } => bytes,
+            ReceptionOutcome::Lost { .. } => return,
+            ReceptionOutcome::Delivered { bytes, .. } => bytes,
         };
         match S2cFrame::decode(bytes) {
             None => self.report_failure(base, arrival.transmission, &signal, now),

@@ -30,8 +30,8 @@ fn one_record_arrives_is_counted_and_delivered() {
     assert_eq!(rig.request(1, "AT?PC\r"), "1\r\n");
     rig.run(5 * SECOND);
     assert_eq!(rig.take(1), "DELIVERED,1,2\r\n");
-    let heard = rig.take(2);
-    assert!(heard.starts_with("RECV,1024,1,2,13000,-50,180,666666,0.0000,xxx"), "{}", &heard[..50]);
+    let received = rig.take(2);
+    assert!(received.starts_with("RECV,1024,1,2,13000,-50,180,666666,0.0000,xxx"), "{}", &received[..50]);
     assert_eq!(rig.request(1, "AT?ZE\r"), "1024\r\n");
 }
 

@@ -1,10 +1,10 @@
 //! Instant, synchronous and piggyback messages, and positions.
 
 use super::rig::{EmulatorRig, SECOND, keywords};
-use crate::channel::{ChannelConfig, Outage, Talker};
+use crate::channel::{ChannelConfig, Interferer, Outage};
 use crate::loss::LossModel;
 use crate::modem::s2c::S2cConfig;
-use crate::nodes::{NodeId, Position};
+use crate::nodes::{NodeId, NodePosition};
 use crate::usbl::UsblConfig;
 use std::time::Duration;
 
@@ -22,11 +22,11 @@ fn acknowledged_message_is_reported_in_order_at_both_ends() {
     assert_eq!(sender[3], "RECVSTART");
     assert!(sender[4].starts_with("RECVEND,"));
     assert_eq!(sender[5], "DELIVEREDIM,2");
-    let heard = rig.take(2);
-    let received = heard.split_once("RECVIM,").expect("received").1;
-    assert!(received.starts_with("4,1,2,ack,204600,-52,178,0.0000,a\r\nb\r\n"), "{received}");
-    assert!(heard.starts_with("RECVSTART\r\nRECVEND,"));
-    assert!(heard.contains("\r\nSENDSTART,1,ack,139000,0\r\n"));
+    let received = rig.take(2);
+    let message = received.split_once("RECVIM,").expect("message").1;
+    assert!(message.starts_with("4,1,2,ack,204600,-52,178,0.0000,a\r\nb\r\n"), "{message}");
+    assert!(received.starts_with("RECVSTART\r\nRECVEND,"));
+    assert!(received.contains("\r\nSENDSTART,1,ack,139000,0\r\n"));
     assert_eq!(rig.request(1, "AT?T\r"), "1000000\r\n");
     assert_eq!(rig.request(1, "AT?DI\r"), "DELIVERED\r\n");
 }
@@ -123,8 +123,8 @@ fn a_lost_message_is_a_failed_reception() {
 fn interferer_causes_failed_receptions() {
     let mut rig = EmulatorRig::calm(2);
     rig.request(2, "AT@ZX1\r");
-    rig.basin.channel().place(NodeId(99), Position::new(100.0, 0.0, 0.0));
-    rig.basin.add_talker(Talker::new(NodeId(99), 20, SECOND, 5 * SECOND, 1));
+    rig.basin.channel().place(NodeId(99), NodePosition::new(100.0, 0.0, 0.0));
+    rig.basin.add_interferer(Interferer::new(NodeId(99), 20, SECOND, 5 * SECOND, 1));
     rig.run(60 * SECOND);
     let lines = rig.lines(2);
     assert!(lines.len() > 10);

@@ -3,7 +3,7 @@
 use super::rig::{EmulatorRig, SECOND};
 use crate::channel::ChannelConfig;
 use crate::modem::s2c::S2cConfig;
-use crate::random::Stream;
+use crate::random::RandomStream;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ fn soak(config: ChannelConfig, seed: u64) {
     for node in 1..=3 {
         rig.request(node, "AT!ZI5\r");
     }
-    let mut rng = Stream::new(seed, &[]);
+    let mut rng = RandomStream::new(seed, &[]);
     let (mut bursts, mut instants) = (BTreeMap::<u8, usize>::new(), BTreeMap::<u8, usize>::new());
     for _ in 0..300 {
         let from = 1 + rng.below(3) as u8;

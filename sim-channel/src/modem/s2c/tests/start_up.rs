@@ -33,8 +33,8 @@ fn dmac_finds_an_at_port_and_sets_it_up() {
 #[test]
 fn evins_queries_numbers_and_switches_options_on() {
     let mut rig = EmulatorRig::calm(3);
-    let answers: Vec<_> = ["?AL", "?AM", "?PID"].map(|query| rig.request(3, &format!("AT{query}\n"))).into();
-    assert_eq!(answers, ["3\r\n", "14\r\n", "0\r\n"]);
+    let replies: Vec<_> = ["?AL", "?AM", "?PID"].map(|query| rig.request(3, &format!("AT{query}\n"))).into();
+    assert_eq!(replies, ["3\r\n", "14\r\n", "0\r\n"]);
     for option in ["@ZF1", "@ZX1", "@ZU1", "@ZA1"] {
         assert_eq!(rig.request(3, &format!("AT{option}\n")), "OK\r\n");
     }
@@ -116,7 +116,7 @@ fn guard_time_leads_to_command_mode_and_ato_back() {
 #[test]
 fn invalid_commands_get_specific_errors() {
     let mut rig = EmulatorRig::calm(1);
-    for (line, answer) in [
+    for (line, reply) in [
         ("AT!L9", "ERROR OUT OF RANGE"),
         ("AT!Lx", "ERROR WRONG FORMAT"),
         ("AT!QQ1", "ERROR UNKNOWN COMMAND"),
@@ -132,7 +132,7 @@ fn invalid_commands_get_specific_errors() {
         ("ATA", "INITIATION LISTEN"),
         ("AT", "OK"),
     ] {
-        assert_eq!(rig.request(1, &format!("{line}\r")), format!("{answer}\r\n"), "{line}");
+        assert_eq!(rig.request(1, &format!("{line}\r")), format!("{reply}\r\n"), "{line}");
     }
 }
 
@@ -148,9 +148,9 @@ fn settings_need_control_where_the_firmware_requires_it() {
 #[test]
 fn noise_is_binary_and_counted() {
     let mut rig = EmulatorRig::calm(1);
-    let answer = rig.request(1, "AT?NOISE\r");
-    let fields: Vec<_> = answer.splitn(6, ',').collect();
+    let reply = rig.request(1, "AT?NOISE\r");
+    let fields: Vec<_> = reply.splitn(6, ',').collect();
     assert_eq!((fields[0], fields[1]), ("NOISE", "64"));
     assert_eq!(fields[5].chars().count(), 66);
-    assert!(answer.ends_with("\r\n"));
+    assert!(reply.ends_with("\r\n"));
 }
