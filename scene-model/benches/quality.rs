@@ -8,7 +8,7 @@ mod workload;
 
 use scene_model::topics::{SceneConfig, SceneModel};
 use scene_model::tuning::mutual_information_nats;
-use workload::{Chance, Workload};
+use workload::{Workload, XorShiftRng};
 
 const SWEEPS: u32 = 30;
 const MAX_LABELS: u32 = 16;
@@ -36,10 +36,10 @@ fn main() {
 
 fn displaced(seed: u64, sigma: f64) -> Workload {
     let mut work = workload::workload(seed, 100, 100, 1000);
-    let mut chance = Chance(seed + 77);
+    let mut rng = XorShiftRng(seed + 77);
     for seen in &mut work.observations {
-        let radius = sigma * (-2.0 * (1.0 - chance.unit()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * chance.unit()).sin_cos();
+        let radius = sigma * (-2.0 * (1.0 - rng.unit()).ln()).sqrt();
+        let (sin, cos) = (std::f64::consts::TAU * rng.unit()).sin_cos();
         (seen.x, seen.y) = (seen.x + radius * cos, seen.y + radius * sin);
     }
     work

@@ -15,7 +15,7 @@ use std::sync::{Mutex, OnceLock};
 use cpu::cpu_seconds;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use plain::Plain;
+use plain::PlainSampler;
 use scene_model::topics::{Kernel, SceneConfig, SceneModel};
 use workload::Workload;
 
@@ -36,7 +36,7 @@ fn main() {
 #[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
 fn plain_algorithm(bencher: Bencher<'_, '_>, labels: u32) {
     let work = work();
-    let inputs = bencher.counter(words(1)).with_inputs(|| Plain::new(work, labels as usize));
+    let inputs = bencher.counter(words(1)).with_inputs(|| PlainSampler::new(work, labels as usize));
     inputs.bench_local_values(|mut plain| spend(PLAIN, labels, || plain.sweep()));
 }
 

@@ -16,7 +16,7 @@ fn main() {
         model.insert(f64::from(row), &strip(row, 100, 100));
     }
     model.sweep(10);
-    model.label_map();
+    let _ = model.label_map();
     println!("10 k cells, 1 M words, K 100: {:.0} MB", resident_mb() - before);
     drop(model);
 
@@ -38,12 +38,12 @@ fn main() {
 
 /// One row of cells of eight kinds of ground.
 fn strip(row: u32, columns: u32, words_per_cell: u32) -> Vec<Observation> {
-    let mut chance = workload::Chance(u64::from(row) * 7919 + 1);
+    let mut rng = workload::XorShiftRng(u64::from(row) * 7919 + 1);
     let mut seen = Vec::with_capacity((columns * words_per_cell) as usize);
     for column in 0..columns {
         let ground = (row / 20 * 3 + column / 30 * 5) % 8;
         for _ in 0..words_per_cell {
-            let word = ground * 125 + (chance.unit() * chance.unit() * 250.0) as u32;
+            let word = ground * 125 + (rng.unit() * rng.unit() * 250.0) as u32;
             let (x, y) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
             seen.push(Observation { word: word % 1000, x, y, z: 0.0 });
         }

@@ -1,6 +1,6 @@
 //! A sample of the spatial CRP: one label for each patch of a grid.
 
-use crate::random::Stream;
+use crate::random::CounterRng;
 
 /// Prior weight of a label that no neighbour has, and of a new label.
 const ALPHA: f64 = 0.01;
@@ -20,23 +20,23 @@ pub(crate) struct Patches {
 
 impl Patches {
     pub(crate) fn sample(key: u64, columns: usize, rows: usize, classes: u8) -> Self {
-        let mut chance = Stream::new(key);
+        let mut rng = CounterRng::new(key);
         let mut patches = Self { columns, rows, labels: vec![u8::MAX; columns * rows] };
         let mut sizes = vec![0usize; classes as usize];
         let mut order: Vec<usize> = (0..columns * rows).collect();
         for _ in 0..=SWEEPS {
             for i in (1..order.len()).rev() {
-                order.swap(i, chance.below(i + 1));
+                order.swap(i, rng.below(i + 1));
             }
             for &place in &order {
-                patches.draw(place, &mut sizes, &mut chance);
+                patches.draw(place, &mut sizes, &mut rng);
             }
         }
         patches
     }
 
     /// Draws the label of one patch given its neighbours: occupied tables by count, a new one by gamma.
-    fn draw(&mut self, place: usize, sizes: &mut [usize], chance: &mut Stream) {
+    fn draw(&mut self, place: usize, sizes: &mut [usize], rng: &mut CounterRng) {
         if let Some(size) = sizes.get_mut(self.labels[place] as usize) {
             *size -= 1;
         }
@@ -53,7 +53,7 @@ impl Patches {
             _ => f64::powi(near[label], SHARPNESS) + ALPHA,
         };
         let weights: Vec<f64> = (0..sizes.len()).map(weight).collect();
-        let mut aim = chance.unit() * weights.iter().sum::<f64>();
+        let mut aim = rng.unit() * weights.iter().sum::<f64>();
         let label = weights.iter().position(|weight| {
             aim -= weight;
             aim < 0.0

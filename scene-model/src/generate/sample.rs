@@ -1,6 +1,6 @@
 //! Random worlds of the spatial CRP itself, as the paper's figure shows them.
 
-use crate::random::Stream;
+use crate::random::CounterRng;
 
 /// A world of labels drawn from the prior: one customer in each cell's restaurant.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,20 +15,21 @@ pub struct LabelWorld {
 
 /// Draws a world of `columns` x `rows` cells with `customers` words in each.
 ///
-/// Cells come in as an explorer would see them, each next to one that is there. Each word sits down at label k with weight n_k + `alpha`, where n_k counts the label in the cell and its Von Neumann
-/// neighbours, or at a new one with weight `gamma`; the cell shows the label that most of its words have (ties to the
-/// oldest). Both weights are at or above 0.
+/// Cells come in as an explorer would see them, each next to one that is there. Each word sits down at label k with
+/// weight n_k + `alpha`, where n_k counts the label in the cell and its Von Neumann neighbours, or at a new one with
+/// weight `gamma`; the cell shows the label that most of its words have (ties to the oldest). Both weights are at or
+/// above 0.
 pub fn sample(seed: u64, columns: usize, rows: usize, alpha: f64, gamma: f64, customers: u32) -> LabelWorld {
-    let mut chance = Stream::new(seed);
+    let mut rng = CounterRng::new(seed);
     let mut tables: Vec<Vec<(u32, u32)>> = vec![Vec::new(); columns * rows];
     let mut room = Room { alpha, gamma, words: Vec::new() };
-    for cell in growth(columns, rows, &mut chance) {
+    for cell in growth(columns, rows, &mut rng) {
         let mut near: Vec<(u32, u32)> = Vec::new();
         for &(label, words) in neighbours(cell, columns, rows).flat_map(|other| &tables[other]) {
             count(&mut near, label, words);
         }
         for _ in 0..customers.max(1) {
-            let label = room.sit_down(&near, &mut chance);
+            let label = room.sit_down(&near, &mut rng);
             count(&mut near, label, 1);
             count(&mut tables[cell], label, 1);
         }
@@ -40,16 +41,16 @@ pub fn sample(seed: u64, columns: usize, rows: usize, alpha: f64, gamma: f64, cu
 }
 
 /// All cells in random order, each but the first next to an earlier one.
-fn growth(columns: usize, rows: usize, chance: &mut Stream) -> Vec<usize> {
+fn growth(columns: usize, rows: usize, rng: &mut CounterRng) -> Vec<usize> {
     let mut reached = vec![false; columns * rows];
     let mut edge = Vec::new();
     let mut order = Vec::with_capacity(columns * rows);
     if !reached.is_empty() {
-        edge.push(chance.below(columns * rows));
+        edge.push(rng.below(columns * rows));
         reached[edge[0]] = true;
     }
     while !edge.is_empty() {
-        let cell = edge.swap_remove(chance.below(edge.len()));
+        let cell = edge.swap_remove(rng.below(edge.len()));
         order.push(cell);
         for other in neighbours(cell, columns, rows) {
             if !std::mem::replace(&mut reached[other], true) {
@@ -69,10 +70,10 @@ struct Room {
 }
 
 impl Room {
-    fn sit_down(&mut self, near: &[(u32, u32)], chance: &mut Stream) -> u32 {
+    fn sit_down(&mut self, near: &[(u32, u32)], rng: &mut CounterRng) -> u32 {
         let occupied: u32 = near.iter().map(|entry| entry.1).sum();
         let elsewhere = self.alpha * self.words.len() as f64;
-        let mut aim = chance.unit() * (f64::from(occupied) + elsewhere + self.gamma);
+        let mut aim = rng.unit() * (f64::from(occupied) + elsewhere + self.gamma);
         for &(label, words) in near {
             aim -= f64::from(words);
             if aim < 0.0 {

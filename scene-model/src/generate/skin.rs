@@ -1,7 +1,7 @@
 //! How a class looks: two tones joined by layered noise of its own grain and direction.
 
 use super::noise::Noise;
-use crate::random::Stream;
+use crate::random::CounterRng;
 
 pub(crate) const MAX_CLASSES: u8 = 24;
 
@@ -53,16 +53,16 @@ impl Skin {
 
 /// One skin for each class; tones differ as long as there are some left.
 pub(crate) fn palette(key: u64, classes: u8) -> Vec<Skin> {
-    let mut chance = Stream::new(key);
+    let mut rng = CounterRng::new(key);
     let mut order: Vec<usize> = (0..TONES.len()).collect();
     for i in (1..order.len()).rev() {
-        order.swap(i, chance.below(i + 1));
+        order.swap(i, rng.below(i + 1));
     }
-    (0..classes as usize).map(|class| skin(TONES[order[class % order.len()]], &mut chance)).collect()
+    (0..classes as usize).map(|class| skin(TONES[order[class % order.len()]], &mut rng)).collect()
 }
 
-fn skin(tone: [f32; 3], chance: &mut Stream) -> Skin {
-    let mut between = |low: f64, high: f64| (low + (high - low) * chance.unit()) as f32;
+fn skin(tone: [f32; 3], rng: &mut CounterRng) -> Skin {
+    let mut between = |low: f64, high: f64| (low + (high - low) * rng.unit()) as f32;
     let contrast = between(0.25, 0.6);
     let brightness = between(0.85, 1.15);
     let grain = 1.0 / between(3.0, 14.0);

@@ -1,19 +1,19 @@
 //! k-means with k-means++ starts, for the baselines.
 
-use crate::random::Stream;
+use crate::random::CounterRng;
 
 const ROUNDS: usize = 60;
 const STARTS: usize = 4;
 
 /// Cluster of each point (rows of `width` numbers), best of four starts; at most `k` clusters.
 pub(super) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
-    let mut chance = Stream::new(seed);
-    let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut chance));
+    let mut rng = CounterRng::new(seed);
+    let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut rng));
     runs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0).unwrap_or_default()
 }
 
-fn one_start(points: &[f32], width: usize, k: usize, chance: &mut Stream) -> (Vec<u32>, f64) {
-    let mut centres = seeds(points, width, k, chance);
+fn one_start(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> (Vec<u32>, f64) {
+    let mut centres = seeds(points, width, k, rng);
     let mut owners = vec![u32::MAX; points.len() / width];
     let mut cost = 0.0;
     for _ in 0..ROUNDS {
@@ -32,18 +32,18 @@ fn one_start(points: &[f32], width: usize, k: usize, chance: &mut Stream) -> (Ve
     (owners, cost)
 }
 
-fn seeds(points: &[f32], width: usize, k: usize, chance: &mut Stream) -> Vec<f32> {
+fn seeds(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> Vec<f32> {
     let count = points.len() / width;
     let mut centres = Vec::new();
     let mut away = vec![f32::INFINITY; count];
-    let mut next = chance.below(count);
+    let mut next = rng.below(count);
     while count > 0 && centres.len() < k * width {
         let centre = &points[next * width..][..width];
         centres.extend_from_slice(centre);
         for (point, away) in points.chunks_exact(width).zip(&mut away) {
             *away = away.min(distance(point, centre));
         }
-        let mut aim = chance.unit() * away.iter().map(|&d| f64::from(d)).sum::<f64>();
+        let mut aim = rng.unit() * away.iter().map(|&d| f64::from(d)).sum::<f64>();
         let passed = away.iter().position(|&d| {
             aim -= f64::from(d);
             aim < 0.0
