@@ -6,12 +6,12 @@ mod cpu;
 use std::collections::BTreeMap;
 
 use cpu::cpu_seconds;
-use scene_model::generate::{Reef, reef};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{SceneConfig, SceneModel};
-use scene_model::tuning::mutual_information_nats;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::{Reef, reef};
 
 fn main() {
     let mut parts = [0.0; 5];

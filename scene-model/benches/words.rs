@@ -5,8 +5,8 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use scene_model::generate::reef;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_worlds::reef;
 
 const NONE: WordConfig = WordConfig { colour: 0, context: 0, spread: 0, texture: 0, binary: 0, warm_up_frames: 1 };
 

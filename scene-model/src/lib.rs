@@ -10,12 +10,9 @@
 
 pub mod envelope;
 pub mod exemplars;
-pub mod generate;
 pub mod project;
 pub mod publish;
 pub mod random;
-pub mod score;
 pub mod topics;
-pub mod tuning;
 pub mod vocabulary;
 pub mod words;

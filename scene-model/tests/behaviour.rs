@@ -1,11 +1,11 @@
 //! What the scene model promises, from outside.
 
-use scene_model::generate::{Reef, reef};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, SceneConfig, SceneModel};
-use scene_model::tuning::mutual_information_nats;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::{Reef, reef};
 
 const CELL_PX: f32 = 25.0;
 

@@ -1,12 +1,13 @@
-//! k-means with k-means++ starts, for the baselines.
+//! k-means with k-means++ seeding (Arthur and Vassilvitskii, SODA 2007), for the baselines.
 
-use crate::random::CounterRng;
+use scene_model::random::CounterRng;
 
 const ROUNDS: usize = 60;
 const STARTS: usize = 4;
 
-/// Cluster of each point (rows of `width` numbers), best of four starts; at most `k` clusters.
-pub(super) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
+/// The cluster of each point, the best of four starts. Points are rows of `width` numbers; there are at most `k`
+/// clusters.
+pub(crate) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
     let mut rng = CounterRng::new(seed);
     let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut rng));
     runs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0).unwrap_or_default()
@@ -101,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn separate_heaps_get_separate_clusters() {
+    fn separate_groups_get_separate_clusters() {
         let points: Vec<f32> = (0..300).flat_map(|i| [(i % 3) as f32 * 10.0, (i / 3) as f32 * 0.01]).collect();
         let owners = k_means(&points, 2, 3, 1);
         assert!(owners.chunks(3).all(|c| c == &owners[..3]));
@@ -109,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn fewer_points_than_clusters_are_no_trouble() {
+    fn fewer_points_than_clusters_are_accepted() {
         assert_eq!(k_means(&[1.0, 1.0], 1, 5, 1), [0, 0]);
         assert!(k_means(&[], 3, 5, 1).is_empty());
     }

@@ -128,8 +128,17 @@ pub(crate) fn box_means(frame: &RgbImage, spacing: f32) -> Vec<[f32; 3]> {
     means
 }
 
-/// CIE Lab (D65) of an sRGB colour with channels 0 to 1.
-pub(crate) fn lab(rgb: [f32; 3]) -> [f32; 3] {
+/// Returns the CIE Lab coordinates (D65) of an sRGB colour with channels of 0 to 1: L from 0 to 100, a and b around 0.
+///
+/// The sRGB curve is approximated by a cubic, with an error below 0.002.
+///
+/// ```
+/// let [l, a, b] = scene_model::words::cie_lab([1.0, 1.0, 1.0]);
+/// assert!((l - 100.0).abs() < 0.1 && a.abs() < 0.1 && b.abs() < 0.1);
+/// ```
+#[inline]
+#[must_use]
+pub fn lab(rgb: [f32; 3]) -> [f32; 3] {
     let [r, g, b] = rgb.map(linear);
     let x = (0.412_456 * r + 0.357_576 * g + 0.180_438 * b) / 0.950_47;
     let y = 0.212_673 * r + 0.715_152 * g + 0.072_175 * b;

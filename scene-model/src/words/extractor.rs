@@ -98,26 +98,16 @@ impl WordExtractor {
         }
     }
 
-    /// Learns from a set of images before a mission, in two passes, and returns the frozen measures.
+    /// Adds an image to the tone stretch: the first pass of training a vocabulary, over all images of a site.
     ///
-    /// `images` is called twice and gives the same images each time, so that not all of them are in memory at once.
-    /// Each comes with the edge of a cell in its pixels. Images that [`WordExtractor::extract`] would refuse are
-    /// skipped.
-    pub fn train<I: Iterator<Item = (RgbImage, f32)>>(config: &WordConfig, images: impl Fn() -> I) -> Measures {
-        let mut extractor = Self::new(config);
-        let usable = || images().filter(|(image, cell_px)| is_usable(image, *cell_px));
-        usable().for_each(|(image, _)| extractor.learn_tones(&image));
-        usable().for_each(|(image, cell_px)| extractor.learn_statistics(&image, cell_px));
-        extractor.freeze();
-        extractor.measures()
-    }
-
-    /// Adds an image to the tone stretch. The first pass of training: every image, before [`Self::learn_statistics`].
+    /// See [`vocabulary`](crate::vocabulary) for both passes. A mission without a trained vocabulary learns in
+    /// [`Self::extract`] instead.
     pub fn learn_tones(&mut self, image: &RgbImage) {
         self.stretch.learn(image);
     }
 
-    /// Adds an image to the means and deviations of the features. The second pass of training.
+    /// Adds an image to the means and deviations of the features: the second pass of training, after the tone stretch
+    /// is complete.
     ///
     /// `cell_px` is the edge of a cell in pixels. An image that [`Self::extract`] refuses is ignored.
     pub fn learn_statistics(&mut self, image: &RgbImage, cell_px: f32) {
@@ -266,16 +256,6 @@ mod tests {
         let mut restarted = WordExtractor::from_measures(postcard::from_bytes(&bytes).unwrap());
         let next = speckle(200, 100);
         assert_eq!(restarted.extract(&next, 20.0), extractor.extract(&next, 20.0));
-    }
-
-    #[test]
-    fn trained_measures_are_frozen() {
-        let images = [(speckle(100, 80), 20.0), (RgbImage::from_pixel(50, 50, Rgb([200, 9, 9])), 20.0)];
-        let measures = WordExtractor::train(&WordConfig::default(), || images.iter().cloned());
-        let mut extractor = WordExtractor::from_measures(measures);
-        let first = extractor.extract(&images[0].0, 20.0);
-        extractor.extract(&images[1].0, 20.0);
-        assert_eq!(extractor.extract(&images[0].0, 20.0), first);
     }
 
     #[test]
