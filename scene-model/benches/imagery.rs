@@ -1,4 +1,4 @@
-//! Scores on real imagery: our defaults and the baselines over a folder of images with `*_label.png` beside them.
+//! Scores on real imagery: the defaults and the baselines over a folder of images with annotations in `*_label.png`.
 //!
 //! `cargo bench -p scene-model --bench imagery -- DIR [SEEDS]`; `scenecast scene score` is the same with more options.
 #![allow(missing_docs)]

@@ -1,4 +1,4 @@
-//! Memory and time at scale: 10 k cells with 1 M words at K = 100, then 1 M cells with 50 M words at K = 16.
+//! Memory and time of large models: 10 k cells with 1 M words at K = 100, then 1 M cells with 50 M words at K = 16.
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub, dead_code)]
 
 mod workload;
@@ -36,7 +36,7 @@ fn main() {
     );
 }
 
-/// One row of cells of eight kinds of ground.
+/// The words of one row of cells, with eight kinds of ground.
 fn strip(row: u32, columns: u32, words_per_cell: u32) -> Vec<Observation> {
     let mut rng = workload::XorShiftRng(u64::from(row) * 7919 + 1);
     let mut seen = Vec::with_capacity((columns * words_per_cell) as usize);
@@ -51,7 +51,7 @@ fn strip(row: u32, columns: u32, words_per_cell: u32) -> Vec<Observation> {
     seen
 }
 
-/// Memory of this process that is in RAM, MB (Linux; elsewhere nothing).
+/// The resident memory of this process in MB (on Linux; elsewhere NaN).
 fn resident_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));

@@ -1,4 +1,4 @@
-//! Words from frames of 640 x 480 pixels, frames a second on one core.
+//! Word extraction from frames of 640 x 480 pixels: frames a second on one core.
 //!
 //! `cargo bench -p scene-model --bench words`
 #![allow(missing_docs)]
@@ -14,7 +14,7 @@ fn main() {
     divan::main();
 }
 
-/// All vocabularies in the default ratio.
+/// All kinds of words in the default ratio.
 #[divan::bench]
 fn all(bencher: Bencher<'_, '_>) {
     frames(bencher, WordConfig { warm_up_frames: 1, ..WordConfig::default() });

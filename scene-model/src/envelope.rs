@@ -24,7 +24,7 @@ const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Envelope {
-    /// The first eight bytes.
+    /// The first eight bytes of the file.
     pub magic: [u8; 8],
     /// The version to write, and the only one that is accepted.
     pub version: u32,
@@ -34,7 +34,7 @@ pub struct Envelope {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EnvelopeError {
-    /// The magic differs.
+    /// The bytes begin with another magic.
     #[error("a file of another kind")]
     Foreign,
     /// The magic is right, but the version differs.

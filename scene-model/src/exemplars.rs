@@ -49,15 +49,15 @@ pub struct ExemplarStore {
 const MAX_TOPICS: usize = 256;
 
 impl ExemplarStore {
-    /// Returns an empty store for at most 256 topics with at most `per_label` patches of `edge_px` x `edge_px` pixels
-    /// each.
+    /// Returns an empty store for at most 256 topics with at most `per_label` patches of
+    /// `edge_px` x `edge_px` pixels each.
     #[must_use]
     pub fn new(per_label: usize, edge_px: u32) -> Self {
         Self { per_label: per_label.max(1), edge_px: edge_px.max(1), apart_m: 0.5, topics: BTreeMap::new() }
     }
 
-    /// Sets the minimum distance between two patches of a topic in metres (0.5 by default), so that they show different
-    /// objects.
+    /// Sets the minimum distance between two patches of a topic in metres (0.5 by default), so
+    /// that they show different objects.
     #[must_use]
     pub fn with_distance(self, apart_m: f64) -> Self {
         Self { apart_m, ..self }

@@ -17,10 +17,10 @@ pub struct PublishedCell {
     pub y: i32,
     /// The published label, 1 to 254.
     pub label: u8,
-    /// As [`FlatCell::confidence`]; 0 if the label does not stand for the cell's own topic (see
-    /// [`LabelBook::publish`]).
+    /// As [`FlatCell::confidence`]; 0 if the label does not stand for the
+    /// cell's own topic (see [`LabelBook::publish`]).
     pub confidence: f32,
-    /// As [`FlatCell::perplexity`].
+    /// The perplexity of the cell's words, as [`FlatCell::perplexity`].
     pub perplexity: f32,
 }
 
@@ -54,8 +54,8 @@ pub fn label_areas(cells: &[PublishedCell]) -> BTreeMap<u8, u32> {
 pub struct LabelBook {
     epoch: u8,
     min_cells: u32,
-    /// The topic of label 1, 2 and so on. `None` if an earlier run may have given the label to a topic that is unknown
-    /// here.
+    /// The topic of label 1, 2 and so on. `None` if an earlier run may have given the label to a
+    /// topic that is unknown here.
     topics: Vec<Option<TopicId>>,
     ids: BTreeMap<TopicId, u8>,
     /// The topics that held enough cells in the last call.
@@ -75,8 +75,8 @@ impl LabelBook {
         Self { epoch, min_cells: DEFAULT_MIN_CELLS, topics, ids: BTreeMap::new(), held, shown }
     }
 
-    /// Sets the number of cells that a topic must hold in two consecutive calls to get a label: 3 by default, at least
-    /// 1.
+    /// Sets the number of cells that a topic must hold in two consecutive calls to get a label: 3
+    /// by default, at least 1.
     #[must_use]
     pub fn with_min_cells(self, min_cells: u32) -> Self {
         Self { min_cells: min_cells.max(1), ..self }
@@ -112,8 +112,8 @@ impl LabelBook {
         self.topics.resize(self.topics.len().max(published), None);
     }
 
-    /// Begins another epoch, whose labels are numbered from 1. Topics that held enough cells before the call get their
-    /// labels at once.
+    /// Begins another epoch, whose labels are numbered from 1. Topics that held enough cells before the call
+    /// get their labels at once.
     pub fn begin_epoch(&mut self, epoch: u8) {
         self.epoch = epoch;
         self.topics.clear();

@@ -9,8 +9,7 @@ use crate::k_means::k_means;
 use crate::label_grid::LabelGrid;
 
 /// Labels each cell by k-means on the mean CIE Lab colours of the cells, with at most `k` labels.
-#[must_use]
-pub fn mean_lab_labels(image: &RgbImage, cell_px: f32, k: usize, seed: u64) -> LabelGrid {
+pub(crate) fn mean_lab_labels(image: &RgbImage, cell_px: f32, k: usize, seed: u64) -> LabelGrid {
     let (columns, rows, colours) = cell_lab(image, cell_px);
     let labels = k_means(colours.as_flattened(), 3, k, seed);
     LabelGrid { columns, rows, labels: labels.into_iter().map(Some).collect() }
@@ -42,8 +41,7 @@ pub fn mosaic_classes(image: &RgbImage, cell_px: f32) -> Annotations {
 /// Labels each cell by k-means on the word frequencies of the cell and its eight neighbours, with at most `k` labels.
 ///
 /// `size` is the width and the height of the image in pixels.
-#[must_use]
-pub fn pooled_word_labels(
+pub(crate) fn pooled_word_labels(
     words: &[Word],
     vocabulary: u32,
     size: (u32, u32),
@@ -76,8 +74,8 @@ pub fn pooled_word_labels(
     LabelGrid { columns, rows, labels: labels.into_iter().map(Some).collect() }
 }
 
-/// The mean CIE Lab colour of each cell, without a tone stretch: columns, rows, and the colours row by row from the
-/// top.
+/// The mean CIE Lab colour of each cell, without a tone stretch: columns, rows, and the colours row
+/// by row from the top.
 fn cell_lab(image: &RgbImage, cell_px: f32) -> (usize, usize, Vec<[f32; 3]>) {
     let cells = |length: u32| (length as f32 / cell_px).ceil().max(1.0) as usize;
     let (columns, rows) = (cells(image.width()), cells(image.height()));

@@ -5,8 +5,8 @@ use scene_model::random::CounterRng;
 const ROUNDS: usize = 60;
 const STARTS: usize = 4;
 
-/// The cluster of each point, the best of four starts. Points are rows of `width` numbers; there are at most `k`
-/// clusters.
+/// The cluster of each point, the best of four starts. Points are rows of `width` numbers; there
+/// are at most `k` clusters.
 pub(crate) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
     let mut rng = CounterRng::new(seed);
     let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut rng));

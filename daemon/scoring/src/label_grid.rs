@@ -7,7 +7,7 @@ use scene_model::topics::FlatCell;
 pub struct LabelGrid {
     /// The number of cells in a row.
     pub columns: usize,
-    /// The number of rows.
+    /// The number of rows, from north to south.
     pub rows: usize,
     /// `columns` x `rows` labels; `None` for a cell without a label.
     pub labels: Vec<Option<u32>>,

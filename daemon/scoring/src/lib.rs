@@ -28,7 +28,7 @@ mod training;
 mod trial;
 
 pub use annotations::{AnnotationError, Annotations};
-pub use baselines::{mean_lab_labels, mosaic_classes, pooled_word_labels};
+pub use baselines::mosaic_classes;
 pub use label_grid::LabelGrid;
 pub use mutual_information::{MutualInformation, mutual_information_nats};
 pub use null::{SceneScore, score};

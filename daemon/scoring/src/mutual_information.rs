@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// The agreement of two labellings, whatever their numbering.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MutualInformation {
-    /// Mutual information, nats.
+    /// Mutual information in nats, 0 or above.
     pub nats: f64,
     /// `nats` over the geometric mean of both entropies, 0 to 1; 0 if an entropy is 0.
     pub normalised: f64,
@@ -39,8 +39,7 @@ pub fn mutual_information_nats(pairs: impl Iterator<Item = (u32, u32)>) -> Mutua
 
 impl MutualInformation {
     /// Returns the mutual information of a table of joint counts with `columns` columns, row by row.
-    #[must_use]
-    pub fn of_table(joint: &[u64], columns: usize) -> Self {
+    pub(crate) fn of_table(joint: &[u64], columns: usize) -> Self {
         let columns = columns.max(1);
         let mut right = vec![0; columns];
         for row in joint.chunks(columns) {

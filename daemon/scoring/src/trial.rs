@@ -26,7 +26,7 @@ impl Method {
     /// All methods; the scene model is the last.
     pub const ALL: [Self; 3] = [Self::MeanLab, Self::PooledWords, Self::SceneModel];
 
-    /// The name in reports.
+    /// The name in reports: `kmeans_lab`, `kmeans_pooled_words` or `scene_model`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -81,7 +81,7 @@ pub enum TrialError {
     /// The annotations and the image differ in size.
     #[error(transparent)]
     Annotations(#[from] AnnotationError),
-    /// No pixel is annotated.
+    /// No pixel has a class that is not ignored.
     #[error("no pixel is annotated")]
     NoClasses,
     /// A parameter is out of its range.
@@ -105,8 +105,8 @@ pub struct AnnotatedScene<'a> {
 }
 
 impl<'a> AnnotatedScene<'a> {
-    /// Extracts the words of an image. `classes` has the class of each pixel; pixels with a class in `ignore` count as
-    /// not annotated.
+    /// Extracts the words of an image. `classes` has the class of each pixel; pixels with a class in
+    /// `ignore` count as not annotated.
     pub fn new(trial: Trial, image: &'a RgbImage, classes: &GrayImage, ignore: &[u8]) -> Result<Self, TrialError> {
         let size = image.dimensions();
         if size.0.min(size.1) < MIN_IMAGE_PX {

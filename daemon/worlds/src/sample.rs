@@ -7,7 +7,7 @@ use scene_model::random::CounterRng;
 pub struct LabelWorld {
     /// The number of cells in a row.
     pub columns: usize,
-    /// The number of rows.
+    /// The number of rows of cells.
     pub rows: usize,
     /// The label of each cell, row by row, numbered from 0 in the order of birth.
     pub labels: Vec<u32>,

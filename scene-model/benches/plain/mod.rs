@@ -1,9 +1,9 @@
-//! The published algorithm, plainly: one word after another, 64-bit floats, a division a label, a cumulative
-//! distribution a word. What the sampler's speed is compared with, on the same machine in the same run.
+//! A plain implementation of the published algorithm, as a reference for the speed of the sampler: one word after
+//! another, 64-bit floats, one division for each label, one cumulative distribution for each word.
 
 use super::workload::{Workload, XorShiftRng};
 
-/// Cells of a square world with a fixed number of labels, all in use from the start.
+/// A square world with a fixed number of labels, all of them in use from the start.
 pub struct PlainSampler {
     labels: usize,
     vocabulary: usize,
@@ -56,7 +56,7 @@ impl PlainSampler {
         self.of_label[label] += sign;
     }
 
-    /// Resamples every word once; returns how many.
+    /// Resamples every word once, and returns their number.
     pub fn sweep(&mut self) -> u64 {
         let mut done = 0;
         for cell in 0..self.words.len() {

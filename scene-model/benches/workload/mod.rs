@@ -1,5 +1,5 @@
-//! The synthetic workload of the speed and quality figures: 100 patches of 8 true
-//! labels (entropy about 2.0 nats), sparse word distributions.
+//! The synthetic workload of the speed and quality benches: 100 patches of 8 true labels (entropy about 2.0
+//! nats) with sparse word distributions.
 
 use scene_model::project::Observation;
 
@@ -15,7 +15,7 @@ pub struct Workload {
 const LABELS: usize = 8;
 const PATCHES: usize = 100;
 
-/// `side` x `side` cells of 1 m with about `words_per_cell` words each out of `vocabulary`.
+/// Returns `side` x `side` cells of 1 m with about `words_per_cell` words each, from a vocabulary of `vocabulary` words.
 pub fn workload(seed: u64, side: i32, words_per_cell: u32, vocabulary: u32) -> Workload {
     let mut rng = XorShiftRng(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let centres: Vec<[f64; 2]> =
@@ -42,7 +42,8 @@ pub fn workload(seed: u64, side: i32, words_per_cell: u32, vocabulary: u32) -> W
     Workload { side, vocabulary, observations, truth }
 }
 
-/// Cumulative word probabilities of one label: a tenth of the vocabulary, exponentially distributed, on a thin floor.
+/// The cumulative word probabilities of one label: a tenth of the vocabulary has most
+/// of the mass, exponentially distributed.
 fn word_table(vocabulary: u32, rng: &mut XorShiftRng) -> Vec<f64> {
     let weight = |rng: &mut XorShiftRng| {
         let mass = -(1.0 - rng.unit()).ln();
@@ -60,7 +61,7 @@ fn word_table(vocabulary: u32, rng: &mut XorShiftRng) -> Vec<f64> {
         .collect()
 }
 
-/// Xorshift64*: the workload must not depend on the crate under test.
+/// Xorshift64*, so that the workload does not depend on the crate under test.
 pub struct XorShiftRng(pub u64);
 
 impl XorShiftRng {

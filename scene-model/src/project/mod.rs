@@ -15,6 +15,6 @@ pub struct Observation {
     pub x: f64,
     /// Metres to the north of the origin.
     pub y: f64,
-    /// Metres above the origin.
+    /// Metres above the origin; negative below it.
     pub z: f64,
 }

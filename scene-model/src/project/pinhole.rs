@@ -86,15 +86,14 @@ impl PinholeCamera {
     fn place(&self, word: &Word, metres: f64, pose: &CameraPose) -> Observation {
         let right = (f64::from(word.u) - self.cx) / self.fx * metres;
         let down = (f64::from(word.v) - self.cy) / self.fy * metres;
-        let [x, y, z] = pose.to_world([right, down, metres]);
+        let [x, y, z] = pose.transform([right, down, metres]);
         Observation { word: word.id, x, y, z }
     }
 }
 
 impl CameraPose {
     /// Transforms a point from the camera's axes to the world, metres.
-    #[must_use]
-    pub fn to_world(&self, point: [f64; 3]) -> [f64; 3] {
+    fn transform(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z, w] = self.rotation;
         let scale = 2.0 / (x * x + y * y + z * z + w * w);
         let rows = [

@@ -1,9 +1,9 @@
 //! Appearance affinity: the label counts of a neighbour weigh more, the more alike the two cells look.
 //!
-//! The weight of a pair of neighbours is exp(-d / mean d), where d is the squared distance of their mean colours.
-//! Weights are scaled to a mean of 1, so that on average the neighbours weigh as much as in the paper, but label
-//! borders move to where the colour changes. It is the contrast term of image segmentation (Boykov and Jolly, ICCV
-//! 2001).
+//! The weight of a pair of neighbours is exp(-d / mean d), where d is the squared distance of their mean
+//! colours. Weights are scaled to a mean of 1, so that on average the neighbours weigh as much as in the
+//! paper, but label borders move to where the colour changes. It is the contrast term of image segmentation
+//! (Boykov and Jolly, ICCV 2001).
 
 use super::grid::NONE;
 

@@ -135,8 +135,8 @@ impl Cells {
         self.affinity.update_weights();
     }
 
-    /// Writes the label counts of a cell's neighbours, weighted by affinity, into `around`, and these plus its own into
-    /// `near`.
+    /// Writes the label counts of a cell's neighbours, weighted by affinity, into `around`, and these
+    /// plus its own into `near`.
     pub(crate) fn gather(&self, cell: u32, near: &mut [Lanes], around: &mut [Lanes]) {
         around.fill(Lanes([0.0; LANES]));
         for (direction, &other) in self.neighbours(cell).iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Checkpoints: a model as bytes, and back.
 //!
-//! The bytes are an [`Envelope`] around the [`Snapshot`] in postcard. Counts, neighbours and the kernels' vectors are
-//! derived on loading.
+//! The bytes are an [`Envelope`] around the [`Snapshot`] in postcard. Counts, neighbours and the kernels'
+//! vectors are derived on loading.
 
 use super::config::ConfigError;
 use super::model::SceneModel;
@@ -41,7 +41,7 @@ impl SceneModel {
     /// // Both continue with the same random numbers, hence with the same labels.
     /// model.refine(100);
     /// restored.refine(100);
-    /// assert_eq!(model.label_map(), restored.label_map());
+    /// assert_eq!(model.save(), restored.save());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
@@ -49,7 +49,11 @@ impl SceneModel {
         ENVELOPE.seal(&postcard::to_allocvec(&self.snapshot()).unwrap_or_default())
     }
 
-    /// Returns a model that continues exactly where the saved one was: with the same labels, topics and random numbers.
+    /// Returns a model that continues where the saved one was: its words have the same labels, and the same calls draw
+    /// the same random numbers.
+    ///
+    /// The first map after loading evaluates every cell. The saved model would have evaluated the changed cells and a
+    /// share of the others, so its next map can differ in cells whose neighbours have changed.
     ///
     /// Content that was not written by [`SceneModel::save`] is refused and never panics.
     pub fn load(bytes: &[u8]) -> Result<Self, CheckpointError> {

@@ -40,7 +40,7 @@ pub struct SceneConfig {
     pub beta: f64,
     /// Weight of a new label in the reading of `birth`: 0 to 1e9. With 0 the first label stays the only one.
     pub gamma: f64,
-    /// The reading of `gamma`.
+    /// How `gamma` becomes the weight of a new label.
     pub birth: Birth,
     /// The maximum number of labels at one time (K): 1 to 1024. The table of V x K counts may hold at most 2^28.
     pub max_labels: u32,
@@ -49,8 +49,9 @@ pub struct SceneConfig {
     /// Levels of the colour lattice behind the first words, for the appearance affinity: 0 to 64, its cube at most
     /// `vocabulary`.
     ///
-    /// Word ids below the cube of this are colours on a lattice, as [`crate::words::COLOUR_LEVELS`] has it, and
-    /// neighbours of a similar colour weigh more. With 0 all neighbours weigh the same, as in the paper.
+    /// Word ids below the cube of this number are colours, (L x levels + a) x levels + b, and neighbours of a similar
+    /// colour weigh more. It is 8 for the words of a [`WordExtractor`](crate::words::WordExtractor). With 0 all
+    /// neighbours weigh the same, as in the paper.
     pub colour_levels: u32,
     /// The maximum number of words in one cell, 1 to 65535; [`insert`](super::SceneModel::insert) skips later ones.
     pub max_words_per_cell: u32,

@@ -34,8 +34,8 @@ impl<'a> Evaluator<'a> {
 
     /// Evaluates one cell. Its topic is the mode of the MAP labels of its words, ties to the oldest topic.
     ///
-    /// The MAP label of a word is the label in use with the largest weight, the word's own label removed, ties to the
-    /// lowest slot.
+    /// The MAP label of a word is the label in use with the largest weight, the word's own label removed,
+    /// ties to the lowest slot.
     pub(crate) fn view(&mut self, kernel: Kernel, cells: &Cells, cell: u32) -> CellView {
         cells.gather(cell, &mut self.near, &mut self.share);
         self.prepare();

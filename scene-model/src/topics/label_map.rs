@@ -20,8 +20,8 @@ pub struct FlatCell {
     pub words: u32,
     /// The share of the column's words whose own MAP label is this topic, 0 to 1.
     pub confidence: f32,
-    /// exp(-mean ln p(w)) over the words of the column, at least about 1. In-sample: a measure of surprise, not of
-    /// quality.
+    /// exp(-mean ln p(w)) over the words of the column, at least about 1. In-sample: a measure
+    /// of surprise, not of quality.
     pub perplexity: f32,
 }
 

@@ -160,8 +160,8 @@ impl Labels {
         }
     }
 
-    /// Gives topics to slots that got their first word, retires empty ones, chooses the birth slot and updates the
-    /// kernels' vectors.
+    /// Gives topics to slots that got their first word, retires empty ones, chooses the birth slot
+    /// and updates the kernels' vectors.
     pub(crate) fn assign_topics(&mut self) {
         for (topic, &total) in self.topics.iter_mut().zip(&self.totals) {
             match (total, *topic) {

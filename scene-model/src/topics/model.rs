@@ -26,8 +26,8 @@ pub struct Inserted {
     pub skipped_full: u64,
 }
 
-/// For each four refined cells, one further cell of the map is evaluated again in turn, since neighbours and topics
-/// have changed.
+/// For each four refined cells, one further cell of the map is evaluated again in turn, since
+/// neighbours and topics have changed.
 const REFRESH_SHARE: usize = 4;
 
 /// The scene model of one mission.
@@ -162,8 +162,8 @@ impl SceneModel {
         self.kernel
     }
 
-    /// Switches to another kernel if this machine can run it, and returns whether `kernel` is in use now. The labels do
-    /// not depend on it.
+    /// Switches to another kernel if this machine can run it, and returns whether `kernel` is in use now. The labels
+    /// do not depend on it.
     pub fn use_kernel(&mut self, kernel: Kernel) -> bool {
         if kernel.is_available() {
             self.kernel = kernel;
@@ -187,8 +187,8 @@ impl SceneModel {
 
     /// Adds words that were seen at the time `t_s`, in seconds, and gives each a first label.
     ///
-    /// Words that the model cannot hold are counted and skipped. The time matters for [`SceneModel::last_seen_s`]
-    /// alone.
+    /// Words that the model cannot hold are counted and skipped. The
+    /// time matters for [`SceneModel::last_seen_s`] alone.
     pub fn insert(&mut self, t_s: f64, observations: &[Observation]) -> Inserted {
         self.last_seen_s = self.last_seen_s.max(t_s);
         let mut outcome = Inserted::default();
@@ -250,8 +250,8 @@ impl SceneModel {
         done
     }
 
-    /// Resamples every word `sweeps` times, and returns the number of draws. Use it offline; 30 sweeps are usually
-    /// enough.
+    /// Resamples every word `sweeps` times, and returns the number of draws. Use it offline;
+    /// 30 sweeps are usually enough.
     pub fn sweep(&mut self, sweeps: u32) -> u64 {
         let mut colours = [Vec::new(), Vec::new()];
         for cell in 0..self.cells.len() as u32 {
@@ -328,9 +328,9 @@ impl SceneModel {
 
     /// Returns the label map flattened to two dimensions, sorted by `(y, x)`.
     ///
-    /// The label of a cell is the mode of the MAP labels of its words. Where cells lie above each other, the label with
-    /// the most words in the column wins, ties to the upper cell. Only cells that have changed since the last call are
-    /// evaluated.
+    /// The label of a cell is the mode of the MAP labels of its words. Where cells lie above each other, the
+    /// label with the most words in the column wins, ties to the upper cell. Only cells that have changed since
+    /// the last call are evaluated.
     #[must_use]
     pub fn label_map(&self) -> Vec<FlatCell> {
         self.fresh_map().flatten(&self.cells)
@@ -349,9 +349,9 @@ impl SceneModel {
 
     /// Returns the topics that the model expects at a position in metres, observed or not, with their probabilities.
     ///
-    /// The probability of a topic is its prior there: (n_k + alpha) over the sum for all topics in use. The largest
-    /// comes first, ties to the oldest topic. The list is empty if neither the cell of the position nor a neighbour has
-    /// words.
+    /// The probability of a topic is its prior there: (n_k + alpha) over the sum for all topics in use. The
+    /// largest comes first, ties to the oldest topic. The list is empty if neither the cell of the position
+    /// nor a neighbour has words.
     #[must_use]
     pub fn expected_at(&self, position: [f64; 3]) -> Vec<(TopicId, f32)> {
         let Some(coord) = coord_of(position, self.config.cell_m) else { return Vec::new() };

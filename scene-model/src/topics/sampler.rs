@@ -7,8 +7,8 @@ use super::kernel::{ActiveCell, Job, Kernel};
 use super::label_changes::LabelChanges;
 use super::labels::Labels;
 
-/// The cells that one thread interleaves: each word depends on the word before it in the same cell, but not on other
-/// cells.
+/// The cells that one thread interleaves: each word depends on the word before it in the same cell,
+/// but not on other cells.
 const INTERLEAVED_CELLS: usize = 4;
 /// With fewer words than this, starting another thread takes longer than it saves.
 const WORDS_PER_THREAD: usize = 4096;

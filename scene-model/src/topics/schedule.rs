@@ -1,8 +1,8 @@
 //! The order in which online refinement visits the cells.
 //!
-//! The mixed schedule of Girdhar and Dudek (arXiv 1509.03242): half of the draws go to the cells of the last
-//! observation, half to all cells, with a probability that rises with recency as Beta(2, 1) over the order of first
-//! observation.
+//! The mixed schedule of Girdhar and Dudek (arXiv 1509.03242): half of the draws go to the cells of the
+//! last observation, half to all cells, with a probability that rises with recency as Beta(2, 1) over
+//! the order of first observation.
 
 use super::cells::Cells;
 use crate::random::CounterRng;

@@ -1,5 +1,5 @@
-//! Binary words: an oriented pattern of brightness comparisons, as in ORB (Rublee et al., ICCV 2011), quantised to the
-//! nearest of random prototypes.
+//! Binary words: an oriented pattern of brightness comparisons, as in ORB (Rublee et al., ICCV 2011), quantised to
+//! the nearest of random prototypes.
 
 use super::grey_plane::GreyPlane;
 use super::grid::centres;
@@ -37,8 +37,8 @@ impl Default for BinaryWords {
 }
 
 impl BinaryWords {
-    /// Appends one word for each position on a grid of `spacing` pixels of the full frame; `half` has half the
-    /// resolution.
+    /// Appends one word for each position on a grid of `spacing` pixels of the full frame;
+    /// `half` has half the resolution.
     pub(crate) fn extract(&self, half: &GreyPlane, spacing: f32, first_id: u32, words: &mut Vec<Word>) {
         let across = centres(half.width as u32, spacing / 2.0);
         let down = centres(half.height as u32, spacing / 2.0);

@@ -7,7 +7,7 @@ use super::moments::Moments;
 use super::word::Word;
 
 /// The levels of L, of a and of b on the lattice of colour words: the first 8 x 8 x 8 ids are (L x 8 + a) x 8 + b.
-pub const LEVELS: u32 = 8;
+pub(crate) const LEVELS: u32 = 8;
 /// The lattice spans this many standard deviations on either side of the mean.
 const REACH: f32 = 2.0;
 

@@ -6,8 +6,8 @@ use super::{binary, colour, context, texture};
 
 /// The number of words of each kind in a cell, and the length of the warm-up.
 ///
-/// Counts are approximate, since words lie on a regular grid. A count of 0 switches a kind off; the ids of the others
-/// stay the same.
+/// Counts are approximate, since words lie on a regular grid. A count of 0 switches a kind off; the ids of
+/// the others stay the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WordConfig {

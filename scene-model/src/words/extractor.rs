@@ -100,8 +100,8 @@ impl WordExtractor {
 
     /// Adds an image to the tone stretch: the first pass of training a vocabulary, over all images of a site.
     ///
-    /// See [`vocabulary`](crate::vocabulary) for both passes. A mission without a trained vocabulary learns in
-    /// [`Self::extract`] instead.
+    /// See [`vocabulary`](crate::vocabulary) for both passes. A mission without a trained
+    /// vocabulary learns in [`Self::extract`] instead.
     pub fn learn_tones(&mut self, image: &RgbImage) {
         self.stretch.learn(image);
     }

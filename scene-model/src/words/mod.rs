@@ -18,7 +18,7 @@ mod stretch;
 mod texture;
 mod word;
 
-pub use colour::LEVELS as COLOUR_LEVELS;
+pub(crate) use colour::LEVELS as COLOUR_LEVELS;
 pub use colour_field::lab as cie_lab;
 pub use config::WordConfig;
 pub use extractor::{Measures, WordExtractor};

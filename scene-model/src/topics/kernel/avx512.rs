@@ -11,7 +11,7 @@ use crate::random::unit_f32;
 use crate::topics::label_changes::{LabelChange, LabelChanges};
 use crate::topics::labels::{Counts, LANES, Labels, Lanes, UNLABELLED, label_of, pack, word_of};
 
-/// As the portable `advance`.
+/// Has the contract of the portable `advance`.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
 pub(super) fn advance(labels: &Labels, active_cells: &mut [ActiveCell], steps: usize, changes: &mut LabelChanges) {
     match labels.blocks {

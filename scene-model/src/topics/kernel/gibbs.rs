@@ -102,8 +102,8 @@ fn choose(lane_sums: &[f32; LANES], block_sums: &[Lanes], unit: f32, blocks: usi
     (block * LANES + lane) as u32
 }
 
-/// The first block whose running sum in `lane` passes `aim`. If rounding has put `aim` at the end, the last block with
-/// a weight above 0.
+/// The first block whose running sum in `lane` passes `aim`. If rounding has put `aim` at the end, the last block
+/// with a weight above 0.
 #[inline(always)]
 pub(super) fn choose_block(block_sums: &[Lanes], lane: usize, aim: f32) -> usize {
     let all = block_sums[block_sums.len() - 1].0[lane];

@@ -25,7 +25,7 @@ pub(crate) use votes::LabelVotes;
 pub enum Kernel {
     /// The baseline of the target: SSE2 on x86-64, NEON on aarch64.
     Portable,
-    /// 256-bit vectors of x86-64.
+    /// 256-bit vectors of x86-64 (AVX2, POPCNT and BMI).
     Avx2,
     /// 512-bit vectors of x86-64 (the subsets F, BW, DQ and VL).
     Avx512,
@@ -76,7 +76,7 @@ fn has_avx512() -> bool {
 }
 
 impl Kernel {
-    /// See [`gibbs::advance`].
+    /// Resamples the next `steps` words of each active cell: see [`gibbs::advance`].
     pub(crate) fn advance(
         self,
         labels: &Labels,
@@ -95,7 +95,7 @@ impl Kernel {
         }
     }
 
-    /// See [`votes::map_labels`].
+    /// Counts the MAP labels of a cell's words: see [`votes::map_labels`].
     pub(crate) fn map_labels(self, votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
         match self {
             // SAFETY: as above.

@@ -3,8 +3,8 @@
 
 use crate::topics::labels::{LANES, Labels, Lanes, label_of, word_of};
 
-/// The label counts of one cell and its neighbours, and the global counts: all that the MAP labels of its words depend
-/// on.
+/// The label counts of one cell and its neighbours, and the global counts: all that the MAP labels
+/// of its words depend on.
 pub(crate) struct LabelVotes<'a> {
     pub(crate) labels: &'a Labels,
     /// Label counts of the cell and its neighbours, these weighted by appearance affinity.
@@ -13,8 +13,8 @@ pub(crate) struct LabelVotes<'a> {
     pub(crate) share: &'a [Lanes],
 }
 
-/// Counts the MAP slots of `words` into `tally`, one number a slot. Returns the logarithm of the product of the words'
-/// unnormalised likelihoods.
+/// Counts the MAP slots of `words` into `tally`, one number a slot. Returns the logarithm of the product
+/// of the words' unnormalised likelihoods.
 #[inline(always)]
 pub(super) fn map_labels<const BLOCKS: usize>(votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
     let mut likelihood = LogProduct::default();
