@@ -85,6 +85,8 @@
 //! | [`vocabulary`], [`envelope`] | files: measures that were learnt before the mission; magic, version, length, CRC |
 //! | [`random`] | counter-based random numbers |
 
+#![warn(missing_docs)]
+
 pub mod envelope;
 pub mod exemplars;
 pub mod project;
