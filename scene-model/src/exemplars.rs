@@ -10,7 +10,7 @@ use crate::topics::TopicId;
 
 /// A patch of a camera frame that shows a topic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Exemplar {
+pub struct ExemplarPatch {
     /// The pixels: a square of the store's edge.
     #[serde(with = "pixels")]
     pub patch: Arc<RgbImage>,
@@ -42,7 +42,7 @@ pub struct ExemplarStore {
     per_label: usize,
     edge_px: u32,
     apart_m: f64,
-    topics: BTreeMap<TopicId, Vec<Exemplar>>,
+    topics: BTreeMap<TopicId, Vec<ExemplarPatch>>,
 }
 
 /// The maximum number of topics. Beyond it, the topic whose best score is lowest is dropped.
@@ -79,13 +79,13 @@ impl ExemplarStore {
         };
         let apart = self.apart_m;
         let kept = self.topics.entry(topic).or_default();
-        let near = |other: &Exemplar| (other.place.0 - place.0).hypot(other.place.1 - place.1) < apart;
+        let near = |other: &ExemplarPatch| (other.place.0 - place.0).hypot(other.place.1 - place.1) < apart;
         if kept.iter().any(|other| near(other) && other.score >= score) {
             return;
         }
         kept.retain(|other| !near(other));
         let rank = kept.partition_point(|other| other.score >= score);
-        kept.insert(rank, Exemplar { patch: Arc::new(patch), score, t_s, place });
+        kept.insert(rank, ExemplarPatch { patch: Arc::new(patch), score, t_s, place });
         kept.truncate(self.per_label);
         self.drop_lowest_topic();
     }
@@ -116,13 +116,13 @@ impl ExemplarStore {
 
     /// Returns the patch of a topic with the highest score.
     #[must_use]
-    pub fn best(&self, topic: TopicId) -> Option<&Exemplar> {
+    pub fn best(&self, topic: TopicId) -> Option<&ExemplarPatch> {
         self.topics.get(&topic)?.first()
     }
 
     /// Returns all patches of a topic, best first.
     #[must_use]
-    pub fn all(&self, topic: TopicId) -> &[Exemplar] {
+    pub fn all(&self, topic: TopicId) -> &[ExemplarPatch] {
         self.topics.get(&topic).map_or(&[], Vec::as_slice)
     }
 
@@ -130,7 +130,7 @@ impl ExemplarStore {
         if self.topics.len() <= MAX_TOPICS {
             return;
         }
-        let best = |kept: &[Exemplar]| kept.first().map_or(f32::NEG_INFINITY, |exemplar| exemplar.score);
+        let best = |kept: &[ExemplarPatch]| kept.first().map_or(f32::NEG_INFINITY, |exemplar| exemplar.score);
         let weakest = self.topics.iter().min_by(|a, b| best(a.1).total_cmp(&best(b.1)));
         if let Some(topic) = weakest.map(|entry| *entry.0) {
             self.topics.remove(&topic);
