@@ -8,26 +8,30 @@ const IO_CRATES: [&str; 8] =
     ["axum", "hyper", "nix", "serialport", "scenecast-files", "tokio", "tokio-serial", "tracing-subscriber"];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 8] = [
+const SANS_IO: [&str; 10] = [
     "scenecast-core",
     "scenecast-drivers",
     "scenecast-motion",
     "scenecast-protocol",
+    "scenecast-scoring",
     "scenecast-surface",
     "scenecast-vehicle",
+    "scenecast-worlds",
     "scene-model",
     "sim-channel",
 ];
 
 /// Crates that no vehicle carries.
-const ASHORE: [&str; 8] = [
+const ASHORE: [&str; 10] = [
     "scenecast-console",
     "scenecast-modem-sim",
     "scenecast-motion",
     "scenecast-rehearsal",
+    "scenecast-scoring",
     "scenecast-surface",
     "scenecast-tests",
     "scenecast-tools",
+    "scenecast-worlds",
     "sim-channel",
 ];
 

@@ -3,7 +3,7 @@
 use super::Spread;
 use crate::VirtualTime;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;

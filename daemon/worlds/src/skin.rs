@@ -1,11 +1,11 @@
-//! How a class looks: two tones joined by layered noise of its own grain and direction.
+//! The appearance of a class: two tones mixed by layered noise with a grain and a direction.
 
-use super::noise::Noise;
-use crate::random::Stream;
+use crate::noise::Noise;
+use scene_model::random::CounterRng;
 
 pub(crate) const MAX_CLASSES: u8 = 24;
 
-/// Colours of a reef as an underwater camera gives them: sand, rubble, rock, algae, corals, sponges.
+/// Colours of sand, rubble, rock, algae, corals and sponges as an underwater camera shows them.
 const TONES: [[f32; 3]; 12] = [
     [196.0, 190.0, 158.0],
     [128.0, 132.0, 122.0],
@@ -21,16 +21,16 @@ const TONES: [[f32; 3]; 12] = [
     [96.0, 92.0, 132.0],
 ];
 
-/// The looks of one class.
+/// The appearance of one class.
 #[derive(Clone, Debug)]
 pub(crate) struct Skin {
     dark: [f32; 3],
     bright: [f32; 3],
-    /// Lattice steps per pixel along and across the grain.
+    /// Lattice steps in a pixel, along and across the grain.
     pitch: [f32; 2],
     turn: [f32; 2],
-    /// Shares of the coarse, middle and fine layer.
-    layers: [f32; 3],
+    /// The shares of coarse, middle and fine noise.
+    octaves: [f32; 3],
     offset: f32,
 }
 
@@ -42,7 +42,7 @@ impl Skin {
         let coarse = noise.value(along * 0.17, across * 0.17);
         let middle = noise.value(along, across);
         let fine = noise.value(along * 3.7 + 40.0, across * 3.7);
-        let tone = self.layers[0] * coarse + self.layers[1] * middle + self.layers[2] * fine;
+        let tone = self.octaves[0] * coarse + self.octaves[1] * middle + self.octaves[2] * fine;
         let light = 0.9 + 0.2 * noise.value(x * 0.004, y * 0.004);
         std::array::from_fn(|channel| {
             let value = self.dark[channel] + (self.bright[channel] - self.dark[channel]) * tone;
@@ -51,31 +51,31 @@ impl Skin {
     }
 }
 
-/// One skin for each class; tones differ as long as there are some left.
+/// One skin for each class. Tones repeat only when there are more classes than tones.
 pub(crate) fn palette(key: u64, classes: u8) -> Vec<Skin> {
-    let mut chance = Stream::new(key);
+    let mut rng = CounterRng::new(key);
     let mut order: Vec<usize> = (0..TONES.len()).collect();
     for i in (1..order.len()).rev() {
-        order.swap(i, chance.below(i + 1));
+        order.swap(i, rng.below(i + 1));
     }
-    (0..classes as usize).map(|class| skin(TONES[order[class % order.len()]], &mut chance)).collect()
+    (0..classes as usize).map(|class| skin(TONES[order[class % order.len()]], &mut rng)).collect()
 }
 
-fn skin(tone: [f32; 3], chance: &mut Stream) -> Skin {
-    let mut between = |low: f64, high: f64| (low + (high - low) * chance.unit()) as f32;
+fn skin(tone: [f32; 3], rng: &mut CounterRng) -> Skin {
+    let mut between = |low: f64, high: f64| (low + (high - low) * rng.unit()) as f32;
     let contrast = between(0.25, 0.6);
     let brightness = between(0.85, 1.15);
     let grain = 1.0 / between(3.0, 14.0);
     let stretch = between(1.0, 3.0);
     let (sin, cos) = between(0.0, std::f64::consts::PI).sin_cos();
-    let layers = [between(0.2, 0.6), between(0.2, 0.8), between(0.1, 0.6)];
-    let sum: f32 = layers.iter().sum();
+    let octaves = [between(0.2, 0.6), between(0.2, 0.8), between(0.1, 0.6)];
+    let sum: f32 = octaves.iter().sum();
     Skin {
         dark: tone.map(|value| value * brightness * (1.0 - contrast)),
         bright: tone.map(|value| value * brightness * (1.0 + contrast)),
         pitch: [grain / stretch, grain],
         turn: [cos, sin],
-        layers: layers.map(|layer| layer / sum),
+        octaves: octaves.map(|octave| octave / sum),
         offset: between(0.0, 200.0),
     }
 }

@@ -1,26 +1,29 @@
-//! The score of a map and its spatial null.
+//! The score of a map, and its spatial null model.
 //!
-//! On small scenes raw mutual information misleads: any map with patches shares some with any annotation with patches.
-//! The null is the mean over the same map flipped (3 ways) and shifted around the torus (12 large shifts); the excess
-//! over it is what the map owes to the scene.
+//! On a small scene, plain mutual information misleads: any map made of patches shares some with any annotation made of
+//! patches. The null model is the mean over the same map flipped in 3 ways and shifted on a torus by 12 large
+//! distances. The excess over it is due to the scene.
 
-use super::{Annotations, LabelGrid};
-use crate::tuning::MutualInformation;
+use crate::annotations::Annotations;
+use crate::label_grid::LabelGrid;
+use crate::mutual_information::MutualInformation;
 
-/// What a label map tells about annotations.
+/// The agreement of a label map with annotations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct SceneScore {
-    /// Of map labels and annotated classes, cell by cell.
+    /// Mutual information of map labels and annotated classes, cell by cell.
     pub mutual_information: MutualInformation,
-    /// Mean mutual information of the displaced maps, nats.
+    /// The mean mutual information of the flipped and shifted maps, nats.
     pub null_nats: f64,
-    /// Mutual information above the null, nats.
+    /// Mutual information minus `null_nats`, nats.
     pub excess_nats: f64,
-    /// Number of different labels in the map.
+    /// The number of different labels in the map.
     pub labels: usize,
 }
 
-/// Scores a map against annotations on the same cells; cells without label or annotation do not count.
+/// Scores a map against annotations on the same cells. Cells without a label or without an annotation are ignored.
+#[must_use]
 pub fn score(map: &LabelGrid, annotations: &Annotations) -> SceneScore {
     let dense = Dense::new(map, annotations);
     let mutual_information = dense.score(|x, y| (x, y));
@@ -39,7 +42,7 @@ pub fn score(map: &LabelGrid, annotations: &Annotations) -> SceneScore {
     SceneScore { mutual_information, null_nats, excess_nats, labels: dense.labels }
 }
 
-/// A map with labels numbered from 0, beside the annotations.
+/// A map whose labels are numbered from 0, and the annotations.
 struct Dense<'a> {
     annotations: &'a Annotations,
     map: Vec<Option<usize>>,
@@ -60,7 +63,7 @@ impl<'a> Dense<'a> {
         Self { annotations, map: (0..columns * rows).map(label).collect(), labels: names.len() }
     }
 
-    /// Mutual information when the cell (x, y) of the annotations meets the map's cell `from(x, y)`.
+    /// The mutual information of the annotations at (x, y) with the map at `from(x, y)`.
     fn score(&self, from: impl Fn(usize, usize) -> (usize, usize)) -> MutualInformation {
         let (columns, classes) = (self.annotations.columns, self.annotations.classes);
         let mut joint = vec![0u64; self.labels * classes];

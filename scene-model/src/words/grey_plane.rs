@@ -2,22 +2,22 @@
 
 /// Grey values, row by row from the top.
 #[derive(Clone, Debug)]
-pub(crate) struct Plane {
+pub(crate) struct GreyPlane {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) grey: Vec<f32>,
 }
 
-impl Plane {
-    /// The plane itself, at half and at a quarter of its size.
-    pub(crate) fn pyramid(full: Plane) -> [Plane; 3] {
+impl GreyPlane {
+    /// The plane at full, half and quarter size.
+    pub(crate) fn pyramid(full: GreyPlane) -> [GreyPlane; 3] {
         let half = full.halved();
         let quarter = half.halved();
         [full, half, quarter]
     }
 
-    /// Means of 2 x 2 pixels; an odd last row or column is dropped unless it is the only one.
-    fn halved(&self) -> Plane {
+    /// The means of 2 x 2 pixels. An odd last row or column is dropped unless it is the only one.
+    fn halved(&self) -> GreyPlane {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let mut grey = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -30,10 +30,10 @@ impl Plane {
             let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
             grey.extend(pairs.map(|(a, b)| 0.25 * ((a[0] + a[1]) + (b[0] + b[1]))));
         }
-        Plane { width, height, grey }
+        GreyPlane { width, height, grey }
     }
 
-    /// The `SIDE` x `SIDE` pixels around a position, borders repeated.
+    /// The `SIDE` x `SIDE` pixels around a position; pixels at the border are repeated.
     pub(crate) fn patch<const SIDE: usize>(&self, x: f32, y: f32) -> [[f32; SIDE]; SIDE] {
         let (left, top) = (x as isize - SIDE as isize / 2, y as isize - SIDE as isize / 2);
         let mut patch = [[0.0; SIDE]; SIDE];

@@ -1,39 +1,39 @@
-//! Worlds from the model's own generative process, to rehearse in.
-
-mod noise;
-mod patches;
-mod sample;
-mod skin;
+//! A procedural sea floor: an image with the class of each pixel.
 
 use image::RgbImage;
+use scene_model::random::derive;
 
-use crate::random::derive;
-use noise::Noise;
-use patches::Patches;
-pub use sample::{LabelWorld, sample};
-use skin::Skin;
+use crate::noise::Noise;
+use crate::patches::Patches;
+use crate::skin::{self, Skin};
 
 /// A procedural sea floor with known truth.
 #[derive(Clone, Debug)]
 pub struct Reef {
-    /// What a camera would see, from above.
+    /// The sea floor from above, without effects of light and water.
     pub image: RgbImage,
-    /// Class of each pixel, row by row from the top.
+    /// The class of each pixel, row by row from the top.
     pub truth: Vec<u8>,
-    /// Pixels.
+    /// Columns of the image, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Rows of the image, pixels.
     pub height: u32,
 }
 
-/// Draws a reef: a sample of the spatial CRP on patches of about `patch_px` pixels, each class with its own colours and
-/// texture.
+/// Draws a reef: a sample of the spatial Chinese Restaurant Process on patches of about `patch_px` pixels, in which
+/// each class has its own colours and texture.
 ///
-/// At most `classes` classes occur (1 to 24), fewer where there are few patches. The same arguments give the same reef.
+/// At most `classes` classes occur (1 to 24), fewer if there are few patches. Sizes below 1 are raised to 1.
+///
+/// ```
+/// let (a, b) = (scenecast_worlds::reef(3, 90, 60, 15, 6), scenecast_worlds::reef(3, 90, 60, 15, 6));
+/// assert_eq!((a.image, a.truth), (b.image, b.truth));
+/// ```
+#[must_use]
 pub fn reef(seed: u64, width_px: u32, height_px: u32, patch_px: u32, classes: u8) -> Reef {
     let (width, height, patch) = (width_px.max(1), height_px.max(1), patch_px.max(1));
     let classes = classes.clamp(1, skin::MAX_CLASSES);
-    // One patch more on each side, because the warp reaches over the edge.
+    // Two more patches on each side, because the bent edges of the patches reach beyond the border.
     let (columns, rows) = (width.div_ceil(patch) as usize + 4, height.div_ceil(patch) as usize + 4);
     let patches = Patches::sample(derive(seed, 1), columns, rows, classes);
     let skins = skin::palette(derive(seed, 2), classes);
@@ -58,7 +58,7 @@ struct Painter {
 }
 
 impl Painter {
-    /// Class and colour of a pixel; the noise that bends the patches' edges makes them look grown.
+    /// The class and the colour of a pixel. Noise bends the edges of the patches, so that they look natural.
     fn pixel(&self, x: f32, y: f32) -> (u8, [u8; 3]) {
         let (u, v) = (x / self.patch + 2.0, y / self.patch + 2.0);
         let bend = |offset: f32| {
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_seed_draws_the_same_reef() {
+    fn reef_is_a_function_of_its_seed() {
         let (a, b) = (reef(5, 90, 60, 15, 6), reef(5, 90, 60, 15, 6));
         assert_eq!((a.image.as_raw(), &a.truth), (b.image.as_raw(), &b.truth));
         assert_ne!(a.truth, reef(6, 90, 60, 15, 6).truth);
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reef_has_several_classes_and_keeps_the_bound() {
+    fn reef_has_several_classes_within_the_bound() {
         for seed in 0..6 {
             let reef = reef(seed, 400, 300, 20, 6);
             let used: std::collections::BTreeSet<u8> = reef.truth.iter().copied().collect();
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_sizes_are_raised_to_one() {
+    fn sizes_below_one_are_raised_to_one() {
         assert_eq!(reef(1, 0, 0, 0, 0).truth.len(), 1);
     }
 }

@@ -1,13 +1,12 @@
-//! A cell on the workbench: its words, how far they are resampled, and the label counts around it.
+//! The working state of one cell while its words are resampled.
 
-use super::Move;
 use crate::random::derive;
 use crate::topics::cells::Cells;
 use crate::topics::labels::{LANES, Labels, Lanes};
 
-/// One of the cells that are resampled side by side.
+/// One of the cells that a worker resamples side by side: its words, and the label counts that their weights need.
 #[derive(Clone, Debug)]
-pub(crate) struct Seat {
+pub(crate) struct ActiveCell {
     cell: u32,
     pub(super) words: Vec<u32>,
     /// The next word to resample.
@@ -16,11 +15,11 @@ pub(crate) struct Seat {
     first: usize,
     /// Key of the cell's random numbers.
     pub(super) key: u64,
-    /// Label counts of the neighbours.
+    /// Label counts of the neighbours, weighted by appearance affinity.
     around: Vec<Lanes>,
-    /// Label counts of the cell and its neighbours, words of this phase's new label left out.
+    /// `around` plus the cell's own counts, without the words that took this phase's new label.
     pub(super) near: Vec<Lanes>,
-    /// `near` plus the prior, kept where there are several blocks.
+    /// `near` plus the prior. The AVX-512 kernel for one or two blocks does not use it.
     pub(super) here: Vec<Lanes>,
     /// Running sums of the weights of one word.
     pub(super) sums: Vec<Lanes>,
@@ -28,7 +27,7 @@ pub(crate) struct Seat {
     pub(super) births: u16,
 }
 
-impl Seat {
+impl ActiveCell {
     pub(crate) fn new(blocks: usize) -> Self {
         let zero = vec![Lanes([0.0; LANES]); blocks];
         Self {
@@ -45,19 +44,19 @@ impl Seat {
         }
     }
 
-    /// Words that are still to be resampled.
-    pub(crate) fn rest(&self) -> usize {
+    /// The number of words that are still to be resampled.
+    pub(crate) fn remaining(&self) -> usize {
         self.words.len() - self.at
     }
 
-    /// Index of the current word among those that are resampled.
+    /// The index of the current word among those that are resampled: the counter of its random number.
     #[inline(always)]
     pub(super) fn count(&self) -> u64 {
         (self.at - self.first) as u64
     }
 
-    /// Takes a job onto the bench.
-    pub(crate) fn take(&mut self, cells: &Cells, labels: &Labels, job: Job, phase: u64) {
+    /// Starts on a job. Its random numbers depend on `phase` and the cell only.
+    pub(crate) fn start(&mut self, cells: &Cells, labels: &Labels, job: Job, phase: u64) {
         cells.gather(job.cell, &mut self.near, &mut self.around);
         for ((here, near), prior) in self.here.iter_mut().zip(&self.near).zip(&labels.prior) {
             here.0 = std::array::from_fn(|lane| near.0[lane] + prior.0[lane]);
@@ -67,7 +66,7 @@ impl Seat {
         self.key = derive(phase, u64::from(job.cell));
     }
 
-    /// Takes one word's label out of the counts.
+    /// Removes one word with the label `slot` from the cell's counts.
     #[inline(always)]
     pub(super) fn leave(&mut self, labels: &Labels, slot: u32) {
         let (block, lane) = (slot as usize / LANES, slot as usize % LANES);
@@ -77,7 +76,7 @@ impl Seat {
         }
     }
 
-    /// Counts one word's new label.
+    /// Adds one word with the label `slot` to the cell's counts.
     #[inline(always)]
     pub(super) fn join(&mut self, labels: &Labels, slot: u32) {
         if labels.birth_slot() == Some(slot) {
@@ -89,7 +88,7 @@ impl Seat {
         self.here[block].0[lane] = self.near[block].0[lane] + labels.prior[block].0[lane];
     }
 
-    /// Gives the words back; the cell's new label counts are added to `counts`.
+    /// Returns the words, and appends the cell's new label counts to `counts`.
     pub(crate) fn finish(&mut self, labels: &Labels, counts: &mut Vec<u16>) -> Job {
         let start = counts.len();
         for (near, around) in self.near.iter().zip(&self.around) {
@@ -104,38 +103,10 @@ impl Seat {
     }
 }
 
-/// A cell to resample: its words, from `first` on.
+/// A cell and its words, of which those from index `first` on are to be resampled.
 #[derive(Clone, Debug)]
 pub(crate) struct Job {
     pub(crate) cell: u32,
     pub(crate) first: usize,
     pub(crate) words: Vec<u32>,
-}
-
-/// Label changes of a phase, written without branches: what lies past `len` is scrap.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Moves {
-    buffer: Vec<Move>,
-    len: usize,
-}
-
-impl Moves {
-    /// Makes room for `count` more.
-    pub(crate) fn reserve(&mut self, count: usize) {
-        if self.buffer.len() < self.len + count {
-            self.buffer.resize((self.len + count).next_power_of_two(), Move::default());
-        }
-    }
-
-    /// Writes a change, and keeps it if it is one.
-    #[inline(always)]
-    pub(super) fn note(&mut self, change: Move) {
-        self.buffer[self.len] = change;
-        self.len += usize::from(change.old != change.new);
-    }
-
-    /// Hands out all changes and forgets them.
-    pub(crate) fn take(&mut self) -> &[Move] {
-        &self.buffer[..std::mem::take(&mut self.len)]
-    }
 }

@@ -1,19 +1,29 @@
-//! How much a label map tells about annotations.
+//! Mutual information of two labellings of the same cells (Cover and Thomas, Elements of Information Theory).
 
 use std::collections::BTreeMap;
 
-/// Agreement of two labellings, whatever their numbering.
+/// The agreement of two labellings, whatever their numbering.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MutualInformation {
-    /// Mutual information, nats.
+    /// Mutual information in nats, 0 or above.
     pub nats: f64,
-    /// Divided by the geometric mean of both entropies; 0 where one of them is 0.
+    /// `nats` over the geometric mean of both entropies, 0 to 1; 0 if an entropy is 0.
     pub normalised: f64,
-    /// Number of pairs.
+    /// The number of labelled pairs.
     pub n: u64,
 }
 
-/// Mutual information of two labellings, given as pairs (the paper's measure for tuning).
+/// Returns the mutual information of two labellings, given as pairs: the measure by which the paper chooses
+/// hyperparameters.
+///
+/// ```
+/// use scenecast_scoring::mutual_information_nats;
+///
+/// // Four labels under other names: the entropy of four equal shares.
+/// let score = mutual_information_nats((0..100).map(|cell| (cell % 4, 9 - cell % 4)));
+/// assert!((score.nats - 4f64.ln()).abs() < 1e-9 && (score.normalised - 1.0).abs() < 1e-9);
+/// ```
+#[must_use]
 pub fn mutual_information_nats(pairs: impl Iterator<Item = (u32, u32)>) -> MutualInformation {
     let mut joint: BTreeMap<(u32, u32), u64> = BTreeMap::new();
     let (mut left, mut right): (BTreeMap<u32, u64>, BTreeMap<u32, u64>) = Default::default();
@@ -28,8 +38,8 @@ pub fn mutual_information_nats(pairs: impl Iterator<Item = (u32, u32)>) -> Mutua
 }
 
 impl MutualInformation {
-    /// From a joint table of `columns` columns, row by row.
-    pub fn of_table(joint: &[u64], columns: usize) -> Self {
+    /// Returns the mutual information of a table of joint counts with `columns` columns, row by row.
+    pub(crate) fn of_table(joint: &[u64], columns: usize) -> Self {
         let columns = columns.max(1);
         let mut right = vec![0; columns];
         for row in joint.chunks(columns) {
@@ -64,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_renamed_labelling_tells_everything() {
+    fn renamed_labelling_has_all_the_information() {
         let score = mutual_information_nats((0..800).map(|i| (i % 8, 100 - i % 8)));
         assert!((score.nats - 8f64.ln()).abs() < 1e-9);
         assert!((score.normalised - 1.0).abs() < 1e-9);
@@ -72,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn independent_labellings_tell_nothing() {
+    fn independent_labellings_share_no_information() {
         let score = mutual_information_nats((0..1600).map(|i| (i % 4, i / 4 % 4)));
         assert!(score.nats.abs() < 1e-9);
         assert_eq!(mutual_information_nats(std::iter::empty()), MutualInformation::default());

@@ -1,19 +1,20 @@
-//! k-means with k-means++ starts, for the baselines.
+//! k-means with k-means++ seeding (Arthur and Vassilvitskii, SODA 2007), for the baselines.
 
-use crate::random::Stream;
+use scene_model::random::CounterRng;
 
 const ROUNDS: usize = 60;
 const STARTS: usize = 4;
 
-/// Cluster of each point (rows of `width` numbers), best of four starts; at most `k` clusters.
-pub(super) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
-    let mut chance = Stream::new(seed);
-    let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut chance));
+/// The cluster of each point, the best of four starts. Points are rows of `width` numbers; there
+/// are at most `k` clusters.
+pub(crate) fn k_means(points: &[f32], width: usize, k: usize, seed: u64) -> Vec<u32> {
+    let mut rng = CounterRng::new(seed);
+    let runs = (0..STARTS).map(|_| one_start(points, width, k, &mut rng));
     runs.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0).unwrap_or_default()
 }
 
-fn one_start(points: &[f32], width: usize, k: usize, chance: &mut Stream) -> (Vec<u32>, f64) {
-    let mut centres = seeds(points, width, k, chance);
+fn one_start(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> (Vec<u32>, f64) {
+    let mut centres = seeds(points, width, k, rng);
     let mut owners = vec![u32::MAX; points.len() / width];
     let mut cost = 0.0;
     for _ in 0..ROUNDS {
@@ -32,18 +33,18 @@ fn one_start(points: &[f32], width: usize, k: usize, chance: &mut Stream) -> (Ve
     (owners, cost)
 }
 
-fn seeds(points: &[f32], width: usize, k: usize, chance: &mut Stream) -> Vec<f32> {
+fn seeds(points: &[f32], width: usize, k: usize, rng: &mut CounterRng) -> Vec<f32> {
     let count = points.len() / width;
     let mut centres = Vec::new();
     let mut away = vec![f32::INFINITY; count];
-    let mut next = chance.below(count);
+    let mut next = rng.below(count);
     while count > 0 && centres.len() < k * width {
         let centre = &points[next * width..][..width];
         centres.extend_from_slice(centre);
         for (point, away) in points.chunks_exact(width).zip(&mut away) {
             *away = away.min(distance(point, centre));
         }
-        let mut aim = chance.unit() * away.iter().map(|&d| f64::from(d)).sum::<f64>();
+        let mut aim = rng.unit() * away.iter().map(|&d| f64::from(d)).sum::<f64>();
         let passed = away.iter().position(|&d| {
             aim -= f64::from(d);
             aim < 0.0
@@ -101,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn separate_heaps_get_separate_clusters() {
+    fn separate_groups_get_separate_clusters() {
         let points: Vec<f32> = (0..300).flat_map(|i| [(i % 3) as f32 * 10.0, (i / 3) as f32 * 0.01]).collect();
         let owners = k_means(&points, 2, 3, 1);
         assert!(owners.chunks(3).all(|c| c == &owners[..3]));
@@ -109,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn fewer_points_than_clusters_are_no_trouble() {
+    fn fewer_points_than_clusters_are_accepted() {
         assert_eq!(k_means(&[1.0, 1.0], 1, 5, 1), [0, 0]);
         assert!(k_means(&[], 3, 5, 1).is_empty());
     }

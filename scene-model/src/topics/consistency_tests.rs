@@ -1,4 +1,4 @@
-//! Property test: whatever is done to a model, its counts are those of its words.
+//! Property tests: after any sequence of calls, the counts of a model are the counts of its words.
 
 use proptest::prelude::*;
 
@@ -7,7 +7,7 @@ use super::{Birth, Kernel, SceneConfig, SceneModel};
 use crate::project::Observation;
 
 #[derive(Clone, Debug)]
-enum Step {
+enum ModelStep {
     Insert(Vec<(i8, i8, i8, u32)>),
     Refine(u64),
     Sweep(u32),
@@ -15,21 +15,21 @@ enum Step {
     Priors(f64, f64, f64),
 }
 
-fn step() -> impl Strategy<Value = Step> {
+fn step() -> impl Strategy<Value = ModelStep> {
     let place = (-4i8..4, -4i8..4, -1i8..2, 0u32..24);
     prop_oneof![
-        4 => prop::collection::vec(place, 0..120).prop_map(Step::Insert),
-        3 => (0u64..400).prop_map(Step::Refine),
-        2 => (1u32..4).prop_map(Step::Sweep),
-        1 => Just(Step::Map),
+        4 => prop::collection::vec(place, 0..120).prop_map(ModelStep::Insert),
+        3 => (0u64..400).prop_map(ModelStep::Refine),
+        2 => (1u32..4).prop_map(ModelStep::Sweep),
+        1 => Just(ModelStep::Map),
         1 => prop::sample::select(vec![(1e-9, 1e-9, 1e-12), (1e-3, 0.5, 0.0), (0.5, 0.1, 1e-5), (1e3, 1e3, 1e3)])
-            .prop_map(|(alpha, beta, gamma)| Step::Priors(alpha, beta, gamma)),
+            .prop_map(|(alpha, beta, gamma)| ModelStep::Priors(alpha, beta, gamma)),
     ]
 }
 
-fn take(model: &mut SceneModel, step: &Step) {
+fn take(model: &mut SceneModel, step: &ModelStep) {
     match step {
-        Step::Insert(words) => {
+        ModelStep::Insert(words) => {
             let seen = |&(x, y, z, word): &(i8, i8, i8, u32)| Observation {
                 word,
                 x: f64::from(x) + 0.5,
@@ -41,15 +41,15 @@ fn take(model: &mut SceneModel, step: &Step) {
             let all = outcome.accepted + outcome.skipped_bad + outcome.skipped_full;
             assert_eq!(all, observations.len() as u64);
         }
-        Step::Refine(words) => assert!(model.refine(*words) >= *words || model.words() == 0),
-        Step::Sweep(sweeps) => assert_eq!(model.sweep(*sweeps), u64::from(*sweeps) * model.words()),
-        Step::Map => drop(model.label_map()),
-        Step::Priors(alpha, beta, gamma) => model.set_priors(*alpha, *beta, *gamma).unwrap(),
+        ModelStep::Refine(words) => assert!(model.refine(*words) >= *words || model.words() == 0),
+        ModelStep::Sweep(sweeps) => assert_eq!(model.sweep(*sweeps), u64::from(*sweeps) * model.words()),
+        ModelStep::Map => drop(model.label_map()),
+        ModelStep::Priors(alpha, beta, gamma) => model.set_priors(*alpha, *beta, *gamma).unwrap(),
     }
 }
 
 impl SceneModel {
-    /// Panics if a count is not the number of words that it stands for.
+    /// Panics if a count differs from the number of words that it stands for.
     pub(crate) fn assert_consistent(&self) {
         let (cells, labels) = self.parts();
         let mut rows = vec![0i32; labels.rows.len() * LANES];
@@ -68,7 +68,7 @@ impl SceneModel {
         }
         assert_eq!(total, cells.total());
         assert!(rows.iter().eq(labels.rows.iter().flat_map(|row| &row.0)));
-        assert!(labels.active() <= self.config().max_labels as usize);
+        assert!(labels.in_use() <= self.config().max_labels as usize);
         for slot in 0..self.config().max_labels {
             let used = cells.total() > 0 && (0..cells.len() as u32).any(|cell| cells.counts(cell)[slot as usize] > 0);
             assert_eq!(labels.topic(slot).is_some(), used, "topics in use are those that words have");
@@ -80,7 +80,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn counts_stay_consistent_after_any_sequence_of_steps(
+    fn counts_are_consistent_after_any_sequence_of_calls(
         steps in prop::collection::vec(step(), 1..12),
         max_labels in prop::sample::select(vec![1u32, 2, 15, 16, 17, 40]),
         birth in prop::sample::select(vec![Birth::Literal, Birth::Collapsed, Birth::Rost]),
@@ -126,7 +126,7 @@ proptest! {
     }
 
     #[test]
-    fn an_incremental_map_equals_one_made_afresh(
+    fn incremental_map_equals_a_map_from_scratch(
         steps in prop::collection::vec(step(), 1..8),
         seed in any::<u64>(),
     ) {
@@ -137,7 +137,7 @@ proptest! {
         for step in &steps {
             take(&mut watched, step);
             take(&mut unwatched, step);
-            watched.label_map();
+            let _ = watched.label_map();
         }
         watched.sweep(1);
         unwatched.sweep(1);
@@ -146,7 +146,7 @@ proptest! {
 }
 
 #[test]
-fn the_number_of_threads_does_not_change_a_label() {
+fn labels_do_not_depend_on_the_number_of_threads() {
     let observations: Vec<Observation> = (0..600_000u32)
         .map(|i| Observation {
             word: (i * 7 + i / 6000 * 11) % 24,

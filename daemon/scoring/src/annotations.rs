@@ -1,29 +1,43 @@
-//! Expert annotations, one class per cell.
+//! Expert annotations: one class for each cell.
 
 use image::GrayImage;
 
-/// The class that most annotated pixels of each cell have; ties to the lowest class.
+/// The class of each cell: that of most of its annotated pixels, ties to the lowest class.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Annotations {
-    pub(super) columns: usize,
-    pub(super) rows: usize,
-    pub(super) classes: usize,
-    /// `columns` x `rows` classes, nothing where no pixel counts.
-    pub(super) of_cells: Vec<Option<u8>>,
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
+    pub(crate) classes: usize,
+    /// `columns` x `rows` classes; `None` if no pixel of the cell is annotated.
+    pub(crate) of_cells: Vec<Option<u8>>,
 }
 
-/// Annotations that do not fit their image.
+/// The annotations and the image differ in size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the annotations are {found:?} pixels, the image is {wanted:?}")]
 pub struct AnnotationError {
-    /// Width and height of the annotations.
+    /// Width and height of the annotations, pixels.
     pub found: (u32, u32),
-    /// Width and height of the image.
+    /// Width and height of the image, pixels.
     pub wanted: (u32, u32),
 }
 
 impl Annotations {
-    /// Takes the classes of an image of `size` pixels on cells of `cell_px` pixels; classes in `ignore` do not count.
+    /// Reduces the classes of an image of `size` (width, height) pixels to cells of `cell_px` x `cell_px` pixels.
+    ///
+    /// Pixels with a class in `ignore` count as not annotated. Fails if `labels` is not of the size of the image.
+    ///
+    /// ```
+    /// use image::{GrayImage, Luma};
+    /// use scenecast_scoring::Annotations;
+    ///
+    /// let classes = GrayImage::from_fn(40, 20, |x, _| Luma([if x < 20 { 3 } else { 255 }]));
+    /// let annotations = Annotations::new(&classes, (40, 20), 10.0, &[255])?;
+    /// assert_eq!(annotations.size(), (4, 2));
+    /// // Four annotated cells, one class.
+    /// assert_eq!(annotations.cells(), Some((4, 1)));
+    /// # Ok::<(), scenecast_scoring::AnnotationError>(())
+    /// ```
     pub fn new(labels: &GrayImage, size: (u32, u32), cell_px: f32, ignore: &[u8]) -> Result<Self, AnnotationError> {
         if labels.dimensions() != size {
             return Err(AnnotationError { found: labels.dimensions(), wanted: size });
@@ -31,7 +45,7 @@ impl Annotations {
         let cells = |length: u32| (length as f32 / cell_px).ceil().max(1.0) as usize;
         let (columns, rows) = (cells(size.0), cells(size.1));
         let counted = |class: &u8| !ignore.contains(class);
-        let classes = labels.as_raw().iter().copied().filter(counted).max().map_or(0, |most| most as usize + 1);
+        let classes = labels.as_raw().iter().copied().filter(counted).max().map_or(0, |highest| highest as usize + 1);
         let mut counts = vec![0u32; columns * rows * classes];
         for (x, y, pixel) in labels.enumerate_pixels().filter(|entry| counted(&entry.2.0[0])) {
             let column = ((x as f32 / cell_px) as usize).min(columns - 1);
@@ -47,13 +61,15 @@ impl Annotations {
         Ok(Self { columns, rows, classes, of_cells })
     }
 
-    /// Annotated cells and different classes among them; nothing if no cell is annotated.
+    /// Returns the number of annotated cells and of different classes, or `None` if no cell is annotated.
+    #[must_use]
     pub fn cells(&self) -> Option<(usize, usize)> {
         let classes: std::collections::BTreeSet<u8> = self.of_cells.iter().copied().flatten().collect();
         (!classes.is_empty()).then(|| (self.of_cells.iter().flatten().count(), classes.len()))
     }
 
-    /// Cells across and down.
+    /// Returns the number of columns and of rows, in cells.
+    #[must_use]
     pub fn size(&self) -> (usize, usize) {
         (self.columns, self.rows)
     }

@@ -1,23 +1,23 @@
-//! Stretched CIE Lab colours of a frame on a regular grid, and their means and spreads over windows.
+//! The tone-stretched CIE Lab colours of a frame on a regular grid, and their means and deviations over windows.
 
 use image::RgbImage;
 
 use super::grid::{bounds, centres};
 use super::stretch::Stretch;
 
-/// Colours on a grid, row by row from the top.
+/// Colours on a regular grid, row by row from the top.
 #[derive(Clone, Debug)]
-pub(crate) struct Field {
+pub(crate) struct ColourField {
     across: Vec<f32>,
     down: Vec<f32>,
-    /// Width and height of the frame and edge of a cell, pixels.
+    /// Width and height of the frame, pixels.
     size: [u32; 2],
     cell_px: f32,
     pub(crate) lab: Vec<[f32; 3]>,
 }
 
-impl Field {
-    /// Mean colours of boxes of `spacing` pixels.
+impl ColourField {
+    /// The mean colours of boxes of `spacing` pixels; `cell_px` is the edge of a cell, pixels.
     pub(crate) fn new(frame: &RgbImage, stretch: &Stretch, spacing: f32, cell_px: f32) -> Self {
         Self {
             across: centres(frame.width(), spacing),
@@ -28,12 +28,12 @@ impl Field {
         }
     }
 
-    /// Pixel positions of the grid's points.
+    /// The positions of the grid points, pixels.
     pub(crate) fn places(&self) -> impl Iterator<Item = (f32, f32)> {
         self.down.iter().flat_map(|&v| self.across.iter().map(move |&u| (u, v)))
     }
 
-    /// Pixel positions about `spacing` apart, each with the index of the grid point that it falls on.
+    /// Positions about `spacing` pixels apart, each with the index of its grid point.
     pub(crate) fn sample(&self, spacing: f32) -> Vec<(f32, f32, usize)> {
         let (columns, rows) = (self.across.len(), self.down.len());
         let index =
@@ -50,7 +50,7 @@ impl Field {
         sample
     }
 
-    /// Mean and standard deviation of L, a and b in a window of about `cells` cells around each grid point.
+    /// The mean and the standard deviation of L, a and b in a window of about `cells` cells around each grid point.
     pub(crate) fn windows(&self, cells: f32) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
         let step = self.size[0] as f32 / self.across.len() as f32;
         let radius = (0.5 * cells * self.cell_px / step).round() as usize;
@@ -64,7 +64,7 @@ impl Field {
         (means, spreads)
     }
 
-    /// Means over squares of 2 `radius` + 1 grid points, cut off at the edges.
+    /// Means over squares with an edge of 2 `radius` + 1 grid points, cut off at the edges of the frame.
     fn blur(&self, values: &[[f32; 3]], radius: usize) -> Vec<[f32; 3]> {
         let (columns, rows) = (self.across.len(), self.down.len());
         let mut rowwise = values.to_vec();
@@ -79,7 +79,7 @@ impl Field {
     }
 }
 
-/// Running means along one line of `count` points from `first` on, `stride` apart.
+/// Running means along a line of `count` points, from index `first` on in steps of `stride`.
 fn blur_line(from: &[[f32; 3]], to: &mut [[f32; 3]], radius: usize, count: usize, first: usize, stride: usize) {
     let mut sum = [0.0f64; 3];
     let add = |sum: &mut [f64; 3], i: usize, sign: f64| {
@@ -100,7 +100,7 @@ fn blur_line(from: &[[f32; 3]], to: &mut [[f32; 3]], radius: usize, count: usize
     }
 }
 
-/// Mean colours of the boxes of a regular grid, row by row.
+/// The mean colours of the boxes of a regular grid, row by row.
 pub(crate) fn box_means(frame: &RgbImage, spacing: f32) -> Vec<[f32; 3]> {
     let across = bounds(frame.width(), spacing);
     let down = bounds(frame.height(), spacing);
@@ -128,8 +128,17 @@ pub(crate) fn box_means(frame: &RgbImage, spacing: f32) -> Vec<[f32; 3]> {
     means
 }
 
-/// CIE Lab (D65) of an sRGB colour with channels 0 to 1.
-pub(crate) fn lab(rgb: [f32; 3]) -> [f32; 3] {
+/// Returns the CIE Lab coordinates (D65) of an sRGB colour with channels of 0 to 1: L from 0 to 100, a and b around 0.
+///
+/// The sRGB curve is approximated by a cubic, with an error below 0.002.
+///
+/// ```
+/// let [l, a, b] = scene_model::words::cie_lab([1.0, 1.0, 1.0]);
+/// assert!((l - 100.0).abs() < 0.1 && a.abs() < 0.1 && b.abs() < 0.1);
+/// ```
+#[inline]
+#[must_use]
+pub fn lab(rgb: [f32; 3]) -> [f32; 3] {
     let [r, g, b] = rgb.map(linear);
     let x = (0.412_456 * r + 0.357_576 * g + 0.180_438 * b) / 0.950_47;
     let y = 0.212_673 * r + 0.715_152 * g + 0.072_175 * b;
@@ -138,7 +147,7 @@ pub(crate) fn lab(rgb: [f32; 3]) -> [f32; 3] {
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 
-/// The sRGB curve, as a cubic that stays within 0.002 of it (a power costs ten times as much).
+/// The sRGB transfer curve as a cubic with an error below 0.002; a power would take ten times as long.
 fn linear(value: f32) -> f32 {
     value * (value * (value * 0.305_306 + 0.682_171) + 0.012_523)
 }
@@ -148,9 +157,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn windows_have_the_means_and_spreads_of_their_points() {
+    fn windows_have_the_mean_and_deviation_of_their_points() {
         let frame = RgbImage::from_fn(60, 40, |x, _| image::Rgb([if x % 2 == 0 { 20 } else { 220 }; 3]));
-        let field = Field::new(&frame, &Stretch::default(), 1.0, 5.0);
+        let field = ColourField::new(&frame, &Stretch::default(), 1.0, 5.0);
         let (means, spreads) = field.windows(2.0);
         let (dark, bright) = (field.lab[0][0], field.lab[1][0]);
         let middle = 20 * 60 + 30;
@@ -160,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn white_is_white_and_black_is_black() {
+    fn black_and_white_have_no_chroma() {
         let [l, a, b] = lab([1.0; 3]);
         assert!((l - 100.0).abs() < 0.1 && a.abs() < 0.1 && b.abs() < 0.1);
         assert!(lab([0.0; 3])[0].abs() < 0.1);

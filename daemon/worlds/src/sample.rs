@@ -1,55 +1,62 @@
-//! Random worlds of the spatial CRP itself, as the paper's figure shows them.
+//! Label maps drawn from the prior: a spatial Chinese Restaurant Process, as in the figure of the paper.
 
-use crate::random::Stream;
+use scene_model::random::CounterRng;
 
-/// A world of labels drawn from the prior: one customer in each cell's restaurant.
+/// A label map that was drawn from the prior.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LabelWorld {
-    /// Cells across.
+    /// The number of cells in a row.
     pub columns: usize,
-    /// Cells down.
+    /// The number of rows of cells.
     pub rows: usize,
-    /// Label of each cell, row by row, numbered from 0 in the order of birth.
+    /// The label of each cell, row by row, numbered from 0 in the order of birth.
     pub labels: Vec<u32>,
 }
 
-/// Draws a world of `columns` x `rows` cells with `customers` words in each.
+/// Draws a world of `columns` x `rows` cells with `words` words in each.
 ///
-/// Cells come in as an explorer would see them, each next to one that is there. Each word sits down at label k with weight n_k + `alpha`, where n_k counts the label in the cell and its Von Neumann
-/// neighbours, or at a new one with weight `gamma`; the cell shows the label that most of its words have (ties to the
-/// oldest). Both weights are at or above 0.
-pub fn sample(seed: u64, columns: usize, rows: usize, alpha: f64, gamma: f64, customers: u32) -> LabelWorld {
-    let mut chance = Stream::new(seed);
+/// Cells are filled in the order of an explorer: each is next to an earlier one. Each word takes label k with the
+/// weight n_k + `alpha`, where n_k counts the label in the cell and its Von Neumann neighbours, or a new label with the
+/// weight `gamma`. Both weights are 0 or above. The cell shows the label that most of its words have, ties to the
+/// oldest.
+///
+/// ```
+/// let world = scenecast_worlds::sample(1, 50, 40, 1e-4, 0.01, 8);
+/// assert_eq!(world.labels.len(), 50 * 40);
+/// ```
+#[must_use]
+pub fn sample(seed: u64, columns: usize, rows: usize, alpha: f64, gamma: f64, words: u32) -> LabelWorld {
+    let mut rng = CounterRng::new(seed);
     let mut tables: Vec<Vec<(u32, u32)>> = vec![Vec::new(); columns * rows];
-    let mut room = Room { alpha, gamma, words: Vec::new() };
-    for cell in growth(columns, rows, &mut chance) {
+    let mut prior = Prior { alpha, gamma, totals: Vec::new() };
+    for cell in growth(columns, rows, &mut rng) {
         let mut near: Vec<(u32, u32)> = Vec::new();
         for &(label, words) in neighbours(cell, columns, rows).flat_map(|other| &tables[other]) {
-            count(&mut near, label, words);
+            add(&mut near, label, words);
         }
-        for _ in 0..customers.max(1) {
-            let label = room.sit_down(&near, &mut chance);
-            count(&mut near, label, 1);
-            count(&mut tables[cell], label, 1);
+        for _ in 0..words.max(1) {
+            let label = prior.draw(&near, &mut rng);
+            add(&mut near, label, 1);
+            add(&mut tables[cell], label, 1);
         }
     }
     let shown = |table: &Vec<(u32, u32)>| {
-        table.iter().max_by_key(|(label, words)| (*words, std::cmp::Reverse(*label))).map_or(0, |most| most.0)
+        table.iter().max_by_key(|(label, words)| (*words, std::cmp::Reverse(*label))).map_or(0, |largest| largest.0)
     };
     LabelWorld { columns, rows, labels: tables.iter().map(shown).collect() }
 }
 
-/// All cells in random order, each but the first next to an earlier one.
-fn growth(columns: usize, rows: usize, chance: &mut Stream) -> Vec<usize> {
+/// All cells in a random order in which each, except the first, is next to an earlier one.
+fn growth(columns: usize, rows: usize, rng: &mut CounterRng) -> Vec<usize> {
     let mut reached = vec![false; columns * rows];
     let mut edge = Vec::new();
     let mut order = Vec::with_capacity(columns * rows);
     if !reached.is_empty() {
-        edge.push(chance.below(columns * rows));
+        edge.push(rng.below(columns * rows));
         reached[edge[0]] = true;
     }
     while !edge.is_empty() {
-        let cell = edge.swap_remove(chance.below(edge.len()));
+        let cell = edge.swap_remove(rng.below(edge.len()));
         order.push(cell);
         for other in neighbours(cell, columns, rows) {
             if !std::mem::replace(&mut reached[other], true) {
@@ -60,34 +67,34 @@ fn growth(columns: usize, rows: usize, chance: &mut Stream) -> Vec<usize> {
     order
 }
 
-/// All labels of the world.
-struct Room {
+/// The weights of the process, and the labels born so far.
+struct Prior {
     alpha: f64,
     gamma: f64,
-    /// Words of each label.
-    words: Vec<u32>,
+    /// The number of words with each label.
+    totals: Vec<u32>,
 }
 
-impl Room {
-    fn sit_down(&mut self, near: &[(u32, u32)], chance: &mut Stream) -> u32 {
+impl Prior {
+    fn draw(&mut self, near: &[(u32, u32)], rng: &mut CounterRng) -> u32 {
         let occupied: u32 = near.iter().map(|entry| entry.1).sum();
-        let elsewhere = self.alpha * self.words.len() as f64;
-        let mut aim = chance.unit() * (f64::from(occupied) + elsewhere + self.gamma);
+        let elsewhere = self.alpha * self.totals.len() as f64;
+        let mut aim = rng.unit() * (f64::from(occupied) + elsewhere + self.gamma);
         for &(label, words) in near {
             aim -= f64::from(words);
             if aim < 0.0 {
-                return self.seat(label);
+                return self.count(label);
             }
         }
         let index = if self.alpha > 0.0 { (aim / self.alpha) as usize } else { usize::MAX };
-        self.seat(index.min(self.words.len()) as u32)
+        self.count(index.min(self.totals.len()) as u32)
     }
 
-    fn seat(&mut self, label: u32) -> u32 {
-        if label as usize == self.words.len() {
-            self.words.push(0);
+    fn count(&mut self, label: u32) -> u32 {
+        if label as usize == self.totals.len() {
+            self.totals.push(0);
         }
-        self.words[label as usize] += 1;
+        self.totals[label as usize] += 1;
         label
     }
 }
@@ -103,7 +110,7 @@ fn neighbours(cell: usize, columns: usize, rows: usize) -> impl Iterator<Item = 
     places.into_iter().flatten()
 }
 
-fn count(table: &mut Vec<(u32, u32)>, label: u32, words: u32) {
+fn add(table: &mut Vec<(u32, u32)>, label: u32, words: u32) {
     match table.iter_mut().find(|entry| entry.0 == label) {
         Some(entry) => entry.1 += words,
         None => table.push((label, words)),

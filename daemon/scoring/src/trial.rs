@@ -1,29 +1,33 @@
-//! A trial of the scene model against the baselines on an annotated image.
+//! A trial: the scene model against the baselines on an annotated image.
 
 use image::{GrayImage, RgbImage};
+use scene_model::project::{DownCamera, Pose};
+use scene_model::topics::{ConfigError, SceneConfig, SceneModel};
+use scene_model::words::{Word, WordConfig, WordExtractor};
 use serde::Serialize;
 
-use super::{AnnotationError, Annotations, LabelGrid, SceneScore, mean_lab_labels, pooled_word_labels, score};
-use crate::project::{DownCamera, Pose};
-use crate::topics::{ConfigError, SceneConfig, SceneModel};
-use crate::words::{Word, WordConfig, WordExtractor};
+use crate::annotations::{AnnotationError, Annotations};
+use crate::baselines::{mean_lab_labels, pooled_word_labels};
+use crate::label_grid::LabelGrid;
+use crate::null::{SceneScore, score};
 
-/// What makes a label map of an image in a trial.
+/// A method that labels the cells of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// k-means on the mean Lab colour of each cell.
     MeanLab,
     /// k-means on the word shares of each cell and its eight neighbours.
     PooledWords,
-    /// The scene model with its defaults.
+    /// The scene model with [`SceneConfig::for_images`].
     SceneModel,
 }
 
 impl Method {
-    /// All of them, the scene model last.
+    /// All methods; the scene model is the last.
     pub const ALL: [Self; 3] = [Self::MeanLab, Self::PooledWords, Self::SceneModel];
 
-    /// Name in reports.
+    /// The name in reports: `kmeans_lab`, `kmeans_pooled_words` or `scene_model`.
+    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::MeanLab => "kmeans_lab",
@@ -33,16 +37,16 @@ impl Method {
     }
 }
 
-/// What is the same for all methods and scenes.
+/// The settings that all methods and scenes of a comparison share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trial {
-    /// Most labels (K): 2 to 254.
+    /// The maximum number of labels (K): 2 to 254.
     pub labels: u32,
-    /// Cells across an image: at least 1. Cells are square, and of 4 pixels at least.
+    /// The number of cells in a row of the image, at least 1. Cells are square, with an edge of at least 4 pixels.
     pub cells_across: u32,
-    /// Sweeps of the scene model over all words.
+    /// The number of sweeps of the scene model over all words.
     pub sweeps: u32,
-    /// Seeds 1 to this; at least 1.
+    /// The number of seeds, from 1 on; 0 counts as 1.
     pub seeds: u64,
 }
 
@@ -52,31 +56,32 @@ impl Default for Trial {
     }
 }
 
-/// What a method reached on a scene: means over the seeds.
+/// The score of a method on a scene: means over the seeds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MeanScore {
-    /// Of map labels and annotated classes, nats.
+    /// Mutual information of map labels and annotated classes, nats.
     pub mutual_information_nats: f64,
-    /// Divided by the geometric mean of both entropies.
+    /// Mutual information over the geometric mean of both entropies, 0 to 1.
     pub normalised_mutual_information: f64,
-    /// Mean of the displaced maps, nats.
+    /// The mean mutual information of the flipped and shifted maps, nats.
     pub null_mutual_information_nats: f64,
-    /// Mutual information above the null, nats.
+    /// Mutual information minus that of the null model, nats.
     pub excess_nats: f64,
-    /// Different labels in the map.
+    /// The number of different labels in the map.
     pub labels_used: f64,
 }
 
-/// Why a scene cannot be tried.
+/// A scene cannot be scored.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrialError {
-    /// Too few pixels for several cells.
-    #[error("the image has {0} x {1} pixels; a scene needs at least {LEAST_PX} x {LEAST_PX}")]
+    /// The image has too few pixels for several cells.
+    #[error("the image has {0} x {1} pixels; a scene needs at least {MIN_IMAGE_PX} x {MIN_IMAGE_PX}")]
     Tiny(u32, u32),
-    /// The annotations do not fit the image.
+    /// The annotations and the image differ in size.
     #[error(transparent)]
     Annotations(#[from] AnnotationError),
-    /// Nothing is annotated.
+    /// No pixel has a class that is not ignored.
     #[error("no pixel is annotated")]
     NoClasses,
     /// A parameter is out of its range.
@@ -84,13 +89,13 @@ pub enum TrialError {
     Config(#[from] ConfigError),
 }
 
-/// Edge of the smallest image, pixels.
-const LEAST_PX: u32 = 16;
-/// Edge of the smallest cell, pixels.
-const LEAST_CELL_PX: f32 = 4.0;
+/// The minimum width and height of an image, pixels.
+const MIN_IMAGE_PX: u32 = 16;
+/// The minimum edge of a cell, pixels.
+const MIN_CELL_PX: f32 = 4.0;
 
-/// An image with its annotations, ready for the methods.
-pub struct Scene<'a> {
+/// An image with its annotations, and the words that the methods share.
+pub struct AnnotatedScene<'a> {
     trial: Trial,
     image: &'a RgbImage,
     cell_px: f32,
@@ -99,14 +104,15 @@ pub struct Scene<'a> {
     vocabulary: u32,
 }
 
-impl<'a> Scene<'a> {
-    /// Finds the words of an image; `classes` has the class of each pixel, those in `ignore` do not count.
+impl<'a> AnnotatedScene<'a> {
+    /// Extracts the words of an image. `classes` has the class of each pixel; pixels with a class in
+    /// `ignore` count as not annotated.
     pub fn new(trial: Trial, image: &'a RgbImage, classes: &GrayImage, ignore: &[u8]) -> Result<Self, TrialError> {
         let size = image.dimensions();
-        if size.0.min(size.1) < LEAST_PX {
+        if size.0.min(size.1) < MIN_IMAGE_PX {
             return Err(TrialError::Tiny(size.0, size.1));
         }
-        let cell_px = (size.0 as f32 / trial.cells_across.max(1) as f32).max(LEAST_CELL_PX);
+        let cell_px = (size.0 as f32 / trial.cells_across.max(1) as f32).max(MIN_CELL_PX);
         let annotations = Annotations::new(classes, size, cell_px, ignore)?;
         if annotations.cells().is_none() {
             return Err(TrialError::NoClasses);
@@ -116,18 +122,20 @@ impl<'a> Scene<'a> {
         Ok(Self { trial, image, cell_px, annotations, words, vocabulary: config.vocabulary_size() })
     }
 
-    /// Edge of a cell, pixels.
+    /// Returns the edge of a cell, pixels.
+    #[must_use]
     pub fn cell_px(&self) -> f32 {
         self.cell_px
     }
 
-    /// The annotations on the cells.
+    /// Returns the annotations of the cells.
+    #[must_use]
     pub fn annotations(&self) -> &Annotations {
         &self.annotations
     }
 
-    /// What a method reaches, mean over the seeds.
-    pub fn grade(&self, method: Method) -> Result<MeanScore, TrialError> {
+    /// Returns the score of a method, mean over the seeds.
+    pub fn mean_score(&self, method: Method) -> Result<MeanScore, TrialError> {
         let seeds = self.trial.seeds.max(1);
         let mut mean = MeanScore::default();
         for seed in 1..=seeds {
@@ -136,7 +144,7 @@ impl<'a> Scene<'a> {
         Ok(mean)
     }
 
-    /// The label map that a method makes.
+    /// Returns the label map of a method.
     pub fn labels(&self, method: Method, seed: u64) -> Result<LabelGrid, TrialError> {
         let (k, size) = (self.trial.labels as usize, self.image.dimensions());
         match method {
@@ -175,7 +183,8 @@ impl MeanScore {
         self.labels_used += share * score.labels as f64;
     }
 
-    /// Medians over scenes, figure by figure; zeros of no scenes.
+    /// Returns the median over scenes, each number on its own; zeros for an empty slice.
+    #[must_use]
     pub fn median(scores: &[Self]) -> Self {
         let median = |pick: fn(&Self) -> f64| {
             let mut values: Vec<f64> = scores.iter().map(pick).collect();
@@ -199,25 +208,25 @@ impl MeanScore {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generate::reef;
+    use scenecast_worlds::reef;
 
     #[test]
-    fn every_method_finds_the_classes_of_a_reef_and_the_scene_model_more_than_clusters_of_its_words() {
+    fn scene_model_finds_more_of_a_reef_than_the_baselines() {
         let reef = reef(3, 480, 360, 60, 5);
         let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap();
         let trial = Trial { labels: 8, cells_across: 40, sweeps: 10, seeds: 1 };
-        let scene = Scene::new(trial, &reef.image, &classes, &[255]).unwrap();
-        let scores = Method::ALL.map(|method| scene.grade(method).unwrap());
+        let scene = AnnotatedScene::new(trial, &reef.image, &classes, &[255]).unwrap();
+        let scores = Method::ALL.map(|method| scene.mean_score(method).unwrap());
         assert!(scores.iter().all(|score| score.excess_nats > 0.5 && score.labels_used <= 8.0), "{scores:?}");
         assert!(scores[2].excess_nats > scores[1].excess_nats, "{scores:?}");
     }
 
     #[test]
-    fn what_cannot_be_tried_is_refused_by_name() {
+    fn unusable_scenes_are_refused_by_name() {
         let refused = |image: (u32, u32), classes: (u32, u32), class| {
             let classes = GrayImage::from_pixel(classes.0, classes.1, image::Luma([class]));
             let image = RgbImage::new(image.0, image.1);
-            Scene::new(Trial::default(), &image, &classes, &[255]).map(|_| ()).unwrap_err()
+            AnnotatedScene::new(Trial::default(), &image, &classes, &[255]).map(|_| ()).unwrap_err()
         };
         assert_eq!(refused((1, 1), (1, 1), 0), TrialError::Tiny(1, 1));
         assert_eq!(refused((40, 30), (40, 30), 255), TrialError::NoClasses);
@@ -225,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn medians_are_taken_figure_by_figure() {
+    fn medians_are_taken_of_each_number() {
         let of = |mutual_information_nats, excess_nats| MeanScore {
             mutual_information_nats,
             excess_nats,

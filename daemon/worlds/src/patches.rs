@@ -1,16 +1,17 @@
-//! A sample of the spatial CRP: one label for each patch of a grid.
+//! A sample of the spatial Chinese Restaurant Process: one label for each patch of a grid.
 
-use crate::random::Stream;
+use scene_model::random::CounterRng;
 
-/// Prior weight of a label that no neighbour has, and of a new label.
+/// The prior weight of a label that no neighbour has.
 const ALPHA: f64 = 0.01;
+/// The weight of a new label.
 const GAMMA: f64 = 0.06;
-/// Times that every patch is drawn again; more would let the largest label take everything.
+/// How often every patch is drawn again. With more sweeps the largest label would take over the grid.
 const SWEEPS: usize = 3;
-/// A neighbour's word counts more than once, as a patch holds many words.
+/// The exponent of the neighbours' count: a patch stands for many words, so that it outweighs a single one.
 const SHARPNESS: i32 = 2;
 
-/// Labels of a grid of patches.
+/// The labels of a grid of patches, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct Patches {
     columns: usize,
@@ -20,23 +21,23 @@ pub(crate) struct Patches {
 
 impl Patches {
     pub(crate) fn sample(key: u64, columns: usize, rows: usize, classes: u8) -> Self {
-        let mut chance = Stream::new(key);
+        let mut rng = CounterRng::new(key);
         let mut patches = Self { columns, rows, labels: vec![u8::MAX; columns * rows] };
         let mut sizes = vec![0usize; classes as usize];
         let mut order: Vec<usize> = (0..columns * rows).collect();
         for _ in 0..=SWEEPS {
             for i in (1..order.len()).rev() {
-                order.swap(i, chance.below(i + 1));
+                order.swap(i, rng.below(i + 1));
             }
             for &place in &order {
-                patches.draw(place, &mut sizes, &mut chance);
+                patches.draw(place, &mut sizes, &mut rng);
             }
         }
         patches
     }
 
-    /// Draws the label of one patch given its neighbours: occupied tables by count, a new one by gamma.
-    fn draw(&mut self, place: usize, sizes: &mut [usize], chance: &mut Stream) {
+    /// Draws the label of one patch given its neighbours: a label in use by its count there, a new one by gamma.
+    fn draw(&mut self, place: usize, sizes: &mut [usize], rng: &mut CounterRng) {
         if let Some(size) = sizes.get_mut(self.labels[place] as usize) {
             *size -= 1;
         }
@@ -53,7 +54,7 @@ impl Patches {
             _ => f64::powi(near[label], SHARPNESS) + ALPHA,
         };
         let weights: Vec<f64> = (0..sizes.len()).map(weight).collect();
-        let mut aim = chance.unit() * weights.iter().sum::<f64>();
+        let mut aim = rng.unit() * weights.iter().sum::<f64>();
         let label = weights.iter().position(|weight| {
             aim -= weight;
             aim < 0.0
@@ -73,7 +74,7 @@ impl Patches {
         [left, right, above, below].into_iter().flatten()
     }
 
-    /// Label at a position in patch units; beyond the edge, that of the edge.
+    /// The label at a position in patch units; beyond the border, the label at the border.
     #[inline]
     pub(crate) fn at(&self, x: f32, y: f32) -> u8 {
         let column = (x.max(0.0) as usize).min(self.columns - 1);

@@ -1,10 +1,10 @@
-//! Value noise: random values on a lattice, smoothly joined.
+//! Value noise: random values on a lattice, smoothly interpolated.
 
-use crate::random::mix;
+use scene_model::random::mix;
 
 const SIDE: usize = 256;
 
-/// A lattice of 256 x 256 random values that repeats.
+/// A lattice of 256 x 256 random values, repeated in both directions.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
     lattice: Vec<f32>,
@@ -16,7 +16,7 @@ impl Noise {
         Self { lattice: (0..(SIDE * SIDE) as u64).map(value).collect() }
     }
 
-    /// Value at a position in lattice units, 0 to 1.
+    /// The value at a position in lattice units, 0 to 1.
     #[inline]
     pub(crate) fn value(&self, x: f32, y: f32) -> f32 {
         let (left, top) = (x.floor(), y.floor());
