@@ -64,13 +64,13 @@ impl<R: StateReplica> SurfaceLink<R> {
     fn give_up_cycle(&mut self, now: Instant) {
         self.turn.clear();
         (self.cycle.polled, self.cycle.answer_of) = (0, None);
-        if let Some(peer) = self.current.and_then(|a| self.peers.get_mut(&a)) {
+        if let Some(peer) = self.fleet.current_mut() {
             peer.master.postpone(now);
         }
     }
 
     /// When a cycle that the modem has not begun is given up.
-    pub(super) fn gives_up_at(&self) -> Option<Instant> {
+    pub(super) fn cycle_gives_up_at(&self) -> Option<Instant> {
         (!self.turn.is_empty()).then(|| self.cycle.began + GIVE_UP)
     }
 

@@ -1,6 +1,6 @@
 //! What the surface's host sees of a vehicle.
 
-use super::peer::Peer;
+use super::Peer;
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// A read-only view of a vehicle for the host.
 #[derive(Debug)]
-pub struct PeerView<'a, R: StateReplica = Replica>(pub(super) &'a Peer<R>);
+pub struct PeerView<'a, R: StateReplica = Replica>(pub(in crate::link::surface) &'a Peer<R>);
 
 impl<R: StateReplica> Clone for PeerView<'_, R> {
     fn clone(&self) -> Self {
@@ -24,32 +24,32 @@ impl<R: StateReplica> Copy for PeerView<'_, R> {}
 impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The operator's copy of what the vehicle replicates.
     pub fn replica(&self) -> &'a R {
-        &self.0.replica
+        &self.0.content.replica
     }
 
     /// The operator's copy of a plane of the map; `None` while nothing of it was heard.
     pub fn plane(&self, kind: PlaneKind) -> Option<&'a PlaneReplica> {
-        self.0.planes.get(kind)
+        self.0.content.planes.get(kind)
     }
 
     /// Counts changes of what the vehicle replicates, planes included.
     pub fn map_version(&self) -> u64 {
-        self.0.map_version()
+        self.0.content.map_version()
     }
 
     /// The last status and when its position came in.
     pub fn status(&self) -> Option<&'a (VehicleStatus, Instant)> {
-        self.0.status.whole.as_ref()
+        self.0.content.status.whole()
     }
 
     /// What the vehicle had still to send by its last report, less what has come in since, and when that report came in.
     pub fn backlog(&self) -> Option<(Backlog, Instant)> {
-        self.0.told.map(|told| told.left(self.stats()))
+        self.0.content.backlog.map(|reported| reported.left(self.stats()))
     }
 
     /// When a frame was last taken.
     pub fn heard(&self) -> Option<Instant> {
-        self.0.heard
+        self.0.contact.last_received()
     }
 
     /// When the next turn will be granted at the latest; `now` if that is due.
@@ -64,7 +64,7 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
 
     /// The vehicle's clock.
     pub fn clock(&self) -> Option<&'a ClockMap> {
-        self.0.clock.as_ref()
+        self.0.timing.clock()
     }
 
     /// The slots that were issued and how far they have come.

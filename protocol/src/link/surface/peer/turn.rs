@@ -1,6 +1,6 @@
-//! What the surface says in a turn.
+//! The frames of the surface's turn.
 
-use super::peer::{Carried, Peer};
+use super::{Carried, LastTurn, Peer};
 use crate::directive::PendingSlot;
 use crate::link::FrameNumber;
 use crate::link::Transmit;
@@ -18,32 +18,32 @@ const SLOT_OVERHEAD: usize = 9 + 1 + SHORT_ACK + 1;
 const SMALL_FRAME: usize = 48;
 
 /// Bytes that a slot may have in a frame of `frame_bytes` that ends in `seal` bytes.
-pub(super) fn room_for_slot(frame_bytes: usize, seal: usize) -> usize {
+pub(in crate::link::surface) fn room_for_slot(frame_bytes: usize, seal: usize) -> usize {
     frame_bytes.saturating_sub(SLOT_OVERHEAD + seal)
 }
 
 /// A frame of the surface, ready to go.
 #[derive(Debug)]
-pub(super) struct Ready {
-    pub(super) transmit: Transmit,
+pub(in crate::link::surface) struct Ready {
+    pub(in crate::link::surface) transmit: Transmit,
     /// Its number, unless it is a hello.
-    pub(super) number: Option<FrameNumber>,
+    pub(in crate::link::surface) number: Option<FrameNumber>,
 }
 
 /// What the next turn will be made of: the slots of each frame.
-type Plan = Vec<Vec<PendingSlot>>;
+pub(super) type TurnPlan = Vec<Vec<PendingSlot>>;
 
 impl<R: StateReplica> Peer<R> {
     /// The frames of a turn: the slots that wait and did not go out after `again_before`, then a grant; each so often that one
     /// gets through.
-    pub(super) fn plan_turn(
+    pub(in crate::link::surface) fn plan_turn(
         &self,
         modem: &ModemProfile,
         hello: bool,
         copies: u32,
         shares: &ClassShares,
         again_before: Instant,
-    ) -> Plan {
+    ) -> TurnPlan {
         let copies = copies as usize;
         if hello || !self.pair.is_met() {
             return vec![Vec::new(); copies.min(2)];
@@ -53,7 +53,7 @@ impl<R: StateReplica> Peer<R> {
             room_for_slot(modem.frame_bytes, self.pair.full_seal_bytes(modem.frame_bytes)),
             shares,
         );
-        let mut plan = Plan::new();
+        let mut plan = TurnPlan::new();
         for _ in 0..copies {
             plan.extend(groups.iter().cloned());
         }
@@ -63,7 +63,7 @@ impl<R: StateReplica> Peer<R> {
     }
 
     /// Writes the frames of a plan; `grant` is the turn byte, if turns are granted.
-    pub(super) fn write_turn(
+    pub(in crate::link::surface) fn write_turn(
         &mut self,
         plan: &[Vec<PendingSlot>],
         modem: &ModemProfile,
@@ -71,8 +71,8 @@ impl<R: StateReplica> Peer<R> {
         hello: bool,
         now: Instant,
     ) -> Vec<Ready> {
-        self.turn_began = self.pair.next_number();
-        self.greeted = hello || !self.pair.is_met();
+        let is_hello = hello || !self.pair.is_met();
+        self.last_turn = LastTurn { began: self.pair.next_number(), is_hello };
         let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem)).sum();
         let mut at = now;
         let mut turn = Vec::with_capacity(plan.len());
@@ -86,7 +86,7 @@ impl<R: StateReplica> Peer<R> {
     }
 
     /// Bits on air that a frame with these slots takes at most.
-    pub(super) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile) -> u64 {
+    pub(in crate::link::surface) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile) -> u64 {
         const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
         let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
         let bytes = HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes();
