@@ -7,7 +7,11 @@
     deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable)
 )]
 
+mod bytes;
+pub mod coordinates;
 pub mod directive;
+#[allow(clippy::indexing_slicing)] // A cell's place is less than the size of its tile.
+mod grid;
 pub mod link;
 pub mod mac;
 pub mod map;

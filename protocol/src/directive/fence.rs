@@ -1,8 +1,8 @@
 //! Where the vehicle may be.
 
-use super::polygon::{Place, Polygon, PolygonFault};
-use super::steps::{minus, plus, put_pair, take_pair, take_width, width_of};
-use crate::map_codec::bits::{BitReader, BitWriter};
+use super::polygon::{Polygon, PolygonFault};
+use crate::bytes::{BitReader, BitWriter, minus, plus, put_pair, take_pair, take_width, width_of};
+use crate::coordinates::DecimetrePoint;
 
 /// The outline that the vehicle stays in, those that it stays out of, and the place that it returns to.
 ///
@@ -35,7 +35,7 @@ pub struct Fence {
     /// The vehicle stays outside of each.
     pub keep_outs: Vec<Polygon>,
     /// Where it goes on its return; `None`: where its run began.
-    pub return_point: Option<Place>,
+    pub return_point: Option<DecimetrePoint>,
 }
 
 /// What is wrong with a fence.
@@ -84,7 +84,7 @@ impl Fence {
             }
         }
         let Some(home) = self.return_point else { return Ok(()) };
-        if Place::from_metres(home.metres().0, home.metres().1).is_none() {
+        if DecimetrePoint::from_metres(home.metres().0, home.metres().1).is_none() {
             return Err(FenceFault::ReturnTooFar);
         }
         if self.fence.as_ref().is_some_and(|f| !f.contains(home)) {
@@ -97,7 +97,7 @@ impl Fence {
     }
 
     /// Whether the vehicle may be at a place.
-    pub fn allows(&self, place: Place) -> bool {
+    pub fn allows(&self, place: DecimetrePoint) -> bool {
         self.fence.as_ref().is_none_or(|f| f.contains(place)) && !self.keep_outs.iter().any(|k| k.contains(place))
     }
 
@@ -156,10 +156,10 @@ impl Fence {
     }
 }
 
-fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: Place, is_first: bool) {
+fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: DecimetrePoint, is_first: bool) {
     let vertices = outline.0.get(..Polygon::MOST_VERTICES).unwrap_or(&outline.0);
     let before = std::iter::once(anchor).chain(vertices.iter().copied());
-    let steps: Vec<Place> =
+    let steps: Vec<DecimetrePoint> =
         vertices.iter().zip(before).map(|(&v, b)| minus(v, b)).skip(usize::from(is_first)).collect();
     let width = width_of(steps.iter().copied());
     bits.put((vertices.len() as u64).saturating_sub(3), 5);
@@ -167,7 +167,7 @@ fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: Place, is_first:
     steps.into_iter().for_each(|step| put_pair(bits, step, width));
 }
 
-fn take_outline(bits: &mut BitReader<'_>, anchor: Place, is_first: bool) -> Option<Polygon> {
+fn take_outline(bits: &mut BitReader<'_>, anchor: DecimetrePoint, is_first: bool) -> Option<Polygon> {
     let n = bits.take(5)? + 3;
     let width = take_width(bits)?;
     let mut vertices = Vec::with_capacity(n as usize);
@@ -187,7 +187,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn polygon(vertices: &[(i32, i32)]) -> Polygon {
-        Polygon(vertices.iter().map(|&(x_dm, y_dm)| Place { x_dm, y_dm }).collect())
+        Polygon(vertices.iter().map(|&(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm }).collect())
     }
 
     fn square(x: i32, y: i32, side: i32) -> Polygon {
@@ -199,7 +199,7 @@ mod tests {
         let fence = Fence {
             fence: Some(square(-100, 50, 400)),
             keep_outs: vec![polygon(&[(0, 100), (50, 100), (0, 180)])],
-            return_point: Some(Place { x_dm: -90, y_dm: 60 }),
+            return_point: Some(DecimetrePoint { x_dm: -90, y_dm: 60 }),
         };
         assert_eq!(fence.check(), Ok(()));
         let bytes = fence.to_bytes();
@@ -210,7 +210,7 @@ mod tests {
         assert_eq!(bytes, golden, "{bytes:02X?}");
         assert_eq!(Fence::from_bytes(&bytes), Some(fence));
         assert_eq!(Fence::default().to_bytes(), [0]);
-        let home = Fence { return_point: Some(Place { x_dm: 1, y_dm: -1 }), ..Fence::default() };
+        let home = Fence { return_point: Some(DecimetrePoint { x_dm: 1, y_dm: -1 }), ..Fence::default() };
         assert_eq!(home.to_bytes(), [0x04, 0, 0, 0x07, 0xFF, 0xFF, 0xFC]);
         assert_eq!(Fence::from_bytes(&home.to_bytes()), Some(home));
     }
@@ -219,10 +219,10 @@ mod tests {
     fn eight_vertices_and_a_return_point_fit_a_frame_of_64_bytes_under_a_key() {
         let r = 8_000.0f64;
         let octagon = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
-        let vertices =
-            octagon.map(|a| Place { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
+        let vertices = octagon
+            .map(|a| DecimetrePoint { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
         let fence = Polygon(vertices.collect());
-        let return_point = Some(Place { x_dm: -8_000_000, y_dm: 7_000_000 });
+        let return_point = Some(DecimetrePoint { x_dm: -8_000_000, y_dm: 7_000_000 });
         let fence = Fence { fence: Some(fence), keep_outs: Vec::new(), return_point };
         assert_eq!(fence.check(), Ok(()));
         // Five bytes of the slot's head, 13 of the frame's, 8 of a tag.
@@ -232,7 +232,7 @@ mod tests {
     #[test]
     fn a_fence_that_no_vehicle_could_obey_is_refused_by_what_is_wrong() {
         let fence = |f: Polygon, k: &[Polygon], home: Option<(i32, i32)>| {
-            let return_point = home.map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+            let return_point = home.map(|(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm });
             Fence { fence: Some(f), keep_outs: k.to_vec(), return_point }.check()
         };
         let field = square(0, 0, 100);
@@ -265,7 +265,7 @@ mod tests {
         ) {
             let mut outlines: Vec<Polygon> = outlines.iter().map(|o| polygon(o)).collect();
             let fence = if has_fence { outlines.pop() } else { None };
-            let return_point = home.map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+            let return_point = home.map(|(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm });
             let fence = Fence { fence, keep_outs: outlines, return_point };
             prop_assert_eq!(Fence::from_bytes(&fence.to_bytes()), Some(fence));
         }

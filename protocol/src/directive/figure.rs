@@ -1,7 +1,7 @@
 //! Numbers of three decimal digits in two bytes.
 
 use super::Change;
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 use std::fmt;
 
 /// A positive number of three decimal digits, so that what is typed is what is in force.

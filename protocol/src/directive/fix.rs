@@ -1,6 +1,6 @@
 //! A position fix.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
 /// Where the vehicle was, as GPS and USBL saw it from the surface.
 ///

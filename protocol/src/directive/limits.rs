@@ -1,6 +1,6 @@
 //! How deep, how far, how long, and what to do when something is amiss.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
 /// What the vehicle does of its own accord.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! What the surface tells a vehicle: independent versioned slots.
 
+mod decision;
 mod fence;
 mod figure;
 mod fix;
@@ -8,23 +9,24 @@ mod outbox;
 mod polygon;
 mod requests;
 mod settings;
-pub(crate) mod steps;
 mod tuning;
 mod utility;
 
+pub use crate::coordinates::DecimetrePoint as Place;
+pub use decision::{SlotReport, SlotState};
 pub use fence::{Fence, FenceFault};
 pub use figure::Figure;
 pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
 pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
-pub use polygon::{Place, Polygon, PolygonFault};
+pub use polygon::{Polygon, PolygonFault};
 pub use requests::{Request, Requests};
 pub use settings::{Budget, Constraints, PlannerKind};
 pub use tuning::{CellBand, Change, PlaneSet, Settings, SettingsFault};
 pub use utility::Utility;
 
+use crate::bytes::{Reader, Truncated};
 use crate::schedule::Class;
-use crate::wire::{Reader, Truncated};
 
 /// Number of slots.
 pub const SLOTS: usize = 8;

@@ -1,8 +1,7 @@
 //! The surface's side of the slots: what to send, and what became of it.
 
-use super::{RefusalReason, SLOTS, Slot, SlotId, VersionedSlot};
+use super::{RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
 use crate::time::Instant;
-use crate::wire::{SlotState, VehicleStatus};
 
 /// How far a version of a slot has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -116,10 +115,9 @@ impl SlotOutbox {
     }
 
     /// The vehicle reported its decisions; returns the slots whose fate is newly known.
-    pub fn handle_report(&mut self, status: &VehicleStatus, now: Instant) -> Vec<SlotId> {
+    pub fn handle_report(&mut self, reports: &[SlotReport; SLOTS], now: Instant) -> Vec<SlotId> {
         let mut settled = Vec::new();
-        for id in SlotId::ALL {
-            let report = status.slot(id);
+        for (id, report) in SlotId::ALL.into_iter().zip(reports) {
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let life = match report.state {
                 SlotState::Unknown => {

@@ -1,40 +1,10 @@
 //! Polygons in whole decimetres: every predicate is exact.
 
-/// A place on the horizontal plane, decimetres from the origin, each coordinate within [`Place::REACH_DM`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Place {
-    /// East.
-    pub x_dm: i32,
-    /// North.
-    pub y_dm: i32,
-}
-
-impl Place {
-    /// Largest coordinate that fits the wire, either sign.
-    pub const REACH_DM: i32 = 8_388_607;
-
-    /// The nearest place to one in metres; `None` if that is not on the plane that the wire can say.
-    pub fn from_metres(x_m: f64, y_m: f64) -> Option<Self> {
-        let dm = |m: f64| {
-            let dm = (m * 10.0).round();
-            (dm.abs() <= f64::from(Self::REACH_DM)).then_some(dm as i32)
-        };
-        Some(Self { x_dm: dm(x_m)?, y_dm: dm(y_m)? })
-    }
-
-    /// East and north of the origin, metres.
-    pub fn metres(self) -> (f64, f64) {
-        (f64::from(self.x_dm) / 10.0, f64::from(self.y_dm) / 10.0)
-    }
-
-    fn is_in_reach(self) -> bool {
-        self.x_dm.unsigned_abs().max(self.y_dm.unsigned_abs()) <= Self::REACH_DM.unsigned_abs()
-    }
-}
+use crate::coordinates::DecimetrePoint;
 
 /// A polygon, the last vertex joined to the first; either sense of rotation.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Polygon(pub Vec<Place>);
+pub struct Polygon(pub Vec<DecimetrePoint>);
 
 /// Why vertices make no polygon. Vertices and edges count from 1; edge n begins at vertex n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -69,7 +39,7 @@ impl Polygon {
         if let Some(far) = self.0.iter().position(|p| !p.is_in_reach()) {
             return Err(PolygonFault::TooFar(far + 1));
         }
-        let edges: Vec<(Place, Place)> = self.edges().collect();
+        let edges: Vec<(DecimetrePoint, DecimetrePoint)> = self.edges().collect();
         if let Some(same) = edges.iter().position(|(a, b)| a == b) {
             return Err(PolygonFault::Repeated((same + 1) % n + 1));
         }
@@ -93,12 +63,12 @@ impl Polygon {
     }
 
     /// Edges, the closing one last.
-    pub fn edges(&self) -> impl Iterator<Item = (Place, Place)> + '_ {
+    pub fn edges(&self) -> impl Iterator<Item = (DecimetrePoint, DecimetrePoint)> + '_ {
         self.0.iter().copied().zip(self.0.iter().copied().cycle().skip(1))
     }
 
     /// Whether a place lies inside or on the edge.
-    pub fn contains(&self, p: Place) -> bool {
+    pub fn contains(&self, p: DecimetrePoint) -> bool {
         let mut inside = false;
         for (a, b) in self.edges() {
             if cross(a, b, p) == 0 && is_between(a, b, p) {
@@ -118,25 +88,25 @@ impl Polygon {
 }
 
 /// Twice the area of the triangle, positive if it turns left.
-fn cross(a: Place, b: Place, c: Place) -> i64 {
+fn cross(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> i64 {
     let d = |p: i32, q: i32| i64::from(p) - i64::from(q);
     d(b.x_dm, a.x_dm) * d(c.y_dm, a.y_dm) - d(b.y_dm, a.y_dm) * d(c.x_dm, a.x_dm)
 }
 
 /// Whether `p` lies in the box of `a` and `b`.
-fn is_between(a: Place, b: Place, p: Place) -> bool {
+fn is_between(a: DecimetrePoint, b: DecimetrePoint, p: DecimetrePoint) -> bool {
     (a.x_dm.min(b.x_dm)..=a.x_dm.max(b.x_dm)).contains(&p.x_dm)
         && (a.y_dm.min(b.y_dm)..=a.y_dm.max(b.y_dm)).contains(&p.y_dm)
 }
 
 /// Whether the way from `a` over `b` to `c` turns round on itself.
-fn folds_back(a: Place, b: Place, c: Place) -> bool {
+fn folds_back(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> bool {
     cross(a, b, c) == 0 && (is_between(a, b, c) || is_between(b, c, a))
 }
 
-fn segments_meet((a, b): (Place, Place), (c, d): (Place, Place)) -> bool {
+fn segments_meet((a, b): (DecimetrePoint, DecimetrePoint), (c, d): (DecimetrePoint, DecimetrePoint)) -> bool {
     let (s, t) = (cross(a, b, c).signum() * cross(a, b, d).signum(), cross(c, d, a).signum() * cross(c, d, b).signum());
-    let touches = |p: Place, q: Place, r: Place| cross(p, q, r) == 0 && is_between(p, q, r);
+    let touches = |p: DecimetrePoint, q: DecimetrePoint, r: DecimetrePoint| cross(p, q, r) == 0 && is_between(p, q, r);
     (s < 0 && t < 0) || touches(a, b, c) || touches(a, b, d) || touches(c, d, a) || touches(c, d, b)
 }
 
@@ -145,7 +115,7 @@ mod tests {
     use super::*;
 
     fn polygon(vertices: &[(i32, i32)]) -> Polygon {
-        Polygon(vertices.iter().map(|&(x_dm, y_dm)| Place { x_dm, y_dm }).collect())
+        Polygon(vertices.iter().map(|&(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm }).collect())
     }
 
     #[test]
@@ -154,7 +124,7 @@ mod tests {
         assert_eq!(polygon(&[(0, 10), (10, 10), (10, 0), (0, 0)]).check(), Ok(()));
         assert_eq!(polygon(&[(0, 0), (40, 0), (40, 40), (20, 10), (0, 40)]).check(), Ok(()), "not convex");
         assert_eq!(polygon(&[(0, 0), (5, 0), (10, 0), (10, 10)]).check(), Ok(()), "a vertex on a straight edge");
-        let far = Place::REACH_DM;
+        let far = DecimetrePoint::REACH_DM;
         assert_eq!(polygon(&[(-far, -far), (far, -far), (far, far), (-far, far)]).check(), Ok(()));
     }
 
@@ -187,7 +157,7 @@ mod tests {
             (31, 5, false),
             (-1, 30, false),
         ] {
-            assert_eq!(u.contains(Place { x_dm, y_dm }), inside, "{x_dm}, {y_dm}");
+            assert_eq!(u.contains(DecimetrePoint { x_dm, y_dm }), inside, "{x_dm}, {y_dm}");
         }
     }
 }

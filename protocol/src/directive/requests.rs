@@ -1,6 +1,6 @@
 //! The images that the operator wants.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
 /// A request for an image of a label.
 ///

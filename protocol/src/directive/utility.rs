@@ -1,6 +1,6 @@
 //! The operator's utility function.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 use std::collections::BTreeMap;
 
 /// What seeing one more cell of each label is worth to the operator.

@@ -1,7 +1,6 @@
 //! The vehicle's side of the directive: each version of each slot is decided about once.
 
-use crate::directive::{SLOTS, SlotId, VersionedSlot};
-use crate::wire::{SlotReport, SlotState};
+use crate::directive::{SLOTS, SlotId, SlotReport, SlotState, VersionedSlot};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

@@ -1,6 +1,6 @@
 //! A set of cells of one tile.
 
-use super::grid::TILE_CELLS;
+use crate::grid::TILE_CELLS;
 use crate::map_codec::Stride;
 
 /// Cells of a tile by their places in it, a bit each.

@@ -1,9 +1,9 @@
 //! The index of what differs between what the surface is known to hold and what it ought to hold.
 
 use super::bits::TileSet;
-use super::grid::{TILE_CELLS, TileKey, TileLabels};
 use super::value::{Interest, Value, cost};
 use super::{Cell, LabelGrid, UNEXPLORED};
+use crate::grid::{TILE_CELLS, TileKey, TileLabels};
 use crate::map_codec::Stride;
 use crate::time::Instant;
 use std::collections::BTreeMap;

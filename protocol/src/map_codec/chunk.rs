@@ -1,12 +1,12 @@
 //! Writing the best chunk for the room that is left, and reading any chunk.
 
-use super::bits::BitReader;
 use super::grow::Growth;
 use super::header::{Body, Header, base_check};
 use super::lattice::{Lattice, Stride};
 use super::window::Patch;
 use super::{Codec, context, png};
-use crate::map::{Cell, LabelGrid, Rect};
+use crate::bytes::BitReader;
+use crate::grid::{Cell, LabelGrid, Rect};
 
 /// One encoded change of the map.
 #[derive(Debug, Clone, PartialEq, Eq)]

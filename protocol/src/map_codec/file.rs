@@ -1,7 +1,7 @@
 //! A file of chunks that turn one map into another.
 
 use super::{Codec, DecodeError, Plane, decode, encode_all};
-use crate::map::Rect;
+use crate::grid::Rect;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// Chunks of one change, in order, and the size of the map they are for.

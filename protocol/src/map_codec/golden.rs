@@ -1,7 +1,7 @@
 //! Chunks whose bytes must not change.
 
 use super::{Codec, decode, encode};
-use crate::map::{Cell, LabelGrid};
+use crate::grid::{Cell, LabelGrid};
 
 /// Blocks of labels around the origin, and the same with a patch of new labels and a few lone flips.
 fn change() -> (LabelGrid, LabelGrid) {

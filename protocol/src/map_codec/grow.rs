@@ -2,7 +2,7 @@
 
 use super::window::{Area, Window};
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
-use crate::map::Cell;
+use crate::grid::Cell;
 use crate::map_codec::lattice::Lattice;
 
 /// Nested areas around the middle of `window`, smallest first; each holds more changes than the one before.

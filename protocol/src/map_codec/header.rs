@@ -1,8 +1,8 @@
 //! The head of a chunk: coder, place and size of the patch, check of the base.
 
-use super::bits::{BitReader, BitWriter};
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
-use crate::map::Rect;
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::Rect;
 use crate::map_codec::lattice::{Lattice, Stride};
 use crc::{CRC_8_AUTOSAR, Crc};
 

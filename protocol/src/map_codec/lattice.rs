@@ -1,6 +1,6 @@
 //! A map seen through every so many cells of it.
 
-use crate::map::{Cell, LabelGrid};
+use crate::grid::{Cell, LabelGrid};
 
 /// Every n-th cell of a map, n = 1 or 4, numbered without gaps: cell (x, y) of the lattice is (n x, n y) of the map.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,6 @@
 //! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
 
 mod best_png;
-pub(crate) mod bits;
 mod chunk;
 mod codec;
 #[allow(clippy::indexing_slicing)] // Tables whose sizes the layouts of its contexts give.

@@ -1,6 +1,6 @@
 //! A dense map of labels.
 
-use crate::map::{Cell, LabelGrid};
+use crate::grid::{Cell, LabelGrid};
 
 /// Labels of a `width` x `height` map, row by row; 0 = unexplored.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use super::lattice::Lattice;
 use super::window::Patch;
 use super::{Codec, MAX_PATCH_CELLS, MAX_PATCH_SIDE, MapChunk, context, encode, png};
-use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
+use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Chunks of at most `room` bytes that together turn `base` into `target`; each decodes alone against `base`.

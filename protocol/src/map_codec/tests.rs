@@ -1,11 +1,11 @@
 //! What every chunk promises, whichever coder wrote it.
 
-use super::bits::BitWriter;
 use super::chunk::header_for;
 use super::header::Body;
 use super::lattice::Lattice;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
-use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
+use crate::bytes::BitWriter;
+use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 

@@ -1,6 +1,6 @@
 //! Dense copies of a part of the two maps.
 
-use crate::map::{Cell, MAX_LABEL, Rect};
+use crate::grid::{Cell, MAX_LABEL, Rect};
 use crate::map_codec::lattice::Lattice;
 
 /// The base and the wanted changes in a square of cells.

@@ -1,7 +1,7 @@
 //! What a chunk of an object carries.
 
 use super::Layout;
-use crate::wire::Reader;
+use crate::bytes::Reader;
 
 /// Names an object within the sender's session, 0..=2047; wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

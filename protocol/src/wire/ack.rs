@@ -1,6 +1,6 @@
 //! What a receiver says of the frames it heard.
 
-use super::cursor::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
 /// Most frames a sender may have outstanding, so that a 12-bit horizon names one of them without doubt.
 pub const MAX_WINDOW: u64 = 2048;

@@ -1,6 +1,6 @@
 //! How much waits at the vehicle to be sent.
 
-use super::cursor::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
 /// Bytes that the vehicle has still to send, about.
 ///

@@ -2,8 +2,8 @@
 
 use super::WIRE_VERSION;
 use super::chunk::{ChunkKind, Chunks, push_chunk};
-use super::cursor::{Reader, Truncated};
 use super::header::{Address, Header, MissionId};
+use crate::bytes::{Reader, Truncated};
 use crate::seal::{Direction, MissionKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
 use std::borrow::Cow;

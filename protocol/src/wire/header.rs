@@ -1,10 +1,10 @@
 //! The header of a frame.
 
 use super::ack::AckStatement;
-use super::cursor::Reader;
 use super::frame::FrameError;
 use super::stamp::Stamp;
 use super::{MAX_WINDOW, WIRE_VERSION};
+use crate::bytes::Reader;
 use std::num::NonZeroU16;
 
 /// Who speaks or is spoken to: 0 the surface, 1..=14 vehicles, 15 everybody.

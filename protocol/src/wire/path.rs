@@ -1,9 +1,7 @@
 //! The way that the vehicle plans to go after its waypoint.
 
-use super::status::decimetres;
-use crate::directive::Place;
-use crate::directive::steps::{minus, plus, put_pair, take_pair, take_width, width_of};
-use crate::map_codec::bits::{BitReader, BitWriter};
+use crate::bytes::{BitReader, BitWriter, decimetres, minus, plus, put_pair, take_pair, take_width, width_of};
+use crate::coordinates::DecimetrePoint;
 
 /// Waypoints after the one in force, as planned when the pose was written.
 ///
@@ -37,7 +35,7 @@ impl PlannedPath {
         let mut steps = Vec::new();
         for next in self.places.iter().map(|&p| place(p)) {
             let step = minus(next, before);
-            if step != Place::default() {
+            if step != DecimetrePoint::default() {
                 steps.push(step);
             }
             before = next;
@@ -66,11 +64,11 @@ impl PlannedPath {
     }
 }
 
-fn place((x_m, y_m): (f64, f64)) -> Place {
-    Place { x_dm: decimetres(x_m), y_dm: decimetres(y_m) }
+fn place((x_m, y_m): (f64, f64)) -> DecimetrePoint {
+    DecimetrePoint { x_dm: decimetres(x_m), y_dm: decimetres(y_m) }
 }
 
-fn write(steps: &[Place], goes_on: bool) -> Vec<u8> {
+fn write(steps: &[DecimetrePoint], goes_on: bool) -> Vec<u8> {
     if steps.is_empty() && !goes_on {
         return Vec::new();
     }
@@ -137,7 +135,7 @@ mod tests {
             let mut at = place(FROM);
             let mut whole = path(&[], goes_on);
             for (x_dm, y_dm) in steps.into_iter().filter(|&s| s != (0, 0)) {
-                at = plus(at, Place { x_dm, y_dm });
+                at = plus(at, DecimetrePoint { x_dm, y_dm });
                 whole.places.push(at.metres());
             }
             let bytes = whole.encode(FROM, room);

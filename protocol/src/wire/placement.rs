@@ -1,6 +1,6 @@
 //! Where the vehicle's map lies in the world.
 
-use super::cursor::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
 /// The map's frame seen from the world's: by how much the map must be moved to lie where it belongs.
 ///
@@ -46,8 +46,8 @@ impl Placement {
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.push(self.version.max(1));
-        super::status::put24(out, super::status::decimetres(self.east_m) as u32);
-        super::status::put24(out, super::status::decimetres(self.north_m) as u32);
+        crate::bytes::put24(out, crate::bytes::decimetres(self.east_m) as u32);
+        crate::bytes::put24(out, crate::bytes::decimetres(self.north_m) as u32);
     }
 
     /// `None` is a version that no vehicle writes.

@@ -1,7 +1,7 @@
 //! Time stamps, so that each end can tell how far away the other is and what its clock says.
 
-use super::cursor::{Reader, Truncated};
 use super::header::Address;
+use crate::bytes::{Reader, Truncated};
 use crate::time::Instant;
 use std::time::Duration;
 

@@ -1,10 +1,10 @@
 //! The vehicle's status.
 
 use super::backlog::Backlog;
-use super::cursor::{Reader, Truncated};
 use super::path::PlannedPath;
 use super::placement::Placement;
-use crate::directive::{RefusalReason, SLOTS, SlotId};
+use crate::bytes::{Reader, Truncated, decimetres, put24};
+use crate::directive::{SLOTS, SlotId, SlotReport, SlotState};
 
 /// What the vehicle is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -76,27 +76,6 @@ impl ModeReason {
             Self::NoWay => Some("no way"),
         }
     }
-}
-
-/// What became of a slot of the directive at the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SlotState {
-    /// Never received in this session of the surface.
-    #[default]
-    Unknown,
-    /// In force.
-    Applied,
-    /// Refused; the vehicle keeps what it had.
-    Refused(RefusalReason),
-}
-
-/// The latest version of a slot that the vehicle decided about, and how.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SlotReport {
-    /// Low 8 bits of the version.
-    pub version_low: u8,
-    /// The decision.
-    pub state: SlotState,
 }
 
 /// What the vehicle says of itself, in two chunks that each fit a small frame.
@@ -190,14 +169,6 @@ impl From<Truncated> for StatusError {
     fn from(_: Truncated) -> Self {
         Self::Length
     }
-}
-
-pub(super) fn decimetres(metres: f64) -> i32 {
-    (metres * 10.0).round().clamp(-8_388_608.0, 8_388_607.0) as i32
-}
-
-pub(super) fn put24(out: &mut Vec<u8>, value: u32) {
-    out.extend_from_slice(value.to_be_bytes().get(1..).unwrap_or_default());
 }
 
 /// Bits a second as 12 bits of value and 4 bits of shift, rounded down.
@@ -330,25 +301,6 @@ impl VehicleStatus {
     /// The report about one slot.
     pub fn slot(&self, id: SlotId) -> SlotReport {
         self.slots.get(id.index()).copied().unwrap_or_default()
-    }
-}
-
-impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=9 a reason of refusal.
-    pub(crate) fn code(self) -> u8 {
-        match self {
-            Self::Unknown => 0,
-            Self::Applied => 1,
-            Self::Refused(reason) => reason.code(),
-        }
-    }
-
-    pub(crate) fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Unknown),
-            1 => Some(Self::Applied),
-            code => RefusalReason::from_code(code).map(Self::Refused),
-        }
     }
 }
 

@@ -2,11 +2,12 @@
 
 use super::planes::PlaneOut;
 use super::status::StatusSender;
+use crate::directive::{SLOTS, SlotReport};
 use crate::map::{Cell, PlaneKind, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BitBudget, Class, ClassShares, Extra, Shares, SpendOrder};
 use crate::time::Instant;
-use crate::wire::{Backlog, ChunkKind, FrameBuilder, SlotReport, room_for_payload};
+use crate::wire::{Backlog, ChunkKind, FrameBuilder, room_for_payload};
 use std::time::Duration;
 
 /// A chunk of a frame, by what its fate means to the sender.
@@ -38,7 +39,7 @@ pub(super) type Carried<C> = Vec<(Part<C>, usize)>;
 pub(super) struct FillContext<'a> {
     pub(super) budget: &'a BitBudget,
     /// Decisions about the slots of the directive.
-    pub(super) slots: [SlotReport; crate::directive::SLOTS],
+    pub(super) slots: [SlotReport; SLOTS],
     /// Frames that were refused because they were not authentic.
     pub(super) refused_frames: u64,
     pub(super) now: Instant,

@@ -19,13 +19,13 @@ pub use config::VehicleConfig;
 pub use event::VehicleEvent;
 
 use super::{LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
-use crate::directive::SlotId;
+use crate::directive::{SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
 use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, PlaneSource, StateSource};
 use crate::object::ObjectId;
 use crate::schedule::{BitBudget, Shares, SpendOrder};
 use crate::time::Instant;
-use crate::wire::{Address, SlotState, VehicleStatus};
+use crate::wire::{Address, VehicleStatus};
 use content::{Carried, Content};
 use discovery::CallReply;
 use repeat::Repeater;

@@ -1,6 +1,6 @@
 //! Binary arithmetic coding with 16-bit probabilities, bit by bit, without a wasted bit at the end.
 
-use crate::map_codec::bits::{BitReader, BitWriter};
+use crate::bytes::{BitReader, BitWriter};
 
 /// Codes one decision at a time; the encoder takes `bit`, the decoder ignores it, both return the decision.
 pub(super) trait BitCoder {

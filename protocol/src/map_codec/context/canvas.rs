@@ -1,6 +1,6 @@
 //! The patch and what lies around it, as the coder sees it: new labels where it has been, old ones elsewhere.
 
-use crate::map::{Rect, UNEXPLORED};
+use crate::grid::{Rect, UNEXPLORED};
 use crate::map_codec::lattice::Lattice;
 use crate::map_codec::window::Patch;
 

@@ -3,7 +3,7 @@
 use super::canvas::Canvas;
 use super::stage::{Contexts, Layout};
 use super::view::{View, magnitude};
-use crate::map::MAX_LABEL;
+use crate::grid::MAX_LABEL;
 
 pub(super) const LAYOUT: Layout = Layout {
     direct: &[512, 512, 2048, 512, 256, 704, 128, 128],

@@ -17,10 +17,10 @@ mod unseen;
 mod view;
 
 use super::DecodeError;
-use super::bits::{BitReader, BitWriter};
 use super::header::Header;
 use super::window::Patch;
-use crate::map::Rect;
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::Rect;
 use crate::map_codec::lattice::Lattice;
 use arith::{Decoder, Encoder};
 use canvas::Canvas;

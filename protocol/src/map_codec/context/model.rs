@@ -9,7 +9,7 @@ use super::stage::{Contexts, Stage};
 use super::unseen::{self, Run};
 use super::view::View;
 use super::{calm, flip};
-use crate::map::{MAX_LABEL, UNEXPLORED};
+use crate::grid::{MAX_LABEL, UNEXPLORED};
 
 /// Adaptive state of a chunk; made afresh from the prior for each.
 #[derive(Debug, Clone)]

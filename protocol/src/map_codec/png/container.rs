@@ -1,7 +1,7 @@
 //! The bytes of a PNG file that never go on the wire.
 
 use super::pixels::{Depth, Palette};
-use crate::map::Rect;
+use crate::grid::Rect;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";

@@ -9,10 +9,10 @@ mod fit;
 mod pixels;
 
 use super::DecodeError;
-use super::bits::{BitReader, BitWriter};
 use super::header::Header;
 use super::window::Patch;
-use crate::map::Rect;
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::Rect;
 use crate::map_codec::lattice::Lattice;
 use deflate::Deflater;
 pub(super) use fit::{best_chunk, smaller};

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::map::{MAX_LABEL, Rect, UNEXPLORED};
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::{MAX_LABEL, Rect, UNEXPLORED};
 use crate::map_codec::DecodeError;
-use crate::map_codec::bits::{BitReader, BitWriter};
 use crate::map_codec::window::Patch;
 
 /// Pixel value, or palette entry, of a cell that becomes unexplored.

@@ -1,7 +1,7 @@
 //! What the prior is trained on: changes as a mission has them, over procedural maps.
 
 use super::{Chance, Flips, Scene, Survey, sampler_noise};
-use crate::map::Rect;
+use crate::grid::Rect;
 use crate::map_codec::Plane;
 
 /// A change of a part of a map.
@@ -87,7 +87,7 @@ fn part(chance: &mut Chance, base: &Plane, target: &Plane) -> Option<Lesson> {
             && (i / base.width).abs_diff(middle / base.width) <= height / 2
     };
     let inside: Vec<usize> = changed.into_iter().filter(|&i| near(i)).collect();
-    let cell = |i: usize| crate::map::Cell::new((i % base.width) as i32, (i / base.width) as i32);
+    let cell = |i: usize| crate::grid::Cell::new((i % base.width) as i32, (i / base.width) as i32);
     let rect = Rect::around(inside.iter().map(|&i| cell(i)))?;
     let mut part = base.clone();
     inside.into_iter().for_each(|i| part.labels[i] = target.labels[i]);

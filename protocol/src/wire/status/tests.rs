@@ -1,6 +1,7 @@
 //! Layout of the status, and what is refused.
 
 use super::*;
+use crate::directive::RefusalReason;
 use proptest::prelude::*;
 
 #[test]

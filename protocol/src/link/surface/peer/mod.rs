@@ -204,7 +204,7 @@ impl<R: StateReplica> Peer<R> {
             return self.pair.stats.drop(DropReason::Malformed);
         }
         if chunk.kind == ChunkKind::Report {
-            let settled = self.outbox.handle_report(self.content.status.latest(), now);
+            let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
             events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotSettled(vehicle, id)));
         }
         if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {

@@ -1,9 +1,9 @@
 //! The status of a vehicle, joined from its two chunks.
 
-use crate::directive::SlotId;
+use crate::directive::{SlotId, SlotReport, SlotState};
 use crate::link::FrameNumber;
 use crate::time::Instant;
-use crate::wire::{PlannedPath, SlotReport, SlotState, VehicleStatus};
+use crate::wire::{PlannedPath, VehicleStatus};
 
 /// The pose and the report of a vehicle, of which one may come in before the other.
 #[derive(Debug, Default)]

@@ -2,15 +2,19 @@
 
 use std::collections::BTreeMap;
 
+/// Label of a cell that was never seen.
+pub const UNEXPLORED: u8 = 0;
+/// Highest label id on the map; 255 stays free for the codecs' own use.
+pub const MAX_LABEL: u8 = 254;
 /// Edge of a storage tile in cells.
 pub const TILE: i32 = 16;
 /// Cells of a storage tile.
-pub(super) const TILE_CELLS: usize = (TILE * TILE) as usize;
+pub(crate) const TILE_CELLS: usize = (TILE * TILE) as usize;
 
 /// A storage tile's place: rows and columns of tiles from the origin.
-pub(super) type TileKey = (i32, i32);
+pub(crate) type TileKey = (i32, i32);
 /// Labels of a tile, row by row.
-pub(super) type TileLabels = [u8; TILE_CELLS];
+pub(crate) type TileLabels = [u8; TILE_CELLS];
 
 /// A cell's place on the grid: east and north counts of cells from the session's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -27,17 +31,17 @@ impl Cell {
         Self { x, y }
     }
 
-    pub(super) fn tile(self) -> TileKey {
+    pub(crate) fn tile(self) -> TileKey {
         (self.y.div_euclid(TILE), self.x.div_euclid(TILE))
     }
 
     /// The place in its tile.
-    pub(super) fn place(self) -> u8 {
+    pub(crate) fn place(self) -> u8 {
         (self.y.rem_euclid(TILE) * TILE + self.x.rem_euclid(TILE)) as u8
     }
 
     /// The cell at a place of a tile.
-    pub(super) fn at((row, column): TileKey, place: u8) -> Self {
+    pub(crate) fn at((row, column): TileKey, place: u8) -> Self {
         let place = i32::from(place);
         Self::new(column * TILE + place % TILE, row * TILE + place / TILE)
     }
@@ -94,7 +98,7 @@ impl Rect {
     }
 }
 
-/// Labels by cell; a cell never set reads as [`UNEXPLORED`](super::UNEXPLORED).
+/// Labels by cell; a cell never set reads as [`UNEXPLORED`].
 ///
 /// Memory is one byte a cell in tiles of [`TILE`] x [`TILE`] that hold at least one set cell.
 #[derive(Debug, Clone, Default)]
@@ -147,12 +151,12 @@ impl LabelGrid {
     }
 
     /// Tiles that hold or held a set cell.
-    pub(super) fn tiles(&self) -> impl Iterator<Item = (TileKey, &TileLabels)> + '_ {
+    pub(crate) fn tiles(&self) -> impl Iterator<Item = (TileKey, &TileLabels)> + '_ {
         self.tiles.iter().map(|(&key, tile)| (key, tile.as_ref()))
     }
 
     /// Labels of a tile.
-    pub(super) fn tile(&self, key: TileKey) -> &TileLabels {
+    pub(crate) fn tile(&self, key: TileKey) -> &TileLabels {
         self.tiles.get(&key).map_or(&[0; TILE_CELLS], |tile| tile)
     }
 

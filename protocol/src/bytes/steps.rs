@@ -1,7 +1,7 @@
 //! Differences of places in as few bits as hold them: what fences and paths are made of.
 
-use super::Place;
-use crate::map_codec::bits::{BitReader, BitWriter};
+use super::{BitReader, BitWriter};
+use crate::coordinates::DecimetrePoint;
 
 /// A width as it stands before the differences that have it.
 pub(crate) fn take_width(bits: &mut BitReader<'_>) -> Option<u32> {
@@ -10,30 +10,30 @@ pub(crate) fn take_width(bits: &mut BitReader<'_>) -> Option<u32> {
 }
 
 /// Appends both coordinates, `width` bits each.
-pub(crate) fn put_pair(bits: &mut BitWriter, place: Place, width: u32) {
+pub(crate) fn put_pair(bits: &mut BitWriter, place: DecimetrePoint, width: u32) {
     for v in [place.x_dm, place.y_dm] {
         bits.put(v as u32 as u64, width);
     }
 }
 
 /// Reads both coordinates.
-pub(crate) fn take_pair(bits: &mut BitReader<'_>, width: u32) -> Option<Place> {
+pub(crate) fn take_pair(bits: &mut BitReader<'_>, width: u32) -> Option<DecimetrePoint> {
     let mut signed = || bits.take(width).map(|v| ((v as u32) << (32 - width)) as i32 >> (32 - width));
-    Some(Place { x_dm: signed()?, y_dm: signed()? })
+    Some(DecimetrePoint { x_dm: signed()?, y_dm: signed()? })
 }
 
 /// From `b` to `a`.
-pub(crate) fn minus(a: Place, b: Place) -> Place {
-    Place { x_dm: a.x_dm.wrapping_sub(b.x_dm), y_dm: a.y_dm.wrapping_sub(b.y_dm) }
+pub(crate) fn minus(a: DecimetrePoint, b: DecimetrePoint) -> DecimetrePoint {
+    DecimetrePoint { x_dm: a.x_dm.wrapping_sub(b.x_dm), y_dm: a.y_dm.wrapping_sub(b.y_dm) }
 }
 
 /// From `a` on by `b`.
-pub(crate) fn plus(a: Place, b: Place) -> Place {
-    Place { x_dm: a.x_dm.wrapping_add(b.x_dm), y_dm: a.y_dm.wrapping_add(b.y_dm) }
+pub(crate) fn plus(a: DecimetrePoint, b: DecimetrePoint) -> DecimetrePoint {
+    DecimetrePoint { x_dm: a.x_dm.wrapping_add(b.x_dm), y_dm: a.y_dm.wrapping_add(b.y_dm) }
 }
 
 /// Bits that hold every number in two's complement, 1 to 25.
-pub(crate) fn width_of(steps: impl IntoIterator<Item = Place>) -> u32 {
+pub(crate) fn width_of(steps: impl IntoIterator<Item = DecimetrePoint>) -> u32 {
     let bits = |v: i32| 33 - (v ^ (v >> 31)).leading_zeros();
     steps.into_iter().map(|s| bits(s.x_dm).max(bits(s.y_dm))).max().unwrap_or(1).min(25)
 }
