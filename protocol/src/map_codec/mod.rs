@@ -19,8 +19,6 @@ mod plane;
 mod plane_png;
 mod png;
 #[allow(clippy::indexing_slicing)]
-pub mod procedural;
-#[allow(clippy::indexing_slicing)]
 mod series;
 #[cfg(test)]
 mod tests;
@@ -29,7 +27,7 @@ mod window;
 
 pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every};
 pub use codec::Codec;
-pub use context::{PRIOR_SCENES, train_prior};
+pub use context::training;
 pub use file::{ChunkFile, ChunkFileError};
 pub use lattice::Stride;
 pub use plane::Plane;

@@ -129,49 +129,7 @@ fn strip_chunks(
 
 #[cfg(test)]
 mod tests {
-    use super::super::procedural::{Chance, Flips, Scene, Survey};
-    use super::super::{Plane, decode};
     use super::*;
-
-    /// Maps of a small survey, one a step.
-    fn survey(scene: Scene) -> Vec<Plane> {
-        let scene = scene.draw(&mut Chance::new(42), 96, 96, 8);
-        let mut survey = Survey::new(7, scene, Flips { border: 10_000, anywhere: 2000, settling: 0 }, 12);
-        let mut maps = vec![survey.map().clone()];
-        for _ in 0..12 {
-            survey.advance();
-            maps.push(survey.map().clone());
-        }
-        maps
-    }
-
-    fn bytes(codec: Codec, maps: &[Plane], room: usize) -> usize {
-        let mut bytes = 0;
-        for pair in maps.windows(2) {
-            let (base, target) = (pair[0].to_grid(), pair[1].to_grid());
-            let mut replica = base.clone();
-            for chunk in encode_all(codec, &base, &target, room).expect("room for a cell") {
-                assert!(chunk.bytes.len() <= room);
-                bytes += chunk.bytes.len();
-                for (cell, label) in decode(&base, &chunk.bytes).expect("own chunk") {
-                    assert_eq!(replica.set(cell, label), base.get(cell), "a cell was sent twice");
-                }
-            }
-            assert_eq!(replica, target);
-        }
-        bytes
-    }
-
-    #[test]
-    fn a_survey_arrives_whole_in_far_fewer_bytes_than_png_chunks_take() {
-        for scene in Scene::ALL {
-            let maps = survey(scene);
-            for (room, most) in [(64, 60), (256, 60), (1000, 60)] {
-                let (context, png) = (bytes(Codec::Auto, &maps, room), bytes(Codec::Png, &maps, room));
-                assert!(context * 100 <= png * most, "{scene:?}, {room} bytes: {context} against {png}");
-            }
-        }
-    }
 
     #[test]
     fn changes_far_apart_and_wider_than_a_patch_are_tiled() {

@@ -4,7 +4,7 @@ use crate::cli::progress::Progress;
 use crate::picture::write_whole;
 use crate::problem::Problem;
 use clap::Args;
-use scenecast_protocol::map_codec::{PRIOR_SCENES, train_prior};
+use scenecast_training::{PRIOR_SCENES, train_prior};
 use std::path::PathBuf;
 
 /// Train the table that the context coder starts from, on maps drawn from the seed alone; it takes minutes.

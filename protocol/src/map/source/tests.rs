@@ -145,43 +145,6 @@ fn a_cell_that_never_rests_is_told_now_and_then() {
     assert!(ends.source.flips_suppressed() > 500);
 }
 
-/// Bytes until the painted map agrees with `share` of the target, and until it is equal.
-fn bytes_until(share: f64, side: i32, coarse_after: Option<usize>, room: usize, scene: usize) -> (usize, usize) {
-    use crate::map_codec::procedural::{Chance, Scene};
-    let plane = Scene::ALL[scene].draw(&mut Chance::new(5), side as usize, side as usize, 8);
-    let mut ends = Ends::new(0.0);
-    ends.source.set_coarse_limit(coarse_after);
-    ends.source.set(square(side, |i| plane.get((i % side) as usize, (i / side) as usize).max(1)), at(0.0));
-    let (mut bytes, mut early) = (0, None);
-    while let Some((chunk, carried)) = ends.source.next_chunk(room, at(bytes as f64 / 125.0)) {
-        bytes += chunk.len();
-        ends.number += 1;
-        assert!(ends.replica.apply(ends.number, &chunk, at(0.0)));
-        ends.replica.advance_base(ends.number);
-        ends.source.handle_fate(carried, true, at(0.0));
-        let painted = |&(cell, label): &(Cell, u8)| ends.replica.painted(cell).is_some_and(|(l, _)| l == label);
-        let agree = ends.source.target().iter().filter(painted).count();
-        if early.is_none() && agree as f64 >= share * f64::from(side * side) {
-            early = Some(bytes);
-        }
-    }
-    assert!(ends.is_equal() && ends.source.is_settled());
-    (early.expect("equal in the end"), bytes)
-}
-
-#[test]
-fn coarse_first_shows_the_whole_early_and_costs_little_more() {
-    let mut total = (0, 0);
-    for scene in 0..4 {
-        let fine = bytes_until(0.6, 192, None, 256, scene);
-        let coarse = bytes_until(0.6, 192, Some(3000), 256, scene);
-        println!("scene {scene}: {fine:?} {coarse:?}");
-        assert!(coarse.0 * 100 <= fine.0 * 90, "scene {scene}: {coarse:?} against {fine:?}");
-        total = (total.0 + fine.1, total.1 + coarse.1);
-    }
-    assert!(total.1 * 100 <= total.0 * 115, "{total:?}");
-}
-
 #[test]
 fn choosing_the_next_chunk_looks_at_the_tiles_that_changed_and_no_others() {
     let mut source = MapSource::new(Codec::Context);

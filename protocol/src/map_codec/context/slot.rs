@@ -13,21 +13,21 @@ const RATE: [u32; 1024] = {
     table
 };
 
-/// Probability of `true` in one context, and how much it has seen.
+/// The estimated probability of `true` in one context.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Slot {
-    /// In 1/2^32.
-    pub(super) p: u32,
-    /// Visits, or what the prior is worth in visits.
-    pub(super) visits: u16,
+pub struct BitEstimate {
+    /// The probability in 1/2^32.
+    pub p: u32,
+    /// Decisions that the estimate is worth, at most [`Self::MAX_VISITS`].
+    pub visits: u16,
 }
 
-impl Slot {
-    /// Visits after which a slot no longer slows down.
-    pub(super) const MOST_VISITS: u16 = 1020;
+impl BitEstimate {
+    /// Decisions after which the estimate adapts no more slowly.
+    pub const MAX_VISITS: u16 = 1020;
 
-    /// Knows nothing.
-    pub(super) const BLANK: Self = Self { p: 1 << 31, visits: 0 };
+    /// One half, worth no decision.
+    pub const BLANK: Self = Self { p: 1 << 31, visits: 0 };
 
     pub(super) fn odds(self) -> i32 {
         odds(self.p)
@@ -37,7 +37,7 @@ impl Slot {
         let goal = if bit { i64::from(u32::MAX) } else { 0 };
         let step = ((goal - i64::from(self.p)) * i64::from(RATE[usize::from(self.visits)])) >> 16;
         self.p = (i64::from(self.p) + step) as u32;
-        if self.visits < Self::MOST_VISITS {
+        if self.visits < Self::MAX_VISITS {
             self.visits += 1;
         }
     }

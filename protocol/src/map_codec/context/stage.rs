@@ -2,7 +2,8 @@
 
 use super::logistic::{MAX_ODDS, odds, probability};
 use super::prior::StagePrior;
-use super::slot::Slot;
+use super::slot::BitEstimate;
+use std::collections::BTreeMap;
 
 /// Most contexts of one kind of decision.
 pub(super) const MOST_DIRECT: usize = 10;
@@ -58,7 +59,7 @@ impl Layout {
     pub(super) fn blank(&self) -> StagePrior {
         let curve = (0..CURVE as i32).map(|i| probability((i - 16) * CURVE_STEP) << 16);
         StagePrior {
-            slots: vec![Slot::BLANK; self.slots()],
+            slots: vec![BitEstimate::BLANK; self.slots()],
             weights: vec![[ONE * 3 / 10; INPUTS]; self.rows()],
             second: vec![[ONE / 3; SETS]; self.curves],
             curves: curve.cycle().take(self.curve_points()).collect(),
@@ -81,8 +82,8 @@ pub(super) struct Contexts {
 pub(super) struct Stage {
     layout: &'static Layout,
     prior: &'static StagePrior,
-    slots: Vec<Slot>,
-    keyed: Vec<Vec<(u32, Slot)>>,
+    slots: Vec<BitEstimate>,
+    keyed: Vec<Vec<(u32, BitEstimate)>>,
     weights: Vec<[i32; INPUTS]>,
     second: Vec<[i32; SETS]>,
     curves: Vec<u32>,
@@ -90,16 +91,16 @@ pub(super) struct Stage {
     /// How fast weights follow, in 1/2^20 of odds times error.
     pub(super) weight_rate: i32,
     /// Decisions counted for training.
-    pub(super) tally: Option<Box<Tally>>,
+    pub(super) counts: Option<Box<VisitCounts>>,
 }
 
-/// How often each slot was visited and how often the decision was `true`, within one chunk.
+/// Counts of decisions in each context within one chunk: all of them, and those that were `true`.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tally {
-    /// By slot of the prior; (visits, true).
-    pub(super) direct: Vec<(u32, u32)>,
-    /// By what the slot started from and key.
-    pub(super) keyed: std::collections::BTreeMap<(usize, u32), (u32, u32)>,
+pub struct VisitCounts {
+    /// By context.
+    direct: Vec<(u32, u32)>,
+    /// By the context whose estimate a keyed one starts from, and by key.
+    keyed: BTreeMap<(usize, u32), (u32, u32)>,
 }
 
 /// What the last prediction was made of.
@@ -107,7 +108,7 @@ pub(super) struct Tally {
 struct Last {
     places: [usize; MOST_DIRECT],
     keyed: [usize; MOST_KEYED],
-    /// Slot of the prior that each keyed context started from.
+    /// BitEstimate of the prior that each keyed context started from.
     starts: [usize; MOST_KEYED],
     odds: [i32; INPUTS],
     sets: [usize; SETS],
@@ -131,13 +132,13 @@ impl Stage {
             layout,
             prior,
             slots: prior.slots.clone(),
-            keyed: layout.keyed.iter().map(|_| vec![(NO_KEY, Slot::BLANK); KEYED_PLACES]).collect(),
+            keyed: layout.keyed.iter().map(|_| vec![(NO_KEY, BitEstimate::BLANK); KEYED_PLACES]).collect(),
             weights: prior.weights.clone(),
             second: prior.second.clone(),
             curves: prior.curves.clone(),
             last: Last::default(),
             weight_rate: WEIGHT_RATE,
-            tally: None,
+            counts: None,
         }
     }
 
@@ -207,9 +208,13 @@ impl Stage {
         for (table, &place) in self.keyed.iter_mut().zip(&self.last.keyed) {
             table[place].1.update(bit);
         }
-        if let Some(tally) = &mut self.tally {
+        if let Some(counts) = &mut self.counts {
             let keys = self.keyed.iter().zip(&self.last.keyed).map(|(table, &place)| table[place].0);
-            tally.count(&self.last.places[..self.layout.direct.len()], self.last.starts.iter().copied().zip(keys), bit);
+            counts.count(
+                &self.last.places[..self.layout.direct.len()],
+                self.last.starts.iter().copied().zip(keys),
+                bit,
+            );
         }
     }
 
@@ -242,7 +247,14 @@ fn follow<const N: usize>(weights: &mut [i32; N], odds: &[i32; N], error: i32) {
     }
 }
 
-impl Tally {
+impl VisitCounts {
+    /// Each context with its decisions and those that were `true`; a context that starts several keyed ones comes up once for
+    /// each key.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, u32, u32)> + '_ {
+        let direct = self.direct.iter().enumerate().map(|(context, &(visits, ones))| (context, visits, ones));
+        direct.chain(self.keyed.iter().map(|(&(start, _), &(visits, ones))| (start, visits, ones)))
+    }
+
     fn count(&mut self, places: &[usize], keyed: impl Iterator<Item = (usize, u32)>, bit: bool) {
         let note = |entry: &mut (u32, u32)| *entry = (entry.0 + 1, entry.1 + u32::from(bit));
         for &place in places {

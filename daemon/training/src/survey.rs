@@ -1,8 +1,8 @@
 //! A survey step by step: a swath of new cells, and the sampler changing its mind about old ones.
 
-use super::Chance;
-use super::scene::sampler_noise;
-use crate::map_codec::Plane;
+use crate::MapRng;
+use crate::scene::{neighbours, sampler_noise};
+use scenecast_protocol::map_codec::Plane;
 
 /// What a step does besides showing new cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub struct Flips {
 pub struct Survey {
     scene: Plane,
     seen: Plane,
-    chance: Chance,
+    rng: MapRng,
     flips: Flips,
     /// Height of a leg and length of a step, cells.
     swath: usize,
@@ -39,7 +39,7 @@ impl Survey {
         let legs = legs.unwrap_or(1);
         let (swath, stride) = (height.div_ceil(legs), width.div_ceil((steps / legs).max(1)));
         let seen = Plane::uniform(width, height, 0);
-        Self { scene, seen, chance: Chance::new(seed), flips, swath, stride, step: 0 }
+        Self { scene, seen, rng: MapRng::new(seed), flips, swath, stride, step: 0 }
     }
 
     /// The map as the vehicle has it.
@@ -49,8 +49,8 @@ impl Survey {
 
     /// One step on.
     pub fn advance(&mut self) {
-        sampler_noise(&mut self.chance, &mut self.seen, self.flips.border, self.flips.anywhere);
-        settle(&mut self.chance, &mut self.seen, self.flips.settling);
+        sampler_noise(&mut self.rng, &mut self.seen, self.flips.border, self.flips.anywhere);
+        settle(&mut self.rng, &mut self.seen, self.flips.settling);
         let steps_a_leg = self.scene.width.div_ceil(self.stride);
         let (leg, along) = (self.step / steps_a_leg, self.step % steps_a_leg);
         let along = if leg % 2 == 0 { along } else { steps_a_leg - 1 - along };
@@ -65,13 +65,13 @@ impl Survey {
     }
 }
 
-fn settle(chance: &mut Chance, plane: &mut Plane, settling: usize) {
+fn settle(rng: &mut MapRng, plane: &mut Plane, settling: usize) {
     for i in (0..plane.labels.len()).filter(|_| settling > 0) {
-        if plane.labels[i] == 0 || !chance.happens(settling) {
+        if plane.labels[i] == 0 || !rng.happens(settling) {
             continue;
         }
         let mut votes = [0u8; 256];
-        plane.around(i).filter(|&label| label != 0).for_each(|label| votes[usize::from(label)] += 1);
+        neighbours(plane, i).filter(|&label| label != 0).for_each(|label| votes[usize::from(label)] += 1);
         let most = votes.iter().copied().max().unwrap_or(0);
         if votes[usize::from(plane.labels[i])] < most {
             plane.labels[i] = votes.iter().position(|&v| v == most).map_or(plane.labels[i], |label| label as u8);

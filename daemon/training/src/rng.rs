@@ -1,11 +1,11 @@
-//! Seeded chance for procedural maps.
+//! Random numbers for procedural maps.
 
-/// SplitMix64.
+/// A SplitMix64 generator (Steele, Lea and Flood 2014); the same seed gives the same numbers.
 #[derive(Debug, Clone)]
-pub struct Chance(u64);
+pub struct MapRng(u64);
 
-impl Chance {
-    /// The same seed gives the same numbers.
+impl MapRng {
+    /// A generator whose numbers depend on `seed` alone.
     pub fn new(seed: u64) -> Self {
         Self(seed ^ 0x5EED_0F5C_E9EC_A571)
     }
@@ -17,22 +17,22 @@ impl Chance {
         z ^ z >> 31
     }
 
-    /// A number below `end`, which is at least 1.
+    /// A number below `end`, which must be at least 1.
     pub fn below(&mut self, end: usize) -> usize {
         ((u128::from(self.next()) * end as u128) >> 64) as usize
     }
 
-    /// A number from `start` up to, without, `end`.
+    /// A number in `start..end`, which must not be empty.
     pub fn within(&mut self, start: usize, end: usize) -> usize {
         start + self.below(end - start)
     }
 
-    /// True `per_million` times in a million.
+    /// `true` with a probability of `per_million` in a million.
     pub fn happens(&mut self, per_million: usize) -> bool {
         self.below(1_000_000) < per_million
     }
 
-    /// One of the entries, of which there is at least one.
+    /// One of the entries; there must be at least one.
     pub fn pick<T: Copy>(&mut self, entries: &[T]) -> T {
         entries[self.below(entries.len())]
     }
