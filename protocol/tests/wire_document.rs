@@ -9,9 +9,9 @@ use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement,
-    PlannedPath, Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION,
-    unwrap_number,
+    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, ModeReason,
+    Placement, PlannedPath, Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus,
+    WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -97,7 +97,7 @@ fn header(from: Address, number: u16) -> Header {
         stamp: None,
         nonce: None,
         ack: None,
-        hello: false,
+        kind: FrameKind::Numbered,
         keyed: false,
     }
 }
@@ -201,14 +201,14 @@ fn surface_hello(keyed: bool) -> Header {
         turn: Some(48),
         stamp: clock(50_000, None),
         nonce: keyed.then_some(SURFACE_NONCE),
-        hello: true,
+        kind: FrameKind::Hello,
         keyed,
         ..header(Address::SURFACE, 0)
     }
 }
 
 fn vehicle_hello(keyed: bool) -> Header {
-    Header { nonce: keyed.then_some(VEHICLE_NONCE), hello: true, keyed, ..header(auv(), 0) }
+    Header { nonce: keyed.then_some(VEHICLE_NONCE), kind: FrameKind::Hello, keyed, ..header(auv(), 0) }
 }
 
 fn call(keyed: bool) -> Header {
@@ -217,7 +217,7 @@ fn call(keyed: bool) -> Header {
         session: SessionId::from_random(CALL_SESSION),
         turn: Some(8),
         nonce: keyed.then_some(CALL_NONCE),
-        hello: true,
+        kind: FrameKind::Hello,
         keyed,
         ..header(Address::SURFACE, 0)
     }

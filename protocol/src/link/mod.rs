@@ -24,6 +24,8 @@ pub use surface::{Cycle, IssueError, PeerView, SurfaceConfig, SurfaceEvent, Surf
 pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{Refusal, Window};
 
+use crate::schedule::Class;
+
 /// A frame to put on air.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Transmit {
@@ -31,8 +33,39 @@ pub struct Transmit {
     pub to: crate::wire::Address,
     /// The frame.
     pub bytes: Vec<u8>,
-    /// What the frame mostly carries.
-    pub kind: &'static str,
+    /// The main purpose of the frame.
+    pub kind: TransmitKind,
+}
+
+/// The main purpose of a transmission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TransmitKind {
+    /// The surface looks for unknown vehicles.
+    DiscoveryCall,
+    /// Opens a handshake, answers one, or answers a discovery call.
+    Hello,
+    /// Grants a turn and carries no slot.
+    Grant,
+    /// Acknowledges received frames only.
+    Acknowledgement,
+    /// The unchanged copy of an earlier frame.
+    Repeat,
+    /// Carries chunks, the most bytes of them of this class.
+    Content(Class),
+}
+
+impl TransmitKind {
+    /// Name in reports and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DiscoveryCall => "call",
+            Self::Hello => "hello",
+            Self::Grant => "grant",
+            Self::Acknowledgement => "ack",
+            Self::Repeat => "again",
+            Self::Content(class) => class.name(),
+        }
+    }
 }
 
 /// Why the link asks to be woken.

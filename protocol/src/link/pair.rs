@@ -4,7 +4,7 @@ use super::meeting::{Greeting, Meeting};
 use super::run::{Authenticity, Identity};
 use super::{DropReason, FrameNumber, LinkStats, Refusal, Window};
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
-use crate::wire::{Address, Chunks, Envelope, Frame, FrameBuilder, Header, MissionId, Seal, Stamp};
+use crate::wire::{Address, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, MissionId, Seal, Stamp};
 
 /// What a verified frame tells.
 #[derive(Debug)]
@@ -155,9 +155,9 @@ impl<T> Pair<T> {
 
     /// Reads a frame of this peer; what is dropped is counted.
     pub fn handle_frame<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
-        let result = match envelope.header.hello {
-            true => self.read_hello(envelope),
-            false => self.read_numbered(envelope),
+        let result = match envelope.header.kind {
+            FrameKind::Hello => self.read_hello(envelope),
+            FrameKind::Numbered => self.read_numbered(envelope),
         };
         if let Err(reason) = &result {
             self.stats.drop(*reason);
@@ -248,13 +248,13 @@ impl<T> Pair<T> {
 
     /// Why a frame that does not open is not ours, as far as it can be told.
     fn refuse(&mut self, envelope: &Envelope<'_>, session: u16) -> DropReason {
-        let expected =
-            if envelope.header.hello { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
+        let kind = envelope.header.kind;
+        let expected = if kind.is_hello() { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
         let plain = || envelope.open(&Seal::Crc(self.mission, session)).is_some();
         match (expected, envelope.header.keyed) {
             (false, true) => DropReason::Keyed,
             (true, false) if plain() => DropReason::Unauthenticated,
-            (false, false) if !envelope.header.hello && plain() => DropReason::OldSession,
+            (false, false) if !kind.is_hello() && plain() => DropReason::OldSession,
             _ => DropReason::Checksum,
         }
     }
@@ -264,16 +264,17 @@ impl<T> Pair<T> {
         self.owes_hello || self.meeting.run().is_none()
     }
 
-    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement; a hello if `hello` is asked for or nobody was met.
+    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement; a hello if `kind` is one or nobody was met.
     pub fn begin_frame(
         &mut self,
         size: usize,
         ack_room: usize,
         turn: Option<u8>,
         stamp: Option<Stamp>,
-        hello: bool,
+        kind: FrameKind,
     ) -> FrameBuilder {
-        let hello = hello || self.must_greet();
+        let kind = FrameKind::hello_if(kind.is_hello() || self.must_greet());
+        let hello = kind.is_hello();
         let own = self.meeting.offered().filter(|_| hello).map_or(self.meeting.own(), |r| r.own);
         let direction = self.direction_out();
         let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
@@ -290,17 +291,17 @@ impl<T> Pair<T> {
             stamp,
             nonce: (hello && keyed).then_some(own.nonce),
             ack: run.and_then(|r| r.window.statement(ack_room)),
-            hello,
+            kind,
             keyed,
         };
         FrameBuilder::new(&header, size)
     }
 
     /// Closes a frame and remembers what it carries.
-    pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, hello: bool, short: bool) -> Vec<u8> {
+    pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, kind: FrameKind, short: bool) -> Vec<u8> {
         self.stats.frames_sent += 1;
         let direction = self.direction_out();
-        if hello || self.must_greet() {
+        if kind.is_hello() || self.must_greet() {
             let to = self.meeting.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
             let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
             return match &self.authenticity {
@@ -363,9 +364,9 @@ mod tests {
     use crate::seal::MissionKey;
     use std::sync::Arc;
 
-    fn carry(from: &mut Pair<u64>, to: &mut Pair<u64>, content: u64, hello: bool) -> Vec<(u64, bool)> {
-        let builder = from.begin_frame(64, 20, Some(4), None, hello);
-        let bytes = from.finish_frame(builder, content, hello, true);
+    fn carry(from: &mut Pair<u64>, to: &mut Pair<u64>, content: u64, kind: FrameKind) -> Vec<(u64, bool)> {
+        let builder = from.begin_frame(64, 20, Some(4), None, kind);
+        let bytes = from.finish_frame(builder, content, kind, true);
         let us = to.us;
         let envelope = Envelope::decode(&bytes, |a| a == us).unwrap();
         let inbound = to.handle_frame(&envelope).unwrap();
@@ -379,14 +380,14 @@ mod tests {
         let auv = Address::vehicle(3).unwrap();
         let mut surface = Pair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), 1);
         let mut vehicle = Pair::new(MissionId(1), auv, Address::SURFACE, authenticity, 2);
-        carry(&mut surface, &mut vehicle, 0, true);
-        carry(&mut vehicle, &mut surface, 0, true);
-        carry(&mut surface, &mut vehicle, 0, false);
+        carry(&mut surface, &mut vehicle, 0, FrameKind::Hello);
+        carry(&mut vehicle, &mut surface, 0, FrameKind::Hello);
+        carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered);
         let mut delivered = 0;
         for i in 0..140_000 {
-            carry(&mut vehicle, &mut surface, i, false);
+            carry(&mut vehicle, &mut surface, i, FrameKind::Numbered);
             if i % 500 == 0 {
-                for (content, held) in carry(&mut surface, &mut vehicle, 0, false) {
+                for (content, held) in carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered) {
                     assert!(held && content == delivered);
                     delivered += 1;
                 }

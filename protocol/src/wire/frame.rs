@@ -232,7 +232,7 @@ impl FrameBuilder {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AckStatement, SessionId, Stamp, room_for_payload};
+    use super::super::{AckStatement, FrameKind, SessionId, Stamp, room_for_payload};
     use super::*;
     use proptest::prelude::*;
     use std::time::Duration;
@@ -251,7 +251,7 @@ mod tests {
             stamp: None,
             nonce: None,
             ack: Some(AckStatement { horizon_low: 5, lost: vec![] }),
-            hello: false,
+            kind: FrameKind::Numbered,
             keyed: false,
         }
     }
@@ -292,7 +292,7 @@ mod tests {
             stamp: Some(stamp),
             nonce: Some(0x0102_0304_0506_0708),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed: true,
             ..header()
         };

@@ -53,6 +53,27 @@ impl SessionId {
     }
 }
 
+/// The two kinds of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// Names the session of the sender; it has neither an acknowledgement statement nor chunks, and its number is 0.
+    Hello,
+    /// Belongs to a session of both ends, in which it has a number.
+    Numbered,
+}
+
+impl FrameKind {
+    /// Hello if `is_hello`.
+    pub(crate) fn hello_if(is_hello: bool) -> Self {
+        if is_hello { Self::Hello } else { Self::Numbered }
+    }
+
+    /// Whether it is a hello.
+    pub fn is_hello(self) -> bool {
+        self == Self::Hello
+    }
+}
+
 /// The header of a frame.
 ///
 /// ```text
@@ -103,8 +124,8 @@ pub struct Header {
     pub nonce: Option<u64>,
     /// What the sender says of the frames it heard from the receiver.
     pub ack: Option<AckStatement>,
-    /// Whether the frame only tells the sender's session.
-    pub hello: bool,
+    /// Whether the frame opens a session or belongs to one.
+    pub kind: FrameKind,
     /// Whether the frame ends in a tag.
     pub keyed: bool,
 }
@@ -138,12 +159,12 @@ impl Header {
         }
         let remaining = r.u8()?;
         let has = |bit: u8| flags & bit != 0;
-        let (hello, keyed) = (has(HELLO), has(KEYED));
+        let (kind, keyed) = (FrameKind::hello_if(has(HELLO)), has(KEYED));
         let turn = has(TURN).then(|| r.u8()).transpose()?;
         let stamp = has(STAMP).then(|| Stamp::decode(from, r)).transpose()?;
-        let nonce = (hello && keyed).then(|| r.u64()).transpose()?;
+        let nonce = (kind.is_hello() && keyed).then(|| r.u64()).transpose()?;
         let ack = has(ACK).then(|| AckStatement::decode(r)).transpose()?;
-        Ok(Self { from, to, session, number, base, remaining, turn, stamp, nonce, ack, hello, keyed })
+        Ok(Self { from, to, session, number, base, remaining, turn, stamp, nonce, ack, kind, keyed })
     }
 
     /// The first byte but for the bit of the ack statement.
@@ -151,7 +172,7 @@ impl Header {
         let bit = |on: bool, bit: u8| if on { bit } else { 0 };
         WIRE_VERSION << 5
             | bit(self.turn.is_some(), TURN)
-            | bit(self.hello, HELLO)
+            | bit(self.kind.is_hello(), HELLO)
             | bit(self.stamp.is_some(), STAMP)
             | bit(self.keyed, KEYED)
     }

@@ -19,7 +19,7 @@ pub use ack::{AckStatement, MAX_WINDOW};
 pub use backlog::Backlog;
 pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
-pub use header::{Address, Header, MissionId, SessionId};
+pub use header::{Address, FrameKind, Header, MissionId, SessionId};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;

@@ -177,7 +177,7 @@ impl Water {
         let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
         self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
-        *self.tally.airtime.entry((who, transmit.kind)).or_default() += airtime;
+        *self.tally.airtime.entry((who, transmit.kind.name())).or_default() += airtime;
         self.ending.insert((self.now + airtime, from), ());
         self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
     }

@@ -117,12 +117,12 @@ impl Mission {
         if self.transmitting[0].is_none()
             && let Some(t) = self.vehicle.poll_transmit(self.now)
         {
-            self.transmit(0, t.bytes, t.kind);
+            self.transmit(0, t.bytes, t.kind.name());
         }
         if self.transmitting[1].is_none()
             && let Some(t) = self.surface.poll_transmit(self.now)
         {
-            self.transmit(1, t.bytes, t.kind);
+            self.transmit(1, t.bytes, t.kind.name());
         }
     }
 

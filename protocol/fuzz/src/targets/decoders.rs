@@ -9,8 +9,8 @@ use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Frame, FrameBuilder, Header, MAX_WINDOW, MissionId, Reader, Seal, SessionId,
-    SlotState, Stamp, VehicleStatus,
+    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, MAX_WINDOW, MissionId, Reader, Seal,
+    SessionId, SlotState, Stamp, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -88,7 +88,7 @@ fn header() -> Header {
         stamp: None,
         nonce: None,
         ack: None,
-        hello: false,
+        kind: FrameKind::Numbered,
         keyed: false,
     }
 }

@@ -1,10 +1,10 @@
 //! Calling for vehicles that are not known.
 
-use crate::link::Transmit;
 use crate::link::run::{Authenticity, Identity};
+use crate::link::{Transmit, TransmitKind};
 use crate::mac::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};
+use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal, SessionId};
 use std::time::Duration;
 
 /// Calls everybody from time to time; who is not spoken with answers at a moment of its own choosing.
@@ -74,7 +74,7 @@ impl Discovery {
             stamp: None,
             nonce: authenticity.map(|_| own.nonce),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed: authenticity.is_some(),
         };
         let builder = FrameBuilder::new(&header, modem.frame_bytes);
@@ -87,7 +87,7 @@ impl Discovery {
         self.open = Some((own, until));
         self.next = until + self.pause;
         self.pause = (self.pause * 2).min(self.every.unwrap_or_default()).max(Self::FIRST_PAUSE);
-        Transmit { to: Address::EVERYBODY, bytes, kind: "call" }
+        Transmit { to: Address::EVERYBODY, bytes, kind: TransmitKind::DiscoveryCall }
     }
 
     /// Whether a hello answers the last call.
@@ -98,7 +98,7 @@ impl Discovery {
         authenticity: Option<&Authenticity>,
         now: Instant,
     ) -> bool {
-        let Some((call, until)) = self.open.filter(|_| envelope.header.hello) else { return false };
+        let Some((call, until)) = self.open.filter(|_| envelope.header.kind.is_hello()) else { return false };
         let session = call.session.get();
         let sound = match authenticity {
             Some(a) => envelope.open(&Seal::Hello(&a.key, mission, session, call.nonce)).is_some(),

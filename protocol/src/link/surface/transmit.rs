@@ -7,7 +7,7 @@ use crate::link::{Transmit, Wakeup};
 use crate::mac::{Access, ModemProfile};
 use crate::map::StateReplica;
 use crate::time::Instant;
-use crate::wire::Address;
+use crate::wire::{Address, FrameKind};
 
 /// Probability that a turn of the surface may be lost with all its copies.
 const TURN_LOSS_RISK: f64 = 0.04;
@@ -57,9 +57,9 @@ impl<R: StateReplica> SurfaceLink<R> {
         let is_plentiful = self.budget.is_plentiful(now);
         let Some(peer) = self.fleet.get_mut(vehicle) else { return false };
         let modem = self.config.modem;
-        let hello = is_hello_due(peer.master.unanswered()) || peer.is_full();
+        let kind = FrameKind::hello_if(is_hello_due(peer.master.unanswered()) || peer.is_full());
         let copies = if is_plentiful { peer.stats().loss_out.copies(TURN_LOSS_RISK, 6) } else { 1 };
-        let mut plan = peer.plan_turn(&modem, hello, copies, &self.shares, now);
+        let mut plan = peer.plan_turn(&modem, kind, copies, &self.shares, now);
         let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem), now)));
         if affordable == 0 {
             let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem));
@@ -68,7 +68,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         }
         plan.truncate(affordable);
         let grant = peer.master.grant(&modem, active);
-        self.turn = peer.write_turn(&plan, &modem, Some(grant), hello, now).into();
+        self.turn = peer.write_turn(&plan, &modem, Some(grant), kind, now).into();
         peer.master.begin(grant, now);
         self.fleet.set_current(vehicle);
         true

@@ -3,7 +3,7 @@
 use super::VehicleConfig;
 use crate::mac::Grant;
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, FrameBuilder, Header, Seal, SessionId};
+use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, Seal, SessionId};
 use std::time::Duration;
 
 /// The answer that is owed to a discovery call.
@@ -26,7 +26,7 @@ impl CallReply {
             Some(a) => envelope.open(&Seal::Hello(&a.key, config.mission, 0, 0)).is_some(),
             None => envelope.open(&Seal::Crc(config.mission, 0)).is_some(),
         };
-        is_sound && envelope.header.hello
+        is_sound && envelope.header.kind.is_hello()
     }
 
     /// Takes a call; returns the turn in which it is answered, at a random time in the window that the call names.
@@ -60,7 +60,7 @@ impl CallReply {
             stamp: None,
             nonce: config.authenticity.as_ref().map(|_| nonce),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed: config.authenticity.is_some(),
         };
         let builder = FrameBuilder::new(&header, config.modem.frame_bytes);

@@ -83,7 +83,7 @@ impl<S: StateSource> VehicleLink<S> {
         let Some(quarters) = header.turn else { return };
         self.call_reply.cancel();
         self.begin_turn();
-        if header.hello {
+        if header.kind.is_hello() {
             // A hello does not acknowledge our frames, so it is not known which of them to repeat.
             self.repeater.forget();
         }

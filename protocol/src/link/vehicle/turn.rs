@@ -3,12 +3,12 @@
 use super::VehicleLink;
 use super::content::{Carried, FillContext, Part};
 use super::repeat::RepeatTerms;
-use crate::link::Transmit;
+use crate::link::{Transmit, TransmitKind};
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, FrameBuilder};
+use crate::wire::{Address, FrameBuilder, FrameKind};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
@@ -61,11 +61,11 @@ impl<S: StateSource> VehicleLink<S> {
     fn next_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         if let Some(bytes) = self.call_reply.take(&self.config) {
             self.pair.stats.count(Class::Overhead, bytes.len());
-            return (Transmit { to: Address::SURFACE, bytes, kind: "hello" }, true);
+            return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Hello }, true);
         }
         if let Some((bytes, last)) = self.repeater.pop() {
             self.pair.stats.repeated_bytes += bytes.len() as u64;
-            return (Transmit { to: Address::SURFACE, bytes, kind: "again" }, last);
+            return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Repeat }, last);
         }
         self.write_frame(frames, now)
     }
@@ -159,7 +159,7 @@ impl<S: StateSource> VehicleLink<S> {
         let has_stamp = size >= SMALL_FRAME && (plan.is_last_new || self.repeater.new_frames() == 0);
         let stamp = self.timing.stamp(now).filter(|_| has_stamp);
         let ack_room = self.ack_room(plan.is_last_new);
-        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, false);
+        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FrameKind::Numbered);
         let mut carried = Carried::new();
         if !greets {
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
@@ -182,7 +182,8 @@ impl<S: StateSource> VehicleLink<S> {
         };
         builder.set_remaining(remaining.min(255) as u8);
         let last = remaining == 0;
-        let transmit = self.close(builder, carried, greets, last || is_complete || !takes_turns);
+        let kind = FrameKind::hello_if(greets);
+        let transmit = self.close(builder, carried, kind, last || is_complete || !takes_turns);
         if !greets {
             let copies = (is_complete && remaining > 0).then_some(remaining);
             self.repeater.keep(self.pair.next_number() - 1, &transmit.bytes, copies);
@@ -191,16 +192,19 @@ impl<S: StateSource> VehicleLink<S> {
         (transmit, last && takes_turns)
     }
 
-    fn close(&mut self, builder: FrameBuilder, carried: Carried<S::Carried>, hello: bool, short: bool) -> Transmit {
-        let kind = carried.iter().max_by_key(|(_, n)| *n).map_or("ack", |(p, _)| p.class().name());
+    fn close(&mut self, builder: FrameBuilder, carried: Carried<S::Carried>, kind: FrameKind, short: bool) -> Transmit {
+        let mainly = carried
+            .iter()
+            .max_by_key(|(_, n)| *n)
+            .map_or(TransmitKind::Acknowledgement, |(p, _)| TransmitKind::Content(p.class()));
         let payload: usize = carried.iter().map(|(_, n)| n).sum();
         for (part, n) in &carried {
             self.pair.stats.count(part.class(), *n);
             self.pair.stats.chunks_sent += u64::from(matches!(part, Part::Map(_)));
         }
-        let bytes = self.pair.finish_frame(builder, carried, hello, short);
+        let bytes = self.pair.finish_frame(builder, carried, kind, short);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
-        Transmit { to: Address::SURFACE, bytes, kind }
+        Transmit { to: Address::SURFACE, bytes, kind: mainly }
     }
 
     /// When another turn would be of use, in the quarter seconds of the turn byte.

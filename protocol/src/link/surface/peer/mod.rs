@@ -20,7 +20,7 @@ use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Envelope, Header, MissionId, Stamp};
+use crate::wire::{Address, Chunk, ChunkKind, Envelope, FrameKind, Header, MissionId, Stamp};
 use content::{PeerContent, class_of};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -30,12 +30,12 @@ use timing::VehicleTiming;
 type Carried = Vec<(SlotId, u16, usize)>;
 
 /// The last turn that was written.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct LastTurn {
     /// Number of its first frame: an answer has judged it.
     began: FrameNumber,
-    /// Whether it was a hello, which has no number that an answer could name.
-    is_hello: bool,
+    /// A hello has no number that an answer could name.
+    kind: FrameKind,
 }
 
 /// When the vehicle was last in contact, and when it must be contacted without a turn.
@@ -87,7 +87,7 @@ impl<R: StateReplica> Peer<R> {
             content: PeerContent::new(),
             timing: VehicleTiming::default(),
             contact: Contact { last_received: None, answer_due: None, hello_due: now, hellos: 0 },
-            last_turn: LastTurn::default(),
+            last_turn: LastTurn { began: 0, kind: FrameKind::Numbered },
             is_out_of_step: false,
         }
     }
@@ -145,7 +145,7 @@ impl<R: StateReplica> Peer<R> {
         self.handle_fates(&inbound.fates, now);
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
-        if header.hello {
+        if header.kind.is_hello() {
             self.contact.last_received = Some(now);
             self.handle_turn(&header, bytes, modem, now);
             return;
@@ -213,7 +213,7 @@ impl<R: StateReplica> Peer<R> {
     }
 
     fn handle_turn(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
-        if self.last_turn.is_hello || self.pair.horizon() >= self.last_turn.began {
+        if self.last_turn.kind.is_hello() || self.pair.horizon() >= self.last_turn.began {
             self.master.handle_answer(bytes, header.remaining, header.turn, modem, now);
             self.contact.hellos = 0;
         }

@@ -6,6 +6,7 @@ use crate::mac::ModemProfile;
 use crate::map::StateReplica;
 use crate::schedule::{BitBudget, ClassShares};
 use crate::time::Instant;
+use crate::wire::FrameKind;
 use std::time::Duration;
 
 /// Received frames after which an acknowledgement does not wait any longer.
@@ -66,20 +67,20 @@ impl<R: StateReplica> Peer<R> {
         budget: &BitBudget,
         now: Instant,
     ) -> Option<Ready> {
-        let hello = self.must_greet(now);
-        let plan = self.plan_turn(modem, hello, 1, shares, now - self.slot_timeout());
+        let kind = FrameKind::hello_if(self.must_greet(now));
+        let plan = self.plan_turn(modem, kind, 1, shares, now - self.slot_timeout());
         let slots = plan.into_iter().next()?;
         let allowed = budget.earliest(self.bits(&slots, modem), now);
         if allowed > now {
             self.contact.answer_due = Some(allowed);
             return None;
         }
-        let ready = self.write_turn(&[slots], modem, None, hello, now).pop()?;
+        let ready = self.write_turn(&[slots], modem, None, kind, now).pop()?;
         self.master.note_begun(now);
         // A run that was met must be proven by a numbered frame, or the vehicle will not transmit.
         let must_prove = self.pair.is_met() && !self.pair.is_proven();
         self.contact.answer_due = must_prove.then(|| now + self.slot_timeout());
-        if hello {
+        if kind.is_hello() {
             self.contact.note_hello(now);
         }
         Some(ready)

@@ -2,13 +2,12 @@
 
 use super::{Carried, LastTurn, Peer};
 use crate::directive::PendingSlot;
-use crate::link::FrameNumber;
-use crate::link::Transmit;
+use crate::link::{FrameNumber, Transmit, TransmitKind};
 use crate::mac::{Grant, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::{Class, ClassShares};
 use crate::time::Instant;
-use crate::wire::{ChunkKind, Stamp, room_for_payload};
+use crate::wire::{ChunkKind, FrameKind, Stamp, room_for_payload};
 
 /// Bytes of acknowledgement that every frame of the surface has room for.
 const SHORT_ACK: usize = 2;
@@ -39,13 +38,13 @@ impl<R: StateReplica> Peer<R> {
     pub(in crate::link::surface) fn plan_turn(
         &self,
         modem: &ModemProfile,
-        hello: bool,
+        kind: FrameKind,
         copies: u32,
         shares: &ClassShares,
         again_before: Instant,
     ) -> TurnPlan {
         let copies = copies as usize;
-        if hello || !self.pair.is_met() {
+        if kind.is_hello() || !self.pair.is_met() {
             return vec![Vec::new(); copies.min(2)];
         }
         let groups = pack(
@@ -68,17 +67,17 @@ impl<R: StateReplica> Peer<R> {
         plan: &[Vec<PendingSlot>],
         modem: &ModemProfile,
         grant: Option<u8>,
-        hello: bool,
+        kind: FrameKind,
         now: Instant,
     ) -> Vec<Ready> {
-        let is_hello = hello || !self.pair.is_met();
-        self.last_turn = LastTurn { began: self.pair.next_number(), is_hello };
+        let turn_kind = FrameKind::hello_if(kind.is_hello() || !self.pair.is_met());
+        self.last_turn = LastTurn { began: self.pair.next_number(), kind: turn_kind };
         let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem)).sum();
         let mut at = now;
         let mut turn = Vec::with_capacity(plan.len());
         for slots in plan {
             bits_left -= self.bits(slots, modem);
-            let ready = self.write_frame(slots, modem, grant, Grant::code_remaining(bits_left), hello, at);
+            let ready = self.write_frame(slots, modem, grant, Grant::code_remaining(bits_left), kind, at);
             at = at + modem.airtime(ready.transmit.bytes.len());
             turn.push(ready);
         }
@@ -99,7 +98,7 @@ impl<R: StateReplica> Peer<R> {
         modem: &ModemProfile,
         grant: Option<u8>,
         remaining: u8,
-        hello: bool,
+        kind: FrameKind,
         at: Instant,
     ) -> Ready {
         let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
@@ -108,9 +107,9 @@ impl<R: StateReplica> Peer<R> {
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
         let fixed = 9 + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
         let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
-        let number = (!hello && self.pair.is_met()).then(|| self.pair.next_number());
+        let number = (!kind.is_hello() && self.pair.is_met()).then(|| self.pair.next_number());
         let has_room = has_room && number.is_some();
-        let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), hello);
+        let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), kind);
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
         for slot in slots {
@@ -122,15 +121,15 @@ impl<R: StateReplica> Peer<R> {
                 carried.push((slot.id, slot.version, bytes.len()));
             }
         }
-        let kind = match (number, carried.first()) {
-            (None, _) => "hello",
-            (_, None) => "grant",
-            (_, Some((id, ..))) => id.class().name(),
+        let mainly = match (number, carried.first()) {
+            (None, _) => TransmitKind::Hello,
+            (_, None) => TransmitKind::Grant,
+            (_, Some((id, ..))) => TransmitKind::Content(id.class()),
         };
         let payload: usize = carried.iter().map(|(_, _, n)| n).sum();
-        let bytes = self.pair.finish_frame(builder, carried, hello, true);
+        let bytes = self.pair.finish_frame(builder, carried, kind, true);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
-        Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind }, number }
+        Ready { transmit: Transmit { to: self.pair.peer(), bytes, kind: mainly }, number }
     }
 }
 
