@@ -1,6 +1,7 @@
 //! What the two ends of scenecast say to each other: wire format, map coding, replicated state, link,
 //! schedule and medium access. Nothing here does IO: bytes and time come in as arguments.
 
+#![warn(missing_docs)]
 // Received bytes must not panic: what indexes all the same says why.
 #![cfg_attr(
     not(test),
@@ -10,6 +11,7 @@
 mod bytes;
 pub mod coordinates;
 pub mod directive;
+pub mod exemplar;
 #[allow(clippy::indexing_slicing)] // A cell's place is less than the size of its tile.
 mod grid;
 pub mod link;
