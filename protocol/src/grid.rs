@@ -1,4 +1,4 @@
-//! Unbounded sparse grid of labels.
+//! An unbounded sparse grid of labels.
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,17 @@ pub const TILE: i32 = 16;
 /// Cells of a storage tile.
 pub(crate) const TILE_CELLS: usize = (TILE * TILE) as usize;
 
-/// A storage tile's place: rows and columns of tiles from the origin.
+/// Row and column of a storage tile, counted in tiles from the origin.
 pub(crate) type TileKey = (i32, i32);
 /// Labels of a tile, row by row.
 pub(crate) type TileLabels = [u8; TILE_CELLS];
 
-/// A cell's place on the grid: east and north counts of cells from the session's origin.
+/// A cell of the grid, addressed by counts of cells from the session's origin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Cell {
-    /// Cells east of the origin.
+    /// Cells east of the origin, negative to the west.
     pub x: i32,
-    /// Cells north of the origin.
+    /// Cells north of the origin, negative to the south.
     pub y: i32,
 }
 
@@ -35,12 +35,12 @@ impl Cell {
         (self.y.div_euclid(TILE), self.x.div_euclid(TILE))
     }
 
-    /// The place in its tile.
+    /// The cell's index in its tile, row by row.
     pub(crate) fn place(self) -> u8 {
         (self.y.rem_euclid(TILE) * TILE + self.x.rem_euclid(TILE)) as u8
     }
 
-    /// The cell at a place of a tile.
+    /// The cell at an index of a tile.
     pub(crate) fn at((row, column): TileKey, place: u8) -> Self {
         let place = i32::from(place);
         Self::new(column * TILE + place % TILE, row * TILE + place / TILE)
@@ -58,9 +58,9 @@ pub struct Rect {
     pub x: i32,
     /// Southernmost row.
     pub y: i32,
-    /// Columns.
+    /// Number of columns, at least 1.
     pub width: u32,
-    /// Rows.
+    /// Number of rows, at least 1.
     pub height: u32,
 }
 
@@ -76,7 +76,7 @@ impl Rect {
         bounds.map(|(x0, y0, x1, y1)| Self { x: x0, y: y0, width: span(x0, x1), height: span(y0, y1) })
     }
 
-    /// Whether `cell` lies inside.
+    /// Whether `cell` lies inside the rectangle.
     pub fn contains(&self, cell: Cell) -> bool {
         cell.x >= self.x
             && cell.y >= self.y
@@ -92,7 +92,7 @@ impl Rect {
         })
     }
 
-    /// Number of cells.
+    /// Number of cells in the rectangle.
     pub fn area(&self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }
@@ -107,7 +107,7 @@ pub struct LabelGrid {
 }
 
 impl LabelGrid {
-    /// The label of `cell`.
+    /// The label of `cell`, 0 if it is unexplored.
     pub fn get(&self, cell: Cell) -> u8 {
         self.tiles.get(&cell.tile()).map_or(0, |t| t[cell.index()])
     }
@@ -155,12 +155,12 @@ impl LabelGrid {
         self.tiles.iter().map(|(&key, tile)| (key, tile.as_ref()))
     }
 
-    /// Labels of a tile.
+    /// Labels of a tile, all 0 if the tile was never touched.
     pub(crate) fn tile(&self, key: TileKey) -> &TileLabels {
         self.tiles.get(&key).map_or(&[0; TILE_CELLS], |tile| tile)
     }
 
-    /// Number of explored cells.
+    /// Number of explored cells; takes time proportional to the stored tiles.
     pub fn explored(&self) -> usize {
         self.iter().count()
     }
@@ -170,12 +170,12 @@ impl LabelGrid {
         Rect::around(self.iter().map(|(c, _)| c))
     }
 
-    /// Whether no cell is explored.
+    /// Whether every cell is unexplored.
     pub fn is_empty(&self) -> bool {
         self.iter().next().is_none()
     }
 
-    /// Forgets every cell.
+    /// Sets every cell to unexplored.
     pub fn clear(&mut self) {
         self.tiles.clear();
     }

@@ -93,7 +93,7 @@ fn files_cut_off_or_for_another_base_are_refused() {
 fn bytes_until(share: f64, side: i32, coarse_after: Option<usize>, room: usize, scene: usize) -> (usize, usize) {
     let plane = Scene::ALL[scene].draw(&mut MapRng::new(5), side as usize, side as usize, 8);
     let (mut source, mut replica, mut number) = (MapSource::new(Codec::Context), Replica::default(), 0);
-    source.set_settle_time(Duration::ZERO);
+    source.set_debounce(Duration::ZERO);
     source.set_coarse_limit(coarse_after);
     let label = |i: i32| plane.get((i % side) as usize, (i / side) as usize).max(1);
     source.set((0..side * side).map(|i| (Cell::new(i % side - 20, i / side), label(i))), Instant::ZERO);
@@ -110,7 +110,7 @@ fn bytes_until(share: f64, side: i32, coarse_after: Option<usize>, room: usize, 
             early = Some(bytes);
         }
     }
-    assert!(replica.shown() == source.target() && source.is_settled());
+    assert!(replica.shown() == source.target() && source.is_converged());
     (early.expect("equal in the end"), bytes)
 }
 

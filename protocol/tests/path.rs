@@ -34,7 +34,7 @@ fn is_told(pair: &Pair) -> bool {
     let plan = &pair.status;
     told(pair).is_some_and(|told| {
         let n = told.path.places.len();
-        let is_whole = n == plan.path.places.len().min(PlannedPath::MOST);
+        let is_whole = n == plan.path.places.len().min(PlannedPath::MAX_POINTS);
         is_whole && told.waypoint == plan.waypoint && told.path.places[..] == plan.path.places[..n]
     })
 }
@@ -113,7 +113,7 @@ fn a_path_takes_at_most_a_hundredth_of_the_budget_and_no_pose_comes_later_for_it
                 pair.vehicle.set_map(patchy(60, minute.into()).iter(), pair.now);
                 pair.run(pair.now + Duration::from_secs(60), false);
             }
-            assert!(told(&pair).is_some_and(|t| t.path.goes_on == (places > PlannedPath::MOST)));
+            assert!(told(&pair).is_some_and(|t| t.path.goes_on == (places > PlannedPath::MAX_POINTS)));
             pair.vehicle.stats().bytes_by_class[&Class::Status] * 8
         };
         let (without, with) = (hour(0), hour(8));

@@ -1,8 +1,8 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, Fence, Figure, Fix, Limits, Place, PlaneSet, PlannerKind, Polygon,
-    Reaction, RefusalReason, Request, Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, Limits, Place,
+    PlaneSet, PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
@@ -287,11 +287,11 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let curious = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
     let curious = Budget { spend: curious.unwrap(), ..budget };
     let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
-    let requests = Requests {
+    let requests = ExemplarRequests {
         epoch: 1,
         wanted: vec![
-            Request { label: 3, serial: 2, size: 0, picture: 0 },
-            Request { label: 5, serial: 1, size: 1, picture: 9 },
+            ExemplarRequest { label: 3, serial: 2, size: 0, picture: 0 },
+            ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 },
         ],
     };
     let plane = |chunk: PlaneChunk<'_>| {

@@ -7,7 +7,7 @@ use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
-use scenecast_protocol::directive::{Fix, LifeLine, SlotId};
+use scenecast_protocol::directive::{Fix, OrderStatus, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -127,7 +127,7 @@ impl World {
 
     fn is_settled(&self) -> bool {
         let mut slots = self.surface.view(self.auv()).unwrap().slots();
-        slots.all(|s| matches!(s.life, LifeLine::Applied | LifeLine::Refused(_)))
+        slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
     }
 
     fn tick(&mut self) {

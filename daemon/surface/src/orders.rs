@@ -97,8 +97,8 @@ impl LimitsOrder {
         let limits = Limits {
             depth: self.depth_m.map(|b| band("depth_m", b)).transpose()?,
             altitude: self.altitude_m.map(|b| band("altitude_m", b)).transpose()?,
-            distance_m: self.distance_m.map(|v| whole("distance_m", v, Limits::MOST)).transpose()?,
-            time_s: self.time_s.map(|v| whole("time_s", v, Limits::MOST)).transpose()?,
+            distance_m: self.distance_m.map(|v| whole("distance_m", v, Limits::MAX)).transpose()?,
+            time_s: self.time_s.map(|v| whole("time_s", v, Limits::MAX)).transpose()?,
             silence_s: self.silence_s.map(|v| whole("silence_s", v, u16::MAX.into())).transpose()?.map(|s| s as u16),
             on_silence: reaction("on_silence", self.on_silence.as_deref())?,
             on_breach: reaction("on_breach", self.on_breach.as_deref())?,

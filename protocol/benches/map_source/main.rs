@@ -17,7 +17,7 @@ fn main() {
     let cell = |i: usize| Cell::new((i % SIDE) as i32 - 900, (i / SIDE) as i32 - 900);
     for (codec, room) in [(Codec::Context, 64), (Codec::Context, 256), (Codec::Auto, 1000), (Codec::Png, 256)] {
         let mut source = MapSource::new(codec);
-        source.set_settle_time(Duration::from_secs(4));
+        source.set_debounce(Duration::from_secs(4));
         time("set all", 1, || source.set((0..SIDE * SIDE).map(|i| (cell(i), label(i))), Instant::ZERO));
         accept_all(&mut source);
         let mut rng = MapRng::new(7);
@@ -46,7 +46,7 @@ fn main() {
 fn accept_all(source: &mut MapSource) {
     let cells: Vec<_> = source.target().iter().collect();
     source.handle_fate(cells, true, Instant::ZERO);
-    assert!(source.is_settled());
+    assert!(source.is_converged());
 }
 
 fn time<R>(name: &str, parts: u32, work: impl FnOnce() -> R) -> R {

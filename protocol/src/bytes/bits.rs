@@ -1,10 +1,9 @@
 //! Bit strings, most significant bit first.
 
-/// Grows a byte string bit by bit.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BitWriter {
     bytes: Vec<u8>,
-    /// Bits used of the last byte; 0 if it is full.
+    /// Used bits of the last byte; 0 if it is full.
     partial: u32,
 }
 
@@ -16,7 +15,6 @@ impl BitWriter {
         }
     }
 
-    /// Appends one bit.
     pub(crate) fn bit(&mut self, bit: bool) {
         if self.partial == 0 {
             self.bytes.push(0);
@@ -27,12 +25,12 @@ impl BitWriter {
         self.partial = (self.partial + 1) % 8;
     }
 
-    /// Bits written.
+    /// The number of bits written.
     pub(crate) fn len(&self) -> usize {
         self.bytes.len() * 8 - (8 - self.partial as usize) % 8
     }
 
-    /// Adds one to the number that the bits written make; a carry out of the first bit is lost.
+    /// Adds one to the number that the written bits make; a carry out of the first bit is lost.
     pub(crate) fn increment(&mut self) {
         let mut carry = 1u8 << ((8 - self.partial) % 8);
         for byte in self.bytes.iter_mut().rev() {
@@ -48,7 +46,6 @@ impl BitWriter {
     }
 }
 
-/// Reads a byte string bit by bit.
 #[derive(Debug, Clone)]
 pub(crate) struct BitReader<'a> {
     bytes: &'a [u8],
@@ -60,12 +57,11 @@ impl<'a> BitReader<'a> {
         Self { bytes, position: 0 }
     }
 
-    /// Bits read.
     pub(crate) fn position(&self) -> usize {
         self.position
     }
 
-    /// Length of the whole string, bytes.
+    /// The length of the whole string in bytes.
     pub(crate) fn total_bytes(&self) -> usize {
         self.bytes.len()
     }

@@ -1,10 +1,11 @@
-//! Where the vehicle may be.
+//! The fence: where the vehicle may be.
 
 use super::polygon::{Polygon, PolygonFault};
 use crate::bytes::{BitReader, BitWriter, minus, plus, put_pair, take_pair, take_width, width_of};
 use crate::coordinates::DecimetrePoint;
 
-/// The outline that the vehicle stays in, those that it stays out of, and the place that it returns to.
+/// The outline that the vehicle stays in, the keep-outs that it stays out of, and the return point; all in the world
+/// frame.
 ///
 /// Bits follow each other, the most significant first; the last byte is filled with zeros.
 ///
@@ -22,41 +23,41 @@ use crate::coordinates::DecimetrePoint;
 /// * anchor: x, y of the first vertex, or of the return point if there is no outline: decimetres, two's complement,
 ///   within 838 860.7 m; left out if there is neither.
 /// * n: vertices, 3 to 34. w: bits of a difference, 1 to 25, two's complement, decimetres.
-/// * dx, dy: from the vertex before; a later outline's first vertex from the anchor. The very first vertex is the anchor
-///   and is left out.
+/// * dx, dy: from the previous vertex; a later outline's first vertex from the anchor. The very first vertex is the
+///   anchor and is left out.
 /// * return point: from the anchor, in a width of its own, written before it in 5 bits; left out if it is the anchor.
 ///
 /// Source: surface. Eight vertices with edges of up to 800 m and a return point take at most 37 bytes, which fit a
 /// frame of 64 bytes under a key; without one, edges may have 6 km.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Fence {
-    /// The vehicle stays inside.
+    /// The outline that the vehicle stays inside.
     pub fence: Option<Polygon>,
-    /// The vehicle stays outside of each.
+    /// Outlines that the vehicle stays outside of, at most [`Self::MAX_KEEP_OUTS`].
     pub keep_outs: Vec<Polygon>,
-    /// Where it goes on its return; `None`: where its run began.
+    /// The goal of a return; `None` is the point where the vehicle's run began.
     pub return_point: Option<DecimetrePoint>,
 }
 
-/// What is wrong with a fence.
+/// Why a fence is refused. Keep-outs are counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FenceFault {
-    /// The fence is no polygon.
+    /// The fence is not a valid polygon.
     #[error("fence: {0}")]
     Fence(PolygonFault),
-    /// A keep-out, counted from 1, is no polygon.
+    /// A keep-out is not a valid polygon.
     #[error("keep_outs: outline {0}: {1}")]
     KeepOut(usize, PolygonFault),
-    /// More than fit the count.
+    /// There are more keep-outs than the layout can count.
     #[error("keep_outs: {0} outlines: it takes 15 or fewer")]
     TooMany(usize),
-    /// A keep-out, counted from 1, covers the whole fence.
+    /// A keep-out covers the whole fence.
     #[error("keep_outs: outline {0} covers the whole fence: nothing is left")]
     NothingLeft(usize),
-    /// The vehicle could never get there.
+    /// The return point is outside the fence.
     #[error("return_point lies outside the fence")]
     ReturnOutside,
-    /// The vehicle could never get there; the keep-out counts from 1.
+    /// The return point is inside a keep-out.
     #[error("return_point lies in keep-out {0}")]
     ReturnKeptOut(usize),
     /// The return point is too far from the origin.
@@ -65,15 +66,15 @@ pub enum FenceFault {
 }
 
 impl Fence {
-    /// Most keep-outs.
-    pub const MOST_KEEP_OUTS: usize = 15;
+    /// The most keep-outs that the layout can count.
+    pub const MAX_KEEP_OUTS: usize = 15;
 
-    /// Whether a vehicle could obey it.
+    /// Checks whether a vehicle could obey the fence.
     pub fn check(&self) -> Result<(), FenceFault> {
         if let Some(fence) = &self.fence {
             fence.check().map_err(FenceFault::Fence)?;
         }
-        if self.keep_outs.len() > Self::MOST_KEEP_OUTS {
+        if self.keep_outs.len() > Self::MAX_KEEP_OUTS {
             return Err(FenceFault::TooMany(self.keep_outs.len()));
         }
         for (i, keep_out) in (1..).zip(&self.keep_outs) {
@@ -96,20 +97,20 @@ impl Fence {
         }
     }
 
-    /// Whether the vehicle may be at a place.
+    /// Whether the vehicle may be at a point.
     pub fn allows(&self, place: DecimetrePoint) -> bool {
         self.fence.as_ref().is_none_or(|f| f.contains(place)) && !self.keep_outs.iter().any(|k| k.contains(place))
     }
 
-    /// Every outline, the fence first.
+    /// Every outline; the fence comes first.
     pub fn outlines(&self) -> impl Iterator<Item = &Polygon> {
         self.fence.iter().chain(&self.keep_outs)
     }
 
-    /// The payload. What [`Self::check`] does not allow is cut to what the layout can say.
+    /// Encodes the payload. A fence that [`Self::check`] refuses is cut to what the layout can state.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bits = BitWriter::default();
-        let keep_outs = self.keep_outs.len().min(Self::MOST_KEEP_OUTS);
+        let keep_outs = self.keep_outs.len().min(Self::MAX_KEEP_OUTS);
         bits.bit(self.fence.is_some());
         bits.put(keep_outs as u64, 4);
         bits.bit(self.return_point.is_some());
@@ -129,7 +130,7 @@ impl Fence {
         bits.into_bytes()
     }
 
-    /// Reads a payload; `None` if it is none. What it says is still to be checked.
+    /// Decodes a payload; `None` if it has another layout. [`Self::check`] must still be called.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut bits = BitReader::new(bytes);
         let has_fence = bits.bit()?;
@@ -157,7 +158,7 @@ impl Fence {
 }
 
 fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: DecimetrePoint, is_first: bool) {
-    let vertices = outline.0.get(..Polygon::MOST_VERTICES).unwrap_or(&outline.0);
+    let vertices = outline.0.get(..Polygon::MAX_VERTICES).unwrap_or(&outline.0);
     let before = std::iter::once(anchor).chain(vertices.iter().copied());
     let steps: Vec<DecimetrePoint> =
         vertices.iter().zip(before).map(|(&v, b)| minus(v, b)).skip(usize::from(is_first)).collect();
@@ -225,7 +226,7 @@ mod tests {
         let return_point = Some(DecimetrePoint { x_dm: -8_000_000, y_dm: 7_000_000 });
         let fence = Fence { fence: Some(fence), keep_outs: Vec::new(), return_point };
         assert_eq!(fence.check(), Ok(()));
-        // Five bytes of the slot's head, 13 of the frame's, 8 of a tag.
+        // Five bytes of the slot's head, 13 of the frame's header, 8 of a tag.
         assert!(fence.to_bytes().len() <= 64 - 13 - 8 - 5, "{} bytes", fence.to_bytes().len());
     }
 

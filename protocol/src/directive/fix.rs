@@ -2,7 +2,7 @@
 
 use crate::bytes::{Reader, Truncated};
 
-/// Where the vehicle was, as GPS and USBL saw it from the surface.
+/// A measured position of the vehicle in the world frame, from GPS and USBL at the surface.
 ///
 /// ```text
 /// byte  field
@@ -19,9 +19,9 @@ pub struct Fix {
     pub x_m: f64,
     /// North of the origin, metres.
     pub y_m: f64,
-    /// Standard deviation, metres.
+    /// Standard deviation in metres, in steps of 0.25 m.
     pub sigma_m: f64,
-    /// Age at transmission, seconds.
+    /// Age at transmission in seconds.
     pub age_s: f64,
 }
 

@@ -1,21 +1,21 @@
-//! Polygons in whole decimetres: every predicate is exact.
+//! Polygons in whole decimetres, on which every predicate is exact.
 
 use crate::coordinates::DecimetrePoint;
 
-/// A polygon, the last vertex joined to the first; either sense of rotation.
+/// A polygon, the last vertex joined to the first; it may turn either way.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Polygon(pub Vec<DecimetrePoint>);
 
-/// Why vertices make no polygon. Vertices and edges count from 1; edge n begins at vertex n.
+/// Why a polygon is not valid. Vertices and edges count from 1; edge n begins at vertex n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PolygonFault {
-    /// No area can lie between so few.
-    #[error("{0} vertices: it takes 3 to {most}", most = Polygon::MOST_VERTICES)]
+    /// Fewer than 3 or more than [`Polygon::MAX_VERTICES`] vertices.
+    #[error("{0} vertices: it takes 3 to {most}", most = Polygon::MAX_VERTICES)]
     Vertices(usize),
-    /// A vertex is too far from the origin.
+    /// A vertex is beyond the range of the wire.
     #[error("vertex {0} lies more than 838 km from the origin")]
     TooFar(usize),
-    /// Two neighbouring vertices are the same.
+    /// Two neighbouring vertices are equal.
     #[error("vertex {0} is at the same place as the one before it")]
     Repeated(usize),
     /// All vertices lie on one line.
@@ -27,13 +27,13 @@ pub enum PolygonFault {
 }
 
 impl Polygon {
-    /// Most vertices.
-    pub const MOST_VERTICES: usize = 34;
+    /// The most vertices that the layout can count.
+    pub const MAX_VERTICES: usize = 34;
 
-    /// Whether this is a simple polygon that the wire can say.
+    /// Checks whether this is a simple polygon within the range of the wire.
     pub fn check(&self) -> Result<(), PolygonFault> {
         let n = self.0.len();
-        if !(3..=Self::MOST_VERTICES).contains(&n) {
+        if !(3..=Self::MAX_VERTICES).contains(&n) {
             return Err(PolygonFault::Vertices(n));
         }
         if let Some(far) = self.0.iter().position(|p| !p.is_in_reach()) {
@@ -62,12 +62,12 @@ impl Polygon {
         Ok(())
     }
 
-    /// Edges, the closing one last.
+    /// All edges; the closing one comes last.
     pub fn edges(&self) -> impl Iterator<Item = (DecimetrePoint, DecimetrePoint)> + '_ {
         self.0.iter().copied().zip(self.0.iter().copied().cycle().skip(1))
     }
 
-    /// Whether a place lies inside or on the edge.
+    /// Whether a point lies inside or on an edge.
     pub fn contains(&self, p: DecimetrePoint) -> bool {
         let mut inside = false;
         for (a, b) in self.edges() {
@@ -93,13 +93,13 @@ fn cross(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> i64 {
     d(b.x_dm, a.x_dm) * d(c.y_dm, a.y_dm) - d(b.y_dm, a.y_dm) * d(c.x_dm, a.x_dm)
 }
 
-/// Whether `p` lies in the box of `a` and `b`.
+/// Whether `p` lies in the bounding box of `a` and `b`.
 fn is_between(a: DecimetrePoint, b: DecimetrePoint, p: DecimetrePoint) -> bool {
     (a.x_dm.min(b.x_dm)..=a.x_dm.max(b.x_dm)).contains(&p.x_dm)
         && (a.y_dm.min(b.y_dm)..=a.y_dm.max(b.y_dm)).contains(&p.y_dm)
 }
 
-/// Whether the way from `a` over `b` to `c` turns round on itself.
+/// Whether the path from `a` over `b` to `c` reverses its direction at `b`.
 fn folds_back(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> bool {
     cross(a, b, c) == 0 && (is_between(a, b, c) || is_between(b, c, a))
 }

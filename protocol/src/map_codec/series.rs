@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Chunks of at most `room` bytes that together turn `base` into `target`; each decodes alone against `base`.
 ///
-/// Looks at both maps as a whole and, unless the codec is `png`, tiles the change with patches that do not overlap:
-/// fewer bytes than [`encode`] one after another. `None` if `room` is too small for a single cell.
+/// The encoder considers both maps as a whole and, unless the codec is `png`, tiles the change with patches that do not
+/// overlap. This takes fewer bytes than repeated calls of [`encode`]. `None` if `room` is too small for a single cell.
 pub fn encode_all(codec: Codec, base: &LabelGrid, target: &LabelGrid, room: usize) -> Option<Vec<MapChunk>> {
     let cells = base.iter().chain(target.iter()).map(|(cell, _)| cell);
     let differs = |cell| base.get(cell) != target.get(cell) && target.get(cell) <= MAX_LABEL;
@@ -50,7 +50,7 @@ fn one_after_another(
     Some(chunks)
 }
 
-/// Edge of the blocks that [`regions`] puts together, as bits; changes farther apart are not worth one patch.
+/// Logarithm of the edge of the blocks that [`regions`] joins; changes farther apart do not share a patch.
 const BLOCK_BITS: u32 = 8;
 
 /// The changes in groups of adjoining blocks.
@@ -77,7 +77,7 @@ fn regions(dirty: &BTreeSet<(i32, i32)>) -> Vec<BTreeSet<(i32, i32)>> {
     regions
 }
 
-/// A guess at the bits of all changes, from how each goes on from its western and southern neighbours.
+/// An estimate of the bits of all changes, from how each continues its western and southern neighbours.
 fn likely_bits(target: &LabelGrid, dirty: &BTreeSet<(i32, i32)>) -> usize {
     let bits = |&(y, x): &(i32, i32)| {
         let label = target.get(Cell::new(x, y));
@@ -103,7 +103,7 @@ fn strips(bounds: Rect, bits: usize, room_bits: usize) -> Vec<Rect> {
     (0..count).map(strip).collect()
 }
 
-/// Chunks for the changes `left` in the strip, from south to north, each as full as it gets.
+/// Chunks for the changes `left` in the strip, from south to north, each as full as possible.
 fn strip_chunks(
     base: &LabelGrid,
     target: &LabelGrid,

@@ -1,4 +1,4 @@
-//! Bits on the water: frames, their acknowledgements, their chunks.
+//! The wire format: frames, acknowledgement statements and chunks.
 //!
 //! Multi-byte integers are big-endian. Diagrams count bits from the most significant one of the first byte.
 
@@ -26,5 +26,5 @@ pub use placement::Placement;
 pub use stamp::Stamp;
 pub use status::{ModeReason, StatusError, VehicleMode, VehicleStatus};
 
-/// Version of the wire; a frame of another version is counted and dropped.
+/// The version of the wire format; a frame of another version is counted and dropped.
 pub const WIRE_VERSION: u8 = 2;

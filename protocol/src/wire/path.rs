@@ -1,35 +1,35 @@
-//! The way that the vehicle plans to go after its waypoint.
+//! The path that the vehicle plans after its waypoint.
 
 use crate::bytes::{BitReader, BitWriter, decimetres, minus, plus, put_pair, take_pair, take_width, width_of};
 use crate::coordinates::DecimetrePoint;
 
-/// Waypoints after the one in force, as planned when the pose was written.
+/// The waypoints after the current one, as planned when the pose was written; in the map frame.
 ///
 /// ```text
-///  bits     1       3     5          2w             0 to 7
-///       +---------+---+------+------------------+-------
-///       | goes on | n | w    | dx, dy, for each | zeros
-///       +---------+---+------+------------------+-------
+///  bits      1       3     5          2w             0 to 7
+///       +-----------+---+------+------------------+-------
+///       | continues | n | w    | dx, dy, for each | zeros
+///       +-----------+---+------+------------------+-------
 /// ```
-/// * goes on: the plan has more waypoints than are told. n: those that are, 0 to 7.
-/// * w: bits of a difference, 1 to 25, two's complement, decimetres, as few as do; left out if n is 0.
-/// * dx, dy: from the waypoint before, never both 0.
+/// * continues: the plan has more waypoints than these n, 0 to 7.
+/// * w: bits of a difference, 1 to 25, two's complement, decimetres, the fewest that hold all; left out if n is 0.
+/// * dx, dy: from the previous waypoint, never both 0.
 ///
-/// A path of which nothing is to be said takes no byte. Source: vehicle, at the end of a pose with a waypoint, in the map's
-/// frame as that is. Seven legs of up to 6.3 m take 14 bytes, of up to 819 m 26.
+/// An empty path that does not continue takes no byte. Source: vehicle, at the end of a pose with a waypoint. Seven
+/// legs of up to 6.3 m take 14 bytes, of up to 819 m 26.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlannedPath {
-    /// East and north, metres; the first is gone to from the waypoint in force.
+    /// The waypoints in their order, at most [`Self::MAX_POINTS`] on the wire.
     pub places: Vec<(f64, f64)>,
     /// Whether the plan has more waypoints than these.
     pub goes_on: bool,
 }
 
 impl PlannedPath {
-    /// Most waypoints that are told after the one in force.
-    pub const MOST: usize = 7;
+    /// The most waypoints that a pose has after the current one.
+    pub const MAX_POINTS: usize = 7;
 
-    /// At most `room` bytes of it, after a waypoint: as many places as fit, and that it goes on if not all do.
+    /// Encodes as many waypoints as fit into `room` bytes.
     pub(super) fn encode(&self, waypoint: (f64, f64), room: usize) -> Vec<u8> {
         let mut before = place(waypoint);
         let mut steps = Vec::new();
@@ -40,14 +40,14 @@ impl PlannedPath {
             }
             before = next;
         }
-        let told = (0..=steps.len().min(Self::MOST)).rev().find_map(|n| {
+        let told = (0..=steps.len().min(Self::MAX_POINTS)).rev().find_map(|n| {
             let (told, rest) = steps.split_at_checked(n)?;
             Some(write(told, self.goes_on || !rest.is_empty())).filter(|bytes| bytes.len() <= room)
         });
         told.unwrap_or_default()
     }
 
-    /// Reads what follows a waypoint; `None` if no vehicle writes that.
+    /// Decodes the bytes after a waypoint; `None` if no vehicle writes them.
     pub(super) fn decode(bytes: &[u8], waypoint: (f64, f64)) -> Option<Self> {
         let mut bits = BitReader::new(bytes);
         let goes_on = bits.bit()?;
@@ -59,7 +59,7 @@ impl PlannedPath {
             at = plus(at, take_pair(&mut bits, width)?);
             read.places.push(at.metres());
         }
-        // There is one way to write a path.
+        // Each path has exactly one encoding.
         (read.encode(waypoint, usize::MAX) == bytes).then_some(read)
     }
 }
@@ -146,10 +146,10 @@ mod tests {
                 return Ok(());
             };
             let told = read.places.len();
-            prop_assert!(told <= PlannedPath::MOST);
+            prop_assert!(told <= PlannedPath::MAX_POINTS);
             prop_assert_eq!(&read.places[..], &whole.places[..told]);
             prop_assert_eq!(read.goes_on, goes_on || told < whole.places.len());
-            prop_assert!(room < 46 || told == whole.places.len().min(PlannedPath::MOST));
+            prop_assert!(room < 46 || told == whole.places.len().min(PlannedPath::MAX_POINTS));
         }
 
         #[test]

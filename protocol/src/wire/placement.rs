@@ -1,8 +1,8 @@
-//! Where the vehicle's map lies in the world.
+//! The placement of the vehicle's map in the world.
 
 use crate::bytes::{Reader, Truncated};
 
-/// The map's frame seen from the world's: by how much the map must be moved to lie where it belongs.
+/// The shift from the map frame to the world frame.
 ///
 /// ```text
 /// byte  bits  field    unit, range
@@ -11,20 +11,20 @@ use crate::bytes::{Reader, Truncated};
 ///  4-6  24    north    decimetres, signed
 /// ```
 ///
-/// Both frames have x east and y north. The map's is the vehicle's own reckoning, in which cells are never binned anew;
-/// the world's is the plane that touches the Earth at the mission's origin. Source: vehicle, at the end of a report.
+/// In both frames x points east and y north. The map frame is the vehicle's dead reckoning, in which no cell ever
+/// moves. The world frame is the tangent plane at the mission's origin. Source: vehicle, at the end of a report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Counts the moves.
+    /// Counts the moves, 1 to 255 and then from 1 again.
     pub version: u8,
-    /// Add to x of the map's frame, metres.
+    /// East coordinate of the map frame's origin in the world frame, in metres.
     pub east_m: f64,
-    /// Add to y of the map's frame, metres.
+    /// North coordinate of the map frame's origin in the world frame, in metres.
     pub north_m: f64,
 }
 
 impl Placement {
-    /// Bytes on the wire.
+    /// Length on the wire in bytes.
     pub const BYTES: usize = 7;
 
     /// A place of the map's frame in the world's.
@@ -37,7 +37,7 @@ impl Placement {
         (x_m - self.east_m, y_m - self.north_m)
     }
 
-    /// What the next move makes of it, in whole decimetres: both ends place the map at the same spot.
+    /// The placement after the next move, rounded to whole decimetres, so that both ends use the same numbers.
     pub fn moved_to(before: Option<Self>, east_m: f64, north_m: f64) -> Self {
         let version = before.map_or(0, |p| p.version).wrapping_add(1).max(1);
         let whole = |metres: f64| (metres * 10.0).round() / 10.0;
@@ -50,7 +50,7 @@ impl Placement {
         crate::bytes::put24(out, crate::bytes::decimetres(self.north_m) as u32);
     }
 
-    /// `None` is a version that no vehicle writes.
+    /// `None` stands for version 0, which no vehicle writes.
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Option<Self>, Truncated> {
         let version = r.u8()?;
         let read = Self { version, east_m: f64::from(r.i24()?) / 10.0, north_m: f64::from(r.i24()?) / 10.0 };

@@ -185,7 +185,7 @@ impl Pair {
     }
 
     pub(crate) fn is_converged(&self) -> bool {
-        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_settled()
+        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_converged()
     }
 
     fn planes_agree(&self) -> bool {
@@ -352,7 +352,7 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
         authenticity: setup.authenticity.clone(),
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
-    link.source_mut().set_settle_time(setup.settle);
+    link.source_mut().set_debounce(setup.settle);
     let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
     let source = |scale| PlaneSource::new(scale, setup.codec, setup.settle);
     link.set_planes(setup.planes.into_iter().flat_map(|shares| scales.map(source).into_iter().zip(shares)));
@@ -368,7 +368,7 @@ fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
         shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: vec![auv()],
-        call_every: None,
+        discovery_period: None,
         authenticity: setup.authenticity.clone(),
     };
     SurfaceLink::new(config, seed, now)

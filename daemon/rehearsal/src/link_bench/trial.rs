@@ -3,7 +3,7 @@
 use super::summary::Summary;
 use super::water::{Setting, Water, auv};
 use crate::VirtualTime;
-use scenecast_protocol::directive::{Fix, LifeLine, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::time::Instant;
@@ -99,7 +99,7 @@ impl Water {
             let slot = Slot::Utility(Utility { weights, ..Utility::default() });
             let version = self.surface.issue(auv(), slot, issued)?;
             self.run_until(issued + GIVE_UP, |w| {
-                w.view().is_some_and(|v| v.slots().any(|s| s.life == LifeLine::Applied))
+                w.view().is_some_and(|v| v.slots().any(|s| s.status == OrderStatus::Applied))
             });
             known.push(self.now.since(issued).as_secs_f64());
             let at = self.vehicle().applied.get(&(SlotId::Utility, version)).copied();

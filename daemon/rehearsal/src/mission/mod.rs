@@ -261,7 +261,7 @@ impl Mission {
 
     /// Whether the survey has ended and the operator has everything.
     pub fn is_drained(&self) -> bool {
-        self.ended.is_some() && self.vehicle.is_settled() && self.meter.agreement() >= 1.0
+        self.ended.is_some() && self.vehicle.is_converged() && self.meter.agreement() >= 1.0
     }
 
     /// Runs until `until`, or a little beyond the last event before it.

@@ -106,7 +106,7 @@ impl Dock {
             shares: Shares::default(),
             master: MasterConfig::default(),
             vehicles: vec![address],
-            call_every: None,
+            discovery_period: None,
             authenticity: None,
         };
         let source = OpaqueSource::default();

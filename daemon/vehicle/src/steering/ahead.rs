@@ -37,12 +37,12 @@ impl Corners {
 
     /// Whether more corners would not be told.
     fn is_full(&self) -> bool {
-        self.places.len() > PlannedPath::MOST
+        self.places.len() > PlannedPath::MAX_POINTS
     }
 
     fn told(mut self) -> PlannedPath {
         let goes_on = self.is_full();
-        self.places.truncate(PlannedPath::MOST);
+        self.places.truncate(PlannedPath::MAX_POINTS);
         PlannedPath { places: self.places, goes_on }
     }
 }

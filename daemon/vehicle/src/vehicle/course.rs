@@ -121,8 +121,8 @@ impl Vehicle {
                 self.go((to, path), VehicleMode::Survey, ModeReason::Survey);
             }
             Course::UsedUp => self.go_home(at, self.guard.tighter()),
-            Course::There => self.stay(VehicleMode::Hold, ModeReason::NoWay),
-            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoWay),
+            Course::There => self.stay(VehicleMode::Hold, ModeReason::NoPath),
+            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
         }
     }
 
@@ -133,7 +133,7 @@ impl Vehicle {
         }
         match self.steering.next_home(at) {
             Course::Go(to) => self.go((to, self.steering.ahead_home(to)), VehicleMode::Return, why),
-            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoWay),
+            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
             Course::There | Course::UsedUp => self.stay(VehicleMode::Hold, why),
         }
     }

@@ -206,8 +206,8 @@ impl Vehicle {
     }
 
     /// Whether the surface is known to have everything.
-    pub fn is_settled(&self) -> bool {
-        self.link.is_settled() && self.whole_png.as_ref().is_none_or(WholePng::is_settled)
+    pub fn is_converged(&self) -> bool {
+        self.link.is_converged() && self.whole_png.as_ref().is_none_or(WholePng::is_converged)
     }
 
     /// Counters of the link.
@@ -295,7 +295,7 @@ impl Vehicle {
     /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
-        if let Some(at) = self.link.last_heard() {
+        if let Some(at) = self.link.last_received() {
             self.guard.handle_surface_heard(at);
         }
         while let Some(event) = self.link.poll_event() {

@@ -15,7 +15,7 @@ pub struct SurfaceConfig {
     pub modem: ModemProfile,
     /// Bit budget on air in bit/s.
     pub budget_bps: u32,
-    /// Window over which the budget holds.
+    /// LinkWindow over which the budget holds.
     pub budget_window: Duration,
     /// Least share of each class while it has something to send.
     pub shares: Shares,
@@ -24,7 +24,7 @@ pub struct SurfaceConfig {
     /// The vehicles that are contacted from the beginning.
     pub vehicles: Vec<Address>,
     /// Longest time between two discovery calls; `None` disables them.
-    pub call_every: Option<Duration>,
+    pub discovery_period: Option<Duration>,
     /// Key and scope of authentication; `None` sends frames with a CRC only.
     pub authenticity: Option<Authenticity>,
 }

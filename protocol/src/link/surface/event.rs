@@ -13,7 +13,7 @@ pub enum SurfaceEvent {
     /// A status came in.
     Status(Address),
     /// A vehicle has applied or refused a slot.
-    SlotSettled(Address, SlotId),
+    SlotDecided(Address, SlotId),
     /// The last part of an object came in.
     Object(Address, Vec<u8>),
     /// A part of an object came in.

@@ -1,6 +1,6 @@
 //! The vehicles that the surface knows, and the choice of the next one to contact.
 
-use super::peer::Peer;
+use super::peer::VehiclePeer;
 use crate::map::StateReplica;
 use crate::time::Instant;
 use crate::wire::Address;
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// The known vehicles; the surface exchanges turns with one of them at a time.
 #[derive(Debug)]
 pub(super) struct Fleet<R> {
-    peers: BTreeMap<Address, Peer<R>>,
+    peers: BTreeMap<Address, VehiclePeer<R>>,
     /// The vehicle that has or had the last turn.
     current: Option<Address>,
 }
@@ -22,19 +22,19 @@ impl<R: StateReplica> Fleet<R> {
         Self { peers: BTreeMap::new(), current: None }
     }
 
-    pub(super) fn insert(&mut self, vehicle: Address, peer: Peer<R>) {
+    pub(super) fn insert(&mut self, vehicle: Address, peer: VehiclePeer<R>) {
         self.peers.insert(vehicle, peer);
     }
 
-    pub(super) fn get(&self, vehicle: Address) -> Option<&Peer<R>> {
+    pub(super) fn get(&self, vehicle: Address) -> Option<&VehiclePeer<R>> {
         self.peers.get(&vehicle)
     }
 
-    pub(super) fn get_mut(&mut self, vehicle: Address) -> Option<&mut Peer<R>> {
+    pub(super) fn get_mut(&mut self, vehicle: Address) -> Option<&mut VehiclePeer<R>> {
         self.peers.get_mut(&vehicle)
     }
 
-    pub(super) fn first_mut(&mut self) -> Option<&mut Peer<R>> {
+    pub(super) fn first_mut(&mut self) -> Option<&mut VehiclePeer<R>> {
         self.peers.values_mut().next()
     }
 
@@ -55,12 +55,12 @@ impl<R: StateReplica> Fleet<R> {
         self.current = Some(vehicle);
     }
 
-    pub(super) fn current_mut(&mut self) -> Option<&mut Peer<R>> {
+    pub(super) fn current_mut(&mut self) -> Option<&mut VehiclePeer<R>> {
         self.current.and_then(|a| self.peers.get_mut(&a))
     }
 
     /// The vehicle whose turn occupies the medium.
-    fn engaged(&self) -> Option<&Peer<R>> {
+    fn engaged(&self) -> Option<&VehiclePeer<R>> {
         self.current.and_then(|a| self.peers.get(&a)).filter(|p| p.master.is_engaged())
     }
 
@@ -90,8 +90,12 @@ impl<R: StateReplica> Fleet<R> {
         self.longest_waiting(|p| p.has_reason_to_transmit(now))
     }
 
-    fn longest_waiting(&self, is_due: impl Fn(&Peer<R>) -> bool) -> Option<Address> {
-        self.peers.values().filter(|p| is_due(p)).min_by_key(|p| (p.master.begun(), p.address())).map(Peer::address)
+    fn longest_waiting(&self, is_due: impl Fn(&VehiclePeer<R>) -> bool) -> Option<Address> {
+        self.peers
+            .values()
+            .filter(|p| is_due(p))
+            .min_by_key(|p| (p.master.begun(), p.address()))
+            .map(VehiclePeer::address)
     }
 
     /// When the next turn may be granted; `discovery` is when the next discovery call is due.
@@ -100,7 +104,7 @@ impl<R: StateReplica> Fleet<R> {
             return peer.master.next_wakeup(false);
         }
         let is_alone = self.peers.len() == 1;
-        let due = |p: &Peer<R>| {
+        let due = |p: &VehiclePeer<R>| {
             let at = p.master.next_wakeup(p.has_slots_to_send())?;
             Some(if is_alone { at } else { at.max(p.master.retry_at()) })
         };
@@ -109,6 +113,6 @@ impl<R: StateReplica> Fleet<R> {
 
     /// When a frame is next due that goes out without a turn.
     pub(super) fn next_without_turn(&self) -> Option<Instant> {
-        self.peers.values().filter_map(Peer::next_reason).min()
+        self.peers.values().filter_map(VehiclePeer::next_reason).min()
     }
 }

@@ -1,7 +1,7 @@
 //! The surface's end of the link.
 //!
-//! [`SurfaceLink`] joins parts that own their state: `fleet` (the known vehicles, each a `peer`), `discovery` (calls for
-//! unknown ones), `polled` (cycles of a modem that polls). `transmit` decides when a frame goes out.
+//! [`SurfaceLink`] joins parts that own their state: `fleet` (the known vehicles, each a `peer`), `discovery` (calls
+//! for unknown ones), `polled` (cycles of a modem that polls). `transmit` decides when a frame goes out.
 
 mod config;
 mod discovery;
@@ -26,7 +26,7 @@ use crate::time::Instant;
 use crate::wire::{Address, Envelope, Seal};
 use discovery::Discovery;
 use fleet::Fleet;
-use peer::{Peer, Ready, room_for_slot};
+use peer::{Ready, VehiclePeer, room_for_slot};
 use std::collections::VecDeque;
 
 /// A frame in the modem.
@@ -68,7 +68,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             shares: ClassShares::new(config.shares),
             turn: VecDeque::new(),
             in_modem: VecDeque::new(),
-            discovery: Discovery::new(config.call_every, is_any_known, config.master.max_propagation, now),
+            discovery: Discovery::new(config.discovery_period, is_any_known, config.master.max_propagation, now),
             cycle: polled::Cycles::default(),
             series,
             random,
@@ -85,7 +85,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     fn add(&mut self, vehicle: Address, now: Instant) {
         let seed = crate::random::next(&mut self.random);
         let c = &self.config;
-        let peer = Peer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
+        let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
         self.fleet.insert(vehicle, peer);
     }
 
@@ -100,7 +100,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 
     /// Frames that no known vehicle has sent, or that could not be read.
-    pub fn strangers(&self) -> u64 {
+    pub fn unknown_senders(&self) -> u64 {
         self.unknown_senders
     }
 
@@ -157,7 +157,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         let envelope = match Envelope::decode(bytes, |to| to == Address::SURFACE) {
             Ok(envelope) if envelope.header.from.is_vehicle() => envelope,
-            Ok(_) => return self.drop_unknown(DropReason::Stranger),
+            Ok(_) => return self.drop_unknown(DropReason::UnknownSender),
             Err(e) => return self.drop_unknown(e.into()),
         };
         let from = envelope.header.from;
@@ -166,7 +166,7 @@ impl<R: StateReplica> SurfaceLink<R> {
             return self.handle_call_answer(from, now);
         }
         let is_current = self.fleet.is_current(from);
-        let Some(peer) = self.fleet.get_mut(from) else { return self.drop_unknown(DropReason::Stranger) };
+        let Some(peer) = self.fleet.get_mut(from) else { return self.drop_unknown(DropReason::UnknownSender) };
         peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);
         if peer.resync_if_out_of_step(now) {
             if is_current && !self.turn.is_empty() {

@@ -92,8 +92,8 @@ impl<R: StateReplica> SurfaceLink<R> {
         true
     }
 
-    /// The next frame for a modem that does half duplex by itself: one goes out whenever there is a reason and its pool has
-    /// room.
+    /// The next frame for a modem that does half duplex by itself: one goes out whenever there is a reason and its pool
+    /// has room.
     fn poll_pool(&mut self, pool_frames: u32, now: Instant) -> Option<Transmit> {
         if self.in_modem.len() >= pool_frames as usize {
             return None;
@@ -105,8 +105,8 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 }
 
-/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while every
-/// one, so that the numbers of unacknowledged frames do not run out.
+/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while
+/// every one, so that the numbers of unacknowledged frames do not run out.
 fn is_hello_due(unanswered: u32) -> bool {
     unanswered >= 2 && (unanswered.is_multiple_of(2) || unanswered >= 16)
 }

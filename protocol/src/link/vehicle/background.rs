@@ -1,20 +1,20 @@
 //! Background streams: content that uses the spare capacity of the link, in the operator's order.
 
-use super::content::Content;
+use super::content::VehicleContent;
 use super::planes::PlaneOut;
 use crate::map::StateSource;
 use crate::schedule::{BitBudget, Extra};
 use crate::time::Instant;
 
-impl<S: StateSource> Content<S> {
+impl<S: StateSource> VehicleContent<S> {
     /// Whether the waiting cells of the map are themselves a background stream.
     pub(super) fn is_refining(&self) -> bool {
         self.spend.has(Extra::Finer) && self.source.is_refining()
     }
 
-    /// The background streams that wait and may be sent now. There is spare capacity while less than half of the budget's
-    /// window was used, so that urgent content that comes up next finds room. While finer cells wait, the streams that the
-    /// operator lists before them may be sent too.
+    /// The background streams that wait and may be sent now. There is spare capacity while less than half of the
+    /// budget's window was used, so that urgent content that comes up next finds room. While finer cells wait, the
+    /// streams that the operator lists before them may be sent too.
     pub(super) fn extras(&self, budget: &BitBudget, now: Instant) -> impl Iterator<Item = Extra> {
         let (spare, refining) = (budget.is_plentiful(now), self.is_refining());
         let finer = self.spend.iter().position(|e| e == Extra::Finer).filter(|_| refining);

@@ -47,7 +47,7 @@ pub(super) struct FillContext<'a> {
 
 /// Everything that the vehicle sends, and the shares by which it is chosen.
 #[derive(Debug)]
-pub(super) struct Content<S> {
+pub(super) struct VehicleContent<S> {
     pub(super) source: S,
     pub(super) planes: Vec<PlaneOut>,
     pub(super) objects: ObjectSender,
@@ -56,7 +56,7 @@ pub(super) struct Content<S> {
     pub(super) status: StatusSender,
 }
 
-impl<S: StateSource> Content<S> {
+impl<S: StateSource> VehicleContent<S> {
     pub(super) fn new(source: S, shares: Shares, status_period: Duration, now: Instant) -> Self {
         Self {
             source,
@@ -85,11 +85,11 @@ impl<S: StateSource> Content<S> {
     }
 
     /// Whether the surface is known to hold the replicated state, its planes, and every object.
-    pub(super) fn is_settled(&self) -> bool {
-        self.source.is_settled() && self.planes().all(StateSource::is_settled) && self.objects.is_empty()
+    pub(super) fn is_converged(&self) -> bool {
+        self.source.is_converged() && self.planes().all(StateSource::is_converged) && self.objects.is_empty()
     }
 
-    /// Whether nothing waits that could be sent now.
+    /// Whether no content waits that could be sent now.
     pub(super) fn is_idle(&self, budget: &BitBudget, now: Instant) -> bool {
         self.source.is_quiet() && self.extras_are_quiet(budget, now) && self.objects.has_only_extra()
     }
@@ -100,11 +100,11 @@ impl<S: StateSource> Content<S> {
         self.source.next_due().into_iter().chain(planes).min()
     }
 
-    /// The likely backlog, for the operator.
+    /// The expected backlog, for the operator.
     fn backlog(&self, budget: &BitBudget, now: Instant) -> Backlog {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
         let others = self.shared_plane_backlog() + self.objects.backlog_bytes() + self.extra_backlog(budget, now);
-        Backlog { map_bytes: bytes(self.source.told_backlog_bytes()), other_bytes: bytes(others) }
+        Backlog { map_bytes: bytes(self.source.expected_backlog_bytes()), other_bytes: bytes(others) }
     }
 
     /// About how many bytes wait and may be sent.
@@ -130,7 +130,8 @@ impl<S: StateSource> Content<S> {
         None
     }
 
-    /// Fills a frame as far as possible: the shares choose the class, and within a class the most valuable chunk goes first.
+    /// Fills a frame as far as possible: the shares choose the class, and within a class the most valuable chunk goes
+    /// first.
     pub(super) fn fill(&mut self, builder: &mut FrameBuilder, context: &FillContext<'_>) -> Carried<S::Carried> {
         let mut carried = Carried::new();
         let mut unfit: Vec<Class> = Vec::new();

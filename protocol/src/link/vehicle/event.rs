@@ -6,8 +6,8 @@ use crate::object::ObjectId;
 /// An event of [`super::VehicleLink`] for its host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleEvent {
-    /// A new version of a slot came in. The host decides about it ([`super::VehicleLink::decide`]), makes the decision durable,
-    /// and confirms that with [`super::VehicleLink::handle_persisted`]; only then is it acknowledged.
+    /// A new version of a slot came in. The host decides about it ([`super::VehicleLink::decide`]), makes the decision
+    /// durable, and confirms that with [`super::VehicleLink::handle_persisted`]; only then is it acknowledged.
     Slot {
         /// The slot, also where its content is unreadable.
         id: SlotId,

@@ -1,7 +1,8 @@
 //! The vehicle's end of the link.
 //!
-//! [`VehicleLink`] joins parts that own their state: `content` (what waits to be sent), `repeat` (copies of the frames of a
-//! turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn` writes frames, `receive` handles them.
+//! [`VehicleLink`] joins parts that own their state: `content` (what waits to be sent), `repeat` (copies of the frames
+//! of a turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn` writes frames, `receive`
+//! handles them.
 
 mod background;
 mod config;
@@ -18,7 +19,7 @@ mod turn;
 pub use config::VehicleConfig;
 pub use event::VehicleEvent;
 
-use super::{LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
+use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
 use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, PlaneSource, StateSource};
@@ -26,7 +27,7 @@ use crate::object::ObjectId;
 use crate::schedule::{BitBudget, Shares, SpendOrder};
 use crate::time::Instant;
 use crate::wire::{Address, VehicleStatus};
-use content::{Carried, Content};
+use content::{Carried, VehicleContent};
 use discovery::CallReply;
 use repeat::Repeater;
 use std::collections::VecDeque;
@@ -37,9 +38,9 @@ use timing::SurfaceTiming;
 #[derive(Debug)]
 pub struct VehicleLink<S: StateSource = MapSource> {
     config: VehicleConfig,
-    pair: Pair<Carried<S::Carried>>,
+    pair: LinkPair<Carried<S::Carried>>,
     budget: BitBudget,
-    content: Content<S>,
+    content: VehicleContent<S>,
     inbox: SlotInbox,
     floor: Floor,
     repeater: Repeater,
@@ -53,13 +54,13 @@ pub struct VehicleLink<S: StateSource = MapSource> {
 }
 
 impl<S: StateSource> VehicleLink<S> {
-    /// An end without contact that replicates `source`. `seed` must be random for each run; `restored` is the state that
-    /// survived the last one.
+    /// An end without contact that replicates `source`. `seed` must be random for each run; `restored` is the state
+    /// that survived the last one.
     pub fn with_source(config: VehicleConfig, source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
         Self {
-            pair: Pair::new(config.mission, config.address, Address::SURFACE, config.authenticity.clone(), seed),
+            pair: LinkPair::new(config.mission, config.address, Address::SURFACE, config.authenticity.clone(), seed),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
-            content: Content::new(source, config.shares, config.status_period, now),
+            content: VehicleContent::new(source, config.shares, config.status_period, now),
             inbox: SlotInbox::restore(restored),
             floor: Floor::default(),
             repeater: Repeater::default(),
@@ -93,7 +94,8 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.planes()
     }
 
-    /// Selects the planes that are sent from now on; the others pause, and continue where they were when selected again.
+    /// Selects the planes that are sent from now on; the others pause, and continue where they were when selected
+    /// again.
     pub fn set_told_planes(&mut self, is_told: impl Fn(PlaneKind) -> bool) {
         self.repeater.forget();
         self.content.set_told_planes(is_told);
@@ -112,8 +114,8 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Whether the surface is known to hold the replicated state, its planes, and every object.
-    pub fn is_settled(&self) -> bool {
-        self.content.is_settled()
+    pub fn is_converged(&self) -> bool {
+        self.content.is_converged()
     }
 
     /// Sets the status to send next; its position and time are those at the moment of the call.
@@ -216,7 +218,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// When a frame of the surface was last received, in this pair of runs.
-    pub fn last_heard(&self) -> Option<Instant> {
+    pub fn last_received(&self) -> Option<Instant> {
         self.timing.last_received()
     }
 
@@ -269,8 +271,8 @@ impl<S: StateSource> VehicleLink<S> {
 }
 
 impl VehicleLink {
-    /// An end without contact that replicates a label map. `seed` must be random for each run; `restored` is the state that
-    /// survived the last one.
+    /// An end without contact that replicates a label map. `seed` must be random for each run; `restored` is the state
+    /// that survived the last one.
     pub fn new(
         config: VehicleConfig,
         codec: crate::map_codec::Codec,
@@ -281,7 +283,8 @@ impl VehicleLink {
         Self::with_source(config, MapSource::new(codec), seed, restored, now)
     }
 
-    /// Sets labels of cells; returns how many changed. Cells that the surface does not hold yet are sent when there is room.
+    /// Sets labels of cells; returns how many changed. Cells that the surface does not hold yet are sent when there is
+    /// room.
     pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
         let changed = self.content.source.set(cells, now);
         if changed > 0 {

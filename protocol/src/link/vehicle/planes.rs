@@ -1,6 +1,6 @@
 //! Planes of the map: what of them goes into a frame, and when they are worth a turn.
 
-use super::content::{Carried, Content, Part};
+use super::content::{Carried, Part, VehicleContent};
 use crate::map::{Cell, PlaneKind, PlaneSource, StateSource};
 use crate::schedule::Class;
 use crate::time::Instant;
@@ -24,7 +24,7 @@ impl PlaneOut {
     }
 }
 
-impl<S: StateSource> Content<S> {
+impl<S: StateSource> VehicleContent<S> {
     /// Replicates these planes beside the state, each with its part of the map's share in percent.
     pub(super) fn set_planes(&mut self, planes: impl IntoIterator<Item = (PlaneSource, u8)>) {
         let mut shares = [0; Class::PLANES.len()];

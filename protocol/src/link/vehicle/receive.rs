@@ -17,7 +17,7 @@ impl<S: StateSource> VehicleLink<S> {
         let us = self.config.address;
         let envelope = match Envelope::decode(bytes, |to| to == us || to == Address::EVERYBODY) {
             Ok(envelope) if envelope.header.from == Address::SURFACE => envelope,
-            Ok(_) => return self.pair.stats.drop(DropReason::Stranger),
+            Ok(_) => return self.pair.stats.drop(DropReason::UnknownSender),
             Err(e) => return self.pair.stats.drop(e.into()),
         };
         if envelope.header.to == Address::EVERYBODY {
@@ -71,7 +71,7 @@ impl<S: StateSource> VehicleLink<S> {
         if !CallReply::is_call(&self.config, envelope) {
             return self.pair.stats.drop(DropReason::Checksum);
         }
-        if self.pair.is_met() && self.last_heard().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
+        if self.pair.is_met() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
             return;
         }
         let grant = self.call_reply.handle_call(&self.config, &envelope.header, now);
@@ -87,7 +87,7 @@ impl<S: StateSource> VehicleLink<S> {
             // A hello does not acknowledge our frames, so it is not known which of them to repeat.
             self.repeater.forget();
         }
-        let grant = Grant::heard(quarters, header.remaining, &self.config.modem, now);
+        let grant = Grant::received(quarters, header.remaining, &self.config.modem, now);
         self.floor.handle_grant((quarters > 0).then_some(grant));
     }
 
@@ -121,7 +121,8 @@ impl<S: StateSource> VehicleLink<S> {
         self.answer_due = Some(now);
     }
 
-    /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second, by itself if need be.
+    /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second, by itself if
+    /// need be.
     fn owe_answer(&mut self, now: Instant) {
         if matches!(self.config.modem.access, Access::ModemOwned { .. })
             && (self.pair.unstated() > 0 || self.pair.must_greet())

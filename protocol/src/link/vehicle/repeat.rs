@@ -1,7 +1,7 @@
 //! Repetition of frames, byte for byte, to save the turn that a loss would cost.
 //!
-//! A turn ends with copies of its frames as long as a copy costs less airtime than the turn it is likely to save, and begins
-//! with the frames of the previous turn that the surface has not acknowledged.
+//! A turn ends with copies of its frames as long as a copy costs less airtime than the turn it is likely to save, and
+//! begins with the frames of the previous turn that the surface has not acknowledged.
 
 use crate::mac::{Access, ModemProfile};
 use std::collections::VecDeque;
@@ -44,8 +44,8 @@ impl Repeater {
     const MAX_KEPT: usize = 64;
     const MAX_COPIES: i32 = 6;
 
-    /// Begins a turn. Where turns alternate, the surface has transmitted since the end of our last turn, so it has missed every
-    /// frame after `horizon`. If these are few and no other frame is outstanding, they are queued again.
+    /// Begins a turn. Where turns alternate, the surface has transmitted since the end of our last turn, so it has
+    /// missed every frame after `horizon`. If these are few and no other frame is outstanding, they are queued again.
     pub(super) fn begin_turn(&mut self, horizon: u64, outstanding: u64, may_repeat: bool) {
         self.sent.retain(|s| s.number > horizon);
         self.new_frames = 0;
@@ -66,8 +66,8 @@ impl Repeater {
         self.queue.clear();
     }
 
-    /// The next copy, and whether the turn ends with it. Copies at the beginning of a turn may be known to the surface by now,
-    /// so a new frame always follows them.
+    /// The next copy, and whether the turn ends with it. Copies at the beginning of a turn may be known to the surface
+    /// by now, so a new frame always follows them.
     pub(super) fn pop(&mut self) -> Option<(Vec<u8>, bool)> {
         let bytes = self.queue.pop_front()?;
         Some((bytes, self.queue.is_empty() && self.new_frames > 0))
@@ -88,10 +88,10 @@ impl Repeater {
         self.new_frames
     }
 
-    /// How often a turn of `frames` frames, `bytes` in all, is sent when nothing new is left: another copy is sent as long as
-    /// it takes less time than the next turn would, times the probability that it makes that turn needless. There are no
-    /// copies where the budget limits the link, or where frames of earlier turns are outstanding: then another turn is needed
-    /// anyway.
+    /// How often a turn of `frames` frames, `bytes` in all, is sent when nothing new is left: another copy is sent as
+    /// long as it takes less time than the next turn would, times the probability that it makes that turn needless.
+    /// There are no copies where the budget limits the link, or where frames of earlier turns are outstanding: then
+    /// another turn is needed anyway.
     pub(super) fn copies(&self, frames: u32, bytes: usize, terms: &RepeatTerms) -> u32 {
         let modem = &terms.modem;
         let is_covered = terms.outstanding <= self.sent.len() as u64;
@@ -106,8 +106,8 @@ impl Repeater {
         (1..Self::MAX_COPIES).find(|&copies| !pays_off(copies)).unwrap_or(Self::MAX_COPIES) as u32
     }
 
-    /// Keeps a new frame of this turn. If it is the last new one, `copies` further frames fill the rest of the turn: the kept
-    /// frames in turn, ending with this one, whose header announces how many follow.
+    /// Keeps a new frame of this turn. If it is the last new one, `copies` further frames fill the rest of the turn:
+    /// the kept frames in turn, ending with this one, whose header announces how many follow.
     pub(super) fn keep(&mut self, number: u64, bytes: &[u8], copies: Option<u32>) {
         self.new_frames += 1;
         if self.sent.len() == Self::MAX_KEPT {

@@ -23,8 +23,8 @@ struct FramePlan {
 }
 
 impl<S: StateSource> VehicleLink<S> {
-    /// The next frame, if it is our turn, there is a reason to transmit and the budget allows it. The host calls this after
-    /// every event and at [`Self::poll_timeout`] until it returns `None`.
+    /// The next frame, if it is our turn, there is a reason to transmit and the budget allows it. The host calls this
+    /// after every event and at [`Self::poll_timeout`] until it returns `None`.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let modem = self.config.modem;
         if self.content.handle_timeout(now) {
@@ -34,7 +34,7 @@ impl<S: StateSource> VehicleLink<S> {
             self.end_turn();
         }
         let open = self.floor.frames(&modem, now).min(u32::from(u8::MAX));
-        let nobody = !self.pair.has_heard() && !self.call_reply.is_pending();
+        let nobody = !self.pair.has_contact() && !self.call_reply.is_pending();
         if open == 0 || nobody || !self.has_reason_to_transmit(now) {
             return None;
         }
@@ -108,8 +108,8 @@ impl<S: StateSource> VehicleLink<S> {
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
-    /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and then in
-    /// every eighth frame.
+    /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and
+    /// then in every eighth frame.
     fn ack_room(&self, is_last_new: bool) -> usize {
         const ACK_INTERVAL: usize = 8;
         let size = self.config.modem.frame_bytes;

@@ -1,7 +1,7 @@
 //! The parameters of the `context` coder, as a program that trains them needs them.
 //!
-//! A training run codes changes with a [`TrainingCoder`], counts how often each decision was `true`, sets the estimates of a
-//! [`TrainablePrior`] from the counts, and finally takes over the weights that the coder has learnt.
+//! A training run codes changes with a [`TrainingCoder`], counts how often each decision was `true`, sets the estimates
+//! of a [`TrainablePrior`] from the counts, and finally takes over the weights that the coder has learnt.
 
 use super::arith::BitCoder;
 use super::canvas::Canvas;
@@ -13,7 +13,7 @@ use crate::grid::{LabelGrid, Rect};
 use crate::map_codec::Plane;
 use crate::map_codec::lattice::Lattice;
 
-pub use super::slot::BitEstimate;
+pub use super::estimate::BitEstimate;
 pub use super::stage::VisitCounts;
 
 /// Kinds of decision of the coder, each with its own parameters.
@@ -47,7 +47,7 @@ impl TrainablePrior {
         }
     }
 
-    /// Takes over the weights and correction curves that a coder has learnt.
+    /// Takes over the weights and correction apms that a coder has learnt.
     pub fn take_weights(&mut self, coder: &mut TrainingCoder) {
         for (stage, prior) in coder.stages().into_iter().zip(self.stages()) {
             stage.teach(prior);
@@ -69,7 +69,7 @@ impl TrainingCoder {
         Self(Model::new(&prior.0))
     }
 
-    /// Takes over the weights and correction curves that `before` has learnt.
+    /// Takes over the weights and correction apms that `before` has learnt.
     pub fn carry_weights(&mut self, before: &Self) {
         self.0.calm.carry(&before.0.calm);
         self.0.flip.carry(&before.0.flip);

@@ -32,7 +32,7 @@ impl ReportedBacklog {
 
 /// Bytes that have come in so far, modulo 4 GiB.
 fn received(stats: &LinkStats) -> Backlog {
-    let of = |class| stats.heard_by_class.get(&class).copied().unwrap_or_default();
+    let of = |class| stats.received_by_class.get(&class).copied().unwrap_or_default();
     let other: u64 = Class::PLANES.into_iter().chain([Class::Exemplar]).map(of).sum();
     Backlog { map_bytes: of(Class::Map) as u32, other_bytes: other as u32 }
 }
@@ -44,12 +44,12 @@ mod tests {
     #[test]
     fn bytes_received_after_the_report_reduce_the_backlog() {
         let (mut stats, now) = (LinkStats::default(), Instant::default());
-        stats.hear(Class::Map, 900, now);
+        stats.receive(Class::Map, 900, now);
         let reported = ReportedBacklog::new(Backlog { map_bytes: 500, other_bytes: 40 }, &stats, now);
-        stats.hear(Class::Map, 200, now);
-        stats.hear(Class::Depth, 30, now);
-        stats.hear(Class::Curiosity, 20, now);
-        stats.hear(Class::Status, 50, now);
+        stats.receive(Class::Map, 200, now);
+        stats.receive(Class::Depth, 30, now);
+        stats.receive(Class::Curiosity, 20, now);
+        stats.receive(Class::Status, 50, now);
         assert_eq!(reported.left(&stats), (Backlog { map_bytes: 300, other_bytes: 0 }, now));
     }
 }

@@ -1,7 +1,7 @@
 //! One vehicle as the surface knows it.
 //!
-//! [`Peer`] joins parts that own their state: `content` (what the vehicle has sent), `timing` (its clock), [`Contact`] (when it
-//! was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
+//! [`VehiclePeer`] joins parts that own their state: `content` (what the vehicle has sent), `timing` (its clock),
+//! [`Contact`] (when it was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
 
 mod backlog;
 mod content;
@@ -15,7 +15,7 @@ pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
 use crate::directive::{Slot, SlotId, SlotOutbox};
-use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkStats, Pair, SurfaceEvent};
+use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
 use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
@@ -57,10 +57,10 @@ impl Contact {
 
 /// A vehicle as the surface knows it.
 #[derive(Debug)]
-pub(super) struct Peer<R> {
+pub(super) struct VehiclePeer<R> {
     /// Grants turns to the vehicle.
     pub(super) master: Master,
-    pair: Pair<Carried>,
+    pair: LinkPair<Carried>,
     outbox: SlotOutbox,
     content: PeerContent<R>,
     timing: VehicleTiming,
@@ -70,7 +70,7 @@ pub(super) struct Peer<R> {
     is_out_of_step: bool,
 }
 
-impl<R: StateReplica> Peer<R> {
+impl<R: StateReplica> VehiclePeer<R> {
     pub(super) fn new(
         mission: MissionId,
         vehicle: Address,
@@ -82,7 +82,7 @@ impl<R: StateReplica> Peer<R> {
     ) -> Self {
         Self {
             master: Master::new(config, now),
-            pair: Pair::new(mission, Address::SURFACE, vehicle, authenticity, seed),
+            pair: LinkPair::new(mission, Address::SURFACE, vehicle, authenticity, seed),
             outbox: SlotOutbox::new(series),
             content: PeerContent::new(),
             timing: VehicleTiming::default(),
@@ -163,7 +163,7 @@ impl<R: StateReplica> Peer<R> {
         for (carried, _) in fates.iter().filter(|(_, delivered)| *delivered) {
             for &(id, version, bytes) in carried {
                 self.pair.stats.deliver(id.class(), bytes, now);
-                self.outbox.mark_heard(id, version, now);
+                self.outbox.mark_received(id, version, now);
             }
         }
     }
@@ -183,7 +183,7 @@ impl<R: StateReplica> Peer<R> {
             overhead = overhead.saturating_sub(chunk.payload.len());
             self.handle_chunk(&chunk, number, now, events);
         }
-        self.pair.stats.hear(Class::Overhead, overhead, now);
+        self.pair.stats.receive(Class::Overhead, overhead, now);
         if self.content.map_version() != version {
             events.push_back(SurfaceEvent::MapChanged(self.address()));
         }
@@ -197,7 +197,7 @@ impl<R: StateReplica> Peer<R> {
         events: &mut VecDeque<SurfaceEvent>,
     ) {
         let vehicle = self.address();
-        self.pair.stats.hear(class_of(chunk), chunk.payload.len(), now);
+        self.pair.stats.receive(class_of(chunk), chunk.payload.len(), now);
         let outcome = self.content.handle_chunk(vehicle, number, chunk, &self.pair.stats, now, events);
         self.is_out_of_step |= outcome.is_out_of_step();
         if !outcome.is_accepted() {
@@ -205,7 +205,7 @@ impl<R: StateReplica> Peer<R> {
         }
         if chunk.kind == ChunkKind::Report {
             let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
-            events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotSettled(vehicle, id)));
+            events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotDecided(vehicle, id)));
         }
         if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {
             events.push_back(SurfaceEvent::Status(vehicle));

@@ -1,7 +1,7 @@
 //! Frames that go out without a turn, through a modem that does half duplex by itself.
 
 use super::turn::Ready;
-use super::{Contact, Peer};
+use super::{Contact, VehiclePeer};
 use crate::mac::ModemProfile;
 use crate::map::StateReplica;
 use crate::schedule::{BitBudget, ClassShares};
@@ -35,7 +35,7 @@ impl Contact {
     }
 }
 
-impl<R: StateReplica> Peer<R> {
+impl<R: StateReplica> VehiclePeer<R> {
     fn must_greet(&self, now: Instant) -> bool {
         let is_doubtful = !self.pair.is_met() || self.contact.is_silent(now) || self.pair.is_full();
         is_doubtful && now >= self.contact.hello_due

@@ -33,7 +33,7 @@ impl VehicleTiming {
     /// `heard`, received `held` before.
     pub(super) fn round_trip(&self, heard: u8, held: Duration, began: Instant) -> Option<Duration> {
         let sent = self.sent.iter().rev().find(|(number, _)| *number as u8 == heard).map(|(_, at)| *at)?;
-        let is_exact = held < Stamp::LONGEST_HELD;
+        let is_exact = held < Stamp::MAX_HELD;
         (is_exact && sent + held <= began).then(|| began.since(sent).saturating_sub(held))
     }
 

@@ -1,6 +1,6 @@
 //! The frames of the surface's turn.
 
-use super::{Carried, LastTurn, Peer};
+use super::{Carried, LastTurn, VehiclePeer};
 use crate::directive::PendingSlot;
 use crate::link::{FrameNumber, Transmit, TransmitKind};
 use crate::mac::{Grant, ModemProfile};
@@ -11,7 +11,7 @@ use crate::wire::{ChunkKind, FrameKind, Stamp, room_for_payload};
 
 /// Bytes of acknowledgement that every frame of the surface has room for.
 const SHORT_ACK: usize = 2;
-/// Bytes of a frame that a slot can not have: header, turn, a short acknowledgement, chunk header.
+/// Bytes of a frame that no slot can use: header, turn, a short acknowledgement, chunk header.
 const SLOT_OVERHEAD: usize = 9 + 1 + SHORT_ACK + 1;
 /// Frames smaller than this have no room for a stamp beside a slot.
 const SMALL_FRAME: usize = 48;
@@ -29,12 +29,12 @@ pub(in crate::link::surface) struct Ready {
     pub(in crate::link::surface) number: Option<FrameNumber>,
 }
 
-/// What the next turn will be made of: the slots of each frame.
+/// The slots of each frame of a turn.
 pub(super) type TurnPlan = Vec<Vec<PendingSlot>>;
 
-impl<R: StateReplica> Peer<R> {
-    /// The frames of a turn: the slots that wait and did not go out after `again_before`, then a grant; each so often that one
-    /// gets through.
+impl<R: StateReplica> VehiclePeer<R> {
+    /// Plans a turn: the slots that wait and were not sent after `again_before`, then a grant. Each is repeated as
+    /// often as it takes for one copy to get through.
     pub(in crate::link::surface) fn plan_turn(
         &self,
         modem: &ModemProfile,
@@ -84,7 +84,7 @@ impl<R: StateReplica> Peer<R> {
         turn
     }
 
-    /// Bits on air that a frame with these slots takes at most.
+    /// The most bits on air that a frame with these slots takes.
     pub(in crate::link::surface) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile) -> u64 {
         const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
         let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
@@ -113,7 +113,7 @@ impl<R: StateReplica> Peer<R> {
         builder.set_remaining(remaining);
         let mut carried = Carried::new();
         for slot in slots {
-            // As old as it is when this frame leaves.
+            // The age of a fix is that at the start of this transmission.
             let Some(bytes) = self.outbox.encode(slot.id, slot.version, at) else { continue };
             if room_for_payload(builder.room()) >= bytes.len() && builder.push(ChunkKind::Slot, &bytes) {
                 self.outbox.mark_on_air(slot.id, slot.version, at);

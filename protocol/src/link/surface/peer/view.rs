@@ -1,6 +1,6 @@
-//! What the surface's host sees of a vehicle.
+//! The surface's view of a vehicle, for its host.
 
-use super::Peer;
+use super::VehiclePeer;
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// A read-only view of a vehicle for the host.
 #[derive(Debug)]
-pub struct PeerView<'a, R: StateReplica = Replica>(pub(in crate::link::surface) &'a Peer<R>);
+pub struct PeerView<'a, R: StateReplica = Replica>(pub(in crate::link::surface) &'a VehiclePeer<R>);
 
 impl<R: StateReplica> Clone for PeerView<'_, R> {
     fn clone(&self) -> Self {
@@ -22,57 +22,57 @@ impl<R: StateReplica> Clone for PeerView<'_, R> {
 impl<R: StateReplica> Copy for PeerView<'_, R> {}
 
 impl<'a, R: StateReplica> PeerView<'a, R> {
-    /// The operator's copy of what the vehicle replicates.
+    /// The operator's copy of the replicated state.
     pub fn replica(&self) -> &'a R {
         &self.0.content.replica
     }
 
-    /// The operator's copy of a plane of the map; `None` while nothing of it was heard.
+    /// The operator's copy of a plane of the map; `None` before its first chunk.
     pub fn plane(&self, kind: PlaneKind) -> Option<&'a PlaneReplica> {
         self.0.content.planes.get(kind)
     }
 
-    /// Counts changes of what the vehicle replicates, planes included.
+    /// Counts changes of the replicated state and its planes.
     pub fn map_version(&self) -> u64 {
         self.0.content.map_version()
     }
 
-    /// The last status and when its position came in.
+    /// The last status, and when its pose came in.
     pub fn status(&self) -> Option<&'a (VehicleStatus, Instant)> {
         self.0.content.status.whole()
     }
 
-    /// What the vehicle had still to send by its last report, less what has come in since, and when that report came in.
+    /// The backlog of the last report less the bytes received since, and when that report came in.
     pub fn backlog(&self) -> Option<(Backlog, Instant)> {
         self.0.content.backlog.map(|reported| reported.left(self.stats()))
     }
 
-    /// When a frame was last taken.
-    pub fn heard(&self) -> Option<Instant> {
+    /// When a frame was last accepted.
+    pub fn last_received(&self) -> Option<Instant> {
         self.0.contact.last_received()
     }
 
-    /// When the next turn will be granted at the latest; `now` if that is due.
+    /// When the next turn is granted at the latest; `now` if it is due.
     pub fn next_contact(&self, now: Instant) -> Option<Instant> {
         self.0.master.next_wakeup(false).map(|at| at.max(now))
     }
 
-    /// Two-way propagation.
+    /// Two-way propagation time, once it was measured.
     pub fn round_trip(&self) -> Option<Duration> {
         self.0.master.round_trip()
     }
 
-    /// The vehicle's clock.
+    /// The vehicle's clock, once a stamp came in.
     pub fn clock(&self) -> Option<&'a ClockMap> {
         self.0.timing.clock()
     }
 
-    /// The slots that were issued and how far they have come.
+    /// The latest version of each issued slot, and how far it has come.
     pub fn slots(&self) -> impl Iterator<Item = &'a SlotProgress> + use<'a, R> {
         self.0.outbox.progress()
     }
 
-    /// Counters.
+    /// Counters and estimates of the link to this vehicle.
     pub fn stats(&self) -> &'a LinkStats {
         &self.0.pair.stats
     }

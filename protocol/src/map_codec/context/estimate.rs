@@ -1,6 +1,6 @@
 //! One adaptive probability.
 
-use super::logistic::odds;
+use super::logistic::logit;
 
 /// 65536 / (visits + 1.6).
 const RATE: [u32; 1024] = {
@@ -29,8 +29,8 @@ impl BitEstimate {
     /// One half, worth no decision.
     pub const BLANK: Self = Self { p: 1 << 31, visits: 0 };
 
-    pub(super) fn odds(self) -> i32 {
-        odds(self.p)
+    pub(super) fn logit(self) -> i32 {
+        logit(self.p)
     }
 
     pub(super) fn update(&mut self, bit: bool) {

@@ -1,44 +1,46 @@
-//! Which run of the peer we speak with: told by a hello, believed once a numbered frame proves it.
+//! The handshake: which run of the peer this end communicates with. A hello names a run, and a numbered frame proves
+//! it.
 
-use super::run::{Identity, Run};
+use super::run::{Identity, LinkRun};
 use crate::seal::SessionKey;
 use crate::wire::SessionId;
 use std::collections::VecDeque;
 
-/// What a hello leads to.
+/// The result of a hello.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Greeting {
-    /// The run we know.
+pub enum HandshakeOutcome {
+    /// It names the current run.
     Known,
-    /// A run that we did not know.
+    /// It names a new run.
     New,
-    /// A run that has ended: an old frame.
+    /// It names a run that has ended, so it is an old frame.
     Retired,
 }
 
-/// Runs toward one peer.
+/// The runs of both ends toward each other.
 ///
 /// The surface begins: its hello names its run. The vehicle answers with a hello that is sealed to that run and names a
-/// run of its own that is new for each run of the surface. So nothing that was sent to or by an earlier run of either end
-/// verifies any more. The vehicle keeps the run that it had until a numbered frame of the new one comes in: a hello alone,
-/// which may be late or replayed, changes nothing.
+/// run of its own, a new one for each run of the surface. Therefore no frame to or from an earlier run of either end
+/// verifies any more. The vehicle keeps its previous run until a numbered frame of the new one comes in: a hello alone,
+/// which may be late or replayed, has no effect.
 #[derive(Debug)]
-pub(super) struct Meeting<T> {
+pub(super) struct Handshake<T> {
     own: Identity,
-    run: Option<Run<T>>,
-    /// At the vehicle: what was answered to a hello, until a numbered frame proves that the surface means it.
-    offered: Option<Run<T>>,
-    /// At the vehicle: `run` is only good for hearing grants, since we have begun a new one.
+    run: Option<LinkRun<T>>,
+    /// At the vehicle: the run offered in answer to a hello, until a numbered frame proves that the surface has
+    /// accepted it.
+    offered: Option<LinkRun<T>>,
+    /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,
     retired: VecDeque<Identity>,
     random: u64,
 }
 
-impl<T> Meeting<T> {
-    /// Ended runs to remember.
+impl<T> Handshake<T> {
+    /// Ended runs that are remembered.
     const MEMORY: usize = 32;
 
-    /// Nobody was met; `seed` is random for each start of the program.
+    /// A handshake that has not begun; `seed` must be random for each start of the program.
     pub(super) fn new(seed: u64) -> Self {
         let mut random = seed;
         let own = fresh(&mut random);
@@ -49,15 +51,15 @@ impl<T> Meeting<T> {
         self.own
     }
 
-    pub(super) fn run(&self) -> Option<&Run<T>> {
+    pub(super) fn run(&self) -> Option<&LinkRun<T>> {
         self.run.as_ref()
     }
 
-    pub(super) fn run_mut(&mut self) -> Option<&mut Run<T>> {
+    pub(super) fn run_mut(&mut self) -> Option<&mut LinkRun<T>> {
         self.run.as_mut()
     }
 
-    pub(super) fn offered(&self) -> Option<&Run<T>> {
+    pub(super) fn offered(&self) -> Option<&LinkRun<T>> {
         self.offered.as_ref()
     }
 
@@ -65,26 +67,26 @@ impl<T> Meeting<T> {
         self.leaving
     }
 
-    /// At the vehicle: a hello of the surface. A new run is offered one of ours.
+    /// At the vehicle: handles a hello of the surface. A new run of the surface is offered a new run of ours.
     pub(super) fn handle_call(
         &mut self,
         peer: Identity,
         key: impl Fn(Identity, Identity) -> Option<SessionKey>,
-    ) -> Greeting {
+    ) -> HandshakeOutcome {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) && !self.leaving {
-            return Greeting::Known;
+            return HandshakeOutcome::Known;
         }
         if self.retired.contains(&peer) {
-            return Greeting::Retired;
+            return HandshakeOutcome::Retired;
         }
         if self.offered.as_ref().is_none_or(|r| r.peer != peer) {
             let own = fresh(&mut self.random);
-            self.offered = Some(Run::new(own, peer, key(own, peer)));
+            self.offered = Some(LinkRun::new(own, peer, key(own, peer)));
         }
-        Greeting::New
+        HandshakeOutcome::New
     }
 
-    /// At the vehicle: a numbered frame has come in the run that was offered.
+    /// At the vehicle: makes the offered run the current one, because a numbered frame of it came in.
     pub(super) fn accept_offered(&mut self) {
         if let Some(run) = self.offered.take() {
             self.own = run.own;
@@ -93,31 +95,31 @@ impl<T> Meeting<T> {
         }
     }
 
-    /// At the surface: a hello of the vehicle that is sealed to our run.
+    /// At the surface: handles a hello of the vehicle that is sealed to our run.
     pub(super) fn handle_answer(
         &mut self,
         peer: Identity,
         key: impl Fn(Identity, Identity) -> Option<SessionKey>,
-    ) -> Greeting {
+    ) -> HandshakeOutcome {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) {
-            return Greeting::Known;
+            return HandshakeOutcome::Known;
         }
         if self.retired.contains(&peer) {
-            return Greeting::Retired;
+            return HandshakeOutcome::Retired;
         }
-        self.replace(Run::new(self.own, peer, key(self.own, peer)));
-        Greeting::New
+        self.replace(LinkRun::new(self.own, peer, key(self.own, peer)));
+        HandshakeOutcome::New
     }
 
-    /// At the vehicle: begins a new run toward the run of the surface that we know.
+    /// At the vehicle: begins a new run toward the surface's current one.
     pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> Option<SessionKey>) {
         let Some(peer) = self.run.as_ref().map(|r| r.peer) else { return };
         let own = fresh(&mut self.random);
-        self.offered = Some(Run::new(own, peer, key(own, peer)));
+        self.offered = Some(LinkRun::new(own, peer, key(own, peer)));
         self.leaving = true;
     }
 
-    /// At the surface: begins a new run; the vehicle is to be greeted again.
+    /// At the surface: begins a new run, which a new handshake must introduce to the vehicle.
     pub(super) fn renew_surface(&mut self) {
         self.own = fresh(&mut self.random);
         if let Some(old) = self.run.take() {
@@ -125,7 +127,7 @@ impl<T> Meeting<T> {
         }
     }
 
-    fn replace(&mut self, run: Run<T>) {
+    fn replace(&mut self, run: LinkRun<T>) {
         let peer = run.peer;
         if let Some(old) = self.run.replace(run)
             && old.peer != peer
