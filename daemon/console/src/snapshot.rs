@@ -6,6 +6,7 @@ use axum::body::Bytes;
 use scenecast_config::Config;
 use scenecast_core::LatLon;
 use scenecast_core::drop_counts::dropped;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{OrderStatus, PlannerKind, SlotId, SlotProgress};
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
@@ -229,8 +230,8 @@ fn clock_ahead_s(clock: &ClockMap, now: Instant) -> f64 {
 fn status(s: &VehicleStatus, at: Instant) -> state::Status {
     state::Status {
         at_s: seconds(at),
-        x_m: s.x_m,
-        y_m: s.y_m,
+        x_m: s.position.x_m,
+        y_m: s.position.y_m,
         z_m: -s.depth_m,
         heading_deg: s.heading_deg,
         sigma_m: s.sigma_m,
@@ -245,9 +246,9 @@ fn status(s: &VehicleStatus, at: Instant) -> state::Status {
         autopilot_silent: s.autopilot_silent,
         reason: s.reason.name().map(str::to_owned),
         doing: doing(s),
-        waypoint: s.waypoint,
-        path: s.path.places.clone(),
-        path_goes_on: s.path.goes_on,
+        waypoint: s.waypoint.map(MapPoint::xy),
+        path: s.path.points.iter().copied().map(MapPoint::xy).collect(),
+        path_goes_on: s.path.continues,
         cells: s.explored_cells,
         labels: u32::from(s.labels),
         fix_age_s: s.fix_age_s,

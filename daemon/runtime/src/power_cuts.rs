@@ -7,6 +7,7 @@ use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Fix, OrderStatus, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
@@ -158,7 +159,11 @@ impl World {
                 self.surface.set_hold(auv, true, now).unwrap();
                 self.surface.set_budget(5000, None, None, now).unwrap();
             }
-            60 => drop(self.surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
+            60 => drop(
+                self.surface
+                    .send_fix(auv, Fix { position: WorldPoint::new(1.0, 1.0), sigma_m: 1.0, age_s: 0.1 }, now)
+                    .unwrap(),
+            ),
             90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
             120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
             150 => self.surface.set_budget(9000, None, None, now).unwrap(),

@@ -75,7 +75,7 @@ impl Desk {
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.album = Album::default();
         }
-        self.track.push_back((now, status.x_m, status.y_m));
+        self.track.push_back((now, status.position.x_m, status.position.y_m));
         if self.track.len() > Self::TRACK {
             self.track.pop_front();
         }

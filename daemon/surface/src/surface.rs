@@ -13,7 +13,7 @@ use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Trans
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::wire::{Address, Placement};
 use std::collections::{BTreeMap, VecDeque};
 
 /// What the surface tells its host.
@@ -279,8 +279,7 @@ impl Surface {
     pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
         let view = self.link.vehicle(vehicle)?;
         let (status, _) = view.status()?;
-        let at = (status.x_m, status.y_m);
-        Some(status.placement.map_or(at, |p| p.to_world(at)))
+        Some(Placement::map_to_world(status.placement, status.position).xy())
     }
 
     pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {

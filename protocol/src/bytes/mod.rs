@@ -8,4 +8,4 @@ mod steps;
 pub(crate) use bits::{BitReader, BitWriter};
 pub(crate) use number::{decimetres, put24};
 pub use reader::{Reader, Truncated};
-pub(crate) use steps::{minus, plus, put_pair, take_pair, take_width, width_of};
+pub(crate) use steps::{DecimetreStep, take_width, width_of};

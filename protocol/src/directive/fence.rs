@@ -1,7 +1,7 @@
 //! The fence: where the vehicle may be.
 
 use super::polygon::{Polygon, PolygonFault};
-use crate::bytes::{BitReader, BitWriter, minus, plus, put_pair, take_pair, take_width, width_of};
+use crate::bytes::{BitReader, BitWriter, DecimetreStep, take_width, width_of};
 use crate::coordinates::DecimetrePoint;
 
 /// The outline that the vehicle stays in, the keep-outs that it stays out of, and the return point; all in the world
@@ -85,7 +85,7 @@ impl Fence {
             }
         }
         let Some(home) = self.return_point else { return Ok(()) };
-        if DecimetrePoint::from_metres(home.metres().0, home.metres().1).is_none() {
+        if DecimetrePoint::nearest(home.to_world()).is_none() {
             return Err(FenceFault::ReturnTooFar);
         }
         if self.fence.as_ref().is_some_and(|f| !f.contains(home)) {
@@ -117,15 +117,15 @@ impl Fence {
         let outlines = || self.fence.iter().chain(self.keep_outs.iter().take(keep_outs));
         let first = outlines().next().and_then(|o| o.0.first()).copied();
         let Some(anchor) = first.or(self.return_point) else { return bits.into_bytes() };
-        put_pair(&mut bits, anchor, 24);
+        step_to(anchor).put(&mut bits, 24);
         for (i, outline) in outlines().enumerate() {
             put_outline(&mut bits, outline, anchor, i == 0);
         }
         if let Some(home) = self.return_point.filter(|_| first.is_some()) {
-            let step = minus(home, anchor);
+            let step = step_to(home).since(step_to(anchor));
             let width = width_of([step]);
             bits.put(u64::from(width), 5);
-            put_pair(&mut bits, step, width);
+            step.put(&mut bits, width);
         }
         bits.into_bytes()
     }
@@ -139,17 +139,17 @@ impl Fence {
         let mut read = Self::default();
         let outlines = u64::from(has_fence) + keep_outs;
         if outlines > 0 || has_return {
-            let anchor = take_pair(&mut bits, 24)?;
+            let anchor = DecimetreStep::take(&mut bits, 24)?;
             for i in 0..outlines {
                 let outline = take_outline(&mut bits, anchor, i == 0)?;
                 if has_fence && i == 0 { read.fence = Some(outline) } else { read.keep_outs.push(outline) }
             }
             read.return_point = match (has_return, outlines) {
                 (false, _) => None,
-                (true, 0) => Some(anchor),
+                (true, 0) => Some(point_at(anchor)),
                 (true, _) => {
                     let width = take_width(&mut bits)?;
-                    Some(plus(anchor, take_pair(&mut bits, width)?))
+                    Some(point_at(anchor.plus(DecimetreStep::take(&mut bits, width)?)))
                 }
             };
         }
@@ -160,15 +160,15 @@ impl Fence {
 fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: DecimetrePoint, is_first: bool) {
     let vertices = outline.0.get(..Polygon::MAX_VERTICES).unwrap_or(&outline.0);
     let before = std::iter::once(anchor).chain(vertices.iter().copied());
-    let steps: Vec<DecimetrePoint> =
-        vertices.iter().zip(before).map(|(&v, b)| minus(v, b)).skip(usize::from(is_first)).collect();
+    let steps = vertices.iter().zip(before).map(|(&v, b)| step_to(v).since(step_to(b)));
+    let steps: Vec<DecimetreStep> = steps.skip(usize::from(is_first)).collect();
     let width = width_of(steps.iter().copied());
     bits.put((vertices.len() as u64).saturating_sub(3), 5);
     bits.put(u64::from(width), 5);
-    steps.into_iter().for_each(|step| put_pair(bits, step, width));
+    steps.into_iter().for_each(|step| step.put(bits, width));
 }
 
-fn take_outline(bits: &mut BitReader<'_>, anchor: DecimetrePoint, is_first: bool) -> Option<Polygon> {
+fn take_outline(bits: &mut BitReader<'_>, anchor: DecimetreStep, is_first: bool) -> Option<Polygon> {
     let n = bits.take(5)? + 3;
     let width = take_width(bits)?;
     let mut vertices = Vec::with_capacity(n as usize);
@@ -177,9 +177,18 @@ fn take_outline(bits: &mut BitReader<'_>, anchor: DecimetrePoint, is_first: bool
     }
     while (vertices.len() as u64) < n {
         let before = vertices.last().copied().unwrap_or(anchor);
-        vertices.push(plus(before, take_pair(bits, width)?));
+        vertices.push(before.plus(DecimetreStep::take(bits, width)?));
     }
-    Some(Polygon(vertices))
+    Some(Polygon(vertices.into_iter().map(point_at).collect()))
+}
+
+/// The step from the origin to a point.
+fn step_to(point: DecimetrePoint) -> DecimetreStep {
+    DecimetreStep { x_dm: point.east_dm, y_dm: point.north_dm }
+}
+
+fn point_at(step: DecimetreStep) -> DecimetrePoint {
+    DecimetrePoint { east_dm: step.x_dm, north_dm: step.y_dm }
 }
 
 #[cfg(test)]
@@ -188,7 +197,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn polygon(vertices: &[(i32, i32)]) -> Polygon {
-        Polygon(vertices.iter().map(|&(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm }).collect())
+        Polygon(vertices.iter().map(|&(x, y)| DecimetrePoint::new(x, y)).collect())
     }
 
     fn square(x: i32, y: i32, side: i32) -> Polygon {
@@ -200,7 +209,7 @@ mod tests {
         let fence = Fence {
             fence: Some(square(-100, 50, 400)),
             keep_outs: vec![polygon(&[(0, 100), (50, 100), (0, 180)])],
-            return_point: Some(DecimetrePoint { x_dm: -90, y_dm: 60 }),
+            return_point: Some(DecimetrePoint::new(-90, 60)),
         };
         assert_eq!(fence.check(), Ok(()));
         let bytes = fence.to_bytes();
@@ -211,7 +220,7 @@ mod tests {
         assert_eq!(bytes, golden, "{bytes:02X?}");
         assert_eq!(Fence::from_bytes(&bytes), Some(fence));
         assert_eq!(Fence::default().to_bytes(), [0]);
-        let home = Fence { return_point: Some(DecimetrePoint { x_dm: 1, y_dm: -1 }), ..Fence::default() };
+        let home = Fence { return_point: Some(DecimetrePoint::new(1, -1)), ..Fence::default() };
         assert_eq!(home.to_bytes(), [0x04, 0, 0, 0x07, 0xFF, 0xFF, 0xFC]);
         assert_eq!(Fence::from_bytes(&home.to_bytes()), Some(home));
     }
@@ -220,10 +229,10 @@ mod tests {
     fn eight_vertices_and_a_return_point_fit_a_frame_of_64_bytes_under_a_key() {
         let r = 8_000.0f64;
         let octagon = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
-        let vertices = octagon
-            .map(|a| DecimetrePoint { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
+        let vertices =
+            octagon.map(|a| DecimetrePoint::new((r * a.cos()) as i32 - 8_000_000, (r * a.sin()) as i32 + 7_000_000));
         let fence = Polygon(vertices.collect());
-        let return_point = Some(DecimetrePoint { x_dm: -8_000_000, y_dm: 7_000_000 });
+        let return_point = Some(DecimetrePoint::new(-8_000_000, 7_000_000));
         let fence = Fence { fence: Some(fence), keep_outs: Vec::new(), return_point };
         assert_eq!(fence.check(), Ok(()));
         // Five bytes of the slot's head, 13 of the frame's header, 8 of a tag.
@@ -233,7 +242,7 @@ mod tests {
     #[test]
     fn a_fence_that_no_vehicle_could_obey_is_refused_by_what_is_wrong() {
         let fence = |f: Polygon, k: &[Polygon], home: Option<(i32, i32)>| {
-            let return_point = home.map(|(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm });
+            let return_point = home.map(|(x, y)| DecimetrePoint::new(x, y));
             Fence { fence: Some(f), keep_outs: k.to_vec(), return_point }.check()
         };
         let field = square(0, 0, 100);
@@ -266,7 +275,7 @@ mod tests {
         ) {
             let mut outlines: Vec<Polygon> = outlines.iter().map(|o| polygon(o)).collect();
             let fence = if has_fence { outlines.pop() } else { None };
-            let return_point = home.map(|(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm });
+            let return_point = home.map(|(x, y)| DecimetrePoint::new(x, y));
             let fence = Fence { fence, keep_outs: outlines, return_point };
             prop_assert_eq!(Fence::from_bytes(&fence.to_bytes()), Some(fence));
         }

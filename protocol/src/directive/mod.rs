@@ -12,7 +12,6 @@ mod settings;
 mod tuning;
 mod utility;
 
-pub use crate::coordinates::DecimetrePoint as Place;
 pub use decision::{SlotReport, SlotState};
 pub use fence::{Fence, FenceFault};
 pub use figure::Figure;

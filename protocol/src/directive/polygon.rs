@@ -36,7 +36,7 @@ impl Polygon {
         if !(3..=Self::MAX_VERTICES).contains(&n) {
             return Err(PolygonFault::Vertices(n));
         }
-        if let Some(far) = self.0.iter().position(|p| !p.is_in_reach()) {
+        if let Some(far) = self.0.iter().position(|p| !p.is_in_range()) {
             return Err(PolygonFault::TooFar(far + 1));
         }
         let edges: Vec<(DecimetrePoint, DecimetrePoint)> = self.edges().collect();
@@ -74,8 +74,8 @@ impl Polygon {
             if cross(a, b, p) == 0 && is_between(a, b, p) {
                 return true;
             }
-            if (a.y_dm > p.y_dm) != (b.y_dm > p.y_dm) {
-                inside ^= (cross(a, b, p) > 0) == (b.y_dm > a.y_dm);
+            if (a.north_dm > p.north_dm) != (b.north_dm > p.north_dm) {
+                inside ^= (cross(a, b, p) > 0) == (b.north_dm > a.north_dm);
             }
         }
         inside
@@ -90,13 +90,13 @@ impl Polygon {
 /// Twice the area of the triangle, positive if it turns left.
 fn cross(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> i64 {
     let d = |p: i32, q: i32| i64::from(p) - i64::from(q);
-    d(b.x_dm, a.x_dm) * d(c.y_dm, a.y_dm) - d(b.y_dm, a.y_dm) * d(c.x_dm, a.x_dm)
+    d(b.east_dm, a.east_dm) * d(c.north_dm, a.north_dm) - d(b.north_dm, a.north_dm) * d(c.east_dm, a.east_dm)
 }
 
 /// Whether `p` lies in the bounding box of `a` and `b`.
 fn is_between(a: DecimetrePoint, b: DecimetrePoint, p: DecimetrePoint) -> bool {
-    (a.x_dm.min(b.x_dm)..=a.x_dm.max(b.x_dm)).contains(&p.x_dm)
-        && (a.y_dm.min(b.y_dm)..=a.y_dm.max(b.y_dm)).contains(&p.y_dm)
+    (a.east_dm.min(b.east_dm)..=a.east_dm.max(b.east_dm)).contains(&p.east_dm)
+        && (a.north_dm.min(b.north_dm)..=a.north_dm.max(b.north_dm)).contains(&p.north_dm)
 }
 
 /// Whether the path from `a` over `b` to `c` reverses its direction at `b`.
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     fn polygon(vertices: &[(i32, i32)]) -> Polygon {
-        Polygon(vertices.iter().map(|&(x_dm, y_dm)| DecimetrePoint { x_dm, y_dm }).collect())
+        Polygon(vertices.iter().map(|&(x, y)| DecimetrePoint::new(x, y)).collect())
     }
 
     #[test]
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(polygon(&[(0, 10), (10, 10), (10, 0), (0, 0)]).check(), Ok(()));
         assert_eq!(polygon(&[(0, 0), (40, 0), (40, 40), (20, 10), (0, 40)]).check(), Ok(()), "not convex");
         assert_eq!(polygon(&[(0, 0), (5, 0), (10, 0), (10, 10)]).check(), Ok(()), "a vertex on a straight edge");
-        let far = DecimetrePoint::REACH_DM;
+        let far = DecimetrePoint::MAX_DM;
         assert_eq!(polygon(&[(-far, -far), (far, -far), (far, far), (-far, far)]).check(), Ok(()));
     }
 
@@ -147,7 +147,7 @@ mod tests {
     fn a_place_is_inside_on_the_edge_or_outside() {
         let u = polygon(&[(0, 0), (30, 0), (30, 30), (20, 30), (20, 10), (10, 10), (10, 30), (0, 30)]);
         assert_eq!(u.check(), Ok(()));
-        for (x_dm, y_dm, inside) in [
+        for (x, y, inside) in [
             (5, 20, true),
             (15, 20, false),
             (25, 20, true),
@@ -157,7 +157,7 @@ mod tests {
             (31, 5, false),
             (-1, 30, false),
         ] {
-            assert_eq!(u.contains(DecimetrePoint { x_dm, y_dm }), inside, "{x_dm}, {y_dm}");
+            assert_eq!(u.contains(DecimetrePoint::new(x, y)), inside, "{x}, {y}");
         }
     }
 }

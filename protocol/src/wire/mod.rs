@@ -14,7 +14,6 @@ mod stamp;
 mod status;
 
 pub use crate::bytes::{Reader, Truncated};
-pub use crate::directive::{SlotReport, SlotState};
 pub use ack::{AckStatement, MAX_WINDOW};
 pub use backlog::Backlog;
 pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};

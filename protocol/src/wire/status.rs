@@ -4,6 +4,7 @@ use super::backlog::Backlog;
 use super::path::PlannedPath;
 use super::placement::Placement;
 use crate::bytes::{Reader, Truncated, decimetres, put24};
+use crate::coordinates::MapPoint;
 use crate::directive::{SLOTS, SlotId, SlotReport, SlotState};
 
 /// The activity of the vehicle.
@@ -119,10 +120,8 @@ pub struct VehicleStatus {
     pub autopilot_silent: bool,
     /// The reason for the mode.
     pub reason: ModeReason,
-    /// East of the origin, metres.
-    pub x_m: f64,
-    /// North of the origin, metres.
-    pub y_m: f64,
+    /// The estimated position.
+    pub position: MapPoint,
     /// Depth below the water surface in metres.
     pub depth_m: f64,
     /// Heading clockwise from north in degrees, 0..360.
@@ -132,7 +131,7 @@ pub struct VehicleStatus {
     /// Seconds since the last fix that was used; `None` before the first.
     pub fix_age_s: Option<f64>,
     /// The next goal of the vehicle, in the map frame.
-    pub waypoint: Option<(f64, f64)>,
+    pub waypoint: Option<MapPoint>,
     /// The planned path after the waypoint; it is sent only with a waypoint.
     pub path: PlannedPath,
     /// Number of explored cells on the map.
@@ -172,6 +171,10 @@ impl From<Truncated> for StatusError {
     }
 }
 
+fn take_point(r: &mut Reader<'_>) -> Result<MapPoint, Truncated> {
+    Ok(MapPoint { x_m: f64::from(r.i24()?) / 10.0, y_m: f64::from(r.i24()?) / 10.0 })
+}
+
 /// A rate in bit/s as 12 bits of value and 4 bits of shift, rounded down.
 fn code_rate(bits_per_s: u32) -> u16 {
     let shift = (32 - bits_per_s.leading_zeros()).saturating_sub(12).min(15);
@@ -194,17 +197,17 @@ impl VehicleStatus {
         let waypoint = self.waypoint.filter(|_| room >= Self::POSE);
         let flags = u8::from(waypoint.is_some()) << 4 | u8::from(self.autopilot_silent) << 3;
         let mut out = vec![self.mode.code() << 5 | flags | self.reason as u8];
-        put24(&mut out, decimetres(self.x_m) as u32);
-        put24(&mut out, decimetres(self.y_m) as u32);
+        put24(&mut out, decimetres(self.position.x_m) as u32);
+        put24(&mut out, decimetres(self.position.y_m) as u32);
         out.extend_from_slice(&((self.depth_m * 10.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
         out.push(((self.heading_deg / 360.0 * 256.0).round() as i64 & 255) as u8);
         out.push((self.sigma_m * 4.0).round().clamp(0.0, 255.0) as u8);
         out.push(self.fix_age_s.map_or(255, |age| age.round().clamp(0.0, 254.0) as u8));
         put24(&mut out, self.explored_cells.min(0xFF_FFFF));
-        if let Some((x, y)) = waypoint {
-            put24(&mut out, decimetres(x) as u32);
-            put24(&mut out, decimetres(y) as u32);
-            out.extend(self.path.encode((x, y), room - Self::POSE));
+        if let Some(at) = waypoint {
+            put24(&mut out, decimetres(at.x_m) as u32);
+            put24(&mut out, decimetres(at.y_m) as u32);
+            out.extend(self.path.encode(at, room - Self::POSE));
         }
         out
     }
@@ -247,8 +250,7 @@ impl VehicleStatus {
         let head = r.u8()?;
         let mode = VehicleMode::ALL.get(usize::from(head >> 5)).copied().ok_or(StatusError::BadField)?;
         let reason = ModeReason::ALL.get(usize::from(head & 7)).copied().ok_or(StatusError::BadField)?;
-        let metres = |dm: i32| f64::from(dm) / 10.0;
-        let mut read = Self { mode, reason, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..self.clone() };
+        let mut read = Self { mode, reason, position: take_point(&mut r)?, ..self.clone() };
         read.depth_m = f64::from(r.u16()?) / 10.0;
         read.heading_deg = f64::from(r.u8()?) / 256.0 * 360.0;
         read.sigma_m = f64::from(r.u8()?) / 4.0;
@@ -257,7 +259,7 @@ impl VehicleStatus {
         (read.waypoint, read.path) = (None, PlannedPath::default());
         read.autopilot_silent = head & 0b1000 != 0;
         if head & 0b1_0000 != 0 {
-            let waypoint = (metres(r.i24()?), metres(r.i24()?));
+            let waypoint = take_point(&mut r)?;
             read.waypoint = Some(waypoint);
             if !r.rest().is_empty() {
                 let path = r.take(r.rest().len())?;

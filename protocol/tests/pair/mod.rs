@@ -3,7 +3,7 @@
 // Each test program uses a part of it.
 #![allow(dead_code)]
 
-use scenecast_protocol::directive::{Constraints, Slot, Utility};
+use scenecast_protocol::directive::{Constraints, Slot, SlotState, Utility};
 use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
@@ -13,7 +13,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;

@@ -3,7 +3,7 @@
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
 use crate::VirtualTime;
-use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, Transmit, VehicleConfig, VehicleEvent,
     VehicleLink,
@@ -11,7 +11,7 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Envelope, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
 use std::collections::BTreeMap;
 use std::time::Duration;

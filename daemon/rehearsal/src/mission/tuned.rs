@@ -3,10 +3,10 @@
 use super::{Mission, MissionOptions};
 use crate::World;
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SlotState;
 use scenecast_surface::SettingsOrder;
 use std::time::Duration;
 

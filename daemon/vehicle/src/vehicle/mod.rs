@@ -16,11 +16,12 @@ use super::steering::Steering;
 use course::Doing;
 use gallery::Gallery;
 use scene_model::exemplars::Exemplar as Picture;
-use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, Utility};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{PlannedPath, SlotState};
+use scenecast_protocol::wire::PlannedPath;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use tuning::Telling;
@@ -72,7 +73,7 @@ pub enum VehicleOutput {
     /// for later, and send nothing.
     Persist,
     /// Go there, metres east and north in the map's frame.
-    Waypoint(f64, f64),
+    Waypoint(MapPoint),
     /// Stay where you are.
     Hold,
     /// Come up.
@@ -111,7 +112,7 @@ pub struct Vehicle {
     explored: u32,
     guard: Guard,
     course: Doing,
-    waypoint: Option<(f64, f64)>,
+    waypoint: Option<MapPoint>,
     /// What is planned after the waypoint.
     path: PlannedPath,
     /// An order was applied that may change the way; the surface is to hear what comes of it.
@@ -259,7 +260,7 @@ impl Vehicle {
             None => self.tell(now),
         }
         let at = self.navigator.position();
-        self.steering.handle_view(at);
+        self.steering.handle_view(at.xy());
         update.perplexity.iter().for_each(|&(cell, p)| self.steering.handle_perplexity(cell, p));
     }
 

@@ -1,7 +1,7 @@
 //! Bytes as everything that the wire and the key file have but the map.
 
 use super::raw::{self, Script};
-use scenecast_protocol::directive::VersionedSlot;
+use scenecast_protocol::directive::{SlotState, VersionedSlot};
 use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
 use scenecast_protocol::map::{PlaneChunk, PlaneReplica};
@@ -10,7 +10,7 @@ use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
     AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, MAX_WINDOW, MissionId, Reader, Seal,
-    SessionId, SlotState, Stamp, VehicleStatus,
+    SessionId, Stamp, VehicleStatus,
 };
 use std::time::Duration;
 
