@@ -4,7 +4,7 @@
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
-use scenecast::cli::Arguments;
+use scenecast::commands::Arguments;
 use scenecast_tests::pages::{Page, all_files, all_pages, arguments, pages, words};
 use scenecast_tests::{Process, free_port, http, run, scenecast, scratch, wait_until, workspace};
 use serde_json::Value;
@@ -89,11 +89,15 @@ fn every_command_line_parses() {
     assert_none(&faults);
 }
 
-/// Names of packages, tests and benches.
-fn cargo_targets() -> BTreeSet<String> {
+fn cargo_metadata() -> Value {
     let mut cargo = std::process::Command::new(env!("CARGO"));
     let output = cargo.args(["metadata", "--format-version", "1", "--no-deps"]).current_dir(workspace()).output();
-    let metadata: Value = serde_json::from_slice(&output.expect("cargo runs").stdout).expect("cargo prints JSON");
+    serde_json::from_slice(&output.expect("cargo runs").stdout).expect("cargo prints JSON")
+}
+
+/// Names of packages, tests and benches.
+fn cargo_targets() -> BTreeSet<String> {
+    let metadata = cargo_metadata();
     let packages = metadata["packages"].as_array().expect("there are packages").iter();
     let targets = |p: &Value| p["targets"].as_array().cloned().unwrap_or_default();
     let all = packages.flat_map(|p| std::iter::once(p.clone()).chain(targets(p)));
@@ -317,6 +321,43 @@ fn the_reference_of_http_is_up_to_date() {
     let (_, body) = http(port, "GET", "/api/openapi.json", "", "").expect("the demo serves the document");
     let document: Value = serde_json::from_slice(&body).expect("the document is JSON");
     generated("docs/reference/http.md", "http", &http_reference(&document));
+}
+
+#[test]
+fn the_list_of_modules_is_up_to_date() {
+    let metadata = cargo_metadata();
+    let packages = metadata["packages"].as_array().expect("there are packages");
+    let mut text = String::new();
+    for package in packages.iter().filter(|p| p["name"] != "scenecast-tests") {
+        let manifest = Path::new(package["manifest_path"].as_str().expect("a package has a manifest"));
+        let folder = manifest.parent().expect("a manifest is in a folder");
+        let shown = folder.strip_prefix(workspace()).expect("below the project's folder").display();
+        let own = purpose(&folder.join("src/lib.rs"));
+        let _ = write!(text, "## `{shown}/`\n\n{own}\n\n| module | purpose |\n|---|---|\n");
+        let mut entries: Vec<_> = std::fs::read_dir(folder.join("src")).expect("it has sources").flatten().collect();
+        entries.sort_by_key(std::fs::DirEntry::file_name);
+        for path in entries.iter().map(std::fs::DirEntry::path) {
+            let name = path.file_stem().expect("a file has a name").to_string_lossy().into_owned();
+            let is_folder = path.join("mod.rs").exists();
+            let is_file = path.extension().is_some_and(|e| e == "rs");
+            if (is_folder || is_file) && name != "lib" && name != "main" && !name.ends_with("tests") {
+                let file = if is_folder { path.join("mod.rs") } else { path };
+                let _ = writeln!(text, "| `{name}` | {} |", purpose(&file));
+            }
+        }
+        text.push('\n');
+    }
+    generated("docs/explanation/code.md", "modules", &text);
+}
+
+/// The first paragraph of a module's documentation, without its links.
+fn purpose(file: &Path) -> String {
+    let text = std::fs::read_to_string(file).expect("a module can be read");
+    let lines = text.lines().skip_while(|l| !l.starts_with("//!")).map_while(|l| l.strip_prefix("//! "));
+    let paragraph = lines.map(|l| l.trim_start_matches('#').trim()).collect::<Vec<_>>().join(" ").replace('|', "\\|");
+    let parts = paragraph.split("](").enumerate();
+    let plain: String = parts.map(|(i, p)| if i == 0 { p } else { p.split_once(')').map_or("", |(_, r)| r) }).collect();
+    plain.replace(['[', ']'], "")
 }
 
 fn http_reference(document: &Value) -> String {
