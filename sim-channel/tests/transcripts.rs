@@ -16,7 +16,7 @@ struct Replay {
     /// Bytes that each host has received and that are not yet compared.
     received: BTreeMap<u8, Vec<u8>>,
     micromodems: bool,
-    /// File and line number.
+    /// File and line number, for failures.
     location: String,
 }
 

@@ -42,5 +42,5 @@ fn drain(modem: &mut impl Emulator, now: Duration) {
     modem.handle_timeout(now);
     while modem.poll_transmit(now).is_some() {}
     while modem.poll_event().is_some() {}
-    modem.poll_host_bytes(HostId::FIRST, now);
+    let _ = modem.poll_host_bytes(HostId::FIRST, now);
 }

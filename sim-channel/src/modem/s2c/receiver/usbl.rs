@@ -1,4 +1,4 @@
-//! Positions from the USBL head: `USBLLONG` and its companions, after an exchange that was answered.
+//! Positions from the USBL head: `USBLLONG` and its companions, after each exchange in both directions.
 
 use crate::modem::s2c::base::{PendingFix, ReceivedSignal, S2cBase, S2cTask};
 use crate::usbl::UsblHead;
@@ -28,7 +28,8 @@ impl UsblReporter {
     pub(crate) fn measure(&mut self, base: &mut S2cBase, remote: u8, signal: &ReceivedSignal, now: Duration) {
         let Some(head) = self.head.as_mut().filter(|_| base.options.usbl()) else { return };
         let fix = head.measure(&signal.receiver, &signal.sender, signal.received_at);
-        let pending = PendingFix { remote, fix, travel: signal.travel, rssi: signal.rssi, integrity: signal.integrity };
+        let pending =
+            PendingFix { remote, fix, travel: signal.one_way, rssi: signal.rssi, integrity: signal.integrity };
         base.board.schedule(fix.ready_at.max(now), S2cTask::UsblFix(Box::new(pending)));
     }
 
