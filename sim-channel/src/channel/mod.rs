@@ -13,8 +13,7 @@ pub use config::ChannelConfig;
 pub use interferer::Interferer;
 pub use outage::{Outage, OutageScope};
 
-use crate::loss::LossModel;
-use crate::loss::{FrameContext, FrameFate};
+use crate::loss::{FrameContext, FrameFate, LossModel};
 use crate::nodes::{NodeId, NodePosition, Track};
 use link::DirectedLink;
 use reception::{Reception, Span};

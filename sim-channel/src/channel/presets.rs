@@ -13,8 +13,7 @@
 
 use crate::acoustics::wind_of_sea_state;
 use crate::channel::{ChannelConfig, Outage};
-use crate::loss::LossModel;
-use crate::loss::{GilbertElliott, Snr, ThreeState};
+use crate::loss::{GilbertElliott, LossModel, Snr, ThreeState};
 use std::time::Duration;
 
 /// A function that makes the conditions of a preset.
@@ -63,7 +62,7 @@ pub fn shallow_harbour() -> ChannelConfig {
     ChannelConfig { loss: model.into(), ..ChannelConfig::default() }
 }
 
-/// The shallow harbour with a ship that drowns all signals for 90 s every 15 minutes of the first day.
+/// The shallow harbour with a ship that masks all signals for 90 s every 15 minutes of the first day.
 ///
 /// Source: `shallow_harbour`; the timetable is assumed.
 #[must_use]
@@ -195,8 +194,8 @@ mod tests {
     #[test]
     fn ships_add_their_share_of_outage() {
         let LossModel::ThreeState(model) = shallow_harbour().loss else { panic!("three states") };
-        let drowned = (90.0 + 0.86) / 900.0;
-        expect(busy_port(), 1000.0, drowned + (1.0 - drowned) * model.loss_rate());
+        let masked = (90.0 + 0.86) / 900.0;
+        expect(busy_port(), 1000.0, masked + (1.0 - masked) * model.loss_rate());
     }
 
     #[test]

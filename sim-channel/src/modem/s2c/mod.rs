@@ -1,7 +1,7 @@
 //! EvoLogics S2C: the AT and NET interpreters over an emulated acoustic layer.
 //!
 //! Syntax, replies and notifications follow what fielded drivers send and parse. The acoustic layer is a model: instant
-//! messages with the measured air times, and connections with trains of packets, selective acknowledgement and turns.
+//! messages with the measured airtimes, and connections with trains of packets, selective acknowledgement and turns.
 //!
 //! ```text
 //!   host -> base::CommandPort -> commands -> messages, burst -> base::Transmitter -> channel

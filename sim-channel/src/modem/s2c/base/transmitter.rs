@@ -53,7 +53,7 @@ impl Transmitter {
         self.queue.retain(|out| !kinds.contains(&out.frame.kind));
     }
 
-    /// Takes the next frame and occupies the transducer for its air time; `None` while it is occupied.
+    /// Takes the next frame and occupies the transducer for its airtime; `None` while it is occupied.
     pub(crate) fn begin(&mut self, now: Duration) -> Option<QueuedFrame> {
         if self.is_busy(now) {
             return None;

@@ -9,7 +9,7 @@ use crate::modem::s2c::base::{
 use crate::modem::s2c::messages::Messages;
 use std::time::Duration;
 
-/// A connection whose peer was silent for so long does not keep others out.
+/// A connection whose peer was silent for this long gives way to another one.
 const STALE_TIMEOUT: Duration = Duration::from_secs(15);
 /// Frames that have no meaning once a connection ends or is taken over.
 const CONNECTION_FRAMES: [FrameKind; 3] = [FrameKind::Request, FrameKind::Packet, FrameKind::Turn];

@@ -7,7 +7,7 @@ use crate::modem::s2c::messages::Messages;
 use crate::modem::s2c::receiver::notices;
 use std::time::Duration;
 
-/// Time for an acknowledgement beyond two ways of travel: turn-round, an instant message, the acknowledgement, a margin.
+/// Time for an acknowledgement beyond two ways of travel: turn-around, an instant message, the acknowledgement, a margin.
 const ACK_ALLOWANCE: Duration = Duration::from_millis(1600);
 /// How much longer the modem that did not request an idle connection keeps it open.
 const ACCEPTOR_ALLOWANCE: Duration = Duration::from_secs(10);

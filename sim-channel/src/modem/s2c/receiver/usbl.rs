@@ -76,9 +76,9 @@ fn fix_times(measured: &PendingFix, now: Duration) -> String {
 /// The head stands level and looks north, so that its own frame is east, north, up.
 fn long(measured: &PendingFix) -> String {
     let [east, north, up] = measured.fix.east_north_up_m();
-    let place = format!("{east:.4},{north:.4},{up:.4}");
+    let position = format!("{east:.4},{north:.4},{up:.4}");
     let (us, accuracy) = (measured.travel.as_micros(), measured.fix.accuracy_m);
-    format!("{place},{place},0.0000,0.0000,0.0000,{us},{},{},{accuracy:.4}", measured.rssi, measured.integrity)
+    format!("{position},{position},0.0000,0.0000,0.0000,{us},{},{},{accuracy:.4}", measured.rssi, measured.integrity)
 }
 
 /// Bearing counts from -pi to pi.
@@ -95,7 +95,7 @@ fn delays() -> String {
     format!("1{}", format!(",{INVALID_DELAY}").repeat(8))
 }
 
-/// Measurement type and the place by each of six triples of hydrophones, which agree.
+/// Measurement type, and the position from each of six triples of hydrophones, which all agree.
 fn positions(measured: &PendingFix) -> String {
     let [east, north, up] = measured.fix.east_north_up_m();
     format!("1{}", format!(",{east:.4},{north:.4},{up:.4}").repeat(6))
