@@ -25,6 +25,7 @@ impl Replay {
         Self { basin, received: BTreeMap::new(), micromodems: false, location: String::new() }
     }
 
+    #[allow(clippy::disallowed_methods, reason = "transcripts are files")]
     fn run(mut self, path: &Path) {
         let text = std::fs::read_to_string(path).expect("transcript");
         for (number, line) in (1..).zip(text.lines().map(str::trim_end)) {

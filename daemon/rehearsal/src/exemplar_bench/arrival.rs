@@ -3,10 +3,11 @@
 use super::Spread;
 use crate::VirtualTime;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::mac::ModemProfile;
@@ -255,7 +256,7 @@ impl VirtualTime for Water {
         }
         if now >= self.next_fix {
             self.next_fix = now + Duration::from_secs_f64(FIX_S);
-            let fix = Fix { x_m: 8.0, y_m: 8.0, sigma_m: 1.0, age_s: 0.5 };
+            let fix = Fix { position: WorldPoint::new(8.0, 8.0), sigma_m: 1.0, age_s: 0.5 };
             // Before the vehicle is known there is no slot for it.
             let _ = self.surface.send_fix(self.address, fix, now);
         }

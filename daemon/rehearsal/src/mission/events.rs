@@ -89,10 +89,11 @@ impl Mission {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => self.vehicle.handle_persisted(),
-                VehicleOutput::Waypoint(x, y) => {
+                VehicleOutput::Waypoint(to) => {
                     let navigator = self.vehicle.navigator();
-                    self.legs.push((navigator.to_world(navigator.position()), navigator.to_world((x, y))));
-                    self.motion.set_target(Some((x, y)));
+                    let from = navigator.to_world(navigator.position());
+                    self.legs.push((from.xy(), navigator.to_world(to).xy()));
+                    self.motion.set_target(Some(to.xy()));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::Surface => self.motion.come_up(),
@@ -117,12 +118,12 @@ impl Mission {
         if self.transmitting[0].is_none()
             && let Some(t) = self.vehicle.poll_transmit(self.now)
         {
-            self.transmit(0, t.bytes, t.kind);
+            self.transmit(0, t.bytes, t.kind.name());
         }
         if self.transmitting[1].is_none()
             && let Some(t) = self.surface.poll_transmit(self.now)
         {
-            self.transmit(1, t.bytes, t.kind);
+            self.transmit(1, t.bytes, t.kind.name());
         }
     }
 
@@ -152,7 +153,7 @@ impl Mission {
         }
         self.vehicle.steer(self.now);
         self.pump();
-        let o = self.motion.step(self.vehicle.navigator().position(), STEP_S);
+        let o = self.motion.step(self.vehicle.navigator().position().xy(), STEP_S);
         let depth = self.motion.depth_m(self.vehicle.navigator().depth_m(), self.survey_depth_m(), STEP_S);
         self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, depth, self.now);
         self.place_vehicle();

@@ -138,7 +138,7 @@ impl Mission {
             seed ^ 0x5EA,
             now,
         )?;
-        let (x, y) = vehicle.navigator().position();
+        let (x, y) = vehicle.navigator().position().xy();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let mut channel = Channel::new(channel_config(&config), seed);
@@ -261,7 +261,7 @@ impl Mission {
 
     /// Whether the survey has ended and the operator has everything.
     pub fn is_drained(&self) -> bool {
-        self.ended.is_some() && self.vehicle.is_settled() && self.meter.agreement() >= 1.0
+        self.ended.is_some() && self.vehicle.is_converged() && self.meter.agreement() >= 1.0
     }
 
     /// Runs until `until`, or a little beyond the last event before it.
@@ -308,7 +308,7 @@ impl Mission {
 
     /// Metres between where the vehicle is and where it believes to be.
     pub fn position_error_m(&self) -> f64 {
-        let (x, y) = self.vehicle.navigator().world();
+        let (x, y) = self.vehicle.navigator().world().xy();
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
     }
 
@@ -320,7 +320,7 @@ impl Mission {
 
 /// The camera's pose as the vehicle believes it.
 pub(crate) fn pose_of(vehicle: &Vehicle) -> Pose {
-    let (x, y) = vehicle.navigator().position();
+    let (x, y) = vehicle.navigator().position().xy();
     Pose { x, y, z: -vehicle.navigator().depth_m(), yaw_rad: -vehicle.navigator().heading_rad() }
 }
 

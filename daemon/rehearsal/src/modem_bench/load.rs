@@ -6,14 +6,14 @@ use crate::link_bench::{OpaqueReplica, OpaqueSource, Summary};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::ModemEvent;
-use scenecast_protocol::directive::{Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use sim_channel::modem::{Emulator, Fault};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream};
 use std::collections::BTreeMap;
@@ -106,7 +106,7 @@ impl Dock {
             shares: Shares::default(),
             master: MasterConfig::default(),
             vehicles: vec![address],
-            call_every: None,
+            discovery_period: None,
             authenticity: None,
         };
         let source = OpaqueSource::default();

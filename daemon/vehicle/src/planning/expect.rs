@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn hidden_cells_of_procedural_reefs_are_likelier_than_by_the_maps_overall_mix() {
         for seed in 1..=6 {
-            let reef = scene_model::generate::reef(seed, 120, 90, 8, 8);
+            let reef = scenecast_worlds::reef(seed, 120, 90, 8, 8);
             let truth: Vec<u8> = reef.truth.iter().map(|c| c + 1).collect();
             let (by_place, by_mix) = likelihoods(&truth, 120, seed);
             assert!(by_place > by_mix + 0.05, "seed {seed}: {by_place} against {by_mix}");
