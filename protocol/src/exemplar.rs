@@ -93,7 +93,9 @@ pub fn unstrip(bytes: &[u8], edge: u16) -> Option<Vec<u8>> {
     file.extend(b"WEBPVP8 ");
     file.extend(length.to_le_bytes());
     file.extend(&frame);
-    file.extend(std::iter::repeat_n(0, padding));
+    if padding == 1 {
+        file.push(0);
+    }
     Some(file)
 }
 

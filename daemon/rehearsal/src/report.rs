@@ -1,8 +1,8 @@
 //! The figures of a mission.
 
 use super::mission::Mission;
-use scene_model::tuning::mutual_information_nats;
 use scenecast_core::drop_counts::dropped;
+use scenecast_scoring::mutual_information_nats;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, PlaneSource};

@@ -3,7 +3,7 @@
 use super::Spread;
 use crate::VirtualTime;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
@@ -17,7 +17,7 @@ use scenecast_protocol::wire::Address;
 use scenecast_surface::{Page, Surface, Wish};
 use scenecast_vehicle::{Durable, MapUpdate, Vehicle, VehicleOutput};
 use serde::Serialize;
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -111,7 +111,7 @@ pub(super) struct Water {
     transmitting: [Option<Instant>; 2],
     next_change: Instant,
     next_fix: Instant,
-    dice: Stream,
+    dice: RandomStream,
     sent_bits: u64,
     frames: u64,
     lost: u64,
@@ -133,8 +133,8 @@ impl Water {
             },
             seed,
         );
-        channel.place(SURFACE, Position::default());
-        channel.place(VEHICLE, Position::new(config.channel.range_m, 0.0, -16.0));
+        channel.place(SURFACE, NodePosition::default());
+        channel.place(VEHICLE, NodePosition::new(config.channel.range_m, 0.0, -16.0));
         let mut vehicle = scenecast_vehicle::assemble(
             &config,
             scenecast_config::authenticity(&config)?,
@@ -163,7 +163,7 @@ impl Water {
             transmitting: [None; 2],
             next_change: now,
             next_fix: now,
-            dice: Stream::new(seed, &[5]),
+            dice: RandomStream::new(seed, &[5]),
             sent_bits: 0,
             frames: 0,
             lost: 0,
@@ -243,12 +243,12 @@ impl VirtualTime for Water {
             }
         }
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
-            let delivered = matches!(arrival.outcome, Outcome::Delivered { .. });
+            let delivered = matches!(arrival.outcome, ReceptionOutcome::Delivered { .. });
             if arrival.to == SURFACE {
                 self.frames += 1;
                 self.lost += u64::from(!delivered);
             }
-            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             match arrival.to {
                 SURFACE => self.surface.handle_frame(&bytes, now),
                 _ => self.vehicle.handle_frame(&bytes, now),

@@ -3,7 +3,7 @@
 use super::Spread;
 use crate::World;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar;
+use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_config::Config;
 use scenecast_core::UserError;
@@ -91,7 +91,7 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
         let pose = Pose { x, y, z: -16.0, yaw_rad: 0.0 };
         mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
     }
-    let of_label = |images: Vec<Exemplar>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
+    let of_label = |images: Vec<ExemplarPatch>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
     Ok(mapper.gallery().into_values().flat_map(of_label).collect())
 }
 

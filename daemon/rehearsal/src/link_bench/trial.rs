@@ -8,7 +8,7 @@ use scenecast_protocol::directive::{Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::time::Instant;
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 use std::time::Duration;
 
 /// Bytes that wait at a vehicle under load: more than the longest turn takes.
@@ -91,7 +91,7 @@ impl Water {
     }
 
     /// Issues `count` directives, each a random while after the last one is known to be applied.
-    pub fn measure_directives(&mut self, count: usize, dice: &mut Stream) -> Result<Directives, IssueError> {
+    pub fn measure_directives(&mut self, count: usize, dice: &mut RandomStream) -> Result<Directives, IssueError> {
         let (mut applied, mut known) = (Vec::new(), Vec::new());
         for _ in 0..count {
             self.run(Duration::from_secs_f64(1.0 + dice.uniform() * 30.0));
@@ -110,7 +110,7 @@ impl Water {
     }
 
     /// Stops the source `count` times at a random moment with a random number of bytes waiting, and waits for equality.
-    pub fn measure_convergence(&mut self, count: usize, loss: f64, dice: &mut Stream) -> Convergence {
+    pub fn measure_convergence(&mut self, count: usize, loss: f64, dice: &mut RandomStream) -> Convergence {
         let mut times = Vec::new();
         let mut within = 0;
         for _ in 0..count {

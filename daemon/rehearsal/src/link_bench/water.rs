@@ -12,7 +12,7 @@ use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, ReceptionOutcome, NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -123,13 +123,13 @@ impl Water {
             ..ChannelConfig::default()
         };
         let mut channel = Channel::new(config, seed);
-        channel.place(SURFACE, Position::default());
-        let mut dice = Stream::new(seed, &[1]);
+        channel.place(SURFACE, NodePosition::default());
+        let mut dice = RandomStream::new(seed, &[1]);
         let mut draw = || (dice.uniform() * 2f64.powi(53)) as u64;
         let mut vehicles = Vec::new();
         for number in 1..=setting.vehicles {
             let angle = f64::from(number) / f64::from(setting.vehicles) * std::f64::consts::TAU;
-            let place = Position::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
+            let place = NodePosition::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
             channel.place(NodeId(number), place);
             vehicles.push(Vehicle::new(setting, address(number), draw(), now));
         }
@@ -214,7 +214,7 @@ impl VirtualTime for Water {
                 _ if arrival.from == SURFACE => self.tally.down.count(&arrival.outcome),
                 _ => {}
             }
-            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
                 self.heard.insert(arrival.to, self.now);
             }

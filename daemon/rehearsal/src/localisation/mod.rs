@@ -17,7 +17,7 @@ use scenecast_vehicle::{FixVerdict, Navigator};
 use serde::Serialize;
 use ship::Ship;
 use sim_channel::usbl::{UsblConfig, UsblHead};
-use sim_channel::{Position, Stream};
+use sim_channel::{NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -158,7 +158,7 @@ struct Lot {
 
 impl Lot {
     /// As many draws whatever comes out, so that runs with and without outliers meet the same noise.
-    fn draw(dice: &mut Stream, outliers: f64) -> Self {
+    fn draw(dice: &mut RandomStream, outliers: f64) -> Self {
         let [lot, kind, a, b, loss, wait] = [(); 6].map(|()| dice.uniform());
         let turn = a * std::f64::consts::TAU;
         let outlier = match (kind * 3.0) as u32 {
@@ -180,7 +180,7 @@ struct UnderWay {
 
 struct Way {
     outliers: f64,
-    dice: Stream,
+    dice: RandomStream,
     sensors: Sensors,
     head: UsblHead,
     ship: Ship,
@@ -196,7 +196,7 @@ impl Way {
         let usbl = UsblConfig { outlier_probability: 0.0, ..UsblConfig::default() };
         Self {
             outliers,
-            dice: Stream::new(seed, &[7]),
+            dice: RandomStream::new(seed, &[7]),
             sensors: Sensors::new(seed),
             head: UsblHead::new(usbl, seed),
             ship: Ship::new(seed),
@@ -242,8 +242,8 @@ impl Way {
 
     /// The head hears the vehicle: what the relay makes of it goes under way.
     fn sight(&mut self, at: (f64, f64), lot: &Lot, now: Instant) {
-        let from = Position::new(self.ship.at.0, self.ship.at.1, 1.0);
-        let target = Position::new(at.0, at.1, DEPTH_M);
+        let from = NodePosition::new(self.ship.at.0, self.ship.at.1, 1.0);
+        let target = NodePosition::new(at.0, at.1, DEPTH_M);
         let seen = self.head.measure(&from, &target, now.into());
         let mut sighting = UsblSighting {
             range_m: seen.range_m,
@@ -302,7 +302,7 @@ fn heading(way_m: f64) -> f64 {
 /// Sensors whose error grows by the drift with the way whatever its shape: a current that they do not see, which turns
 /// slowly, and beside it a compass and a log that are off by a third of the drift each.
 struct Sensors {
-    dice: Stream,
+    dice: RandomStream,
     current_towards: f64,
     compass: f64,
     log: f64,
@@ -310,7 +310,7 @@ struct Sensors {
 
 impl Sensors {
     fn new(seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[8]);
+        let mut dice = RandomStream::new(seed, &[8]);
         let current_towards = dice.uniform() * std::f64::consts::TAU;
         let [compass, log] = [(); 2].map(|()| DRIFT / 3.0 * dice.normal());
         Self { dice, current_towards, compass, log }

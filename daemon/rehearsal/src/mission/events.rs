@@ -10,7 +10,7 @@ use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
 use scenecast_vehicle::VehicleOutput;
-use sim_channel::{Outcome, Position};
+use sim_channel::{NodePosition, ReceptionOutcome};
 use std::time::Duration;
 
 impl Mission {
@@ -50,7 +50,7 @@ impl Mission {
         }
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
             self.log.handle_fate(&arrival);
-            if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
+            if let ReceptionOutcome::Delivered { bytes, .. } = &arrival.outcome {
                 if arrival.to == SURFACE {
                     self.heard_bits += self.modem.bits_on_air(bytes.len());
                 }
@@ -159,8 +159,8 @@ impl Mission {
         self.place_vehicle();
     }
 
-    fn true_place(&self) -> Position {
-        Position::new(self.motion.x_m, self.motion.y_m, self.vehicle.navigator().depth_m())
+    fn true_place(&self) -> NodePosition {
+        NodePosition::new(self.motion.x_m, self.motion.y_m, self.vehicle.navigator().depth_m())
     }
 
     pub(super) fn place_vehicle(&mut self) {

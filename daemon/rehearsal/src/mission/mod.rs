@@ -29,7 +29,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{Surface, SurfaceOutput};
 use scenecast_vehicle::{AppliedSlot, Durable, MapUpdate, Mapper, Vehicle};
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Position};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -143,7 +143,7 @@ impl Mission {
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let mut channel = Channel::new(channel_config(&config), seed);
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
-        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
+        let surface_place = NodePosition::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
         channel.place(SURFACE, surface_place);
         if let Some(docked) = &mut docked {
             docked.place(docked::SURFACE, surface_place);

@@ -7,7 +7,7 @@ use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::directive::{Fence, PlannerKind, Polygon};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_vehicle::{Course, Footprint, Steering};
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 
 /// Edge of what the camera sees, metres: eight cells.
 const SIGHT_M: f64 = 2.0;
@@ -40,10 +40,10 @@ pub(crate) struct Drive {
 impl Task {
     /// A fence with cut corners, one or two keep-outs, and a start inside.
     pub fn draw(scene: &Scene, seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[0x91A7]);
+        let mut dice = RandomStream::new(seed, &[0x91A7]);
         let Area { east, north, .. } = scene.area;
         let place = |x: f64, y: f64| DecimetrePoint::nearest(WorldPoint::new(x, y)).unwrap_or_default();
-        let cut = |dice: &mut Stream| (0.03 + 0.12 * dice.uniform()) * east.min(north);
+        let cut = |dice: &mut RandomStream| (0.03 + 0.12 * dice.uniform()) * east.min(north);
         let [a, b, c, d] = [cut(&mut dice), cut(&mut dice), cut(&mut dice), cut(&mut dice)];
         let fence = [
             (a, 0.0),

@@ -2,7 +2,7 @@
 
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 use scenecast_protocol::link::VehicleLink;

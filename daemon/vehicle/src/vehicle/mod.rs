@@ -15,7 +15,7 @@ use super::navigator::Navigator;
 use super::steering::Steering;
 use course::Doing;
 use gallery::Gallery;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
