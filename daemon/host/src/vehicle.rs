@@ -218,7 +218,8 @@ impl VehicleHost {
             self.mapper.outstanding -= 1;
             self.handle_pose(pose, now);
         }
-        self.handle_map(update, exemplars, now);
+        self.handle_map(update, now);
+        self.handle_exemplars(exemplars);
         self.finish_after_last_frame();
     }
 
@@ -228,11 +229,14 @@ impl VehicleHost {
         self.finish_after_last_frame();
     }
 
-    /// The mapper has a new map and the best exemplars of each label.
-    pub fn handle_map(&mut self, update: &MapUpdate, exemplars: BTreeMap<u8, Vec<Exemplar>>, now: Instant) {
-        let vehicle = self.link.end_mut();
-        vehicle.handle_map(update, now);
-        vehicle.handle_exemplars(exemplars);
+    /// The mapper has a new map.
+    pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
+        self.link.end_mut().handle_map(update, now);
+    }
+
+    /// The mapper has the best exemplars of each label, the best first.
+    pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<Exemplar>>) {
+        self.link.end_mut().handle_exemplars(exemplars);
     }
 
     fn finish_after_last_frame(&mut self) {
