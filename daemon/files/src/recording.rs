@@ -9,13 +9,10 @@ use std::path::{Path, PathBuf};
 /// A camera frame of a recorded mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedFrame {
-    /// Mission time, seconds.
     pub t_s: f64,
-    /// The image's file.
     pub file: PathBuf,
     /// Where the camera believed to be: metres east and north.
     pub x_m: f64,
-    /// Metres north.
     pub y_m: f64,
     /// Depth below the surface, metres.
     pub depth_m: f64,
@@ -26,7 +23,6 @@ pub struct RecordedFrame {
 }
 
 impl RecordedFrame {
-    /// Reads the image.
     pub fn image(&self) -> Result<RgbImage, UserError> {
         Ok(crate::read_image(&self.file)?.to_rgb8())
     }
@@ -127,7 +123,6 @@ fn of_mosaic(dir: &Path, line: &str, metres_per_pixel: f64) -> Option<RecordedFr
     Some(RecordedFrame { t_s, file: dir.join(file), x_m, y_m, depth_m: 0.0, heading_rad: yaw_deg.to_radians(), scale })
 }
 
-/// Seconds of `hhmmss`.
 fn time_of_day(text: &str) -> Option<f64> {
     let number: u32 = text.parse().ok().filter(|_| text.len() == 6)?;
     let (hours, minutes, seconds) = (number / 10_000, number / 100 % 100, number % 100);
@@ -190,7 +185,6 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes `poses.csv`.
     pub fn finish(&self) -> Result<(), UserError> {
         crate::write_whole(&self.dir.join("poses.csv"), self.poses.as_bytes())
     }

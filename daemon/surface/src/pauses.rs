@@ -16,7 +16,6 @@ impl Pauses {
     /// A pause up to this length is as usual as it is long.
     const SHORT: Duration = Duration::from_secs(60);
 
-    /// A frame was heard.
     pub fn hear(&mut self, now: Instant) {
         let Some(last) = self.heard.replace(now) else { return };
         let pause = now.since(last);

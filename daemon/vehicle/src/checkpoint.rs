@@ -33,7 +33,6 @@ pub enum NoCheckpoint {
     Config(#[from] UserError),
 }
 
-/// What is kept.
 #[derive(Serialize, Deserialize)]
 struct Kept<M, B, W, E, R> {
     lineage: u64,
@@ -47,9 +46,7 @@ struct Kept<M, B, W, E, R> {
 
 /// A mapper that goes on where a checkpoint left it, and the mission that it belongs to.
 pub struct Restored {
-    /// The mapper.
     pub mapper: Mapper,
-    /// As [`super::Durable::lineage`].
     pub lineage: u64,
 }
 

@@ -34,7 +34,6 @@ pub struct Navigator {
 /// What became of a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FixVerdict {
-    /// It corrects the estimate.
     Used,
     /// It is of a time that the vehicle does not remember.
     TooOld,
@@ -63,7 +62,7 @@ impl Navigator {
     /// How far it may have drifted while it was off, metres.
     const RESUMED_SIGMA_M: f64 = 50.0;
     /// Farther from the origin is no mission, metres.
-    const FARTHEST_M: f64 = 800_000.0;
+    const MAX_DISTANCE_M: f64 = 800_000.0;
 
     /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of way.
     pub fn new(x_m: f64, y_m: f64, depth_m: f64, drift: f64) -> Self {
@@ -171,7 +170,7 @@ impl Navigator {
     /// A fix of where in the world the vehicle was at `taken`.
     pub fn handle_fix(&mut self, at: WorldPoint, sigma_m: f64, taken: Instant, now: Instant) -> FixVerdict {
         let (x_m, y_m) = at.xy();
-        let is_place = x_m.abs() <= Self::FARTHEST_M && y_m.abs() <= Self::FARTHEST_M;
+        let is_place = x_m.abs() <= Self::MAX_DISTANCE_M && y_m.abs() <= Self::MAX_DISTANCE_M;
         if !is_place || !sigma_m.is_finite() || sigma_m < 0.0 {
             return FixVerdict::Absurd;
         }

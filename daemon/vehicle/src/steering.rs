@@ -18,9 +18,7 @@ use std::collections::VecDeque;
 /// What the camera sees, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
-    /// Across the heading.
     pub across: f64,
-    /// Along the heading.
     pub along: f64,
 }
 
@@ -34,7 +32,6 @@ impl Footprint {
 /// What the vehicle is to do next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
-    /// Go there, straight.
     Go(Point),
     /// What is left of distance or time is the way home.
     UsedUp,
@@ -91,7 +88,6 @@ impl Steering {
         self.grounds.home()
     }
 
-    /// The bounds in force.
     pub fn bounds(&self) -> &Bounds {
         self.grounds.bounds()
     }

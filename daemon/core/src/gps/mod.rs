@@ -12,9 +12,7 @@ use std::time::Duration;
 /// The language of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GpsLanguage {
-    /// NMEA 0183 lines.
     Nmea,
-    /// gpsd's JSON.
     Gpsd,
 }
 
@@ -36,7 +34,6 @@ pub enum GpsFault {
 }
 
 impl GpsFault {
-    /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Checksum => "checksum",
@@ -52,11 +49,9 @@ impl GpsFault {
 /// A position that can be believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GpsFix {
-    /// Where.
     pub place: LatLon,
     /// Standard deviation in each direction, metres.
     pub sigma_m: f64,
-    /// When it was told.
     pub at: Instant,
 }
 
@@ -93,8 +88,8 @@ impl Gps {
     /// A receiver that has said nothing.
     pub fn new(language: GpsLanguage) -> Self {
         let longest = match language {
-            GpsLanguage::Nmea => nmea::LONGEST_LINE,
-            GpsLanguage::Gpsd => gpsd::LONGEST_LINE,
+            GpsLanguage::Nmea => nmea::MAX_LINE,
+            GpsLanguage::Gpsd => gpsd::MAX_LINE,
         };
         Self {
             language,
@@ -118,7 +113,6 @@ impl Gps {
             .chain((self.lines.overlong() > 0).then_some((GpsFault::Overlong, self.lines.overlong())))
     }
 
-    /// The last good position.
     pub fn fix(&self) -> Option<GpsFix> {
         self.fix
     }

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub(crate) type Quality = SceneScore;
 
 /// Most cells times classes that are counted.
-const MOST_COUNTS: u64 = 1 << 27;
+const MAX_COUNTS: u64 = 1 << 27;
 /// Class of cells that have none.
 const NONE: u8 = 255;
 
@@ -52,7 +52,7 @@ impl Sheet {
         layers.dedup();
         let classes = places.iter().map(|place| u64::from(place.1) + 1).max().unwrap_or(1);
         let cells = u64::from(bounds.width) * u64::from(bounds.height) * layers.len() as u64;
-        if cells * classes > MOST_COUNTS {
+        if cells * classes > MAX_COUNTS {
             let what =
                 format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
             return Err(UserError::Input(what));

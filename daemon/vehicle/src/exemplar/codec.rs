@@ -4,10 +4,8 @@ use super::ssim::Luma;
 use image::RgbImage;
 use scenecast_protocol::exemplar::{strip, unstrip};
 
-/// A compressed patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compressed {
-    /// As on the wire.
     pub bytes: Vec<u8>,
     /// Structural similarity with the patch.
     pub ssim: f64,

@@ -3,9 +3,7 @@
 /// Labels of a rectangle of cells, row by row from the south-west; 0 = not seen.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
-    /// One label a cell.
     pub labels: &'a [u8],
-    /// Cells of a row.
     pub width: usize,
 }
 
@@ -41,7 +39,6 @@ const MIX: f32 = 0.05;
 const NEW: f32 = 0.05;
 
 impl<'a> Expectation<'a> {
-    /// Takes what was seen.
     pub fn new(seen: Seen<'a>) -> Self {
         Self::with(seen, REACH, MIX)
     }

@@ -26,7 +26,6 @@ pub struct Question<'a> {
     pub lattice: &'a Lattice,
     /// What is to be gained.
     pub worth: &'a Worth,
-    /// Where the way begins.
     pub from: Node,
     /// Ways from the place where it must be able to end.
     pub home: &'a Ways,

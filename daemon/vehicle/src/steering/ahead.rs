@@ -16,7 +16,6 @@ impl Corners {
         Self { start, places: Vec::new(), metres: 0.0 }
     }
 
-    /// Where it ends.
     fn end(&self) -> Point {
         self.places.last().copied().unwrap_or(self.start)
     }

@@ -3,11 +3,9 @@
 use crate::planning::{Planner, planner};
 use scenecast_protocol::directive::PlannerKind;
 
-/// The planner in use.
 #[derive(Debug)]
 pub(super) struct PlannerChoice {
     configured: PlannerKind,
-    /// The operator's choice.
     chosen: Option<PlannerKind>,
     planner: Box<dyn Planner>,
     running: PlannerKind,
