@@ -77,7 +77,7 @@ fn a_series_is_measured_in_the_order_of_its_numbers() {
 }
 
 #[test]
-fn bad_maps_and_chunk_files_are_refused_in_one_line_and_leave_no_file() {
+fn bad_maps_and_chunk_files_are_refused_in_one_line() {
     let dir = scratch("map-refused");
     series(&dir, 2);
     let (map, rgb, high, small) = (dir.join("2.png"), dir.join("rgb.png"), dir.join("high.png"), dir.join("small.png"));

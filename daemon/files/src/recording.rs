@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn places_in_a_mosaic_become_metres_with_north_up_and_time_goes_on_over_midnight() {
+    fn mosaic_positions_become_metres_and_time_passes_midnight() {
         let text = "file,time_utc_hms,x_px,y_px,yaw_deg,scale\na.tif,235950,10,20,90,0.9\nb.tif,000010,-4,8,0,1\n";
         let frames = open("mosaic", "poses_estimated.csv", text).unwrap().frames;
         let first = &frames[0];

@@ -191,7 +191,7 @@ fn a_label_keeps_its_meaning_wherever_the_power_is_cut() {
 }
 
 #[test]
-fn with_a_checkpoint_labels_go_on_in_the_same_epoch_and_without_one_a_new_epoch_begins() {
+fn labels_continue_with_a_checkpoint_and_begin_again_without() {
     let mut world = World::new(5);
     world.run().unwrap();
     world.run().unwrap();

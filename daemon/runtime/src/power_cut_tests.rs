@@ -300,7 +300,7 @@ fn start(
 }
 
 #[test]
-fn a_power_cut_at_any_step_applies_nothing_twice_and_renames_no_label() {
+fn a_power_cut_applies_nothing_twice_and_keeps_label_meanings() {
     let mut whole = World::new(1, 0, Vec::new());
     whole.run();
     assert_eq!(whole.acted.len(), 6, "every version comes through");
@@ -316,7 +316,7 @@ fn a_power_cut_at_any_step_applies_nothing_twice_and_renames_no_label() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
     #[test]
-    fn power_cuts_and_losses_apply_nothing_twice_and_rename_no_label(
+    fn power_cuts_and_losses_apply_nothing_twice(
         seed: u64, loss in 0usize..40, cuts in proptest::collection::vec(0usize..80, 1..8),
     ) {
         World::new(seed, loss, cuts).run();
@@ -324,7 +324,7 @@ proptest! {
 }
 
 #[test]
-fn a_disk_that_fails_ends_the_run_with_a_problem_and_the_next_run_applies_what_it_missed() {
+fn a_failing_disk_ends_the_run_and_the_next_run_catches_up() {
     for (seed, failing) in (0..50).flat_map(|seed| [(seed, Step::Sync), (seed, Step::Append)]) {
         let mut world = World::new(seed, 0, Vec::new());
         while world.ticks < 29 {

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_is_met_by_its_own_answer_and_a_larger_one_takes_the_place_of_the_smaller() {
+    fn a_request_takes_its_own_reply_and_a_larger_image_replaces() {
         let mut album = Album::default();
         assert_eq!(
             album.ask(5, Wish::Larger(None), NOW).unwrap_err(),
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cancelled_or_refused_is_wanted_no_more_and_what_is_here_stays() {
+    fn cancelled_and_refused_requests_end_and_images_stay() {
         let mut album = Album::default();
         assert!(album.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
         assert!(!album.page(5).unwrap().pictures[0].asked);

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_makes_the_vehicle_do_as_it_is_set_until_somebody_is_heard() {
+    fn silence_triggers_the_policy_until_the_surface_is_received() {
         let mut guard = Guard::new(Habits::default(), at(0.0));
         guard.set_limits(Limits { silence_s: Some(60), on_silence: Some(Reaction::Hold), ..Limits::default() });
         guard.handle_time(at(60.0));
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_that_came_up_in_silence_stays_up_until_it_is_ordered_on() {
+    fn a_vehicle_surfaced_by_silence_waits_for_an_order() {
         let mut guard =
             Guard::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
         guard.handle_time(at(61.0));

@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fix_moves_the_placement_and_neither_the_vehicle_nor_its_map() {
+    fn a_fix_moves_the_placement_but_not_the_map() {
         let mut nav = under_way();
         assert_eq!((nav.position(), nav.placement()), (MapPoint::new(60.0, 0.0), None));
         nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn fixes_tell_what_is_wrong_with_the_sensors_and_the_way_becomes_straight() {
+    fn fixes_calibrate_the_sensors_and_straighten_the_track() {
         // A compass that is off by two degrees, on a way of 1 km to the east.
         let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.03);
         let (sin, cos) = 2f64.to_radians().sin_cos();
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_that_nobody_measured_makes_the_place_uncertain_until_a_fix() {
+    fn unmeasured_motion_is_uncertain_until_a_fix() {
         let mut nav = under_way();
         nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.sigma_m();

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_patch_whose_place_has_another_label_by_now_represents_it_no_more() {
+    fn a_relabelled_patch_is_no_exemplar_of_its_old_label() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
         judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);

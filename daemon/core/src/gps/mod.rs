@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_stays_while_the_receiver_says_it_moves_is_frozen_and_a_vessel_at_anchor_is_not() {
+    fn a_frozen_receiver_is_refused_but_a_vessel_at_anchor_is_not() {
         for (knots, frozen) in [(4.0, true), (0.0, false)] {
             let mut gps = Gps::new(GpsLanguage::Nmea);
             for s in 0..20 {
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_refused_and_a_place_that_stays_there_is_believed_in_the_end() {
+    fn a_jump_is_refused_until_the_new_position_persists() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         gps.handle_bytes(gga(29.5, 0).as_bytes(), at(0.0));
         assert!(gps.handle_bytes(gga(29.6, 1).as_bytes(), at(1.0)).is_empty(), "11 km in a second");

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_line_of_the_table_is_refused_with_its_number_and_what_is_allowed() {
+    fn a_malformed_row_is_refused_with_its_line_and_the_rule() {
         let text = filled().text();
         let refused = |from: &str, to: &str| TuningTable::read(&text.replacen(from, to, 1)).unwrap_err();
         assert_eq!(refused("table 2", "table 3").0, 1);

@@ -49,7 +49,7 @@ fn state(water: &Water, label: u8) -> Option<AskState> {
 }
 
 #[test]
-fn a_small_image_comes_first_then_it_grows_and_another_one_comes_though_the_camera_sees_nothing_more() {
+fn a_small_image_grows_and_another_follows_after_the_survey() {
     let mut water = water(IDLE, 1);
     let (_, small) = water.get(3, Wish::Another).unwrap().unwrap();
     let first = water.page(3).unwrap().picture(None).unwrap().clone();
@@ -82,7 +82,7 @@ fn what_is_cancelled_costs_no_more_bits() {
 }
 
 #[test]
-fn a_vehicle_without_an_image_says_so_and_sends_it_when_it_has_one() {
+fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
     let mut water = water(IDLE, 3);
     let gallery = water.vehicle.vehicle().exemplars().clone();
     water.vehicle.handle_exemplars(Default::default());
@@ -97,7 +97,7 @@ fn a_vehicle_without_an_image_says_so_and_sends_it_when_it_has_one() {
 }
 
 #[test]
-fn bits_that_are_left_over_show_every_label_once_and_give_way_to_what_is_asked_for() {
+fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut water = water(IDLE, 4);
     spend(&mut water, &["exemplars"]);
     let until = water.now + std::time::Duration::from_secs(120);
@@ -114,7 +114,7 @@ fn bits_that_are_left_over_show_every_label_once_and_give_way_to_what_is_asked_f
 }
 
 #[test]
-fn while_the_map_waits_what_nobody_asked_for_gets_only_ends_of_frames_that_no_cell_fits_into() {
+fn while_the_map_waits_background_images_get_only_frame_ends() {
     let loaded = Setting { loaded: true, ..IDLE };
     let map_bytes = |names: &[&str]| {
         let mut water = water(loaded, 5);

@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_is_refused_and_a_place_that_is_told_again_and_again_is_believed() {
+    fn an_echo_is_refused_until_it_repeats() {
         let mut filter = PlaneFilter::new(0.02);
         for s in 0..20 {
             filter.update(&Estimate::round(0.0, 0.0, 1.0), f64::from(s));

@@ -104,7 +104,7 @@ mod tests {
     use scene_model::topics::SceneConfig;
 
     #[test]
-    fn labels_that_follow_the_classes_tell_everything_in_every_layer() {
+    fn labels_equal_to_the_classes_have_full_information() {
         let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 0.01, ..SceneConfig::default() };
         let mut model = SceneModel::new(config).unwrap();
         let (mut seen, mut places) = (Vec::new(), Vec::new());

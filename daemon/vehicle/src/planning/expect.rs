@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn hidden_cells_of_procedural_reefs_are_likelier_than_by_the_maps_overall_mix() {
+    fn hidden_cells_are_predicted_better_than_by_overall_shares() {
         for seed in 1..=6 {
             let reef = scenecast_worlds::reef(seed, 120, 90, 8, 8);
             let truth: Vec<u8> = reef.truth.iter().map(|c| c + 1).collect();

@@ -108,7 +108,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
-        fn every_way_is_allowed_leaves_the_way_home_and_is_the_same_again(
+        fn every_plan_is_allowed_leaves_a_return_path_and_repeats(
             corner in (1i32..15, 1i32..8), start in 0usize..100_000, left_m in 0.0f64..80.0,
             weights in (-100i8..=100, -100i8..=100),
         ) {

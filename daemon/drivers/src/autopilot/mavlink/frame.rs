@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn version_one_signatures_and_unknown_messages_are_passed_over_whole() {
+    fn version_one_signed_and_unknown_messages_are_skipped() {
         let mut v1 = vec![V1, 9, 7, 1, 1, 0, 0, 0, 0, 0, 6, 8, 0, 4, 3];
         v1.extend(check(&v1[1..], 50).to_le_bytes());
         let mut signed = bytes(HEARTBEAT);
