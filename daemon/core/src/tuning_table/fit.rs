@@ -1,8 +1,8 @@
-//! The setting that tells most of those whose stream fits, and what it gives up.
+//! The most informative setting whose stream fits a budget, and its loss.
 
 use super::table::{Row, TuningTable};
 
-/// What fits, beside the best of all and the leanest of all.
+/// The chosen row, the best row and the leanest row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
     /// Bits a second that the stream may take.
@@ -59,7 +59,7 @@ pub fn least<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
 }
 
 impl Fit {
-    /// What is given up against the best setting, or that none fits; one line for people.
+    /// The loss against the best setting, or that none fits; one line for people.
     pub fn said(&self) -> String {
         let (best, leanest) = (&self.best.measurement, &self.leanest.measurement);
         match &self.chosen {
@@ -90,7 +90,7 @@ impl Fit {
     }
 }
 
-/// In what a setting is less than the best one.
+/// The parameters in which a setting is lower than the best one.
 fn differences(row: &Row, best: &Row) -> String {
     let mut less = Vec::new();
     if row.setting.cells != best.setting.cells {

@@ -1,4 +1,4 @@
-//! What an S2C modem is to be.
+//! The configuration of an S2C modem.
 
 use scenecast_core::ModemAddress;
 pub use scenecast_core::{S2C_BURST_FRAME_BYTES as BURST_FRAME_BYTES, S2C_INSTANT_BYTES as INSTANT_BYTES};
@@ -31,11 +31,11 @@ pub struct S2cConfig {
     pub baud: Option<u32>,
     /// Bit rate of bursts for plans, bit/s.
     pub burst_bps: f64,
-    /// Frames that may be in the modem: bulk, or what the surface has to say.
+    /// Frames in the modem at most.
     pub pool_frames: u32,
 }
 
-/// An instant message takes 161 ms and 10.9 ms a byte: bits a second, and what the beginning takes in bits.
+/// An instant message takes 161 ms and 10.9 ms a byte: bits a second, and the preamble in bits.
 ///
 /// Source: a fit to the table of measured durations shipped with a fielded driver.
 pub const INSTANT_BPS: f64 = 8.0 / 0.0109;
@@ -51,7 +51,7 @@ pub fn instant_airtime(bytes: usize) -> Duration {
 impl S2cConfig {
     /// Settings to write and to read back.
     ///
-    /// No retries of messages: what comes twice costs air, and the driver repeats by itself. Two retries of a connection:
+    /// No retries of messages: duplicates cost airtime, and the driver repeats by itself. Two retries of a connection:
     /// more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so that others get
     /// to speak.
     pub(super) fn settings(&self) -> [(&'static str, u32); 10] {
