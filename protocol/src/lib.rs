@@ -1,6 +1,7 @@
 //! What the two ends of scenecast say to each other: wire format, map coding, replicated state, link,
 //! schedule and medium access. Nothing here does IO: bytes and time come in as arguments.
 
+#![warn(missing_docs)]
 // Received bytes must not panic: what indexes all the same says why.
 #![cfg_attr(
     not(test),
@@ -8,6 +9,7 @@
 )]
 
 pub mod directive;
+pub mod exemplar;
 pub mod link;
 pub mod mac;
 pub mod map;

@@ -7,6 +7,8 @@
 //! Nothing here does input or output, reads a clock, or draws from a global random source: the same calls with the same
 //! seed give the same labels.
 
+#![warn(missing_docs)]
+
 pub mod envelope;
 pub mod exemplars;
 pub mod generate;

@@ -26,6 +26,8 @@
 //! assert!(matches!(arrival.outcome, Outcome::Delivered { .. }));
 //! ```
 
+#![warn(missing_docs)]
+
 pub mod acoustics;
 mod channel;
 pub mod loss;

@@ -1,8 +1,7 @@
 //! A recorded mission for processes whose camera plays it.
 
 use crate::scratch;
-use scenecast::config;
-use scenecast::rehearsal::{Mission, MissionOptions, World};
+use scenecast_rehearsal::{Mission, MissionOptions, World};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -16,7 +15,7 @@ pub fn recorded() -> &'static (PathBuf, Vec<u8>) {
         let dir = scratch("recorded");
         let fly = |sets: &[String], record| {
             let sets: Vec<String> = SHARED.iter().map(|s| (*s).to_owned()).chain(sets.iter().cloned()).collect();
-            let config = config::load(None, &sets).expect("the settings are allowed");
+            let config = scenecast_config::load(None, &sets).expect("the settings are allowed");
             let options = MissionOptions { world: World::procedural(2, 0.01), seed: 1, record };
             let mut mission = Mission::new(config, options).expect("a mission");
             mission.run(Duration::from_secs(3600), &mut |_| {}).expect("the mission ends");
@@ -25,7 +24,7 @@ pub fn recorded() -> &'static (PathBuf, Vec<u8>) {
         fly(&["survey.duration_s=60".into()], Some(dir.clone()));
         let replay = fly(&["survey.duration_s=90".into(), format!("camera.source=frames:{}", dir.display())], None);
         assert!(replay.is_drained());
-        let map = scenecast::picture::encode(replay.vehicle().map()).expect("a map is a picture");
+        let map = scenecast_core::label_picture::encode(replay.vehicle().map()).expect("a map is a picture");
         (dir, map)
     })
 }

@@ -1,8 +1,8 @@
 //! The vehicle and an autopilot built on pymavlink that behaves as ArduSub does.
 
-use scenecast::asv::position::LatLon;
-use scenecast::autopilot::mavlink::MavlinkConfig;
-use scenecast::autopilot::{Autopilot, Goal, Health, Mavlink};
+use scenecast_core::LatLon;
+use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
+use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink};
 use scenecast_protocol::time::Instant;
 use scenecast_tests::{Process, free_port, http, scratch, wait_until, workspace};
 use serde_json::Value;

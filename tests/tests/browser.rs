@@ -87,7 +87,7 @@ fn a_surface_with_a_token_asks_the_browser_for_it() {
 
 /// The modules of the page with the modules that each imports.
 fn page_modules() -> BTreeMap<PathBuf, Vec<PathBuf>> {
-    let root = workspace().join("daemon/console/js");
+    let root = workspace().join("daemon/console/page/js");
     let mut modules = BTreeMap::new();
     let mut folders = vec![root.clone()];
     while let Some(folder) = folders.pop() {
@@ -124,7 +124,7 @@ fn modules_and_folders_of_the_page_form_no_circle() {
     let modules = page_modules();
     assert!(modules.len() > 40, "only {} modules", modules.len());
     assert_eq!(circles(modules.clone()), Vec::<PathBuf>::new());
-    let root = workspace().join("daemon/console/js").canonicalize().expect("the page's folder");
+    let root = workspace().join("daemon/console/page/js").canonicalize().expect("the page's folder");
     // A module directly below js/ stands for itself.
     let room = |path: &Path| match path.parent() {
         Some(folder) if folder != root => folder.to_owned(),

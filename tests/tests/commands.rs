@@ -152,7 +152,7 @@ fn the_configuration_files_that_ship_are_accepted() {
         "scenarios/deep-wreck.toml",
     ];
     for file in files {
-        scenecast::config::load(Some(&root.join(file)), &[]).unwrap_or_else(|e| panic!("{e}"));
+        scenecast_config::load(Some(&root.join(file)), &[]).unwrap_or_else(|e| panic!("{e}"));
     }
 }
 

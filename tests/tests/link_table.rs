@@ -1,6 +1,6 @@
 //! What the link achieves: the golden table and the figures it has to reach.
 
-use scenecast::rehearsal::link_bench::{LinkTable, Pattern, Row, link_table};
+use scenecast_rehearsal::link_bench::{LinkTable, Pattern, Row, link_table};
 use std::sync::OnceLock;
 
 /// Rows that miss the bound of convergence, as range, bytes, loss; this list may only get shorter.

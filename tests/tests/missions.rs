@@ -1,10 +1,10 @@
 //! Rehearsed missions.
 
 use proptest::prelude::*;
-use scenecast::config::{self, Config};
-use scenecast::rehearsal::{Mission, MissionOptions, World, report};
+use scenecast_config::Config;
 use scenecast_protocol::map::PlaneScale;
 use scenecast_protocol::time::Instant;
+use scenecast_rehearsal::{Mission, MissionOptions, World, report};
 use serde_json::Value;
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ fn config(sets: &[&str]) -> Config {
     let small =
         ["survey.duration_s=120", "camera.width_px=320", "camera.height_px=240", "scene.refine_words_per_s=20000"];
     let sets: Vec<String> = small.iter().chain(sets).map(|s| (*s).to_owned()).collect();
-    config::load(None, &sets).unwrap()
+    scenecast_config::load(None, &sets).unwrap()
 }
 
 /// A small reef, drawn once.

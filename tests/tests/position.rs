@@ -1,6 +1,6 @@
 //! The surface's GPS as real connections: gpsd that goes away and comes back, a receiver that talks nonsense.
 
-use scenecast::asv::position::nmea;
+use scenecast_core::nmea;
 use scenecast_tests::{Process, assert_refused, free_port, http, scratch, wait_until};
 use serde_json::Value;
 use std::io::{Read, Write};

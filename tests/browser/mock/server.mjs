@@ -17,7 +17,7 @@ import { Mission } from "./mission.mjs";
 import { faultOf, fit } from "./settings.mjs";
 
 const HERE = dirname(fileURLToPath(import.meta.url));
-const ASSETS = join(HERE, "../../../daemon/console");
+const ASSETS = join(HERE, "../../../daemon/console/page");
 const TYPES = {
   ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
   ".js": "text/javascript; charset=utf-8",

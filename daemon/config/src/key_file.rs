@@ -1,0 +1,103 @@
+//! The file of the mission key.
+
+use super::Config;
+use scenecast_core::UserError;
+use scenecast_protocol::seal::MissionKey;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use zeroize::Zeroizing;
+
+/// More than a key and its comments need.
+const MAX_BYTES: u64 = 64 * 1024;
+
+/// The key of `link.key_file`; `None` if it is empty: frames are then not authenticated.
+///
+/// Warns in the log if others on this machine may read the file, so the log must have begun.
+pub fn load_key(config: &Config) -> Result<Option<MissionKey>, UserError> {
+    let file = &config.link.key_file;
+    if file.is_empty() {
+        return Ok(None);
+    }
+    let (key, warning) = read_key(Path::new(file))?;
+    if let Some(warning) = warning {
+        tracing::warn!("{warning}");
+    }
+    Ok(Some(key))
+}
+
+/// The key in a file, and a warning if others on this machine may read it.
+pub fn read_key(path: &Path) -> Result<(MissionKey, Option<String>), UserError> {
+    let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key new writes a key file"));
+    let file = File::open(path).map_err(problem)?;
+    let warning = others_may_read(&file)
+        .then(|| format!("{}: others may read this key; chmod 600 keeps it to its owner", path.display()));
+    let mut text = Zeroizing::new(String::with_capacity(1024));
+    file.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
+    let key = MissionKey::parse(&text).map_err(|e| UserError::file(path, e))?;
+    Ok((key, warning))
+}
+
+#[cfg(unix)]
+pub(super) fn others_may_read(file: &File) -> bool {
+    use std::os::unix::fs::PermissionsExt;
+    file.metadata().is_ok_and(|m| m.is_file() && m.permissions().mode() & 0o077 != 0)
+}
+
+#[cfg(not(unix))]
+pub(super) fn others_may_read(_: &File) -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file_of(name: &str, text: &str) -> (std::path::PathBuf, Config) {
+        let path = std::env::temp_dir().join(format!("scenecast-key-file-{}-{name}", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let mut config = Config::default();
+        config.link.key_file = path.display().to_string();
+        (path, config)
+    }
+
+    #[test]
+    fn no_file_is_no_key() {
+        assert!(load_key(&Config::default()).unwrap().is_none());
+    }
+
+    #[test]
+    fn a_key_is_read_from_its_file() {
+        let key = MissionKey::from_bytes([3; 16]);
+        let (path, config) = file_of("good", &format!("# reef\n{}", *key.to_text()));
+        let read = load_key(&config).unwrap().unwrap();
+        std::fs::remove_file(path).unwrap();
+        assert_eq!(read.fingerprint(), key.fingerprint());
+    }
+
+    #[test]
+    fn a_broken_file_is_named_with_the_line_and_what_is_allowed() {
+        let (path, config) = file_of("broken", "# reef\nhello\n");
+        let said = load_key(&config).unwrap_err();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(said.exit_code(), 2);
+        let said = said.to_string();
+        assert!(said.starts_with(&format!("{}: line 2: ", path.display())), "{said}");
+        assert!(said.contains("scenecast-key 1 KEY CHECK"), "{said}");
+        let missing = load_key(&config).unwrap_err().to_string();
+        assert!(missing.contains(&config.link.key_file) && missing.contains("scenecast key new"), "{missing}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_others_may_read_is_noticed() {
+        use std::os::unix::fs::PermissionsExt;
+        let (path, _) = file_of("mode", &MissionKey::from_bytes([3; 16]).to_text());
+        let noticed = [0o600, 0o400, 0o640, 0o604].map(|mode| {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+            read_key(&path).unwrap().1.is_some()
+        });
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(noticed, [false, false, true, true]);
+    }
+}

@@ -1,0 +1,95 @@
+//! The formats: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
+
+use super::place::{lon_lat, well_known_text};
+use super::regions::{Polygon, regions};
+use super::{Cells, Explored};
+use crate::state::Origin;
+use scenecast_core::label_picture;
+use scenecast_protocol::map::{LabelGrid, PlaneKind};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// An indexed PNG, north up, pixel value = label.
+pub(crate) fn indexed_png(cells: &Cells) -> Option<Vec<u8>> {
+    let grid: LabelGrid = cells.bounds.cells().zip(cells.labels.iter().copied()).collect();
+    label_picture::encode(&grid).ok()
+}
+
+/// The six lines of a world file: size of a pixel, and the middle of the north-west one.
+pub(crate) fn world_file(cells: &Cells) -> String {
+    let (west, _) = cells.corner_m(0, 0);
+    let (_, north) = cells.corner_m(0, cells.bounds.height.max(1));
+    let (cell, half) = (cells.cell_m, cells.cell_m / 2.0);
+    [cell, 0.0, 0.0, -cell, west + half, north - half].map(|v| format!("{v}\n")).concat()
+}
+
+/// The `.aux.xml` file beside a PNG, where GDAL and QGIS look for the projection.
+pub(crate) fn projection(origin: Option<Origin>) -> String {
+    let text = well_known_text(origin).replace('"', "&quot;");
+    format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n</PAMDataset>\n")
+}
+
+/// Regions of equal label: WGS 84 if the mission has an origin, else metres east and north of it.
+pub(crate) fn geojson(cells: &Cells, origin: Option<Origin>) -> String {
+    let corner = |&(column, row): &(u32, u32)| {
+        let (x, y) = cells.corner_m(column, row);
+        let Some(origin) = origin else { return json!([x, y]) };
+        let (lon, lat) = lon_lat(origin, x, y);
+        json!([tidy(lon), tidy(lat)])
+    };
+    let feature = |(label, polygons): (u8, Vec<Polygon>)| {
+        let count = cells.labels.iter().filter(|l| **l == label).count();
+        let rings = |polygon: &Polygon| polygon.iter().map(|r| r.iter().map(corner).collect()).collect::<Vec<Value>>();
+        json!({
+            "type": "Feature",
+            "id": label,
+            "properties": { "label": label, "area_m2": count as f64 * cells.cell_m * cells.cell_m },
+            "geometry": { "type": "MultiPolygon", "coordinates": polygons.iter().map(rings).collect::<Vec<_>>() },
+        })
+    };
+    let all = regions(&cells.labels, cells.bounds.width, cells.bounds.height);
+    let mut about = json!({ "map_version": cells.version, "mission_time_s": cells.at_s });
+    if origin.is_none() {
+        about["coordinates"] = json!("metres east and north of the mission's origin");
+    }
+    let features: Vec<Value> = all.into_iter().map(feature).collect();
+    json!({ "type": "FeatureCollection", "scenecast": about, "features": features }).to_string()
+}
+
+/// Degrees to a tenth of a millimetre.
+fn tidy(degrees: f64) -> f64 {
+    (degrees * 1e9).round() / 1e9
+}
+
+/// ASCII PLY: the middle of each explored cell in metres east, north and up (0: no depth is known), colour, label.
+pub(crate) fn ply(cells: &Cells) -> String {
+    let count = cells.explored().count();
+    let mut out = format!(
+        "ply\nformat ascii 1.0\ncomment scenecast map, metres east, north, up\nelement vertex {count}\n\
+         property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
+         property uchar blue\nproperty uchar label\nend_header\n"
+    );
+    let depth = cells.planes.iter().find(|p| p.name == PlaneKind::Depth.name());
+    for Explored { at, x, y, label, .. } in cells.explored() {
+        let [red, green, blue] = scenecast_core::palette::colour(label);
+        let up = depth.and_then(|plane| plane.value(at)).map_or(0.0, |depth| -depth);
+        let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
+    }
+    out
+}
+
+/// A line for each explored cell: the middle in metres, label, age in seconds, what is known of each plane.
+pub(crate) fn csv(cells: &Cells) -> String {
+    let mut out = String::from("east_m,north_m,label,age_s");
+    cells.planes.iter().for_each(|plane| out.extend([",", plane.name]));
+    for Explored { at, x, y, label, age_s } in cells.explored() {
+        let age = if age_s == u16::MAX { String::new() } else { age_s.to_string() };
+        let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");
+        for plane in &cells.planes {
+            let value = plane.value(at).map_or(String::new(), |value| format!("{value:.3}"));
+            let _ = write!(out, ",{value}");
+        }
+    }
+    out.push('\n');
+    out
+}

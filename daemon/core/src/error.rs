@@ -1,0 +1,41 @@
+//! What went wrong, for people.
+
+use std::fmt;
+use std::path::Path;
+
+/// A problem that ends a command, with the exit code that tells which kind it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum UserError {
+    /// Wrong usage or input: one line that says what, where and what is allowed. Exit code 2.
+    Input(String),
+    /// Right usage, but it could not be done. Exit code 1.
+    Failed(String),
+}
+
+impl UserError {
+    /// A problem with a file, as `FILE: what`.
+    pub fn file(path: &Path, what: impl fmt::Display) -> Self {
+        Self::Input(format!("{}: {what}", path.display()))
+    }
+
+    /// The process's exit code.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Failed(_) => 1,
+        }
+    }
+}
+
+impl fmt::Display for UserError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // One line, whatever a library has put into its message.
+            Self::Input(what) | Self::Failed(what) => {
+                f.write_str(&what.split_whitespace().collect::<Vec<_>>().join(" "))
+            }
+        }
+    }
+}
+
+impl std::error::Error for UserError {}

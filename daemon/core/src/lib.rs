@@ -1,0 +1,29 @@
+//! What the crates of the daemon share: coordinates, sensor sentences, pictures of label maps and the error for people.
+//!
+//! Internal to scenecast. No IO: bytes and time come in as arguments.
+
+mod area;
+pub mod drop_counts;
+mod error;
+mod geodesy;
+pub mod gps;
+pub mod label_picture;
+mod lines;
+mod micromodem_rate;
+mod modem_units;
+pub mod nmea;
+pub mod palette;
+mod port_address;
+pub mod tuning_table;
+mod usbl_line;
+mod world_file;
+
+pub use area::Area;
+pub use error::UserError;
+pub use geodesy::{LatLon, TangentPlane, wrap_rad};
+pub use lines::Lines;
+pub use micromodem_rate::{CYCLE_INIT, MicromodemRate, OVERHEAD_BITS};
+pub use modem_units::{S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES};
+pub use port_address::PortAddress;
+pub use usbl_line::{ModemAddress, UsblLine};
+pub use world_file::world_file;

@@ -1,0 +1,241 @@
+//! The table of `scenecast tune`: a line a setting, with what it reaches and what its stream takes.
+
+use crate::UserError;
+use scenecast_protocol::directive::CellBand;
+use std::fmt;
+
+/// The first line. A change of the columns is another version.
+const TITLE: &str = "# scenecast tuning table 2";
+const HEAD: &str = "inputs,cell_m,alpha,beta,gamma,refine_words_per_s,frames_per_s,cells,mutual_information_nats,\
+normalised_mutual_information,null_mutual_information_nats,mosaic_mutual_information_nats,labels,map_bytes,stream_bps";
+/// Most lines that are read.
+const MOST_ROWS: usize = 100_000;
+
+/// One setting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// Edge of a cell of the model, metres.
+    pub cell_m: f64,
+    /// Preference for labels that are used elsewhere.
+    pub alpha: f64,
+    /// Prior weight of each word in a label.
+    pub beta: f64,
+    /// Weight of a new label.
+    pub gamma: f64,
+    /// Words resampled a second of mission time.
+    pub refine_words_per_s: f64,
+    /// Camera frames a second that the scene model sees.
+    pub frames_per_s: f64,
+    /// Which cells are told: fine or coarse.
+    pub cells: CellBand,
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells } = self;
+        write!(f, "cell_m {cell_m}, alpha {alpha}, beta {beta}, gamma {gamma}, ")?;
+        write!(f, "{refine_words_per_s} words/s, {frames_per_s} frames/s, {} cells", cells.name())
+    }
+}
+
+/// The figures of one setting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurement {
+    /// Of map labels and annotated classes, nats.
+    pub mutual_information_nats: f64,
+    /// Divided by the geometric mean of both entropies.
+    pub normalised_mutual_information: f64,
+    /// Mean of the map flipped and shifted, nats.
+    pub null_mutual_information_nats: f64,
+    /// Of map labels and the mosaic's colours, nats.
+    pub mosaic_mutual_information_nats: f64,
+    /// Different labels in the final map.
+    pub labels: usize,
+    /// Bytes of all chunks that say the final map from nothing.
+    pub map_bytes: usize,
+    /// Bits of all chunks of the survey over its time.
+    pub stream_bps: f64,
+}
+
+/// A setting with its figures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// The setting.
+    pub setting: Setting,
+    /// Its figures.
+    pub measurement: Measurement,
+}
+
+/// Settings with their figures, none twice, in order.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TuningTable {
+    /// What the figures of each row were measured with.
+    rows: Vec<(String, Row)>,
+}
+
+impl TuningTable {
+    /// The table that ships: procedural sea floors, surveyed as configured by default.
+    pub fn shipped() -> Self {
+        // A test reads it; were it ever wrong, there would be nothing to fit.
+        Self::read(include_str!("default.csv")).unwrap_or_default()
+    }
+
+    /// Reads the text of `file`.
+    ///
+    /// # Errors
+    /// The file, the line and what is wrong with it; a table without a row.
+    pub fn parse(file: &str, text: &str) -> Result<Self, UserError> {
+        let table = Self::read(text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
+        if table.rows.is_empty() {
+            return Err(UserError::Input(format!("{file}: the table has no line; scenecast tune writes them")));
+        }
+        Ok(table)
+    }
+
+    /// Reads a table's text; the error is the line and what is wrong with it.
+    pub fn read(text: &str) -> Result<Self, (usize, String)> {
+        let mut lines = text.lines().enumerate();
+        if lines.next().is_none_or(|(_, title)| title.trim_end() != TITLE) {
+            return Err((1, format!("not a table of this version of scenecast tune, which begins with \"{TITLE}\"")));
+        }
+        if lines.next().is_none_or(|(_, head)| head.trim_end() != HEAD) {
+            return Err((2, format!("has other columns than {HEAD}")));
+        }
+        let mut table = Self::default();
+        for (index, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+            let (inputs, row) = parse(line).map_err(|what| (index + 1, what))?;
+            table.insert(inputs, row);
+            if table.rows.len() > MOST_ROWS {
+                return Err((index + 1, format!("more than {MOST_ROWS} lines")));
+            }
+        }
+        Ok(table)
+    }
+
+    /// The table's text.
+    pub fn text(&self) -> String {
+        let lines = self.rows.iter().map(|(inputs, row)| line(inputs, row));
+        format!("{TITLE}\n{HEAD}\n{}", lines.collect::<String>())
+    }
+
+    /// The rows.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().map(|(_, row)| row)
+    }
+
+    /// The first line of the text whose figures were measured with other inputs than these.
+    pub fn line_of_others(&self, inputs: &str) -> Option<usize> {
+        self.rows.iter().position(|(own, _)| own != inputs).map(|at| at + 3)
+    }
+
+    /// Whether it has a row of a setting.
+    pub fn has(&self, setting: &Setting) -> bool {
+        self.rows().any(|row| row.setting == *setting)
+    }
+
+    /// Takes a row in, unless there is one of this setting.
+    pub fn insert(&mut self, inputs: String, row: Row) {
+        let key = |row: &Row| {
+            let Setting { cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells } = row.setting;
+            [cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells as u8 as f64]
+        };
+        let place = self.rows.partition_point(|(_, other)| key(other) < key(&row));
+        if self.rows.get(place).is_none_or(|(_, other)| other.setting != row.setting) {
+            self.rows.insert(place, (inputs, row));
+        }
+    }
+}
+
+fn line(inputs: &str, Row { setting, measurement: m }: &Row) -> String {
+    let Setting { cell_m, alpha, beta, gamma, refine_words_per_s, frames_per_s, cells } = setting;
+    let cells = cells.name();
+    let of_setting = format!("{cell_m},{alpha},{beta},{gamma},{refine_words_per_s},{frames_per_s},{cells}");
+    let (mi, nmi) = (m.mutual_information_nats, m.normalised_mutual_information);
+    let (null, mosaic) = (m.null_mutual_information_nats, m.mosaic_mutual_information_nats);
+    let told = format!("{mi:.6},{nmi:.6},{null:.6},{mosaic:.6},{},{},{:.3}", m.labels, m.map_bytes, m.stream_bps);
+    format!("{inputs},{of_setting},{told}\n")
+}
+
+fn parse(line: &str) -> Result<(String, Row), String> {
+    let fields: Vec<&str> = line.trim_end().split(',').collect();
+    let names: Vec<&str> = HEAD.split(',').collect();
+    if fields.len() != names.len() {
+        return Err(format!("{} fields; the table has {}", fields.len(), names.len()));
+    }
+    let number = |at: usize, low: f64, high: f64| {
+        let value = fields[at].parse::<f64>().ok().filter(|value| (low..=high).contains(value));
+        value.ok_or_else(|| format!("{} {:?}: it takes {low} to {high}", names[at], fields[at]))
+    };
+    let band = CellBand::from_name(fields[7]).filter(|&band| band != CellBand::CoarseToFine);
+    let setting = Setting {
+        cell_m: number(1, 1e-6, 1e3)?,
+        alpha: number(2, 1e-9, 1e3)?,
+        beta: number(3, 1e-9, 1e3)?,
+        gamma: number(4, 1e-12, 1e3)?,
+        refine_words_per_s: number(5, 0.0, 1e8)?,
+        frames_per_s: number(6, 0.01, 30.0)?,
+        cells: band.ok_or_else(|| format!("cells {:?}: it takes fine or coarse", fields[7]))?,
+    };
+    let measurement = Measurement {
+        mutual_information_nats: number(8, 0.0, 1e3)?,
+        normalised_mutual_information: number(9, 0.0, 1.000_001)?,
+        null_mutual_information_nats: number(10, 0.0, 1e3)?,
+        mosaic_mutual_information_nats: number(11, 0.0, 1e3)?,
+        labels: number(12, 0.0, 1e6)? as usize,
+        map_bytes: number(13, 0.0, 1e12)? as usize,
+        stream_bps: number(14, 0.0, 1e12)?,
+    };
+    Ok((fields[0].to_owned(), Row { setting, measurement }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fit::tests::row;
+    use super::*;
+
+    fn filled() -> TuningTable {
+        let mut table = TuningTable::default();
+        for alpha in [1.0, 0.001, 1e-9] {
+            table.insert("0123".to_owned(), row(alpha, 0.25, 812.5));
+        }
+        table
+    }
+
+    #[test]
+    fn a_table_comes_back_from_its_text() {
+        let table = filled();
+        assert_eq!(TuningTable::read(&table.text()), Ok(table.clone()));
+        assert_eq!(table.rows().map(|row| row.setting.alpha).collect::<Vec<_>>(), [1e-9, 0.001, 1.0]);
+        assert!(table.has(&row(0.001, 0.0, 0.0).setting));
+        assert_eq!((table.line_of_others("0123"), table.line_of_others("4567")), (None, Some(3)));
+        assert_eq!(TuningTable::read(&table.text().replace('\n', "\r\n")), Ok(table));
+    }
+
+    #[test]
+    fn what_is_no_line_of_the_table_is_refused_with_its_number_and_what_is_allowed() {
+        let text = filled().text();
+        let refused = |from: &str, to: &str| TuningTable::read(&text.replacen(from, to, 1)).unwrap_err();
+        assert_eq!(refused("table 2", "table 3").0, 1);
+        assert_eq!(refused("cells,", "").0, 2);
+        assert_eq!(refused("0.25,1,", "0.25,one,"), (5, "alpha \"one\": it takes 0.000000001 to 1000".to_owned()));
+        assert_eq!(refused("0.25,1,", "0.25,NaN,").0, 5);
+        assert_eq!(refused(",fine", ",huge"), (3, "cells \"huge\": it takes fine or coarse".to_owned()));
+        assert_eq!(refused(",fine", ""), (3, "14 fields; the table has 15".to_owned()));
+        assert_eq!(TuningTable::read("").unwrap_err().0, 1);
+    }
+
+    #[test]
+    fn the_table_that_ships_can_be_sent_as_it_stands() {
+        use scenecast_protocol::directive::Figure;
+        let table = TuningTable::shipped();
+        assert!(table.rows().count() >= 16);
+        for Row { setting: s, .. } in table.rows() {
+            for value in [s.alpha, s.beta, s.gamma, s.refine_words_per_s, s.frames_per_s] {
+                assert_eq!(Figure::new(value).map(Figure::value), Some(value), "{s}");
+            }
+        }
+        let [fine, coarse] =
+            [CellBand::Fine, CellBand::Coarse].map(|band| table.rows().filter(|row| row.setting.cells == band).count());
+        assert!(fine > 0 && coarse > 0);
+    }
+}

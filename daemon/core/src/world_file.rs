@@ -1,0 +1,49 @@
+//! A map in the world: the file that geographic information systems look for beside a picture.
+
+use crate::geodesy::TangentPlane;
+use scenecast_protocol::map::Rect;
+use scenecast_protocol::wire::Placement;
+
+/// The six lines of an ESRI world file for a picture of `bounds`, north up, a pixel a cell; degrees of WGS-84 (EPSG:4326).
+///
+/// Source: ESRI, "World files for raster datasets": pixel width, two rotations, pixel height, middle of the north-west
+/// pixel.
+pub fn world_file(plane: &TangentPlane, placement: Option<Placement>, bounds: Rect, cell_m: f64) -> String {
+    let world = |column: f64, row: f64| {
+        let at =
+            ((f64::from(bounds.x) + column) * cell_m, (f64::from(bounds.y) + f64::from(bounds.height) - row) * cell_m);
+        let (x, y) = placement.map_or(at, |p| p.to_world(at));
+        plane.to_place(x, y)
+    };
+    let (width, height) = (f64::from(bounds.width), f64::from(bounds.height));
+    let (corner, right, down) = (world(0.5, 0.5), world(0.5 + width, 0.5), world(0.5, 0.5 + height));
+    let lines = [
+        (right.lon_deg - corner.lon_deg) / width,
+        (right.lat_deg - corner.lat_deg) / width,
+        (down.lon_deg - corner.lon_deg) / height,
+        (down.lat_deg - corner.lat_deg) / height,
+        corner.lon_deg,
+        corner.lat_deg,
+    ];
+    lines.iter().map(|v| format!("{v:.12}\n")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geodesy::LatLon;
+
+    #[test]
+    fn a_pixel_of_the_picture_lies_where_its_cell_does() {
+        let plane = TangentPlane::new(LatLon::new(29.5, 34.92).unwrap());
+        let bounds = Rect { x: -10, y: 20, width: 100, height: 60 };
+        let placement = Placement { version: 1, east_m: 3.0, north_m: -2.0 };
+        let text = world_file(&plane, Some(placement), bounds, 0.5);
+        let v: Vec<f64> = text.lines().map(|l| l.parse().unwrap()).collect();
+        // Column 40, row 10 from the north is cell (30, 69).
+        let (column, row) = (40.0, 10.0);
+        let place = LatLon::new(v[1] * column + v[3] * row + v[5], v[0] * column + v[2] * row + v[4]).unwrap();
+        let (x, y) = plane.to_plane(place);
+        assert!((x - (30.5 * 0.5 + 3.0)).abs() < 0.01 && (y - (69.5 * 0.5 - 2.0)).abs() < 0.01, "{x} {y}");
+    }
+}

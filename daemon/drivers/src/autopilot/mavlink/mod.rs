@@ -1,0 +1,371 @@
+//! ArduSub, and its relatives, over MAVLink 2.
+
+pub mod frame;
+pub mod message;
+
+use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use frame::{Deframer, Frame, encode};
+use message::{Heard, Said, heard_extra};
+use scenecast_core::LatLon;
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+/// How this end presents itself and what it may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MavlinkConfig {
+    /// System number of the autopilot; frames of others are passed over.
+    pub system: u8,
+    /// Whether to arm it and to switch it to guided mode, once.
+    pub arms: bool,
+    /// Silence after which it counts as gone.
+    pub silence: Duration,
+}
+
+/// What the autopilot said of itself last.
+#[derive(Debug, Clone, Copy)]
+struct Peer {
+    component: u8,
+    guided_mode: u32,
+    custom_mode: u32,
+    is_armed: bool,
+    heard: Instant,
+}
+
+impl Peer {
+    fn is_in_command(&self) -> bool {
+        self.is_armed && self.custom_mode == self.guided_mode
+    }
+}
+
+/// What it told of its motion last.
+#[derive(Debug, Clone, Copy)]
+struct Pose {
+    /// Own frame, north, east, down, metres; nothing if it tells only where on the Earth it is.
+    local: Option<[f32; 3]>,
+    place: Option<(i32, i32)>,
+    depth_m: f64,
+    /// East and north, metres a second.
+    velocity: (f64, f64),
+    time_boot_ms: u32,
+    heard: Instant,
+}
+
+/// A state machine toward an autopilot of the ArduPilot family.
+///
+/// Way is what its velocity adds up to, not the difference of its positions: these jump when it takes a fix in, and a fix
+/// that this vehicle has used already must not count twice. Waypoints are held as way still to go, and sent anew each
+/// second in the autopilot's own frame, so that nothing depends on where that has its origin.
+#[derive(Debug)]
+pub struct Mavlink {
+    config: MavlinkConfig,
+    deframer: Deframer,
+    seq: u8,
+    began: Instant,
+    peer: Option<Peer>,
+    pose: Option<Pose>,
+    yaw: Option<f64>,
+    /// Way still to go, east and north, and the depth; `None`: stay.
+    goal: Option<Goal>,
+    stay: Option<[f32; 3]>,
+    /// Where on the Earth it is, moved on by its own way: latitude, longitude, standard deviation.
+    place: Option<(LatLon, f32, Instant)>,
+    /// Whether it was in command once: from then on whoever takes it out of that is obeyed.
+    was_in_command: bool,
+    due: Due,
+    tray: Tray,
+    was_silent: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Due {
+    second: Instant,
+    gps: Instant,
+}
+
+/// MAV_CMD_DO_SET_MODE.
+const SET_MODE: u16 = 176;
+/// MAV_CMD_COMPONENT_ARM_DISARM.
+const ARM: u16 = 400;
+/// MAV_CMD_SET_MESSAGE_INTERVAL.
+const INTERVAL: u16 = 511;
+/// Component of this end: MAV_COMP_ID_ONBOARD_COMPUTER.
+const OWN_COMPONENT: u8 = 191;
+/// Longest time between two positions that is bridged by the velocity.
+const BRIDGED: Duration = Duration::from_secs(3);
+/// GPS_INPUT goes out so often, as ArduPilot expects of a receiver.
+const GPS_PERIOD: Duration = Duration::from_millis(200);
+/// A place on the Earth is passed on for so long after it was told.
+const PLACE_LASTS: Duration = Duration::from_secs(5);
+
+impl Mavlink {
+    /// Toward an autopilot that has said nothing yet.
+    pub fn new(config: MavlinkConfig, now: Instant) -> Self {
+        Self {
+            config,
+            deframer: Deframer::default(),
+            seq: 0,
+            began: now,
+            peer: None,
+            pose: None,
+            yaw: None,
+            goal: None,
+            stay: None,
+            place: None,
+            was_in_command: false,
+            due: Due { second: now, gps: now },
+            tray: Tray::default(),
+            was_silent: false,
+        }
+    }
+
+    fn say(&mut self, said: &Said, now: Instant) {
+        let (id, extra) = said.id();
+        let component = self.peer.map_or(1, |p| p.component);
+        let time_ms = now.since(self.began).as_millis() as u32;
+        let payload = said.payload(self.config.system, component, time_ms);
+        let frame = Frame { system: self.config.system, component: OWN_COMPONENT, id, payload };
+        self.tray.write(encode(&frame, self.seq, extra));
+        self.seq = self.seq.wrapping_add(1);
+    }
+
+    fn handle_frame(&mut self, frame: &Frame, now: Instant) {
+        if frame.system != self.config.system {
+            self.tray.count("other_systems");
+            return;
+        }
+        let Some(heard) = Heard::read(frame.id, &frame.payload) else {
+            self.tray.count("unreadable");
+            return;
+        };
+        self.tray.count("messages");
+        match heard {
+            Heard::Heartbeat { custom_mode, kind, autopilot, base_mode } => {
+                // Cameras and ground stations of the same system have no autopilot.
+                if autopilot != 8 {
+                    self.handle_heartbeat(frame.component, custom_mode, kind, base_mode, now);
+                }
+            }
+            Heard::Attitude { yaw } => self.yaw = Some(f64::from(yaw)),
+            Heard::Local { time_boot_ms, place, velocity: [north, east, _] } => {
+                let velocity = (f64::from(east), f64::from(north));
+                let was = self.pose.and_then(|p| p.place);
+                let depth_m = f64::from(place[2]);
+                let pose = Pose { local: Some(place), place: was, depth_m, velocity, time_boot_ms, heard: now };
+                self.handle_pose(pose, true);
+            }
+            Heard::Global { time_boot_ms, lat, lon, relative_alt, velocity: [north, east, _], heading } => {
+                if heading != u16::MAX && self.yaw.is_none() {
+                    self.yaw = Some((f64::from(heading) / 100.0).to_radians());
+                }
+                let velocity = (f64::from(east) / 100.0, f64::from(north) / 100.0);
+                let local = self.pose.filter(|p| now.since(p.heard) < BRIDGED).and_then(|p| p.local);
+                let depth_m = -f64::from(relative_alt) / 1000.0;
+                let pose = Pose { local, place: Some((lat, lon)), depth_m, velocity, time_boot_ms, heard: now };
+                self.handle_pose(pose, local.is_none());
+            }
+            Heard::Ack { command, result } => {
+                // In progress is no refusal.
+                if !matches!(result, 0 | 5) {
+                    self.tray.count("commands_refused");
+                    if command != INTERVAL {
+                        self.tray.note(format!("the autopilot refuses command {command}: result {result}"));
+                    }
+                }
+            }
+            Heard::Text { severity, text } => {
+                if severity <= 4 {
+                    self.tray.note(format!("the autopilot says: {text}"));
+                }
+            }
+        }
+    }
+
+    fn handle_heartbeat(&mut self, component: u8, custom_mode: u32, kind: u8, base_mode: u8, now: Instant) {
+        // GUIDED is 4 of ArduSub and ArduCopter, 15 of ArduRover, which drives boats too.
+        let guided_mode = if matches!(kind, 10 | 11) { 15 } else { 4 };
+        let peer = Peer { component, guided_mode, custom_mode, is_armed: base_mode & 128 != 0, heard: now };
+        let is_new = self.peer.is_none_or(|p| now.since(p.heard) >= self.config.silence);
+        let was_in_command = self.peer.is_some_and(|p| p.is_in_command());
+        self.peer = Some(peer);
+        if is_new {
+            self.tray.note("the autopilot answers");
+            self.was_silent = false;
+            self.ask_for_streams(now);
+        }
+        if was_in_command && !peer.is_in_command() {
+            self.tray.note("the autopilot was taken out of guided mode or disarmed: waypoints wait until it is back");
+        }
+        self.was_in_command |= peer.is_in_command();
+    }
+
+    fn ask_for_streams(&mut self, now: Instant) {
+        // Microseconds between two: attitude, local and global position.
+        for (id, interval) in [(30.0, 200_000.0), (32.0, 200_000.0), (33.0, 500_000.0)] {
+            self.say(&Said::Command { command: INTERVAL, params: [id, interval, 0.0] }, now);
+        }
+    }
+
+    /// Takes a position; `counts` is whether its velocity is the one to add up.
+    fn handle_pose(&mut self, pose: Pose, counts: bool) {
+        let before = self.pose;
+        if !counts {
+            if let Some(mine) = &mut self.pose {
+                mine.place = pose.place;
+            }
+            return;
+        }
+        self.pose = Some(pose);
+        let Some(before) = before else { return };
+        let passed_ms = pose.time_boot_ms.wrapping_sub(before.time_boot_ms);
+        // A clock that went back is another run of the autopilot.
+        if passed_ms == 0 || u128::from(passed_ms) > BRIDGED.as_millis() {
+            self.tray.count("gaps");
+            return self.push_step(0.0, 0.0, &pose, pose.heard.since(before.heard));
+        }
+        let passed_s = f64::from(passed_ms) / 1000.0;
+        let mean = |a: f64, b: f64| (a + b) / 2.0 * passed_s;
+        let (dx_m, dy_m) = (mean(before.velocity.0, pose.velocity.0), mean(before.velocity.1, pose.velocity.1));
+        if dx_m.hypot(dy_m) > 20.0 * passed_s {
+            self.tray.count("absurd_velocities");
+            return self.push_step(0.0, 0.0, &pose, Duration::from_secs_f64(passed_s));
+        }
+        if let Some(goal) = &mut self.goal {
+            (goal.east_m, goal.north_m) = (goal.east_m - dx_m, goal.north_m - dy_m);
+        }
+        if let Some((place, ..)) = &mut self.place {
+            *place = moved(*place, dx_m, dy_m);
+        }
+        self.push_step(dx_m, dy_m, &pose, Duration::ZERO);
+    }
+
+    fn push_step(&mut self, dx_m: f64, dy_m: f64, pose: &Pose, unseen: Duration) {
+        let heading_rad = self.yaw.unwrap_or(0.0);
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: pose.depth_m, unseen });
+    }
+
+    fn handle_second(&mut self, now: Instant) {
+        self.say(&Said::Heartbeat, now);
+        let health = self.health(now);
+        if health == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
+            self.tray.count("silences");
+            self.tray.note("the autopilot does not answer any more");
+        }
+        let Some(peer) = self.peer.filter(|_| !health.is_silent()) else { return };
+        if self.pose.is_none_or(|p| now.since(p.heard) > BRIDGED) {
+            self.ask_for_streams(now);
+        }
+        match health {
+            Health::InCommand => self.send_target(now),
+            _ if self.config.arms && !self.was_in_command && self.goal.is_some() => {
+                // MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+                let params = [1.0, peer.guided_mode as f32, 0.0];
+                self.say(&Said::Command { command: SET_MODE, params }, now);
+                self.say(&Said::Command { command: ARM, params: [1.0, 0.0, 0.0] }, now);
+            }
+            _ => {}
+        }
+    }
+
+    fn send_target(&mut self, now: Instant) {
+        let Some(pose) = self.pose.filter(|p| now.since(p.heard) < BRIDGED) else { return };
+        self.tray.count("targets");
+        match (pose.local, self.goal) {
+            (Some(at), Some(goal)) => {
+                let down = goal.depth_m.map_or(at[2], |d| d as f32);
+                self.stay = None;
+                self.say(&Said::Local([at[0] + goal.north_m as f32, at[1] + goal.east_m as f32, down]), now);
+            }
+            (Some(at), None) => {
+                let stay = *self.stay.get_or_insert(at);
+                self.say(&Said::Local(stay), now);
+            }
+            (None, goal) => {
+                let Some((lat, lon)) = pose.place else { return };
+                let here = LatLon { lat_deg: f64::from(lat) / 1e7, lon_deg: f64::from(lon) / 1e7 };
+                let (east, north) = goal.map_or((0.0, 0.0), |g| (g.east_m, g.north_m));
+                let depth = goal.and_then(|g| g.depth_m).unwrap_or(pose.depth_m);
+                let (lat, lon) = units(moved(here, east, north));
+                self.say(&Said::Global(lat, lon, -depth as f32), now);
+            }
+        }
+    }
+}
+
+/// Degrees times ten million.
+fn units(place: LatLon) -> (i32, i32) {
+    ((place.lat_deg * 1e7).round() as i32, (place.lon_deg * 1e7).round() as i32)
+}
+
+/// A place so many metres further.
+fn moved(place: LatLon, east_m: f64, north_m: f64) -> LatLon {
+    scenecast_core::TangentPlane::new(place).to_place(east_m, north_m)
+}
+
+impl Autopilot for Mavlink {
+    fn handle_open(&mut self, now: Instant) {
+        self.deframer.clear();
+        self.due = Due { second: now, gps: now };
+    }
+
+    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
+        let mut frames = Vec::new();
+        self.deframer.push(bytes, heard_extra, |frame| frames.push(frame));
+        frames.iter().for_each(|frame| self.handle_frame(frame, now));
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if now >= self.due.second {
+            self.due.second = now + Duration::from_secs(1);
+            self.handle_second(now);
+        }
+        if now >= self.due.gps {
+            self.due.gps = now + GPS_PERIOD;
+            let fresh = self.place.filter(|(_, _, at)| now.since(*at) < PLACE_LASTS);
+            if let Some((place, sigma_m, _)) = fresh.filter(|_| !self.health(now).is_silent()) {
+                let (lat, lon) = units(place);
+                self.tray.count("gps_inputs");
+                self.say(&Said::Gps { lat, lon, sigma_m }, now);
+            }
+        }
+    }
+
+    fn poll_timeout(&self) -> Instant {
+        if self.place.is_some() { self.due.second.min(self.due.gps) } else { self.due.second }
+    }
+
+    fn tray(&mut self) -> &mut Tray {
+        &mut self.tray
+    }
+
+    fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
+        self.goal = goal.filter(Goal::is_finite);
+    }
+
+    fn handle_place(&mut self, place: LatLon, sigma_m: f64, now: Instant) {
+        self.place = Some((place, sigma_m as f32, now));
+    }
+
+    fn health(&self, now: Instant) -> Health {
+        match self.peer {
+            None => Health::Awaited,
+            Some(peer) if now.since(peer.heard) >= self.config.silence => Health::Silent,
+            Some(peer) if peer.is_in_command() => Health::InCommand,
+            Some(_) => Health::NotInCommand,
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        let refused = self.deframer.refused();
+        let mut counters = self.tray.counters.clone();
+        let more = [
+            ("checksum", refused.checksum),
+            ("incompatible", refused.incompatible),
+            ("garbage_bytes", refused.garbage),
+        ];
+        counters.extend(more.into_iter().filter(|(_, n)| *n > 0));
+        counters
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,135 @@
+//! Autopilots: state machines between the vehicle's role and the bytes of what flies it.
+//!
+//! Waypoints go out, steps of way come in, fixes go out. None of them does IO; [`crate::runtime`] moves their bytes.
+//!
+//! | kind | is |
+//! |---|---|
+//! | [`Mavlink`] | ArduSub as on a BlueROV2, ArduRover on a surface vehicle: MAVLink over serial or UDP |
+//! | [`Nmea`] | lines of NMEA 0183 for other vehicles; or only written down |
+//! | [`Rehearsed`] | a simulated vehicle |
+
+pub mod mavlink;
+mod nmea;
+mod tray;
+
+pub use mavlink::Mavlink;
+pub use nmea::Nmea;
+pub use tray::Tray;
+
+use scenecast_core::LatLon;
+use scenecast_protocol::time::Instant;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Where the autopilot is to take the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// East of where the vehicle is now, metres.
+    pub east_m: f64,
+    /// North of where the vehicle is now, metres.
+    pub north_m: f64,
+    /// Depth below the surface, metres; `None`: as it is.
+    pub depth_m: Option<f64>,
+    /// The same place on the Earth, where that is known.
+    pub place: Option<LatLon>,
+}
+
+impl Goal {
+    /// Whether it is anywhere at all.
+    fn is_finite(&self) -> bool {
+        self.east_m.is_finite() && self.north_m.is_finite() && self.depth_m.is_none_or(f64::is_finite)
+    }
+}
+
+/// A stretch of way, as the autopilot measured it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// East, metres.
+    pub dx_m: f64,
+    /// North, metres.
+    pub dy_m: f64,
+    /// Heading clockwise from north, radians.
+    pub heading_rad: f64,
+    /// Depth below the surface, metres.
+    pub depth_m: f64,
+    /// Time in which it may have gone anywhere, for nothing credible was told; the way is that of the rest.
+    pub unseen: Duration,
+}
+
+/// How an autopilot does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Health {
+    /// Nothing was heard of it yet.
+    Awaited,
+    /// It answered once, and does not any more.
+    Silent,
+    /// It answers, but does not do what it is told: disarmed, or in a mode of the pilot's.
+    NotInCommand,
+    /// It does what it is told.
+    InCommand,
+}
+
+impl Health {
+    /// Name in the log and for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Awaited => "awaited",
+            Self::Silent => "silent",
+            Self::NotInCommand => "not in command",
+            Self::InCommand => "in command",
+        }
+    }
+
+    /// Whether nobody carries out what the vehicle decides.
+    pub fn is_silent(self) -> bool {
+        matches!(self, Self::Awaited | Self::Silent)
+    }
+}
+
+/// Counters of an autopilot by name, for people.
+pub type Counters = BTreeMap<&'static str, u64>;
+
+/// An autopilot. `now` never goes back.
+pub trait Autopilot: Send {
+    /// The way to it was opened; what was said before is forgotten.
+    fn handle_open(&mut self, now: Instant);
+
+    /// Bytes of it, in pieces of any size. Anything may be in them.
+    fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
+
+    /// Time has passed.
+    fn handle_timeout(&mut self, now: Instant);
+
+    /// When [`Self::handle_timeout`] is due.
+    fn poll_timeout(&self) -> Instant;
+
+    /// What it has ready.
+    fn tray(&mut self) -> &mut Tray;
+
+    /// Bytes to send.
+    fn poll_output(&mut self) -> Option<Vec<u8>> {
+        self.tray().outputs.pop_front()
+    }
+
+    /// The next stretch of way.
+    fn poll_step(&mut self) -> Option<Step> {
+        self.tray().steps.pop_front()
+    }
+
+    /// Something that a person should read.
+    fn poll_note(&mut self) -> Option<String> {
+        self.tray().notes.pop_front()
+    }
+
+    /// Go there; `None`: stay. Said anew every second or so, for the autopilot may have forgotten.
+    fn set_goal(&mut self, goal: Option<Goal>, now: Instant);
+
+    /// Where on the Earth the vehicle is, as known from fixes, with its standard deviation in metres.
+    fn handle_place(&mut self, place: LatLon, sigma_m: f64, now: Instant);
+
+    /// How it does.
+    fn health(&self, now: Instant) -> Health;
+
+    /// What happened so far.
+    fn counters(&self) -> Counters;
+}

@@ -1,0 +1,219 @@
+//! Waypoints as lines of NMEA 0183, for vehicles whose autopilot reads those; or only written down.
+//!
+//! Each second, while there is a waypoint:
+//!
+//! ```text
+//! $SCWPL,ddmm.mmmmm,N,dddmm.mmmmm,E,SC*hh                              waypoint, where the mission's origin is known
+//! $SCRMB,A,0.00,L,,SC,ddmm.mmmmm,N,dddmm.mmmmm,E,miles,degrees,,V*hh   way to it
+//! $PSCWP,east,north,depth*hh                                           metres still to go, depth or nothing
+//! ```
+//! and `$PSCHD*hh` while the vehicle is to stay. Read are positions (GGA, RMC), headings (HDT, THS) and depths below the
+//! surface (DBS).
+
+use super::{Autopilot, Counters, Goal, Health, Step, Tray};
+use scenecast_core::gps::{Gps, GpsLanguage};
+use scenecast_core::{LatLon, Lines, TangentPlane, nmea};
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+/// A state machine of lines.
+#[derive(Debug)]
+pub struct Nmea {
+    gps: Gps,
+    lines: Lines,
+    /// Whether answers are expected; not of a file.
+    answers: bool,
+    silence: Duration,
+    heard: Option<Instant>,
+    depth_m: f64,
+    at: Option<(LatLon, Instant)>,
+    goal: Option<Goal>,
+    has_order: bool,
+    second: Instant,
+    tray: Tray,
+    was_silent: bool,
+}
+
+impl Nmea {
+    /// `answers`: whether the vehicle tells where it is; silence of `silence` then counts.
+    pub fn new(answers: bool, silence: Duration, now: Instant) -> Self {
+        Self {
+            gps: Gps::new(GpsLanguage::Nmea),
+            lines: Lines::new(nmea::LONGEST_LINE),
+            answers,
+            silence,
+            heard: None,
+            depth_m: 0.0,
+            at: None,
+            goal: None,
+            has_order: false,
+            second: now,
+            tray: Tray::default(),
+            was_silent: false,
+        }
+    }
+
+    fn write(&mut self, body: &str) {
+        self.tray.write(nmea::line(body).into_bytes());
+    }
+
+    fn say_goal(&mut self) {
+        let Some(goal) = self.goal else { return self.write("PSCHD") };
+        if let Some(place) = goal.place {
+            let fields = nmea::place_fields(place);
+            self.write(&format!("SCWPL,{fields},SC"));
+            let miles = goal.east_m.hypot(goal.north_m) / 1852.0;
+            let bearing = goal.east_m.atan2(goal.north_m).to_degrees().rem_euclid(360.0);
+            self.write(&format!("SCRMB,A,0.00,L,,SC,{fields},{miles:.3},{bearing:.1},,V"));
+        }
+        let depth = goal.depth_m.map_or(String::new(), |d| format!("{d:.1}"));
+        self.write(&format!("PSCWP,{:.1},{:.1},{depth}", goal.east_m, goal.north_m));
+    }
+
+    fn handle_place_of_vehicle(&mut self, place: LatLon, now: Instant) {
+        let heading_rad = self.gps.heading_rad(now).unwrap_or(0.0);
+        if let Some((before, at)) = self.at.replace((place, now)) {
+            let (dx_m, dy_m) = TangentPlane::new(before).to_plane(place);
+            let passed = now.since(at);
+            if dx_m.hypot(dy_m) > 20.0 * passed.as_secs_f64().max(0.1) {
+                self.tray.count("jumps");
+                return self.push_step(0.0, 0.0, heading_rad, passed);
+            }
+            if let Some(goal) = &mut self.goal {
+                (goal.east_m, goal.north_m) = (goal.east_m - dx_m, goal.north_m - dy_m);
+            }
+            self.push_step(dx_m, dy_m, heading_rad, Duration::ZERO);
+        }
+    }
+
+    fn push_step(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, unseen: Duration) {
+        self.tray.walk(Step { dx_m, dy_m, heading_rad, depth_m: self.depth_m, unseen });
+    }
+
+    /// DBS: feet, f, metres, M, fathoms, F.
+    fn handle_depth(&mut self, line: &[u8]) -> Option<f64> {
+        let fields = nmea::fields(line).ok()?;
+        fields.first()?.ends_with("DBS").then(|| fields.get(3)?.parse().ok()).flatten()
+    }
+}
+
+impl Autopilot for Nmea {
+    fn handle_open(&mut self, now: Instant) {
+        self.lines.clear();
+        self.gps.handle_open();
+        self.second = now;
+    }
+
+    fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
+        let mut lines = Vec::new();
+        self.lines.push(bytes, |line| lines.push(line.to_vec()));
+        for line in lines {
+            if let Some(depth) = self.handle_depth(&line).filter(|d: &f64| (0.0..12_000.0).contains(d)) {
+                self.depth_m = depth;
+            }
+            if nmea::fields(&line).is_ok() {
+                if self.heard.is_none() || self.was_silent {
+                    self.tray.note("the autopilot answers");
+                }
+                (self.heard, self.was_silent) = (Some(now), false);
+            }
+            for fix in self.gps.handle_bytes(&[&line[..], b"\n"].concat(), now) {
+                self.handle_place_of_vehicle(fix.place, now);
+            }
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant) {
+        if now < self.second {
+            return;
+        }
+        self.second = now + Duration::from_secs(1);
+        if self.has_order {
+            self.say_goal();
+        }
+        if self.health(now) == Health::Silent && !std::mem::replace(&mut self.was_silent, true) {
+            self.tray.count("silences");
+            self.tray.note("the autopilot does not answer any more");
+        }
+    }
+
+    fn poll_timeout(&self) -> Instant {
+        self.second
+    }
+
+    fn tray(&mut self) -> &mut Tray {
+        &mut self.tray
+    }
+
+    fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
+        self.goal = goal.filter(Goal::is_finite);
+        self.has_order = true;
+    }
+
+    fn handle_place(&mut self, _place: LatLon, _sigma_m: f64, _now: Instant) {}
+
+    fn health(&self, now: Instant) -> Health {
+        match self.heard {
+            _ if !self.answers => Health::InCommand,
+            None => Health::Awaited,
+            Some(at) if now.since(at) >= self.silence => Health::Silent,
+            Some(_) => Health::InCommand,
+        }
+    }
+
+    fn counters(&self) -> Counters {
+        let mut counters = self.tray.counters.clone();
+        counters.extend(self.gps.faults().map(|(fault, n)| (fault.name(), n)));
+        counters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(s: f64) -> Instant {
+        Instant::from_secs_f64(s)
+    }
+
+    fn said(pilot: &mut Nmea) -> Vec<String> {
+        std::iter::from_fn(|| pilot.poll_output()).map(|l| String::from_utf8(l).unwrap()).collect()
+    }
+
+    #[test]
+    fn a_waypoint_is_said_each_second_with_right_checksums() {
+        let mut pilot = Nmea::new(false, Duration::from_secs(5), at(0.0));
+        pilot.handle_timeout(at(0.0));
+        assert!(said(&mut pilot).is_empty(), "nothing is ordered yet");
+        let place = LatLon::new(29.5, 34.92);
+        pilot.set_goal(Some(Goal { east_m: 30.0, north_m: 40.0, depth_m: Some(12.0), place }), at(1.0));
+        pilot.handle_timeout(at(1.0));
+        let lines = said(&mut pilot);
+        assert_eq!(lines[0], "$SCWPL,2930.00000,N,03455.20000,E,SC*51\r\n");
+        assert!(lines[1].starts_with("$SCRMB,A,0.00,L,,SC,2930.00000,N,03455.20000,E,0.027,36.9,,V*"), "{}", lines[1]);
+        assert!(lines[2].starts_with("$PSCWP,30.0,40.0,12.0*"));
+        assert!(lines.iter().all(|l| nmea::fields(l.as_bytes()).is_ok() && l.len() <= 82), "{lines:?}");
+        pilot.set_goal(None, at(2.0));
+        pilot.handle_timeout(at(2.0));
+        assert_eq!(said(&mut pilot), [nmea::line("PSCHD")]);
+    }
+
+    #[test]
+    fn positions_become_steps_and_silence_is_counted() {
+        let mut pilot = Nmea::new(true, Duration::from_secs(5), at(0.0));
+        let plane = TangentPlane::new(LatLon::new(29.5, 34.92).unwrap());
+        for s in 0..3u32 {
+            let place = nmea::place_fields(plane.to_place(f64::from(s), 0.0));
+            let gga = nmea::line(&format!("GPGGA,0000{s:02},{place},1,9,1,0,M,0,M,,"));
+            let depth = nmea::line("SDDBS,,f,7.5,M,,F");
+            pilot.handle_bytes((nmea::line("HEHDT,90.0,T") + &depth + &gga).as_bytes(), at(f64::from(s)));
+        }
+        let steps: Vec<Step> = std::iter::from_fn(|| pilot.poll_step()).collect();
+        assert_eq!(steps.len(), 2);
+        assert!((steps[0].dx_m - 1.0).abs() < 0.03 && steps[0].depth_m == 7.5, "{steps:?}");
+        for s in 3..12 {
+            pilot.handle_timeout(at(f64::from(s)));
+        }
+        assert_eq!((pilot.health(at(12.0)), pilot.counters()["silences"]), (Health::Silent, 1));
+    }
+}

@@ -1,0 +1,71 @@
+//! What an autopilot has ready for its host.
+
+use super::{Counters, Step};
+use std::collections::VecDeque;
+
+/// Bytes, way and notes that wait to be fetched, at most [`Tray::MOST`] of each, and counters.
+#[derive(Debug, Default)]
+pub struct Tray {
+    pub(super) outputs: VecDeque<Vec<u8>>,
+    pub(super) steps: VecDeque<Step>,
+    pub(super) notes: VecDeque<String>,
+    pub(super) counters: Counters,
+}
+
+impl Tray {
+    /// Most of each that waits.
+    pub(super) const MOST: usize = 256;
+
+    /// Bytes for the autopilot; what nobody fetches is stale.
+    pub(super) fn write(&mut self, bytes: Vec<u8>) {
+        if self.outputs.len() < Self::MOST {
+            self.outputs.push_back(bytes);
+        }
+    }
+
+    /// A stretch of way. None is lost: where too many wait, it is added to the last one.
+    pub fn walk(&mut self, step: Step) {
+        let is_full = self.steps.len() >= Self::MOST;
+        match self.steps.back_mut() {
+            Some(last) if is_full => {
+                let (dx_m, dy_m) = (last.dx_m + step.dx_m, last.dy_m + step.dy_m);
+                *last = Step { dx_m, dy_m, unseen: last.unseen.saturating_add(step.unseen), ..step };
+            }
+            _ => self.steps.push_back(step),
+        }
+    }
+
+    /// Something that a person should read.
+    pub(super) fn note(&mut self, text: impl Into<String>) {
+        if self.notes.len() < Self::MOST {
+            self.notes.push_back(text.into());
+        }
+    }
+
+    /// It has happened once more.
+    pub(super) fn count(&mut self, what: &'static str) {
+        *self.counters.entry(what).or_default() += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn way_that_nobody_fetches_is_kept_in_sum_and_nothing_grows() {
+        let mut tray = Tray::default();
+        for i in 0..10_000 {
+            let unseen = Duration::from_millis(u64::from(i % 2 == 0));
+            tray.walk(Step { dx_m: 1.0, dy_m: -2.0, heading_rad: f64::from(i), depth_m: 3.0, unseen });
+            tray.note("the same");
+            tray.write(vec![0]);
+        }
+        assert!([tray.steps.len(), tray.notes.len(), tray.outputs.len()].iter().all(|&n| n == Tray::MOST));
+        let (x, y) = tray.steps.iter().fold((0.0, 0.0), |(x, y), s| (x + s.dx_m, y + s.dy_m));
+        assert_eq!((x, y), (10_000.0, -20_000.0));
+        assert_eq!(tray.steps.iter().map(|s| s.unseen).sum::<Duration>(), Duration::from_secs(5));
+        assert_eq!(tray.steps.back().map(|s| s.heading_rad), Some(9_999.0));
+    }
+}

@@ -1,0 +1,174 @@
+//! What an S2C modem says, and what it means.
+
+use super::notice::{Heard, Notice, Place, Position, Service};
+use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, LONGEST_WAIT, Line, PATIENCE, Phase, S2c};
+use crate::modem::driver::{Event, Reception, Token};
+use crate::modem::framing::Deframer;
+use bytes::Bytes;
+use scenecast_core::{ModemAddress, UsblLine};
+use scenecast_protocol::time::Instant;
+
+/// Metres that sound makes in a second, where only its time is told.
+const SOUND_SPEED_M_S: f64 = 1500.0;
+/// Modems whose streams are kept.
+const MOST_STREAMS: usize = 16;
+/// Of the raw bits of a burst so many carry data.
+const DATA_SHARE: f64 = 0.9;
+/// An accuracy of so much of the range means that only the range is good.
+const RANGE_ONLY: f64 = 0.8;
+
+impl S2c {
+    pub(super) fn is_at_work(&self) -> bool {
+        self.phase == Phase::Ready
+    }
+
+    pub(super) fn handle_line(&mut self, line: Line, now: Instant) {
+        match line {
+            Line::Reply(name, text) => self.handle_reply(name.as_deref(), &text, now),
+            Line::Notice(notice) => {
+                self.heard = now;
+                // A reply waits behind what else the modem has to say, which may take seconds on a slow line.
+                let latest = self.asked_at + LONGEST_WAIT;
+                if let Some((_, deadline)) = &mut self.asked {
+                    *deadline = (*deadline).max((now + PATIENCE).min(latest));
+                }
+                self.handle_notice(notice, now);
+            }
+            // A port of the AT interpreter does not say whose data it is.
+            Line::Raw(bytes) => self.handle_stream(None, &bytes, None, None, now),
+        }
+    }
+
+    fn handle_reply(&mut self, name: Option<&str>, text: &str, now: Instant) {
+        // A reply that nobody waits for is one that came too late.
+        let Some((asked, deadline)) = self.asked.take() else { return };
+        if name.is_some_and(|name| !asked.is_answered_by(name)) {
+            self.asked = Some((asked, deadline));
+            return;
+        }
+        self.heard = now;
+        match &asked {
+            Asked::Interpreter | Asked::Mode => self.handle_interpreter(&asked, text, now),
+            Asked::Setup(step) | Asked::Beat(step) => self.handle_step(step, text, now),
+            _ => self.handle_send_reply(asked, text, now),
+        }
+    }
+
+    fn handle_notice(&mut self, notice: Notice, now: Instant) {
+        match notice {
+            Notice::Heard(heard) => self.handle_heard(heard, now),
+            Notice::InstantDone { delivered, .. } => self.handle_message_done(delivered),
+            Notice::InstantCanceled => self.handle_message_done(false),
+            Notice::BurstDone { delivered, count } => {
+                if let Some((token, _)) = self.jobs.pool.remove(&count) {
+                    self.events.push_back(if delivered { Event::Delivered(token) } else { Event::Failed(token) });
+                }
+            }
+            Notice::SendEnd(kind, us) => match kind.as_str() {
+                "im" => self.handle_message_sent(),
+                "data" => self.handle_aired(us),
+                _ => {}
+            },
+            Notice::LocalRate(bps) => self.local_rate = bps,
+            Notice::Usbl(position) => self.handle_position(&position),
+            Notice::Dropped | Notice::Other => {}
+        }
+    }
+
+    /// Data was on air for so long: what exceeds what was given is the modem's own repeats.
+    fn handle_aired(&mut self, us: u32) {
+        let rate = if self.local_rate > 0 { f64::from(self.local_rate) * DATA_SHARE } else { self.config.burst_bps };
+        self.aired_bits += (f64::from(us) * rate / 1e6) as u64;
+        if let Some(more) = self.aired_bits.checked_sub(self.given_bits).filter(|&more| more > 0) {
+            self.given_bits = self.aired_bits;
+            self.events.push_back(Event::Repeated(more));
+        }
+    }
+
+    fn handle_heard(&mut self, heard: Heard, now: Instant) {
+        if heard.src == self.config.address {
+            let ours = self.config.address;
+            return self.refuse(format!("another modem in the water has our address {ours}"));
+        }
+        if heard.dst != self.config.address && heard.dst != EVERYBODY {
+            return;
+        }
+        let range_m = heard.travel_us.map(|us| f64::from(us) * 1e-6 * SOUND_SPEED_M_S);
+        let quality = Some(heard.integrity);
+        match heard.service {
+            Service::Burst => {
+                self.burst_heard.insert(heard.src, now);
+                self.handle_stream(Some(heard.src), &heard.data, quality, range_m, now);
+            }
+            Service::Message => self.receive(Some(heard.src), heard.data, quality, range_m),
+        }
+    }
+
+    fn receive(&mut self, src: Option<ModemAddress>, bytes: Vec<u8>, quality: Option<i32>, range_m: Option<f64>) {
+        let reception = Reception { src, bytes: Bytes::from(bytes), quality, range_m };
+        self.events.push_back(Event::Received(reception));
+    }
+
+    /// A piece of a framed stream.
+    fn handle_stream(
+        &mut self,
+        src: Option<ModemAddress>,
+        bytes: &[u8],
+        quality: Option<i32>,
+        range_m: Option<f64>,
+        _now: Instant,
+    ) {
+        let key = src.unwrap_or(0);
+        if !self.streams.contains_key(&key) && self.streams.len() >= MOST_STREAMS {
+            self.streams.clear();
+        }
+        let deframer = self.streams.entry(key).or_insert_with(|| Deframer::new(BURST_FRAME_BYTES));
+        let mut frames = Vec::new();
+        deframer.push(bytes, |frame| frames.push(frame));
+        frames.into_iter().for_each(|frame| self.receive(src, frame, quality, range_m));
+    }
+
+    fn handle_position(&mut self, position: &Position) {
+        if position.accuracy < 0.0 {
+            return;
+        }
+        let (range_m, direction_rad) = match position.place {
+            Place::Enu([east, north, up], travel_us) => {
+                let range = f64::from(travel_us) * 1e-6 * SOUND_SPEED_M_S;
+                let direction = (east.atan2(north), up.atan2(east.hypot(north)));
+                (Some(range), (position.accuracy < RANGE_ONLY * range).then_some(direction))
+            }
+            Place::Angles(bearing, elevation) => (None, Some((bearing, elevation))),
+        };
+        let accuracy = position.accuracy;
+        let line =
+            UsblLine { remote: position.remote, range_m, direction_rad, accuracy, age_s: position.age_s.max(0.0) };
+        self.events.push_back(Event::Usbl(line));
+    }
+}
+
+impl Asked {
+    /// The transmission that it is about.
+    pub(super) fn token(&self) -> Option<Token> {
+        match self {
+            Self::Message(job, _) | Self::Piggyback(job) | Self::Copy(job) | Self::Record(job) => Some(job.token),
+            Self::Count(token) => Some(*token),
+            Self::Interpreter | Self::Mode | Self::Setup(_) | Self::Beat(_) => None,
+        }
+    }
+
+    /// Whether a reply that repeats this command's name is the one that is waited for.
+    fn is_answered_by(&self, name: &str) -> bool {
+        match self {
+            Self::Interpreter | Self::Mode => name == "?MODE",
+            Self::Setup(step) | Self::Beat(step) => {
+                let plain = step.command.trim_end_matches(|c: char| c.is_ascii_digit());
+                name == plain || name == step.command
+            }
+            Self::Message(..) => name == "*SENDIM",
+            Self::Piggyback(_) | Self::Copy(_) => name == "*SENDPBM",
+            Self::Record(_) => name == "*SEND",
+            Self::Count(_) => name == "?PC",
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Images of the sea floor and their annotations, from files.
+
+use scenecast_core::UserError;
+use scenecast_core::label_picture::{Indices, read_indices};
+use std::path::Path;
+
+/// An image in any format that the program knows; a JPEG that is cut off is refused.
+pub fn read_image(path: &Path) -> Result<image::DynamicImage, UserError> {
+    let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
+    // The decoder fills the missing part of a cut JPEG with grey, which would be surveyed as sea floor.
+    let cut = bytes.starts_with(&[0xFF, 0xD8]) && !bytes.windows(2).rev().take(4096).any(|w| w == [0xFF, 0xD9]);
+    if cut {
+        return Err(UserError::file(
+            path,
+            "not an image that can be read: the JPEG has no end, so a part of it is missing",
+        ));
+    }
+    let reader = image::ImageReader::new(std::io::Cursor::new(bytes));
+    let reader = reader.with_guessed_format().map_err(|e| UserError::file(path, e))?;
+    reader.decode().map_err(|e| UserError::file(path, format!("not an image that can be read: {e}")))
+}
+
+/// Classes from a grey or indexed image of `size` pixels: the pixel value is the class.
+pub fn read_classes(path: &Path, size: (u32, u32)) -> Result<Vec<u8>, UserError> {
+    let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
+    let unreadable = |e| UserError::file(path, format!("not an image that can be read: {e}"));
+    let indices = read_indices(&bytes, u64::from(u32::MAX)).map_err(unreadable)?;
+    let (classes, width, height) = match indices {
+        Some(Indices { pixels, width, height }) => (pixels, width, height),
+        None => {
+            let grey = match read_image(path)? {
+                image::DynamicImage::ImageLuma8(grey) => grey,
+                _ => {
+                    return Err(UserError::file(path, "annotations need a grey or indexed image: pixel value = class"));
+                }
+            };
+            let (w, h) = grey.dimensions();
+            (grey.into_raw(), w, h)
+        }
+    };
+    if (width, height) != size {
+        let what = format!("the annotations have {width} x {height} pixels, the image has {} x {}", size.0, size.1);
+        return Err(UserError::file(path, what));
+    }
+    Ok(classes)
+}

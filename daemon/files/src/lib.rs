@@ -1,0 +1,13 @@
+//! Files of scenecast: images, recorded missions and vocabularies are read; results are written whole or not at all.
+//!
+//! Internal to scenecast. Reads and writes disks; no clock, no network.
+
+mod images;
+mod recording;
+mod vocabulary;
+mod whole;
+
+pub use images::{read_classes, read_image};
+pub use recording::{RecordedFrame, Recorder, Recording};
+pub use vocabulary::{configured_vocabulary, read_vocabulary};
+pub use whole::{sync_folder, write_whole};

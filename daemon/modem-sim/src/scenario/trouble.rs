@@ -1,0 +1,98 @@
+//! `[[fault]]`, and the same in words for a running emulation.
+
+use super::reader::Reader;
+use super::water::LONGEST_S;
+use super::{index_of, seconds};
+use scenecast_core::UserError;
+use std::time::Duration;
+
+/// What can be made to go wrong with a modem.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Trouble {
+    /// Every message is refused with BUSY for so long.
+    Busy(Duration),
+    /// It restarts; settings that were not stored are lost.
+    Reboot,
+    /// Noise on the line to the host for so long.
+    Garbage(Duration),
+    /// What the host is being told ends in half a line.
+    HalfLine,
+    /// The port neither reads nor writes for so long.
+    Freeze(Duration),
+    /// It has another address than it was given.
+    WrongAddress(u8),
+    /// The supply fails in its next transmission, which is cut short, and it restarts.
+    BrownOut,
+    /// It takes a megabyte of data before it says that it is full.
+    BigBuffer,
+    /// The device or the TCP port is gone for so long.
+    Unplug(Duration),
+}
+
+/// Names, whether a number goes with them, what it is if it is not given, and what it means.
+const TROUBLES: [(&str, Option<f64>, &str); 9] = [
+    ("busy", Some(10.0), "s"),
+    ("reboot", None, ""),
+    ("garbage", Some(10.0), "s"),
+    ("half_line", None, ""),
+    ("freeze", Some(60.0), "s"),
+    ("wrong_address", Some(99.0), "address"),
+    ("brown_out", None, ""),
+    ("big_buffer", None, ""),
+    ("unplug", Some(30.0), "s"),
+];
+
+impl Trouble {
+    /// What may be written, for people.
+    pub fn names() -> String {
+        TROUBLES.map(|(name, ..)| name).join(", ")
+    }
+
+    fn new(name: &str, number: Option<f64>) -> Option<Self> {
+        let (name, usual, _) = TROUBLES.iter().find(|(known, ..)| *known == name)?;
+        let number = number.or(*usual);
+        let length = number.map_or(Duration::ZERO, seconds);
+        Some(match *name {
+            "busy" => Self::Busy(length),
+            "reboot" => Self::Reboot,
+            "garbage" => Self::Garbage(length),
+            "half_line" => Self::HalfLine,
+            "freeze" => Self::Freeze(length),
+            "wrong_address" => Self::WrongAddress(number.filter(|n| (1.0..=254.0).contains(n))? as u8),
+            "brown_out" => Self::BrownOut,
+            "big_buffer" => Self::BigBuffer,
+            _ => Self::Unplug(length),
+        })
+    }
+
+    /// From the words of a line, as in `freeze 60`.
+    pub fn parse(words: &[&str]) -> Result<Self, String> {
+        let wrong =
+            || format!("it takes one of {}, and seconds or an address behind those that have one", Self::names());
+        let (name, rest) = words.split_first().ok_or_else(wrong)?;
+        let number = match rest {
+            [] => None,
+            [number] => Some(number.parse().ok().filter(|n| (0.0..=LONGEST_S).contains(n)).ok_or_else(wrong)?),
+            _ => return Err(wrong()),
+        };
+        Self::new(name, number).ok_or_else(wrong)
+    }
+}
+
+/// A fault of `[[fault]]`: when, to which modem, what.
+pub(super) fn read(table: Reader<'_>, names: &[&str]) -> Result<(Duration, usize, Trouble), UserError> {
+    let at = table.number("at_s", 0.0..=LONGEST_S, "s")?;
+    let at = at.ok_or_else(|| table.missing("at_s", format!("a number from 0 to {LONGEST_S} s")))?;
+    let modem = index_of(&table, "modem", names)?;
+    let words = TROUBLES.map(|(name, _, unit)| (name, (name, unit)));
+    let takes = format!("one of {}", Trouble::names());
+    let (name, unit) = table.choice("what", &words)?.ok_or_else(|| table.missing("what", takes.clone()))?;
+    let number = match unit {
+        "s" => table.number("for_s", 0.0..=LONGEST_S, "s")?,
+        "address" => table.whole("address", 1..=254, "")?.map(|address| address as f64),
+        _ => None,
+    };
+    let trouble = Trouble::new(name, number).ok_or_else(|| table.wrong("what", takes))?;
+    table.finish()?;
+    Ok((seconds(at), modem, trouble))
+}

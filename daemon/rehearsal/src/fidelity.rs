@@ -1,0 +1,83 @@
+//! How faithful the operator's map is at a given bit budget.
+
+use super::baseline::whole_png;
+use super::mission::{Mission, MissionOptions};
+use super::world::World;
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use serde::Serialize;
+use std::time::Duration;
+
+/// One mission of the comparison.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FidelityRow {
+    /// Bit budget of each transmitter, bits a second.
+    pub budget_bps: u32,
+    /// `delta` or `whole-png`.
+    pub stream: &'static str,
+    /// Share of explored cells on which the maps agree, mean over the survey.
+    pub agreement_mean: f64,
+    /// Seconds until a change at the vehicle shows at the operator's: median.
+    pub age_s_median: f64,
+    /// The same: 95th percentile.
+    pub age_s_p95: f64,
+    /// The same: maximum.
+    pub age_s_max: f64,
+    /// Of the operator's map at the end of the survey with the truth, nats.
+    pub mutual_information_nats: Option<f64>,
+    /// Bits that the vehicle put on air.
+    pub sent_bits: u64,
+    /// Bytes of directives, exemplars and fixes are the same for both; this is what carried the map.
+    pub map_bytes: u64,
+}
+
+/// Runs the same mission at four budgets, for the delta stream and for whole PNGs.
+pub fn fidelity(
+    config: &Config,
+    world: &World,
+    seed: u64,
+    progress: &mut dyn FnMut(&FidelityRow),
+) -> Result<Vec<FidelityRow>, UserError> {
+    let mut rows = Vec::new();
+    for budget_bps in [100, 250, 1000, 10_000] {
+        let mut delta = config.clone();
+        delta.link.budget_bps = budget_bps;
+        let whole = whole_png(&delta);
+        for (stream, config) in [("delta", delta), ("whole-png", whole)] {
+            let row = run(config, world, seed, budget_bps, stream)?;
+            progress(&row);
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+fn run(
+    config: Config,
+    world: &World,
+    seed: u64,
+    budget_bps: u32,
+    stream: &'static str,
+) -> Result<FidelityRow, UserError> {
+    let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
+    mission.run(Duration::ZERO, &mut |_| {})?;
+    let operator = mission.operator_map();
+    let [median, p95, max] = mission.meter.delays(mission.now()).summary();
+    let stats = mission.vehicle.stats();
+    let class = if stream == "delta" {
+        scenecast_protocol::schedule::Class::Map
+    } else {
+        scenecast_protocol::schedule::Class::Exemplar
+    };
+    Ok(FidelityRow {
+        budget_bps,
+        stream,
+        agreement_mean: mission.meter.agreement_mean(),
+        age_s_median: median,
+        age_s_p95: p95,
+        age_s_max: max,
+        mutual_information_nats: mission.mutual_information(&operator).map(|v| v.0),
+        sent_bits: mission.audits[0].total_bits(),
+        map_bytes: stats.bytes_by_class.get(&class).copied().unwrap_or(0),
+    })
+}

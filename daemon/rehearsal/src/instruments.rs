@@ -1,0 +1,51 @@
+//! GPS receiver and compass of a rehearsed surface vehicle: what they say of where it is.
+
+use scenecast_core::{LatLon, TangentPlane, nmea};
+use sim_channel::Stream;
+
+/// Standard deviation of the compass, degrees.
+const COMPASS_SIGMA_DEG: f64 = 0.5;
+
+/// What a receiver is and how good it is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Receiver {
+    /// Where x = y = 0 of the world is.
+    pub(super) origin: LatLon,
+    /// White noise, metres; beside it an error of as much that changes over minutes.
+    pub(super) sigma_m: f64,
+    /// What it says of its quality: dilution of precision, and whether it has corrections.
+    pub(super) hdop: f64,
+    pub(super) is_corrected: bool,
+}
+
+/// Says sentences, with a chance of its own.
+#[derive(Debug)]
+pub(super) struct Instruments {
+    receiver: Receiver,
+    plane: TangentPlane,
+    dice: Stream,
+    slow_error: (f64, f64),
+}
+
+impl Instruments {
+    pub(super) fn new(receiver: Receiver, seed: u64) -> Self {
+        let plane = TangentPlane::new(receiver.origin);
+        Self { receiver, plane, dice: Stream::new(seed, &[9]), slow_error: (0.0, 0.0) }
+    }
+
+    /// Position and heading as NMEA 0183, once a second; `astray` is by how much the receiver is led astray.
+    pub(super) fn say(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
+        let [a, b, c, d, e] = [(); 5].map(|()| self.dice.normal());
+        let Receiver { sigma_m, hdop, is_corrected, .. } = self.receiver;
+        let slow = |error: f64, draw: f64| error * 0.99 + sigma_m * 0.14 * draw;
+        self.slow_error = (slow(self.slow_error.0, a), slow(self.slow_error.1, b));
+        let x = at.0 + self.slow_error.0 + sigma_m * c + astray.0;
+        let y = at.1 + self.slow_error.1 + sigma_m * d + astray.1;
+        let place = nmea::place_fields(self.plane.to_place(x, y));
+        let (h, m, s) = (second / 3600 % 24, second / 60 % 60, second % 60);
+        let quality = if is_corrected { 4 } else { 1 };
+        let gga = nmea::line(&format!("GPGGA,{h:02}{m:02}{s:02}.00,{place},{quality},09,{hdop:.1},0.0,M,0.0,M,,"));
+        let heading = (heading_rad.to_degrees() + COMPASS_SIGMA_DEG * e).rem_euclid(360.0);
+        gga + &nmea::line(&format!("HEHDT,{heading:.2},T"))
+    }
+}

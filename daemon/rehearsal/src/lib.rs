@@ -1,0 +1,38 @@
+//! A whole mission in virtual time: the role code of the sea, a made-up sea floor and water around it.
+
+mod baseline;
+#[cfg(test)]
+mod conformance_tests;
+#[cfg(test)]
+mod discovery_tests;
+pub mod docked;
+pub mod exemplar_bench;
+mod fidelity;
+mod frames_log;
+mod instruments;
+pub mod link_bench;
+mod localisation;
+mod meter;
+mod mission;
+pub mod modem_bench;
+mod outputs;
+mod panorama;
+pub mod planning_bench;
+mod report;
+mod script;
+mod simulated_autopilot;
+#[cfg(test)]
+mod storm_tests;
+mod virtual_time;
+mod world;
+
+pub use fidelity::{FidelityRow, fidelity};
+pub use frames_log::FramesLog;
+pub use localisation::{Localisation, LocalisationRun, Tracks, fly_with_outliers, localisation, picture};
+pub use meter::Delays;
+pub use mission::{Mission, MissionOptions};
+pub use outputs::write_outputs;
+pub use report::{Report, report};
+pub use simulated_autopilot::{SimulatedAutopilot, simulated_autopilot};
+pub use virtual_time::VirtualTime;
+pub use world::World;

@@ -1,0 +1,129 @@
+//! How fast the link runs on one core of this machine.
+
+use super::opaque::OpaqueReplica;
+use super::water::{Setting, Vehicle, Water, auv, surface_config};
+use crate::VirtualTime;
+use scenecast_protocol::link::SurfaceLink;
+use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::time::Instant;
+use sim_channel::LossModel;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Bytes that always wait at the vehicle.
+const LOAD: usize = 20_000;
+
+/// Figures of one run on this machine; another run gives others.
+#[derive(Debug, Clone, Copy)]
+pub struct Speed {
+    /// Frames sent and received a second, both ends on one core, 64 bytes each.
+    pub small_frames_per_s: f64,
+    /// The same: 256 bytes.
+    pub frames_per_s: f64,
+    /// Seconds that an hour of virtual time under load takes with 64-byte frames, the simulated water included.
+    pub hour_s: f64,
+}
+
+/// Takes some seconds.
+pub fn measure_speed() -> Speed {
+    let setting = Setting::new(1000.0, 64, LossModel::Independent { probability: 0.1 });
+    let mut water = Water::under_load(&setting, 1);
+    let began = std::time::Instant::now();
+    water.run(Duration::from_secs(3600));
+    let hour_s = began.elapsed().as_secs_f64();
+    Speed { small_frames_per_s: frames_per_s(64), frames_per_s: frames_per_s(256), hour_s }
+}
+
+fn frames_per_s(frame_bytes: usize) -> f64 {
+    let mut wire = Wire::new(frame_bytes);
+    wire.run(Duration::from_secs(120));
+    let (frames, began) = (wire.frames, std::time::Instant::now());
+    while began.elapsed() < Duration::from_secs(1) {
+        wire.run(Duration::from_secs(60));
+    }
+    (wire.frames - frames) as f64 / began.elapsed().as_secs_f64()
+}
+
+/// Two ends under load with nothing but airtime between them.
+struct Wire {
+    now: Instant,
+    surface: SurfaceLink<OpaqueReplica>,
+    vehicle: Vehicle,
+    modem: ModemProfile,
+    /// Frames on air by when they end and whether the surface sent them.
+    on_air: BTreeMap<(Instant, bool), Vec<u8>>,
+    frames: u64,
+}
+
+impl Wire {
+    fn new(frame_bytes: usize) -> Self {
+        let setting = Setting::new(0.0, frame_bytes, LossModel::None);
+        let now = Instant::ZERO;
+        let mut vehicle = Vehicle::new(&setting, auv(), 1, now);
+        vehicle.load = Some(LOAD);
+        let surface = SurfaceLink::new(surface_config(&setting), 2, now);
+        Self { now, surface, vehicle, modem: setting.modem(), on_air: BTreeMap::new(), frames: 0 }
+    }
+
+    fn run(&mut self, duration: Duration) {
+        let until = self.now + duration;
+        while self.now < until {
+            self.pump();
+            self.now = self.next_event();
+            self.handle_frames();
+        }
+    }
+
+    fn pump(&mut self) {
+        while self.surface.poll_event().is_some() {}
+        if let Some(transmit) = self.surface.poll_transmit(self.now) {
+            self.put_on_air(true, transmit.bytes);
+        }
+        self.vehicle.handle_news(self.now);
+        if let Some(transmit) = self.vehicle.link.poll_transmit(self.now) {
+            self.put_on_air(false, transmit.bytes);
+        }
+    }
+
+    fn put_on_air(&mut self, by_surface: bool, bytes: Vec<u8>) {
+        self.frames += 1;
+        self.on_air.insert((self.now + self.modem.airtime(bytes.len()), by_surface), bytes);
+    }
+
+    fn next_event(&self) -> Instant {
+        let timers = self.vehicle.link.poll_timeout().into_iter().chain(self.surface.poll_timeout(self.now));
+        let timers = timers.map(|(at, _)| at).filter(|&at| at > self.now);
+        let end = self.on_air.keys().next().map(|&(at, _)| at);
+        timers.chain(end).min().unwrap_or(self.now + Duration::from_millis(200))
+    }
+
+    fn handle_frames(&mut self) {
+        while let Some(entry) = self.on_air.first_entry().filter(|e| e.key().0 <= self.now) {
+            let ((_, by_surface), bytes) = entry.remove_entry();
+            match by_surface {
+                true => {
+                    self.surface.handle_transmit_outcome(self.now);
+                    self.vehicle.link.handle_frame(&bytes, self.now);
+                }
+                false => {
+                    self.vehicle.link.handle_transmit_outcome(self.now);
+                    self.surface.handle_frame(&bytes, self.now);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ends_on_a_wire_use_nearly_all_of_it() {
+        let mut wire = Wire::new(256);
+        wire.run(Duration::from_secs(600));
+        let share = wire.frames as f64 * 256.0 * 8.0 / 10_000.0 / 600.0;
+        assert!((0.8..1.2).contains(&share), "{share}");
+        assert!(wire.surface.vehicle(auv()).is_some_and(|v| v.replica().useful_bytes() > 400_000.0));
+    }
+}

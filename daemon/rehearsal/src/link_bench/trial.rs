@@ -1,0 +1,156 @@
+//! What is measured of one setting.
+
+use super::summary::Summary;
+use super::water::{Setting, Water, auv};
+use crate::VirtualTime;
+use scenecast_protocol::directive::{Fix, LifeLine, Slot, SlotId, Utility};
+use scenecast_protocol::link::IssueError;
+use scenecast_protocol::map::StateReplica;
+use scenecast_protocol::time::Instant;
+use sim_channel::Stream;
+use std::time::Duration;
+
+/// Bytes that wait at a vehicle under load: more than the longest turn takes.
+const LOAD: usize = 20_000;
+/// Time until both ends know each other and their estimates have settled.
+const WARM_UP: Duration = Duration::from_secs(120);
+/// Time after which a trial is given up.
+const GIVE_UP: Duration = Duration::from_secs(900);
+
+/// How long and how often each thing is measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Time over which the efficiency is measured.
+    pub saturated: Duration,
+    /// Directives.
+    pub directives: usize,
+    /// Times that the source stops changing.
+    pub stops: usize,
+}
+
+impl Effort {
+    /// Of the golden table.
+    pub const TABLE: Self = Self { saturated: Duration::from_secs(1200), directives: 60, stops: 40 };
+}
+
+/// How a saturated link did.
+#[derive(Debug, Clone, Copy)]
+pub struct Flow {
+    /// Useful bits a second.
+    pub useful_bps: f64,
+    /// Share of the vehicle's frames that the water lost.
+    pub loss: f64,
+}
+
+/// Latencies of directives, seconds.
+#[derive(Debug, Clone)]
+pub struct Directives {
+    /// From issue to applied.
+    pub applied: Summary,
+    /// From issue to known at the surface.
+    pub known: Summary,
+}
+
+/// How the replica caught up.
+#[derive(Debug, Clone)]
+pub struct Convergence {
+    /// From the last change to equality, seconds.
+    pub time: Summary,
+    /// Share of stops after which that was within the bound.
+    pub within: f64,
+}
+
+impl Water {
+    /// Ends under load that know each other.
+    pub fn under_load(setting: &Setting, seed: u64) -> Self {
+        let mut water = Self::new(setting, seed);
+        water.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
+        water.run(WARM_UP);
+        water
+    }
+
+    /// Useful bytes at the replica so far.
+    fn useful_bytes(&self) -> f64 {
+        self.view().map_or(0.0, |v| v.replica().useful_bytes())
+    }
+
+    /// Useful bits a second over `time`; with a fix each `fix_every`, if wanted.
+    pub fn measure_flow(&mut self, time: Duration, fix_every: Option<Duration>) -> Result<Flow, IssueError> {
+        let (began, before, until) = (self.now, self.useful_bytes(), self.now + time);
+        self.tally = Default::default();
+        while self.now < until {
+            if fix_every.is_some() {
+                let fix = Fix { x_m: 10.0, y_m: -20.0, sigma_m: 1.0, age_s: 0.5 };
+                self.surface.issue(auv(), Slot::Fix(fix), self.now)?;
+            }
+            self.run((fix_every.unwrap_or(time)).min(until.since(self.now)));
+        }
+        let useful_bps = (self.useful_bytes() - before) * 8.0 / self.now.since(began).as_secs_f64();
+        Ok(Flow { useful_bps, loss: self.tally.up.loss() })
+    }
+
+    /// Issues `count` directives, each a random while after the last one is known to be applied.
+    pub fn measure_directives(&mut self, count: usize, dice: &mut Stream) -> Result<Directives, IssueError> {
+        let (mut applied, mut known) = (Vec::new(), Vec::new());
+        for _ in 0..count {
+            self.run(Duration::from_secs_f64(1.0 + dice.uniform() * 30.0));
+            let issued = self.now;
+            let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
+            let slot = Slot::Utility(Utility { weights, ..Utility::default() });
+            let version = self.surface.issue(auv(), slot, issued)?;
+            self.run_until(issued + GIVE_UP, |w| {
+                w.view().is_some_and(|v| v.slots().any(|s| s.life == LifeLine::Applied))
+            });
+            known.push(self.now.since(issued).as_secs_f64());
+            let at = self.vehicle().applied.get(&(SlotId::Utility, version)).copied();
+            applied.push(at.unwrap_or(self.now).since(issued).as_secs_f64());
+        }
+        Ok(Directives { applied: Summary::of(applied), known: Summary::of(known) })
+    }
+
+    /// Stops the source `count` times at a random moment with a random number of bytes waiting, and waits for equality.
+    pub fn measure_convergence(&mut self, count: usize, loss: f64, dice: &mut Stream) -> Convergence {
+        let mut times = Vec::new();
+        let mut within = 0;
+        for _ in 0..count {
+            self.vehicle().load = Some(LOAD);
+            self.run(Duration::from_secs_f64(20.0 + dice.uniform() * 30.0));
+            let keep = (8.0 * 500f64.powf(dice.uniform())) as usize;
+            let (time, bytes) = self.stop_and_converge(keep);
+            let bound = base_s(loss) + 1.5 * bytes as f64 * 8.0 / (10_000.0 * (1.0 - loss));
+            within += usize::from(time <= bound);
+            times.push(time);
+        }
+        Convergence { time: Summary::of(times), within: within as f64 / count as f64 }
+    }
+
+    /// Stops the source with `keep` bytes waiting: seconds until the replica is equal, and bytes that it lacked.
+    fn stop_and_converge(&mut self, keep: usize) -> (f64, usize) {
+        let stopped: Instant = self.now;
+        let vehicle = self.vehicle();
+        vehicle.load = None;
+        vehicle.link.source_mut().take_back(keep);
+        let bytes = self.missing();
+        let mut seen = None;
+        self.run_until(stopped + GIVE_UP, |w| {
+            let version = w.view().map(|v| v.replica().version());
+            seen.replace(version) != Some(version) && w.missing() == 0
+        });
+        (self.now.since(stopped).as_secs_f64(), bytes)
+    }
+
+    /// Bytes that the replica lacks.
+    fn missing(&self) -> usize {
+        let target = self.vehicles[0].link.source().target();
+        self.view().map_or(usize::MAX, |v| v.replica().missing(target))
+    }
+}
+
+/// The part of the bound of convergence that does not depend on what is left to say, seconds: 10, 20, 60 at 10, 30, 50 %.
+pub fn base_s(loss: f64) -> f64 {
+    match loss {
+        l if l <= 0.1 => 10.0,
+        l if l <= 0.3 => 10.0 + (l - 0.1) / 0.2 * 10.0,
+        l => (20.0 + (l - 0.3) / 0.2 * 40.0).min(60.0),
+    }
+}

@@ -1,0 +1,299 @@
+//! Vehicles and a surface that share one half-duplex acoustic channel in virtual time.
+
+use super::opaque::{OpaqueReplica, OpaqueSource};
+use super::tally::Tally;
+use crate::VirtualTime;
+use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::link::{
+    PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, Transmit, VehicleConfig, VehicleEvent,
+    VehicleLink,
+};
+use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
+use scenecast_protocol::schedule::{Audit, Shares};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, Envelope, MissionId, SlotState, VehicleStatus};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+const SURFACE: NodeId = NodeId(0);
+/// Bits a second on air.
+pub const BIT_RATE_BPS: u32 = 10_000;
+/// Window of the budget.
+pub const WINDOW: Duration = Duration::from_secs(10);
+/// Speed of sound in every row.
+const SOUND_SPEED_M_S: f64 = 1500.0;
+
+/// What the ends and the water between them are like.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// Slant range of every vehicle.
+    pub range_m: f64,
+    /// Bytes of a full frame.
+    pub frame_bytes: usize,
+    /// How frames are lost, each way.
+    pub loss: LossModel,
+    /// Vehicles, numbered from 1.
+    pub vehicles: u8,
+    /// Whether the surface knows none of them at the start and calls so often.
+    pub call_every: Option<Duration>,
+    /// Bit budget of each end.
+    pub budget_bps: u32,
+}
+
+impl Setting {
+    /// One known vehicle, and a budget that does not bind.
+    pub fn new(range_m: f64, frame_bytes: usize, loss: LossModel) -> Self {
+        Self { range_m, frame_bytes, loss, vehicles: 1, call_every: None, budget_bps: BIT_RATE_BPS }
+    }
+
+    /// The modem of every end.
+    pub fn modem(&self) -> ModemProfile {
+        ModemProfile {
+            frame_bytes: self.frame_bytes,
+            bit_rate_bps: f64::from(BIT_RATE_BPS),
+            overhead_bits: 0,
+            turn_around: Duration::from_millis(200),
+            access: Access::Shared,
+        }
+    }
+
+    /// Two-way propagation.
+    pub fn round_trip(&self) -> Duration {
+        Duration::from_secs_f64(2.0 * self.range_m / SOUND_SPEED_M_S)
+    }
+}
+
+/// A vehicle and what the harness keeps of it.
+#[derive(Debug)]
+pub struct Vehicle {
+    /// Its address.
+    pub address: Address,
+    /// Its end of the link.
+    pub link: VehicleLink<OpaqueSource>,
+    /// Bytes that always wait, while it is under load.
+    pub load: Option<usize>,
+    /// When a slot was last applied, by slot and version.
+    pub applied: BTreeMap<(SlotId, u16), Instant>,
+    /// What it put on air.
+    pub audit: Audit,
+}
+
+/// The ends and the channel between them.
+pub struct Water {
+    /// The time.
+    pub now: Instant,
+    /// The surface's end of the link.
+    pub surface: SurfaceLink<OpaqueReplica>,
+    /// The vehicles, in the order of their addresses.
+    pub vehicles: Vec<Vehicle>,
+    /// What the surface put on air.
+    pub audit: Audit,
+    /// Where airtime and frames went.
+    pub tally: Tally,
+    /// Turns that were granted, and the time that they add up to.
+    pub grants: (u64, Duration),
+    setting: Setting,
+    modem: ModemProfile,
+    channel: Channel,
+    /// When each transmission ends, and whose it is.
+    ending: BTreeMap<(Instant, NodeId), ()>,
+    /// When each end last took in a frame that was meant for it.
+    heard: BTreeMap<NodeId, Instant>,
+}
+
+/// The vehicle of every row that has only one.
+pub fn auv() -> Address {
+    address(1)
+}
+
+/// The address of the vehicle with this number.
+fn address(number: u8) -> Address {
+    Address::vehicle(number).unwrap_or(Address::EVERYBODY)
+}
+
+impl Water {
+    /// Ends that have not met, all chance drawn from `seed`.
+    pub fn new(setting: &Setting, seed: u64) -> Self {
+        let now = Instant::from_secs_f64(1000.0);
+        let config = ChannelConfig {
+            sound_speed_m_s: SOUND_SPEED_M_S,
+            half_duplex: true,
+            loss: setting.loss.clone(),
+            ..ChannelConfig::default()
+        };
+        let mut channel = Channel::new(config, seed);
+        channel.place(SURFACE, Position::default());
+        let mut dice = Stream::new(seed, &[1]);
+        let mut draw = || (dice.uniform() * 2f64.powi(53)) as u64;
+        let mut vehicles = Vec::new();
+        for number in 1..=setting.vehicles {
+            let angle = f64::from(number) / f64::from(setting.vehicles) * std::f64::consts::TAU;
+            let place = Position::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
+            channel.place(NodeId(number), place);
+            vehicles.push(Vehicle::new(setting, address(number), draw(), now));
+        }
+        Self {
+            now,
+            surface: SurfaceLink::new(surface_config(setting), draw(), now),
+            vehicles,
+            audit: Audit::new(WINDOW),
+            tally: Tally::default(),
+            grants: (0, Duration::ZERO),
+            setting: setting.clone(),
+            modem: setting.modem(),
+            channel,
+            ending: BTreeMap::new(),
+            heard: BTreeMap::new(),
+        }
+    }
+
+    /// What it is like.
+    pub fn setting(&self) -> &Setting {
+        &self.setting
+    }
+
+    /// The only vehicle.
+    pub fn vehicle(&mut self) -> &mut Vehicle {
+        &mut self.vehicles[0]
+    }
+
+    /// The only vehicle as the surface knows it.
+    pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
+        self.surface.vehicle(auv())
+    }
+
+    fn note_grant(&mut self, transmit: &Transmit) {
+        let header = Envelope::decode(&transmit.bytes, |_| true).map(|e| e.header);
+        if let Some(quarters) = header.ok().filter(|h| h.to.is_vehicle() && h.remaining == 0).and_then(|h| h.turn) {
+            self.grants.0 += 1;
+            self.grants.1 += Duration::from_millis(250) * u32::from(quarters);
+        }
+    }
+
+    fn transmit(&mut self, from: NodeId, transmit: Transmit) {
+        assert!(transmit.bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
+        let airtime = self.modem.airtime(transmit.bytes.len());
+        let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
+        self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
+        let who = if from == SURFACE { "surface" } else { "vehicle" };
+        *self.tally.airtime.entry((who, transmit.kind)).or_default() += airtime;
+        self.ending.insert((self.now + airtime, from), ());
+        self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
+    }
+}
+
+impl VirtualTime for Water {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn set_now(&mut self, now: Instant) {
+        self.now = now;
+    }
+
+    /// The next moment at which something happens, at most a while away.
+    fn next_event(&self) -> Instant {
+        let timers = self.vehicles.iter().filter_map(|v| v.link.poll_timeout());
+        let timers = timers.chain(self.surface.poll_timeout(self.now)).map(|(at, _)| at).filter(|&at| at > self.now);
+        let ending = self.ending.first_key_value().map(|((at, _), ())| *at);
+        let arrival = self.channel.poll_timeout().map(Instant::from);
+        timers.chain(ending).chain(arrival).min().unwrap_or(self.now + Duration::from_millis(200))
+    }
+
+    fn handle_events(&mut self) {
+        while let Some(entry) = self.ending.first_entry().filter(|e| e.key().0 <= self.now) {
+            match entry.remove_entry().0.1 {
+                SURFACE => self.surface.handle_transmit_outcome(self.now),
+                NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_transmit_outcome(self.now),
+            }
+        }
+        while let Some(arrival) = self.channel.poll_arrival(self.now.into()) {
+            match arrival.to {
+                SURFACE => self.tally.up.count(&arrival.outcome),
+                _ if arrival.from == SURFACE => self.tally.down.count(&arrival.outcome),
+                _ => {}
+            }
+            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
+                self.heard.insert(arrival.to, self.now);
+            }
+            match arrival.to {
+                SURFACE => self.surface.handle_frame(&bytes, self.now),
+                NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_frame(&bytes, self.now),
+            }
+        }
+    }
+
+    /// Lets every end say what it may say now.
+    fn pump(&mut self) {
+        while let Some(event) = self.surface.poll_event() {
+            if let SurfaceEvent::VehicleRestarted(_) = event {
+                self.tally.restarts += 1;
+            }
+        }
+        if let Some(transmit) = self.surface.poll_transmit(self.now) {
+            self.note_grant(&transmit);
+            self.audit.record(self.modem.bits_on_air(transmit.bytes.len()), self.now);
+            self.transmit(SURFACE, transmit);
+        }
+        for i in 0..self.vehicles.len() {
+            let vehicle = &mut self.vehicles[i];
+            vehicle.handle_news(self.now);
+            if let Some(transmit) = vehicle.link.poll_transmit(self.now) {
+                vehicle.audit.record(self.modem.bits_on_air(transmit.bytes.len()), self.now);
+                let node = NodeId(vehicle.address.number());
+                self.transmit(node, transmit);
+            }
+        }
+    }
+}
+
+impl Vehicle {
+    /// A vehicle that has met nobody.
+    pub(super) fn new(setting: &Setting, address: Address, seed: u64, now: Instant) -> Self {
+        let config = VehicleConfig {
+            address,
+            mission: MissionId(7),
+            modem: setting.modem(),
+            budget_bps: setting.budget_bps,
+            budget_window: WINDOW,
+            shares: Shares::default(),
+            status_period: Duration::from_secs(10),
+            authenticity: None,
+        };
+        let link = VehicleLink::with_source(config, OpaqueSource::default(), seed, SlotInboxState::default(), now);
+        Self { address, link, load: None, applied: BTreeMap::new(), audit: Audit::new(WINDOW) }
+    }
+
+    /// Applies what came in, and sees to it that there is something to say.
+    pub(super) fn handle_news(&mut self, now: Instant) {
+        while let Some(event) = self.link.poll_event() {
+            if let VehicleEvent::Slot { id, version, .. } = event {
+                self.link.decide(id, SlotState::Applied, now);
+                self.link.handle_persisted();
+                self.applied.insert((id, version), now);
+            }
+        }
+        self.link.set_status(VehicleStatus::default());
+        if let Some(bytes) = self.load {
+            self.link.source_mut().fill(bytes);
+        }
+    }
+}
+
+/// The surface of a setting.
+pub(super) fn surface_config(setting: &Setting) -> SurfaceConfig {
+    let known = if setting.call_every.is_none() { setting.vehicles } else { 0 };
+    SurfaceConfig {
+        mission: MissionId(7),
+        modem: setting.modem(),
+        budget_bps: setting.budget_bps,
+        budget_window: WINDOW,
+        shares: Shares::default(),
+        master: MasterConfig::default(),
+        vehicles: (1..=known).map(address).collect(),
+        call_every: setting.call_every,
+        authenticity: None,
+    }
+}

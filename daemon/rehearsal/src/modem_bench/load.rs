@@ -1,0 +1,270 @@
+//! The link under load of opaque bytes through drivers and emulated modems.
+
+use crate::VirtualTime;
+use crate::docked::{Docked, SURFACE, VEHICLE};
+use crate::link_bench::{OpaqueReplica, OpaqueSource, Summary};
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use scenecast_drivers::modem::ModemEvent;
+use scenecast_protocol::directive::{Slot, SlotId, Utility};
+use scenecast_protocol::link::{
+    PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
+};
+use scenecast_protocol::mac::{Access, MasterConfig};
+use scenecast_protocol::schedule::Shares;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use sim_channel::modem::{Emulator, Fault};
+use sim_channel::{Channel, ChannelConfig, LossModel, Position, Stream};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// Bytes that wait at the vehicle under load: more than its modem ever holds.
+const LOAD: usize = 25_000;
+/// Time after which a directive counts as lost.
+const GIVE_UP: Duration = Duration::from_secs(600);
+
+/// What the modems and the water between them are like.
+#[derive(Debug, Clone)]
+pub struct DockSetting {
+    /// Of both ends.
+    pub config: Config,
+    /// Slant range, m.
+    pub range_m: f64,
+    /// Share of frames that the water loses, each way.
+    pub loss: f64,
+}
+
+impl DockSetting {
+    /// The water.
+    pub(super) fn water(&self) -> ChannelConfig {
+        let loss = LossModel::Independent { probability: self.loss };
+        ChannelConfig { loss: if self.loss > 0.0 { loss } else { LossModel::None }, ..ChannelConfig::default() }
+    }
+}
+
+/// A vehicle's and a surface's link at their modems.
+pub struct Dock {
+    /// The time.
+    pub now: Instant,
+    /// The modems.
+    pub docked: Docked,
+    /// The vehicle's link.
+    pub vehicle: VehicleLink<OpaqueSource>,
+    /// The surface's link.
+    pub surface: SurfaceLink<OpaqueReplica>,
+    /// Bytes that always wait at the vehicle.
+    pub load: Option<usize>,
+    /// When each slot was applied, each time.
+    pub applied: BTreeMap<(SlotId, u16), Vec<Instant>>,
+    /// When a frame last came to each end.
+    pub heard: [Instant; 2],
+    /// The end that a fault strikes.
+    pub struck: usize,
+    /// What the modems told a person to change.
+    pub refusals: Vec<String>,
+    address: Address,
+    budget_bits: f64,
+}
+
+impl Dock {
+    /// Ends that have not met.
+    pub fn new(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
+        let now = Instant::from_secs_f64(1.0);
+        let docked = Docked::new(&setting.config, Channel::new(setting.water(), seed), seed, now)?;
+        Self::at(setting, docked, seed, now)
+    }
+
+    /// The same at these modems.
+    pub fn with_modems(setting: &DockSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, UserError> {
+        let now = Instant::from_secs_f64(1.0);
+        let docked = Docked::with_modems(&setting.config, Channel::new(setting.water(), seed), modems, now)?;
+        Self::at(setting, docked, seed, now)
+    }
+
+    fn at(setting: &DockSetting, mut docked: Docked, seed: u64, now: Instant) -> Result<Self, UserError> {
+        let config = &setting.config;
+        docked.place(VEHICLE, Position::new(0.0, 0.0, 10.0));
+        docked.place(SURFACE, Position::new(setting.range_m, 0.0, 10.0));
+        let address = scenecast_config::vehicle_address(config)?;
+        let (mission, window) = (MissionId(7), Duration::from_secs_f64(config.link.budget_window_s));
+        let vehicle = VehicleConfig {
+            address,
+            mission,
+            modem: *docked.station(VEHICLE).profile(),
+            budget_bps: config.link.budget_bps,
+            budget_window: window,
+            shares: Shares::default(),
+            status_period: Duration::from_secs(10),
+            authenticity: None,
+        };
+        let surface = SurfaceConfig {
+            mission,
+            modem: *docked.station(SURFACE).profile(),
+            budget_bps: config.link.budget_bps,
+            budget_window: window,
+            shares: Shares::default(),
+            master: MasterConfig::default(),
+            vehicles: vec![address],
+            call_every: None,
+            authenticity: None,
+        };
+        let source = OpaqueSource::default();
+        Ok(Self {
+            now,
+            vehicle: VehicleLink::with_source(vehicle, source, seed ^ 0xA, SlotInboxState::default(), now),
+            surface: SurfaceLink::new(surface, seed ^ 0xB, now),
+            docked,
+            load: None,
+            applied: BTreeMap::new(),
+            heard: [now; 2],
+            struck: VEHICLE,
+            refusals: Vec::new(),
+            address,
+            budget_bits: f64::from(config.link.budget_bps) * config.link.budget_window_s,
+        })
+    }
+
+    /// Ends under load that know each other.
+    pub fn under_load(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
+        let mut dock = Self::new(setting, seed)?;
+        dock.load = Some(LOAD);
+        dock.run(Duration::from_secs(180));
+        Ok(dock)
+    }
+
+    /// The vehicle as the surface knows it.
+    pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
+        self.surface.vehicle(self.address)
+    }
+
+    fn handle_modem(&mut self, end: usize, event: ModemEvent) {
+        let now = self.now;
+        match (event, end) {
+            (ModemEvent::Sent, VEHICLE) => self.vehicle.handle_transmit_outcome(now),
+            (ModemEvent::Sent, _) => self.surface.handle_transmit_outcome(now),
+            (ModemEvent::Received(bytes), _) => {
+                self.heard[end] = now;
+                if end == VEHICLE {
+                    self.vehicle.handle_frame(&bytes, now)
+                } else {
+                    self.surface.handle_frame(&bytes, now)
+                }
+            }
+            (ModemEvent::Poll(frames), VEHICLE) => self.vehicle.handle_poll(frames),
+            (ModemEvent::Poll(frames), _) => self.surface.handle_poll(frames),
+            (ModemEvent::Repeated(bits), VEHICLE) => self.vehicle.handle_repeated(bits, now),
+            (ModemEvent::Repeated(bits), _) => self.surface.handle_repeated(bits, now),
+            (ModemEvent::Refused(what), _) => self.refusals.push(what),
+            (ModemEvent::Fix(..) | ModemEvent::Ready | ModemEvent::Lost, _) => {}
+        }
+    }
+
+    fn speak(&mut self) {
+        let now = self.now;
+        let polled = self.docked.station(SURFACE).profile().access == Access::Polled;
+        if polled
+            && self.docked.station(SURFACE).takes_cycles(now)
+            && let Some(cycle) = self.surface.poll_cycle(now)
+        {
+            self.docked.station(SURFACE).begin_cycle(cycle, now);
+        }
+        while self.docked.station(SURFACE).takes_frames()
+            && let Some(transmit) = self.surface.poll_transmit(now)
+        {
+            // What a modem refuses is lost, and the link repairs it.
+            let _ = self.docked.station(SURFACE).send(transmit, now);
+        }
+        while self.docked.station(VEHICLE).takes_frames()
+            && let Some(transmit) = self.vehicle.poll_transmit(now)
+        {
+            let _ = self.docked.station(VEHICLE).send(transmit, now);
+        }
+    }
+
+    /// Useful bits a second at the replica over `time`.
+    pub fn measure_flow(&mut self, time: Duration) -> f64 {
+        let useful = |dock: &Self| dock.view().map_or(0.0, |v| v.replica().useful_bytes());
+        let before = useful(self);
+        self.run(time);
+        (useful(self) - before) * 8.0 / time.as_secs_f64()
+    }
+
+    /// Issues directives at random moments: from issue to applied, seconds.
+    pub fn measure_directives(&mut self, count: usize, seed: u64) -> Summary {
+        let mut dice = Stream::new(seed, &[7]);
+        let mut latencies = Vec::new();
+        for _ in 0..count {
+            self.run(Duration::from_secs_f64(5.0 + dice.uniform() * 30.0));
+            let issued = self.now;
+            let Some(version) = self.issue() else { continue };
+            self.run_until(issued + GIVE_UP, |d| d.applied.contains_key(&(SlotId::Utility, version)));
+            latencies.push(self.now.since(issued).as_secs_f64());
+        }
+        Summary::of(latencies)
+    }
+
+    /// Issues a directive; its version.
+    pub fn issue(&mut self) -> Option<u16> {
+        let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
+        let slot = Slot::Utility(Utility { weights, ..Utility::default() });
+        self.surface.issue(self.address, slot, self.now).ok()
+    }
+
+    /// Breaks something of a modem.
+    pub fn inject(&mut self, end: usize, fault: Fault) {
+        self.docked.inject(end, fault, self.now);
+    }
+
+    /// Pulls a cable, or puts it back.
+    pub fn plug(&mut self, end: usize, plugged: bool) {
+        self.docked.plug(end, plugged, self.now);
+    }
+
+    /// Most of the vehicle's bits in any window, over what the budget allows.
+    pub fn budget_use(&mut self) -> f64 {
+        self.docked.station(VEHICLE).audit().worst_window_bits() as f64 / self.budget_bits
+    }
+}
+
+impl VirtualTime for Dock {
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn set_now(&mut self, now: Instant) {
+        self.now = now;
+    }
+
+    fn next_event(&self) -> Instant {
+        let links = self.vehicle.poll_timeout().into_iter().chain(self.surface.poll_timeout(self.now));
+        let links = links.map(|(at, _)| at).filter(|&at| at > self.now);
+        links.chain(self.docked.poll_timeout()).min().unwrap_or(self.now + Duration::from_secs(1))
+    }
+
+    fn handle_events(&mut self) {
+        self.docked.handle_timeout(self.now);
+    }
+
+    fn pump(&mut self) {
+        for end in [VEHICLE, SURFACE] {
+            while let Some(event) = self.docked.poll_event(end) {
+                self.handle_modem(end, event);
+            }
+        }
+        while let Some(event) = self.vehicle.poll_event() {
+            if let VehicleEvent::Slot { id, version, .. } = event {
+                self.vehicle.decide(id, SlotState::Applied, self.now);
+                self.vehicle.handle_persisted();
+                self.applied.entry((id, version)).or_default().push(self.now);
+            }
+        }
+        while self.surface.poll_event().is_some() {}
+        self.vehicle.set_status(VehicleStatus::default());
+        if let Some(bytes) = self.load {
+            self.vehicle.source_mut().fill(bytes);
+        }
+        self.speak();
+        self.docked.write(self.now);
+    }
+}

@@ -1,0 +1,60 @@
+//! The files of a rehearsal.
+
+use super::mission::Mission;
+use super::panorama::panorama;
+use super::report::Report;
+use scenecast_core::UserError;
+use scenecast_core::label_picture;
+use scenecast_protocol::map::{LabelGrid, Rect};
+use serde_json::Value;
+use std::path::Path;
+
+/// Writes report, maps, images and frame log into a folder, which is made.
+pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path) -> Result<(), UserError> {
+    let failed = |path: &Path, e: std::io::Error| UserError::Failed(format!("{}: {e}", path.display()));
+    std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, format!("cannot be used as a folder: {e}")))?;
+    remove_old(dir);
+    let bounds = mission.vehicle.map().bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    write_map(&dir.join("vehicle-map.png"), mission.vehicle.map(), bounds)?;
+    write_map(&dir.join("operator-map.png"), &mission.operator_map(), bounds)?;
+    if mission.world.is_annotated() {
+        write_map(&dir.join("truth.png"), &truth(mission, bounds), bounds)?;
+    }
+    let panorama = panorama(mission).map_err(|e| UserError::Failed(e.to_string()))?;
+    scenecast_files::write_whole(&dir.join("mission.png"), &panorama)?;
+    let exemplars = dir.join("exemplars");
+    std::fs::create_dir_all(&exemplars).map_err(|e| failed(&exemplars, e))?;
+    for (label, webp) in mission.exemplars() {
+        scenecast_files::write_whole(&exemplars.join(format!("label-{label}.webp")), webp)?;
+    }
+    scenecast_files::write_whole(&dir.join("frames.log"), mission.log.text().as_bytes())?;
+    let mut figures = report.figures.clone();
+    figures["wall"] = wall;
+    let text = serde_json::to_string_pretty(&figures).map_err(|e| UserError::Failed(e.to_string()))? + "\n";
+    scenecast_files::write_whole(&dir.join("report.json"), text.as_bytes())
+}
+
+/// Removes what an earlier run left that this one may not write again.
+fn remove_old(dir: &Path) {
+    // What is not there need not be removed; what cannot be removed is complained of when it is written.
+    let _ = std::fs::remove_file(dir.join("truth.png"));
+    for entry in std::fs::read_dir(dir.join("exemplars")).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with("label-") && name.ends_with(".webp") {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn write_map(path: &Path, map: &LabelGrid, bounds: Rect) -> Result<(), UserError> {
+    let png =
+        label_picture::encode_within(map, bounds).map_err(|e| UserError::Failed(format!("{}: {e}", path.display())))?;
+    scenecast_files::write_whole(path, &png)
+}
+
+/// Classes of the annotation on the cells of the map, shifted by one: 0 = not annotated.
+fn truth(mission: &Mission, bounds: Rect) -> LabelGrid {
+    let class = |cell| mission.world.class_of(cell, mission.cell_m());
+    bounds.cells().filter_map(|cell| Some((cell, class(cell)?.saturating_add(1).min(254)))).collect()
+}

@@ -1,0 +1,134 @@
+//! Planners against each other: utility collected a metre on label maps that are seen bit by bit.
+
+mod drive;
+mod picture;
+mod scene;
+
+use drive::{Drive, Task, Told};
+pub use picture::picture;
+use scene::Scene;
+use scenecast_core::UserError;
+use scenecast_protocol::directive::PlannerKind;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Seeds of one run.
+pub const SEEDS: u64 = 32;
+
+/// One scene with one start, driven by every planner.
+#[derive(Debug)]
+pub struct Trial {
+    /// Name of the scene.
+    pub name: String,
+    /// Utility a metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
+    pub utility_per_m: [f64; 3],
+    /// The same of `horizon` if it is told the whole map before it starts.
+    pub told_all_per_m: f64,
+    /// Breaches of fence, keep-outs and limit, by the witness.
+    pub violations: usize,
+    pub(crate) scene: Scene,
+    pub(crate) task: Task,
+    pub(crate) drives: Vec<Drive>,
+}
+
+/// Medians over all trials, by planner.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Medians {
+    /// Parallel legs.
+    pub lawnmower: f64,
+    /// Best gain a metre.
+    pub greedy: f64,
+    /// Best way over a horizon.
+    pub horizon: f64,
+}
+
+/// What the bench found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PlanningTable {
+    /// Utility collected a metre, in units of what a metre brings where all is new, on the mean of the scene: so rare and
+    /// common classes weigh alike.
+    pub median: Medians,
+    /// Median of `horizon` where it is told the whole map before it starts: what not knowing costs is between the two.
+    pub told_all: f64,
+    /// Breaches of any constraint.
+    pub violations: usize,
+    /// Seeds.
+    pub seeds: u64,
+}
+
+/// The images with annotations in a folder, in the order of their names.
+pub fn annotated_images(dir: &Path) -> Vec<(PathBuf, PathBuf)> {
+    let entries = std::fs::read_dir(dir).into_iter().flatten().flatten().map(|e| e.path());
+    let labelled = entries.filter(|p| p.extension().is_some_and(|e| e == "jpg")).filter_map(|image| {
+        let stem = image.file_stem()?.to_string_lossy().into_owned();
+        let labels = image.with_file_name(format!("{stem}_label.png"));
+        labels.is_file().then_some((image, labels))
+    });
+    let mut found: Vec<_> = labelled.collect();
+    found.sort();
+    found
+}
+
+/// Drives every trial: each seed has a procedural reef and, where there are any, one of the annotated images.
+pub fn drive_all(
+    seed: u64,
+    images: &[(PathBuf, PathBuf)],
+    each: &mut dyn FnMut(f64, &Trial) -> Result<(), UserError>,
+) -> Result<PlanningTable, UserError> {
+    let real = images.iter().map(|(i, l)| Scene::from_files(i, l, seed)).collect::<Result<Vec<_>, _>>()?;
+    let (mut found, mut told_all) = (Vec::new(), Vec::new());
+    let mut violations = 0;
+    for n in 0..SEEDS {
+        let reef = Scene::procedural(seed.wrapping_add(n));
+        let here = (!real.is_empty()).then(|| real[n as usize % real.len()].clone());
+        for scene in here.into_iter().chain([reef]) {
+            let trial = trial(scene, seed.wrapping_add(n));
+            violations += trial.violations;
+            found.push(trial.utility_per_m);
+            told_all.push(trial.told_all_per_m);
+            each((n + 1) as f64 / SEEDS as f64, &trial)?;
+        }
+    }
+    let [lawnmower, greedy, horizon] = [0, 1, 2].map(|i| median(found.iter().map(|f| f[i]).collect()));
+    let median_of = Medians { lawnmower, greedy, horizon };
+    Ok(PlanningTable { median: median_of, told_all: median(told_all), violations, seeds: SEEDS })
+}
+
+fn trial(scene: Scene, seed: u64) -> Trial {
+    let task = Task::draw(&scene, seed);
+    let drives = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind, Told::Seen));
+    let all = drive::drive(&scene, &task, PlannerKind::Horizon, Told::All);
+    let rate = |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9);
+    let utility_per_m = drives.each_ref().map(rate);
+    let told_all_per_m = rate(&all);
+    let violations = drives.iter().chain([&all]).map(|d| d.violations(&task)).sum();
+    Trial { name: scene.name.clone(), utility_per_m, told_all_per_m, violations, scene, task, drives: drives.into() }
+}
+
+/// Rounded to a thousandth.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    let value = match values.len() % 2 {
+        0 if middle > 0 => (values[middle - 1] + values[middle]) / 2.0,
+        _ => values.get(middle).copied().unwrap_or(0.0),
+    };
+    (value * 1e3).round() / 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_is_the_same_again_and_breaks_nothing() {
+        let scene = Scene::small(3);
+        let (a, b) = (trial(scene.clone(), 3), trial(scene, 3));
+        assert_eq!(a.utility_per_m, b.utility_per_m);
+        assert_eq!(a.violations, 0);
+        assert!(a.utility_per_m.iter().all(|&u| u > 0.0), "{:?}", a.utility_per_m);
+        let lawnmower = a.utility_per_m[0];
+        assert!(a.told_all_per_m > lawnmower, "{} against {lawnmower}", a.told_all_per_m);
+        assert!(a.drives.iter().all(|d| d.metres() > 0.5 * a.task.limit_m), "the limit is made use of");
+    }
+}

@@ -1,0 +1,48 @@
+//! The file of the scene model's checkpoints: the last one or the one before it, whole.
+
+use super::journal::Storage;
+use scenecast_core::UserError;
+use std::io;
+
+/// The file's name.
+const NAME: &str = "scene.checkpoint";
+/// The name that it is written under.
+const PART: &str = "scene.checkpoint.part";
+
+/// Keeps checkpoints.
+pub(super) struct CheckpointFile<S: Storage> {
+    storage: S,
+}
+
+impl<S: Storage> CheckpointFile<S> {
+    pub(super) fn new(storage: S) -> Self {
+        Self { storage }
+    }
+
+    /// Where it is, for people.
+    pub(super) fn path(&self) -> std::path::PathBuf {
+        self.storage.path(NAME)
+    }
+
+    /// The last checkpoint that was kept; none before the first.
+    pub(super) fn read(&self) -> Result<Option<Vec<u8>>, UserError> {
+        self.storage.read(NAME).map_err(|e| self.failed(e))
+    }
+
+    /// Keeps a checkpoint: a power cut before this has returned leaves the last one or this one.
+    pub(super) fn keep(&mut self, bytes: &[u8]) -> Result<(), UserError> {
+        self.write(bytes).map_err(|e| self.failed(e))
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut file = self.storage.create(PART)?;
+        self.storage.append(&mut file, bytes)?;
+        self.storage.sync(&mut file)?;
+        self.storage.rename(PART, NAME)?;
+        self.storage.sync_folder()
+    }
+
+    fn failed(&self, e: io::Error) -> UserError {
+        UserError::Failed(format!("{}: {e}", self.path().display()))
+    }
+}

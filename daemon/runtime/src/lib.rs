@@ -1,0 +1,56 @@
+//! The tokio shells around the roles: they move bytes, read the clock, keep files.
+
+mod checkpoint;
+mod clock;
+mod durable;
+mod flight;
+mod journal;
+#[cfg(test)]
+mod kept_labels;
+mod mapping;
+pub mod modem;
+mod pilot;
+mod port;
+#[cfg(feature = "surface")]
+mod position;
+#[cfg(all(test, feature = "surface"))]
+mod power_cuts;
+mod refusals;
+mod reload;
+mod restore;
+mod stop;
+#[cfg(feature = "surface")]
+mod surface;
+mod vehicle;
+
+pub use clock::Clock;
+pub use pilot::SimulatedAutopilot;
+pub use reload::Load;
+pub use stop::Stop;
+#[cfg(feature = "surface")]
+pub use surface::run_surface;
+pub use vehicle::run_vehicle;
+
+use scenecast_core::UserError;
+use std::hash::{BuildHasher, Hasher, RandomState};
+
+/// Longest wait for other threads at the end.
+const LONGEST_END: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// Random bits for sessions: not secret, only different each run.
+pub fn random_bits() -> u64 {
+    RandomState::new().build_hasher().finish()
+}
+
+/// Runs a future to its end, with log lines on the standard error output as `RUST_LOG` asks.
+pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    // A second command in the same process (as in tests) keeps the first one's log.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
+    let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
+    let result = runtime.block_on(future);
+    // A name that is being looked up would hold the end up for as long as the network likes.
+    runtime.shutdown_timeout(LONGEST_END);
+    result
+}

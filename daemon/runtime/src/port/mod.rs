@@ -1,0 +1,112 @@
+//! Ways to modems and instruments: serial, TCP, UDP, files. They move bytes, and open themselves again whenever they fail.
+
+mod carry;
+mod keeper;
+mod tcp;
+mod udp;
+
+use bytes::Bytes;
+use keeper::Keeper;
+use scenecast_core::PortAddress;
+use std::io;
+use std::time::Duration;
+use tokio::sync::mpsc;
+
+/// What a port is told.
+#[derive(Debug)]
+enum ToPort {
+    /// Write this.
+    Bytes(Bytes),
+    /// Close and open again: nobody answers.
+    Reopen,
+}
+
+/// What a port tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FromPort {
+    /// It is open.
+    Open,
+    /// It is closed, and being opened again.
+    Closed,
+    /// This was read.
+    Bytes(Bytes),
+}
+
+/// A port and the way to it.
+#[derive(Debug)]
+pub struct Port {
+    to: mpsc::Sender<ToPort>,
+    from: mpsc::Receiver<FromPort>,
+}
+
+/// The far side of a [`Port`].
+struct Ends {
+    to: mpsc::Receiver<ToPort>,
+    from: mpsc::Sender<FromPort>,
+}
+
+impl Port {
+    /// Opens it now; one that fails later is opened again by itself. `name` is for the log.
+    ///
+    /// # Errors
+    /// Why it cannot be opened. A peer that does not take a connection yet is waited for instead.
+    pub async fn open(name: &'static str, place: PortAddress) -> io::Result<Self> {
+        let first = match &place {
+            PortAddress::Connect(_) => None,
+            there => Some(keeper::open(there).await?),
+        };
+        let (port, ends) = Self::pair();
+        tokio::spawn(Keeper { name, place, quiet: None, ends }.run(first));
+        Ok(port)
+    }
+
+    /// Opens it as soon as it is there, and again for ever. An instrument that says nothing for `quiet` counts as gone, where
+    /// that is given: an unplugged adapter or a half-open connection may never tell.
+    pub fn open_when_there(name: &'static str, place: PortAddress, quiet: Option<Duration>) -> Self {
+        let (port, ends) = Self::pair();
+        tokio::spawn(Keeper { name, place, quiet, ends }.run(None));
+        port
+    }
+
+    fn pair() -> (Self, Ends) {
+        let (to, to_port) = mpsc::channel(64);
+        let (from_port, from) = mpsc::channel(64);
+        (Self { to, from }, Ends { to: to_port, from: from_port })
+    }
+
+    /// The next thing that it tells; safe to abandon.
+    pub async fn next(&mut self) -> FromPort {
+        match self.from.recv().await {
+            Some(told) => told,
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Writes bytes; says whether the port took them. What it does not take is stale by the time that it would.
+    pub fn write(&self, bytes: Vec<u8>) -> bool {
+        self.to.try_send(ToPort::Bytes(bytes.into())).is_ok()
+    }
+
+    /// Closes it and opens it again.
+    pub fn reopen(&self) {
+        let _ = self.to.try_send(ToPort::Reopen);
+    }
+}
+
+impl Ends {
+    /// The port has been opened: what waited while it was not is stale. Says whether the host is still there.
+    async fn tell_open(&mut self) -> bool {
+        while self.to.try_recv().is_ok() {}
+        self.from.send(FromPort::Open).await.is_ok()
+    }
+
+    /// Says whether the host is still there.
+    async fn tell(&self, told: FromPort) -> bool {
+        self.from.send(told).await.is_ok()
+    }
+}
+
+/// Bytes of a buffer that were just read.
+fn read(buffer: &[u8], n: usize) -> FromPort {
+    FromPort::Bytes(Bytes::copy_from_slice(buffer.get(..n).unwrap_or_default()))
+}

@@ -1,0 +1,48 @@
+//! SIGHUP: the configuration is read again.
+
+use scenecast_config::Config;
+use scenecast_core::UserError;
+#[cfg(unix)]
+use tokio::signal::unix::{Signal, SignalKind, signal};
+
+/// Reads a configuration, the same file and options each time.
+pub type Load = Box<dyn Fn() -> Result<Config, UserError>>;
+
+/// Reads the configuration again whenever SIGHUP asks for it.
+pub(super) struct Reload {
+    load: Load,
+    #[cfg(unix)]
+    hang_ups: Signal,
+}
+
+impl Reload {
+    #[cfg(unix)]
+    pub(super) fn new(load: Load) -> Result<Self, UserError> {
+        let hang_ups = signal(SignalKind::hangup()).map_err(|e| UserError::Failed(format!("SIGHUP: {e}")))?;
+        Ok(Self { load, hang_ups })
+    }
+
+    #[cfg(not(unix))]
+    pub(super) fn new(load: Load) -> Result<Self, UserError> {
+        Ok(Self { load })
+    }
+
+    /// The configuration as it is now, once it is asked for; one that cannot be read is logged and changes nothing.
+    pub(super) async fn next(&mut self) -> Config {
+        loop {
+            self.hang_up().await;
+            match (self.load)() {
+                Ok(config) => return config,
+                Err(problem) => tracing::error!("{problem}; SIGHUP changes nothing"),
+            }
+        }
+    }
+
+    async fn hang_up(&mut self) {
+        #[cfg(unix)]
+        if self.hang_ups.recv().await.is_some() {
+            return;
+        }
+        std::future::pending().await
+    }
+}

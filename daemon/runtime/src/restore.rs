@@ -1,0 +1,65 @@
+//! The scene model at the start of a run: that of the last checkpoint, or a new one.
+
+use super::checkpoint::CheckpointFile;
+use super::durable::{Keeper, Run};
+use super::journal::Folder;
+use super::mapping::Keep;
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use scenecast_files::configured_vocabulary;
+use scenecast_vehicle::{Mapper, NoCheckpoint, Restored};
+use std::path::Path;
+
+/// What a run begins with.
+pub(super) struct Start {
+    pub(super) run: Run<Folder>,
+    pub(super) mapper: Mapper,
+    pub(super) keep: Keep,
+}
+
+/// Begins a run in the folder of its state.
+///
+/// A checkpoint that cannot be gone on from costs the map that was learnt, and nothing that was promised: labels begin a
+/// new epoch. So it is said in the log, and does not keep the vehicle from its mission.
+pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
+    let refused = |e: std::io::Error| UserError::file(dir, e);
+    let folder = Folder::hold(dir).map_err(refused)?;
+    let file = CheckpointFile::new(folder.share().map_err(refused)?);
+    let restored = if config.scene.checkpoint_s > 0.0 { restore(config, &file)? } else { None };
+    let claim = restored.as_ref().map(|restored| (restored.lineage, restored.mapper.epoch()));
+    let run = Keeper::begin_run(folder, super::random_bits(), claim)?;
+    let durable = &run.durable;
+    let mapper = match restored {
+        Some(Restored { mut mapper, lineage }) if lineage == durable.lineage => {
+            mapper.resume(durable.epoch, durable.labels);
+            let (cells, at) = (mapper.cells(), mapper.last_s().unwrap_or(0.0));
+            tracing::info!(
+                "the scene model goes on from its checkpoint at {at} s: {cells} cells, epoch {}",
+                durable.epoch
+            );
+            mapper
+        }
+        other => {
+            if other.is_some() {
+                tracing::warn!("the checkpoint of the scene model is of another mission: it begins anew");
+            }
+            Mapper::new(config, configured_vocabulary(&config.scene.vocabulary)?, durable.epoch, config.runtime.seed)?
+        }
+    };
+    let last_s = mapper.last_s();
+    let keep = Keep { file, lineage: durable.lineage, every_s: config.scene.checkpoint_s, last_s };
+    Ok(Start { run, mapper, keep })
+}
+
+fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {
+    let Some(bytes) = file.read()? else { return Ok(None) };
+    match Mapper::restore(config, configured_vocabulary(&config.scene.vocabulary)?, &bytes) {
+        Ok(restored) => Ok(Some(restored)),
+        Err(NoCheckpoint::Config(problem)) => Err(problem),
+        Err(why) => {
+            let place = file.path();
+            tracing::error!("{}: {why}; the scene model begins anew, with new labels", place.display());
+            Ok(None)
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Who asks a process to end: a person or the system.
+
+use scenecast_core::UserError;
+
+/// Hears Ctrl-C and SIGTERM from its making on: one that comes while the process is at other work is not lost.
+pub struct Stop {
+    #[cfg(unix)]
+    interrupt: tokio::signal::unix::Signal,
+    #[cfg(unix)]
+    terminate: tokio::signal::unix::Signal,
+    #[cfg(not(unix))]
+    interrupt: tokio::signal::windows::CtrlC,
+}
+
+impl Stop {
+    /// Listens from now on.
+    #[cfg(unix)]
+    pub fn new() -> Result<Self, UserError> {
+        use tokio::signal::unix::{SignalKind, signal};
+        let problem = |e| UserError::Failed(format!("the signals to end: {e}"));
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt()).map_err(problem)?,
+            terminate: signal(SignalKind::terminate()).map_err(problem)?,
+        })
+    }
+
+    /// Listens from now on.
+    #[cfg(not(unix))]
+    pub fn new() -> Result<Self, UserError> {
+        let interrupt = tokio::signal::windows::ctrl_c();
+        Ok(Self { interrupt: interrupt.map_err(|e| UserError::Failed(format!("Ctrl-C: {e}")))? })
+    }
+
+    /// Returns when the process is to end; safe to abandon.
+    pub async fn asked(&mut self) {
+        #[cfg(unix)]
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+        }
+        #[cfg(not(unix))]
+        let _ = self.interrupt.recv().await;
+    }
+}

@@ -1,0 +1,84 @@
+//! `scenecast bench`
+
+use super::bench_exemplar::ExemplarBench;
+use super::bench_link::Link;
+use super::bench_localisation::LocalisationBench;
+use super::bench_modem::Modem;
+use super::bench_planning::Planning;
+use super::sim::WorldArguments;
+use clap::{Args, Subcommand};
+use scenecast_core::UserError;
+use scenecast_rehearsal::{FidelityRow, fidelity};
+
+/// Measurements.
+#[derive(Debug, Subcommand)]
+pub(super) enum Bench {
+    /// Images of labels: seconds from the order under full load, bytes for a likeness of 0.9.
+    Exemplar(ExemplarBench),
+    /// The operator's map at 100, 250, 1000 and 10 000 bit/s: our stream against whole PNGs.
+    Fidelity(Fidelity),
+    /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
+    Link(Link),
+    /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
+    Localisation(LocalisationBench),
+    /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
+    Modem(Modem),
+    /// Planners against each other: utility collected a metre.
+    Planning(Planning),
+}
+
+/// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
+/// changed", with the same frames, acknowledgements, repair and turns.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast bench fidelity --seed 3")]
+pub(super) struct Fidelity {
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    world: WorldArguments,
+}
+
+impl Bench {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        match self {
+            Self::Exemplar(e) => e.run(),
+            Self::Fidelity(f) => f.run(),
+            Self::Link(l) => l.run(),
+            Self::Localisation(l) => l.run(),
+            Self::Modem(m) => m.run(),
+            Self::Planning(p) => p.run(),
+        }
+    }
+}
+
+impl Fidelity {
+    fn run(mut self) -> Result<(), UserError> {
+        // What the rows have in common unless it is set otherwise: small frames suit small budgets.
+        let defaults = ["channel.loss=0.1", "link.frame_bytes=64"].map(str::to_owned);
+        self.world.sets.splice(0..0, defaults);
+        let config = self.world.config()?;
+        let world = self.world.world(&config)?;
+        if !self.json {
+            println!("budget_bps stream     agreement_mean  age_s median     p95     max  MI nats  map bytes");
+        }
+        let rows = fidelity(&config, &world, self.world.seed, &mut |row| {
+            if !self.json {
+                print_row(row);
+            }
+        })?;
+        if self.json {
+            let text = serde_json::to_string_pretty(&rows).map_err(|e| UserError::Failed(e.to_string()))?;
+            println!("{text}");
+        }
+        Ok(())
+    }
+}
+
+fn print_row(r: &FidelityRow) {
+    let mi = r.mutual_information_nats.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    println!(
+        "{:>10} {:<10} {:>14.4} {:>13.1} {:>7.1} {:>7.1} {:>8} {:>10}",
+        r.budget_bps, r.stream, r.agreement_mean, r.age_s_median, r.age_s_p95, r.age_s_max, mi, r.map_bytes
+    );
+}

@@ -1,0 +1,126 @@
+//! `scenecast bench link`
+
+use clap::Args;
+use scenecast_core::UserError;
+use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkTable, RangingRow, Row, link_table, measure_speed};
+use scenecast_tools::Progress;
+
+/// The link in virtual time with opaque payload of which there is always more: 10 kbit/s half duplex, 0.2 s turn-around,
+/// turns granted by the surface. Takes less than a minute; the same seed gives the same table.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast bench link --seed 3 --json")]
+pub(super) struct Link {
+    /// Print JSON, without the figures of this machine
+    #[arg(long)]
+    json: bool,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+impl Link {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        let mut progress = Progress::new("link");
+        let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(failed)?;
+        drop(progress);
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&table).map_err(failed)?);
+            return Ok(());
+        }
+        print_table(&table);
+        print_speed();
+        Ok(())
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> UserError {
+    UserError::Failed(error.to_string())
+}
+
+fn print_table(table: &LinkTable) {
+    println!(
+        "Seed {}. efficiency: useful payload / (bit rate x (1 - loss)); directive: issue to applied; known: issue to",
+        table.seed
+    );
+    println!("known at the surface; converge: last change to equal maps, within: share of stops that kept the bound.");
+    println!();
+    println!("range frame pattern     loss  effi-     directive  known converge          budget    re-");
+    println!("   km bytes                % ciency med. s  p95 s  p95 s    p95 s  within    used  syncs");
+    table.rows.iter().for_each(print_row);
+    println!();
+    println!("A budget that binds: efficiency against the vehicle's budget.");
+    println!("range frame loss  budget  effi-   budget");
+    println!("   km bytes    %   bit/s  ciency    used");
+    table.budgets.iter().for_each(print_budget);
+    println!();
+    println!("A fix each 10 s.");
+    println!("range frame loss  efficiency         cost  error round trip  one way");
+    println!("   km bytes    %  without    with       %                ms       ms");
+    table.ranging.iter().for_each(print_ranging);
+    println!();
+    print_fleet(&table.fleet);
+}
+
+fn print_row(r: &Row) {
+    println!(
+        "{:>5} {:>5} {:<11} {:>4.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
+        r.range_km,
+        r.frame_bytes,
+        r.pattern.name(),
+        r.loss * 100.0,
+        r.efficiency,
+        r.directive_median_s,
+        r.directive_p95_s,
+        r.known_p95_s,
+        r.converge_p95_s,
+        r.converge_within,
+        r.budget_use,
+        r.resyncs
+    );
+}
+
+fn print_budget(r: &BudgetRow) {
+    let percent = r.loss * 100.0;
+    println!(
+        "{:>5} {:>5} {percent:>4.0} {:>7} {:>7.3} {:>7.2}",
+        r.range_km, r.frame_bytes, r.budget_bps, r.efficiency, r.budget_use
+    );
+}
+
+fn print_ranging(r: &RangingRow) {
+    println!(
+        "{:>5} {:>5} {:>4.0} {:>8.3} {:>7.3} {:>7.1} {:>17.1} {:>8.1}",
+        r.range_km,
+        r.frame_bytes,
+        r.loss * 100.0,
+        r.efficiency,
+        r.efficiency_with_fixes,
+        r.cost * 100.0,
+        r.round_trip_error_ms,
+        r.one_way_error_ms
+    );
+}
+
+fn print_fleet(f: &FleetRow) {
+    println!(
+        "{} vehicles at {} km, {} bytes, {:.0} % loss: all known after {:.0} s; oldest map {:.0} s = {:.2} fair shares of",
+        f.vehicles,
+        f.range_km,
+        f.frame_bytes,
+        f.loss * 100.0,
+        f.found_s,
+        f.oldest_s,
+        f.oldest_shares
+    );
+    println!("{:.0} s; efficiency {:.3}, budget used {:.2}.", f.fair_share_s, f.efficiency, f.budget_use);
+}
+
+fn print_speed() {
+    let speed = measure_speed();
+    println!();
+    println!(
+        "This machine, one core: {:.0} frames/s of 64 bytes and {:.0} of 256, both ends; a saturated hour of 64-byte frames, \
+         water included, in {:.2} s.",
+        speed.small_frames_per_s, speed.frames_per_s, speed.hour_s
+    );
+}

@@ -1,0 +1,52 @@
+//! `scenecast bench modem`
+
+use clap::Args;
+use scenecast_core::UserError;
+use scenecast_rehearsal::modem_bench::{ModemTable, modem_table};
+use scenecast_tools::Progress;
+
+/// Both ends' drivers at emulated modems, 1 km and 10 % loss, in virtual time: what an S2C in burst mode carries for the
+/// link and for a host that only keeps its pool full, how long directives take meanwhile, and surveys of 20 minutes
+/// through slow modems. The same seed gives the same figures.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast bench modem --seed 3 --json")]
+pub(super) struct Modem {
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+impl Modem {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        let mut progress = Progress::new("modems");
+        let table = modem_table(self.seed, &mut |share| progress.show(share))?;
+        drop(progress);
+        if self.json {
+            let text = serde_json::to_string_pretty(&table).map_err(|e| UserError::Failed(e.to_string()))?;
+            println!("{text}");
+        } else {
+            print_table(&table);
+        }
+        Ok(())
+    }
+}
+
+fn print_table(table: &ModemTable) {
+    let b = &table.burst;
+    println!("S2C in burst mode, {:.0} m, {:.0} % loss, seed {}:", b.range_m, b.loss * 100.0, table.seed);
+    println!("  raw pusher      {:>7.0} bit/s", b.raw_bps);
+    println!("  useful at map   {:>7.0} bit/s, {:.3} of it", b.useful_bps, b.share);
+    println!(
+        "  directive       {:>7.1} s median, {:.1} s p95, issue to applied, bulk queue full",
+        b.directive_median_s, b.directive_p95_s
+    );
+    println!("  budget used     {:>7.3} in the worst window", b.budget_use);
+    println!();
+    println!("survey through                 agreement mean   final  drain s");
+    for row in &table.surveys {
+        println!("{:<30} {:>14.4} {:>7.4} {:>8.0}", row.modem, row.agreement_mean, row.agreement_final, row.drain_s);
+    }
+}

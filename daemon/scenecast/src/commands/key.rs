@@ -1,0 +1,146 @@
+//! `scenecast key`
+
+use clap::{Args, Subcommand};
+use scenecast_core::UserError;
+use scenecast_protocol::seal::MissionKey;
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use zeroize::Zeroizing;
+
+/// The mission key, and the token of the operator's page.
+#[derive(Debug, Subcommand)]
+pub(super) enum Key {
+    /// Write a fresh random key to a new file.
+    New(New),
+    /// Print the fingerprint of a key, by which you see that both ends hold the same.
+    Show(Show),
+    /// Write a fresh random token for the operator's page to a new file.
+    Token(Token),
+}
+
+/// Write a fresh random key to a new file, which only its owner may read.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast key new --out reef-3.key")]
+pub(super) struct New {
+    /// File to write; it must not exist
+    #[arg(long, value_name = "FILE", default_value = "mission.key")]
+    out: PathBuf,
+}
+
+/// Write a fresh random token to a new file, which only its owner may read. Whoever shows it may steer.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast key token --out console.token")]
+pub(super) struct Token {
+    /// File to write; it must not exist
+    #[arg(long, value_name = "FILE", default_value = "console.token")]
+    out: PathBuf,
+}
+
+/// Print the fingerprint of a key, by which you see that both ends hold the same.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast key show mission.key")]
+pub(super) struct Show {
+    /// Key file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+}
+
+impl Key {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        match self {
+            Self::New(new) => {
+                let key = random_key()?;
+                write_new(&new.out, &key.to_text())?;
+                println!("{}: fingerprint {:08x}", new.out.display(), key.fingerprint());
+                println!("Copy the file to the vehicle and to the surface, and set link.key_file to its path at both.");
+            }
+            Self::Token(token) => {
+                write_new(&token.out, &random_token()?)?;
+                println!("{}: a new token", token.out.display());
+                println!("Set console.token_file of the surface to its path, and give a copy to those who may steer.");
+            }
+            Self::Show(show) => {
+                let (key, warning) = scenecast_config::read_key(&show.file)?;
+                println!("{}: fingerprint {:08x}", show.file.display(), key.fingerprint());
+                if let Some(warning) = warning {
+                    eprintln!("scenecast: {warning}");
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A key from the operating system's random source.
+fn random_key() -> Result<MissionKey, UserError> {
+    let mut bytes = Zeroizing::new([0; 16]);
+    getrandom::fill(&mut *bytes).map_err(|e| UserError::Failed(format!("no random bytes from the system: {e}")))?;
+    Ok(MissionKey::from_bytes(*bytes))
+}
+
+/// A token of 128 bits from the operating system's random source.
+fn random_token() -> Result<Zeroizing<String>, UserError> {
+    let mut bytes = Zeroizing::new([0; 16]);
+    getrandom::fill(&mut *bytes).map_err(|e| UserError::Failed(format!("no random bytes from the system: {e}")))?;
+    Ok(Zeroizing::new(format!("{:032x}\n", u128::from_be_bytes(*bytes))))
+}
+
+/// Writes a secret to a file that does not exist yet, readable by its owner alone; leaves no half file.
+fn write_new(path: &Path, text: &str) -> Result<(), UserError> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.open(path).map_err(|e| match e.kind() {
+        ErrorKind::AlreadyExists => {
+            UserError::file(path, "it exists and is not overwritten; name another file with --out, or remove it")
+        }
+        _ => UserError::file(path, e),
+    })?;
+    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(|e| {
+        let _ = std::fs::remove_file(path);
+        UserError::Failed(format!("{}: {e}", path.display()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fresh(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("scenecast-key-{}-{name}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        path
+    }
+
+    #[test]
+    fn a_new_key_is_its_owners_alone_and_is_read_again() {
+        let (path, key) = (fresh("new"), random_key().unwrap());
+        write_new(&path, &key.to_text()).unwrap();
+        let (read, warning) = scenecast_config::read_key(&path).unwrap();
+        assert_eq!((read.fingerprint(), warning), (key.fingerprint(), None));
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o600);
+        }
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_exists_is_kept() {
+        let path = fresh("kept");
+        std::fs::write(&path, "precious").unwrap();
+        let refused = write_new(&path, &random_key().unwrap().to_text()).unwrap_err();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(refused.exit_code(), 2);
+        assert!(refused.to_string().contains("not overwritten"), "{refused}");
+    }
+
+    #[test]
+    fn two_keys_differ() {
+        assert_ne!(*random_key().unwrap().to_text(), *random_key().unwrap().to_text());
+    }
+}

@@ -1,0 +1,69 @@
+//! `scenecast auv`, `scenecast asv`, `scenecast config`
+
+use clap::{Args, ValueEnum};
+use scenecast_core::UserError;
+use std::path::PathBuf;
+
+/// Run one end as a process.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: scenecast asv --config config/asv.toml, and in another terminal: scenecast auv --config config/auv.toml"
+)]
+pub(super) struct Node {
+    /// Configuration file
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Set a key of the configuration, as in link.budget_bps=2000
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+}
+
+impl Node {
+    pub(super) fn run_vehicle(self) -> Result<(), UserError> {
+        scenecast_runtime::run_vehicle(
+            Box::new(move || scenecast_config::load(Some(&self.config), &self.sets)),
+            simulator(),
+        )
+    }
+
+    #[cfg(feature = "surface")]
+    pub(super) fn run_surface(self) -> Result<(), UserError> {
+        scenecast_runtime::run_surface(scenecast_config::load(Some(&self.config), &self.sets)?, simulator())
+    }
+}
+
+/// The simulated vehicle of `autopilot.kind = "rehearsal"`, in builds that have it.
+fn simulator() -> Option<scenecast_runtime::SimulatedAutopilot> {
+    #[cfg(feature = "rehearsal")]
+    return Some(scenecast_rehearsal::simulated_autopilot);
+    #[cfg(not(feature = "rehearsal"))]
+    None
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Role {
+    Auv,
+    Asv,
+    Scenario,
+}
+
+/// Print a configuration file with every key explained.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast config --role auv > auv.toml")]
+pub(super) struct PrintConfig {
+    /// Whose file
+    #[arg(long, value_enum, default_value = "scenario")]
+    role: Role,
+}
+
+impl PrintConfig {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        let role = match self.role {
+            Role::Auv => 'a',
+            Role::Asv => 's',
+            Role::Scenario => 'r',
+        };
+        print!("{}", scenecast_config::print(role));
+        Ok(())
+    }
+}

@@ -1,0 +1,115 @@
+//! `scenecast sim`
+
+use clap::Args;
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use scenecast_rehearsal::{Mission, MissionOptions, World, report, write_outputs};
+use scenecast_tools::Progress;
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// The sea floor of a rehearsal and what to change of its configuration.
+#[derive(Debug, Args)]
+pub(super) struct WorldArguments {
+    /// Scenario: a configuration file; without one a scripted operator acts
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+    /// Image of a sea floor; without one a procedural reef is surveyed
+    #[arg(long, value_name = "IMG")]
+    pub mosaic: Option<PathBuf>,
+    /// Classes of the image's pixels: a grey or indexed image of the same size, 255 = not annotated
+    #[arg(long, value_name = "LABELS", requires = "mosaic")]
+    pub annotations: Option<PathBuf>,
+    /// Size of the image's pixels on the sea floor [default: camera.metres_per_pixel]
+    #[arg(long, value_name = "M", requires = "mosaic", allow_negative_numbers = true)]
+    pub metres_per_pixel: Option<f64>,
+    /// Length of the survey in seconds
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub duration: Option<f64>,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Set a key of the configuration, as in link.budget_bps=2000 (scenecast config lists them)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub sets: Vec<String>,
+}
+
+impl WorldArguments {
+    /// The configuration, all arguments applied.
+    pub fn config(&self) -> Result<Config, UserError> {
+        let mut sets = self.sets.clone();
+        sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
+        sets.extend(self.duration.map(|d| format!("survey.duration_s={d:?}")));
+        let config = scenecast_config::load(self.scenario.as_deref(), &sets)?;
+        if config.survey.duration_s <= 0.0 {
+            return Err(UserError::Input("a rehearsal needs an end: survey.duration_s must be above 0".to_owned()));
+        }
+        Ok(config)
+    }
+
+    /// The sea floor.
+    pub fn world(&self, config: &Config) -> Result<World, UserError> {
+        match &self.mosaic {
+            Some(mosaic) => World::from_files(mosaic, self.annotations.as_deref(), config.camera.metres_per_pixel),
+            None => Ok(World::procedural(self.seed, config.camera.metres_per_pixel)),
+        }
+    }
+
+    /// Name of the scenario for the report.
+    pub fn scenario_name(&self) -> String {
+        let stem = self.scenario.as_ref().and_then(|p| p.file_stem()).map(|s| s.to_string_lossy().into_owned());
+        stem.unwrap_or_else(|| "default".to_owned())
+    }
+}
+
+/// Fly a simulated mission in virtual time and write a report.
+///
+/// The same arguments and seed give the same report.json byte for byte, apart from the members under "wall".
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: scenecast sim --set channel.loss=0.3 --set link.budget_bps=1000 --duration 600 --out run1"
+)]
+pub(super) struct Sim {
+    #[command(flatten)]
+    world: WorldArguments,
+    /// Record the camera frames and poses into a folder, to be used as camera.source=frames:DIR
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
+    /// Longest time in seconds for the link to carry what is left after the survey
+    #[arg(long, value_name = "SECONDS", default_value_t = 7200.0, allow_negative_numbers = true)]
+    drain: f64,
+    /// Folder for report.json, maps, images and frames.log
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Sim {
+    pub(super) fn run(self) -> Result<(), UserError> {
+        let started = Instant::now();
+        if !self.drain.is_finite() || self.drain < 0.0 {
+            return Err(UserError::Input(format!("--drain {}: it takes seconds, 0 or more", self.drain)));
+        }
+        let config = self.world.config()?;
+        let world = self.world.world(&config)?;
+        let options = MissionOptions { world, seed: self.world.seed, record: self.record.clone() };
+        let mut mission = Mission::new(config, options)?;
+        let mut progress = Progress::new("survey");
+        mission.run(Duration::from_secs_f64(self.drain), &mut |share| progress.show(share))?;
+        drop(progress);
+        let report = report(&mission, &self.world.scenario_name());
+        let seconds = started.elapsed().as_secs_f64();
+        let speedup = mission.now().as_secs_f64() / seconds;
+        write_outputs(&mission, &report, json!({ "seconds": seconds, "speedup": speedup }), &self.out)?;
+        let map = &report.figures["map"];
+        println!(
+            "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {seconds:.1} s",
+            self.out.join("report.json").display(),
+            report.figures["scene"]["cells"],
+            report.figures["scene"]["labels"],
+            map["agreement_final"],
+            map["agreement_mean"],
+        );
+        Ok(())
+    }
+}

@@ -1,8 +1,0 @@
-//! What is known of the settings of the scene model before a mission: how much each tells, and what its stream takes.
-
-mod fit;
-mod table;
-
-pub use fit::{Fit, NoRow};
-pub(crate) use fit::{least, most};
-pub use table::{Measurement, Row, Setting, TuningTable};

@@ -1,0 +1,285 @@
+//! Images of a vehicle's labels: those that are here, and those that are asked for.
+
+use scenecast_protocol::directive::{Request, Requests};
+use scenecast_protocol::exemplar::Exemplar;
+use scenecast_protocol::exemplar::edge_px;
+use scenecast_protocol::time::Instant;
+use std::collections::BTreeMap;
+
+/// Which image of a label is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wish {
+    /// The best one that is not here.
+    Another,
+    /// One that is here with twice its edge: the one of this number, or the one that came last.
+    Larger(Option<u8>),
+}
+
+/// How far a request is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AskState {
+    /// Asked for; how far the request is, the directive's slot knows.
+    Asked,
+    /// The vehicle has no such image yet, and sends it when it has.
+    NoneYet,
+    /// Bytes held of bytes in all.
+    Coming(usize, usize),
+    /// The vehicle refused the request.
+    Refused,
+}
+
+/// A request that is not met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Asked {
+    /// What the vehicle is asked.
+    pub request: Request,
+    /// How far it is.
+    pub state: AskState,
+    /// When that last changed.
+    pub changed: Instant,
+}
+
+/// An image that is here.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Its number among those of the label.
+    pub number: u8,
+    /// Its size: an edge of 64 << `size` pixels.
+    pub size: u8,
+    /// The file.
+    pub webp: Vec<u8>,
+    /// Bytes of it that came over the water.
+    pub sent_bytes: usize,
+    /// When it came.
+    pub came: Instant,
+    /// Whether somebody had asked for it.
+    pub asked: bool,
+}
+
+/// What there is of a label.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Page {
+    /// Images, the last one last.
+    pub pictures: Vec<Picture>,
+    /// The request that is not met, if there is one.
+    pub asked: Option<Asked>,
+    serial: u8,
+}
+
+/// The images of a vehicle's labels in one epoch.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Album {
+    pages: BTreeMap<u8, Page>,
+}
+
+impl Album {
+    /// Requests at a time: as many as a vehicle takes.
+    const MOST_ASKED: usize = 8;
+    /// Images that are kept of a label.
+    const MOST_OF_LABEL: usize = 8;
+    /// Bytes that are kept; the oldest images go.
+    const MOST_BYTES: usize = 1 << 20;
+    /// The largest size that is asked for.
+    pub const LARGEST: u8 = 1;
+
+    /// What there is of a label.
+    pub fn page(&self, label: u8) -> Option<&Page> {
+        self.pages.get(&label)
+    }
+
+    /// Labels that were asked for or shown.
+    pub fn pages(&self) -> impl Iterator<Item = (u8, &Page)> {
+        self.pages.iter().map(|(&label, page)| (label, page))
+    }
+
+    /// Asks for an image of a label in place of what was asked of it before. The error is one line for the operator.
+    pub fn ask(&mut self, label: u8, wish: Wish, now: Instant) -> Result<(), String> {
+        let others = self.pages.iter().filter(|(l, p)| **l != label && p.is_open()).count();
+        if others >= Self::MOST_ASKED {
+            return Err(format!("{others} images are on their way: wait for one, or cancel one"));
+        }
+        let mut request = Request { label, ..Request::default() };
+        let page = self.pages.get(&label);
+        if let Wish::Larger(number) = wish {
+            let picture = page.and_then(|p| p.picture(number)).ok_or_else(|| match number {
+                Some(number) => format!("picture {number} of label {label} is not here"),
+                None => format!("no image of label {label} is here yet: ask for one first"),
+            })?;
+            if picture.size >= Self::LARGEST {
+                let edge = edge_px(picture.size);
+                return Err(format!(
+                    "picture {} of label {label} is as large as they come: {edge} pixels",
+                    picture.number
+                ));
+            }
+            (request.picture, request.size) = (picture.number, picture.size + 1);
+        }
+        let page = self.pages.entry(label).or_default();
+        page.serial = page.serial % u8::MAX + 1;
+        request.serial = page.serial;
+        page.asked = Some(Asked { request, state: AskState::Asked, changed: now });
+        Ok(())
+    }
+
+    /// Nobody wants what was asked of a label any more. The error is one line for the operator.
+    pub fn cancel(&mut self, label: u8) -> Result<(), String> {
+        let asked = self.pages.get_mut(&label).and_then(|page| page.asked.take());
+        asked.map(drop).ok_or_else(|| format!("no image of label {label} is asked for"))
+    }
+
+    /// Requests that are not met yet.
+    pub fn wanted(&self, epoch: u8) -> Requests {
+        let open = self.pages.values().filter(|page| page.is_open());
+        Requests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
+    }
+
+    /// The vehicle refused what is asked for.
+    pub fn handle_refusal(&mut self, now: Instant) {
+        let asked = self.pages.values_mut().filter_map(|page| page.asked.as_mut());
+        asked.filter(|a| a.state == AskState::Asked).for_each(|a| (a.state, a.changed) = (AskState::Refused, now));
+    }
+
+    /// Part of an image came in; `head` are its first bytes.
+    pub fn handle_progress(&mut self, head: [u8; 4], (held, total): (usize, usize), now: Instant) {
+        let [_, label, serial, _] = head;
+        let asked = self.pages.get_mut(&label).and_then(|page| page.asked.as_mut());
+        if let Some(asked) = asked.filter(|a| a.request.serial == serial) {
+            (asked.state, asked.changed) = (AskState::Coming(held, total), now);
+        }
+    }
+
+    /// An image is complete; says whether there is something new to show.
+    pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
+        let is_meant = |asked: &Asked| asked.request.serial == exemplar.serial;
+        let page = self.pages.entry(exemplar.label).or_default();
+        let asked = page.asked.is_some_and(|a| is_meant(&a));
+        let Some(webp) = exemplar.webp() else {
+            let none_yet = asked && exemplar.bytes.is_empty();
+            if let Some(open) = page.asked.as_mut().filter(|_| none_yet) {
+                (open.state, open.changed) = (AskState::NoneYet, now);
+            }
+            return none_yet;
+        };
+        page.asked = page.asked.filter(|_| !asked);
+        let Exemplar { picture: number, size, .. } = *exemplar;
+        let sent_bytes = exemplar.encode().len();
+        page.pictures.retain(|p| p.number != number);
+        page.pictures.push(Picture { number, size, webp, sent_bytes, came: now, asked });
+        if page.pictures.len() > Self::MOST_OF_LABEL {
+            page.pictures.remove(0);
+        }
+        self.make_room();
+        true
+    }
+
+    fn make_room(&mut self) {
+        let bytes =
+            |pages: &BTreeMap<u8, Page>| pages.values().flat_map(|p| &p.pictures).map(|p| p.webp.len()).sum::<usize>();
+        while bytes(&self.pages) > Self::MOST_BYTES {
+            let with_some = self.pages.values_mut().filter(|page| !page.pictures.is_empty());
+            let Some(page) = with_some.min_by_key(|page| page.pictures.first().map(|p| p.came)) else { return };
+            page.pictures.remove(0);
+        }
+    }
+}
+
+impl Page {
+    /// The picture of a number, or the one that came last.
+    pub fn picture(&self, number: Option<u8>) -> Option<&Picture> {
+        match number {
+            Some(number) => self.pictures.iter().find(|p| p.number == number),
+            None => self.pictures.last(),
+        }
+    }
+
+    fn is_open(&self) -> bool {
+        self.asked.is_some_and(|a| a.state != AskState::Refused)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOW: Instant = Instant::ZERO;
+
+    fn come(label: u8, serial: u8, size: u8, picture: u8) -> Exemplar {
+        Exemplar { epoch: 0, label, serial, size, picture, bytes: vec![0x10, 0, 0, 9] }
+    }
+
+    #[test]
+    fn a_request_is_met_by_its_own_answer_and_a_larger_one_takes_the_place_of_the_smaller() {
+        let mut album = Album::default();
+        assert_eq!(
+            album.ask(5, Wish::Larger(None), NOW).unwrap_err(),
+            "no image of label 5 is here yet: ask for one first"
+        );
+        album.ask(5, Wish::Another, NOW).unwrap();
+        assert_eq!(
+            album.wanted(3),
+            Requests { epoch: 3, wanted: vec![Request { label: 5, serial: 1, size: 0, picture: 0 }] }
+        );
+        album.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
+        assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
+        assert!(album.handle_exemplar(&come(5, 1, 0, 9), NOW));
+        assert!(album.wanted(3).wanted.is_empty());
+        album.ask(5, Wish::Larger(None), NOW).unwrap();
+        assert_eq!(album.wanted(3).wanted, [Request { label: 5, serial: 2, size: 1, picture: 9 }]);
+        assert!(album.handle_exemplar(&come(5, 2, 1, 9), NOW));
+        let sizes: Vec<(u8, u8)> = album.page(5).unwrap().pictures.iter().map(|p| (p.number, p.size)).collect();
+        assert_eq!(sizes, [(9, 1)]);
+        let said = album.ask(5, Wish::Larger(Some(9)), NOW).unwrap_err();
+        assert_eq!(said, "picture 9 of label 5 is as large as they come: 128 pixels");
+        assert_eq!(album.ask(5, Wish::Larger(Some(4)), NOW).unwrap_err(), "picture 4 of label 5 is not here");
+    }
+
+    #[test]
+    fn what_is_cancelled_or_refused_is_wanted_no_more_and_what_is_here_stays() {
+        let mut album = Album::default();
+        assert!(album.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
+        assert!(!album.page(5).unwrap().pictures[0].asked);
+        album.ask(5, Wish::Another, NOW).unwrap();
+        album.cancel(5).unwrap();
+        assert!(album.wanted(0).wanted.is_empty() && album.page(5).unwrap().pictures.len() == 1);
+        assert_eq!(album.cancel(5).unwrap_err(), "no image of label 5 is asked for");
+        album.handle_progress([0, 5, 1, 0], (1, 2), NOW);
+        assert_eq!(album.page(5).unwrap().asked, None, "a late part of what was cancelled");
+        album.ask(6, Wish::Another, NOW).unwrap();
+        album.handle_refusal(NOW);
+        assert!(album.wanted(0).wanted.is_empty());
+        album.ask(6, Wish::Another, NOW).unwrap();
+        assert_eq!(album.wanted(0).wanted[0].serial, 2);
+    }
+
+    #[test]
+    fn a_vehicle_that_has_no_image_says_so_and_is_still_asked() {
+        let mut album = Album::default();
+        album.ask(5, Wish::Another, NOW).unwrap();
+        let none = Exemplar { bytes: Vec::new(), ..come(5, 1, 0, 0) };
+        assert!(album.handle_exemplar(&none, NOW));
+        assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::NoneYet);
+        assert_eq!(album.wanted(0).wanted.len(), 1);
+        assert!(!album.handle_exemplar(&Exemplar { serial: 7, ..none }, NOW), "an answer to what was not asked");
+    }
+
+    #[test]
+    fn requests_and_images_are_bounded() {
+        let mut album = Album::default();
+        (1..=8).for_each(|label| album.ask(label, Wish::Another, NOW).unwrap());
+        assert!(album.ask(9, Wish::Another, NOW).unwrap_err().contains("8 images are on their way"));
+        album.ask(8, Wish::Another, NOW).unwrap();
+        let large = |label, picture| Exemplar {
+            bytes: [vec![0x10, 0, 0], vec![9; 16_000]].concat(),
+            ..come(label, 0, 0, picture)
+        };
+        for picture in 1..=20 {
+            for label in 1..=20 {
+                album.handle_exemplar(&large(label, picture), Instant::from_secs_f64(f64::from(picture)));
+            }
+        }
+        let kept: Vec<&Picture> = album.pages().flat_map(|(_, page)| &page.pictures).collect();
+        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= Album::MOST_BYTES);
+        assert!(kept.len() > 60 && kept.iter().all(|p| p.number > 15), "the newest are kept");
+        assert!(album.pages().all(|(_, page)| page.pictures.len() <= Album::MOST_OF_LABEL));
+    }
+}

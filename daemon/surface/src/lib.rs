@@ -1,0 +1,18 @@
+//! The surface: holds the operator's map of each vehicle, sends each its directive.
+
+mod album;
+mod assemble;
+mod desk;
+mod orders;
+mod pauses;
+pub mod position;
+mod requests;
+mod settings;
+mod surface;
+
+pub use album::{Album, AskState, Asked, Page, Picture, Wish};
+pub use assemble::assemble;
+pub use desk::Desk;
+pub use orders::{FenceOrder, LimitsOrder};
+pub use settings::{SettingsDesk, SettingsOrder};
+pub use surface::{Surface, SurfaceOutput};

@@ -1,0 +1,325 @@
+//! The relay: where the surface is, and where it sees the vehicles.
+
+use super::filter::{Estimate, PlaneFilter, Verdict};
+use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
+use scenecast_core::gps::{Gps, GpsLanguage};
+use scenecast_core::{LatLon, TangentPlane};
+use scenecast_protocol::directive::Fix;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// How the relay works.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RelayConfig {
+    /// Origin of the world frame; `None`: the first good position.
+    pub origin: Option<LatLon>,
+    /// What the GPS speaks.
+    pub language: GpsLanguage,
+    /// How the USBL head is mounted.
+    pub mounting: Mounting,
+    /// Fixes of less are not sent, metres: a standard deviation.
+    pub most_sigma_m: f64,
+    /// At most one fix of a vehicle in so long.
+    pub period: Duration,
+}
+
+/// Why a sighting of a vehicle became no fix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RelayFault {
+    /// What the head told gives no place.
+    Usbl(UsblFault),
+    /// Nobody knows where the surface is, or was at the time.
+    NoGps,
+    /// It is too far from where the vehicle can be.
+    Outlier,
+    /// It is too uncertain to be of use.
+    TooVague,
+    /// It came too late.
+    TooOld,
+}
+
+impl RelayFault {
+    /// Name in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Usbl(fault) => fault.name(),
+            Self::NoGps => "no_gps",
+            Self::Outlier => "outlier",
+            Self::TooVague => "too_vague",
+            Self::TooOld => "too_old",
+        }
+    }
+}
+
+/// A vehicle as the head sees it.
+#[derive(Debug)]
+struct Seen {
+    filter: PlaneFilter,
+    /// As its status said.
+    depth: Option<(f64, Instant)>,
+    sighted: Option<Instant>,
+    fixed: Option<Instant>,
+}
+
+/// Fuses GPS, heading and USBL into fixes of vehicles. Times are of one clock; no IO.
+#[derive(Debug)]
+pub struct Relay {
+    config: RelayConfig,
+    plane: Option<TangentPlane>,
+    gps: Gps,
+    compass: Gps,
+    own: PlaneFilter,
+    own_at: Option<Instant>,
+    gps_outliers: u64,
+    vehicles: BTreeMap<Address, Seen>,
+    faults: BTreeMap<RelayFault, u64>,
+    fixes: u64,
+}
+
+impl Relay {
+    /// A surface without GPS for longer gives no fixes.
+    const GPS_LASTS: Duration = Duration::from_secs(10);
+    /// The vehicle refuses what is older than 120 s; what is nearly as old is not worth its bits.
+    const OLDEST: Duration = Duration::from_secs(60);
+    /// A depth that the vehicle told before so long says little of its depth now.
+    const DEPTH_LASTS: Duration = Duration::from_secs(60);
+
+    /// A relay that knows nothing yet.
+    pub fn new(config: RelayConfig) -> Self {
+        Self {
+            config,
+            plane: config.origin.map(TangentPlane::new),
+            gps: Gps::new(config.language),
+            compass: Gps::new(GpsLanguage::Nmea),
+            own: PlaneFilter::new(0.3),
+            own_at: None,
+            gps_outliers: 0,
+            vehicles: BTreeMap::new(),
+            faults: BTreeMap::new(),
+            fixes: 0,
+        }
+    }
+
+    /// The world frame, once it is known.
+    pub fn plane(&self) -> Option<&TangentPlane> {
+        self.plane.as_ref()
+    }
+
+    /// The receiver, for what it said.
+    pub fn gps(&self) -> &Gps {
+        &self.gps
+    }
+
+    /// Positions of the receiver that the filter did not believe.
+    pub fn gps_outliers(&self) -> u64 {
+        self.gps_outliers
+    }
+
+    /// Sightings that became no fix, by reason.
+    pub fn faults(&self) -> impl Iterator<Item = (RelayFault, u64)> + '_ {
+        self.faults.iter().map(|(&f, &n)| (f, n))
+    }
+
+    /// Fixes given so far.
+    pub fn fixes(&self) -> u64 {
+        self.fixes
+    }
+
+    /// Where the surface is in the world frame; nothing without a fresh GPS.
+    pub fn own(&self, at: Instant) -> Option<Estimate> {
+        let last = self.own_at?;
+        let is_fresh = at.since(last) < Self::GPS_LASTS;
+        is_fresh.then(|| self.own.predict(at.as_secs_f64())).flatten()
+    }
+
+    /// Where the surface's bow points, clockwise from true north, radians.
+    pub fn heading_rad(&self, now: Instant) -> Option<f64> {
+        self.compass.heading_rad(now).or_else(|| self.gps.heading_rad(now))
+    }
+
+    /// Where the head sees a vehicle, and its way east and north in m/s; nothing if it has not seen it for a minute.
+    pub fn vehicle(&self, vehicle: Address, now: Instant) -> Option<(Estimate, (f64, f64))> {
+        let seen = self.vehicles.get(&vehicle)?;
+        let is_fresh = now.since(seen.sighted?) < Self::OLDEST;
+        let estimate = seen.filter.predict(now.as_secs_f64()).filter(|_| is_fresh)?;
+        Some((estimate, seen.filter.velocity()?))
+    }
+
+    /// The connection to the GPS was opened: what to say to it.
+    pub fn handle_gps_open(&mut self) -> &'static [u8] {
+        self.gps.handle_open()
+    }
+
+    /// Bytes of the GPS.
+    pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
+        for fix in self.gps.handle_bytes(bytes, now) {
+            let plane = self.plane.get_or_insert_with(|| TangentPlane::new(fix.place));
+            let (x, y) = plane.to_plane(fix.place);
+            match self.own.update(&Estimate::round(x, y, fix.sigma_m), now.as_secs_f64()) {
+                Verdict::Outlier => self.gps_outliers += 1,
+                Verdict::Used | Verdict::BeganAnew => self.own_at = Some(now),
+            }
+        }
+    }
+
+    /// Bytes of a compass of its own.
+    pub fn handle_compass(&mut self, bytes: &[u8], now: Instant) {
+        self.compass.handle_bytes(bytes, now);
+    }
+
+    /// The vehicle said how deep it is.
+    pub fn handle_depth(&mut self, vehicle: Address, depth_m: f64, now: Instant) {
+        if depth_m.is_finite() {
+            self.seen(vehicle).depth = Some((depth_m, now));
+        }
+    }
+
+    fn seen(&mut self, vehicle: Address) -> &mut Seen {
+        let new = || Seen { filter: PlaneFilter::new(0.05), depth: None, sighted: None, fixed: None };
+        self.vehicles.entry(vehicle).or_insert_with(new)
+    }
+
+    /// The head saw a vehicle: the fix to send to it, if there is one now.
+    ///
+    /// It is the one measurement, not the filter's estimate: the vehicle filters too, with odometry that is better than
+    /// any guess from here.
+    pub fn handle_usbl(
+        &mut self,
+        vehicle: Address,
+        sighting: &UsblSighting,
+        now: Instant,
+    ) -> Result<Option<Fix>, RelayFault> {
+        let fix = self.fuse(vehicle, sighting, now);
+        match fix {
+            Err(fault) => *self.faults.entry(fault).or_default() += 1,
+            Ok(fix) => self.fixes += u64::from(fix.is_some()),
+        }
+        fix
+    }
+
+    fn fuse(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) -> Result<Option<Fix>, RelayFault> {
+        let age_s = if sighting.age_s.is_finite() { sighting.age_s.max(0.0) } else { f64::MAX };
+        if age_s > Self::OLDEST.as_secs_f64() {
+            return Err(RelayFault::TooOld);
+        }
+        let taken = now - Duration::from_secs_f64(age_s);
+        let own = self.own(now).ok_or(RelayFault::NoGps)?;
+        let (vx, vy) = self.own.velocity().unwrap_or_default();
+        let heading = self.heading_rad(now);
+        let mounting = self.config.mounting;
+        let seen = self.seen(vehicle);
+        let depth = seen.depth.filter(|(_, at)| now.since(*at) < Self::DEPTH_LASTS).map(|(d, _)| d);
+        let away = offset(sighting, &mounting, heading, depth).map_err(RelayFault::Usbl)?;
+        let [xx, xy, yy] = away.cov_m2;
+        let [own_xx, _, own_yy] = own.cov_m2;
+        let place = Estimate {
+            x_m: own.x_m - vx * age_s + away.x_m,
+            y_m: own.y_m - vy * age_s + away.y_m,
+            cov_m2: [xx + own_xx, xy, yy + own_yy],
+        };
+        if seen.filter.update(&place, taken.as_secs_f64()) == Verdict::Outlier {
+            return Err(RelayFault::Outlier);
+        }
+        seen.sighted = Some(now);
+        let is_due = seen.fixed.is_none_or(|at| now.since(at) + Duration::from_millis(100) >= self.config.period);
+        if place.sigma_m() > self.config.most_sigma_m {
+            return Err(RelayFault::TooVague);
+        }
+        if !is_due {
+            return Ok(None);
+        }
+        self.seen(vehicle).fixed = Some(now);
+        Ok(Some(Fix { x_m: place.x_m, y_m: place.y_m, sigma_m: place.sigma_m(), age_s }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use scenecast_core::nmea;
+
+    const ORIGIN: LatLon = LatLon { lat_deg: 29.5, lon_deg: 34.92 };
+
+    fn relay() -> Relay {
+        Relay::new(RelayConfig {
+            origin: Some(ORIGIN),
+            language: GpsLanguage::Nmea,
+            mounting: Mounting::default(),
+            most_sigma_m: 50.0,
+            period: Duration::from_secs(10),
+        })
+    }
+
+    fn vehicle() -> Address {
+        Address::vehicle(1).unwrap()
+    }
+
+    fn at(s: f64) -> Instant {
+        Instant::from_secs_f64(1000.0 + s)
+    }
+
+    /// A GPS that stays at `(x, y)` for as long as a receiver needs to be believed.
+    fn anchored(relay: &mut Relay, x: f64, y: f64, seconds: u32) {
+        let place = TangentPlane::new(ORIGIN).to_place(x, y);
+        for s in 0..seconds {
+            let body = format!("GPGGA,1200{s:02}.00,{},4,08,0.5,0,M,0,M,,", nmea::place_fields(place));
+            relay.handle_gps(nmea::line(&body).as_bytes(), at(f64::from(s)));
+        }
+    }
+
+    fn sighting(east: f64, north: f64, down: f64) -> UsblSighting {
+        UsblSighting {
+            range_m: (east * east + north * north + down * down).sqrt(),
+            bearing_rad: east.atan2(north),
+            elevation_rad: (-down).atan2(east.hypot(north)),
+            accuracy_m: 1.0,
+            age_s: 0.8,
+        }
+    }
+
+    #[test]
+    fn gps_and_usbl_give_a_fix_with_its_age_and_its_uncertainty() {
+        let mut relay = relay();
+        assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(0.0)), Err(RelayFault::NoGps));
+        anchored(&mut relay, 100.0, -50.0, 30);
+        let fix = relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(29.0)).unwrap().unwrap();
+        assert!((fix.x_m - 130.0).abs() < 0.5 && (fix.y_m + 10.0).abs() < 0.5, "{fix:?}");
+        assert!((1.0..2.0).contains(&fix.sigma_m) && fix.age_s == 0.8, "{fix:?}");
+        assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(30.0)), Ok(None), "one in 10 s");
+    }
+
+    #[test]
+    fn echoes_and_a_gps_that_is_gone_give_no_fix_and_are_counted() {
+        let mut relay = relay();
+        anchored(&mut relay, 0.0, 0.0, 30);
+        relay.handle_depth(vehicle(), 21.0, at(29.0));
+        for s in 0..10 {
+            let _ = relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(29.0 + f64::from(s) * 0.1));
+        }
+        let echo = sighting(-40.0, 30.0, 20.0);
+        assert_eq!(relay.handle_usbl(vehicle(), &echo, at(30.5)), Err(RelayFault::Outlier));
+        let from_above = sighting(30.0, 40.0, -20.0);
+        assert_eq!(relay.handle_usbl(vehicle(), &from_above, at(30.6)), Err(RelayFault::Usbl(UsblFault::Depth)));
+        let old = UsblSighting { age_s: 300.0, ..sighting(30.0, 40.0, 20.0) };
+        assert_eq!(relay.handle_usbl(vehicle(), &old, at(31.0)), Err(RelayFault::TooOld));
+        assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(60.0)), Err(RelayFault::NoGps));
+        let counted: Vec<_> = relay.faults().map(|(f, n)| (f.name(), n)).collect();
+        assert_eq!(counted, [("depth", 1), ("no_gps", 1), ("outlier", 1), ("too_old", 1)]);
+    }
+
+    proptest! {
+        #[test]
+        fn any_sighting_gives_a_finite_fix_or_a_fault(numbers: [f64; 5]) {
+            let mut relay = relay();
+            anchored(&mut relay, 0.0, 0.0, 5);
+            let [range_m, bearing_rad, elevation_rad, accuracy_m, age_s] = numbers;
+            let s = UsblSighting { range_m, bearing_rad, elevation_rad, accuracy_m, age_s };
+            if let Ok(Some(fix)) = relay.handle_usbl(vehicle(), &s, at(5.0)) {
+                prop_assert!(fix.x_m.is_finite() && fix.y_m.is_finite() && fix.sigma_m.is_finite());
+            }
+        }
+    }
+}

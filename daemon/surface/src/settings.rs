@@ -1,0 +1,238 @@
+//! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
+
+use scenecast_protocol::directive::{CellBand, Change, Figure, LifeLine, PlaneSet, PlannerKind, Settings};
+use scenecast_protocol::map::PlaneKind;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings as they are typed. What is left out or null stays as it is on the vehicle; 0, or an empty text, is as the
+/// vehicle is configured. Numbers have three significant digits.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SettingsOrder {
+    /// How it chooses its way: lawnmower, greedy, horizon.
+    pub planner: Option<String>,
+    /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
+    /// first where there is much to say. The cells of its model stay.
+    pub cells: Option<String>,
+    /// Planes that it tells beside the labels: none, or different ones of confidence, depth, curiosity with commas between.
+    pub planes: Option<String>,
+    /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
+    pub alpha: Option<f64>,
+    /// Prior weight of each word in a label, 1e-9 to 1e3.
+    pub beta: Option<f64>,
+    /// Weight of a new label, 1e-12 to 1e3.
+    pub gamma: Option<f64>,
+    /// Words resampled a second of mission time, 1 to 1e8.
+    pub refine_words_per_s: Option<f64>,
+    /// Camera frames a second that the scene model sees at most, 0.01 to 30.
+    pub frames_per_s: Option<f64>,
+}
+
+/// The planes of these names, with commas between.
+fn plane_set(names: &str) -> Option<PlaneSet> {
+    let names: Vec<&str> = if names == "none" { Vec::new() } else { names.split(',').map(str::trim).collect() };
+    let set = PlaneSet::of(|kind| names.contains(&kind.name()));
+    (set.kinds().count() == names.len()).then_some(set)
+}
+
+fn plane_names(set: PlaneSet) -> String {
+    let names: Vec<&str> = set.kinds().map(PlaneKind::name).collect();
+    if names.is_empty() { "none".to_owned() } else { names.join(",") }
+}
+
+impl SettingsOrder {
+    /// The slot's content.
+    pub fn read(&self) -> Result<Settings, String> {
+        let mut settings = Settings {
+            planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
+            cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
+            planes: choice(
+                "planes",
+                &self.planes,
+                plane_set,
+                "none, or different ones of confidence, depth, curiosity",
+            )?,
+            ..Settings::default()
+        };
+        let given = [self.alpha, self.beta, self.gamma, self.refine_words_per_s, self.frames_per_s];
+        let mut changes = [Change::Keep; 5];
+        for ((change, value), (name, _, range)) in changes.iter_mut().zip(given).zip(settings.figures()) {
+            *change = match value {
+                None => Change::Keep,
+                Some(0.0) => Change::Configured,
+                Some(value) => {
+                    let figure = Figure::new(value).filter(|figure| range.contains(&figure.value()));
+                    Change::To(figure.ok_or_else(|| {
+                        format!("{name} {value}: it takes {} to {}, or 0 as configured", range.start(), range.end())
+                    })?)
+                }
+            };
+        }
+        [settings.alpha, settings.beta, settings.gamma, settings.refine_words_per_s, settings.frames_per_s] = changes;
+        Ok(settings)
+    }
+}
+
+fn choice<T>(
+    what: &str,
+    name: &Option<String>,
+    find: impl Fn(&str) -> Option<T>,
+    allowed: &str,
+) -> Result<Change<T>, String> {
+    match name.as_deref() {
+        None => Ok(Change::Keep),
+        Some("") => Ok(Change::Configured),
+        Some(name) => {
+            let found = find(name).map(Change::To);
+            found.ok_or_else(|| format!("{what} {name:?}: it takes {allowed}, or \"\" as configured"))
+        }
+    }
+}
+
+impl From<&Settings> for SettingsOrder {
+    fn from(settings: &Settings) -> Self {
+        fn told<T, U>(change: Change<T>, configured: U, tell: impl FnOnce(T) -> U) -> Option<U> {
+            match change {
+                Change::Keep => None,
+                Change::Configured => Some(configured),
+                Change::To(value) => Some(tell(value)),
+            }
+        }
+        let text = |name: &str| name.to_owned();
+        let figure = |change| told(change, 0.0, Figure::value);
+        Self {
+            planner: told(settings.planner, String::new(), |p| text(p.name())),
+            cells: told(settings.cells, String::new(), |c| text(c.name())),
+            planes: told(settings.planes, String::new(), plane_names),
+            alpha: figure(settings.alpha),
+            beta: figure(settings.beta),
+            gamma: figure(settings.gamma),
+            refine_words_per_s: figure(settings.refine_words_per_s),
+            frames_per_s: figure(settings.frames_per_s),
+        }
+    }
+}
+
+/// The operator's papers about the settings of a vehicle. Each order that goes out holds all that this surface has asked for,
+/// so a newer one may take the place of one that the vehicle never heard.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SettingsDesk {
+    asked: Settings,
+    in_force: Settings,
+    /// An order was superseded of which nobody knows whether the vehicle follows it.
+    is_unsure: bool,
+}
+
+impl SettingsDesk {
+    /// All that this surface has asked for.
+    pub fn asked(&self) -> &Settings {
+        &self.asked
+    }
+
+    /// What the vehicle has said to follow, as far as this surface has ordered it; none while that is not known.
+    pub fn in_force(&self) -> Option<&Settings> {
+        (!self.is_unsure).then_some(&self.in_force)
+    }
+
+    /// What is to go out for an order: what was asked for before it included, but for what the vehicle has refused.
+    pub(super) fn next_order(&self, order: &Settings, last: Option<LifeLine>) -> Settings {
+        let base = if matches!(last, Some(LifeLine::Refused(_))) { &self.in_force } else { &self.asked };
+        base.then(order)
+    }
+
+    /// That has gone out, after an order that had come as far as `last`.
+    pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<LifeLine>) {
+        self.is_unsure |= matches!(last, Some(LifeLine::OnAir | LifeLine::Heard));
+        self.asked = settings;
+    }
+
+    /// The vehicle has decided about the last order.
+    pub(super) fn handle_settled(&mut self, life: LifeLine) {
+        if life == LifeLine::Applied {
+            (self.in_force, self.is_unsure) = (self.asked, false);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::directive::RefusalReason;
+
+    fn read(json: &str) -> Result<Settings, String> {
+        serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read()
+    }
+
+    #[test]
+    fn what_no_vehicle_could_obey_is_refused_where_it_is_typed() {
+        let refused = |json: &str| read(json).unwrap_err();
+        assert_eq!(refused(r#"{"alpha": 5000}"#), "alpha 5000: it takes 0.000000001 to 1000, or 0 as configured");
+        assert_eq!(refused(r#"{"gamma": -1}"#), "gamma -1: it takes 0.000000000001 to 1000, or 0 as configured");
+        assert_eq!(
+            refused(r#"{"frames_per_s": 0.001}"#),
+            "frames_per_s 0.001: it takes 0.01 to 30, or 0 as configured"
+        );
+        assert_eq!(
+            refused(r#"{"refine_words_per_s": 0.5}"#),
+            "refine_words_per_s 0.5: it takes 1 to 100000000, or 0 as configured"
+        );
+        assert_eq!(
+            refused(r#"{"cells": "huge"}"#),
+            "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
+        );
+        for planes in ["perplexity", "depth,depth", "depth,", "none,depth"] {
+            let said = refused(&format!(r#"{{"planes": "{planes}"}}"#));
+            assert!(said.contains("none, or different ones of confidence, depth, curiosity"), "{said}");
+        }
+        assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
+        assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));
+    }
+
+    #[test]
+    fn an_order_is_told_as_it_was_typed() {
+        let typed = r#"{"planner":"","cells":"coarse","planes":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
+        let order: SettingsOrder = serde_json::from_str(typed).unwrap();
+        assert_eq!(SettingsOrder::from(&order.read().unwrap()), order);
+        let planes = |names: &str| read(&format!(r#"{{"planes": "{names}"}}"#)).unwrap();
+        let told = |names: &str| SettingsOrder::from(&planes(names)).planes.unwrap();
+        assert_eq!(["none", "curiosity, depth"].map(told), ["none", "depth,curiosity"]);
+        assert_eq!(read("{}").unwrap(), Settings::default());
+    }
+
+    #[test]
+    fn what_is_allowed_is_what_the_configuration_allows() {
+        use scenecast_config::{Allowed, KEYS};
+        let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
+        for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().figures()) {
+            let key = KEYS.iter().find(|k| k.name == name).unwrap();
+            // 0 words a second is a configuration's way to have no refinement.
+            let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };
+            assert_eq!(key.allowed, Allowed::Range(low, *range.end()), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_is_in_force_is_what_the_vehicle_said_last() {
+        let order = |json: &str| read(json).unwrap();
+        let mut desk = SettingsDesk::default();
+        let send = |desk: &mut SettingsDesk, json: &str, last| {
+            let settings = desk.next_order(&order(json), last);
+            desk.handle_sent(settings, last);
+        };
+        send(&mut desk, r#"{"alpha": 0.5}"#, None);
+        assert_eq!(desk.in_force(), Some(&Settings::default()));
+        send(&mut desk, r#"{"gamma": 0.1}"#, Some(LifeLine::Queued));
+        desk.handle_settled(LifeLine::Applied);
+        assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
+        send(&mut desk, r#"{"planes": "confidence,depth"}"#, Some(LifeLine::Applied));
+        send(&mut desk, r#"{"beta": 1}"#, Some(LifeLine::Heard));
+        assert_eq!(desk.in_force(), None, "the vehicle may follow the planes already");
+        let refused = LifeLine::Refused(RefusalReason::OutOfRange);
+        desk.handle_settled(refused);
+        send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
+        assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
+        desk.handle_settled(LifeLine::Applied);
+        assert_eq!(desk.in_force(), Some(desk.asked()));
+    }
+}

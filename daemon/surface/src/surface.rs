@@ -1,0 +1,403 @@
+//! The surface's role: link and operator in one sans-IO whole.
+
+use super::desk::Desk;
+use super::orders::{FenceOrder, LimitsOrder};
+use super::position::{Relay, UsblSighting};
+use super::settings::SettingsOrder;
+use scenecast_core::UsblLine;
+use scenecast_core::label_picture;
+use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
+use scenecast_protocol::directive::{Budget, Constraints, Fix, LifeLine, Slot, SlotId, Utility};
+use scenecast_protocol::exemplar::Exemplar;
+use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
+use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::collections::{BTreeMap, VecDeque};
+
+/// What the surface tells its host.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SurfaceOutput {
+    /// The operator's map of a vehicle has changed.
+    MapChanged(Address),
+    /// A vehicle answered that nobody had known of.
+    VehicleFound(Address),
+    /// An image of a label is here.
+    ExemplarHere(Address, u8),
+    /// A slot is in force or was refused.
+    SlotSettled(Address, SlotId),
+    /// Anything else that the operator's page shows.
+    Changed(Address),
+}
+
+/// The surface.
+pub struct Surface {
+    pub(super) link: SurfaceLink,
+    pub(super) desks: BTreeMap<Address, Desk>,
+    outputs: VecDeque<SurfaceOutput>,
+    spend: SpendOrder,
+    /// Where the surface is and where it sees the vehicles, if it has a GPS.
+    relay: Option<Relay>,
+    tuning: TuningTable,
+}
+
+impl Surface {
+    /// A surface that speaks with these vehicles, by address and name.
+    pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
+        let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
+        let (tuning, spend) = (TuningTable::default(), SpendOrder::default());
+        Self { link, desks, outputs: VecDeque::new(), spend, relay: None, tuning }
+    }
+
+    /// Knows what settings of the scene model reach.
+    #[must_use]
+    pub fn with_tuning_table(self, tuning: TuningTable) -> Self {
+        Self { tuning, ..self }
+    }
+
+    /// Name for people of a vehicle that has none.
+    pub fn name_of(vehicle: Address) -> String {
+        format!("vehicle {}", vehicle.number())
+    }
+
+    /// The vehicles.
+    pub fn vehicles(&self) -> impl Iterator<Item = (Address, &Desk)> {
+        self.desks.iter().map(|(&a, d)| (a, d))
+    }
+
+    /// The operator's papers about a vehicle.
+    pub fn desk(&self, vehicle: Address) -> Option<&Desk> {
+        self.desks.get(&vehicle)
+    }
+
+    /// The link's view of a vehicle.
+    pub fn view(&self, vehicle: Address) -> Option<PeerView<'_>> {
+        self.link.vehicle(vehicle)
+    }
+
+    /// The operator's map of a vehicle.
+    pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
+        let whole = self.desks.get(&vehicle).and_then(|d| d.whole.as_ref());
+        whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+    }
+
+    /// Counts up whenever the operator's map of a vehicle or a plane of it changes.
+    pub fn map_version(&self, vehicle: Address) -> u64 {
+        let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
+        wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
+    }
+
+    /// Bits a second that the surface may use.
+    pub fn budget_bps(&self) -> u32 {
+        self.link.budget_bps()
+    }
+
+    /// Least shares of the classes in what the surface sends.
+    pub fn shares(&self) -> Shares {
+        self.link.shares()
+    }
+
+    /// Frames that no known vehicle has sent, or that could not be read.
+    pub fn strangers(&self) -> u64 {
+        self.link.strangers()
+    }
+
+    /// An earlier run may have sent until `now`: the budget counts as spent.
+    pub fn assume_budget_spent(&mut self, now: Instant) {
+        self.link.assume_budget_spent(now);
+    }
+
+    /// The next thing to tell the host.
+    pub fn poll_output(&mut self) -> Option<SurfaceOutput> {
+        self.outputs.pop_front()
+    }
+
+    /// Sends weights (-1..=1) of labels, of unseen cells and of perplexity. The error is one line for the operator.
+    pub fn set_utility(
+        &mut self,
+        vehicle: Address,
+        weights: &BTreeMap<u8, f64>,
+        (exploration, curiosity): (f64, f64),
+        now: Instant,
+    ) -> Result<u16, String> {
+        let known = self.labels(vehicle).ok_or("no such vehicle")?;
+        let hundredths = |what: &str, w: f64| {
+            let ok = w.is_finite() && (-1.0..=1.0).contains(&w);
+            ok.then_some((w * 100.0).round() as i8).ok_or(format!("{what} {w} is not within -1 to 1"))
+        };
+        let mut utility = Utility {
+            exploration: hundredths("exploration", exploration)?,
+            curiosity: hundredths("curiosity", curiosity)?,
+            ..Utility::default()
+        };
+        for (&label, &weight) in weights {
+            if !known.contains_key(&label) {
+                return Err(format!("label {label} is not on the map"));
+            }
+            let weight = hundredths(&format!("weight of label {label}:"), weight)?;
+            if weight != 0 {
+                utility.weights.insert(label, weight);
+            }
+        }
+        let desk = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?;
+        utility.epoch = desk.epoch;
+        desk.utility = utility.clone();
+        self.issue(vehicle, Slot::Utility(utility), now)
+    }
+
+    /// Tells a vehicle to stay, or to go on.
+    pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
+        self.set_order(vehicle, Constraints { hold, abort: false }, now)
+    }
+
+    /// Tells a vehicle to stay, to abort, or to go on.
+    pub fn set_order(&mut self, vehicle: Address, order: Constraints, now: Instant) -> Result<u16, String> {
+        self.issue(vehicle, Slot::Constraints(order), now)
+    }
+
+    /// Sends a fence, keep-outs and a return point in place of the last ones.
+    pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
+        let fence = order.read()?;
+        let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
+        Ok(version)
+    }
+
+    /// Sends limits in place of the last ones.
+    pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
+        let limits = order.read()?;
+        let version = self.issue(vehicle, Slot::Limits(limits), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
+        Ok(version)
+    }
+
+    /// Changes settings of a vehicle; what the order does not name stays as it is there.
+    pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
+        let order = order.read()?;
+        let last = self.life_of(vehicle, SlotId::Settings);
+        let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
+        let version = self.issue(vehicle, Slot::Settings(settings), now)?;
+        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
+        Ok(version)
+    }
+
+    /// Bits a second that are the map's of a vehicle's budget: its share of what the vehicle has said, or of ours before.
+    pub fn map_bits_per_s(&self, vehicle: Address) -> f64 {
+        let [_, _, _, map, _] = self.link.shares().0;
+        let said = self.link.vehicle(vehicle).and_then(|v| v.status().map(|(status, _)| status.budget_bps));
+        f64::from(said.unwrap_or(self.link.budget_bps())) * f64::from(map) / 100.0
+    }
+
+    /// The settings of the scene model that tell most of those whose stream takes at most `bits_per_s`.
+    pub fn fit(&self, cell_m: f64, bits_per_s: f64) -> Result<Fit, NoRow> {
+        self.tuning.fit(cell_m, bits_per_s)
+    }
+
+    /// How far the last order of a slot has come.
+    fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<LifeLine> {
+        self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.life)
+    }
+
+    /// What the vehicles spend left-over bits on, as it was configured or sent last.
+    pub fn spend(&self) -> SpendOrder {
+        self.spend
+    }
+
+    /// What the next budget that is sent says of left-over bits, unless it is given.
+    pub fn set_spend(&mut self, spend: SpendOrder) {
+        self.spend = spend;
+    }
+
+    /// Changes the bit budget of the surface and of every vehicle, and if they are given the least shares of the classes and
+    /// what left-over bits are spent on.
+    pub fn set_budget(
+        &mut self,
+        bits_per_s: u32,
+        shares: Option<Shares>,
+        spend: Option<SpendOrder>,
+        now: Instant,
+    ) -> Result<(), String> {
+        if !(10..=10_000_000).contains(&bits_per_s) {
+            return Err(format!("budget_bps {bits_per_s} is not within 10 to 10000000"));
+        }
+        let shares = shares.unwrap_or(self.link.shares());
+        if !shares.is_sound() {
+            let sum: u32 = shares.0.iter().map(|&s| u32::from(s)).sum();
+            return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
+        }
+        let vehicles: Vec<Address> = self.desks.keys().copied().collect();
+        let spend = spend.unwrap_or(self.spend);
+        let slot = Slot::Budget(Budget { bits_per_s, shares, spend });
+        vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
+        self.link.set_budget(bits_per_s, now);
+        self.link.set_shares(shares);
+        self.spend = spend;
+        Ok(())
+    }
+
+    /// Sends a position fix.
+    pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, String> {
+        self.issue(vehicle, Slot::Fix(fix), now)
+    }
+
+    /// Gives it a GPS.
+    pub fn set_relay(&mut self, relay: Relay) {
+        self.relay = Some(relay);
+    }
+
+    /// Where the surface is and where it sees the vehicles, if it has a GPS.
+    pub fn relay(&self) -> Option<&Relay> {
+        self.relay.as_ref()
+    }
+
+    /// The connection to the GPS was opened: what to say to it.
+    pub fn handle_gps_open(&mut self) -> &'static [u8] {
+        self.relay.as_mut().map_or(b"", |relay| relay.handle_gps_open())
+    }
+
+    /// Bytes of the GPS.
+    pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
+        self.relay.iter_mut().for_each(|relay| relay.handle_gps(bytes, now));
+    }
+
+    /// Bytes of a compass of its own.
+    pub fn handle_compass(&mut self, bytes: &[u8], now: Instant) {
+        self.relay.iter_mut().for_each(|relay| relay.handle_compass(bytes, now));
+    }
+
+    /// The USBL head saw a vehicle: if that gives a fix, the vehicle is sent it.
+    pub fn handle_usbl(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) {
+        let Some(relay) = &mut self.relay else { return };
+        if let Ok(Some(fix)) = relay.handle_usbl(vehicle, sighting, now) {
+            // A vehicle that the link does not know has no slot for it.
+            let _ = self.send_fix(vehicle, fix, now);
+        }
+    }
+
+    /// Where a vehicle says that it is, in the world's frame, metres.
+    pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
+        let view = self.link.vehicle(vehicle)?;
+        let (status, _) = view.status()?;
+        let at = (status.x_m, status.y_m);
+        Some(status.placement.map_or(at, |p| p.to_world(at)))
+    }
+
+    pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
+        let version = self.link.issue(vehicle, slot, now).map_err(|e| e.to_string())?;
+        self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        Ok(version)
+    }
+
+    /// Cells of each label on the operator's map.
+    pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
+        let mut cells = BTreeMap::new();
+        for (_, label) in self.map(vehicle)?.iter() {
+            *cells.entry(label).or_default() += 1;
+        }
+        Some(cells)
+    }
+
+    /// Takes received bytes.
+    pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
+        self.link.handle_frame(bytes, now);
+        while let Some(event) = self.link.poll_event() {
+            if let Some(output) = self.handle_event(event, now) {
+                self.outputs.push_back(output);
+            }
+        }
+        let link = &self.link;
+        let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.heard()) == Some(now);
+        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.hear(now));
+    }
+
+    fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
+        match event {
+            SurfaceEvent::VehicleFound(vehicle) => {
+                self.desks.entry(vehicle).or_insert_with(|| Desk::new(Self::name_of(vehicle)));
+                Some(SurfaceOutput::VehicleFound(vehicle))
+            }
+            SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
+            SurfaceEvent::VehicleRestarted(vehicle) => {
+                self.ask_again(vehicle, now);
+                Some(SurfaceOutput::MapChanged(vehicle))
+            }
+            SurfaceEvent::SlotSettled(vehicle, slot) => {
+                let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
+                let (life, version) = (settled.life, settled.version);
+                let desk = self.desks.get_mut(&vehicle)?;
+                if slot == SlotId::Settings {
+                    desk.settings.handle_settled(life);
+                }
+                if life == LifeLine::Applied {
+                    desk.handle_applied(slot, version);
+                }
+                self.handle_settled(vehicle, slot, now);
+                Some(SurfaceOutput::SlotSettled(vehicle, slot))
+            }
+            SurfaceEvent::Status(vehicle) => {
+                let (status, _) = self.link.vehicle(vehicle)?.status()?;
+                self.desks.get_mut(&vehicle)?.handle_status(status, now);
+                self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
+                Some(SurfaceOutput::Changed(vehicle))
+            }
+            SurfaceEvent::ObjectProgress { vehicle, head, held, total } => {
+                self.desks.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
+                Some(SurfaceOutput::Changed(vehicle))
+            }
+            SurfaceEvent::Object(vehicle, bytes) => {
+                let desk = self.desks.get_mut(&vehicle)?;
+                if let Some(whole) = label_picture::read_whole(&bytes) {
+                    desk.whole = Some(whole);
+                    desk.wholes += 1;
+                    return Some(SurfaceOutput::MapChanged(vehicle));
+                }
+                let exemplar = Exemplar::decode(&bytes)?;
+                let is_new = desk.handle_exemplar(&exemplar, now);
+                is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
+            }
+        }
+    }
+
+    /// The transmission that was handed out has left the modem.
+    pub fn handle_transmit_outcome(&mut self, now: Instant) {
+        self.link.handle_transmit_outcome(now);
+    }
+
+    /// The modem asks for so many frames.
+    pub fn handle_poll(&mut self, frames: u32) {
+        self.link.handle_poll(frames);
+    }
+
+    /// The cycle that the modem is to begin next.
+    pub fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
+        self.link.poll_cycle(now)
+    }
+
+    /// The modem itself put so many bits on air.
+    pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
+        self.link.handle_repeated(bits, now);
+    }
+
+    /// The modem's head has found a vehicle.
+    pub fn handle_range(&mut self, vehicle: Address, line: &UsblLine, now: Instant) {
+        if let Some(desk) = self.desks.get_mut(&vehicle) {
+            desk.found = Some((*line, now));
+            self.outputs.push_back(SurfaceOutput::Changed(vehicle));
+        }
+        if let (Some(range_m), Some((bearing_rad, elevation_rad))) = (line.range_m, line.direction_rad) {
+            let (accuracy_m, age_s) = (line.accuracy, line.age_s);
+            self.handle_usbl(vehicle, &UsblSighting { range_m, bearing_rad, elevation_rad, accuracy_m, age_s }, now);
+        }
+    }
+
+    /// The next frame to put on air.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        self.link.poll_transmit(now)
+    }
+
+    /// When to ask for the next frame.
+    pub fn poll_timeout(&self, now: Instant) -> Option<(Instant, Wakeup)> {
+        self.link.poll_timeout(now)
+    }
+}

@@ -1,0 +1,109 @@
+//! `scenecast map bench`
+
+use super::Coding;
+use super::change::{Sizes, encode, refused, sizes};
+use super::files::{numbered, read_map, same_size};
+use crate::progress::Progress;
+use clap::Args;
+use scenecast_core::UserError;
+use scenecast_protocol::map_codec::Plane;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Measure a folder of numbered maps, each coded against the one before and the first against nothing.
+///
+/// Every step is decoded again and compared. Beside it stand the best PNG files: the whole map each step, and the
+/// smaller of delta image and dirty box. They are deflated by zopfli, which takes nearly all of the time.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast map bench --series steps --frame-bytes 256")]
+pub struct Bench {
+    /// Folder of indexed PNG files of one size, in the order of the last number in their names
+    #[arg(long, value_name = "DIR")]
+    series: PathBuf,
+    #[command(flatten)]
+    coding: Coding,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Totals over a series.
+#[derive(Debug, Default, Serialize)]
+struct Totals {
+    steps: usize,
+    frame_bytes: u16,
+    #[serde(flatten)]
+    sizes: Sizes,
+    /// Our bytes against those of whole PNG files; none if those are none.
+    ratio_full: Option<f64>,
+    ratio_delta: Option<f64>,
+    /// Mean and longest time of a step, encoding and decoding together.
+    step_ms_mean: f64,
+    step_ms_max: f64,
+}
+
+impl Bench {
+    pub fn run(self) -> Result<(), UserError> {
+        let files = numbered(&self.series)?;
+        let mut totals = Totals { frame_bytes: self.coding.frame_bytes, ..Totals::default() };
+        totals.sizes.codec = self.coding.codec.to_string();
+        let mut progress = Progress::new("maps");
+        let mut before: Option<(&PathBuf, Plane)> = None;
+        for (done, path) in files.iter().enumerate() {
+            progress.show(done as f64 / files.len() as f64);
+            let map = read_map(path)?;
+            let base = match &before {
+                Some((base_path, base)) => {
+                    same_size((base_path, base), (path, &map))?;
+                    base.clone()
+                }
+                None => Plane::uniform(map.width, map.height, 0),
+            };
+            totals.add(&self.coding, &base, &map)?;
+            before = Some((path, map));
+        }
+        drop(progress);
+        totals.finish();
+        if self.json {
+            println!("{}", serde_json::to_string(&totals).map_err(|e| UserError::Failed(e.to_string()))?);
+        } else {
+            totals.print();
+        }
+        Ok(())
+    }
+}
+
+impl Totals {
+    fn add(&mut self, coding: &Coding, base: &Plane, target: &Plane) -> Result<(), UserError> {
+        let started = Instant::now();
+        let (file, cells_changed) = encode(coding, base, target)?;
+        let decoded = file.apply(Some(base)).map_err(refused)?;
+        let ms = started.elapsed().as_secs_f64() * 1000.0;
+        if decoded != *target {
+            return Err(UserError::Failed(format!("step {} does not decode to its map", self.steps + 1)));
+        }
+        self.steps += 1;
+        self.step_ms_mean += ms;
+        self.step_ms_max = self.step_ms_max.max(ms);
+        self.sizes.add(&sizes(coding, base, target, &file, cells_changed));
+        Ok(())
+    }
+
+    fn finish(&mut self) {
+        let ratio = |of: usize| (of > 0).then(|| self.sizes.bytes as f64 / of as f64);
+        (self.ratio_full, self.ratio_delta) = (ratio(self.sizes.png_full_bytes), ratio(self.sizes.png_delta_bytes));
+        self.step_ms_mean /= self.steps.max(1) as f64;
+    }
+
+    fn print(&self) {
+        let Sizes { bytes, frames, cells_changed, codec, png_full_bytes, png_delta_bytes } = &self.sizes;
+        let shown = |ratio: Option<f64>| ratio.map_or("-".to_owned(), |r| format!("{r:.3}"));
+        println!("{} steps, {cells_changed} cells changed, frames of {} bytes", self.steps, self.frame_bytes);
+        println!("{:<16} {:>10} {:>12}", "", "bytes", "ours to it");
+        println!("{:<16} {bytes:>10}  {frames} frames", format!("ours ({codec})"));
+        println!("{:<16} {png_full_bytes:>10} {:>12}", "best PNG, whole", shown(self.ratio_full));
+        println!("{:<16} {png_delta_bytes:>10} {:>12}", "best PNG, delta", shown(self.ratio_delta));
+        println!("a step is coded and read in {:.1} ms, at most {:.1} ms", self.step_ms_mean, self.step_ms_max);
+    }
+}

@@ -1,0 +1,76 @@
+//! What the chunks of one change take.
+
+use super::Coding;
+use super::zopfli_bytes::zopfli_bytes;
+use scenecast_core::UserError;
+use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, Plane};
+use serde::Serialize;
+
+/// Sizes of one change or of several.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Sizes {
+    /// Bytes of all chunks, their heads included.
+    pub(super) bytes: usize,
+    /// Frames that the chunks fill one after another, no chunk in two.
+    pub(super) frames: usize,
+    pub(super) cells_changed: usize,
+    pub(super) codec: String,
+    /// Bytes of the whole map as the best PNG.
+    pub(super) png_full_bytes: usize,
+    /// Bytes of the change as the best PNG: delta image or dirty box.
+    pub(super) png_delta_bytes: usize,
+}
+
+impl Sizes {
+    pub fn add(&mut self, other: &Self) {
+        self.bytes += other.bytes;
+        self.frames += other.frames;
+        self.cells_changed += other.cells_changed;
+        self.png_full_bytes += other.png_full_bytes;
+        self.png_delta_bytes += other.png_delta_bytes;
+    }
+}
+
+/// The chunks from `base` to `target`, and how many cells they change.
+pub fn encode(coding: &Coding, base: &Plane, target: &Plane) -> Result<(ChunkFile, usize), UserError> {
+    ChunkFile::encode(coding.codec, base, target, coding.frame_bytes.into()).map_err(refused)
+}
+
+/// Wrong input, for the files were read before.
+pub fn refused(error: ChunkFileError) -> UserError {
+    UserError::Input(error.to_string())
+}
+
+/// Sizes of an encoded change, beside those of the PNG files.
+pub fn sizes(coding: &Coding, base: &Plane, target: &Plane, file: &ChunkFile, cells_changed: usize) -> Sizes {
+    Sizes {
+        bytes: file.chunks.iter().map(Vec::len).sum(),
+        frames: frames(file.chunks.iter().map(Vec::len), coding.frame_bytes.into()),
+        cells_changed,
+        codec: coding.codec.to_string(),
+        png_full_bytes: target.smallest_png(&mut zopfli_bytes),
+        png_delta_bytes: target.smallest_delta_png(base, &mut zopfli_bytes),
+    }
+}
+
+fn frames(chunks: impl Iterator<Item = usize>, room: usize) -> usize {
+    let (mut frames, mut left) = (0, 0);
+    for chunk in chunks {
+        if chunk > left {
+            (frames, left) = (frames + 1, room);
+        }
+        left -= chunk.min(left);
+    }
+    frames
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chunks_share_a_frame_while_they_fit() {
+        assert_eq!(frames([60, 40, 1, 99, 100].into_iter(), 100), 3);
+        assert_eq!(frames([].into_iter(), 100), 0);
+    }
+}

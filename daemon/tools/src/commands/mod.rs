@@ -1,0 +1,11 @@
+//! The commands of offline work.
+
+mod map;
+mod scene;
+mod tune;
+mod vocabulary;
+
+pub use map::Map;
+pub use scene::Scene;
+pub use tune::Tune;
+pub use vocabulary::Vocabulary;

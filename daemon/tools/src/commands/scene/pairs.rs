@@ -1,0 +1,77 @@
+//! Images with their annotations beside them.
+
+use scenecast_core::UserError;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const SUFFIX: &str = "_label.png";
+const EXTENSIONS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
+
+/// An image and the classes of its pixels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pair {
+    pub(super) image: PathBuf,
+    pub(super) classes: PathBuf,
+}
+
+/// Every `NAME_label.png` of a folder with the image `NAME`, by name; one without an image or with two is refused.
+pub fn pairs(dir: &Path) -> Result<Vec<Pair>, UserError> {
+    let mut images: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    let mut labels: BTreeMap<String, PathBuf> = BTreeMap::new();
+    for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {
+        let path = entry.map_err(|e| UserError::file(dir, e))?.path();
+        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if let Some(name) = file.strip_suffix(SUFFIX) {
+            labels.insert(name.to_owned(), path);
+        } else if EXTENSIONS.contains(&extension.as_str()) {
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            images.entry(name).or_default().push(path);
+        }
+    }
+    if labels.is_empty() {
+        return Err(UserError::file(
+            dir,
+            "no NAME_label.png; each belongs to an image NAME.jpg, .png or .tif beside it",
+        ));
+    }
+    let pair = |(name, classes): (String, PathBuf)| match images.remove(&name).unwrap_or_default().as_slice() {
+        [image] => Ok(Pair { image: image.clone(), classes }),
+        [] => Err(UserError::file(&classes, format!("no image {name}.jpg, .png or .tif beside it"))),
+        [one, other, ..] => {
+            let (one, other) = (one.display(), other.display());
+            Err(UserError::file(&classes, format!("two images could be meant: {one} and {other}")))
+        }
+    };
+    labels.into_iter().map(pair).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str, files: &[&str]) -> PathBuf {
+        let dir = std::env::temp_dir().join(format!("scenecast-{}-pairs-{name}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&dir);
+        std::fs::create_dir_all(&dir).unwrap();
+        files.iter().for_each(|file| std::fs::write(dir.join(file), "").unwrap());
+        dir
+    }
+
+    #[test]
+    fn each_annotation_finds_its_image_whatever_its_kind() {
+        let files = ["b.TIF", "b_label.png", "a.jpg", "a_label.png", "alone.png", "legend.txt"];
+        let found = pairs(&folder("kinds", &files)).unwrap();
+        let names: Vec<String> =
+            found.iter().map(|pair| pair.image.file_name().unwrap().to_string_lossy().into_owned()).collect();
+        assert_eq!(names, ["a.jpg", "b.TIF"]);
+    }
+
+    #[test]
+    fn what_has_no_pair_or_two_is_named() {
+        let said = |name: &str, files: &[&str]| pairs(&folder(name, files)).unwrap_err().to_string();
+        assert!(said("none", &["a.jpg"]).contains("no NAME_label.png"));
+        assert!(said("orphan", &["a_label.png"]).contains("a_label.png: no image a.jpg"));
+        assert!(said("twice", &["a_label.png", "a.jpg", "a.png"]).contains("two images"));
+    }
+}

@@ -1,0 +1,318 @@
+//! `scenecast scene run`
+
+use crate::progress::Progress;
+use crate::scene::{
+    Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, Outcome, Schedule, Source, Tum, WordsFile, learn, quality,
+    read_vocabulary, write,
+};
+use clap::Args;
+use scene_model::topics::{Birth, SceneConfig, SceneModel};
+use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_core::UserError;
+use std::path::{Path, PathBuf};
+
+/// Label words, a mosaic or a sequence of images, and print what it took as one line of JSON.
+///
+/// Writes labels.png (indexed, pixel = label, 0 = nothing seen, x to the right, y up; where cells stack, the label with
+/// most words in the column) and labels.csv (every cell: its middle in metres, label, confidence, perplexity; of stacked
+/// cells the one that the picture shows comes last). Labels are
+/// numbered from 1 by age. The same seed gives the same labels whatever the number of threads.
+///
+/// "seconds" and "cpu_seconds" are wall and CPU time of resampling, "words_per_cpu_second" is resampled / cpu_seconds.
+/// "labels" are in use, "labels_used" show in labels.csv. Mutual information is that of labels and annotated classes cell by
+/// cell, its null that of the same labels displaced; without annotations they are null.
+#[derive(Debug, Args)]
+#[command(after_help = "Example: scenecast scene run --mosaic reef.jpg --annotations classes.png --out run1
+Example: scenecast scene run --words words.csv --cell-size 0.5 --refine-rate 100000 --out run2
+Example: scenecast scene run --source tum:rgbd_dataset_freiburg1_desk --cell-size 0.1 --out run3")]
+pub struct Run {
+    #[command(flatten)]
+    input: Input,
+    /// Classes. For a mosaic a grey or indexed image of its size, pixel = class; otherwise lines x,y,z,class. 255 does not
+    /// count
+    #[arg(long, value_name = "LABELS")]
+    annotations: Option<PathBuf>,
+    /// Further classes that do not count
+    #[arg(long, value_name = "CLASS,..", value_delimiter = ',', requires = "annotations")]
+    ignore: Vec<u8>,
+    /// Edge of a cell in metres, or three edges: x,y,z [default: 1 for words, 0.25 for tum, else 25 pixels]
+    #[arg(long, value_name = "M", value_parser = edges, allow_negative_numbers = true)]
+    cell_size: Option<Edges>,
+    #[command(flatten)]
+    parameters: Parameters,
+    /// Resample every word so many times, when everything was read
+    #[arg(long, value_name = "N", default_value_t = 30, conflicts_with = "refine_rate")]
+    sweeps: u32,
+    /// Instead: resample so many words a second of the input's time, while it is read in order of time
+    #[arg(long, value_name = "WORDS_PER_S", allow_negative_numbers = true)]
+    refine_rate: Option<f64>,
+    /// Sampling threads
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: u16,
+    /// Folder for labels.png and labels.csv
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Where words come from.
+#[derive(Debug, Args)]
+struct Input {
+    #[command(flatten)]
+    which: Which,
+    /// Size of a pixel on the ground, mosaic and frames [default: 0.01]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    metres_per_pixel: Option<f64>,
+    /// Vocabulary of scenecast vocabulary train, for images
+    #[arg(long, value_name = "FILE", conflicts_with = "words")]
+    vocabulary: Option<PathBuf>,
+    /// Number of different words in a words file [default: largest id + 1]
+    #[arg(long, value_name = "V", requires = "words", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    vocabulary_size: Option<u32>,
+    /// Camera of a tum source, pixels [default: 525,525,319.5,239.5 at a width of 640]
+    #[arg(long, value_name = "FX,FY,CX,CY", requires = "source")]
+    intrinsics: Option<Intrinsics>,
+    /// Depth units a metre of a tum source
+    #[arg(long, value_name = "N", default_value_t = 5000.0, allow_negative_numbers = true)]
+    depth_scale: f64,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct Which {
+    /// Words at places: lines t,x,y,z,w1,w2,... (seconds, metres, word ids)
+    #[arg(long, value_name = "FILE.csv")]
+    words: Option<PathBuf>,
+    /// Image of the ground; its top left corner is the origin
+    #[arg(long, value_name = "IMG")]
+    mosaic: Option<PathBuf>,
+    /// tum:DIR, an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt, or frames:DIR, images from above with
+    /// poses.csv
+    #[arg(long, value_name = "KIND:DIR")]
+    source: Option<String>,
+}
+
+/// Parameters of the model.
+#[derive(Debug, Args)]
+struct Parameters {
+    /// Prior count of each label in each cell
+    #[arg(long, default_value_t = 0.01, allow_negative_numbers = true)]
+    alpha: f64,
+    /// Prior count of each word under each label
+    #[arg(long, default_value_t = 0.1, allow_negative_numbers = true)]
+    beta: f64,
+    /// Weight of a new label
+    #[arg(long, default_value_t = 1e-4, allow_negative_numbers = true)]
+    gamma: f64,
+    /// Reading of gamma: literal (gamma), collapsed (gamma / V) or rost (alpha gamma / V)
+    #[arg(long, default_value = "literal", value_parser = ["literal", "collapsed", "rost"])]
+    birth: String,
+    /// Most labels at a time
+    #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=254))]
+    max_labels: u32,
+    /// Seed of every random choice
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// Edges of a cell in x, y, z; only one where all are equal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Edges {
+    x: f64,
+    y: f64,
+    z: Option<f64>,
+}
+
+fn edges(text: &str) -> Result<Edges, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|field| field.trim().parse().ok()).collect();
+    let numbers = numbers.filter(|all| all.iter().all(|edge| (1e-6..=1e6).contains(edge)));
+    match numbers.as_deref() {
+        Some(&[edge]) => Ok(Edges { x: edge, y: edge, z: None }),
+        Some(&[x, y, z]) => Ok(Edges { x, y, z: Some(z) }),
+        _ => Err("it takes metres from 0.000001 to 1000000, one number or three as in 0.5,0.5,1".to_owned()),
+    }
+}
+
+/// A source with all that goes with it.
+struct Opened {
+    source: Box<dyn Source>,
+    vocabulary: u32,
+    cell_m: [f64; 3],
+    /// Edge of a cell in pixels, for a mosaic.
+    cell_px: f32,
+    annotated: Option<Annotated>,
+}
+
+impl Run {
+    pub fn run(self) -> Result<(), UserError> {
+        if self.out.exists() && !self.out.is_dir() {
+            return Err(UserError::file(&self.out, "--out takes a folder, and this is a file"));
+        }
+        let schedule = self.schedule()?;
+        let Opened { mut source, vocabulary, cell_m, cell_px, annotated } = self.open(schedule)?;
+        let mut model = self.model(vocabulary, cell_m)?;
+        let mut progress = Progress::new("labels");
+        let effort = learn(&mut model, source.as_mut(), schedule, &mut |share| progress.show(share))?;
+        drop(progress);
+        let passed_over = source.skipped();
+        if model.words() == 0 {
+            let what = passed_over.unwrap_or_else(|| "the source gave none".to_owned());
+            return Err(UserError::Input(format!("there are no words to label: {what}")));
+        }
+        if let Some(what) = passed_over {
+            eprintln!("scenecast: {what}");
+        }
+        if effort.skipped.skipped_full > 0 {
+            eprintln!("scenecast: {} words of full cells passed over", effort.skipped.skipped_full);
+        }
+        let mut quality = annotated.map(|annotated| quality(&model, &annotated, cell_px)).transpose()?;
+        if quality.take_if(|quality| quality.mutual_information.n == 0).is_some() {
+            eprintln!("scenecast: no cell of the map is annotated, so there is nothing to compare with");
+        }
+        let outcome = Outcome::new(&model, &effort, quality.as_ref());
+        let line = serde_json::to_string(&outcome).map_err(|e| UserError::Failed(e.to_string()))?;
+        write(&model, &self.out)?;
+        println!("{line}");
+        Ok(())
+    }
+
+    fn schedule(&self) -> Result<Schedule, UserError> {
+        match self.refine_rate {
+            None => Ok(Schedule::Sweeps(self.sweeps)),
+            Some(_) if self.input.which.mosaic.is_some() => {
+                Err(UserError::Input("--refine-rate: a mosaic is seen at one time; use --sweeps".to_owned()))
+            }
+            Some(rate) if (0.0..=1e9).contains(&rate) => Ok(Schedule::Online(rate)),
+            Some(rate) => Err(UserError::Input(format!("--refine-rate {rate}: it takes 0 to 1e9 words a second"))),
+        }
+    }
+
+    fn open(&self, schedule: Schedule) -> Result<Opened, UserError> {
+        let Which { words, mosaic, source } = &self.input.which;
+        if let Some(path) = words {
+            return self.open_words(path, schedule);
+        }
+        if let Some(path) = mosaic {
+            return self.open_mosaic(path);
+        }
+        let (kind, dir) = source.as_deref().and_then(|text| text.split_once(':')).unwrap_or_default();
+        let extractor = self.extractor()?;
+        let vocabulary = extractor.vocabulary_size();
+        let dir = Path::new(dir);
+        let annotated = self.places()?;
+        let (source, cell_m): (Box<dyn Source>, _) = match kind {
+            "tum" => {
+                let scale = self.input.depth_scale;
+                if !(1.0..=1e6).contains(&scale) {
+                    return Err(UserError::Input(format!(
+                        "--depth-scale {scale}: it takes 1 to 1000000 units a metre"
+                    )));
+                }
+                let cell_m = self.cubes(0.25);
+                (Box::new(Tum::open(dir, extractor, self.input.intrinsics, scale, cell_m[0])?), cell_m)
+            }
+            "frames" => {
+                let metres_per_pixel = self.metres_per_pixel()?;
+                let cell_m = self.columns(CELL_PX * metres_per_pixel);
+                (Box::new(Frames::open(dir, extractor, metres_per_pixel, cell_m[0])?), cell_m)
+            }
+            _ => return Err(UserError::Input("--source: it takes tum:DIR or frames:DIR".to_owned())),
+        };
+        Ok(Opened { source, vocabulary, cell_m, cell_px: 1.0, annotated })
+    }
+
+    fn open_words(&self, path: &Path, schedule: Schedule) -> Result<Opened, UserError> {
+        let cell_m = self.cubes(1.0);
+        let annotated = self.places()?;
+        let in_time = matches!(schedule, Schedule::Online(_));
+        let file = WordsFile::open(path, self.input.vocabulary_size, cell_m, in_time)?;
+        Ok(Opened { vocabulary: file.vocabulary, source: Box::new(file), cell_m, cell_px: 1.0, annotated })
+    }
+
+    fn open_mosaic(&self, path: &Path) -> Result<Opened, UserError> {
+        let metres_per_pixel = self.metres_per_pixel()?;
+        let cell_m = self.columns(CELL_PX * metres_per_pixel);
+        if cell_m[0] != cell_m[1] {
+            return Err(UserError::Input("--cell-size: cells of a mosaic are square".to_owned()));
+        }
+        let mut extractor = self.extractor()?;
+        let mosaic = Mosaic::open(path, &mut extractor, metres_per_pixel, cell_m[0])?;
+        let read = |labels: &PathBuf| Annotated::of_mosaic(labels, mosaic.size, &self.ignore);
+        let annotated = self.annotations.as_ref().map(read).transpose()?;
+        let (vocabulary, cell_px) = (extractor.vocabulary_size(), mosaic.cell_px);
+        Ok(Opened { source: Box::new(mosaic), vocabulary, cell_m, cell_px, annotated })
+    }
+
+    fn places(&self) -> Result<Option<Annotated>, UserError> {
+        self.annotations.as_ref().map(|path| Annotated::of_places(path, &self.ignore)).transpose()
+    }
+
+    fn extractor(&self) -> Result<WordExtractor, UserError> {
+        match &self.input.vocabulary {
+            Some(path) => Ok(WordExtractor::from_measures(read_vocabulary(path)?)),
+            None => Ok(WordExtractor::new(&WordConfig::default())),
+        }
+    }
+
+    fn metres_per_pixel(&self) -> Result<f64, UserError> {
+        let metres = self.input.metres_per_pixel.unwrap_or(0.01);
+        if (1e-6..=1e3).contains(&metres) {
+            return Ok(metres);
+        }
+        Err(UserError::Input(format!("--metres-per-pixel {metres}: it takes metres from 0.000001 to 1000")))
+    }
+
+    /// Cells of a world with height.
+    fn cubes(&self, usual: f64) -> [f64; 3] {
+        let edges = self.cell_size.unwrap_or(Edges { x: usual, y: usual, z: None });
+        [edges.x, edges.y, edges.z.unwrap_or(edges.x)]
+    }
+
+    /// Cells of a flat world.
+    fn columns(&self, usual: f64) -> [f64; 3] {
+        let edges = self.cell_size.unwrap_or(Edges { x: usual, y: usual, z: None });
+        [edges.x, edges.y, edges.z.unwrap_or(FLAT_M)]
+    }
+
+    fn model(&self, vocabulary: u32, cell_m: [f64; 3]) -> Result<SceneModel, UserError> {
+        let birth = match self.parameters.birth.as_str() {
+            "collapsed" => Birth::Collapsed,
+            "rost" => Birth::Rost,
+            _ => Birth::Literal,
+        };
+        let Parameters { alpha, beta, gamma, max_labels, seed, .. } = self.parameters;
+        let max_words_per_cell = u32::from(u16::MAX);
+        let usual = if self.input.which.words.is_some() { SceneConfig::default() } else { SceneConfig::for_images() };
+        let config = SceneConfig {
+            cell_m,
+            alpha,
+            beta,
+            gamma,
+            birth,
+            max_labels,
+            vocabulary,
+            max_words_per_cell,
+            seed,
+            ..usual
+        };
+        let flag = |key: &str| format!("--{}", key.replace('_', "-"));
+        let refused =
+            |e: scene_model::topics::ConfigError| format!("{} {}: allowed is {}", flag(e.key), e.value, e.allowed);
+        let mut model = SceneModel::new(config).map_err(|e| UserError::Input(refused(e)))?;
+        model.use_threads(usize::from(self.threads));
+        Ok(model)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_has_one_edge_or_three() {
+        assert_eq!(edges("0.5"), Ok(Edges { x: 0.5, y: 0.5, z: None }));
+        assert_eq!(edges("1, 2,3"), Ok(Edges { x: 1.0, y: 2.0, z: Some(3.0) }));
+        for wrong in ["", "0", "-1", "nan", "1,2", "1,2,3,4", "inf"] {
+            assert!(edges(wrong).is_err(), "{wrong}");
+        }
+    }
+}

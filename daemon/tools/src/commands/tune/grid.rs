@@ -1,0 +1,200 @@
+//! The settings that are tried.
+
+use scenecast_config::Config;
+use scenecast_config::cell_m;
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::Setting;
+use scenecast_protocol::directive::CellBand;
+use serde::Deserialize;
+use std::path::Path;
+
+/// The values of each parameter.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Grid {
+    alpha: Vec<f64>,
+    beta: Vec<f64>,
+    gamma: Vec<f64>,
+    /// These empty: that of the configuration.
+    cell_m: Vec<f64>,
+    refine_words_per_s: Vec<f64>,
+    frames_per_s: Vec<f64>,
+    cells: Vec<String>,
+}
+
+impl Default for Grid {
+    /// The grid of the paper (ICRA 2019, section V.A).
+    fn default() -> Self {
+        Self {
+            alpha: vec![1.0, 0.1, 0.01, 0.001],
+            beta: vec![10.0, 1.0, 0.1],
+            gamma: vec![1e-3, 1e-4, 1e-5],
+            cell_m: Vec::new(),
+            refine_words_per_s: Vec::new(),
+            frames_per_s: Vec::new(),
+            cells: Vec::new(),
+        }
+    }
+}
+
+/// Most settings of a grid.
+const MOST: usize = 100_000;
+
+impl Grid {
+    /// The grid in a file, or the paper's; what it does not name is as configured.
+    pub fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
+        let mut grid = match path {
+            None => Self::default(),
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
+                Self::read(&text).map_err(|what| UserError::Input(format!("{}{what}", path.display())))?
+            }
+        };
+        let every_frame = config.camera.rate_hz;
+        let frames_per_s = if config.scene.frames_per_s > 0.0 { config.scene.frames_per_s } else { every_frame };
+        let configured = [
+            (&mut grid.cell_m, cell_m(config)),
+            (&mut grid.refine_words_per_s, f64::from(config.scene.refine_words_per_s)),
+            (&mut grid.frames_per_s, frames_per_s),
+        ];
+        for (values, value) in configured {
+            if values.is_empty() {
+                values.push(value);
+            }
+        }
+        if grid.cells.is_empty() {
+            grid.cells.push(config.map.cells.clone());
+        }
+        Ok(grid)
+    }
+
+    fn read(text: &str) -> Result<Self, String> {
+        let mut grid: Self = toml::from_str(text).map_err(|e: toml::de::Error| {
+            let line =
+                e.span().and_then(|span| text.get(..span.start)).map_or(1, |before| before.matches('\n').count() + 1);
+            format!(
+                ":{line}: {} (it takes lists alpha, beta, gamma, cell_m, refine_words_per_s, frames_per_s, cells)",
+                e.message()
+            )
+        })?;
+        let ranges = [
+            ("alpha", &grid.alpha, 1e-9, 1e3),
+            ("beta", &grid.beta, 1e-9, 1e3),
+            ("gamma", &grid.gamma, 1e-12, 1e3),
+            ("cell_m", &grid.cell_m, 1e-6, 1e3),
+            ("refine_words_per_s", &grid.refine_words_per_s, 0.0, 1e8),
+            ("frames_per_s", &grid.frames_per_s, 0.01, 30.0),
+        ];
+        for (name, values, low, high) in ranges {
+            if values.is_empty() && ["alpha", "beta", "gamma"].contains(&name) {
+                return Err(format!(": {name} is empty; it takes one number at least"));
+            }
+            if let Some(value) = values.iter().find(|value| !(low..=high).contains(*value)) {
+                return Err(format!(": {name} has {value}; it takes numbers from {low} to {high}"));
+            }
+        }
+        if let Some(name) = grid.cells.iter().find(|name| band(name).is_none()) {
+            return Err(format!(": cells has {name:?}; it takes fine and coarse"));
+        }
+        let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len()]);
+        let count = count.map(|n| n.max(1)).fold(1usize, usize::saturating_mul);
+        if count > MOST {
+            return Err(format!(": {count} settings; at most {MOST} are allowed"));
+        }
+        grid.drop_repeats();
+        Ok(grid)
+    }
+
+    fn drop_repeats(&mut self) {
+        fn each_once<T: PartialEq + Clone>(values: &mut Vec<T>) {
+            let all = std::mem::take(values);
+            all.into_iter().for_each(|value| {
+                if !values.contains(&value) {
+                    values.push(value);
+                }
+            });
+        }
+        let numbers = [&mut self.alpha, &mut self.beta, &mut self.gamma, &mut self.cell_m];
+        numbers.into_iter().chain([&mut self.refine_words_per_s, &mut self.frames_per_s]).for_each(each_once);
+        each_once(&mut self.cells);
+    }
+
+    /// All settings, those with the same cells one after another, none twice.
+    pub fn settings(&self) -> Vec<Setting> {
+        let mut settings = Vec::new();
+        for &cell_m in &self.cell_m {
+            for &alpha in &self.alpha {
+                for &beta in &self.beta {
+                    for &gamma in &self.gamma {
+                        let priors = Setting { alpha, beta, gamma, cell_m, ..self.first() };
+                        self.at_each_pace(priors, &mut settings);
+                    }
+                }
+            }
+        }
+        settings
+    }
+
+    /// The first value of each list that need not be named.
+    fn first(&self) -> Setting {
+        let of = |values: &[f64]| values.first().copied().unwrap_or_default();
+        Setting {
+            cell_m: of(&self.cell_m),
+            alpha: 0.0,
+            beta: 0.0,
+            gamma: 0.0,
+            refine_words_per_s: of(&self.refine_words_per_s),
+            frames_per_s: of(&self.frames_per_s),
+            cells: self.cells.first().and_then(|name| band(name)).unwrap_or(CellBand::Fine),
+        }
+    }
+
+    fn at_each_pace(&self, priors: Setting, settings: &mut Vec<Setting>) {
+        for &refine_words_per_s in &self.refine_words_per_s {
+            for &frames_per_s in &self.frames_per_s {
+                let bands = self.cells.iter().filter_map(|name| band(name));
+                settings.extend(bands.map(|cells| Setting { refine_words_per_s, frames_per_s, cells, ..priors }));
+            }
+        }
+    }
+}
+
+/// The bands of cells that a setting may have; coarse to fine ends with every cell told, as fine does.
+fn band(name: &str) -> Option<CellBand> {
+    CellBand::from_name(name).filter(|&band| band != CellBand::CoarseToFine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_file_it_is_the_grid_of_the_paper() {
+        let settings = Grid::load(None, &Config::default()).unwrap().settings();
+        assert_eq!(settings.len(), 36);
+        let first = settings[0];
+        assert_eq!((first.cell_m, first.alpha, first.beta, first.gamma), (0.25, 1.0, 10.0, 1e-3));
+        assert_eq!((first.refine_words_per_s, first.frames_per_s, first.cells), (5e4, 0.5, CellBand::Fine));
+        assert_eq!(settings[35], Setting { alpha: 0.001, beta: 0.1, gamma: 1e-5, ..first });
+    }
+
+    #[test]
+    fn a_file_gives_what_it_names_and_no_setting_twice() {
+        let path = std::env::temp_dir().join(format!("scenecast-{}-grid.toml", std::process::id()));
+        let text = "alpha = [1, 0.5, 1]\ncell_m = [0.1, 0.2]\nframes_per_s = [0.5, 0.1]\ncells = ['fine', 'coarse']\n";
+        std::fs::write(&path, text).unwrap();
+        let settings = Grid::load(Some(&path), &Config::default()).unwrap().settings();
+        assert_eq!(settings.len(), 2 * 2 * 3 * 3 * 2 * 2);
+        assert!(settings.is_sorted_by_key(|s| s.cell_m));
+    }
+
+    #[test]
+    fn a_wrong_file_is_answered_with_line_and_range() {
+        assert!(Grid::read("alpha = [1]\nbta = [1]").unwrap_err().starts_with(":2: unknown field `bta`"));
+        assert!(Grid::read("beta = [0]").unwrap_err().contains("beta has 0; it takes numbers from"));
+        assert!(Grid::read("cells = ['huge']").unwrap_err().contains("it takes fine and coarse"));
+        assert!(Grid::read("frames_per_s = [31]").unwrap_err().contains("it takes numbers from 0.01 to 30"));
+        assert!(Grid::read("gamma = []").unwrap_err().contains("gamma is empty"));
+        assert!(Grid::read("alpha = [nan]").is_err() && Grid::read("alpha = 3").is_err());
+    }
+}

@@ -1,0 +1,102 @@
+//! What a setting reaches and what its map takes.
+
+use super::survey::Survey;
+use scene_model::publish::LabelBook;
+use scene_model::score::{LabelGrid, score};
+use scene_model::topics::{FlatCell, SceneModel};
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::{Measurement, Setting};
+use scenecast_protocol::directive::CellBand;
+use scenecast_protocol::map::{self, Cell};
+use scenecast_protocol::map_codec::{Codec, Stride, encode_all};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Flies the survey with a setting, then sweeps over all words.
+pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, UserError> {
+    let config = survey.config;
+    let codec: Codec = config.map.codec.parse().map_err(|_| UserError::Input("map.codec is unknown".to_owned()))?;
+    let room = config.link.frame_bytes as usize;
+    let bytes = |base: &map::LabelGrid, target: &map::LabelGrid| {
+        let chunks = encode_all(codec, base, target, room);
+        let chunks = chunks.ok_or_else(|| UserError::Input(format!("link.frame_bytes = {room} holds no cell")))?;
+        Ok::<usize, UserError>(chunks.iter().map(|chunk| chunk.bytes.len()).sum())
+    };
+    let mut model = SceneModel::new(survey.scene(setting, seed)).map_err(|e| UserError::Input(format!("scene.{e}")))?;
+    let (mut book, mut sent, mut streamed) = (LabelBook::new(0), map::LabelGrid::default(), 0);
+    let is_coarse = setting.cells == CellBand::Coarse;
+    let interval = |index: usize| (index as f64 * survey.step_s * setting.frames_per_s + 1e-6).floor();
+    let (mut last, mut refined) = (None, 0);
+    // A label has its id when it has lasted for two maps, so the last map is told once more after the last frame.
+    for (index, seen) in survey.frames().map(Some).chain([None]).enumerate() {
+        if let Some(seen) = seen {
+            // As at sea: of each interval of the frame rate the first frame is seen, and no refinement is lost.
+            if last.is_some_and(|last| interval(last) == interval(index)) {
+                continue;
+            }
+            last = Some(index);
+            model.insert(index as f64 * survey.step_s, &seen);
+            let words = (setting.refine_words_per_s * survey.step_s * (index + 1) as f64) as u64;
+            model.refine(words - refined);
+            refined = words;
+        }
+        let epoch = book.epoch();
+        let published = book.publish(&model.label_map());
+        if book.epoch() != epoch {
+            sent = map::LabelGrid::default();
+        }
+        let target = told(published.iter().map(|cell| (Cell::new(cell.x, cell.y), cell.label)), is_coarse);
+        streamed += bytes(&sent, &target)?;
+        sent = target;
+    }
+    model.sweep(sweeps);
+    let map = model.label_map();
+    let cells = if is_coarse { blocks(&map) } else { map.clone() };
+    let (columns, rows) = survey.annotations.size();
+    let labels = LabelGrid::from_map(&cells, 0, -1, columns, rows);
+    let scored = score(&labels, &survey.annotations);
+    Ok(Measurement {
+        mutual_information_nats: scored.mutual_information.nats,
+        normalised_mutual_information: scored.mutual_information.normalised,
+        null_mutual_information_nats: scored.null_nats,
+        mosaic_mutual_information_nats: score(&labels, &survey.colours).mutual_information.nats,
+        labels: scored.labels,
+        map_bytes: bytes(&map::LabelGrid::default(), &told(numbered(&map), is_coarse))?,
+        stream_bps: streamed as f64 * 8.0 / survey.duration_s(),
+    })
+}
+
+/// The cells that are told. The lattice of the coarse ones is told as a map of its own: its chunks see nothing else.
+fn told(cells: impl Iterator<Item = (Cell, u8)>, is_coarse: bool) -> map::LabelGrid {
+    let stride = if is_coarse { Stride::Four } else { Stride::One };
+    cells.filter_map(|(cell, label)| Some((stride.on_lattice(cell)?, label))).collect()
+}
+
+/// What an operator sees of coarse cells: each stands for the block of which it is the south-west corner.
+fn blocks(map: &[FlatCell]) -> Vec<FlatCell> {
+    let side = Stride::Four.cells();
+    let corners: BTreeMap<(i32, i32), FlatCell> = map.iter().map(|cell| ((cell.x, cell.y), *cell)).collect();
+    let corner = |cell: &FlatCell| corners.get(&(cell.x.div_euclid(side) * side, cell.y.div_euclid(side) * side));
+    map.iter().filter_map(|cell| Some(FlatCell { topic: corner(cell)?.topic, ..*cell })).collect()
+}
+
+/// The mean of the figures of several sites.
+pub fn mean(of: &[Measurement]) -> Measurement {
+    let n = of.len().max(1) as f64;
+    let mean = |figure: fn(&Measurement) -> f64| of.iter().map(figure).sum::<f64>() / n;
+    Measurement {
+        mutual_information_nats: mean(|m| m.mutual_information_nats),
+        normalised_mutual_information: mean(|m| m.normalised_mutual_information),
+        null_mutual_information_nats: mean(|m| m.null_mutual_information_nats),
+        mosaic_mutual_information_nats: mean(|m| m.mosaic_mutual_information_nats),
+        labels: mean(|m| m.labels as f64).round() as usize,
+        map_bytes: mean(|m| m.map_bytes as f64).round() as usize,
+        stream_bps: mean(|m| m.stream_bps),
+    }
+}
+
+/// The map with labels from 1 on, oldest topic first.
+fn numbered(cells: &[FlatCell]) -> impl Iterator<Item = (Cell, u8)> {
+    let topics: Vec<_> = cells.iter().map(|cell| cell.topic).collect::<BTreeSet<_>>().into_iter().collect();
+    let label = move |cell: &FlatCell| topics.binary_search(&cell.topic).map_or(0, |index| (index + 1).min(254) as u8);
+    cells.iter().map(move |cell| (Cell::new(cell.x, cell.y), label(cell)))
+}

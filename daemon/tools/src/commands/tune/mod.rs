@@ -1,0 +1,198 @@
+//! `scenecast tune`
+
+mod best;
+mod grid;
+mod measure;
+mod picture;
+mod survey;
+
+use crate::progress::Progress;
+use clap::Args;
+use grid::Grid;
+use measure::{mean, measure};
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::{Measurement, Row, Setting, TuningTable, least, most};
+use scenecast_files::write_whole;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use survey::{Site, Survey};
+
+/// Search the settings of the scene model whose labels tell most about annotations of a similar site.
+///
+/// Each setting flies a virtual survey over the mosaic: the camera crosses it line by line, the scene model refines as
+/// at sea, and every change of the map is coded as the stream does (map chunks alone, nothing lost). Then the model
+/// sweeps over all words and the map is compared with the annotations. A run that was interrupted goes on where it was.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
+         scenecast tune --procedural 1,2,3 --grid grid.toml --out tuning"
+)]
+pub struct Tune {
+    /// Image of the sea floor
+    #[arg(long, value_name = "IMG", requires = "annotations", required_unless_present = "procedural")]
+    mosaic: Option<PathBuf>,
+    /// Size of the image's pixels on the sea floor [default: camera.metres_per_pixel]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    metres_per_pixel: Option<f64>,
+    /// Classes of the image's pixels: a grey or indexed image of the same size
+    #[arg(long, value_name = "LABELS", requires = "mosaic")]
+    annotations: Option<PathBuf>,
+    /// Instead of an image: sea floors drawn from these seeds; the figures are their means
+    #[arg(long, value_name = "SEEDS", value_delimiter = ',', conflicts_with_all = ["mosaic", "annotations"])]
+    procedural: Vec<u64>,
+    /// Classes that do not count
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
+    ignore: Vec<u8>,
+    /// TOML file with lists alpha, beta, gamma, cell_m (metres), refine_words_per_s, frames_per_s and cells ("fine", "coarse"), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4, 1e-5; the rest as configured]
+    #[arg(long, value_name = "FILE")]
+    grid: Option<PathBuf>,
+    /// Most bits a second that the stream of the best setting may take [default: link.budget_bps]
+    #[arg(long, value_name = "BPS", allow_negative_numbers = true)]
+    budget: Option<f64>,
+    /// Sweeps over all words after the survey
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(0..=10_000))]
+    sweeps: u32,
+    /// Seed of the scene model
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Settings measured side by side [default: one a core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Configuration file
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Set a key of the configuration, as in scene.max_labels=32 (scenecast config lists them)
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    sets: Vec<String>,
+    /// Folder for tuning.csv, tuning.svg, tuning.png and best.toml
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl Tune {
+    pub fn run(self) -> Result<(), UserError> {
+        let config = self.config()?;
+        let budget_bps = self.budget.unwrap_or(f64::from(config.link.budget_bps));
+        if !(budget_bps > 0.0 && budget_bps.is_finite()) {
+            return Err(UserError::Input(format!("--budget {budget_bps}: it takes bits a second, above 0")));
+        }
+        let grid = Grid::load(self.grid.as_deref(), &config)?;
+        let sites = self.sites(&config)?;
+        std::fs::create_dir_all(&self.out).map_err(|e| UserError::file(&self.out, e))?;
+        let inputs = Site::fingerprint(&sites, &format!("{} sweeps, seed {}", self.sweeps, self.seed));
+        let path = self.out.join("tuning.csv");
+        let mut table = Growing { table: open(&path, &inputs)?, path, inputs };
+        let settings = grid.settings();
+        let left: Vec<Setting> = settings.iter().copied().filter(|setting| !table.table.has(setting)).collect();
+        if left.len() < settings.len() {
+            eprintln!("tune: {} of {} settings are in tuning.csv already", settings.len() - left.len(), settings.len());
+        }
+        self.search(&sites, &left, &mut table)?;
+        let rows: Vec<Row> = table.table.rows().copied().collect();
+        self.conclude(&config, &rows, budget_bps)
+    }
+
+    fn config(&self) -> Result<Config, UserError> {
+        let mut sets = self.sets.clone();
+        sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
+        scenecast_config::load(self.config.as_deref(), &sets)
+    }
+
+    fn sites<'a>(&'a self, config: &'a Config) -> Result<Vec<Site<'a>>, UserError> {
+        match (&self.mosaic, &self.annotations) {
+            (Some(mosaic), Some(annotations)) => Ok(vec![Site::load(mosaic, annotations, &self.ignore, config)?]),
+            _ => Ok(self.procedural.iter().map(|&seed| Site::procedural(seed, config)).collect()),
+        }
+    }
+
+    /// Measures settings, those with one size of cells after another, each written down as soon as it is known.
+    fn search(&self, sites: &[Site<'_>], settings: &[Setting], table: &mut Growing) -> Result<(), UserError> {
+        let progress = Mutex::new((Progress::new("settings"), 0));
+        let table = Mutex::new(table);
+        for same_cells in settings.chunk_by(|a, b| a.cell_m == b.cell_m) {
+            let surveys = sites.iter().map(|site| Survey::new(site, same_cells[0].cell_m));
+            let surveys: Vec<Survey<'_>> = surveys.collect::<Result<_, _>>()?;
+            let next = AtomicUsize::new(0);
+            let work = || -> Result<(), UserError> {
+                while let Some(setting) = same_cells.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let measured = surveys.iter().map(|survey| measure(survey, setting, self.sweeps, self.seed));
+                    let measurement = mean(&measured.collect::<Result<Vec<_>, _>>()?);
+                    table.lock().unwrap_or_else(PoisonError::into_inner).add(*setting, measurement)?;
+                    let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
+                    progress.1 += 1;
+                    let share = f64::from(progress.1) / settings.len() as f64;
+                    progress.0.show(share);
+                }
+                Ok(())
+            };
+            let threads = self.threads.map(usize::from);
+            let threads = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+            let failed = |_| UserError::Failed("a measuring thread ended early".to_owned());
+            std::thread::scope(|scope| {
+                let threads: Vec<_> = (0..threads.min(same_cells.len())).map(|_| scope.spawn(work)).collect();
+                threads.into_iter().try_for_each(|thread| thread.join().map_err(failed)?)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), UserError> {
+        let best = most(rows.iter().filter(|row| row.measurement.stream_bps <= budget_bps));
+        let figure = picture::Figure::new(rows, best);
+        write_whole(&self.out.join("tuning.svg"), figure.svg().as_bytes())?;
+        write_whole(&self.out.join("tuning.png"), &figure.png()?)?;
+        let path = self.out.join("best.toml");
+        let Some(best) = best else {
+            // One of an earlier run would pass for the answer.
+            match std::fs::remove_file(&path) {
+                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(UserError::file(&path, e)),
+                _ => {}
+            }
+            let least = least(rows.iter()).map_or(f64::INFINITY, |row| row.measurement.stream_bps);
+            let what = format!("the stream of no setting fits --budget {budget_bps} bit/s: the least is {least:.0}");
+            return Err(UserError::Failed(what));
+        };
+        write_whole(&path, best::toml(best, config, budget_bps).as_bytes())?;
+        let Measurement { mutual_information_nats, map_bytes, stream_bps, .. } = best.measurement;
+        println!(
+            "{}: {}; MI {mutual_information_nats:.3} nats, map {map_bytes} bytes, stream {stream_bps:.0} bit/s",
+            path.display(),
+            best.setting
+        );
+        Ok(())
+    }
+}
+
+/// The table of a run, written with each setting that is measured.
+struct Growing {
+    table: TuningTable,
+    path: PathBuf,
+    /// Fingerprint of everything but the setting that the figures depend on.
+    inputs: String,
+}
+
+impl Growing {
+    fn add(&mut self, setting: Setting, measurement: Measurement) -> Result<(), UserError> {
+        self.table.insert(self.inputs.clone(), Row { setting, measurement });
+        write_whole(&self.path, self.table.text().as_bytes())
+    }
+}
+
+/// The table of an earlier run with the same inputs, or an empty one.
+fn open(path: &Path, inputs: &str) -> Result<TuningTable, UserError> {
+    let refused = |line: usize, what: String| UserError::Input(format!("{}:{line}: {what}", path.display()));
+    let table = match std::fs::read_to_string(path) {
+        Ok(text) => {
+            TuningTable::read(&text).map_err(|(line, what)| refused(line, format!("{what}; give another --out")))?
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => TuningTable::default(),
+        Err(e) => return Err(UserError::file(path, e)),
+    };
+    let what = "was measured with another sea floor, annotations or options than this run's";
+    match table.line_of_others(inputs) {
+        Some(line) => Err(refused(line, format!("{what}; give those again, or another --out"))),
+        None => Ok(table),
+    }
+}

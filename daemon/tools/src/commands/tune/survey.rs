@@ -1,0 +1,213 @@
+//! The mosaic with its annotations, and a virtual survey over it.
+
+use image::{GrayImage, RgbImage};
+use scene_model::project::{DownCamera, Observation, Pose};
+use scene_model::score::{Annotations, mosaic_classes};
+use scene_model::topics::{Birth, SceneConfig};
+use scene_model::words::{Word, WordConfig, WordExtractor};
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use scenecast_core::tuning_table::Setting;
+use scenecast_files::{read_classes, read_image};
+use std::path::Path;
+
+/// Part of a frame by which neighbouring lines, and frames along a line, overlap at least.
+const OVERLAP: f64 = 0.1;
+/// Most words of a survey: 1.5 GB of them.
+const MOST_WORDS: f64 = 1e8;
+const LEAST_PX: u32 = 64;
+/// Width and height of a sea floor that is drawn, and about the size of its patches, pixels.
+const REEF_PX: (u32, u32, u32) = (2600, 1800, 100);
+
+/// What all settings have in common.
+pub struct Site<'a> {
+    image: RgbImage,
+    classes: GrayImage,
+    ignore: &'a [u8],
+    pub(super) config: &'a Config,
+    crc: u32,
+}
+
+impl<'a> Site<'a> {
+    pub fn load(mosaic: &Path, annotations: &Path, ignore: &'a [u8], config: &'a Config) -> Result<Self, UserError> {
+        let image = read_image(mosaic)?.to_rgb8();
+        let (width, height) = image.dimensions();
+        if width.min(height) < LEAST_PX {
+            let what = format!("the image has {width} x {height} pixels; a mosaic needs at least 64 x 64");
+            return Err(UserError::file(mosaic, what));
+        }
+        let classes = read_classes(annotations, image.dimensions())?;
+        if classes.iter().all(|class| ignore.contains(class)) {
+            return Err(UserError::file(annotations, "no pixel is annotated with a class that counts (see --ignore)"));
+        }
+        let sum = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+        let mut digest = sum.digest();
+        digest.update(image.as_raw());
+        digest.update(&classes);
+        let classes = GrayImage::from_raw(width, height, classes)
+            .ok_or_else(|| UserError::file(annotations, "has another number of pixels than its head says"))?;
+        Ok(Self { image, classes, ignore, config, crc: digest.finalize() })
+    }
+
+    /// A sea floor that is drawn, with every pixel annotated.
+    pub fn procedural(seed: u64, config: &'a Config) -> Self {
+        let reef = scene_model::generate::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
+        let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
+        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(reef.image.as_raw());
+        Self { image: reef.image, classes, ignore: &[], config, crc }
+    }
+
+    /// 16 hexadecimal digits over everything but the setting that a measurement of these sites depends on.
+    pub fn fingerprint(sites: &[Self], options: &str) -> String {
+        let Some(Self { config, ignore, .. }) = sites.first() else { return String::new() };
+        let Config { camera, scene, survey, link, map, .. } = config;
+        let rest = format!(
+            "2 {options} {:?} {} {} {} {} {} {} {} {} {} {} {:?}",
+            ignore,
+            camera.metres_per_pixel,
+            camera.width_px,
+            camera.height_px,
+            camera.rate_hz,
+            survey.speed_m_s,
+            scene.birth,
+            scene.max_labels,
+            scene.max_words_per_cell,
+            link.frame_bytes,
+            map.codec,
+            WordConfig::default()
+        );
+        let images = sites.iter().fold(0, |all: u32, site| all.rotate_left(5) ^ site.crc);
+        format!("{images:08x}{:08x}", crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(rest.as_bytes()))
+    }
+}
+
+/// The frames of a survey as words, with cells of one size.
+pub struct Survey<'a> {
+    pub(super) config: &'a Config,
+    /// The annotations on the map's cells, and the colours of the mosaic as if they were some.
+    pub(super) annotations: Annotations,
+    pub(super) colours: Annotations,
+    camera: DownCamera,
+    size: (u32, u32),
+    frames: Vec<(Pose, Vec<Word>)>,
+    /// Time between two frames, seconds.
+    pub(super) step_s: f64,
+}
+
+impl<'a> Survey<'a> {
+    pub fn new(site: &Site<'a>, cell_m: f64) -> Result<Self, UserError> {
+        let config = site.config;
+        let mpp = config.camera.metres_per_pixel;
+        let cell_px = (cell_m / mpp) as f32;
+        let (width, height) = site.image.dimensions();
+        if !(1.0..=width.min(height) as f32 / 4.0).contains(&cell_px) {
+            let what = format!("cells of {cell_m} m are {cell_px} pixels of {mpp} m");
+            let allowed = format!("1 to {} pixels are allowed with this mosaic", width.min(height) / 4);
+            return Err(UserError::Input(format!(
+                "{what}; {allowed} (--metres-per-pixel, scene.cell_m, the grid's cell_m)"
+            )));
+        }
+        let size = (config.camera.width_px.min(width), config.camera.height_px.min(height));
+        let (corners, step_px) = corners((width, height), size, config.survey.speed_m_s / config.camera.rate_hz / mpp);
+        let words = WordConfig::default();
+        let per_cell = f64::from(words.colour + words.context + words.spread + words.texture + words.binary);
+        let per_frame = f64::from(size.0) * f64::from(size.1) / f64::from(cell_px).powi(2) * per_cell;
+        if per_frame * corners.len() as f64 > MOST_WORDS {
+            let what = format!("a survey of {} frames with {per_frame:.0} words each is too long", corners.len());
+            return Err(UserError::Input(format!(
+                "{what}; raise survey.speed_m_s, lower camera.rate_hz or take larger cells"
+            )));
+        }
+        let mut extractor = WordExtractor::new(&words);
+        let frame = |(left, top): (u32, u32)| {
+            let view = image::imageops::crop_imm(&site.image, left, top, size.0, size.1).to_image();
+            let middle = |from: u32, length: u32| (f64::from(from) + f64::from(length) / 2.0) * mpp;
+            let pose = Pose { x: middle(left, size.0), y: -middle(top, size.1), z: 0.0, yaw_rad: 0.0 };
+            (pose, extractor.extract(&view, cell_px))
+        };
+        let frames = corners.into_iter().map(frame).collect();
+        let annotations = Annotations::new(&site.classes, site.image.dimensions(), cell_px, site.ignore);
+        Ok(Self {
+            config,
+            annotations: annotations.map_err(|e| UserError::Input(e.to_string()))?,
+            colours: mosaic_classes(&site.image, cell_px),
+            camera: DownCamera { metres_per_pixel: mpp, altitude_m: 0.0 },
+            size,
+            frames,
+            step_s: step_px * mpp / config.survey.speed_m_s,
+        })
+    }
+
+    /// What the camera sees, frame after frame; the mosaic's north-west corner is the origin of the world.
+    pub fn frames(&self) -> impl Iterator<Item = Vec<Observation>> {
+        self.frames.iter().map(|(pose, words)| self.camera.project(self.size.0, self.size.1, pose, words))
+    }
+
+    /// Time of the whole survey, seconds.
+    pub fn duration_s(&self) -> f64 {
+        self.frames.len() as f64 * self.step_s
+    }
+
+    /// The scene model with a setting.
+    pub fn scene(&self, setting: &Setting, seed: u64) -> SceneConfig {
+        let scene = &self.config.scene;
+        let birth = match scene.birth.as_str() {
+            "collapsed" => Birth::Collapsed,
+            "rost" => Birth::Rost,
+            _ => Birth::Literal,
+        };
+        SceneConfig {
+            cell_m: [setting.cell_m, setting.cell_m, 1e4],
+            alpha: setting.alpha,
+            beta: setting.beta,
+            gamma: setting.gamma,
+            birth,
+            max_labels: scene.max_labels,
+            max_words_per_cell: scene.max_words_per_cell,
+            seed,
+            ..SceneConfig::for_images()
+        }
+    }
+}
+
+/// North-west corners of the frames of `size` that cross a mosaic line by line, about `step` pixels apart along the
+/// lines, and how far apart they are.
+fn corners(mosaic: (u32, u32), size: (u32, u32), step: f64) -> (Vec<(u32, u32)>, f64) {
+    let places = |length: u32, frame: u32, step: f64| -> Vec<u32> {
+        let free = f64::from(length - frame);
+        let steps = (free / step).ceil().max(if free > 0.0 { 1.0 } else { 0.0 }) as u32;
+        (0..=steps).map(|i| (free * f64::from(i) / f64::from(steps.max(1))).round() as u32).collect()
+    };
+    let most = |frame: u32| f64::from(frame) * (1.0 - OVERLAP);
+    let across = places(mosaic.0, size.0, step.clamp(1.0, most(size.0)));
+    let mut corners = Vec::new();
+    for (line, &top) in places(mosaic.1, size.1, most(size.1)).iter().enumerate() {
+        let along = (0..across.len()).map(|i| across[if line % 2 == 0 { i } else { across.len() - 1 - i }]);
+        corners.extend(along.map(|left| (left, top)));
+    }
+    (corners, step.clamp(1.0, most(size.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_survey_leaves_no_pixel_out_and_turns_at_the_end_of_lines() {
+        for (mosaic, size, step) in
+            [((1000, 700), (320, 240), 90.0), ((320, 240), (320, 240), 5.0), ((333, 90), (64, 64), 1e9)]
+        {
+            let (corners, _) = corners(mosaic, size, step);
+            let mut seen = vec![false; (mosaic.0 * mosaic.1) as usize];
+            for &(left, top) in &corners {
+                for y in top..top + size.1 {
+                    seen[(y * mosaic.0 + left) as usize..][..size.0 as usize].fill(true);
+                }
+            }
+            assert!(seen.iter().all(|&seen| seen), "{mosaic:?}");
+            assert!(
+                corners.windows(2).all(|pair| pair[0] != pair[1] && (pair[0].0 == pair[1].0 || pair[0].1 == pair[1].1))
+            );
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! Offline work: the scene model over files, label maps in files, tuning and vocabularies, as commands.
+//!
+//! Internal to scenecast.
+
+pub mod commands;
+mod progress;
+mod scene;
+
+pub use progress::Progress;

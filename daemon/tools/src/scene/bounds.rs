@@ -1,0 +1,30 @@
+//! How far a map may reach: it is written as a picture.
+
+use scene_model::topics::FlatCell;
+use scenecast_core::UserError;
+use scenecast_protocol::map::Rect;
+
+/// Most cells of the rectangle around a map.
+const MOST_CELLS: u64 = 1 << 26;
+
+/// The rectangle around cells from (west, south) to (east, north); a problem if it is too large for a picture.
+pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<Rect, String> {
+    let (width, height) = ((east - west + 1) as u64, (north - south + 1) as u64);
+    if width.saturating_mul(height) > MOST_CELLS {
+        return Err(format!(
+            "the map would reach over {width} x {height} cells, more than {MOST_CELLS}: a position far off, or --cell-size too small"
+        ));
+    }
+    Ok(Rect { x: west as i32, y: south as i32, width: width as u32, height: height as u32 })
+}
+
+/// The rectangle around a map; one cell if there is none.
+pub(super) fn around(map: &[FlatCell]) -> Result<Rect, UserError> {
+    let Some(first) = map.first() else { return Ok(Rect { x: 0, y: 0, width: 1, height: 1 }) };
+    let mut limits = (first.x, first.y, first.x, first.y);
+    for cell in map {
+        limits = (limits.0.min(cell.x), limits.1.min(cell.y), limits.2.max(cell.x), limits.3.max(cell.y));
+    }
+    let (west, south, east, north) = limits;
+    rectangle(west.into(), south.into(), east.into(), north.into()).map_err(UserError::Input)
+}

@@ -1,0 +1,64 @@
+//! Words of a recorded survey: images from above with their poses.
+
+use super::{Sighting, Source};
+use scene_model::project::{DownCamera, Pose};
+use scene_model::words::WordExtractor;
+use scenecast_core::UserError;
+use scenecast_files::Recording;
+use std::path::Path;
+
+/// The frames of a recording; those that cannot be read are counted and passed over.
+pub(crate) struct Frames {
+    recording: Recording,
+    extractor: WordExtractor,
+    metres_per_pixel: f64,
+    cell_m: f64,
+    next: usize,
+    unreadable: Vec<String>,
+}
+
+impl Frames {
+    pub(crate) fn open(
+        dir: &Path,
+        extractor: WordExtractor,
+        metres_per_pixel: f64,
+        cell_m: f64,
+    ) -> Result<Self, UserError> {
+        let recording = Recording::open(dir, metres_per_pixel)?;
+        Ok(Self { recording, extractor, metres_per_pixel, cell_m, next: 0, unreadable: Vec::new() })
+    }
+}
+
+impl Source for Frames {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
+        while let Some(frame) = self.recording.frames.get(self.next) {
+            self.next += 1;
+            let done = self.next as f64 / self.recording.frames.len() as f64;
+            let image = match frame.image() {
+                Ok(image) => image,
+                Err(problem) => {
+                    self.unreadable.push(problem.to_string());
+                    continue;
+                }
+            };
+            let camera = DownCamera { metres_per_pixel: self.metres_per_pixel * frame.scale, altitude_m: 0.0 };
+            let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
+            let cell_px = (self.cell_m / camera.metres_per_pixel) as f32;
+            if f64::from(image.width().min(image.height())) < f64::from(cell_px) {
+                let (width, height) = image.dimensions();
+                let file = frame.file.display();
+                self.unreadable.push(format!("{file}: {width} x {height} pixels are less than a cell of {cell_px:.1}"));
+                continue;
+            }
+            let words = self.extractor.extract(&image, cell_px);
+            let observations = camera.project(image.width(), image.height(), &pose, &words);
+            return Ok(Some(Sighting { t_s: frame.t_s, observations, done }));
+        }
+        Ok(None)
+    }
+
+    fn skipped(&self) -> Option<String> {
+        let (count, all) = (self.unreadable.len(), self.recording.frames.len());
+        self.unreadable.first().map(|first| format!("{count} of {all} frames passed over, the first: {first}"))
+    }
+}

@@ -1,0 +1,89 @@
+//! A source is learnt from, in one go or as it comes in.
+
+use super::process::cpu_seconds;
+use super::{Sighting, Source};
+use scene_model::topics::{Inserted, SceneModel};
+use scenecast_core::UserError;
+use std::time::Instant;
+
+/// Longest time between two sightings that is refined for, seconds.
+const LONGEST_GAP_S: f64 = 60.0;
+
+/// When words are resampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Schedule {
+    /// All words, so many times, when everything was seen.
+    Sweeps(u32),
+    /// So many words a second of the source's time, while it comes in.
+    Online(f64),
+}
+
+/// What learning took.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Effort {
+    /// Words resampled.
+    pub(crate) resampled: u64,
+    /// Time of resampling.
+    pub(crate) seconds: f64,
+    /// CPU time of resampling, all threads together.
+    pub(crate) cpu_seconds: f64,
+    /// Words that were not taken in.
+    pub(crate) skipped: Inserted,
+}
+
+impl Effort {
+    fn measure(&mut self, work: impl FnOnce() -> u64) -> u64 {
+        let (began, cpu) = (Instant::now(), cpu_seconds());
+        let done = work();
+        self.resampled += done;
+        self.seconds += began.elapsed().as_secs_f64();
+        self.cpu_seconds += cpu_seconds() - cpu;
+        done
+    }
+}
+
+/// Has a model learn from a source; `progress` is told the share that is done.
+///
+/// Online, the time from one sighting to the next is that of refining, and after the last one as long as on the mean.
+pub(crate) fn learn(
+    model: &mut SceneModel,
+    source: &mut dyn Source,
+    schedule: Schedule,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Effort, UserError> {
+    let mut effort = Effort::default();
+    let (mut owed, mut last, mut gaps) = (0.0, None, (0.0, 0u64));
+    let mut refine = |model: &mut SceneModel, effort: &mut Effort, words: f64| {
+        owed += words;
+        if owed >= 1.0 {
+            owed -= effort.measure(|| model.refine(owed as u64)) as f64;
+        }
+    };
+    let reading = if matches!(schedule, Schedule::Online(_)) { 1.0 } else { 0.3 };
+    while let Some(Sighting { t_s, observations, done }) = source.next()? {
+        if let (Schedule::Online(rate), Some(last)) = (schedule, last) {
+            let gap = f64::clamp(t_s - last, 0.0, LONGEST_GAP_S);
+            gaps = (gaps.0 + gap, gaps.1 + 1);
+            refine(model, &mut effort, rate * gap);
+        }
+        last = Some(t_s);
+        let outcome = model.insert(t_s, &observations);
+        effort.skipped.accepted += outcome.accepted;
+        effort.skipped.skipped_bad += outcome.skipped_bad;
+        effort.skipped.skipped_full += outcome.skipped_full;
+        progress(reading * done);
+    }
+    match schedule {
+        Schedule::Online(rate) => {
+            let mean = if gaps.1 > 0 { gaps.0 / gaps.1 as f64 } else { 1.0 };
+            refine(model, &mut effort, rate * mean);
+        }
+        Schedule::Sweeps(sweeps) => {
+            for sweep in 0..sweeps {
+                effort.measure(|| model.sweep(1));
+                progress(reading + (1.0 - reading) * f64::from(sweep + 1) / f64::from(sweeps));
+            }
+        }
+    }
+    Ok(effort)
+}

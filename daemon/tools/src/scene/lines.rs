@@ -1,0 +1,105 @@
+//! Text files, line by line, however long a line or a file is.
+
+use scenecast_core::UserError;
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// Most bytes of a line.
+const MOST_BYTES: usize = 1 << 20;
+
+/// The lines of a file that say something: not empty, no comment behind `#`.
+pub(super) struct Lines {
+    path: PathBuf,
+    reader: BufReader<File>,
+    buffer: Vec<u8>,
+    length: u64,
+    offset: u64,
+    number: u64,
+}
+
+/// A line.
+pub(super) struct Line<'a> {
+    /// Without white space around.
+    pub(super) text: &'a str,
+    /// Counted from 1.
+    pub(super) number: u64,
+    /// Where it begins, bytes.
+    pub(super) offset: u64,
+}
+
+impl Lines {
+    pub(super) fn open(path: &Path) -> Result<Self, UserError> {
+        let file = File::open(path).map_err(|e| UserError::file(path, e))?;
+        let about = file.metadata().map_err(|e| UserError::file(path, e))?;
+        if !about.is_file() {
+            return Err(UserError::file(path, "a file is needed that can be read twice, no folder and no pipe"));
+        }
+        let reader = BufReader::with_capacity(1 << 16, file);
+        let length = about.len();
+        Ok(Self { path: path.to_owned(), reader, buffer: Vec::new(), length, offset: 0, number: 0 })
+    }
+
+    /// Share of the file that was read.
+    pub(super) fn done(&self) -> f64 {
+        self.offset as f64 / self.length.max(1) as f64
+    }
+
+    /// A problem with the line that was read last.
+    pub(super) fn problem(&self, what: impl Display) -> UserError {
+        UserError::Input(format!("{}:{}: {what}", self.path.display(), self.number))
+    }
+
+    /// Goes to where a line begins.
+    pub(super) fn seek(&mut self, offset: u64, number: u64) -> Result<(), UserError> {
+        if offset != self.offset {
+            let moved = match i64::try_from(i128::from(offset) - i128::from(self.offset)) {
+                Ok(by) => self.reader.seek_relative(by),
+                Err(_) => self.reader.seek(SeekFrom::Start(offset)).map(drop),
+            };
+            moved.map_err(|e| UserError::file(&self.path, e))?;
+        }
+        (self.offset, self.number) = (offset, number - 1);
+        Ok(())
+    }
+
+    /// The next line; none at the end of the file.
+    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, UserError> {
+        loop {
+            self.buffer.clear();
+            let offset = self.offset;
+            let read = (&mut self.reader).take(MOST_BYTES as u64 + 1).read_until(b'\n', &mut self.buffer);
+            let read = read.map_err(|e| UserError::file(&self.path, e))?;
+            if read == 0 {
+                return Ok(None);
+            }
+            self.number += 1;
+            self.offset += read as u64;
+            if read > MOST_BYTES {
+                return Err(self.problem(format!("the line is longer than {MOST_BYTES} bytes")));
+            }
+            let says_something = |text: &str| !text.is_empty() && !text.starts_with('#');
+            match std::str::from_utf8(&self.buffer) {
+                Err(_) => return Err(self.problem("not text in UTF-8")),
+                Ok(text) if !says_something(text.trim_start_matches('\u{feff}').trim()) => {}
+                Ok(_) => {
+                    let text = std::str::from_utf8(&self.buffer).unwrap_or_default();
+                    let text = text.trim_start_matches('\u{feff}').trim();
+                    return Ok(Some(Line { text, number: self.number, offset }));
+                }
+            }
+        }
+    }
+}
+
+/// A number that is finite.
+pub(super) fn number(field: Option<&str>, name: &str) -> Result<f64, String> {
+    let text = field.map(str::trim).ok_or_else(|| format!("{name} is missing"))?;
+    let value: Option<f64> = text.parse().ok();
+    match value {
+        Some(value) if value.is_finite() => Ok(value),
+        Some(_) => Err(format!("{name} = {text}: it takes a finite number")),
+        None => Err(format!("{name} = {text:?} is no number")),
+    }
+}

@@ -1,0 +1,60 @@
+//! Words of a mosaic: one image of the ground from above.
+
+use super::{Sighting, Source};
+use scene_model::project::Observation;
+use scene_model::words::WordExtractor;
+use scenecast_core::UserError;
+use scenecast_files::read_image;
+use std::path::Path;
+
+/// Least edge of a cell: with less there is nothing to see in one.
+const LEAST_CELL_PX: f64 = 4.0;
+
+/// A mosaic, its top left corner at the origin: x grows to the right, y upwards, so y is below 0.
+pub(crate) struct Mosaic {
+    observations: Option<Vec<Observation>>,
+    /// Width and height, pixels.
+    pub(crate) size: (u32, u32),
+    /// Edge of a cell, pixels.
+    pub(crate) cell_px: f32,
+}
+
+impl Mosaic {
+    /// Finds the words of a mosaic whose pixels are `metres_per_pixel` wide.
+    pub(crate) fn open(
+        path: &Path,
+        extractor: &mut WordExtractor,
+        metres_per_pixel: f64,
+        cell_m: f64,
+    ) -> Result<Self, UserError> {
+        let cell_px = cell_m / metres_per_pixel;
+        let image = read_image(path)?.to_rgb8();
+        let (width, height) = image.dimensions();
+        if cell_px < LEAST_CELL_PX {
+            let what =
+                format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {LEAST_CELL_PX} are needed");
+            return Err(UserError::Input(what));
+        }
+        if f64::from(width.min(height)) < cell_px {
+            let what =
+                format!("the image has {width} x {height} pixels; a mosaic needs at least a cell of {cell_px:.1}");
+            return Err(UserError::file(path, what));
+        }
+        let place = |word: &scene_model::words::Word| Observation {
+            word: word.id,
+            x: f64::from(word.u) * metres_per_pixel,
+            // A word on the upper edge belongs to the first row of cells.
+            y: -f64::from(word.v).max(1e-3) * metres_per_pixel,
+            z: 0.0,
+        };
+        let words = extractor.extract(&image, cell_px as f32);
+        let observations = Some(words.iter().map(place).collect());
+        Ok(Self { observations, size: (width, height), cell_px: cell_px as f32 })
+    }
+}
+
+impl Source for Mosaic {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
+        Ok(self.observations.take().map(|observations| Sighting { t_s: 0.0, observations, done: 1.0 }))
+    }
+}

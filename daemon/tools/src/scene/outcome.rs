@@ -1,0 +1,86 @@
+//! What a run of the scene model is worth, and its labels in files.
+
+use super::Quality;
+use super::bounds::around;
+use super::learn::Effort;
+use super::process::peak_rss_bytes;
+use scene_model::topics::{FlatCell, SceneModel, TopicId, centre_of};
+use scenecast_core::UserError;
+use scenecast_core::label_picture::encode_within;
+use scenecast_files::write_whole;
+use scenecast_protocol::map::{Cell, LabelGrid};
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::Path;
+
+/// The figures of a run.
+#[derive(Debug, Serialize)]
+pub(crate) struct Outcome {
+    words: u64,
+    cells: usize,
+    resampled: u64,
+    seconds: f64,
+    cpu_seconds: f64,
+    words_per_cpu_second: f64,
+    labels: usize,
+    labels_used: usize,
+    perplexity: f64,
+    mutual_information_nats: Option<f64>,
+    normalised_mutual_information: Option<f64>,
+    null_mutual_information_nats: Option<f64>,
+    peak_rss_bytes: u64,
+    kernel: &'static str,
+}
+
+impl Outcome {
+    pub(crate) fn new(model: &SceneModel, effort: &Effort, quality: Option<&Quality>) -> Self {
+        Self {
+            words: model.words(),
+            cells: model.cells(),
+            resampled: effort.resampled,
+            seconds: effort.seconds,
+            cpu_seconds: effort.cpu_seconds,
+            words_per_cpu_second: effort.resampled as f64 / effort.cpu_seconds.max(1e-6),
+            labels: model.labels(),
+            labels_used: numbers(&model.label_volume()).len(),
+            perplexity: model.perplexity(),
+            mutual_information_nats: quality.map(|q| q.mutual_information.nats),
+            normalised_mutual_information: quality.map(|q| q.mutual_information.normalised),
+            null_mutual_information_nats: quality.map(|q| q.null_nats),
+            peak_rss_bytes: peak_rss_bytes(),
+            kernel: model.kernel().name(),
+        }
+    }
+}
+
+/// The topics of a map from the oldest on: the first has the label 1.
+fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
+    let mut topics: Vec<TopicId> = volume.iter().map(|cell| cell.topic).collect();
+    topics.sort_unstable();
+    topics.dedup();
+    topics
+}
+
+/// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions by y, x; of stacked cells the one
+/// that the map shows comes last.
+pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), UserError> {
+    let (map, mut volume) = (model.label_map(), model.label_volume());
+    // Painted in this order the rows make the flattened map.
+    let shows =
+        |cell: &FlatCell| map.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).is_ok_and(|i| map[i].z == cell.z);
+    volume.sort_by_cached_key(|cell| (cell.y, cell.x, shows(cell)));
+    let topics = numbers(&volume);
+    let label = |topic| topics.binary_search(&topic).map_or(0, |index| (index + 1).min(254)) as u8;
+    let bounds = around(&map)?;
+    let grid: LabelGrid = map.iter().map(|cell| (Cell::new(cell.x, cell.y), label(cell.topic))).collect();
+    let png = encode_within(&grid, bounds).map_err(|e| UserError::Failed(e.to_string()))?;
+    let mut table = "x,y,z,label,confidence,perplexity\n".to_owned();
+    for cell in &volume {
+        let [x, y, z] = centre_of([cell.x, cell.y, cell.z], model.config().cell_m);
+        let (label, FlatCell { confidence, perplexity, .. }) = (label(cell.topic), cell);
+        let _ = writeln!(table, "{x:.6},{y:.6},{z:.6},{label},{confidence:.4},{perplexity:.4}");
+    }
+    std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
+    write_whole(&dir.join("labels.csv"), table.as_bytes())?;
+    write_whole(&dir.join("labels.png"), &png)
+}

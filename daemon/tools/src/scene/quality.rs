@@ -1,0 +1,124 @@
+//! How much a model's labels tell about annotations.
+
+use super::Annotated;
+use super::bounds::around;
+use image::{GrayImage, Luma};
+use scene_model::score::{Annotations, LabelGrid, SceneScore, score};
+use scene_model::topics::{FlatCell, SceneModel, coord_of};
+use scenecast_core::UserError;
+use scenecast_protocol::map::Rect;
+use std::collections::BTreeMap;
+
+/// Mutual information of labels and classes, and of displaced labels and classes.
+pub(crate) type Quality = SceneScore;
+
+/// Most cells times classes that are counted.
+const MOST_COUNTS: u64 = 1 << 27;
+/// Class of cells that have none.
+const NONE: u8 = 255;
+
+/// Scores a model, cell by cell; a cell has the class that most of its pixels or places have, ties to the lowest.
+///
+/// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
+pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
+    let refused = |e: scene_model::score::AnnotationError| UserError::Input(e.to_string());
+    match annotated {
+        Annotated::Pixels { classes, ignore } => {
+            let annotations = Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(refused)?;
+            let (columns, rows) = annotations.size();
+            Ok(score(&LabelGrid::from_map(&model.label_map(), 0, -1, columns, rows), &annotations))
+        }
+        Annotated::Places(places) => {
+            let volume = model.label_volume();
+            let sheet = Sheet::new(&volume, places)?;
+            let classes = sheet.classes(places, model.config().cell_m);
+            let annotations = Annotations::new(&classes, classes.dimensions(), 1.0, &[NONE]).map_err(refused)?;
+            Ok(score(&sheet.labels(&volume), &annotations))
+        }
+    }
+}
+
+/// The layers of a world in three dimensions, one below the other.
+struct Sheet {
+    bounds: Rect,
+    layers: Vec<i32>,
+}
+
+impl Sheet {
+    fn new(volume: &[FlatCell], places: &[([f64; 3], u8)]) -> Result<Self, UserError> {
+        let bounds = around(volume)?;
+        let mut layers: Vec<i32> = volume.iter().map(|cell| cell.z).collect();
+        layers.sort_unstable();
+        layers.dedup();
+        let classes = places.iter().map(|place| u64::from(place.1) + 1).max().unwrap_or(1);
+        let cells = u64::from(bounds.width) * u64::from(bounds.height) * layers.len() as u64;
+        if cells * classes > MOST_COUNTS {
+            let what =
+                format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
+            return Err(UserError::Input(what));
+        }
+        Ok(Self { bounds, layers })
+    }
+
+    fn index(&self, [x, y, z]: [i32; 3]) -> Option<usize> {
+        let Rect { width, height, .. } = self.bounds;
+        let column = u32::try_from(x.checked_sub(self.bounds.x)?).ok().filter(|&column| column < width)?;
+        let row = u32::try_from(y.checked_sub(self.bounds.y)?).ok().filter(|&row| row < height)?;
+        let layer = self.layers.binary_search(&z).ok()?;
+        Some((layer * height as usize + row as usize) * width as usize + column as usize)
+    }
+
+    fn labels(&self, volume: &[FlatCell]) -> LabelGrid {
+        let mut grid = LabelGrid::empty(self.bounds.width as usize, self.bounds.height as usize * self.layers.len());
+        for cell in volume {
+            if let Some(index) = self.index([cell.x, cell.y, cell.z]) {
+                grid.labels[index] = Some(cell.topic.0);
+            }
+        }
+        grid
+    }
+
+    fn classes(&self, places: &[([f64; 3], u8)], cell_m: [f64; 3]) -> GrayImage {
+        let mut votes: BTreeMap<usize, BTreeMap<u8, u32>> = BTreeMap::new();
+        for (at, class) in places {
+            if let Some(index) = coord_of(*at, cell_m).and_then(|coord| self.index(coord)) {
+                *votes.entry(index).or_default().entry(*class).or_default() += 1;
+            }
+        }
+        let width = self.bounds.width;
+        let mut image = GrayImage::from_pixel(width, self.bounds.height * self.layers.len() as u32, Luma([NONE]));
+        for (index, classes) in votes {
+            let most = classes.iter().max_by_key(|(class, votes)| (**votes, std::cmp::Reverse(**class)));
+            if let Some((class, _)) = most {
+                image.put_pixel(index as u32 % width, index as u32 / width, Luma([*class]));
+            }
+        }
+        image
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scene_model::project::Observation;
+    use scene_model::topics::SceneConfig;
+
+    #[test]
+    fn labels_that_follow_the_classes_tell_everything_in_every_layer() {
+        let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 0.01, ..SceneConfig::default() };
+        let mut model = SceneModel::new(config).unwrap();
+        let (mut seen, mut places) = (Vec::new(), Vec::new());
+        for i in 0..400 {
+            let (x, y, z) = (f64::from(i % 20) + 0.5, f64::from(i / 20) - 9.5, if i % 2 == 0 { 0.0 } else { 5.0 });
+            let word = if i % 2 == 0 { 0 } else { 3 };
+            seen.extend(vec![Observation { word, x, y, z }; 20]);
+            places.push(([x, y, z], word as u8));
+        }
+        places.push(([500.0, 0.0, 0.0], 9));
+        model.insert(0.0, &seen);
+        model.sweep(30);
+        let found = quality(&model, &Annotated::Places(places), 1.0).unwrap().mutual_information;
+        assert_eq!(found.n, 400);
+        assert!((found.nats - 2f64.ln()).abs() < 0.01, "{found:?}");
+    }
+}

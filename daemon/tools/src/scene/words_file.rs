@@ -1,0 +1,226 @@
+//! Words from a file: lines `t,x,y,z,w1,w2,...`.
+
+use super::bounds::rectangle;
+use super::lines::{Line, Lines, number};
+use super::{Sighting, Source};
+use scene_model::project::Observation;
+use scene_model::topics::coord_of;
+use scenecast_core::UserError;
+use std::path::Path;
+
+/// Words of one sighting at most; so much is held at once.
+const MOST_WORDS: usize = 1 << 16;
+/// Most different words, as the scene model has it.
+const MOST_VOCABULARY: u32 = 1 << 20;
+
+/// A file of words, read twice: once to check all of it, then as it is learnt from.
+///
+/// A line is a place and the words there: seconds, metres, word ids. A first line that begins with `t` names the columns.
+pub(crate) struct WordsFile {
+    lines: Lines,
+    /// Number of different words.
+    pub(crate) vocabulary: u32,
+    /// Where each line begins, in order of time, if the file has another order.
+    order: Option<std::vec::IntoIter<Mark>>,
+    marks: (usize, usize),
+    in_time: bool,
+    /// Number of the first line, which may be the head of the table.
+    begun: u64,
+    ahead: Option<(f64, Vec<Observation>)>,
+}
+
+/// When and where a line is.
+#[derive(Clone, Copy)]
+struct Mark {
+    t_s: f64,
+    offset: u64,
+    number: u64,
+}
+
+impl WordsFile {
+    /// Checks a file; with `in_time` its lines come in order of time, otherwise as they are.
+    pub(crate) fn open(
+        path: &Path,
+        vocabulary: Option<u32>,
+        cell_m: [f64; 3],
+        in_time: bool,
+    ) -> Result<Self, UserError> {
+        let mut lines = Lines::open(path)?;
+        let mut extent = Extent::new(cell_m);
+        let (mut marks, mut largest, mut words, mut begun) = (Vec::new(), 0, 0u64, 0);
+        let most = vocabulary.unwrap_or(MOST_VOCABULARY);
+        let mut seen = Vec::new();
+        while let Some(line) = lines.next()? {
+            let Line { number, offset, .. } = line;
+            if begun == 0 {
+                begun = number;
+            }
+            let parsed = parse(line.text, number == begun, &mut seen).and_then(|t_s| {
+                if let Some(word) = seen.iter().map(|o| o.word).find(|&word| word >= most) {
+                    let whose = if vocabulary.is_some() { "--vocabulary-size is" } else { "ids go up to" };
+                    let limit = if vocabulary.is_some() { most } else { most - 1 };
+                    return Err(format!("word id {word}: {whose} {limit}"));
+                }
+                seen.first().map_or(Ok(()), |o| extent.take(o))?;
+                Ok(t_s)
+            });
+            let Some(t_s) = parsed.map_err(|what| lines.problem(what))? else { continue };
+            largest = seen.iter().map(|o| o.word).fold(largest, u32::max);
+            words += seen.len() as u64;
+            if in_time {
+                marks.push(Mark { t_s, offset, number });
+            }
+        }
+        if words == 0 {
+            return Err(UserError::file(path, "there are no words; lines are t,x,y,z,w1,w2,..."));
+        }
+        let is_sorted = marks.is_sorted_by(|a, b| a.t_s <= b.t_s);
+        marks.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        let marks_len = marks.len();
+        Ok(Self {
+            lines: Lines::open(path)?,
+            vocabulary: vocabulary.unwrap_or(largest + 1),
+            order: (!is_sorted).then(|| marks.into_iter()),
+            marks: (0, marks_len),
+            in_time,
+            begun,
+            ahead: None,
+        })
+    }
+
+    /// The next line with its time; none at the end.
+    fn next_line(&mut self) -> Result<Option<(f64, Vec<Observation>)>, UserError> {
+        if let Some(ahead) = self.ahead.take() {
+            return Ok(Some(ahead));
+        }
+        loop {
+            if let Some(order) = &mut self.order {
+                let Some(mark) = order.next() else { return Ok(None) };
+                self.marks.0 += 1;
+                self.lines.seek(mark.offset, mark.number)?;
+            }
+            let Some(line) = self.lines.next()? else { return Ok(None) };
+            let mut seen = Vec::new();
+            let first = line.number == self.begun;
+            match parse(line.text, first, &mut seen).map_err(|what| self.lines.problem(what))? {
+                Some(t_s) => return Ok(Some((t_s, seen))),
+                None => continue,
+            }
+        }
+    }
+
+    fn done(&self) -> f64 {
+        match self.order {
+            Some(_) => self.marks.0 as f64 / self.marks.1.max(1) as f64,
+            None => self.lines.done(),
+        }
+    }
+}
+
+impl Source for WordsFile {
+    fn next(&mut self) -> Result<Option<Sighting>, UserError> {
+        let Some((t_s, mut observations)) = self.next_line()? else { return Ok(None) };
+        while observations.len() < MOST_WORDS {
+            let Some((later_s, more)) = self.next_line()? else { break };
+            if self.in_time && later_s != t_s {
+                self.ahead = Some((later_s, more));
+                break;
+            }
+            observations.extend(more);
+        }
+        Ok(Some(Sighting { t_s, observations, done: self.done() }))
+    }
+}
+
+/// Reads a line; no time if it is the head of the table.
+fn parse(text: &str, first: bool, seen: &mut Vec<Observation>) -> Result<Option<f64>, String> {
+    seen.clear();
+    let mut fields = text.split(',');
+    if first && text.starts_with('t') {
+        return Ok(None);
+    }
+    let t_s = number(fields.next(), "t")?;
+    let (x, y) = (number(fields.next(), "x")?, number(fields.next(), "y")?);
+    let z = number(fields.next(), "z")?;
+    for field in fields {
+        let word = field.trim().parse().map_err(|_| format!("word id {:?} is no whole number from 0", field.trim()))?;
+        seen.push(Observation { word, x, y, z });
+    }
+    Ok(Some(t_s))
+}
+
+/// How far the cells of the words reach.
+struct Extent {
+    cell_m: [f64; 3],
+    limits: Option<[i64; 4]>,
+}
+
+impl Extent {
+    fn new(cell_m: [f64; 3]) -> Self {
+        Self { cell_m, limits: None }
+    }
+
+    fn take(&mut self, seen: &Observation) -> Result<(), String> {
+        let coord = coord_of([seen.x, seen.y, seen.z], self.cell_m);
+        let [x, y, _] = coord.ok_or("the position is more than 2^30 cells from the origin")?.map(i64::from);
+        let [west, south, east, north] = self.limits.unwrap_or([x, y, x, y]);
+        let limits = [west.min(x), south.min(y), east.max(x), north.max(y)];
+        rectangle(limits[0], limits[1], limits[2], limits[3])?;
+        self.limits = Some(limits);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn open(name: &str, text: &str, vocabulary: Option<u32>, in_time: bool) -> Result<WordsFile, UserError> {
+        let path = std::env::temp_dir().join(format!("scenecast-{}-{name}.csv", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let opened = WordsFile::open(&path, vocabulary, [1.0; 3], in_time);
+        std::fs::remove_file(&path).unwrap();
+        opened
+    }
+
+    fn sightings(file: &mut WordsFile) -> Vec<(f64, Vec<u32>)> {
+        let mut all = Vec::new();
+        while let Some(s) = file.next().unwrap() {
+            all.push((s.t_s, s.observations.iter().map(|o| o.word).collect()));
+        }
+        all
+    }
+
+    #[test]
+    fn words_come_in_order_of_time_whatever_the_order_of_the_lines() {
+        let text = "# words\nt,x,y,z,w1\n# later\n2,0,0,0,5,6\n\n1,0,0,0,7\r\n2,1,0,-3,8\n1,5,5,5\n";
+        let mut file = open("order", text, None, true).unwrap();
+        assert_eq!(sightings(&mut file), [(1.0, vec![7]), (2.0, vec![5, 6, 8])]);
+        assert_eq!((file.vocabulary, file.done()), (9, 1.0));
+        let mut file = open("batch", text, Some(10), false).unwrap();
+        assert_eq!(sightings(&mut file), [(2.0, vec![5, 6, 7, 8])]);
+        assert_eq!(file.vocabulary, 10);
+    }
+
+    #[test]
+    fn a_wrong_line_is_named_with_what_is_wrong() {
+        let said = |text: &str| open("wrong", text, Some(9), true).err().unwrap().to_string();
+        for (line, what) in [
+            ("1,nan,0,0,1", ":2: x = nan: it takes a finite number"),
+            ("1,0,inf,0,1", ":2: y = inf"),
+            ("1,0,0", ":2: z is missing"),
+            ("1,0,0,0,9", ":2: word id 9: --vocabulary-size is 9"),
+            ("1,0,0,0,-1", ":2: word id \"-1\" is no whole number"),
+            ("1,0,0,0,", ":2: word id \"\" is no whole number"),
+            ("1,1e300,0,0,1", ":2: the position is more than"),
+            ("1,100000,100000,0,1", ":2: the map would reach over 100001 x 100001 cells"),
+            ("t,0,0,0,1", ":2: t = \"t\" is no number"),
+        ] {
+            let said = said(&format!("0,0,0,0,1\n{line}\n"));
+            assert!(said.contains(what), "{said}");
+        }
+        for empty in ["", "\n\n", "t,x,y,z\n", "1,0,0,0\n"] {
+            assert!(said(empty).contains("there are no words"), "{empty:?}");
+        }
+    }
+}

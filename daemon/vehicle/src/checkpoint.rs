@@ -1,0 +1,197 @@
+//! A mapper as bytes: the model with all that its labels and words mean.
+
+use super::mapper::Mapper;
+use super::relief::Relief;
+use scene_model::envelope::{Envelope, EnvelopeError};
+use scene_model::exemplars::ExemplarStore;
+use scene_model::publish::LabelBook;
+use scene_model::topics::{CheckpointError, SceneConfig, SceneModel};
+use scene_model::words::{Measures, WordExtractor};
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use serde::{Deserialize, Serialize};
+
+const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
+
+/// Why a checkpoint is not gone on from.
+#[derive(Debug, thiserror::Error)]
+pub enum NoCheckpoint {
+    /// Not a checkpoint, of another version, or damaged.
+    #[error(transparent)]
+    Envelope(#[from] EnvelopeError),
+    /// The model in it is none to go on from.
+    #[error(transparent)]
+    Model(#[from] CheckpointError),
+    /// The checksum is right but the content cannot be.
+    #[error("its content is inconsistent")]
+    Inconsistent,
+    /// It was made with other parameters.
+    #[error("it was made with other parameters of the scene model")]
+    OtherParameters,
+    /// The configuration itself is wrong.
+    #[error(transparent)]
+    Config(#[from] UserError),
+}
+
+/// What is kept.
+#[derive(Serialize, Deserialize)]
+struct Kept<M, B, W, E, R> {
+    lineage: u64,
+    last_s: Option<f64>,
+    model: M,
+    book: B,
+    words: W,
+    exemplars: E,
+    relief: R,
+}
+
+/// A mapper that goes on where a checkpoint left it, and the mission that it belongs to.
+pub struct Restored {
+    /// The mapper.
+    pub mapper: Mapper,
+    /// As [`super::Durable::lineage`].
+    pub lineage: u64,
+}
+
+impl Mapper {
+    /// Everything as bytes, for [`Mapper::restore`]; `lineage` says which mission it belongs to.
+    pub fn save(&self, lineage: u64) -> Vec<u8> {
+        let kept = Kept {
+            lineage,
+            last_s: self.last_s,
+            model: self.model.save(),
+            book: &self.book,
+            words: self.extractor.measures(),
+            exemplars: &self.exemplars,
+            relief: &self.relief,
+        };
+        ENVELOPE.seal(&postcard::to_allocvec(&kept).unwrap_or_default())
+    }
+
+    /// Goes on from a checkpoint, if it was made with the parameters that are configured. Priors may differ: they are those
+    /// of the checkpoint until [`Mapper::tune`] says which are in force.
+    pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
+        let content = ENVELOPE.open(bytes)?;
+        let kept: Kept<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
+            postcard::from_bytes(content).map_err(|_| NoCheckpoint::Inconsistent)?;
+        let model = SceneModel::load(&kept.model)?;
+        let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
+        let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
+        let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
+        let (words, configured_words) = (kept.words.config(), fresh.extractor.measures());
+        if *model.config() != configured || words != configured_words.config() {
+            return Err(NoCheckpoint::OtherParameters);
+        }
+        if !config.scene.vocabulary.is_empty() && !is_same(&kept.words, &configured_words) {
+            return Err(NoCheckpoint::OtherParameters);
+        }
+        let mut mapper = fresh;
+        mapper.extractor = WordExtractor::from_measures(kept.words);
+        (mapper.model, mapper.book) = (model, kept.book);
+        (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
+        mapper.flat = mapper.model.label_map();
+        Ok(Restored { mapper, lineage: kept.lineage })
+    }
+}
+
+fn is_same(a: &Measures, b: &Measures) -> bool {
+    scene_model::vocabulary::save(a) == scene_model::vocabulary::save(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgb, RgbImage};
+    use scene_model::project::Pose;
+    use scenecast_protocol::directive::{Change, Figure, Settings};
+
+    fn config(sets: &[&str]) -> Config {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        scenecast_config::load(None, &sets).unwrap()
+    }
+
+    fn frame(mapper: &mut Mapper, at: u32) -> super::super::MapUpdate {
+        let image = RgbImage::from_fn(160, 120, |x, y| {
+            let kind = ((x + 40 * at) / 80 + y / 60) % 3;
+            Rgb([(kind * 90 + x % 7) as u8, (200 - kind * 60 + y % 5) as u8, ((x * y) % 31) as u8])
+        });
+        let pose = Pose { x: f64::from(at) * 0.4, y: 0.0, z: -4.0, yaw_rad: 0.0 };
+        mapper.handle_frame(&image, &pose, 1.0, f64::from(at) * 2.0)
+    }
+
+    #[test]
+    fn a_restored_mapper_goes_on_as_the_one_that_was_saved() {
+        let config = config(&[]);
+        let mut whole = Mapper::new(&config, None, 3, 1).unwrap();
+        (0..12).for_each(|at| drop(frame(&mut whole, at)));
+        let shown = whole.current();
+        let Restored { mapper: mut restored, lineage } = Mapper::restore(&config, None, &whole.save(77)).unwrap();
+        assert_eq!((lineage, restored.epoch(), restored.last_s()), (77, 3, Some(22.0)));
+        assert_eq!(restored.current(), shown);
+        assert!(shown.cells.len() > 20 && shown.labels > 1);
+        for label in 1..=shown.labels {
+            assert_eq!(restored.exemplars(label), whole.exemplars(label));
+        }
+        for at in 12..20 {
+            assert_eq!(frame(&mut restored, at), frame(&mut whole, at));
+        }
+    }
+
+    #[test]
+    fn other_priors_do_not_cost_the_checkpoint_and_those_in_force_go_on() {
+        let figure = |value: f64| Change::To(Figure::new(value).unwrap());
+        let settings = Settings { gamma: figure(0.2), alpha: figure(0.5), ..Settings::default() };
+        let mut whole = Mapper::new(&config(&[]), None, 3, 1).unwrap();
+        (0..4).for_each(|at| drop(frame(&mut whole, at)));
+        whole.tune(&settings);
+        (4..9).for_each(|at| drop(frame(&mut whole, at)));
+        assert_eq!(whole.priors(), [0.5, 0.1, 0.2]);
+        for sets in [&[][..], &["scene.gamma=0.01", "scene.alpha=3"]] {
+            let mut again = Mapper::restore(&config(sets), None, &whole.save(7)).unwrap().mapper;
+            assert_eq!((again.priors(), again.current()), (whole.priors(), whole.current()));
+            again.tune(&settings);
+            assert_eq!(again.current(), whole.current());
+            let mut went_on = Mapper::restore(&config(&[]), None, &whole.save(7)).unwrap().mapper;
+            went_on.tune(&settings);
+            assert_eq!(frame(&mut again, 9), frame(&mut went_on, 9));
+        }
+        let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), None, &whole.save(7)).unwrap().mapper;
+        other.tune(&Settings::default());
+        assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured where nobody says otherwise");
+        assert_eq!(frame(&mut other, 9).epoch, 3);
+    }
+
+    #[test]
+    fn a_frame_rate_takes_the_first_frame_of_each_interval() {
+        let mut mapper = Mapper::new(&config(&[]), None, 0, 1).unwrap();
+        let taken = |mapper: &mut Mapper| {
+            (0..20).filter(|at| mapper.takes(f64::from(*at) * 2.0).then(|| frame(mapper, *at)).is_some()).count()
+        };
+        assert_eq!(taken(&mut mapper), 20);
+        for (rate, frames) in [(30.0, 20), (0.5, 20), (0.25, 10), (0.3, 12), (0.05, 2)] {
+            mapper.tune(&Settings { frames_per_s: Change::To(Figure::new(rate).unwrap()), ..Settings::default() });
+            mapper.last_s = None;
+            assert_eq!(taken(&mut mapper), frames, "{rate} 1/s of 0.5");
+        }
+    }
+
+    #[test]
+    fn other_parameters_and_damage_are_refused_by_name() {
+        let mut mapper = Mapper::new(&config(&[]), None, 0, 1).unwrap();
+        frame(&mut mapper, 0);
+        let bytes = mapper.save(1);
+        let said =
+            |sets: &[&str], bytes: &[u8]| Mapper::restore(&config(sets), None, bytes).err().map(|e| e.to_string());
+        assert_eq!(said(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
+        let other = Some("it was made with other parameters of the scene model".to_owned());
+        assert_eq!(said(&["scene.max_labels=20"], &bytes), other);
+        assert_eq!(said(&["scene.cell_m=0.5"], &bytes), other);
+        assert_eq!(said(&[], &bytes[..bytes.len() / 2]), Some("cut off or damaged".to_owned()));
+        assert_eq!(said(&[], b"hello"), Some("a file of another kind".to_owned()));
+        for at in (20..bytes.len() - 4).step_by(bytes.len() / 200) {
+            let mut content = bytes[20..bytes.len() - 4].to_vec();
+            content[at - 20] ^= 0x41;
+            drop(Mapper::restore(&config(&[]), None, &ENVELOPE.seal(&content)));
+        }
+    }
+}

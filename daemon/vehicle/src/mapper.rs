@@ -1,0 +1,230 @@
+//! Camera frames to label map.
+
+use super::picker::{Judge, PATCH_PX};
+use super::relief::Relief;
+use image::RgbImage;
+use scene_model::exemplars::{Exemplar, ExemplarStore};
+use scene_model::project::{DownCamera, Pose};
+use scene_model::publish::{LabelBook, PublishedCell};
+use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
+use scene_model::words::{Measures, WordConfig, WordExtractor};
+use scenecast_config::Config;
+use scenecast_config::cell_m;
+use scenecast_core::UserError;
+use scenecast_protocol::directive::{Change, Figure, Settings};
+use scenecast_protocol::map::{Cell, PlaneKind};
+use std::collections::BTreeMap;
+
+/// Representative images kept a label.
+const EXEMPLARS_KEPT: usize = 4;
+
+/// The label map after a camera frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapUpdate {
+    /// Mission time of the frame, seconds.
+    pub t_s: f64,
+    /// Epoch of the label ids.
+    pub epoch: u8,
+    /// Labels of every explored cell.
+    pub cells: Vec<(Cell, u8)>,
+    /// How sure the model is of these labels, 0 to 1, depths of the sea floor there, metres, and mean surprise of a word, bits.
+    pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
+    /// Labels given so far.
+    pub labels: u8,
+    /// How badly the model explains each cell.
+    pub perplexity: Vec<(Cell, f32)>,
+}
+
+/// The scene model of one vehicle.
+pub struct Mapper {
+    pub(super) extractor: WordExtractor,
+    camera: DownCamera,
+    cell_m: f64,
+    pub(super) model: SceneModel,
+    pub(super) book: LabelBook,
+    pub(super) exemplars: ExemplarStore,
+    pub(super) relief: Relief,
+    refine_words_per_s: f64,
+    /// Camera frames a second that are taken at most; none: every one.
+    frames_per_s: Option<f64>,
+    configured: Configured,
+    pub(super) last_s: Option<f64>,
+    pub(super) flat: Vec<FlatCell>,
+}
+
+/// What the settings of the operator take the place of.
+struct Configured {
+    priors: [f64; 3],
+    refine_words_per_s: f64,
+    frames_per_s: Option<f64>,
+}
+
+/// A frame rate as it is configured, where 0 is every frame.
+fn every_frame_or(rate: f64) -> Option<f64> {
+    (rate > 0.0).then_some(rate)
+}
+
+impl Mapper {
+    /// A mapper that has seen nothing; its label ids begin at `epoch`.
+    pub fn new(config: &Config, vocabulary: Option<Measures>, epoch: u8, seed: u64) -> Result<Self, UserError> {
+        let extractor =
+            vocabulary.map_or_else(|| WordExtractor::new(&WordConfig::default()), WordExtractor::from_measures);
+        let cell_m = cell_m(config);
+        let birth = match config.scene.birth.as_str() {
+            "collapsed" => Birth::Collapsed,
+            "rost" => Birth::Rost,
+            _ => Birth::Literal,
+        };
+        let scene = SceneConfig {
+            cell_m: [cell_m, cell_m, 1e4],
+            alpha: config.scene.alpha,
+            beta: config.scene.beta,
+            gamma: config.scene.gamma,
+            birth,
+            max_labels: config.scene.max_labels,
+            vocabulary: extractor.vocabulary_size(),
+            max_words_per_cell: config.scene.max_words_per_cell,
+            seed,
+            ..SceneConfig::for_images()
+        };
+        Ok(Self {
+            extractor,
+            camera: DownCamera {
+                metres_per_pixel: config.camera.metres_per_pixel,
+                altitude_m: config.survey.altitude_m,
+            },
+            cell_m,
+            model: SceneModel::new(scene).map_err(|e| UserError::Input(format!("scene.{e}")))?,
+            book: LabelBook::new(epoch),
+            exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
+                .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
+            relief: Relief::default(),
+            refine_words_per_s: f64::from(config.scene.refine_words_per_s),
+            frames_per_s: every_frame_or(config.scene.frames_per_s),
+            configured: Configured {
+                priors: [config.scene.alpha, config.scene.beta, config.scene.gamma],
+                refine_words_per_s: f64::from(config.scene.refine_words_per_s),
+                frames_per_s: every_frame_or(config.scene.frames_per_s),
+            },
+            last_s: None,
+            flat: Vec::new(),
+        })
+    }
+
+    /// Follows settings that were checked; what they do not name is as configured. Topics and their labels stay.
+    pub fn tune(&mut self, settings: &Settings) {
+        let or = |change: Change<Figure>, configured: f64| change.value().map_or(configured, Figure::value);
+        let [alpha, beta, gamma] = self.configured.priors;
+        let priors = (or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma));
+        if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
+            // What a vehicle accepts lies within what the model takes.
+            tracing::error!("the scene model keeps its priors: {e}");
+        }
+        self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
+        self.frames_per_s = settings.frames_per_s.value().map(Figure::value).or(self.configured.frames_per_s);
+    }
+
+    /// Whether a frame taken at mission time `t_s` is to be seen: of each interval of the frame rate the first one is.
+    pub fn takes(&self, t_s: f64) -> bool {
+        let Some(rate) = self.frames_per_s else { return true };
+        let interval = |t_s: f64| (t_s * rate + 1e-6).floor();
+        self.last_s.is_none_or(|last_s| interval(last_s) != interval(t_s))
+    }
+
+    /// Priors in force: alpha, beta, gamma.
+    pub fn priors(&self) -> [f64; 3] {
+        let config = self.model.config();
+        [config.alpha, config.beta, config.gamma]
+    }
+
+    /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.
+    ///
+    /// Its pixels are `scale` times as large on the sea floor as the configured ones.
+    pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
+        let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
+        let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
+        let observations = camera.project(image.width(), image.height(), pose, &words);
+        self.model.insert(t_s, &observations);
+        for seen in &observations {
+            self.relief.add(Cell::new(self.cell(seen.x), self.cell(seen.y)), -seen.z);
+        }
+        let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
+        self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
+        self.flat = self.model.label_map();
+        self.book.publish(&self.flat);
+        let (cell_m, metres_per_pixel) = (self.cell_m, camera.metres_per_pixel);
+        let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
+        judge.review(&mut self.exemplars);
+        judge.offer(&mut self.exemplars, image, pose, t_s);
+        self.current()
+    }
+
+    /// The map as it was published last.
+    pub fn current(&self) -> MapUpdate {
+        let published = self.book.published(&self.flat);
+        let place = |c: &PublishedCell| Cell::new(c.x, c.y);
+        let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
+        let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
+        let curiosity = published.iter().map(|c| (place(c), f64::from(c.perplexity.max(1.0)).log2())).collect();
+        let planes =
+            [(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth), (PlaneKind::Curiosity, curiosity)];
+        MapUpdate {
+            t_s: self.last_s.unwrap_or(0.0),
+            epoch: self.book.epoch(),
+            cells: published.iter().map(|c| (place(c), c.label)).collect(),
+            planes: BTreeMap::from(planes),
+            perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
+            labels: self.book.labels().count() as u8,
+        }
+    }
+
+    /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.
+    pub fn resume(&mut self, epoch: u8, told: u8) {
+        if self.book.epoch() == epoch {
+            self.book.resume(told);
+        } else {
+            self.book.begin_epoch(epoch);
+        }
+    }
+
+    /// Mission time of the last frame, seconds.
+    pub fn last_s(&self) -> Option<f64> {
+        self.last_s
+    }
+
+    fn cell(&self, metres: f64) -> i32 {
+        (metres / self.cell_m).floor() as i32
+    }
+
+    /// The images that represent a label best so far, the best first.
+    pub fn exemplars(&self, label: u8) -> &[Exemplar] {
+        self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
+    }
+
+    /// The images of all labels that have some.
+    pub fn gallery(&self) -> BTreeMap<u8, Vec<Exemplar>> {
+        let labels = self.book.labels();
+        let images = labels.map(|label| (label, self.exemplars(label).to_vec()));
+        images.filter(|(_, images)| !images.is_empty()).collect()
+    }
+
+    /// Epoch of the label ids.
+    pub fn epoch(&self) -> u8 {
+        self.book.epoch()
+    }
+
+    /// Cells with words.
+    pub fn cells(&self) -> usize {
+        self.model.cells()
+    }
+
+    /// Words held.
+    pub fn words(&self) -> u64 {
+        self.model.words()
+    }
+
+    /// Perplexity of the words under the model.
+    pub fn perplexity(&self) -> f64 {
+        self.model.perplexity()
+    }
+}

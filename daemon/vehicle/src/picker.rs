@@ -1,0 +1,148 @@
+//! Which patches of a camera frame show best what a label means.
+
+use scene_model::exemplars::ExemplarStore;
+use scene_model::project::{DownCamera, Pose};
+use scene_model::topics::{FlatCell, TopicId};
+use scene_model::words::Word;
+use scenecast_protocol::exemplar::edge_px;
+
+/// Edge of a patch in pixels: the largest that is sent.
+pub(super) const PATCH_PX: u32 = 128;
+/// Pixels from one place in a frame that is looked at to the next.
+const STEP_PX: u32 = 64;
+/// Least score of a patch that goes on representing its label.
+const LEAST_SCORE: f32 = 0.3;
+
+/// The map by which patches are judged.
+pub(super) struct Judge<'a> {
+    /// Sorted by row and column.
+    pub(super) flat: &'a [FlatCell],
+    pub(super) cell_m: f64,
+    pub(super) metres_per_pixel: f64,
+}
+
+impl Judge<'_> {
+    /// The topic at a place and how sure the model is that all that the smallest image of it would show is of that topic.
+    fn score(&self, place: (f64, f64)) -> Option<(TopicId, f32)> {
+        let topic = self.at(place)?.topic;
+        let reach = f64::from(edge_px(0)) * 0.375 * self.metres_per_pixel;
+        let mut sum = 0.0;
+        for (east, north) in (0..9).map(|i| (f64::from(i % 3 - 1), f64::from(i / 3 - 1))) {
+            let cell = self.at((place.0 + reach * east, place.1 + reach * north));
+            sum += cell.filter(|c| c.topic == topic).map_or(0.0, |c| c.confidence);
+        }
+        Some((topic, sum / 9.0))
+    }
+
+    fn at(&self, place: (f64, f64)) -> Option<&FlatCell> {
+        let index = |metres: f64| (metres / self.cell_m).floor() as i32;
+        let wanted = (index(place.1), index(place.0));
+        let at = self.flat.binary_search_by_key(&wanted, |c| (c.y, c.x)).ok()?;
+        self.flat.get(at)
+    }
+
+    /// Judges the patches that are kept anew: labels of cells change as the model learns.
+    pub(super) fn review(&self, store: &mut ExemplarStore) {
+        store.review(|topic, place| {
+            let (now, score) = self.score(place)?;
+            (now == topic && score >= LEAST_SCORE).then_some(score)
+        });
+    }
+
+    /// Offers patches of a frame, those in the middle first, where the camera distorts least.
+    pub(super) fn offer(&self, store: &mut ExemplarStore, frame: &image::RgbImage, pose: &Pose, t_s: f64) {
+        let (width, height) = frame.dimensions();
+        let edge = PATCH_PX.min(width).min(height);
+        if edge < edge_px(0) {
+            return;
+        }
+        let camera = DownCamera { metres_per_pixel: self.metres_per_pixel, altitude_m: 0.0 };
+        for (left, top) in places(width - edge, height - edge) {
+            let middle = (left as f32 + edge as f32 / 2.0, top as f32 + edge as f32 / 2.0);
+            let centre = [Word { id: 0, u: middle.0, v: middle.1 }];
+            let Some(place) = camera.project(width, height, pose, &centre).first().map(|o| (o.x, o.y)) else { return };
+            let Some((topic, score)) = self.score(place).filter(|s| s.1 >= LEAST_SCORE) else { continue };
+            if store.would_keep(topic, score) {
+                let patch = image::imageops::crop_imm(frame, left, top, edge, edge).to_image();
+                store.offer(topic, patch, score, t_s, place);
+            }
+        }
+    }
+}
+
+/// Corners of patches where there is so much room beside a patch, from the middle outwards.
+fn places(across: u32, down: u32) -> Vec<(u32, u32)> {
+    let along = |room: u32| {
+        let steps = (room / 2) / STEP_PX;
+        let middle = room / 2;
+        (0..=2 * steps).map(move |i| middle + i * STEP_PX - steps * STEP_PX)
+    };
+    let mut all: Vec<(u32, u32)> = along(down).flat_map(|y| along(across).map(move |x| (x, y))).collect();
+    let off = |at: u32, room: u32| u64::from(at.abs_diff(room / 2));
+    all.sort_by_key(|&(x, y)| off(x, across).pow(2) + off(y, down).pow(2));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::RgbImage;
+
+    /// A map that is of topic 1 west of the middle and of topic 2 east of it.
+    fn halves(confidence: f32) -> Vec<FlatCell> {
+        let cell = |x: i32, y: i32| FlatCell {
+            x,
+            y,
+            z: 0,
+            topic: TopicId(if x < 0 { 1 } else { 2 }),
+            words: 9,
+            confidence,
+            perplexity: 1.0,
+        };
+        (-20..20).flat_map(|y| (-20..20).map(move |x| cell(x, y))).collect()
+    }
+
+    fn judge(flat: &[FlatCell]) -> Judge<'_> {
+        Judge { flat, cell_m: 0.25, metres_per_pixel: 0.01 }
+    }
+
+    fn frame() -> RgbImage {
+        RgbImage::from_fn(640, 480, |x, _| image::Rgb([if x < 320 { 10 } else { 200 }, 0, 0]))
+    }
+
+    #[test]
+    fn every_label_in_sight_is_represented_by_what_shows_it_alone() {
+        let flat = halves(0.9);
+        let mut store = ExemplarStore::new(4, PATCH_PX);
+        judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);
+        for (topic, shade) in [(1, 10), (2, 200)] {
+            let best = store.best(TopicId(topic)).unwrap();
+            assert!(best.score > 0.85, "{}", best.score);
+            let small = crate::exemplar::middle(&best.patch, 0).unwrap().1;
+            assert!(small.pixels().all(|p| p.0[0] == shade), "topic {topic} at {:?}", best.place);
+        }
+        assert!(store.all(TopicId(1)).len() > 1, "there are others to show");
+    }
+
+    #[test]
+    fn a_patch_whose_place_has_another_label_by_now_represents_it_no_more() {
+        let flat = halves(0.9);
+        let mut store = ExemplarStore::new(4, PATCH_PX);
+        judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);
+        let mut changed = halves(0.5);
+        changed.iter_mut().for_each(|c| c.topic = TopicId(2));
+        judge(&changed).review(&mut store);
+        assert!(store.best(TopicId(1)).is_none());
+        assert!(store.best(TopicId(2)).unwrap().score < 0.6);
+    }
+
+    #[test]
+    fn frames_that_are_too_small_are_passed_over() {
+        let flat = halves(0.9);
+        let mut store = ExemplarStore::new(4, PATCH_PX);
+        judge(&flat).offer(&mut store, &RgbImage::new(63, 480), &Pose::default(), 1.0);
+        assert!(store.best(TopicId(1)).is_none() && store.best(TopicId(2)).is_none());
+        assert_eq!(places(0, 0), [(0, 0)]);
+        assert_eq!(places(100, 150)[0], (50, 75));
+    }
+}

@@ -1,0 +1,118 @@
+//! Where the vehicle may go.
+
+use scenecast_protocol::directive::{Fence, Polygon};
+
+/// East and north of the origin, metres.
+pub type Point = (f64, f64);
+
+/// The fence and the keep-outs in metres, and how far from them the vehicle stays for its size and turns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Bounds {
+    fence: Option<Vec<Point>>,
+    keep_outs: Vec<Vec<Point>>,
+    clearance_m: f64,
+}
+
+impl Bounds {
+    /// The bounds of a fence that was checked.
+    pub fn new(fence: &Fence, clearance_m: f64) -> Self {
+        let metres = |p: &Polygon| p.0.iter().map(|v| v.metres()).collect();
+        Self {
+            fence: fence.fence.as_ref().map(metres),
+            keep_outs: fence.keep_outs.iter().map(metres).collect(),
+            clearance_m,
+        }
+    }
+
+    /// Whether the vehicle may be at a place, clearance or not.
+    pub fn holds(&self, at: Point) -> bool {
+        self.fence.as_ref().is_none_or(|f| contains(f, at)) && !self.keep_outs.iter().any(|k| contains(k, at))
+    }
+
+    /// Whether the vehicle may plan to be at a place.
+    pub fn allows(&self, at: Point) -> bool {
+        self.holds(at) && self.is_clear(at, at)
+    }
+
+    /// Whether the vehicle may plan to go straight from one place to another.
+    pub fn allows_leg(&self, from: Point, to: Point) -> bool {
+        self.holds(from) && self.holds(to) && self.is_clear(from, to)
+    }
+
+    /// Whether a straight way out of the margin meets no outline.
+    pub fn allows_exit(&self, from: Point, to: Point) -> bool {
+        self.holds(from) && self.allows(to) && !self.edges().any(|(a, b)| segments_meet(from, to, a, b))
+    }
+
+    fn is_clear(&self, from: Point, to: Point) -> bool {
+        self.edges().all(|(a, b)| distance_of_segments(from, to, a, b) >= self.clearance_m)
+    }
+
+    fn edges(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
+        self.fence.iter().chain(&self.keep_outs).flat_map(|o| o.iter().copied().zip(o.iter().copied().cycle().skip(1)))
+    }
+}
+
+/// Metres between two places.
+pub fn distance(a: Point, b: Point) -> f64 {
+    (a.0 - b.0).hypot(a.1 - b.1)
+}
+
+fn contains(outline: &[Point], (x, y): Point) -> bool {
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    edges.fold(false, |inside, (a, b)| {
+        let spans = (a.1 > y) != (b.1 > y);
+        inside ^ (spans && x < (b.0 - a.0) * (y - a.1) / (b.1 - a.1) + a.0)
+    })
+}
+
+fn distance_of_segments(a: Point, b: Point, c: Point, d: Point) -> f64 {
+    if segments_meet(a, b, c, d) {
+        return 0.0;
+    }
+    let ends = [to_segment(a, c, d), to_segment(b, c, d), to_segment(c, a, b), to_segment(d, a, b)];
+    ends.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+fn segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool {
+    let side = |p: Point, q: Point, r: Point| (q.0 - p.0) * (r.1 - p.1) - (q.1 - p.1) * (r.0 - p.0);
+    side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0 && boxes_meet(a, b, c, d)
+}
+
+fn boxes_meet(a: Point, b: Point, c: Point, d: Point) -> bool {
+    let meet = |p: f64, q: f64, r: f64, s: f64| p.min(q) <= r.max(s) && r.min(s) <= p.max(q);
+    meet(a.0, b.0, c.0, d.0) && meet(a.1, b.1, c.1, d.1)
+}
+
+/// Metres from a place to a segment.
+fn to_segment(p: Point, a: Point, b: Point) -> f64 {
+    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+    let length = dx * dx + dy * dy;
+    let t = if length > 0.0 { (((p.0 - a.0) * dx + (p.1 - a.1) * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+    distance(p, (a.0 + t * dx, a.1 + t * dy))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::directive::Place;
+
+    fn square(x: i32, y: i32, side: i32) -> Polygon {
+        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        Polygon(vec![place(x, y), place(x + side, y), place(x + side, y + side), place(x, y + side)])
+    }
+
+    #[test]
+    fn the_vehicle_keeps_clear_of_fence_and_keep_outs() {
+        let fence = Fence { fence: Some(square(0, 0, 100)), keep_outs: vec![square(40, 40, 20)], return_point: None };
+        let bounds = Bounds::new(&fence, 2.0);
+        assert!(bounds.allows((10.0, 10.0)) && bounds.allows((38.0, 50.0)));
+        assert!(!bounds.allows((1.0, 50.0)) && bounds.holds((1.0, 50.0)), "within the margin");
+        assert!(!bounds.holds((50.0, 50.0)) && !bounds.holds((-1.0, 50.0)));
+        assert!(bounds.allows_leg((10.0, 30.0), (90.0, 30.0)));
+        assert!(!bounds.allows_leg((10.0, 39.0), (90.0, 39.0)), "one metre from the keep-out");
+        assert!(!bounds.allows_leg((10.0, 50.0), (90.0, 50.0)), "through the keep-out");
+        assert!(bounds.allows_exit((1.0, 50.0), (5.0, 50.0)) && !bounds.allows_exit((39.0, 50.0), (70.0, 50.0)));
+        assert!(Bounds::default().allows_leg((-1e6, 0.0), (1e6, 0.0)));
+    }
+}

@@ -1,0 +1,129 @@
+//! Which way to go: places, what they are worth, and the planners that choose among them.
+
+mod bounds;
+mod expect;
+mod greedy;
+mod horizon;
+mod lattice;
+mod lawnmower;
+mod way_back;
+mod worth;
+
+pub use bounds::{Bounds, Point, distance};
+pub use expect::{Expectation, Seen};
+pub use greedy::Greedy;
+pub use horizon::Horizon;
+pub use lattice::{Lattice, Node, Ways};
+pub use lawnmower::Lawnmower;
+pub use worth::{Knowledge, Shown, Window, Worth};
+
+use scenecast_protocol::directive::PlannerKind;
+
+/// Where the vehicle is, what is left to it, and what there is to gain.
+#[derive(Debug)]
+pub struct Question<'a> {
+    /// Places and ways that are allowed.
+    pub lattice: &'a Lattice,
+    /// What is to be gained.
+    pub worth: &'a Worth,
+    /// Where the way begins.
+    pub from: Node,
+    /// Ways from the place where it must be able to end.
+    pub home: &'a Ways,
+    /// Metres that may be gone from `from`, the way home included; infinite if there is no limit.
+    pub left_m: f64,
+}
+
+impl Question<'_> {
+    /// Whether the way home from `node` can still be gone after `gone_m` metres.
+    pub fn can_return(&self, node: Node, gone_m: f64) -> bool {
+        // A way that begins where no way home is known may go on: it is lost either way.
+        !self.left_m.is_finite() || gone_m + self.home.metres[node] <= self.left_m + 1e-6
+    }
+}
+
+/// Chooses a way.
+///
+/// The answer's places are neighbours on the lattice, the first next to [`Question::from`], and the way home from each is
+/// within what is left. Empty: there is nothing to gain, or nothing left. The same questions in the same order get the same
+/// answers.
+pub trait Planner: std::fmt::Debug + Send {
+    /// The way to go next.
+    fn plan(&mut self, question: &Question<'_>) -> Vec<Node>;
+
+    /// Places that it will go to after its last answer, the next one first, each by the shortest way; empty where it decides
+    /// when it is there.
+    fn beyond(&self) -> Vec<Node> {
+        Vec::new()
+    }
+
+    /// The lattice has changed: places have other numbers.
+    fn handle_change(&mut self) {}
+}
+
+/// The planner of a kind.
+pub fn planner(kind: PlannerKind) -> Box<dyn Planner> {
+    match kind {
+        PlannerKind::Lawnmower => Box::new(Lawnmower::default()),
+        PlannerKind::Greedy => Box::new(Greedy),
+        PlannerKind::Horizon => Box::new(Horizon::default()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use scenecast_core::Area;
+    use scenecast_protocol::directive::{Fence, Place, Polygon, Utility};
+    use scenecast_protocol::map::{Cell, LabelGrid};
+
+    const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
+
+    /// The answer of a planner on a patchy map with a keep-out, and whether each of its places may be gone to.
+    fn ask(kind: PlannerKind, corner: (i32, i32), start: usize, left_m: f64, weights: (i8, i8)) -> (Vec<Node>, bool) {
+        let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let (x, y) = corner;
+        let keep_out = Polygon(vec![place(x, y), place(x + 4, y + 1), place(x + 2, y + 5)]);
+        let bounds = Bounds::new(&Fence { keep_outs: vec![keep_out], ..Fence::default() }, 0.5);
+        let lattice = Lattice::new(AREA, &[], 0.9, &bounds);
+        let seen = (0..40).flat_map(|y| (0..50).map(move |x| (x, y)));
+        let map: LabelGrid = seen.map(|(x, y)| (Cell::new(x, y), ((x / 9 + y / 7) % 3 + 1) as u8)).collect();
+        let weights = [(1, weights.0), (2, weights.1)].into_iter().collect();
+        let utility = Utility { exploration: 5, weights, ..Utility::default() };
+        let worth = Worth::new(&lattice, (&Window::new(AREA, 0.25), (0.0, 0.0)), &map, &Knowledge::default(), &utility);
+        let open: Vec<Node> = (0..lattice.places()).filter(|&n| lattice.is_open(n)).collect();
+        let (from, home) = (open[start % open.len()], lattice.ways(open[(start / 7) % open.len()]));
+        let question = Question { lattice: &lattice, worth: &worth, from, home: &home, left_m };
+        let way = planner(kind).plan(&question);
+        let (mut at, mut gone_m, mut is_allowed) = (from, 0.0, true);
+        for &node in &way {
+            let step = lattice.around(at).find(|(n, _)| *n == node).map_or(f64::INFINITY, |(_, step)| step);
+            (at, gone_m) = (node, gone_m + step);
+            is_allowed &= bounds.allows(lattice.place(node)) && gone_m + home.metres[node] <= left_m + 1e-6;
+        }
+        (way, is_allowed)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn every_way_is_allowed_leaves_the_way_home_and_is_the_same_again(
+            corner in (1i32..15, 1i32..8), start in 0usize..100_000, left_m in 0.0f64..80.0,
+            weights in (-100i8..=100, -100i8..=100),
+        ) {
+            for kind in PlannerKind::ALL {
+                let (way, is_allowed) = ask(kind, corner, start, left_m, weights);
+                prop_assert!(is_allowed, "{kind:?}: {way:?}");
+                prop_assert_eq!(&way, &ask(kind, corner, start, left_m, weights).0);
+            }
+        }
+    }
+
+    #[test]
+    fn with_metres_left_every_planner_goes() {
+        for kind in PlannerKind::ALL {
+            assert!(!ask(kind, (8, 4), 200, 80.0, (100, 0)).0.is_empty(), "{kind:?}");
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! What it is worth to see each part of the sea floor next.
+
+use super::bounds::Point;
+use super::expect::{Expectation, Seen};
+use super::lattice::{Lattice, Node};
+use scenecast_protocol::directive::Utility;
+use scenecast_protocol::map::{Cell, LabelGrid};
+
+/// What the vehicle knows of the sea floor.
+#[derive(Debug, Default, Clone)]
+pub struct Knowledge {
+    /// How often the camera looked at each cell, up to 255.
+    looks: LabelGrid,
+    /// How badly the scene model explains each cell, 1..=255: twenty times the logarithm of its perplexity.
+    surprise: LabelGrid,
+}
+
+impl Knowledge {
+    /// The camera saw a cell.
+    pub fn look(&mut self, cell: Cell) {
+        let looks = self.looks.get(cell);
+        self.looks.set(cell, looks.saturating_add(1));
+    }
+
+    /// The scene model's perplexity of a cell.
+    pub fn set_perplexity(&mut self, cell: Cell, perplexity: f32) {
+        let level = (20.0 * perplexity.max(1.0).ln()).round().clamp(1.0, 255.0);
+        self.surprise.set(cell, level as u8);
+    }
+}
+
+/// Worth of the next look at a cell that was looked at before, against the look before that.
+const AGAIN: f32 = 0.2;
+
+/// Worth of the next look at each block, the square between four places of a lattice. A place shows the four blocks around it.
+#[derive(Debug, Clone)]
+pub struct Worth {
+    /// Blocks of a row: one more than places.
+    columns: usize,
+    blocks: Vec<f32>,
+}
+
+/// The blocks of a place, as places in the rows of blocks.
+pub type Shown = [usize; 4];
+
+impl Worth {
+    /// Worth by the operator's utility, in whole cells of weight 1. Beyond the cells of the window nothing is worth anything;
+    /// with it goes where its cells lie in the world.
+    pub fn new(
+        lattice: &Lattice,
+        (window, placed): (&Window, Point),
+        map: &LabelGrid,
+        known: &Knowledge,
+        utility: &Utility,
+    ) -> Self {
+        let (places, rows) = lattice.size();
+        let columns = places + 1;
+        let mut worth = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
+        let (south_west, step) = (lattice.place(0), lattice.step_m());
+        let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
+        let cells = window.worth_of_cells(map, known, utility);
+        for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
+            let y = block(window.centre(row, window.y) + placed.1, south_west.1);
+            if !(0..=rows as i64).contains(&y) {
+                continue;
+            }
+            for (column, value) in (0..).zip(line) {
+                let x = block(window.centre(column, window.x) + placed.0, south_west.0);
+                if (0..columns as i64).contains(&x) {
+                    worth.blocks[y as usize * columns + x as usize] += value;
+                }
+            }
+        }
+        worth
+    }
+
+    /// The blocks that a place shows.
+    pub fn shown(&self, node: Node) -> Shown {
+        let first = node + node / (self.columns - 1);
+        [first, first + 1, first + self.columns, first + self.columns + 1]
+    }
+
+    /// Worth of a block.
+    pub fn of(&self, block: usize) -> f32 {
+        self.blocks[block]
+    }
+
+    /// Number of blocks.
+    pub fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+}
+
+/// The cells whose worth counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    /// Westernmost column.
+    pub x: i32,
+    /// Southernmost row.
+    pub y: i32,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Edge of a cell, metres.
+    pub cell_m: f64,
+}
+
+/// Most cells whose worth is reckoned one by one.
+const MOST_CELLS: f64 = 4e6;
+
+impl Window {
+    /// The cells of an area; fewer where that would be too many.
+    pub fn new(area: scenecast_core::Area, cell_m: f64) -> Self {
+        let cell = |metres: f64| (metres / cell_m + 1e-9).floor().clamp(-1e9, 1e9) as i32;
+        let (x, y) = (cell(area.west), cell(area.south));
+        let count =
+            |from: i32, to: f64| f64::from((((to / cell_m - 1e-9).ceil().clamp(-1e9, 1e9) as i32) - from).max(1));
+        let (width, height) = (count(x, area.east), count(y, area.north));
+        let height = height.min((MOST_CELLS / width).max(1.0));
+        Self { x, y, width: width.min(MOST_CELLS) as usize, height: height as usize, cell_m }
+    }
+
+    /// The middle of a cell of the window, metres.
+    fn centre(&self, index: i64, first: i32) -> f64 {
+        (f64::from(first) + index as f64 + 0.5) * self.cell_m
+    }
+
+    fn copy(&self, grid: &LabelGrid) -> Vec<u8> {
+        grid.copy_area(i64::from(self.x), i64::from(self.y), self.width, self.height)
+    }
+
+    fn worth_of_cells(&self, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Vec<f32> {
+        let labels = self.copy(map);
+        let seen = Seen { labels: &labels, width: self.width };
+        let weight: Vec<f32> = (0..=255).map(|l| utility.weight(l) as f32).collect();
+        let (exploration, curiosity) = (f32::from(utility.exploration) / 100.0, f32::from(utility.curiosity) / 100.0);
+        let expectation = Expectation::new(seen);
+        let mut worth = expectation.of(|label| weight[usize::from(label)], 0.0);
+        for (w, &label) in worth.iter_mut().zip(&labels) {
+            *w = if label == 0 { *w + exploration } else { weight[usize::from(label)] };
+        }
+        if curiosity != 0.0 {
+            let odd = oddness(&self.copy(&known.surprise));
+            worth.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
+        }
+        let looks = self.copy(&known.looks);
+        worth.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= AGAIN.powi(i32::from(n)));
+        worth
+    }
+}
+
+/// Surprise of each cell from 0, the least on the map, to 1, the most; unseen cells have the mean.
+fn oddness(surprise: &[u8]) -> Vec<f32> {
+    let known = || surprise.iter().filter(|&&s| s > 0).map(|&s| f32::from(s));
+    let (least, most) = known().fold((255.0f32, 0.0f32), |(l, m), s| (l.min(s), m.max(s)));
+    let scale = 1.0 / (most - least).max(1.0);
+    let count = known().count().max(1) as f32;
+    let mean = known().map(|s| (s - least) * scale).sum::<f32>() / count;
+    surprise.iter().map(|&s| if s == 0 { mean } else { (f32::from(s) - least) * scale }).collect()
+}

@@ -1,0 +1,190 @@
+//! What is planned after the waypoint, as people are told it.
+
+use super::Steering;
+use crate::planning::{Point, distance};
+use scenecast_protocol::wire::PlannedPath;
+
+/// A way as its corners.
+struct Corners {
+    start: Point,
+    places: Vec<Point>,
+    metres: f64,
+}
+
+impl Corners {
+    fn new(start: Point) -> Self {
+        Self { start, places: Vec::new(), metres: 0.0 }
+    }
+
+    /// Where it ends.
+    fn end(&self) -> Point {
+        self.places.last().copied().unwrap_or(self.start)
+    }
+
+    /// Straight on to there; a place on a straight stretch is no corner.
+    fn go(&mut self, to: Point) {
+        let (end, leg) = (self.end(), distance(self.end(), to));
+        if leg < 1e-6 {
+            return;
+        }
+        self.metres += leg;
+        let before = self.places.iter().rev().nth(1).copied().unwrap_or(self.start);
+        match self.places.last_mut() {
+            Some(last) if is_straight(before, end, to) => *last = to,
+            _ => self.places.push(to),
+        }
+    }
+
+    /// Whether more corners would not be told.
+    fn is_full(&self) -> bool {
+        self.places.len() > PlannedPath::MOST
+    }
+
+    fn told(mut self) -> PlannedPath {
+        let goes_on = self.is_full();
+        self.places.truncate(PlannedPath::MOST);
+        PlannedPath { places: self.places, goes_on }
+    }
+}
+
+fn is_straight(a: Point, b: Point, c: Point) -> bool {
+    let ((x, y), (u, v)) = ((b.0 - a.0, b.1 - a.1), (c.0 - b.0, c.1 - b.1));
+    x * u + y * v > 0.0 && (x * v - y * u).abs() < 1e-3 * x.hypot(y) * u.hypot(v)
+}
+
+impl Steering {
+    /// The plan after the waypoint that [`Self::next`] gave last, from which `left_m` metres may be gone. Places are of the
+    /// world.
+    pub fn ahead(&self, waypoint: Point, left_m: f64) -> PlannedPath {
+        let left_m = left_m - self.home_leg_m;
+        let mut way = Corners::new(waypoint);
+        self.plan.iter().for_each(|&node| way.go(self.lattice.place(node)));
+        let Some(&(mut end)) = self.plan.back() else { return way.told() };
+        for goal in self.planner.beyond() {
+            if way.is_full() {
+                break;
+            }
+            let straight = self.lattice.straight(end, goal);
+            for node in straight.unwrap_or_else(|| self.lattice.ways(end).to(goal)) {
+                let place = self.lattice.place(node);
+                if !self.leaves_way_home(node, way.metres + distance(way.end(), place), left_m) {
+                    return way.told();
+                }
+                way.go(place);
+                end = node;
+            }
+        }
+        way.told()
+    }
+
+    /// The way home after a waypoint of it.
+    pub fn ahead_home(&self, waypoint: Point) -> PlannedPath {
+        let mut way = Corners::new(waypoint);
+        let home = self.home();
+        if let Some((_, end, nodes)) = self.way_home(waypoint) {
+            nodes.into_iter().for_each(|node| way.go(self.lattice.place(node)));
+            if self.bounds.allows_exit(home, self.lattice.place(end)) {
+                way.go(home);
+            }
+        }
+        way.told()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Course, Footprint};
+    use scenecast_core::Area;
+    use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
+    use scenecast_protocol::map::{Cell, LabelGrid};
+
+    const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
+    const FOOTPRINT: Footprint = Footprint { across: 4.0, along: 4.0 };
+
+    fn steering(kind: PlannerKind) -> Steering {
+        Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
+    }
+
+    /// The waypoint from the start, and what is told to come after it.
+    fn first(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> (Point, PlannedPath) {
+        let from = steering.start();
+        let Course::Go(to) = steering.next(from, (map, 1), utility, left_m) else { panic!("nowhere to go") };
+        (to, steering.ahead(to, left_m - distance(from, to)))
+    }
+
+    #[test]
+    fn a_way_is_told_by_its_corners_and_that_it_goes_on() {
+        let mut way = Corners::new((0.0, 0.0));
+        for to in [(0.0, 0.0), (1.8, 0.0), (3.6, 0.0), (5.4, 1.8), (7.2, 3.6), (7.2, 3.6), (5.4, 1.8)] {
+            way.go(to);
+        }
+        let folded = [(3.6, 0.0), (7.2, 3.6), (5.4, 1.8)];
+        assert_eq!(way.told(), PlannedPath { places: folded.to_vec(), goes_on: false });
+        let stairs = |steps: i32| {
+            let mut way = Corners::new((0.0, 0.0));
+            (1..=steps).for_each(|i| way.go((f64::from(i / 2), f64::from((i + 1) / 2))));
+            way.told()
+        };
+        assert_eq!((stairs(7).places.len(), stairs(7).goes_on), (7, false));
+        assert_eq!((stairs(8).places, stairs(8).goes_on), (stairs(7).places, true));
+    }
+
+    #[test]
+    fn the_lawnmower_tells_the_legs_that_it_then_goes() {
+        let mut steering = steering(PlannerKind::Horizon);
+        let (mut at, told) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
+        assert_eq!((told.places.len(), told.goes_on), (4, false));
+        for place in told.places {
+            let Course::Go(to) = steering.next(at, (&LabelGrid::default(), 1), None, f64::INFINITY) else { panic!() };
+            assert!(distance(to, place) < 1e-9, "{to:?} instead of {place:?}");
+            at = to;
+        }
+    }
+
+    #[test]
+    fn no_leg_is_told_that_would_leave_no_way_home() {
+        let metres = |left_m: f64| {
+            let mut steering = steering(PlannerKind::Lawnmower);
+            let (to, told) = first(&mut steering, &LabelGrid::default(), None, left_m);
+            let way: Vec<Point> = [steering.start(), to].into_iter().chain(told.places).collect();
+            let gone: f64 = way.windows(2).map(|w| distance(w[0], w[1])).sum();
+            gone + distance(way[way.len() - 1], steering.home())
+        };
+        assert!(metres(f64::INFINITY) > 60.0);
+        for left_m in [10.0, 25.0, 40.0, 55.0] {
+            assert!(metres(left_m) <= left_m && metres(left_m) > left_m - 8.0, "{} of {left_m}", metres(left_m));
+        }
+    }
+
+    #[test]
+    fn a_horizon_is_told_as_it_is_planned_and_anew_when_the_plan_is() {
+        let label = |x: i32, y: i32, east: bool| if (x > 40) == east && y > 10 { 2 } else { 1 };
+        let map = |east: bool| -> LabelGrid {
+            (0..48 * 80).map(|i| (i % 80, i / 80)).map(|(x, y)| (Cell::new(x, y), label(x, y, east))).collect()
+        };
+        let utility = Utility { weights: [(2, 100), (1, -5)].into(), ..Utility::default() };
+        let mut steering = steering(PlannerKind::Horizon);
+        let (to, told) = first(&mut steering, &map(true), Some(&utility), f64::INFINITY);
+        assert!(!told.places.is_empty());
+        let Course::Go(next) = steering.next(to, (&map(true), 1), Some(&utility), f64::INFINITY) else { panic!() };
+        assert!(told.places[0] == next || is_straight(to, next, told.places[0]), "{next:?} is on no leg of {told:?}");
+        let Course::Go(west) = steering.next(to, (&map(false), 2), Some(&utility), f64::INFINITY) else { panic!() };
+        assert_ne!(steering.ahead(west, f64::INFINITY), told);
+    }
+
+    #[test]
+    fn the_way_home_is_told_round_what_is_kept_out() {
+        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let wall = Polygon(vec![place(9, -5), place(11, -5), place(11, 8), place(9, 8)]);
+        let mut steering = steering(PlannerKind::Lawnmower);
+        let return_point = Some(Place { x_dm: 31, y_dm: 33 });
+        steering.set_fence(&Fence { keep_outs: vec![wall], return_point, ..Fence::default() });
+        let Course::Go(to) = steering.next_home((17.0, 3.0)) else { panic!("no way") };
+        let told = steering.ahead_home(to);
+        assert_eq!((told.places.last(), told.goes_on), (Some(&(3.1, 3.3)), false));
+        assert!(told.places.iter().any(|p| p.1 > 8.0), "{told:?}");
+        let way: Vec<Point> = std::iter::once(to).chain(told.places).collect();
+        assert!(way.windows(2).all(|w| steering.bounds().allows_leg(w[0], w[1])));
+    }
+}

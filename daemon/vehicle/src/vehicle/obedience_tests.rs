@@ -1,0 +1,325 @@
+//! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
+
+use super::{Vehicle, VehicleOutput};
+use crate::{Durable, MapUpdate, Navigator};
+use proptest::prelude::*;
+use scenecast_config::Config;
+use scenecast_core::Area;
+use scenecast_motion::Motion;
+use scenecast_motion::stretches_outside;
+use scenecast_protocol::directive::{
+    CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason,
+    Settings, Slot, Utility,
+};
+use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::map::Cell;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+const AREA: Area = Area { west: 0.0, south: 0.0, east: 40.0, north: 30.0 };
+const STEP_S: f64 = 0.5;
+
+/// A vehicle in kinematic water, and what it was told.
+struct Sea {
+    vehicle: Vehicle,
+    motion: Motion,
+    now: Instant,
+    fence: Fence,
+    /// Limit of distance, and what of it is used.
+    limit: Option<(f64, f64)>,
+}
+
+fn profile(config: &Config) -> ModemProfile {
+    scenecast_config::modem_profile(config, config.modem.bit_rate)
+}
+
+impl Sea {
+    fn new(drift: f64, seed: u64) -> Self {
+        let mut config = Config::default();
+        config.camera.width_px = 320;
+        config.camera.height_px = 240;
+        let profile = profile(&config);
+        let now = Instant::ZERO;
+        let vehicle = crate::assemble(&config, None, profile, AREA, Durable::default(), seed, now).unwrap();
+        let (x, y) = vehicle.navigator().position();
+        Self { vehicle, motion: Motion::new(x, y, 0.5, drift, seed), now, fence: Fence::default(), limit: None }
+    }
+
+    fn tell(&mut self, slot: Slot) {
+        if self.vehicle.apply(slot.clone(), self.now).is_err() {
+            return;
+        }
+        match slot {
+            Slot::Fence(fence) => self.fence = fence,
+            Slot::Limits(limits) => self.limit = limits.distance_m.map(|m| (f64::from(m), 0.0)),
+            _ => {}
+        }
+    }
+
+    fn see(&mut self, seed: u64) {
+        let patch = |x: i32, y: i32| (((x / 9 + 3 * (y / 7)) as u64).wrapping_mul(seed | 1) >> 40) as u8 % 4 + 1;
+        let (x, y) = self.vehicle.navigator().position();
+        let (x, y) = ((x / 0.25) as i32, (y / 0.25) as i32);
+        let cells = (-6..6).flat_map(|dy| (-6..6).map(move |dx| (x + dx, y + dy)));
+        let mut known: Vec<(Cell, u8)> = self.vehicle.cells().collect();
+        known.extend(cells.map(|(x, y)| (Cell::new(x, y), patch(x, y))));
+        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: 0.0, epoch: 0, cells: known, planes, perplexity, labels: 4 };
+        self.vehicle.handle_map(&update, self.now);
+    }
+
+    /// Half a second; checks every leg that the vehicle sets out on.
+    fn step(&mut self) {
+        self.now = self.now + Duration::from_secs_f64(STEP_S);
+        self.vehicle.steer(self.now);
+        let at = self.vehicle.navigator().position();
+        while let Some(output) = self.vehicle.poll_output() {
+            match output {
+                VehicleOutput::Waypoint(x, y) => {
+                    let navigator = self.vehicle.navigator();
+                    self.check(navigator.to_world(at), navigator.to_world((x, y)));
+                    self.check_path();
+                    self.motion.set_target(Some((x, y)));
+                }
+                VehicleOutput::Hold => self.motion.set_target(None),
+                VehicleOutput::Surface => self.motion.come_up(),
+                _ => {}
+            }
+        }
+        let o = self.motion.step(at, STEP_S);
+        self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, self.vehicle.navigator().depth_m(), self.now);
+        if let Some((_, used)) = &mut self.limit {
+            *used += o.dx_m.hypot(o.dy_m);
+        }
+    }
+
+    fn check(&self, from: (f64, f64), to: (f64, f64)) {
+        let is_back = stretches_outside(&[from, from], &self.fence) > 0;
+        assert!(stretches_outside(&[to, to], &self.fence) == 0, "{to:?} is outside of {:?}", self.fence);
+        // From outside the way in is straight.
+        assert!(is_back || stretches_outside(&[from, to], &self.fence) == 0, "{from:?} to {to:?}: {:?}", self.fence);
+        let returns = self.vehicle.mode().0 == VehicleMode::Return;
+        if let Some((limit, used)) = self.limit.filter(|_| !returns) {
+            let leg = (to.0 - from.0).hypot(to.1 - from.1);
+            assert!(used + leg <= limit, "{used} m and {leg} m more are beyond {limit} m");
+        }
+    }
+
+    /// What is told to come after the waypoint, too.
+    fn check_path(&self) {
+        let (vehicle, navigator) = (&self.vehicle, self.vehicle.navigator());
+        let waypoint = navigator.to_world(vehicle.waypoint().unwrap());
+        let path: Vec<(f64, f64)> = vehicle.path().places.iter().map(|&p| navigator.to_world(p)).collect();
+        let way: Vec<(f64, f64)> = std::iter::once(waypoint).chain(path).collect();
+        assert_eq!(stretches_outside(&way, &self.fence), 0, "{way:?} leaves {:?}", self.fence);
+        let returns = vehicle.mode().0 == VehicleMode::Return;
+        if let Some((limit, used)) = self.limit.filter(|_| !returns) {
+            let legs: f64 = way.windows(2).map(|w| (w[1].0 - w[0].0).hypot(w[1].1 - w[0].1)).sum();
+            assert!(used + legs <= limit, "{used} m and {legs} m more are beyond {limit} m");
+        }
+    }
+}
+
+fn fence() -> impl Strategy<Value = Slot> {
+    let corner =
+        |x: std::ops::Range<i32>, y: std::ops::Range<i32>| (x, y).prop_map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+    let outline =
+        (corner(-20..8, -20..8), corner(150..410, -20..8), corner(150..410, 120..310), corner(-20..8, 120..310));
+    let keep_out = (0i32..350, 0i32..250, 10i32..120).prop_map(|(x, y, r)| {
+        let at = |dx: i32, dy: i32| Place { x_dm: x + dx, y_dm: y + dy };
+        Polygon(vec![at(-r, -r), at(r, -r / 2), at(r / 3, r)])
+    });
+    let home = proptest::option::of(corner(0..200, 0..150));
+    (outline, proptest::collection::vec(keep_out, 0..4), home).prop_map(|((a, b, c, d), keep_outs, return_point)| {
+        Slot::Fence(Fence { fence: Some(Polygon(vec![a, b, c, d])), keep_outs, return_point })
+    })
+}
+
+fn order() -> impl Strategy<Value = Slot> {
+    let reaction =
+        || proptest::sample::select(vec![None, Some(Reaction::Hold), Some(Reaction::Return), Some(Reaction::Surface)]);
+    let limits = (
+        proptest::option::of(10u32..300),
+        proptest::option::of(60u32..2000),
+        proptest::option::of(5u16..400),
+        reaction(),
+        reaction(),
+    );
+    prop_oneof![
+        4 => fence(),
+        2 => limits.prop_map(|(distance_m, time_s, silence_s, on_silence, on_breach)| {
+            Slot::Limits(Limits { distance_m, time_s, silence_s, on_silence, on_breach, ..Limits::default() })
+        }),
+        2 => (-100i8..=100, -100i8..=100, -100i8..=100, -20i8..=100).prop_map(|(a, b, c, exploration)| {
+            Slot::Utility(Utility { epoch: 0, exploration, curiosity: c / 2, weights: [(1, a), (2, b), (3, c)].into() })
+        }),
+        1 => (any::<bool>(), prop::bool::weighted(0.2)).prop_map(|(hold, abort)| Slot::Constraints(Constraints { hold, abort })),
+        1 => Just(Slot::Constraints(Constraints::default())),
+        1 => proptest::sample::select(vec![None, Some(PlannerKind::Lawnmower), Some(PlannerKind::Greedy), Some(PlannerKind::Horizon)])
+            .prop_map(|planner| Slot::Settings(Settings { planner: planner.map_or(Change::Configured, Change::To), ..Settings::default() })),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn no_waypoint_leads_out_of_the_fence_into_a_keep_out_or_beyond_a_limit(
+        orders in proptest::collection::vec((0u32..160, order()), 1..12),
+        drift in 0.0f64..0.05, seed: u64, fixes: bool,
+    ) {
+        let mut sea = Sea::new(drift, seed);
+        sea.see(seed);
+        for (steps, slot) in orders {
+            sea.tell(slot);
+            for step in 0..steps {
+                sea.step();
+                if step % 8 == 0 {
+                    sea.see(seed);
+                }
+                if fixes && step % 20 == 0 {
+                    let (x, y) = (sea.motion.x_m, sea.motion.y_m);
+                    sea.vehicle.navigator.handle_fix(x, y, 0.3, sea.now, sea.now);
+                }
+            }
+        }
+    }
+}
+
+/// A fence from the origin to (20, 20) m with a return point at (5, 5) m.
+fn small_fence() -> Fence {
+    let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+    let fence = Polygon(vec![place(-1, -1), place(20, -1), place(20, 20), place(-1, 20)]);
+    Fence { fence: Some(fence), keep_outs: Vec::new(), return_point: Some(place(5, 5)) }
+}
+
+#[test]
+fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.tell(Slot::Fence(small_fence()));
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
+    sea.vehicle.navigator.set_pose(25.0, 5.0, 0.0, 16.0, sea.now);
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Return, ModeReason::Fence));
+    assert_eq!(sea.vehicle.durable().breach, 2);
+    (0..200).for_each(|_| sea.step());
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Hold, ModeReason::Fence), "back at the return point");
+    sea.tell(Slot::Constraints(Constraints::default()));
+    sea.step();
+    assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
+}
+
+#[test]
+fn an_order_takes_the_path_away_until_there_is_a_new_one_and_a_vehicle_that_stays_has_none() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.see(1);
+    sea.step();
+    let survey = sea.vehicle.path().clone();
+    assert!(survey.places.len() > 3 && sea.vehicle.waypoint().is_some(), "{survey:?}");
+    sea.tell(Slot::Fence(small_fence()));
+    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().places.len()), (None, 0), "not of the old plan");
+    sea.step();
+    assert!(!sea.vehicle.path().places.is_empty() && sea.vehicle.path() != &survey);
+    sea.tell(Slot::Constraints(Constraints { hold: true, abort: false }));
+    sea.step();
+    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().places.len()), (None, 0));
+    sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
+    sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Return), ..Limits::default() }));
+    sea.vehicle.navigator.set_pose(17.0, 17.0, 0.0, 16.0, sea.now);
+    sea.step();
+    assert_eq!(sea.vehicle.mode().0, VehicleMode::Return);
+    assert_eq!(sea.vehicle.path().places.last(), Some(&(5.0, 5.0)), "home");
+}
+
+#[test]
+fn a_fence_stays_where_it_is_in_the_world_when_a_fix_moves_the_map() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
+    sea.tell(Slot::Fence(small_fence()));
+    sea.step();
+    let fix = |sea: &mut Sea, x, y| sea.vehicle.navigator.handle_fix(x, y, 0.1, sea.now, sea.now);
+    assert!(fix(&mut sea, 18.0, 10.0).is_used());
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
+    let (east, _) = sea.vehicle.waypoint().unwrap();
+    assert!(east < 12.0, "{east}: 20 m east of the origin is 12 m east on its map now");
+    // Its own reckoning stays within the numbers of the fence all the time.
+    sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
+    assert!(fix(&mut sea, 24.0, 10.0).is_used());
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Return, ModeReason::Fence));
+    let (x, y) = (0..200)
+        .map(|_| sea.step())
+        .last()
+        .map(|()| sea.vehicle.navigator())
+        .map(|n| n.to_world(n.position()))
+        .unwrap();
+    assert!((x - 5.0).hypot(y - 5.0) < 1.0, "({x}, {y}): the return point is of the world, too");
+}
+
+#[test]
+fn silence_and_abort_bring_the_vehicle_home_or_up() {
+    let mut sea = Sea::new(0.0, 1);
+    let limits = Limits { silence_s: Some(30), on_silence: Some(Reaction::Surface), ..Limits::default() };
+    sea.tell(Slot::Limits(limits));
+    (0..70).for_each(|_| sea.step());
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Surface, ModeReason::Silence));
+    let mut sea = Sea::new(0.0, 1);
+    sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Hold), ..Limits::default() }));
+    sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
+    sea.step();
+    assert_eq!(sea.vehicle.mode(), (VehicleMode::Abort, ModeReason::Order));
+}
+
+#[test]
+fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
+    let mut sea = Sea::new(0.0, 1);
+    sea.tell(Slot::Fence(small_fence()));
+    let far = Fence {
+        fence: small_fence().fence.map(|p| Polygon(p.0.iter().map(|v| Place { x_dm: v.x_dm + 900, ..*v }).collect())),
+        ..Fence::default()
+    };
+    sea.tell(Slot::Fence(far));
+    assert_eq!(sea.fence, small_fence(), "a fence that the vehicle is outside of is refused");
+    let config = Config::default();
+    let durable = sea.vehicle.durable().clone();
+    let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
+    assert!(!again.steering.bounds().holds((25.0, 5.0)));
+    assert!(again.steering.bounds().holds((15.0, 5.0)));
+    assert_eq!(again.steering.home(), (5.0, 5.0));
+}
+
+#[test]
+fn settings_out_of_range_are_refused_and_those_in_force_survive_a_restart() {
+    let figure = |value: f64| Change::To(Figure::new(value).unwrap());
+    let mut sea = Sea::new(0.0, 1);
+    let asked = Settings {
+        planner: Change::To(PlannerKind::Greedy),
+        cells: Change::To(CellBand::Coarse),
+        gamma: figure(1e-5),
+        frames_per_s: figure(0.2),
+        ..Settings::default()
+    };
+    let tuned = |vehicle: &mut Vehicle| {
+        let outputs = std::iter::from_fn(|| vehicle.poll_output());
+        outputs.filter_map(|o| if let VehicleOutput::Tune(settings) = o { Some(settings) } else { None }).last()
+    };
+    assert_eq!(sea.vehicle.apply(Slot::Settings(asked), sea.now), Ok(()));
+    assert_eq!(tuned(&mut sea.vehicle), Some(asked));
+    for settings in [
+        Settings { alpha: figure(1e4), ..Settings::default() },
+        Settings { frames_per_s: figure(0.001), gamma: figure(0.1), ..Settings::default() },
+        Settings { refine_words_per_s: figure(1e9), ..Settings::default() },
+    ] {
+        assert_eq!(sea.vehicle.apply(Slot::Settings(settings), sea.now), Err(RefusalReason::OutOfRange));
+        assert_eq!((*sea.vehicle.settings(), tuned(&mut sea.vehicle)), (asked, None));
+    }
+    let more = Settings { alpha: figure(0.3), gamma: Change::Configured, ..Settings::default() };
+    assert_eq!(sea.vehicle.apply(Slot::Settings(more), sea.now), Ok(()));
+    let config = Config::default();
+    let durable = sea.vehicle.durable().clone();
+    let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
+    assert_eq!(again.settings(), &asked.then(&more));
+}

@@ -1,0 +1,128 @@
+//! Where the vehicle is, through a restart.
+
+use super::Vehicle;
+use crate::Navigator;
+use crate::planning::distance;
+use scenecast_protocol::map::Cell;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Placement, PlannedPath};
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// Where the vehicle was at its last fix; decimetres, so that it compares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LastPlace {
+    /// East and north in the map's frame.
+    at_dm: (i32, i32),
+    /// Version, east and north of the placement, if there was one.
+    placement: Option<(u8, i32, i32)>,
+}
+
+fn dm(metres: f64) -> i32 {
+    (metres * 10.0).round() as i32
+}
+
+fn metres(dm: i32) -> f64 {
+    f64::from(dm) / 10.0
+}
+
+impl LastPlace {
+    /// Where a vehicle is now.
+    pub fn of(navigator: &Navigator) -> Self {
+        let (x, y) = navigator.position();
+        let placement = navigator.placement().map(|p| (p.version, dm(p.east_m), dm(p.north_m)));
+        Self { at_dm: (dm(x), dm(y)), placement }
+    }
+
+    /// The same place for a map that begins anew, whose frame is the world's at first.
+    pub fn for_new_map(self) -> Self {
+        let (_, east, north) = self.placement.unwrap_or_default();
+        let at_dm = (self.at_dm.0.saturating_add(east), self.at_dm.1.saturating_add(north));
+        Self { at_dm, placement: None }
+    }
+
+    /// East and north in the map's frame, metres.
+    pub fn at(self) -> (f64, f64) {
+        (metres(self.at_dm.0), metres(self.at_dm.1))
+    }
+
+    /// Where the map lies in the world.
+    pub fn placement(self) -> Option<Placement> {
+        self.placement.map(|(version, east, north)| Placement { version, east_m: metres(east), north_m: metres(north) })
+    }
+}
+
+impl Vehicle {
+    /// The position is known from elsewhere, as in a recorded mission.
+    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        let before = self.navigator.position();
+        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
+        self.guard.handle_way(distance(before, (x_m, y_m)));
+    }
+
+    /// For so long nobody measured the way: it may be anywhere that it could have gone to, and counts as gone there.
+    pub fn handle_unseen(&mut self, time: Duration) {
+        let metres = time.as_secs_f64() * self.guard.speed_m_s();
+        self.navigator.handle_unseen_way(metres);
+        self.guard.handle_way(metres);
+    }
+
+    /// Labels of cells as the vehicle sees them.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
+        self.telling.seen.iter()
+    }
+
+    /// The position estimate.
+    pub fn navigator(&self) -> &Navigator {
+        &self.navigator
+    }
+
+    /// Fixes that corrected the estimate.
+    pub fn fixes_applied(&self) -> u64 {
+        self.fixes_applied
+    }
+
+    /// Where it is going, east and north in the map's frame, metres.
+    pub fn waypoint(&self) -> Option<(f64, f64)> {
+        self.waypoint
+    }
+
+    /// Where it plans to go from there.
+    pub fn path(&self) -> &PlannedPath {
+        &self.path
+    }
+
+    /// Whether the autopilot does not answer; the status tells it.
+    pub fn set_autopilot_silent(&mut self, is_silent: bool) {
+        self.autopilot_silent = is_silent;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_bytes_of_a_place() {
+        let place = LastPlace { at_dm: (10, -1), placement: Some((2, 300, 0)) };
+        assert_eq!(postcard::to_allocvec(&place).unwrap(), [20, 1, 1, 2, 216, 4, 0]);
+    }
+
+    #[test]
+    fn a_vehicle_that_comes_back_finds_itself_on_its_map_by_a_fix() {
+        let at = Instant::from_secs_f64;
+        let mut before = Navigator::new(0.0, 0.0, 10.0, 0.01).with_start_sigma(20.0);
+        before.handle_odometry(50.0, 0.0, 0.0, 10.0, at(50.0));
+        assert!(before.handle_fix(57.0, 3.0, 0.5, at(50.0), at(51.0)).is_used());
+        let last = LastPlace::of(&before);
+        // It drifted 12 m to the north while its computer was off.
+        let mut after = Navigator::resume(last, 10.0, 0.01);
+        assert_eq!((after.position(), after.placement()), ((50.0, 0.0), before.placement()));
+        assert!(after.handle_fix(57.0, 15.0, 0.5, at(1.0), at(1.0)).is_used());
+        assert_eq!(after.placement(), before.placement(), "the map lies where it lay");
+        let (x, y) = after.position();
+        assert!((x - 50.0).abs() < 0.5 && (y - 12.0).abs() < 0.5, "{x} {y}");
+        let (x, y) = LastPlace::of(&before).for_new_map().at();
+        assert!((x - 57.0).abs() < 0.5 && (y - 3.0).abs() < 0.5, "a new map begins where it is in the world");
+    }
+}
