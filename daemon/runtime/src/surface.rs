@@ -8,7 +8,9 @@ use super::position::Position;
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
 use scenecast_config::Config;
-use scenecast_console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
+use scenecast_console::{
+    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request, snapshot, start,
+};
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_core::world_file;
@@ -25,7 +27,7 @@ use tokio::sync::oneshot;
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
-        let entrance = match config.console.listen.as_str() {
+        let listener = match config.console.listen.as_str() {
             "" => None,
             address => {
                 let token = scenecast_config::load_token(&config)?;
@@ -49,9 +51,9 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
-        let console = entrance.map(|entrance| {
+        let console = listener.map(|listener| {
             println!("the operator's page is at http://{} (end with Ctrl-C)", config.console.listen);
-            start(entrance)
+            start(listener)
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
@@ -100,7 +102,7 @@ impl Host {
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
                 _ = second.tick() => self.publish(),
                 event = self.modem.next() => self.handle_modem(event?),
-                (ask, reply) = next_request(&mut self.console) => self.answer(ask, reply),
+                (request, reply) = next_request(&mut self.console) => self.handle_request(request, reply),
                 () = self.position.next(&mut self.surface, self.vehicle) => {}
             }
         }
@@ -120,15 +122,15 @@ impl Host {
 
     fn handle_frame(&mut self, bytes: &[u8]) {
         let now = self.clock.now();
-        self.meter.heard(self.bits.bits_on_air(bytes.len()), now);
+        self.meter.received(self.bits.bits_on_air(bytes.len()), now);
         self.surface.handle_frame(bytes, now);
         let views = self.surface.vehicles().filter_map(|(a, _)| self.surface.view(a));
         views.for_each(|v| self.refusals.note(v.stats()));
     }
 
-    fn answer(&mut self, ask: Ask, reply: oneshot::Sender<Reply>) {
+    fn handle_request(&mut self, request: SurfaceRequest, reply: oneshot::Sender<Reply>) {
         // A browser that has gone away needs no answer.
-        let _ = reply.send(answer(&mut self.surface, ask, self.facts.cell_m, self.clock.now()));
+        let _ = reply.send(handle_request(&mut self.surface, request, self.facts.cell_m, self.clock.now()));
     }
 
     fn publish(&mut self) {
@@ -190,7 +192,7 @@ impl Host {
     }
 }
 
-async fn next_request(console: &mut Option<Console>) -> Request {
+async fn next_request(console: &mut Option<Console>) -> PendingRequest {
     let request = match console {
         Some(console) => console.requests.recv().await,
         None => None,

@@ -73,7 +73,7 @@ impl ModeReason {
             Self::Time => Some("time"),
             Self::Silence => Some("silence"),
             Self::Band => Some("depth or altitude"),
-            Self::NoWay => Some("no way"),
+            Self::NoWay => Some("no path"),
         }
     }
 }

@@ -55,7 +55,7 @@ impl UsblFault {
     /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Unreadable => "unreadable",
+            Self::Unreadable => "malformed",
             Self::RangeOnly => "range_only",
             Self::Depth => "depth",
             Self::NoHeading => "no_heading",
