@@ -19,7 +19,7 @@ fn name(reason: DropReason) -> &'static str {
         DropReason::Duplicate => "duplicate",
         DropReason::Late => "late",
         DropReason::NoBase => "base_missing",
-        DropReason::Stranger => "unknown_sender",
+        DropReason::UnknownSender => "unknown_sender",
         DropReason::Unauthenticated => "unauthenticated",
         DropReason::Keyed => "key_missing",
     }

@@ -2,7 +2,7 @@
 
 use super::facts::seconds;
 use crate::state::{ExemplarImage, ExemplarProgress, ExemplarStage};
-use scenecast_protocol::directive::{LifeLine, SlotId};
+use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::wire::Address;
@@ -50,6 +50,6 @@ fn image(p: &Picture, base: &str) -> ExemplarImage {
 
 /// Whether the requests for images have not been sent yet.
 fn is_queued(view: &PeerView<'_>) -> bool {
-    let requests = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.life);
-    matches!(requests, Some(LifeLine::Queued) | None)
+    let requests = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.status);
+    matches!(requests, Some(OrderStatus::Queued) | None)
 }

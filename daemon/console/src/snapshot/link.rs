@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> LinkSummary {
     let views: Vec<PeerView<'_>> = surface.vehicles().filter_map(|(a, _)| surface.view(a)).collect();
     let sum = |of: &dyn Fn(&LinkStats) -> u64| views.iter().map(|v| of(v.stats())).sum::<u64>();
-    let received = sum(&|s| s.frames_heard);
+    let received = sum(&|s| s.frames_received);
     let numbered = sum(&|s| s.frames_numbered);
     let (lost, delivered) = (sum(&|s| s.frames_lost), sum(&|s| s.frames_delivered));
     let elapsed = now.as_secs_f64().max(1.0);
@@ -39,7 +39,7 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
         background: surface.spend().names(),
         unknown_senders: surface.strangers(),
-        up: direction(0, numbered, numbered.saturating_sub(received), &|s, c| of_class(&s.heard_by_class, c)),
+        up: direction(0, numbered, numbered.saturating_sub(received), &|s, c| of_class(&s.received_by_class, c)),
         down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),
         round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),
         backlog_bits: total_bits(views.iter().filter_map(PeerView::backlog)),

@@ -13,8 +13,8 @@ pub(super) fn measured_origin(surface: &Surface) -> Option<Origin> {
 }
 
 pub(super) fn placement(placement: Placement) -> MapPlacement {
-    let Placement { version, east_m, north_m } = placement;
-    MapPlacement { version, east_m, north_m }
+    let Placement { version, origin } = placement;
+    MapPlacement { version, east_m: origin.east_m, north_m: origin.north_m }
 }
 
 /// The position of the surface; `None` without a GPS.

@@ -6,7 +6,8 @@ use crate::state::{
     AppliedOrder, DirectiveSlots, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath, ReportedMode,
     ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState,
 };
-use scenecast_protocol::directive::{LifeLine, PlannerKind, SlotProgress};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
@@ -29,7 +30,7 @@ fn vehicle(
     Some(VehicleState {
         id: address.number(),
         name: desk.name.clone(),
-        last_received_s: view.heard().map(seconds),
+        last_received_s: view.last_received().map(seconds),
         expected_interval_s: expected_interval_s(surface, &view, desk, facts),
         next_contact_s: view.next_contact(now).map(seconds),
         status: view.status().map(|(s, at)| status(s, *at)),
@@ -108,8 +109,8 @@ fn status(s: &VehicleStatus, at: Instant) -> StatusReport {
     StatusReport {
         at_s: seconds(at),
         pose: ReportedPose {
-            x_m: s.x_m,
-            y_m: s.y_m,
+            x_m: s.position.x_m,
+            y_m: s.position.y_m,
             z_m: -s.depth_m,
             heading_deg: s.heading_deg,
             sigma_m: s.sigma_m,
@@ -119,7 +120,11 @@ fn status(s: &VehicleStatus, at: Instant) -> StatusReport {
         autopilot_silent: s.autopilot_silent,
         reason: s.reason.name().map(str::to_owned),
         activity: activity(s),
-        plan: PlannedPath { waypoint: s.waypoint, path: s.path.places.clone(), path_continues: s.path.goes_on },
+        plan: PlannedPath {
+            waypoint: s.waypoint.map(MapPoint::xy),
+            path: s.path.points.iter().copied().map(MapPoint::xy).collect(),
+            path_continues: s.path.continues,
+        },
         cells: s.explored_cells,
         labels: u32::from(s.labels),
         budget_bps: s.budget_bps,
@@ -162,12 +167,12 @@ fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address,
 }
 
 fn order_progress(s: &SlotProgress) -> OrderProgress {
-    let (state, reason) = match s.life {
-        LifeLine::Queued => (OrderStatus::Queued, None),
-        LifeLine::OnAir => (OrderStatus::OnAir, None),
-        LifeLine::Heard => (OrderStatus::Received, None),
-        LifeLine::Applied => (OrderStatus::Applied, None),
-        LifeLine::Refused(reason) => (OrderStatus::Refused, Some(reason.explain().to_owned())),
+    let (state, reason) = match s.status {
+        directive::OrderStatus::Queued => (OrderStatus::Queued, None),
+        directive::OrderStatus::OnAir => (OrderStatus::OnAir, None),
+        directive::OrderStatus::Received => (OrderStatus::Received, None),
+        directive::OrderStatus::Applied => (OrderStatus::Applied, None),
+        directive::OrderStatus::Refused(reason) => (OrderStatus::Refused, Some(reason.explain().to_owned())),
     };
     OrderProgress {
         slot: s.id.name().to_owned(),
