@@ -34,7 +34,7 @@ fn assert_sound(figures: &Value) {
     for end in ["up", "down"] {
         let limit = link["budget_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
         let largest = link[end]["largest_transmission_bits"].as_f64().unwrap();
-        let worst = link[end]["worst_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
+        let worst = link[end]["max_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
         assert!(worst <= limit + largest, "{end}: {worst} bits in a window");
     }
 }
@@ -74,12 +74,12 @@ fn whole_missions_pass_with_either_codec() {
 #[test]
 fn planes_arrive_and_labels_do_not_wait_for_them() {
     let without = fly(&["map.planes=[]"], 8);
-    assert_eq!(without["map"]["planes"], serde_json::json!({}));
+    assert_eq!(without["map"]["layers"], serde_json::json!({}));
     for sets in [&["map.plane_shares=[0, 0, 0]"], &["map.plane_shares=[10, 5, 0]"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
         for plane in ["confidence", "depth"] {
-            let plane = &with["map"]["planes"][plane];
+            let plane = &with["map"]["layers"][plane];
             assert_eq!(plane["agreement_final"], 1.0, "{plane}");
             assert!(plane["agreement_mean"].as_f64().unwrap() > 0.8, "{plane}");
             assert_eq!(plane["cells"], with["survey"]["explored_cells"]);
@@ -93,13 +93,13 @@ fn planes_arrive_and_labels_do_not_wait_for_them() {
 fn curiosity_is_sent_only_with_a_share_or_as_background() {
     let without = fly(&[], 8);
     assert_eq!(without.to_string(), fly(&[r#"map.planes=["confidence", "depth"]"#], 8).to_string());
-    assert_eq!(without["map"]["planes"]["curiosity"], Value::Null);
+    assert_eq!(without["map"]["layers"]["curiosity"], Value::Null);
     for sets in
         [r#"link.spend=["finer", "depth", "exemplars", "confidence", "curiosity"]"#, "map.plane_shares=[0, 0, 10]"]
     {
         let with = fly(&[sets], 8);
         assert_sound(&with);
-        let plane = &with["map"]["planes"]["curiosity"];
+        let plane = &with["map"]["layers"]["curiosity"];
         assert_eq!((&plane["agreement_final"], &plane["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
         assert!(mean(&with) > mean(&without) - 0.02, "{} with curiosity, {} without", mean(&with), mean(&without));

@@ -83,7 +83,7 @@ fn priors_frame_rate_and_layers_change_during_a_mission() {
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
     assert!(frames >= 50 && labels > 1 && mission.heard_of(PlaneKind::Confidence) > 0);
-    mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "planes": "depth"}"#);
+    mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
     // What was in the water when the vehicle began to follow has come in.
     mission.fly_to(mission.now().as_secs_f64() + 30.0);
@@ -94,7 +94,7 @@ fn priors_frame_rate_and_layers_change_during_a_mission() {
     assert!((9..=11).contains(&(mission.logbook.track.len() - frames)), "one frame in ten seconds is seen");
     assert_eq!(mission.heard_of(PlaneKind::Confidence), confidence, "a plane that is not told costs nothing");
     assert!(mission.heard_of(PlaneKind::Depth) > depth);
-    mission.tune(r#"{"frames_per_s": 0, "planes": "", "gamma": 0}"#);
+    mission.tune(r#"{"frames_per_s": 0, "layers": "", "gamma": 0}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "what an order does not name stays");
     mission.fly_to(mission.now().as_secs_f64() + 60.0);
     assert!(mission.heard_of(PlaneKind::Confidence) > confidence);
