@@ -127,7 +127,7 @@ fn a_modem_with_another_address_is_refused_aloud_and_sends_nothing() {
         dock.run(60 * SECOND);
         let said = dock.refusals.join(" ");
         assert!(said.contains("is 7 and ours is 1"), "{name}: {said:?}");
-        assert_eq!(dock.docked.station(0).audit().transmissions(), 0, "{name}");
+        assert_eq!(dock.vehicle.audit().transmissions(), 0, "{name}");
     }
 }
 

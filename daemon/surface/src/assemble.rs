@@ -33,7 +33,7 @@ pub fn assemble(
             max_idle: Duration::from_secs_f64(config.link.max_idle_s),
         },
         vehicles: vehicles.keys().copied().collect(),
-        call_every: (config.link.call_every_s > 0.0).then(|| Duration::from_secs_f64(config.link.call_every_s)),
+        discovery_period: (config.link.call_every_s > 0.0).then(|| Duration::from_secs_f64(config.link.call_every_s)),
         authenticity,
     };
     let link = SurfaceLink::new(link, seed, now);

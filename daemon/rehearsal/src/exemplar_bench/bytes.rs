@@ -8,7 +8,7 @@ use scene_model::project::Pose;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::exemplar::edge_px;
-use scenecast_protocol::exemplar::{HEAD, most_bytes};
+use scenecast_protocol::exemplar::{HEAD, max_bytes};
 use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
@@ -129,7 +129,7 @@ fn measure(patches: &[RgbImage], size: u8) -> Measured {
             let good = (0..=100).filter_map(|quality| compress(&patch, quality)).filter(|c| c.ssim >= GOOD_SSIM);
             measured.fewest.extend(good.map(|c| c.bytes.len() + HEAD).min());
         }
-        if let Some(sent) = compress_to(&patch, GOOD_SSIM, most_bytes(size)) {
+        if let Some(sent) = compress_to(&patch, GOOD_SSIM, max_bytes(size)) {
             measured.sent.push(sent.bytes.len() + HEAD);
             measured.ssim.push(sent.ssim);
         }

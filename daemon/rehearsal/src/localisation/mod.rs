@@ -9,6 +9,7 @@ mod ship;
 
 pub use picture::picture;
 
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Fix, Slot, VersionedSlot};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::position::UsblSighting;
@@ -228,8 +229,8 @@ impl Way {
             }
             self.deliver(now);
             self.tracks.truth.push(at);
-            self.tracks.reckoned.push(self.reckoner.position());
-            self.tracks.relayed.push(self.navigator.world());
+            self.tracks.reckoned.push(self.reckoner.position().xy());
+            self.tracks.relayed.push(self.navigator.world().xy());
             self.tracks.ship.push(self.ship.at);
         }
         for (fault, n) in self.ship.relay.faults() {
@@ -257,7 +258,7 @@ impl Way {
         let told = now + UsblConfig::default().latency;
         let Some(mut fix) = self.ship.sight(&sighting, DEPTH_M, told) else { return };
         if let Some(Outlier::Fooled(east, north)) = lot.outlier {
-            (fix.x_m, fix.y_m) = (fix.x_m + east, fix.y_m + north);
+            fix.position = WorldPoint::new(fix.position.east_m + east, fix.position.north_m + north);
         }
         *self.counts.entry("sent").or_default() += 1;
         if lot.is_lost {
@@ -276,10 +277,10 @@ impl Way {
                 continue;
             };
             let taken = arrives - travel - Duration::from_secs_f64(fix.age_s);
-            let verdict = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
+            let verdict = self.navigator.handle_fix(fix.position, fix.sigma_m, taken, now);
             let name = if verdict == FixVerdict::Used { "used" } else { "refused_by_vehicle" };
             *self.counts.entry(name).or_default() += 1;
-            self.tracks.fixes.push(((fix.x_m, fix.y_m), verdict.is_used()));
+            self.tracks.fixes.push((fix.position.xy(), verdict.is_used()));
         }
     }
 }
