@@ -59,7 +59,7 @@ impl MissionFacts {
 /// The origin that is configured, if any is.
 fn origin(config: &Config) -> Option<state::Origin> {
     // At a pole there is no east.
-    let LatLon { lat_deg, lon_deg } = scenecast_config::origin(config).ok()?.filter(|o| o.lat_deg.abs() < 90.0)?;
+    let LatLon { lat_deg, lon_deg } = config.mission.origin_deg.filter(|o| o.lat_deg.abs() < 90.0)?;
     Some(state::Origin { lat_deg, lon_deg })
 }
 

@@ -1,6 +1,6 @@
 //! Both ends' drivers at emulated modems in one simulated water, in virtual time.
 
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::UserError;
 use scenecast_drivers::modem;
 use scenecast_drivers::modem::{ModemEvent, Station};
@@ -56,7 +56,7 @@ impl Docked {
     ) -> Result<Self, UserError> {
         let mut config = config.clone();
         // Emulated ports are serial ones.
-        config.modem.device = "emulated".to_owned();
+        config.modem.device = Some("emulated".into());
         let vehicle = scenecast_config::vehicle_address(&config)?;
         let mut basin = Basin::new(channel);
         basin.advance(now.into());
@@ -172,16 +172,20 @@ fn berth(config: &Config, end: Address, modem: Box<dyn Emulator>, basin: &mut Ba
 fn emulator(config: &Config, address: u8, head: bool, seed: u64) -> Result<Box<dyn Emulator>, UserError> {
     let seed = seed ^ u64::from(address);
     let baud = Some(config.modem.baud);
-    Ok(match config.modem.kind.as_str() {
-        "s2c" => {
+    Ok(match config.modem.kind {
+        ModemKind::S2c => {
             let usbl = head.then(UsblConfig::default);
             Box::new(S2c::new(S2cConfig { baud, usbl, seed, ..S2cConfig::new(address) }))
         }
-        "micromodem" => Box::new(Micromodem::new(MicromodemConfig { baud, seed, ..MicromodemConfig::new(address) })),
-        "transparent" => {
+        ModemKind::Micromodem => {
+            Box::new(Micromodem::new(MicromodemConfig { baud, seed, ..MicromodemConfig::new(address) }))
+        }
+        ModemKind::Transparent => {
             let bit_rate = config.modem.bit_rate as u32;
             Box::new(Transparent::new(TransparentConfig { baud, bit_rate, seed, ..TransparentConfig::default() }))
         }
-        other => return Err(UserError::Input(format!("modem.kind = \"{other}\" has no emulator"))),
+        kind @ (ModemKind::Tcp | ModemKind::Udp) => {
+            return Err(UserError::Input(format!("modem.kind = \"{kind}\" has no emulator")));
+        }
     })
 }

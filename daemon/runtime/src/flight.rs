@@ -2,7 +2,7 @@
 
 use super::clock::Clock;
 use super::pilot::{Pilot, SimulatedAutopilot, next_of};
-use scenecast_config::{Config, origin, survey_depth_m};
+use scenecast_config::{Config, survey_depth_m};
 use scenecast_core::TangentPlane;
 use scenecast_core::UserError;
 use scenecast_drivers::autopilot::Goal;
@@ -30,7 +30,7 @@ impl Flight {
         simulated: Option<SimulatedAutopilot>,
         clock: Clock,
     ) -> Result<Self, UserError> {
-        let plane = origin(config)?.map(TangentPlane::new);
+        let plane = config.mission.origin_deg.map(TangentPlane::new);
         Ok(Self {
             pilot: Pilot::open(config, simulated, clock)?,
             plane,

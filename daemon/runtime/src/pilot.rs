@@ -5,7 +5,7 @@ use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
 use scenecast_drivers::autopilot::{Autopilot, Goal, Health, Mavlink, Nmea, Step};
 
 use crate::port::{FromPort, Port};
-use scenecast_config::{Config, autopilot_place};
+use scenecast_config::{AutopilotKind, Config};
 use scenecast_core::LatLon;
 use scenecast_core::UserError;
 use scenecast_protocol::time::Instant;
@@ -31,24 +31,24 @@ impl Pilot {
     ) -> Result<Option<Self>, UserError> {
         let a = &config.autopilot;
         let now = clock.now();
-        let silence = Duration::from_secs_f64(a.silence_s);
-        let autopilot: Box<dyn Autopilot> = match a.kind.as_str() {
-            "mavlink" => {
+        let silence = Duration::from_secs_f64(a.timeout_s);
+        let autopilot: Box<dyn Autopilot> = match a.kind {
+            AutopilotKind::Mavlink => {
                 let config = MavlinkConfig { system: a.system, arms: a.arm, silence };
                 Box::new(Mavlink::new(config, now))
             }
-            "nmea" => Box::new(Nmea::new(true, silence, now)),
-            "log" => Box::new(Nmea::new(false, silence, now)),
-            "rehearsal" => match simulated {
+            AutopilotKind::Nmea => Box::new(Nmea::new(true, silence, now)),
+            AutopilotKind::Log => Box::new(Nmea::new(false, silence, now)),
+            AutopilotKind::Rehearsal => match simulated {
                 Some(make) => make(config, now),
                 None => {
                     let what = "autopilot.kind = \"rehearsal\" is not allowed: this build has no simulator";
                     return Err(UserError::Input(format!("{what}; it takes none, mavlink, nmea or log")));
                 }
             },
-            _ => return Ok(None),
+            AutopilotKind::None => return Ok(None),
         };
-        let place = autopilot_place(config)?;
+        let place = a.port.clone().filter(|_| a.kind != AutopilotKind::Rehearsal);
         let port = place.map(|place| Port::open_when_there("autopilot", place, None));
         let health = autopilot.health(now);
         Ok(Some(Self { autopilot, port, clock, health }))

@@ -3,7 +3,7 @@
 use super::clock::Clock;
 use super::pilot::{Pilot, SimulatedAutopilot, next_of};
 use crate::port::{FromPort, Port};
-use scenecast_config::{Config, is_gpsd, origin, position_places};
+use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_core::gps::GpsLanguage;
 use scenecast_drivers::autopilot::Goal;
@@ -43,14 +43,12 @@ impl Position {
         clock: Clock,
     ) -> Result<Self, UserError> {
         let p = &config.position;
-        let [gps, compass] = position_places(config)?;
-        let language = if is_gpsd(config) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
-        if gps.is_some() {
-            surface.set_relay(Relay::new(relay_config(config, language)?));
+        if let Some(gps) = &p.gps {
+            surface.set_relay(Relay::new(relay_config(config, gps.language)));
         }
         Ok(Self {
-            gps: gps.map(|place| Port::open_when_there("GPS", place, Some(QUIET))),
-            compass: compass.map(|place| Port::open_when_there("compass", place, Some(QUIET))),
+            gps: p.gps.clone().map(|gps| Port::open_when_there("GPS", gps.address, Some(QUIET))),
+            compass: p.compass.clone().map(|place| Port::open_when_there("compass", place, Some(QUIET))),
             pilot: Pilot::open(config, simulated, clock)?,
             follow: p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m)),
             target: None,
@@ -114,20 +112,20 @@ async fn next_of_port(port: &mut Option<Port>) -> FromPort {
     }
 }
 
-fn relay_config(config: &Config, language: GpsLanguage) -> Result<RelayConfig, UserError> {
+fn relay_config(config: &Config, language: GpsLanguage) -> RelayConfig {
     let p = &config.position;
     let sound_ratio = if p.sound_speed_m_s > 0.0 { p.sound_speed_m_s / MODEM_SOUND_M_S } else { 1.0 };
-    Ok(RelayConfig {
-        origin: origin(config)?,
+    RelayConfig {
+        origin: config.mission.origin_deg,
         language,
         mounting: Mounting {
             lever_m: p.usbl_lever_m,
             depth_m: p.usbl_depth_m,
             from_bow: p.usbl_from_bow,
-            turn_rad: p.usbl_turn_deg.to_radians(),
+            turn_rad: p.usbl_rotation_deg.to_radians(),
             sound_ratio,
         },
-        most_sigma_m: p.most_sigma_m,
+        most_sigma_m: p.max_sigma_m,
         period: Duration::from_secs_f64(p.fix_period_s),
-    })
+    }
 }

@@ -25,14 +25,14 @@ use tokio::sync::oneshot;
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
-        let entrance = match config.console.listen.as_str() {
-            "" => None,
-            address => {
+        let entrance = match &config.console.listen {
+            None => None,
+            Some(address) => {
                 let token = scenecast_config::load_token(&config)?;
-                Some(bind(address, "console.listen", token, &config.console.host).await?)
+                Some(bind(address.as_str(), "console.listen", token, &config.console.host).await?)
             }
         };
-        let dir = PathBuf::from(&config.runtime.state_dir);
+        let dir = config.runtime.state_dir.clone();
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
@@ -49,8 +49,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
-        let console = entrance.map(|entrance| {
-            println!("the operator's page is at http://{} (end with Ctrl-C)", config.console.listen);
+        let console = entrance.zip(config.console.listen.as_ref()).map(|(entrance, address)| {
+            println!("the operator's page is at http://{address} (end with Ctrl-C)");
             start(entrance)
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);

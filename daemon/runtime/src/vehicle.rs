@@ -11,16 +11,14 @@ use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
-use scenecast_config::Config;
+use scenecast_config::{CameraSource, Config};
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::ModemEvent;
 use scenecast_files::Recording;
 use scenecast_protocol::directive::Budget;
-use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{Vehicle, VehicleOutput};
-use std::path::Path;
 
 /// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -28,15 +26,15 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let stop = Stop::new()?;
         let config = load()?;
         warn_without_key(&config);
-        let dir = Path::new(&config.runtime.state_dir);
+        let dir = config.runtime.state_dir.as_path();
         let Start { run, mut mapper, keep } = start(&config, dir)?;
         let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
-        let recording = match config.camera.source.as_str() {
-            "" => None,
-            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
+        let recording = match &config.camera.source {
+            CameraSource::Rehearsal => None,
+            CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
@@ -66,7 +64,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, UserError> {
-    let area = scenecast_config::survey_area(config).or_else(|| recording.map(Recording::area));
+    let area = config.survey.area_m.or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
     area.ok_or_else(|| UserError::Input(missing.to_owned()))
 }
@@ -135,8 +133,8 @@ impl Host {
 
     /// Budget and shares of the configuration are in force, whatever the surface said before.
     fn follow(&mut self, config: &Config) {
-        let spend = scenecast_config::background(config);
-        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), spend };
+        let link = &config.link;
+        let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, spend: link.background };
         let extras = budget.spend.names().join(", ");
         tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {extras}", budget.bits_per_s, budget.shares.0);
         self.vehicle.set_budget(budget, self.clock.now());

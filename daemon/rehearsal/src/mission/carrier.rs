@@ -2,7 +2,7 @@
 
 use super::{Mission, channel_config};
 use crate::docked::{Docked, SURFACE, VEHICLE};
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::UserError;
 use scenecast_drivers::modem::ModemEvent;
 use scenecast_protocol::mac::ModemProfile;
@@ -11,9 +11,11 @@ use sim_channel::Channel;
 
 /// The modems, if the configuration names a make; TCP and UDP are no modems: there the water is bare.
 pub(super) fn docked(config: &Config, seed: u64, now: Instant) -> Result<Option<Docked>, UserError> {
-    match config.modem.kind.as_str() {
-        "tcp" | "udp" => Ok(None),
-        _ => Docked::new(config, Channel::new(channel_config(config), seed), seed, now).map(Some),
+    match config.modem.kind {
+        ModemKind::Tcp | ModemKind::Udp => Ok(None),
+        ModemKind::S2c | ModemKind::Micromodem | ModemKind::Transparent => {
+            Docked::new(config, Channel::new(channel_config(config), seed), seed, now).map(Some)
+        }
     }
 }
 

@@ -15,8 +15,7 @@ use super::script::Script;
 use super::world::World;
 use anchored::Anchored;
 use scene_model::project::Pose;
-use scenecast_config::Config;
-use scenecast_config::cell_m;
+use scenecast_config::{CameraSource, Config, OperatorScript, cell_m};
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_files::{Recorder, Recording};
@@ -111,9 +110,9 @@ impl Mission {
         let mut docked = carrier::docked(&config, seed, now)?;
         let water = scenecast_config::modem_profile(&config, config.channel.bit_rate);
         let [modem, surface_modem] = docked.as_mut().map_or([water; 2], carrier::profiles);
-        let recording = match config.camera.source.as_str() {
-            "" => None,
-            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
+        let recording = match &config.camera.source {
+            CameraSource::Rehearsal => None,
+            CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref(), &world);
         if recording.is_none() && !overlap(&area, &world.area()) {
@@ -148,17 +147,22 @@ impl Mission {
         if let Some(docked) = &mut docked {
             docked.place(docked::SURFACE, surface_place);
         }
-        let (anchored, relay) = Anchored::new(&config, surface_place, scenecast_config::origin(&config)?, seed ^ 0x6B5);
+        let (anchored, relay) = Anchored::new(&config, surface_place, config.mission.origin_deg, seed ^ 0x6B5);
         surface.set_relay(relay);
-        let script = match config.operator.script.as_str() {
-            "scripted" => Script::of_survey(config.survey.duration_s),
-            "fenced" => Script::fenced(config.survey.duration_s, area, config.survey.speed_m_s),
-            _ => Script::none(),
+        let script = match config.operator.script {
+            OperatorScript::Scripted => Script::of_survey(config.survey.duration_s),
+            OperatorScript::Fenced => Script::fenced(config.survey.duration_s, area, config.survey.speed_m_s),
+            OperatorScript::None => Script::none(),
         };
         let fix_period = Instant::from_secs_f64(config.navigation.fix_period_s);
         let window = Duration::from_secs_f64(config.link.budget_window_s);
         let mut mission = Self {
-            mapper: Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?,
+            mapper: Mapper::new(
+                &config,
+                scenecast_files::configured_vocabulary(config.scene.vocabulary.as_deref())?,
+                0,
+                seed,
+            )?,
             address: scenecast_config::vehicle_address(&config)?,
             recorder: record.as_deref().map(Recorder::new).transpose()?,
             times: Timetable { step: now, frame: now, fix: fix_period, look: now },
@@ -325,7 +329,7 @@ pub(crate) fn pose_of(vehicle: &Vehicle) -> Pose {
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>, world: &World) -> Area {
-    scenecast_config::survey_area(config).unwrap_or_else(|| recording.map_or_else(|| world.area(), Recording::area))
+    config.survey.area_m.unwrap_or_else(|| recording.map_or_else(|| world.area(), Recording::area))
 }
 
 fn overlap(a: &Area, b: &Area) -> bool {

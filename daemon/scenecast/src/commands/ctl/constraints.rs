@@ -10,29 +10,28 @@ use std::path::PathBuf;
 const FILE: &str = "\
 Example: scenecast ctl fence set fence.geojson --wait 120
 
-A feature's property `role` says what it is: fence (a Polygon; the one without a role), keep_out (Polygons), return_point
-(a Point). Coordinates are longitude and latitude, WGS 84, where the mission has an origin, else metres east and north
-of it.";
+The property `role` of a feature is fence (one Polygon; the default), keep_out (Polygons) or return_point (one Point).
+Coordinates are longitude and latitude in WGS 84 if the mission has an origin, and else metres east and north.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FenceCommand {
-    /// Send fence, keep-outs and return point from a GeoJSON file, in place of the last.
+    /// Send fence, keep-outs and return point from a GeoJSON file. They replace the last ones.
     #[command(after_help = FILE)]
     Set {
         /// GeoJSON file
         file: PathBuf,
-        /// The coordinates are metres east and north of the origin
+        /// Read coordinates as metres east and north of the origin
         #[arg(long)]
         metres: bool,
     },
-    /// Send that there is neither fence nor keep-out nor return point.
+    /// Remove fence, keep-outs and return point.
     #[command(after_help = "Example: scenecast ctl fence clear --wait 120")]
     Clear,
 }
 
 #[derive(Debug, Subcommand)]
 pub(super) enum ReturnPointCommand {
-    /// Move it; fence and keep-outs stay as sent last.
+    /// Set the return point. Fence and keep-outs stay.
     #[command(after_help = "Example: scenecast ctl return-point set 12.5 -40 --wait 120")]
     Set {
         /// Metres east of the origin
@@ -42,14 +41,15 @@ pub(super) enum ReturnPointCommand {
         #[arg(allow_negative_numbers = true)]
         north_m: f64,
     },
-    /// Return to where the vehicle's run began.
+    /// Remove the return point: the vehicle returns to the start of its run.
     #[command(after_help = "Example: scenecast ctl return-point clear")]
     Clear,
 }
 
 #[derive(Debug, Subcommand)]
 pub(super) enum LimitsCommand {
-    /// Send limits in place of the last; what is not named is not limited, reactions then are as configured on the vehicle.
+    /// Send limits. They replace the last ones: a limit that is not given is removed, and reactions are as configured on the
+    /// vehicle.
     #[command(
         after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
     )]
@@ -64,32 +64,32 @@ pub(super) struct Limits {
     /// Least and greatest altitude, metres
     #[arg(long, value_name = "LOW..HIGH", value_parser = band)]
     altitude: Option<[f64; 2]>,
-    /// Way over ground, the way back included
+    /// Longest path over ground, return path included
     #[arg(long, value_name = "METRES")]
     distance: Option<f64>,
-    /// Length of the survey, the way back included
+    /// Longest duration of the survey, return path included
     #[arg(long, value_name = "SECONDS")]
     time: Option<f64>,
     /// Longest silence of the surface
     #[arg(long, value_name = "SECONDS")]
     silence: Option<f64>,
-    /// What it does then: hold, return or surface
+    /// Reaction to that silence: hold, return or surface
     #[arg(long, value_name = "REACTION")]
     on_silence: Option<String>,
-    /// What it does outside of the fence, in a keep-out or out of a band
+    /// Reaction outside the fence, in a keep-out or outside a band
     #[arg(long, value_name = "REACTION")]
     on_breach: Option<String>,
-    /// What it does on an abort
+    /// Reaction to an abort
     #[arg(long, value_name = "REACTION")]
     on_abort: Option<String>,
-    /// Keep what is not named as it was sent last
+    /// Keep the last limits that are not given
     #[arg(long)]
     keep: bool,
 }
 
 fn band(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once("..").and_then(|(low, high)| Some([low.parse().ok()?, high.parse().ok()?]));
-    ends.ok_or_else(|| "it takes LOW..HIGH in metres, as in 5..30".to_owned())
+    ends.ok_or_else(|| "allowed: LOW..HIGH in metres, as in 5..30".to_owned())
 }
 
 pub(super) async fn fence(ctl: &Ctl, change: Option<FenceCommand>) -> Result<(), UserError> {
@@ -122,14 +122,13 @@ pub(super) async fn limits(ctl: &Ctl, change: Option<LimitsCommand>) -> Result<(
     ctl.set_limits(order, l.keep).await
 }
 
-/// Hold, or go on.
 pub(super) async fn hold(ctl: &Ctl, hold: bool) -> Result<(), UserError> {
     ctl.constrain(ConstraintsOrder { hold, abort: false }).await
 }
 
 pub(super) async fn abort(ctl: &Ctl, yes: bool) -> Result<(), UserError> {
     if !yes {
-        return Err(UserError::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
+        return Err(UserError::Input("an abort ends the survey; confirm it with --yes".to_owned()));
     }
     ctl.constrain(ConstraintsOrder { hold: false, abort: true }).await
 }
