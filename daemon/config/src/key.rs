@@ -100,6 +100,11 @@ impl Key {
         (self.operations.get)(config)
     }
 
+    /// Whether its value is a table whose members are set one by one.
+    pub(crate) fn is_table(&self) -> bool {
+        !(self.operations.members)().is_empty()
+    }
+
     /// Its name without the section.
     pub(crate) fn leaf(&self) -> &'static str {
         self.name.split_once('.').map_or(self.name, |(_, leaf)| leaf)

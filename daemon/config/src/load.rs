@@ -43,17 +43,26 @@ fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), User
         .map_err(|e| UserError::Input(format!("{}: {}", place(e.span().map_or(0, |s| s.start)), e.message())))?;
     for (section, value) in table.get_ref() {
         let is_known = Section::ALL.iter().any(|s| s.name == section.get_ref());
-        let DeValue::Table(keys) = value.get_ref() else {
-            return Err(unknown(section.get_ref(), &place(section.span().start)));
+        let keys = match value.get_ref() {
+            DeValue::Table(keys) if is_known => keys,
+            _ => return Err(unknown(section.get_ref(), &place(section.span().start))),
         };
-        if !is_known {
-            return Err(unknown(section.get_ref(), &place(section.span().start)));
-        }
         for (name, value) in keys {
             let key = format!("{}.{}", section.get_ref(), name.get_ref());
-            let place = place(name.span().start);
-            let value = plain(value).ok_or_else(|| UserError::Input(format!("{place}: {key} cannot be read")))?;
-            given.push(Given { key, value, place });
+            let mut push = |key: String, at: usize, value| {
+                let place = place(at);
+                let value = plain(value).ok_or_else(|| UserError::Input(format!("{place}: {key} cannot be read")))?;
+                given.push(Given { key, value, place });
+                Ok(())
+            };
+            match value.get_ref() {
+                DeValue::Table(members) if Key::find(&key).is_some_and(Key::is_table) => {
+                    for (member, value) in members {
+                        push(format!("{key}.{}", member.get_ref()), member.span().start, value)?;
+                    }
+                }
+                _ => push(key, name.span().start, value)?,
+            }
         }
     }
     Ok(())
@@ -121,7 +130,7 @@ fn find(name: &str) -> Option<(&'static Key, Option<&str>)> {
         return Some((key, None));
     }
     let (key, member) = name.rsplit_once('.')?;
-    Key::find(key).filter(|key| !(key.operations.members)().is_empty()).map(|key| (key, Some(member)))
+    Key::find(key).filter(|key| key.is_table()).map(|key| (key, Some(member)))
 }
 
 fn unknown(name: &str, place: &str) -> UserError {
@@ -188,6 +197,17 @@ mod tests {
         assert!(said.starts_with("x.toml:2: link.budget_bps = 5"), "{said}");
         let broken = read_file(Path::new("x.toml"), "[link]\n\nbudget_bps = = 5\n", &mut given).unwrap_err();
         assert!(broken.to_string().starts_with("x.toml:3: "), "{broken}");
+    }
+
+    #[test]
+    fn a_member_of_a_table_is_refused_with_its_own_line() {
+        let mut given = Vec::new();
+        read_file(Path::new("x.toml"), "[link.shares]\nmap = 60\nfix = 101\n", &mut given).unwrap();
+        let mut config = Config::default();
+        apply(&mut config, &given[0]).unwrap();
+        assert_eq!(config.link.shares.0, [10, 5, 5, 60, 20]);
+        let said = apply(&mut config, &given[1]).unwrap_err().to_string();
+        assert!(said.starts_with("x.toml:3: link.shares.fix = 101"), "{said}");
     }
 
     #[test]
