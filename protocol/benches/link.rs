@@ -55,7 +55,7 @@ impl StateSource for Endless {
         20_000
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         false
     }
 
@@ -124,7 +124,7 @@ impl Wire {
             shares,
             master: MasterConfig::default(),
             vehicles: vec![address],
-            call_every: None,
+            discovery_period: None,
             authenticity: None,
         };
         let mut vehicle = VehicleLink::with_source(vehicle, Endless, 1, SlotInboxState::default(), now);

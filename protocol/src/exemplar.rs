@@ -1,6 +1,6 @@
 //! A representative image of a label on the wire.
 
-use crate::directive::Request;
+use crate::directive::ExemplarRequest;
 
 /// Bytes before the image.
 pub const HEAD: usize = 4;
@@ -16,7 +16,7 @@ pub fn edge_px(size: u8) -> u32 {
 }
 
 /// Most bytes of an image of this size as it travels: 700 for the smallest, as much a pixel for larger ones.
-pub fn most_bytes(size: u8) -> usize {
+pub fn max_bytes(size: u8) -> usize {
     (700 << (2 * size.min(2))) - HEAD
 }
 
@@ -49,14 +49,14 @@ pub struct Exemplar {
 impl Exemplar {
     /// The object's bytes.
     pub fn encode(&self) -> Vec<u8> {
-        let what = self.size << 6 | self.picture & Request::MOST_PICTURE;
+        let what = self.size << 6 | self.picture & ExemplarRequest::MAX_PICTURE;
         [&[self.epoch, self.label, self.serial, what][..], &self.bytes].concat()
     }
 
     /// Reads an object; `None` if it names no label, or a picture that is not there.
     pub fn decode(object: &[u8]) -> Option<Self> {
         let (&[epoch, label, serial, what], bytes) = object.split_first_chunk::<HEAD>()?;
-        let (size, picture) = (what >> 6, what & Request::MOST_PICTURE);
+        let (size, picture) = (what >> 6, what & ExemplarRequest::MAX_PICTURE);
         let is_sound = label != 0 && label != 255 && (picture == 0) == bytes.is_empty();
         is_sound.then(|| Self { epoch, label, serial, size, picture, bytes: bytes.to_vec() })
     }
@@ -93,7 +93,9 @@ pub fn unstrip(bytes: &[u8], edge: u16) -> Option<Vec<u8>> {
     file.extend(b"WEBPVP8 ");
     file.extend(length.to_le_bytes());
     file.extend(&frame);
-    file.extend(&[0][..padding]);
+    if padding == 1 {
+        file.push(0);
+    }
     Some(file)
 }
 

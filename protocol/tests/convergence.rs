@@ -4,7 +4,7 @@ mod pair;
 
 use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
 use proptest::prelude::*;
-use scenecast_protocol::directive::{LifeLine, Slot, Utility};
+use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, PlaneKind, PlaneScale, PlaneSource};
 use scenecast_protocol::map_codec::Codec;
@@ -101,7 +101,7 @@ proptest! {
             }
         }
         let applied = |pair: &Pair| {
-            pair.surface.vehicle(auv()).unwrap().slots().all(|s| s.life == LifeLine::Applied)
+            pair.surface.vehicle(auv()).unwrap().slots().all(|s| s.status == OrderStatus::Applied)
         };
         for _ in 0..1000 {
             pair.run(pair.now + Duration::from_secs(100), false);

@@ -4,6 +4,7 @@ mod pair;
 
 use pair::{Pair, Setup, Water, auv, patchy, utility};
 use proptest::prelude::*;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::wire::{PlannedPath, VehicleStatus};
@@ -18,11 +19,12 @@ const STILL: Water = Water {
     propagation: Duration::from_millis(300),
 };
 
-/// A plan whose every place tells which one it is.
-fn plan(number: u32, places: usize) -> VehicleStatus {
+/// A plan whose every point has its number.
+fn plan(number: u32, points: usize) -> VehicleStatus {
     let x = f64::from(number);
-    let path = PlannedPath { places: (1..=places).map(|i| (x, i as f64)).collect(), goes_on: false };
-    VehicleStatus { labels: 3, waypoint: Some((x, 0.0)), path, ..VehicleStatus::default() }
+    let points = (1..=points).map(|i| MapPoint::new(x, i as f64)).collect();
+    let path = PlannedPath { points, continues: false };
+    VehicleStatus { labels: 3, waypoint: Some(MapPoint::new(x, 0.0)), path, ..VehicleStatus::default() }
 }
 
 fn told(pair: &Pair) -> Option<&VehicleStatus> {
@@ -33,9 +35,9 @@ fn told(pair: &Pair) -> Option<&VehicleStatus> {
 fn is_told(pair: &Pair) -> bool {
     let plan = &pair.status;
     told(pair).is_some_and(|told| {
-        let n = told.path.places.len();
-        let is_whole = n == plan.path.places.len().min(PlannedPath::MOST);
-        is_whole && told.waypoint == plan.waypoint && told.path.places[..] == plan.path.places[..n]
+        let n = told.path.points.len();
+        let is_whole = n == plan.path.points.len().min(PlannedPath::MAX_POINTS);
+        is_whole && told.waypoint == plan.waypoint && told.path.points[..] == plan.path.points[..n]
     })
 }
 
@@ -61,8 +63,8 @@ proptest! {
                     pair.vehicle.owe_pose(pair.now);
                 }
                 pair.run(pair.now + Duration::from_secs(1), false);
-                let Some((told, (x, _))) = told(&pair).and_then(|t| Some((t, t.waypoint?))) else { continue };
-                prop_assert!(told.path.places.iter().all(|p| p.0 == x), "{:?} of two plans", told.path);
+                let Some((told, x)) = told(&pair).and_then(|t| Some((t, t.waypoint?.x_m))) else { continue };
+                prop_assert!(told.path.points.iter().all(|p| p.x_m == x), "{:?} of two plans", told.path);
                 prop_assert!(x as u32 >= latest, "plan {} after {}", x, latest);
                 latest = x as u32;
             }
@@ -108,12 +110,12 @@ fn a_path_takes_at_most_a_hundredth_of_the_budget_and_no_pose_comes_later_for_it
             for minute in 0..60 {
                 // Differences of 25 bits.
                 pair.status = plan(minute, places);
-                let far = |(i, place): (usize, &mut (f64, f64))| place.0 = if i % 2 == 0 { 8e5 } else { -8e5 };
-                pair.status.path.places.iter_mut().enumerate().for_each(far);
+                let far = |(i, point): (usize, &mut MapPoint)| point.x_m = if i % 2 == 0 { 8e5 } else { -8e5 };
+                pair.status.path.points.iter_mut().enumerate().for_each(far);
                 pair.vehicle.set_map(patchy(60, minute.into()).iter(), pair.now);
                 pair.run(pair.now + Duration::from_secs(60), false);
             }
-            assert!(told(&pair).is_some_and(|t| t.path.goes_on == (places > PlannedPath::MOST)));
+            assert!(told(&pair).is_some_and(|t| t.path.continues == (places > PlannedPath::MAX_POINTS)));
             pair.vehicle.stats().bytes_by_class[&Class::Status] * 8
         };
         let (without, with) = (hour(0), hour(8));

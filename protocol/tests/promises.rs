@@ -94,12 +94,12 @@ fn nothing_of_another_mission_is_taken() {
                 pair.surface.issue(auv(), hold(phase % 2 == 0), pair.now).unwrap();
                 pair.run(pair.now + Duration::from_secs(20), false);
             }
-            let heard = ours.vehicle.stats().frames_heard;
+            let heard = ours.vehicle.stats().frames_received;
             for bytes in &theirs.overheard {
                 ours.vehicle.handle_frame(bytes, ours.now);
                 ours.surface.handle_frame(bytes, ours.now);
             }
-            assert_eq!(ours.vehicle.stats().frames_heard, heard, "a frame of another mission was taken");
+            assert_eq!(ours.vehicle.stats().frames_received, heard, "a frame of another mission was taken");
             assert_eq!(ours.vehicle.poll_event(), None);
         }
         assert!(ours.vehicle.stats().dropped[&DropReason::Checksum] > 1000);
@@ -230,7 +230,7 @@ fn the_surface_knows_about_how_much_the_vehicle_has_still_to_send() {
     for phase in 0..10 {
         pair.vehicle.set_map(patchy(200, phase).iter(), pair.now);
         pair.run(pair.now + Duration::from_secs(30), false);
-        let (told, is) = (told(&pair), pair.vehicle.source().told_backlog_bytes());
+        let (told, is) = (told(&pair), pair.vehicle.source().expected_backlog_bytes());
         if let Some(told) = told.filter(|_| phase > 2 && is > 300) {
             // The vehicle goes on learning what its cells take, and does not count what is on its way.
             assert!((is / 3..=is * 3).contains(&told), "{told} bytes are said to wait, and {is} do");

@@ -1,17 +1,18 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
+use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, Fence, Figure, Fix, Limits, Place, PlaneSet, PlannerKind, Polygon,
-    Reaction, RefusalReason, Request, Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, Limits,
+    PlaneSet, PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState,
+    Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement,
-    PlannedPath, Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION,
-    unwrap_number,
+    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, ModeReason,
+    Placement, PlannedPath, Reader, Seal, SessionId, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -97,7 +98,7 @@ fn header(from: Address, number: u16) -> Header {
         stamp: None,
         nonce: None,
         ack: None,
-        hello: false,
+        kind: FrameKind::Numbered,
         keyed: false,
     }
 }
@@ -126,8 +127,7 @@ fn status() -> VehicleStatus {
         mode: VehicleMode::Hold,
         autopilot_silent: false,
         reason: ModeReason::Order,
-        x_m: 1.5,
-        y_m: -0.1,
+        position: MapPoint::new(1.5, -0.1),
         depth_m: 18.0,
         heading_deg: 90.0,
         sigma_m: 1.25,
@@ -147,8 +147,8 @@ fn status() -> VehicleStatus {
 }
 
 /// A place in metres.
-fn place(x_m: i32, y_m: i32) -> Place {
-    Place { x_dm: 10 * x_m, y_dm: 10 * y_m }
+fn place(east_m: i32, north_m: i32) -> DecimetrePoint {
+    DecimetrePoint::new(10 * east_m, 10 * north_m)
 }
 
 /// The report and the pose of the vehicle's answer.
@@ -201,14 +201,14 @@ fn surface_hello(keyed: bool) -> Header {
         turn: Some(48),
         stamp: clock(50_000, None),
         nonce: keyed.then_some(SURFACE_NONCE),
-        hello: true,
+        kind: FrameKind::Hello,
         keyed,
         ..header(Address::SURFACE, 0)
     }
 }
 
 fn vehicle_hello(keyed: bool) -> Header {
-    Header { nonce: keyed.then_some(VEHICLE_NONCE), hello: true, keyed, ..header(auv(), 0) }
+    Header { nonce: keyed.then_some(VEHICLE_NONCE), kind: FrameKind::Hello, keyed, ..header(auv(), 0) }
 }
 
 fn call(keyed: bool) -> Header {
@@ -217,7 +217,7 @@ fn call(keyed: bool) -> Header {
         session: SessionId::from_random(CALL_SESSION),
         turn: Some(8),
         nonce: keyed.then_some(CALL_NONCE),
-        hello: true,
+        kind: FrameKind::Hello,
         keyed,
         ..header(Address::SURFACE, 0)
     }
@@ -275,9 +275,10 @@ fn parts_of_a_frame_are_those_of_the_document() {
         assert_eq!(VersionedSlot::decode(&bytes), Ok(read));
         bytes
     };
-    let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], goes_on: bool| {
-        let path = PlannedPath { places: path.to_vec(), goes_on };
-        let bytes = VehicleStatus { waypoint, path, ..status() }.encode_pose(99);
+    let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], continues: bool| {
+        let point = |(x_m, y_m)| MapPoint { x_m, y_m };
+        let path = PlannedPath { points: path.iter().copied().map(point).collect(), continues };
+        let bytes = VehicleStatus { waypoint: waypoint.map(point), path, ..status() }.encode_pose(99);
         assert_eq!(VehicleStatus::default().read_pose(&bytes), Ok(()));
         bytes
     };
@@ -286,12 +287,12 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), spend: SpendOrder::default() };
     let curious = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
     let curious = Budget { spend: curious.unwrap(), ..budget };
-    let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
-    let requests = Requests {
+    let fix = Fix { position: WorldPoint::new(-12.3, 400.0), sigma_m: 1.5, age_s: 0.82 };
+    let requests = ExemplarRequests {
         epoch: 1,
         wanted: vec![
-            Request { label: 3, serial: 2, size: 0, picture: 0 },
-            Request { label: 5, serial: 1, size: 1, picture: 9 },
+            ExemplarRequest { label: 3, serial: 2, size: 0, picture: 0 },
+            ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 },
         ],
     };
     let plane = |chunk: PlaneChunk<'_>| {
@@ -377,10 +378,13 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         (
             "the same with a placement: version 2, 12.5 m east, -0.1 m north",
-            VehicleStatus { placement: Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 }), ..status() }
-                .encode_report(99, 0)
-                .unwrap()
-                .0,
+            VehicleStatus {
+                placement: Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) }),
+                ..status()
+            }
+            .encode_report(99, 0)
+            .unwrap()
+            .0,
         ),
         (
             "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",

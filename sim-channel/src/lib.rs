@@ -15,15 +15,15 @@
 //! | [`modem`] | what a host sees of an S2C, a Micromodem or a byte pipe; [`modem::Basin`] joins them by a channel |
 //!
 //! ```
-//! use sim_channel::{Channel, Duration, NodeId, Outcome, Position, presets};
+//! use sim_channel::{Channel, Duration, NodeId, ReceptionOutcome, NodePosition, presets};
 //!
 //! let mut channel = Channel::new(presets::calm_lake(), 7);
-//! channel.place(NodeId(1), Position::new(0.0, 0.0, 1.0));
-//! channel.place(NodeId(2), Position::new(800.0, 0.0, 20.0));
+//! channel.place(NodeId(1), NodePosition::new(0.0, 0.0, 1.0));
+//! channel.place(NodeId(2), NodePosition::new(800.0, 0.0, 20.0));
 //! channel.transmit(NodeId(1), b"hello".to_vec(), Duration::from_millis(300), Duration::ZERO);
 //! let at = channel.poll_timeout().unwrap();
 //! let arrival = channel.poll_arrival(at).unwrap();
-//! assert!(matches!(arrival.outcome, Outcome::Delivered { .. }));
+//! assert!(matches!(arrival.outcome, ReceptionOutcome::Delivered { .. }));
 //! ```
 
 #![warn(missing_docs)]
@@ -32,18 +32,15 @@ pub mod acoustics;
 mod channel;
 pub mod loss;
 pub mod modem;
-mod node;
-pub mod presets;
+mod nodes;
 mod random;
-mod talker;
-mod track;
 pub mod usbl;
 
 pub use std::time::Duration;
 
-pub use channel::{Arrival, Channel, ChannelConfig, LossReason, Onset, Outage, OutageScope, Outcome};
+pub use channel::{
+    Arrival, Channel, ChannelConfig, Interferer, LossReason, Onset, Outage, OutageScope, ReceptionOutcome, presets,
+};
 pub use loss::LossModel;
-pub use node::{NodeId, Position};
-pub use random::Stream;
-pub use talker::Talker;
-pub use track::Track;
+pub use nodes::{NodeId, NodePosition, Track};
+pub use random::RandomStream;

@@ -1,5 +1,6 @@
 //! Harness of the whole-system tests.
 
+pub mod pages;
 mod recorded;
 
 pub use recorded::recorded;

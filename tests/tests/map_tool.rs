@@ -1,14 +1,14 @@
 //! `scenecast map` as its user meets it.
 
 use scenecast_protocol::map_codec::Plane;
-use scenecast_protocol::map_codec::procedural::{Chance, Flips, Scene, Survey};
 use scenecast_tests::{assert_refused, run, scratch};
+use scenecast_training::{Flips, MapRng, Scene, Survey};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The first maps of a small survey as `1.png`, `2.png`, ...
 fn series(dir: &Path, steps: usize) -> Vec<Plane> {
-    let scene = Scene::Colonies.draw(&mut Chance::new(3), 60, 40, 6);
+    let scene = Scene::Colonies.draw(&mut MapRng::new(3), 60, 40, 6);
     let mut survey = Survey::new(1, scene, Flips { border: 20_000, anywhere: 0, settling: 0 }, steps);
     let maps = (1..=steps).map(|step| {
         survey.advance();

@@ -171,7 +171,7 @@ fn a_wrong_words_file_is_refused_with_its_line_and_leaves_nothing() {
 }
 
 fn reef(dir: &Path) -> String {
-    let reef = scene_model::generate::reef(3, 400, 300, 60, 5);
+    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5);
     reef.image.save(dir.join("reef.png")).unwrap();
     image::GrayImage::from_raw(400, 300, reef.truth).unwrap().save(dir.join("classes.png")).unwrap();
     path(dir.join("reef.png"))
@@ -207,7 +207,7 @@ fn a_mosaic_is_labelled_and_scored_and_what_does_not_fit_it_is_refused() {
 fn tum(dir: &Path) -> PathBuf {
     let dir = dir.join("tum");
     std::fs::create_dir_all(dir.join("rgb")).unwrap();
-    let reef = scene_model::generate::reef(3, 400, 300, 60, 5).image;
+    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5).image;
     let (mut rgb, mut depth, mut truth) = ("# color images\n".to_owned(), String::new(), String::new());
     for i in 0..6u32 {
         let time = 100.0 + f64::from(i) * 0.5;
@@ -259,7 +259,7 @@ fn a_tum_sequence_is_put_where_depth_and_pose_say_and_what_is_missing_is_counted
 #[test]
 fn frames_with_poses_are_labelled_and_bad_ones_are_counted() {
     let dir = scratch("scene-frames");
-    let reef = scene_model::generate::reef(3, 400, 300, 60, 5).image;
+    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5).image;
     let mut poses = "t_s,file,x_m,y_m,depth_m,heading_deg\n".to_owned();
     for i in 0..5u32 {
         image::imageops::crop_imm(&reef, i * 40, 0, 160, 120).to_image().save(dir.join(format!("{i}.png"))).unwrap();

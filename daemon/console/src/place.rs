@@ -14,8 +14,8 @@ pub(super) fn origin(surface: &Surface) -> Option<state::Origin> {
 
 /// By how much a map must be moved to lie where it belongs in the world.
 pub(super) fn placement(placement: Placement) -> state::Placement {
-    let Placement { version, east_m, north_m } = placement;
-    state::Placement { version, east_m, north_m }
+    let Placement { version, origin } = placement;
+    state::Placement { version, east_m: origin.east_m, north_m: origin.north_m }
 }
 
 /// The surface's GPS and what became of what it told; nothing without one.

@@ -6,7 +6,8 @@ use axum::body::Bytes;
 use scenecast_config::Config;
 use scenecast_core::LatLon;
 use scenecast_core::drop_counts::dropped;
-use scenecast_protocol::directive::{LifeLine, PlannerKind, SlotId, SlotProgress};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{OrderStatus, PlannerKind, SlotId, SlotProgress};
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
 use scenecast_protocol::mac::{ClockMap, ModemProfile};
@@ -119,7 +120,7 @@ fn vehicle(
     Some(state::Vehicle {
         id: address.number(),
         name: desk.name.clone(),
-        heard_s: view.heard().map(seconds),
+        heard_s: view.last_received().map(seconds),
         expected_interval_s: expected_interval_s(surface, &view, desk, facts),
         next_contact_s: view.next_contact(now).map(seconds),
         status: view.status().map(|(s, at)| status(s, *at)),
@@ -229,8 +230,8 @@ fn clock_ahead_s(clock: &ClockMap, now: Instant) -> f64 {
 fn status(s: &VehicleStatus, at: Instant) -> state::Status {
     state::Status {
         at_s: seconds(at),
-        x_m: s.x_m,
-        y_m: s.y_m,
+        x_m: s.position.x_m,
+        y_m: s.position.y_m,
         z_m: -s.depth_m,
         heading_deg: s.heading_deg,
         sigma_m: s.sigma_m,
@@ -245,9 +246,9 @@ fn status(s: &VehicleStatus, at: Instant) -> state::Status {
         autopilot_silent: s.autopilot_silent,
         reason: s.reason.name().map(str::to_owned),
         doing: doing(s),
-        waypoint: s.waypoint,
-        path: s.path.places.clone(),
-        path_goes_on: s.path.goes_on,
+        waypoint: s.waypoint.map(MapPoint::xy),
+        path: s.path.points.iter().copied().map(MapPoint::xy).collect(),
+        path_goes_on: s.path.continues,
         cells: s.explored_cells,
         labels: u32::from(s.labels),
         fix_age_s: s.fix_age_s,
@@ -320,17 +321,17 @@ fn picture(p: &Picture, base: &str) -> state::Picture {
 
 /// Whether the requests have not been sent yet.
 fn is_waiting(view: &PeerView<'_>) -> bool {
-    let request = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.life);
-    matches!(request, Some(LifeLine::Queued) | None)
+    let request = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.status);
+    matches!(request, Some(OrderStatus::Queued) | None)
 }
 
 fn slot(s: &SlotProgress) -> state::Slot {
-    let (life, reason) = match s.life {
-        LifeLine::Queued => (state::LifeLine::Queued, None),
-        LifeLine::OnAir => (state::LifeLine::OnAir, None),
-        LifeLine::Heard => (state::LifeLine::Heard, None),
-        LifeLine::Applied => (state::LifeLine::Applied, None),
-        LifeLine::Refused(reason) => (state::LifeLine::Refused, Some(reason.explain().to_owned())),
+    let (life, reason) = match s.status {
+        OrderStatus::Queued => (state::LifeLine::Queued, None),
+        OrderStatus::OnAir => (state::LifeLine::OnAir, None),
+        OrderStatus::Received => (state::LifeLine::Heard, None),
+        OrderStatus::Applied => (state::LifeLine::Applied, None),
+        OrderStatus::Refused(reason) => (state::LifeLine::Refused, Some(reason.explain().to_owned())),
     };
     state::Slot {
         slot: s.id.name().to_owned(),
@@ -345,7 +346,7 @@ fn slot(s: &SlotProgress) -> state::Slot {
 fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> state::Link {
     let views: Vec<PeerView<'_>> = surface.vehicles().filter_map(|(a, _)| surface.view(a)).collect();
     let sum = |of: &dyn Fn(&LinkStats) -> u64| views.iter().map(|v| of(v.stats())).sum::<u64>();
-    let heard = sum(&|s| s.frames_heard);
+    let heard = sum(&|s| s.frames_received);
     let numbered = sum(&|s| s.frames_numbered);
     let (lost, delivered) = (sum(&|s| s.frames_lost), sum(&|s| s.frames_delivered));
     let elapsed = now.as_secs_f64().max(1.0);
@@ -368,7 +369,7 @@ fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> state::Link {
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
         spend: surface.spend().names(),
         strangers: surface.strangers(),
-        up: direction(0, numbered, numbered.saturating_sub(heard), &|s, c| of_class(&s.heard_by_class, c)),
+        up: direction(0, numbered, numbered.saturating_sub(heard), &|s, c| of_class(&s.received_by_class, c)),
         down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),
         round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),
         backlog_bits: total(views.iter().filter_map(PeerView::backlog)),

@@ -19,7 +19,7 @@ fn name(reason: DropReason) -> &'static str {
         DropReason::Duplicate => "duplicate",
         DropReason::Late => "late",
         DropReason::NoBase => "no_base",
-        DropReason::Stranger => "stranger",
+        DropReason::UnknownSender => "stranger",
         DropReason::Unauthenticated => "unauthenticated",
         DropReason::Keyed => "keyed",
     }

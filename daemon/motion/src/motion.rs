@@ -1,7 +1,7 @@
 //! How the vehicle of a rehearsal really moves, and what its own sensors make of it.
 
 use scenecast_core::wrap_rad;
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 
 /// What the vehicle's sensors tell of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ pub struct Motion {
     /// Where it believes to be, for a vehicle that reckons by itself.
     believed: (f64, f64),
     rising: bool,
-    dice: Stream,
+    dice: RandomStream,
 }
 
 /// Speed up and down, metres a second: that of a small vehicle.
@@ -47,7 +47,7 @@ const VERTICAL_M_S: f64 = 0.3;
 impl Motion {
     /// At rest at a place; `drift` is the error of dead reckoning a metre of way.
     pub fn new(x_m: f64, y_m: f64, speed_m_s: f64, drift: f64, seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[1]);
+        let mut dice = RandomStream::new(seed, &[1]);
         let scale_error = drift * dice.normal();
         let heading_error_rad = drift * dice.normal();
         Self {

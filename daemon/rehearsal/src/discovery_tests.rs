@@ -46,7 +46,7 @@ fn a_vehicle_that_answers_a_call_gets_a_desk_and_its_status_is_shown() {
     }
     assert_eq!(surface.desk(third).unwrap().name, "vehicle 3");
     assert!(surface.view(third).unwrap().status().is_some());
-    assert!(surface.view(Address::vehicle(1).unwrap()).unwrap().heard().is_none());
+    assert!(surface.view(Address::vehicle(1).unwrap()).unwrap().last_received().is_none());
 }
 
 #[test]

@@ -12,7 +12,7 @@ use sim_channel::modem::s2c::{S2c, S2cConfig};
 use sim_channel::modem::transparent::{Transparent, TransparentConfig};
 use sim_channel::modem::{Basin, Emulator, Fault};
 use sim_channel::usbl::UsblConfig;
-use sim_channel::{Channel, NodeId, Position};
+use sim_channel::{Channel, NodeId, NodePosition};
 use std::time::Duration;
 
 /// The ends of the link, as indices.
@@ -71,7 +71,7 @@ impl Docked {
     }
 
     /// Puts an end's modem somewhere.
-    pub fn place(&mut self, end: usize, position: Position) {
+    pub fn place(&mut self, end: usize, position: NodePosition) {
         let node = self.berths[end].node;
         self.basin.channel().place(node, position);
     }

@@ -1,12 +1,12 @@
 //! The figures of a mission.
 
 use super::mission::Mission;
-use scene_model::tuning::mutual_information_nats;
 use scenecast_core::drop_counts::dropped;
+use scenecast_scoring::mutual_information_nats;
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::schedule::Class;
-use scenecast_protocol::wire::SlotState;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

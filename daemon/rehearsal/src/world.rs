@@ -21,12 +21,12 @@ const IGNORE: u8 = 255;
 impl World {
     /// A procedural reef of about 26 x 18 m drawn from the scene model's own generative process.
     pub fn procedural(seed: u64, metres_per_pixel: f64) -> Self {
-        let reef = scene_model::generate::reef(seed, 2600, 1800, 25, 8);
+        let reef = scenecast_worlds::reef(seed, 2600, 1800, 25, 8);
         Self { image: reef.image, metres_per_pixel, classes: Some(reef.truth) }
     }
 
     /// A reef that was drawn before.
-    pub(crate) fn from_reef(reef: &scene_model::generate::Reef, metres_per_pixel: f64) -> Self {
+    pub(crate) fn from_reef(reef: &scenecast_worlds::Reef, metres_per_pixel: f64) -> Self {
         Self { image: reef.image.clone(), metres_per_pixel, classes: Some(reef.truth.clone()) }
     }
 

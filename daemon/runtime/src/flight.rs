@@ -54,7 +54,7 @@ impl Flight {
     pub(super) fn place_camera(&self, vehicle: &Vehicle, frame: &mut RecordedFrame) {
         if self.is_piloted() {
             let navigator = vehicle.navigator();
-            (frame.x_m, frame.y_m) = navigator.position();
+            (frame.x_m, frame.y_m) = navigator.position().xy();
             (frame.heading_rad, frame.depth_m) = (navigator.heading_rad(), navigator.depth_m());
         }
     }
@@ -74,10 +74,10 @@ impl Flight {
         }
         vehicle.set_autopilot_silent(pilot.health().is_silent());
         let navigator = vehicle.navigator();
-        let (x, y) = navigator.position();
-        let (world_x, world_y) = navigator.world();
-        let goal = vehicle.waypoint().map(|(to_x, to_y)| {
-            let (east_m, north_m) = (to_x - x, to_y - y);
+        let (x, y) = navigator.position().xy();
+        let (world_x, world_y) = navigator.world().xy();
+        let goal = vehicle.waypoint().map(|to| {
+            let (east_m, north_m) = (to.x_m - x, to.y_m - y);
             let place = self.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
             Goal { east_m, north_m, depth_m: Some(self.depth_m), place }
         });

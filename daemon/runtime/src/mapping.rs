@@ -3,7 +3,7 @@
 use super::checkpoint::CheckpointFile;
 use super::clock::Clock;
 use super::journal::Folder;
-use scene_model::exemplars::Exemplar;
+use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
@@ -37,7 +37,7 @@ pub(super) struct Seen {
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
-    pub(super) exemplars: BTreeMap<u8, Vec<Exemplar>>,
+    pub(super) exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
 }
 
 /// The thread's two ends.

@@ -7,7 +7,8 @@ use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
-use scenecast_protocol::directive::{Fix, LifeLine, SlotId};
+use scenecast_protocol::coordinates::WorldPoint;
+use scenecast_protocol::directive::{Fix, OrderStatus, SlotId};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -127,7 +128,7 @@ impl World {
 
     fn is_settled(&self) -> bool {
         let mut slots = self.surface.view(self.auv()).unwrap().slots();
-        slots.all(|s| matches!(s.life, LifeLine::Applied | LifeLine::Refused(_)))
+        slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
     }
 
     fn tick(&mut self) {
@@ -158,7 +159,11 @@ impl World {
                 self.surface.set_hold(auv, true, now).unwrap();
                 self.surface.set_budget(5000, None, None, now).unwrap();
             }
-            60 => drop(self.surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
+            60 => drop(
+                self.surface
+                    .send_fix(auv, Fix { position: WorldPoint::new(1.0, 1.0), sigma_m: 1.0, age_s: 0.1 }, now)
+                    .unwrap(),
+            ),
             90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
             120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
             150 => self.surface.set_budget(9000, None, None, now).unwrap(),

@@ -152,7 +152,7 @@ impl Host {
                 SurfaceOutput::ExemplarHere(vehicle, label) => {
                     tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
                 }
-                SurfaceOutput::SlotSettled(..) | SurfaceOutput::Changed(_) => {}
+                SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
             }
         }
         self.modem.set_budget(self.surface.budget_bps());

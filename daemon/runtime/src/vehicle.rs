@@ -183,16 +183,21 @@ impl Host {
                     let _ = self.mapper.orders.send(ToMapper::Tune(settings));
                 }
                 VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
-                VehicleOutput::Waypoint(x, y) => {
+                VehicleOutput::Waypoint(at) => {
                     self.flight.set_rising(false);
-                    tracing::info!("waypoint {x:.1} m east, {y:.1} m north");
+                    tracing::info!("waypoint {:.1} m east, {:.1} m north", at.x_m, at.y_m);
                 }
                 VehicleOutput::Hold => {
                     self.flight.set_rising(false);
                     tracing::info!("hold");
                 }
                 VehicleOutput::Fixed(fix, _) => {
-                    tracing::debug!("fix: {:.1} m east, {:.1} m north, +-{:.1} m", fix.x_m, fix.y_m, fix.sigma_m);
+                    tracing::debug!(
+                        "fix: {:.1} m east, {:.1} m north, +-{:.1} m",
+                        fix.position.east_m,
+                        fix.position.north_m,
+                        fix.sigma_m
+                    );
                 }
                 VehicleOutput::Surface => {
                     self.flight.set_rising(true);

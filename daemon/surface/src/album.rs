@@ -1,6 +1,6 @@
 //! Images of a vehicle's labels: those that are here, and those that are asked for.
 
-use scenecast_protocol::directive::{Request, Requests};
+use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::time::Instant;
@@ -32,7 +32,7 @@ pub enum AskState {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
     /// What the vehicle is asked.
-    pub request: Request,
+    pub request: ExemplarRequest,
     /// How far it is.
     pub state: AskState,
     /// When that last changed.
@@ -98,7 +98,7 @@ impl Album {
         if others >= Self::MOST_ASKED {
             return Err(format!("{others} images are on their way: wait for one, or cancel one"));
         }
-        let mut request = Request { label, ..Request::default() };
+        let mut request = ExemplarRequest { label, ..ExemplarRequest::default() };
         let page = self.pages.get(&label);
         if let Wish::Larger(number) = wish {
             let picture = page.and_then(|p| p.picture(number)).ok_or_else(|| match number {
@@ -128,9 +128,9 @@ impl Album {
     }
 
     /// Requests that are not met yet.
-    pub fn wanted(&self, epoch: u8) -> Requests {
+    pub fn wanted(&self, epoch: u8) -> ExemplarRequests {
         let open = self.pages.values().filter(|page| page.is_open());
-        Requests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
+        ExemplarRequests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
     }
 
     /// The vehicle refused what is asked for.
@@ -217,14 +217,14 @@ mod tests {
         album.ask(5, Wish::Another, NOW).unwrap();
         assert_eq!(
             album.wanted(3),
-            Requests { epoch: 3, wanted: vec![Request { label: 5, serial: 1, size: 0, picture: 0 }] }
+            ExemplarRequests { epoch: 3, wanted: vec![ExemplarRequest { label: 5, serial: 1, size: 0, picture: 0 }] }
         );
         album.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
         assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
         assert!(album.handle_exemplar(&come(5, 1, 0, 9), NOW));
         assert!(album.wanted(3).wanted.is_empty());
         album.ask(5, Wish::Larger(None), NOW).unwrap();
-        assert_eq!(album.wanted(3).wanted, [Request { label: 5, serial: 2, size: 1, picture: 9 }]);
+        assert_eq!(album.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
         assert!(album.handle_exemplar(&come(5, 2, 1, 9), NOW));
         let sizes: Vec<(u8, u8)> = album.page(5).unwrap().pictures.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);

@@ -32,7 +32,7 @@ pub fn assemble(
             max_idle: Duration::from_secs_f64(config.link.max_idle_s),
         },
         vehicles: vehicles.keys().copied().collect(),
-        call_every: (config.link.discovery_period_s > 0.0)
+        discovery_period: (config.link.discovery_period_s > 0.0)
             .then(|| Duration::from_secs_f64(config.link.discovery_period_s)),
         authenticity,
     };

@@ -4,7 +4,7 @@ use super::album::Album;
 use super::pauses::Pauses;
 use super::settings::SettingsDesk;
 use scenecast_core::UsblLine;
-use scenecast_protocol::directive::{Fence, Limits, Requests, SlotId, Utility};
+use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
@@ -75,7 +75,7 @@ impl Desk {
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.album = Album::default();
         }
-        self.track.push_back((now, status.x_m, status.y_m));
+        self.track.push_back((now, status.position.x_m, status.position.y_m));
         if self.track.len() > Self::TRACK {
             self.track.pop_front();
         }
@@ -102,7 +102,7 @@ impl Desk {
     }
 
     /// Images that are asked for and not here.
-    pub fn wanted(&self) -> Requests {
+    pub fn wanted(&self) -> ExemplarRequests {
         self.album.wanted(self.epoch)
     }
 }

@@ -1,6 +1,6 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, LifeLine, PlaneSet, PlannerKind, Settings};
+use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlaneSet, PlannerKind, Settings};
 use scenecast_protocol::map::PlaneKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -136,20 +136,20 @@ impl SettingsDesk {
     }
 
     /// What is to go out for an order: what was asked for before it included, but for what the vehicle has refused.
-    pub(super) fn next_order(&self, order: &Settings, last: Option<LifeLine>) -> Settings {
-        let base = if matches!(last, Some(LifeLine::Refused(_))) { &self.in_force } else { &self.asked };
+    pub(super) fn next_order(&self, order: &Settings, last: Option<OrderStatus>) -> Settings {
+        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.asked };
         base.then(order)
     }
 
     /// That has gone out, after an order that had come as far as `last`.
-    pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<LifeLine>) {
-        self.is_unsure |= matches!(last, Some(LifeLine::OnAir | LifeLine::Heard));
+    pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<OrderStatus>) {
+        self.is_unsure |= matches!(last, Some(OrderStatus::OnAir | OrderStatus::Received));
         self.asked = settings;
     }
 
     /// The vehicle has decided about the last order.
-    pub(super) fn handle_settled(&mut self, life: LifeLine) {
-        if life == LifeLine::Applied {
+    pub(super) fn handle_settled(&mut self, life: OrderStatus) {
+        if life == OrderStatus::Applied {
             (self.in_force, self.is_unsure) = (self.asked, false);
         }
     }
@@ -222,17 +222,17 @@ mod tests {
         };
         send(&mut desk, r#"{"alpha": 0.5}"#, None);
         assert_eq!(desk.in_force(), Some(&Settings::default()));
-        send(&mut desk, r#"{"gamma": 0.1}"#, Some(LifeLine::Queued));
-        desk.handle_settled(LifeLine::Applied);
+        send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
+        desk.handle_settled(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"planes": "confidence,depth"}"#, Some(LifeLine::Applied));
-        send(&mut desk, r#"{"beta": 1}"#, Some(LifeLine::Heard));
+        send(&mut desk, r#"{"planes": "confidence,depth"}"#, Some(OrderStatus::Applied));
+        send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
         assert_eq!(desk.in_force(), None, "the vehicle may follow the planes already");
-        let refused = LifeLine::Refused(RefusalReason::OutOfRange);
+        let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
         desk.handle_settled(refused);
         send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
         assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        desk.handle_settled(LifeLine::Applied);
+        desk.handle_settled(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(desk.asked()));
     }
 }

@@ -36,7 +36,7 @@ pub fn assemble(
     let codec = config.map.codec;
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     link.set_planes(planes(config, codec));
-    link.source_mut().set_settle_time(Duration::from_secs_f64(config.map.debounce_s));
+    link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
     let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
     let (x, y) = steering.start();

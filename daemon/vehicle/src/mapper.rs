@@ -3,7 +3,7 @@
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use image::RgbImage;
-use scene_model::exemplars::{Exemplar, ExemplarStore};
+use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
@@ -196,12 +196,12 @@ impl Mapper {
     }
 
     /// The images that represent a label best so far, the best first.
-    pub fn exemplars(&self, label: u8) -> &[Exemplar] {
+    pub fn exemplars(&self, label: u8) -> &[ExemplarPatch] {
         self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
     }
 
     /// The images of all labels that have some.
-    pub fn gallery(&self) -> BTreeMap<u8, Vec<Exemplar>> {
+    pub fn gallery(&self) -> BTreeMap<u8, Vec<ExemplarPatch>> {
         let labels = self.book.labels();
         let images = labels.map(|label| (label, self.exemplars(label).to_vec()));
         images.filter(|(_, images)| !images.is_empty()).collect()

@@ -2,6 +2,8 @@
 
 mod ahead;
 
+pub use ahead::PathAhead;
+
 use super::planning::{
     Bounds, Knowledge, Lattice, Node, Planner, Point, Question, Ways, Window, Worth, distance, planner,
 };
@@ -136,7 +138,7 @@ impl Steering {
     /// Puts a fence that was checked in force.
     pub fn set_fence(&mut self, fence: &Fence) {
         self.bounds = Bounds::new(fence, self.clearance_m);
-        self.return_point = fence.return_point.map(|p| p.metres());
+        self.return_point = fence.return_point.map(|p| p.to_world().xy());
         self.lay_out();
     }
 

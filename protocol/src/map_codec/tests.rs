@@ -1,17 +1,17 @@
-//! What every chunk promises, whichever coder wrote it.
+//! Properties of every chunk, whichever coder wrote it.
 
-use super::bits::BitWriter;
 use super::chunk::header_for;
 use super::header::Body;
 use super::lattice::Lattice;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
-use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
+use crate::bytes::BitWriter;
+use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
 const CODECS: [Codec; 3] = [Codec::Auto, Codec::Png, Codec::Context];
 
-/// A patchy grid: blobs of labels on a square, somewhere on the map.
+/// A patchy grid: blobs of labels on a square at any position.
 fn grid(labels: u8, density: u8) -> impl Strategy<Value = Vec<(i32, i32, u8)>> {
     let blob = (0..40i32, 0..40i32, 1..9i32, 1..9i32, 0..=labels);
     let cell = (0..40i32, 0..40i32, 0..=labels);

@@ -1,4 +1,4 @@
-//! What the keys promise together.
+//! Properties of the keys together.
 
 use super::*;
 use proptest::collection::vec;
@@ -25,7 +25,7 @@ fn flip(bytes: &mut [u8], bit: usize) {
     bytes[bit / 8] ^= 1 << (bit % 8);
 }
 
-/// Values for another implementation to check itself; those here are confirmed by one in Python, written from the standard.
+/// Values for another implementation to check itself; one in Python, written from the standard, confirms them.
 #[test]
 fn golden_bytes() {
     let seal = |encrypt, direction| {
@@ -89,7 +89,7 @@ fn a_tag_of_another_length_is_a_wrong_one() {
     }
 }
 
-/// Of a million random forgeries none gets through, in either kind of session nor as a hello.
+/// Of a million random forgeries none succeeds, in either kind of session or as a hello.
 #[test]
 fn random_forgeries_are_refused() {
     let (sessions, key) = ([session(false), session(true)], key());
@@ -138,7 +138,7 @@ proptest! {
         prop_assert!(!session(encrypt).open(Direction::Up, 1, head, body, &tag));
     }
 
-    /// Every bit, one after the other: of head, body, tag, number, direction, both nonces, mission and vehicle.
+    /// Flips every bit in turn: of head, body, tag, number, direction, both nonces, mission and vehicle.
     #[test]
     fn a_flipped_bit_is_refused(encrypt: bool, head in vec(any::<u8>(), 0..12), body in vec(any::<u8>(), 0..40), number: u64) {
         let mut sealed = body.clone();

@@ -1,4 +1,4 @@
-//! Sixteen-bit frame numbers on the wire, unbounded ones inside.
+//! Frame numbers: 16 bits on the wire, unbounded inside.
 
 /// The unbounded number nearest to `near` whose low 16 bits are `low`.
 pub fn unwrap_number(low: u16, near: u64) -> u64 {

@@ -3,7 +3,7 @@
 // Each test program uses a part of it.
 #![allow(dead_code)]
 
-use scenecast_protocol::directive::{Constraints, Slot, Utility};
+use scenecast_protocol::directive::{Constraints, Slot, SlotState, Utility};
 use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
@@ -13,7 +13,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
@@ -185,7 +185,7 @@ impl Pair {
     }
 
     pub(crate) fn is_converged(&self) -> bool {
-        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_settled()
+        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_converged()
     }
 
     fn planes_agree(&self) -> bool {
@@ -352,7 +352,7 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
         authenticity: setup.authenticity.clone(),
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
-    link.source_mut().set_settle_time(setup.settle);
+    link.source_mut().set_debounce(setup.settle);
     let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
     let source = |scale| PlaneSource::new(scale, setup.codec, setup.settle);
     link.set_planes(setup.planes.into_iter().flat_map(|shares| scales.map(source).into_iter().zip(shares)));
@@ -368,7 +368,7 @@ fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
         shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: vec![auv()],
-        call_every: None,
+        discovery_period: None,
         authenticity: setup.authenticity.clone(),
     };
     SurfaceLink::new(config, seed, now)

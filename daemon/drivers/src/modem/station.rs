@@ -4,7 +4,7 @@ use super::driver::{Class, Destination, Driver, Event, Token};
 use super::framing;
 use bytes::Bytes;
 use scenecast_core::{ModemAddress, UsblLine};
-use scenecast_protocol::link::{Cycle, Transmit};
+use scenecast_protocol::link::{Cycle, Transmit, TransmitKind};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
@@ -206,7 +206,7 @@ impl Station {
 fn class_of(transmit: &Transmit) -> Class {
     match (transmit.to, transmit.kind) {
         (Address::SURFACE, _) => Class::Bulk,
-        (_, "grant") => Class::Service,
+        (_, TransmitKind::Grant) => Class::Service,
         _ => Class::Command,
     }
 }

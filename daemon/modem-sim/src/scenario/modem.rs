@@ -9,7 +9,7 @@ use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
 use sim_channel::modem::transparent::{Transparent, TransparentConfig};
 use sim_channel::usbl::UsblConfig;
-use sim_channel::{Position, Track};
+use sim_channel::{NodePosition, Track};
 use std::net::SocketAddr;
 use std::time::Duration;
 
@@ -122,10 +122,10 @@ fn read_place(table: &Reader<'_>) -> Result<Place, UserError> {
 fn read_track(table: &Reader<'_>) -> Result<Track, UserError> {
     const TAKES: &str = "rows [time in s, metres east, metres north, metres down], times growing";
     let range = -FARTHEST_M..=LONGEST_S;
-    let place = |[x, y, z]: [f64; 3]| Position::new(x, y, z);
+    let place = |[x, y, z]: [f64; 3]| NodePosition::new(x, y, z);
     let position = table.numbers::<3>("position_m", -FARTHEST_M..=FARTHEST_M, "m")?;
     let Some(rows) = table.rows::<4>("track", range, TAKES)? else {
-        return Ok(Track::new(vec![(Duration::ZERO, position.map_or_else(Position::default, place))]));
+        return Ok(Track::new(vec![(Duration::ZERO, position.map_or_else(NodePosition::default, place))]));
     };
     if position.is_some() {
         return Err(table.wrong("position_m", "nothing beside a track"));

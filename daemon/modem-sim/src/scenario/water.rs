@@ -3,16 +3,16 @@
 use super::reader::Reader;
 use super::{index_of, node, seconds};
 use scenecast_core::UserError;
-use sim_channel::acoustics::noise::wind_of_sea_state;
+use sim_channel::acoustics::wind_of_sea_state;
 use sim_channel::loss::{GilbertElliott, RangeTable, Snr, ThreeState, Trace};
-use sim_channel::{ChannelConfig, LossModel, NodeId, Outage, OutageScope, Position, presets};
+use sim_channel::{ChannelConfig, LossModel, NodeId, NodePosition, Outage, OutageScope, presets};
 use std::time::Duration;
 
 /// Somebody who talks at random and understands nobody.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stranger {
     /// Where it is.
-    pub position: Position,
+    pub position: NodePosition,
     /// Bytes of a transmission.
     pub bytes: usize,
     /// How long a transmission takes.
@@ -82,7 +82,7 @@ pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, U
 pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, UserError> {
     let position = table.numbers("position_m", -FARTHEST_M..=FARTHEST_M, "m")?;
     let stranger = Stranger {
-        position: position.map_or_else(Position::default, |[x, y, z]| Position::new(x, y, z)),
+        position: position.map_or_else(NodePosition::default, |[x, y, z]| NodePosition::new(x, y, z)),
         bytes: table.whole("bytes", 1..=4096, "bytes")?.unwrap_or(32) as usize,
         airtime: seconds(table.number("airtime_s", 0.01..=60.0, "s")?.unwrap_or(0.5)),
         mean_gap: seconds(table.number("mean_gap_s", 0.01..=86_400.0, "s")?.unwrap_or(20.0)),

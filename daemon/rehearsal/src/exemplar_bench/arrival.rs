@@ -3,10 +3,11 @@
 use super::Spread;
 use crate::VirtualTime;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::mac::ModemProfile;
@@ -17,7 +18,7 @@ use scenecast_protocol::wire::Address;
 use scenecast_surface::{Page, Surface, Wish};
 use scenecast_vehicle::{Durable, MapUpdate, Vehicle, VehicleOutput};
 use serde::Serialize;
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -111,7 +112,7 @@ pub(super) struct Water {
     transmitting: [Option<Instant>; 2],
     next_change: Instant,
     next_fix: Instant,
-    dice: Stream,
+    dice: RandomStream,
     sent_bits: u64,
     frames: u64,
     lost: u64,
@@ -133,8 +134,8 @@ impl Water {
             },
             seed,
         );
-        channel.place(SURFACE, Position::default());
-        channel.place(VEHICLE, Position::new(config.channel.range_m, 0.0, -16.0));
+        channel.place(SURFACE, NodePosition::default());
+        channel.place(VEHICLE, NodePosition::new(config.channel.range_m, 0.0, -16.0));
         let mut vehicle = scenecast_vehicle::assemble(
             &config,
             scenecast_config::authenticity(&config)?,
@@ -163,7 +164,7 @@ impl Water {
             transmitting: [None; 2],
             next_change: now,
             next_fix: now,
-            dice: Stream::new(seed, &[5]),
+            dice: RandomStream::new(seed, &[5]),
             sent_bits: 0,
             frames: 0,
             lost: 0,
@@ -243,12 +244,12 @@ impl VirtualTime for Water {
             }
         }
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
-            let delivered = matches!(arrival.outcome, Outcome::Delivered { .. });
+            let delivered = matches!(arrival.outcome, ReceptionOutcome::Delivered { .. });
             if arrival.to == SURFACE {
                 self.frames += 1;
                 self.lost += u64::from(!delivered);
             }
-            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             match arrival.to {
                 SURFACE => self.surface.handle_frame(&bytes, now),
                 _ => self.vehicle.handle_frame(&bytes, now),
@@ -256,7 +257,7 @@ impl VirtualTime for Water {
         }
         if now >= self.next_fix {
             self.next_fix = now + Duration::from_secs_f64(FIX_S);
-            let fix = Fix { x_m: 8.0, y_m: 8.0, sigma_m: 1.0, age_s: 0.5 };
+            let fix = Fix { position: WorldPoint::new(8.0, 8.0), sigma_m: 1.0, age_s: 0.5 };
             // Before the vehicle is known there is no slot for it.
             let _ = self.surface.send_fix(self.address, fix, now);
         }

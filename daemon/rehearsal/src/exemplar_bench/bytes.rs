@@ -3,12 +3,12 @@
 use super::Spread;
 use crate::World;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar;
+use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::exemplar::edge_px;
-use scenecast_protocol::exemplar::{HEAD, most_bytes};
+use scenecast_protocol::exemplar::{HEAD, max_bytes};
 use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
@@ -92,7 +92,7 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
         let pose = Pose { x, y, z: -16.0, yaw_rad: 0.0 };
         mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
     }
-    let of_label = |images: Vec<Exemplar>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
+    let of_label = |images: Vec<ExemplarPatch>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
     Ok(mapper.gallery().into_values().flat_map(of_label).collect())
 }
 
@@ -130,7 +130,7 @@ fn measure(patches: &[RgbImage], size: u8) -> Measured {
             let good = (0..=100).filter_map(|quality| compress(&patch, quality)).filter(|c| c.ssim >= GOOD_SSIM);
             measured.fewest.extend(good.map(|c| c.bytes.len() + HEAD).min());
         }
-        if let Some(sent) = compress_to(&patch, GOOD_SSIM, most_bytes(size)) {
+        if let Some(sent) = compress_to(&patch, GOOD_SSIM, max_bytes(size)) {
             measured.sent.push(sent.bytes.len() + HEAD);
             measured.ssim.push(sent.ssim);
         }

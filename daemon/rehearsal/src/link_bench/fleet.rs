@@ -46,7 +46,7 @@ impl Ages {
     fn sample(&mut self, water: &Water) {
         for vehicle in &water.vehicles {
             let taken = water.surface.vehicle(vehicle.address).and_then(|v| v.replica().taken());
-            let settled = water.surface.vehicle(vehicle.address).is_some() && vehicle.link.is_settled();
+            let settled = water.surface.vehicle(vehicle.address).is_some() && vehicle.link.is_converged();
             let age = water.now.since(taken.unwrap_or(Instant::ZERO));
             self.oldest = self.oldest.max(if settled { Duration::ZERO } else { age });
         }
@@ -58,7 +58,7 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     let loss = 0.1;
     let mut setting = Setting::new(1000.0, 256, LossModel::Independent { probability: loss });
     setting.vehicles = VEHICLES;
-    setting.call_every = Some(Duration::from_secs(60));
+    setting.discovery_period = Some(Duration::from_secs(60));
     let mut water = Water::new(&setting, seed);
     water.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
     let began = water.now;

@@ -213,7 +213,7 @@ impl StateSource for OpaqueSource {
         self.waiting + RUN_HEAD * self.queue.len()
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         self.waiting + self.flying == 0
     }
 
@@ -357,7 +357,7 @@ mod tests {
             source.fill(bytes.min(CELLS));
             pass(&mut source, &mut replica, &mut number);
             assert_eq!(source.target(), replica.shown());
-            assert!(source.is_settled());
+            assert!(source.is_converged());
         }
     }
 

@@ -5,7 +5,7 @@ use super::water::{BIT_RATE_BPS, Setting, WINDOW, Water};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::schedule::Audit;
 use serde::Serialize;
-use sim_channel::{LossModel, Stream, presets};
+use sim_channel::{LossModel, RandomStream, presets};
 
 /// How frames are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -92,15 +92,15 @@ impl Place {
     /// Measures the row; all chance is drawn from `seed`.
     pub fn measure(&self, effort: &Effort, seed: u64) -> Result<Row, IssueError> {
         let setting = self.setting();
-        let mut dice = Stream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
+        let mut dice = RandomStream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
         let mut seed = || (dice.uniform() * 2f64.powi(53)) as u64;
         let mut flowing = Water::under_load(&setting, seed());
         let Flow { useful_bps, loss } = flowing.measure_flow(effort.saturated, None)?;
         let loss = self.loss.unwrap_or(loss);
         let mut directed = Water::under_load(&setting, seed());
-        let directives = directed.measure_directives(effort.directives, &mut Stream::new(seed(), &[]))?;
+        let directives = directed.measure_directives(effort.directives, &mut RandomStream::new(seed(), &[]))?;
         let mut stopped = Water::under_load(&setting, seed());
-        let convergence = stopped.measure_convergence(effort.stops, loss, &mut Stream::new(seed(), &[]));
+        let convergence = stopped.measure_convergence(effort.stops, loss, &mut RandomStream::new(seed(), &[]));
         let waters = [flowing, directed, stopped];
         Ok(Row {
             range_km: self.range_km,

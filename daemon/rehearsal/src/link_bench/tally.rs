@@ -1,6 +1,6 @@
 //! What became of the time on the medium and of the frames in it.
 
-use sim_channel::{LossReason, Outcome};
+use sim_channel::{LossReason, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -17,12 +17,14 @@ pub struct Frames {
 
 impl Frames {
     /// Counts what became of a frame.
-    pub fn count(&mut self, outcome: &Outcome) {
+    pub fn count(&mut self, outcome: &ReceptionOutcome) {
         self.sent += 1;
         match outcome {
-            Outcome::Lost { reason: LossReason::SelfDeaf | LossReason::Collision, .. } => self.talked_over += 1,
-            Outcome::Lost { .. } => self.lost += 1,
-            Outcome::Delivered { .. } => {}
+            ReceptionOutcome::Lost { reason: LossReason::SelfDeaf | LossReason::Collision, .. } => {
+                self.talked_over += 1
+            }
+            ReceptionOutcome::Lost { .. } => self.lost += 1,
+            ReceptionOutcome::Delivered { .. } => {}
         }
     }
 

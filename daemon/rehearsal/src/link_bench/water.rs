@@ -3,7 +3,7 @@
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
 use crate::VirtualTime;
-use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::{SlotId, SlotState};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, Transmit, VehicleConfig, VehicleEvent,
     VehicleLink,
@@ -11,8 +11,8 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Envelope, MissionId, SlotState, VehicleStatus};
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, ReceptionOutcome, NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ pub struct Setting {
     /// Vehicles, numbered from 1.
     pub vehicles: u8,
     /// Whether the surface knows none of them at the start and calls so often.
-    pub call_every: Option<Duration>,
+    pub discovery_period: Option<Duration>,
     /// Bit budget of each end.
     pub budget_bps: u32,
 }
@@ -44,7 +44,7 @@ pub struct Setting {
 impl Setting {
     /// One known vehicle, and a budget that does not bind.
     pub fn new(range_m: f64, frame_bytes: usize, loss: LossModel) -> Self {
-        Self { range_m, frame_bytes, loss, vehicles: 1, call_every: None, budget_bps: BIT_RATE_BPS }
+        Self { range_m, frame_bytes, loss, vehicles: 1, discovery_period: None, budget_bps: BIT_RATE_BPS }
     }
 
     /// The modem of every end.
@@ -123,13 +123,13 @@ impl Water {
             ..ChannelConfig::default()
         };
         let mut channel = Channel::new(config, seed);
-        channel.place(SURFACE, Position::default());
-        let mut dice = Stream::new(seed, &[1]);
+        channel.place(SURFACE, NodePosition::default());
+        let mut dice = RandomStream::new(seed, &[1]);
         let mut draw = || (dice.uniform() * 2f64.powi(53)) as u64;
         let mut vehicles = Vec::new();
         for number in 1..=setting.vehicles {
             let angle = f64::from(number) / f64::from(setting.vehicles) * std::f64::consts::TAU;
-            let place = Position::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
+            let place = NodePosition::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
             channel.place(NodeId(number), place);
             vehicles.push(Vehicle::new(setting, address(number), draw(), now));
         }
@@ -177,7 +177,7 @@ impl Water {
         let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
         self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
-        *self.tally.airtime.entry((who, transmit.kind)).or_default() += airtime;
+        *self.tally.airtime.entry((who, transmit.kind.name())).or_default() += airtime;
         self.ending.insert((self.now + airtime, from), ());
         self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
     }
@@ -214,7 +214,7 @@ impl VirtualTime for Water {
                 _ if arrival.from == SURFACE => self.tally.down.count(&arrival.outcome),
                 _ => {}
             }
-            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
                 self.heard.insert(arrival.to, self.now);
             }
@@ -284,7 +284,7 @@ impl Vehicle {
 
 /// The surface of a setting.
 pub(super) fn surface_config(setting: &Setting) -> SurfaceConfig {
-    let known = if setting.call_every.is_none() { setting.vehicles } else { 0 };
+    let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),
         modem: setting.modem(),
@@ -293,7 +293,7 @@ pub(super) fn surface_config(setting: &Setting) -> SurfaceConfig {
         shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: (1..=known).map(address).collect(),
-        call_every: setting.call_every,
+        discovery_period: setting.discovery_period,
         authenticity: None,
     }
 }

@@ -9,6 +9,7 @@ mod ship;
 
 pub use picture::picture;
 
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Fix, Slot, VersionedSlot};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::position::UsblSighting;
@@ -16,7 +17,7 @@ use scenecast_vehicle::{FixVerdict, Navigator};
 use serde::Serialize;
 use ship::Ship;
 use sim_channel::usbl::{UsblConfig, UsblHead};
-use sim_channel::{Position, Stream};
+use sim_channel::{NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -157,7 +158,7 @@ struct Lot {
 
 impl Lot {
     /// As many draws whatever comes out, so that runs with and without outliers meet the same noise.
-    fn draw(dice: &mut Stream, outliers: f64) -> Self {
+    fn draw(dice: &mut RandomStream, outliers: f64) -> Self {
         let [lot, kind, a, b, loss, wait] = [(); 6].map(|()| dice.uniform());
         let turn = a * std::f64::consts::TAU;
         let outlier = match (kind * 3.0) as u32 {
@@ -179,7 +180,7 @@ struct UnderWay {
 
 struct Way {
     outliers: f64,
-    dice: Stream,
+    dice: RandomStream,
     sensors: Sensors,
     head: UsblHead,
     ship: Ship,
@@ -195,7 +196,7 @@ impl Way {
         let usbl = UsblConfig { outlier_probability: 0.0, ..UsblConfig::default() };
         Self {
             outliers,
-            dice: Stream::new(seed, &[7]),
+            dice: RandomStream::new(seed, &[7]),
             sensors: Sensors::new(seed),
             head: UsblHead::new(usbl, seed),
             ship: Ship::new(seed),
@@ -228,8 +229,8 @@ impl Way {
             }
             self.deliver(now);
             self.tracks.truth.push(at);
-            self.tracks.reckoned.push(self.reckoner.position());
-            self.tracks.relayed.push(self.navigator.world());
+            self.tracks.reckoned.push(self.reckoner.position().xy());
+            self.tracks.relayed.push(self.navigator.world().xy());
             self.tracks.ship.push(self.ship.at);
         }
         for (fault, n) in self.ship.relay.faults() {
@@ -241,8 +242,8 @@ impl Way {
 
     /// The head hears the vehicle: what the relay makes of it goes under way.
     fn sight(&mut self, at: (f64, f64), lot: &Lot, now: Instant) {
-        let from = Position::new(self.ship.at.0, self.ship.at.1, 1.0);
-        let target = Position::new(at.0, at.1, DEPTH_M);
+        let from = NodePosition::new(self.ship.at.0, self.ship.at.1, 1.0);
+        let target = NodePosition::new(at.0, at.1, DEPTH_M);
         let seen = self.head.measure(&from, &target, now.into());
         let mut sighting = UsblSighting {
             range_m: seen.range_m,
@@ -257,7 +258,7 @@ impl Way {
         let told = now + UsblConfig::default().latency;
         let Some(mut fix) = self.ship.sight(&sighting, DEPTH_M, told) else { return };
         if let Some(Outlier::Fooled(east, north)) = lot.outlier {
-            (fix.x_m, fix.y_m) = (fix.x_m + east, fix.y_m + north);
+            fix.position = WorldPoint::new(fix.position.east_m + east, fix.position.north_m + north);
         }
         *self.counts.entry("sent").or_default() += 1;
         if lot.is_lost {
@@ -276,10 +277,10 @@ impl Way {
                 continue;
             };
             let taken = arrives - travel - Duration::from_secs_f64(fix.age_s);
-            let verdict = self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now);
+            let verdict = self.navigator.handle_fix(fix.position, fix.sigma_m, taken, now);
             let name = if verdict == FixVerdict::Used { "used" } else { "refused_by_vehicle" };
             *self.counts.entry(name).or_default() += 1;
-            self.tracks.fixes.push(((fix.x_m, fix.y_m), verdict.is_used()));
+            self.tracks.fixes.push((fix.position.xy(), verdict.is_used()));
         }
     }
 }
@@ -301,7 +302,7 @@ fn heading(way_m: f64) -> f64 {
 /// Sensors whose error grows by the drift with the way whatever its shape: a current that they do not see, which turns
 /// slowly, and beside it a compass and a log that are off by a third of the drift each.
 struct Sensors {
-    dice: Stream,
+    dice: RandomStream,
     current_towards: f64,
     compass: f64,
     log: f64,
@@ -309,7 +310,7 @@ struct Sensors {
 
 impl Sensors {
     fn new(seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[8]);
+        let mut dice = RandomStream::new(seed, &[8]);
         let current_towards = dice.uniform() * std::f64::consts::TAU;
         let [compass, log] = [(); 2].map(|()| DRIFT / 3.0 * dice.normal());
         Self { dice, current_towards, compass, log }

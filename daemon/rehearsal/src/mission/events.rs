@@ -10,7 +10,7 @@ use scenecast_protocol::map::{LabelGrid, PlaneReplica};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
 use scenecast_vehicle::VehicleOutput;
-use sim_channel::{Outcome, Position};
+use sim_channel::{NodePosition, ReceptionOutcome};
 use std::time::Duration;
 
 impl Mission {
@@ -50,7 +50,7 @@ impl Mission {
         }
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
             self.log.handle_fate(&arrival);
-            if let Outcome::Delivered { bytes, .. } = &arrival.outcome {
+            if let ReceptionOutcome::Delivered { bytes, .. } = &arrival.outcome {
                 if arrival.to == SURFACE {
                     self.heard_bits += self.modem.bits_on_air(bytes.len());
                 }
@@ -89,10 +89,11 @@ impl Mission {
         while let Some(output) = self.vehicle.poll_output() {
             match output {
                 VehicleOutput::Persist => self.vehicle.handle_persisted(),
-                VehicleOutput::Waypoint(x, y) => {
+                VehicleOutput::Waypoint(to) => {
                     let navigator = self.vehicle.navigator();
-                    self.legs.push((navigator.to_world(navigator.position()), navigator.to_world((x, y))));
-                    self.motion.set_target(Some((x, y)));
+                    let from = navigator.to_world(navigator.position());
+                    self.legs.push((from.xy(), navigator.to_world(to).xy()));
+                    self.motion.set_target(Some(to.xy()));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::Surface => self.motion.come_up(),
@@ -117,12 +118,12 @@ impl Mission {
         if self.transmitting[0].is_none()
             && let Some(t) = self.vehicle.poll_transmit(self.now)
         {
-            self.transmit(0, t.bytes, t.kind);
+            self.transmit(0, t.bytes, t.kind.name());
         }
         if self.transmitting[1].is_none()
             && let Some(t) = self.surface.poll_transmit(self.now)
         {
-            self.transmit(1, t.bytes, t.kind);
+            self.transmit(1, t.bytes, t.kind.name());
         }
     }
 
@@ -152,14 +153,14 @@ impl Mission {
         }
         self.vehicle.steer(self.now);
         self.pump();
-        let o = self.motion.step(self.vehicle.navigator().position(), STEP_S);
+        let o = self.motion.step(self.vehicle.navigator().position().xy(), STEP_S);
         let depth = self.motion.depth_m(self.vehicle.navigator().depth_m(), self.survey_depth_m(), STEP_S);
         self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, depth, self.now);
         self.place_vehicle();
     }
 
-    fn true_place(&self) -> Position {
-        Position::new(self.motion.x_m, self.motion.y_m, self.vehicle.navigator().depth_m())
+    fn true_place(&self) -> NodePosition {
+        NodePosition::new(self.motion.x_m, self.motion.y_m, self.vehicle.navigator().depth_m())
     }
 
     pub(super) fn place_vehicle(&mut self) {

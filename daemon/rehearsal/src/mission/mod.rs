@@ -28,7 +28,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{Surface, SurfaceOutput};
 use scenecast_vehicle::{AppliedSlot, Durable, MapUpdate, Mapper, Vehicle};
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Position};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -137,12 +137,12 @@ impl Mission {
             seed ^ 0x5EA,
             now,
         )?;
-        let (x, y) = vehicle.navigator().position();
+        let (x, y) = vehicle.navigator().position().xy();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let mut channel = Channel::new(channel_config(&config), seed);
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
-        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
+        let surface_place = NodePosition::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
         channel.place(SURFACE, surface_place);
         if let Some(docked) = &mut docked {
             docked.place(docked::SURFACE, surface_place);
@@ -265,7 +265,7 @@ impl Mission {
 
     /// Whether the survey has ended and the operator has everything.
     pub fn is_drained(&self) -> bool {
-        self.ended.is_some() && self.vehicle.is_settled() && self.meter.agreement() >= 1.0
+        self.ended.is_some() && self.vehicle.is_converged() && self.meter.agreement() >= 1.0
     }
 
     /// Runs until `until`, or a little beyond the last event before it.
@@ -312,7 +312,7 @@ impl Mission {
 
     /// Metres between where the vehicle is and where it believes to be.
     pub fn position_error_m(&self) -> f64 {
-        let (x, y) = self.vehicle.navigator().world();
+        let (x, y) = self.vehicle.navigator().world().xy();
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
     }
 
@@ -324,7 +324,7 @@ impl Mission {
 
 /// The camera's pose as the vehicle believes it.
 pub(crate) fn pose_of(vehicle: &Vehicle) -> Pose {
-    let (x, y) = vehicle.navigator().position();
+    let (x, y) = vehicle.navigator().position().xy();
     Pose { x, y, z: -vehicle.navigator().depth_m(), yaw_rad: -vehicle.navigator().heading_rad() }
 }
 

@@ -3,10 +3,10 @@
 use super::{Mission, MissionOptions};
 use crate::World;
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SlotState;
 use scenecast_surface::SettingsOrder;
 use std::time::Duration;
 
@@ -132,7 +132,8 @@ fn coarse_cells_need_far_fewer_bits() {
         let mut mission = mission(&["channel.loss=0", "map.layers=[]", cells]);
         mission.fly_to(200.0);
         mission.drain();
-        mission.surface.view(mission.address).unwrap().stats().heard_by_class[&scenecast_protocol::schedule::Class::Map]
+        mission.surface.view(mission.address).unwrap().stats().received_by_class
+            [&scenecast_protocol::schedule::Class::Map]
     };
     let (fine, coarse) = (bytes("map.cells=fine"), bytes("map.cells=coarse"));
     // A sixteenth of the cells, but each alone: labels of neighbours tell less of each other four cells apart.

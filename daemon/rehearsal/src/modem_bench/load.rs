@@ -6,16 +6,16 @@ use crate::link_bench::{OpaqueReplica, OpaqueSource, Summary};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::ModemEvent;
-use scenecast_protocol::directive::{Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use sim_channel::modem::{Emulator, Fault};
-use sim_channel::{Channel, ChannelConfig, LossModel, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -84,8 +84,8 @@ impl Dock {
 
     fn at(setting: &DockSetting, mut docked: Docked, seed: u64, now: Instant) -> Result<Self, UserError> {
         let config = &setting.config;
-        docked.place(VEHICLE, Position::new(0.0, 0.0, 10.0));
-        docked.place(SURFACE, Position::new(setting.range_m, 0.0, 10.0));
+        docked.place(VEHICLE, NodePosition::new(0.0, 0.0, 10.0));
+        docked.place(SURFACE, NodePosition::new(setting.range_m, 0.0, 10.0));
         let address = scenecast_config::vehicle_address(config)?;
         let (mission, window) = (MissionId(7), Duration::from_secs_f64(config.link.budget_window_s));
         let vehicle = VehicleConfig {
@@ -106,7 +106,7 @@ impl Dock {
             shares: Shares::default(),
             master: MasterConfig::default(),
             vehicles: vec![address],
-            call_every: None,
+            discovery_period: None,
             authenticity: None,
         };
         let source = OpaqueSource::default();
@@ -192,7 +192,7 @@ impl Dock {
 
     /// Issues directives at random moments: from issue to applied, seconds.
     pub fn measure_directives(&mut self, count: usize, seed: u64) -> Summary {
-        let mut dice = Stream::new(seed, &[7]);
+        let mut dice = RandomStream::new(seed, &[7]);
         let mut latencies = Vec::new();
         for _ in 0..count {
             self.run(Duration::from_secs_f64(5.0 + dice.uniform() * 30.0));

@@ -179,11 +179,11 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim_channel::Stream;
+    use sim_channel::RandomStream;
 
     #[test]
     fn a_steady_way_becomes_known_better_than_it_is_measured() {
-        let mut dice = Stream::new(1, &[]);
+        let mut dice = RandomStream::new(1, &[]);
         let mut filter = PlaneFilter::new(0.02);
         let mut worst: f64 = 0.0;
         for s in 0..200 {

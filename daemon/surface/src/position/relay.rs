@@ -4,6 +4,7 @@ use super::filter::{Estimate, PlaneFilter, Verdict};
 use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, TangentPlane};
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -231,7 +232,8 @@ impl Relay {
             return Ok(None);
         }
         self.seen(vehicle).fixed = Some(now);
-        Ok(Some(Fix { x_m: place.x_m, y_m: place.y_m, sigma_m: place.sigma_m(), age_s }))
+        let position = WorldPoint { east_m: place.x_m, north_m: place.y_m };
+        Ok(Some(Fix { position, sigma_m: place.sigma_m(), age_s }))
     }
 }
 
@@ -286,7 +288,7 @@ mod tests {
         assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(0.0)), Err(RelayFault::NoGps));
         anchored(&mut relay, 100.0, -50.0, 30);
         let fix = relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(29.0)).unwrap().unwrap();
-        assert!((fix.x_m - 130.0).abs() < 0.5 && (fix.y_m + 10.0).abs() < 0.5, "{fix:?}");
+        assert!((fix.position.east_m - 130.0).abs() < 0.5 && (fix.position.north_m + 10.0).abs() < 0.5, "{fix:?}");
         assert!((1.0..2.0).contains(&fix.sigma_m) && fix.age_s == 0.8, "{fix:?}");
         assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(30.0)), Ok(None), "one in 10 s");
     }
@@ -318,7 +320,7 @@ mod tests {
             let [range_m, bearing_rad, elevation_rad, accuracy_m, age_s] = numbers;
             let s = UsblSighting { range_m, bearing_rad, elevation_rad, accuracy_m, age_s };
             if let Ok(Some(fix)) = relay.handle_usbl(vehicle(), &s, at(5.0)) {
-                prop_assert!(fix.x_m.is_finite() && fix.y_m.is_finite() && fix.sigma_m.is_finite());
+                prop_assert!(fix.position.east_m.is_finite() && fix.position.north_m.is_finite() && fix.sigma_m.is_finite());
             }
         }
     }

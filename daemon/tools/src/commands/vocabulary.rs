@@ -3,10 +3,11 @@
 use crate::progress::Progress;
 use clap::{Args, Subcommand};
 use image::RgbImage;
-use scene_model::words::{WordConfig, WordExtractor};
+use scene_model::words::WordConfig;
 use scenecast_core::UserError;
 use scenecast_files::read_image;
 use scenecast_files::write_whole;
+use scenecast_scoring::train_vocabulary;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
@@ -59,7 +60,7 @@ impl Train {
             image.map_err(|e| *problem.borrow_mut() = Some(e)).ok().map(|image| (image, self.cell_px))
         };
         // The first image that cannot be read ends the work.
-        let measures = WordExtractor::train(&WordConfig::default(), || files.iter().map_while(read));
+        let measures = train_vocabulary(&WordConfig::default(), || files.iter().map_while(read));
         drop(progress);
         if let Some(problem) = problem.into_inner() {
             return Err(problem);

@@ -3,10 +3,10 @@
 use super::Annotated;
 use super::bounds::around;
 use image::{GrayImage, Luma};
-use scene_model::score::{Annotations, LabelGrid, SceneScore, score};
 use scene_model::topics::{FlatCell, SceneModel, coord_of};
 use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
+use scenecast_scoring::{Annotations, LabelGrid, SceneScore, score};
 use std::collections::BTreeMap;
 
 /// Mutual information of labels and classes, and of displaced labels and classes.
@@ -21,7 +21,7 @@ const NONE: u8 = 255;
 ///
 /// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
 pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
-    let refused = |e: scene_model::score::AnnotationError| UserError::Input(e.to_string());
+    let refused = |e: scenecast_scoring::AnnotationError| UserError::Input(e.to_string());
     match annotated {
         Annotated::Pixels { classes, ignore } => {
             let annotations = Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(refused)?;

@@ -149,7 +149,7 @@ mod tests {
     /// Mean log-likelihood of the hidden cells by the expectation and by the shares of the seen map.
     fn likelihoods(truth: &[u8], width: usize, seed: u64) -> (f64, f64) {
         let mut seen = vec![0u8; truth.len()];
-        let mut chance = sim_channel::Stream::new(seed, &[7]);
+        let mut chance = sim_channel::RandomStream::new(seed, &[7]);
         let height = truth.len() / width;
         for _ in 0..40 {
             let (x, y) = (chance.below(width - 8), chance.below(height - 8));
@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn hidden_cells_of_procedural_reefs_are_likelier_than_by_the_maps_overall_mix() {
         for seed in 1..=6 {
-            let reef = scene_model::generate::reef(seed, 120, 90, 8, 8);
+            let reef = scenecast_worlds::reef(seed, 120, 90, 8, 8);
             let truth: Vec<u8> = reef.truth.iter().map(|c| c + 1).collect();
             let (by_place, by_mix) = likelihoods(&truth, 120, seed);
             assert!(by_place > by_mix + 0.05, "seed {seed}: {by_place} against {by_mix}");

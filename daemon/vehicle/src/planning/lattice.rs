@@ -170,13 +170,14 @@ impl Ways {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::directive::{Fence, Place, Polygon};
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Fence, Polygon};
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 10.0 };
 
     /// A wall from the southern edge to two metres before the northern one.
     fn walled() -> (Bounds, Lattice) {
-        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         let wall = Polygon(vec![place(9, -1), place(11, -1), place(11, 8), place(9, 8)]);
         let bounds = Bounds::new(&Fence { keep_outs: vec![wall], ..Fence::default() }, 0.5);
         let lattice = Lattice::new(AREA, &[], 1.0, &bounds);

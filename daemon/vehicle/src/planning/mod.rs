@@ -75,14 +75,15 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use scenecast_core::Area;
-    use scenecast_protocol::directive::{Fence, Place, Polygon, Utility};
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Fence, Polygon, Utility};
     use scenecast_protocol::map::{Cell, LabelGrid};
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
 
     /// The answer of a planner on a patchy map with a keep-out, and whether each of its places may be gone to.
     fn ask(kind: PlannerKind, corner: (i32, i32), start: usize, left_m: f64, weights: (i8, i8)) -> (Vec<Node>, bool) {
-        let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
         let (x, y) = corner;
         let keep_out = Polygon(vec![place(x, y), place(x + 4, y + 1), place(x + 2, y + 5)]);
         let bounds = Bounds::new(&Fence { keep_outs: vec![keep_out], ..Fence::default() }, 0.5);

@@ -15,12 +15,13 @@ use super::navigator::Navigator;
 use super::steering::Steering;
 use course::Doing;
 use gallery::Gallery;
-use scene_model::exemplars::Exemplar as Picture;
-use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, Utility};
+use scene_model::exemplars::ExemplarPatch as Picture;
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{PlannedPath, SlotState};
+use scenecast_protocol::wire::PlannedPath;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use tuning::Telling;
@@ -72,7 +73,7 @@ pub enum VehicleOutput {
     /// for later, and send nothing.
     Persist,
     /// Go there, metres east and north in the map's frame.
-    Waypoint(f64, f64),
+    Waypoint(MapPoint),
     /// Stay where you are.
     Hold,
     /// Come up.
@@ -111,7 +112,7 @@ pub struct Vehicle {
     explored: u32,
     guard: Guard,
     course: Doing,
-    waypoint: Option<(f64, f64)>,
+    waypoint: Option<MapPoint>,
     /// What is planned after the waypoint.
     path: PlannedPath,
     /// An order was applied that may change the way; the surface is to hear what comes of it.
@@ -206,8 +207,8 @@ impl Vehicle {
     }
 
     /// Whether the surface is known to have everything.
-    pub fn is_settled(&self) -> bool {
-        self.link.is_settled() && self.whole_png.as_ref().is_none_or(WholePng::is_settled)
+    pub fn is_converged(&self) -> bool {
+        self.link.is_converged() && self.whole_png.as_ref().is_none_or(WholePng::is_converged)
     }
 
     /// Counters of the link.
@@ -259,7 +260,7 @@ impl Vehicle {
             None => self.tell(now),
         }
         let at = self.navigator.position();
-        self.steering.handle_view(at);
+        self.steering.handle_view(at.xy());
         update.perplexity.iter().for_each(|&(cell, p)| self.steering.handle_perplexity(cell, p));
     }
 
@@ -295,7 +296,7 @@ impl Vehicle {
     /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
-        if let Some(at) = self.link.last_heard() {
+        if let Some(at) = self.link.last_received() {
             self.guard.handle_surface_heard(at);
         }
         while let Some(event) = self.link.poll_event() {

@@ -1,16 +1,16 @@
 //! Bytes as everything that the wire and the key file have but the map.
 
 use super::raw::{self, Script};
-use scenecast_protocol::directive::VersionedSlot;
-use scenecast_protocol::link::{Flight, SlotInbox, Window};
+use scenecast_protocol::directive::{SlotState, VersionedSlot};
+use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
 use scenecast_protocol::map::{PlaneChunk, PlaneReplica};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Frame, FrameBuilder, Header, MAX_WINDOW, MissionId, Reader, Seal, SessionId,
-    SlotState, Stamp, VehicleStatus,
+    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, MAX_WINDOW, MissionId, Reader, Seal,
+    SessionId, Stamp, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ pub fn ack(data: &[u8]) {
 
 /// Any numbers may be heard, and a statement on them is made.
 fn hear(mut script: Script<'_>) {
-    let mut window = Window::default();
+    let mut window = LinkWindow::default();
     while !script.is_over() {
         let (number, base, what) = (script.u16(), script.u16() % 2048 + 1, script.u8());
         if let Ok(number) = window.accept(number, base)
@@ -88,7 +88,7 @@ fn header() -> Header {
         stamp: None,
         nonce: None,
         ack: None,
-        hello: false,
+        kind: FrameKind::Numbered,
         keyed: false,
     }
 }

@@ -70,7 +70,7 @@ impl StateSource for Pile {
     fn backlog_bytes(&self) -> usize {
         self.waiting
     }
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         self.waiting + self.in_flight == 0
     }
     fn digest(&self) -> u16 {
@@ -188,7 +188,7 @@ impl Setup {
             shares: Shares::default(),
             master: MasterConfig::default(),
             vehicles: vec![vehicle()],
-            call_every: (self.choice & 0x20 != 0).then_some(Duration::from_secs(60)),
+            discovery_period: (self.choice & 0x20 != 0).then_some(Duration::from_secs(60)),
             authenticity: authenticity(self.choice),
         };
         let mut link = SurfaceLink::new(config, 12, now);

@@ -4,7 +4,7 @@ use super::raw::{self, Script};
 use scenecast_protocol::link::{Authenticity, Flight};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Header, MissionId, Reader, SessionId, Stamp, unwrap_number,
+    AckStatement, Address, Envelope, FrameKind, Header, MissionId, Reader, SessionId, Stamp, unwrap_number,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -55,7 +55,7 @@ impl Peer {
         if envelope.header.to == Address::EVERYBODY {
             return;
         }
-        if envelope.header.hello {
+        if envelope.header.kind.is_hello() {
             self.begin_run((envelope.header.session, envelope.header.nonce.unwrap_or_default()));
         } else {
             self.flight.push(());
@@ -70,9 +70,9 @@ impl Peer {
         let run = (header.session, header.nonce.unwrap_or_default());
         if header.to == Address::EVERYBODY {
             self.call = Some(run);
-        } else if header.hello && run != self.theirs && header.session != self.own.0 {
+        } else if header.kind.is_hello() && run != self.theirs && header.session != self.own.0 {
             (self.theirs, self.flight, self.heard) = (run, Flight::default(), 0);
-        } else if !header.hello {
+        } else if !header.kind.is_hello() {
             self.heard = self.heard.max(unwrap_number(header.number, self.heard));
             header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack)));
         }
@@ -109,7 +109,7 @@ impl Peer {
             base: 1,
             nonce: keyed.then_some(nonce),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed,
             ..self.header(what, script)
         };
@@ -173,7 +173,7 @@ impl Peer {
             stamp,
             nonce: None,
             ack,
-            hello: false,
+            kind: FrameKind::Numbered,
             keyed: self.is_keyed(false),
         }
     }
@@ -184,9 +184,9 @@ impl Peer {
         bytes.extend_from_slice(body);
         let (session, nonce) = if self.us == Address::SURFACE { (0, 0) } else { (self.theirs.0.get(), self.theirs.1) };
         match self.authenticity.as_ref().filter(|_| header.keyed) {
-            None if header.hello => raw::close_with_crc(&mut bytes, MISSION, session),
+            None if header.kind.is_hello() => raw::close_with_crc(&mut bytes, MISSION, session),
             None => raw::close_with_crc(&mut bytes, MISSION, self.theirs.0.get()),
-            Some(a) if header.hello => {
+            Some(a) if header.kind.is_hello() => {
                 let (m, s, n) = (MISSION.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
                 let tag = a.key.hello_tag(&[&m, &s, &n, &bytes]);
                 bytes.extend_from_slice(&tag);

@@ -2,6 +2,7 @@
 
 use super::link::{End, Pile, Setup, Surface, run};
 use super::peer::vehicle;
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Fix, Slot, Utility};
 use scenecast_protocol::link::Transmit;
 use scenecast_protocol::map::StateReplica;
@@ -58,7 +59,7 @@ impl<R: StateReplica> End for Surface<R> {
         let slot = match what % 4 {
             0 => Slot::Utility(Utility { weights, ..Utility::default() }),
             1 => Slot::Constraints(Constraints { hold: with & 1 != 0, abort: with & 2 != 0 }),
-            2 => Slot::Fix(Fix { x_m: f64::from(with), ..Fix::default() }),
+            2 => Slot::Fix(Fix { position: WorldPoint::new(f64::from(with), 0.0), ..Fix::default() }),
             _ => return self.set_shares(Shares([with % 20; 5])),
         };
         let _ = self.issue(vehicle(), slot, now);

@@ -39,9 +39,18 @@ pub(super) struct Jobs {
     pub message: Option<Message>,
     /// Records in the modem's pool by packet counter, and since when.
     pub pool: BTreeMap<u32, (Token, Instant)>,
+    /// No message is tried before this time.
+    pub message_pause: Instant,
+    /// No record is tried before this time.
+    pub record_pause: Instant,
 }
 
 impl Jobs {
+    /// Ends the pauses.
+    pub(super) fn resume(&mut self, now: Instant) {
+        (self.message_pause, self.record_pause) = (now, now);
+    }
+
     /// Whether nothing of the bulk is in the modem.
     pub(super) fn is_pool_empty(&self) -> bool {
         self.pool.is_empty()

@@ -4,7 +4,7 @@ use crate::progress::Progress;
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_protocol::map_codec::{PRIOR_SCENES, train_prior};
+use scenecast_training::{PRIOR_SCENES, train_prior};
 use std::path::PathBuf;
 
 /// Train the table that the context coder starts from, on maps drawn from the seed alone; it takes minutes.

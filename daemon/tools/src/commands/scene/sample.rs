@@ -1,10 +1,10 @@
 //! `scenecast scene sample`
 
 use clap::Args;
-use scene_model::generate::{LabelWorld, sample};
 use scenecast_core::UserError;
 use scenecast_core::palette::colour;
 use scenecast_files::write_whole;
+use scenecast_worlds::{LabelWorld, sample};
 use std::path::PathBuf;
 
 /// Words in each cell of a world; the cell shows the label that most of them have.

@@ -4,10 +4,10 @@ use super::pairs::{Pair, pairs};
 use crate::progress::Progress;
 use clap::Args;
 use image::GrayImage;
-use scene_model::score::{MeanScore, Method, Scene, Trial, TrialError};
 use scene_model::topics::Kernel;
 use scenecast_core::UserError;
 use scenecast_files::{read_classes, read_image};
+use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial, TrialError};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -159,10 +159,10 @@ fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<Sc
         let of_classes = matches!(error, TrialError::Annotations(_) | TrialError::NoClasses);
         UserError::file(if of_classes { &pair.classes } else { &pair.image }, error)
     };
-    let scene = Scene::new(trial, &image, &classes, ignore).map_err(refused)?;
+    let scene = AnnotatedScene::new(trial, &image, &classes, ignore).map_err(refused)?;
     let mut methods = BTreeMap::new();
     for method in Method::ALL {
-        methods.insert(method.name(), scene.grade(method).map_err(refused)?);
+        methods.insert(method.name(), scene.mean_score(method).map_err(refused)?);
         step();
     }
     let (columns, rows) = scene.annotations().size();

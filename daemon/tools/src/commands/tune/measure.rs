@@ -2,13 +2,13 @@
 
 use super::survey::Survey;
 use scene_model::publish::LabelBook;
-use scene_model::score::{LabelGrid, score};
 use scene_model::topics::{FlatCell, SceneModel};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::{Measurement, Setting};
 use scenecast_protocol::directive::CellBand;
 use scenecast_protocol::map::{self, Cell};
 use scenecast_protocol::map_codec::{Stride, encode_all};
+use scenecast_scoring::{LabelGrid, score};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Flies the survey with a setting, then sweeps over all words.

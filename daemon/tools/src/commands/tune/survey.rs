@@ -2,13 +2,13 @@
 
 use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
-use scene_model::score::{Annotations, mosaic_classes};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};
+use scenecast_scoring::{Annotations, mosaic_classes};
 use std::path::Path;
 
 /// Part of a frame by which neighbouring lines, and frames along a line, overlap at least.
@@ -51,7 +51,7 @@ impl<'a> Site<'a> {
 
     /// A sea floor that is drawn, with every pixel annotated.
     pub fn procedural(seed: u64, config: &'a Config) -> Self {
-        let reef = scene_model::generate::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
+        let reef = scenecast_worlds::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
         let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(reef.image.as_raw());
         Self { image: reef.image, classes, ignore: &[], config, crc }
