@@ -1,16 +1,9 @@
 //! The configuration of an S2C modem.
 
+pub use scenecast_config::S2cMode;
 use scenecast_core::ModemAddress;
 pub use scenecast_core::{S2C_BURST_FRAME_BYTES as BURST_FRAME_BYTES, S2C_INSTANT_BYTES as INSTANT_BYTES};
 use std::time::Duration;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum S2cMode {
-    /// In records of bursts; the modem does half duplex and repeats by itself.
-    Burst,
-    /// In instant messages alone, in turns that the surface grants.
-    Instant,
-}
 
 /// Settings of an S2C modem and of the way to it.
 #[derive(Debug, Clone, PartialEq)]
