@@ -30,7 +30,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ")
 }
 
-/// Bytes from pairs of digits; `None` if the text is anything else.
+/// Bytes from pairs of digits; `None` if the text has anything else.
 fn pairs(text: &str) -> Option<Vec<u8>> {
     text.split_whitespace().map(|p| u8::from_str_radix(p, 16).ok().filter(|_| p.len() == 2)).collect()
 }
@@ -41,7 +41,7 @@ fn section(from: &str, to: &str) -> &'static str {
     &rest[..rest.find(to).expect(to)]
 }
 
-/// The rows of a table: what stands in the first column, and what stands in backticks in the second.
+/// The rows of a table: the first column, and the part in backticks of the second.
 fn rows(section: &'static str) -> BTreeMap<&'static str, &'static str> {
     let row = |line: &'static str| {
         let (what, bytes) = line.strip_prefix("| ")?.strip_suffix("` |")?.rsplit_once(" | `")?;
@@ -66,7 +66,7 @@ fn frames(section: &'static str) -> BTreeMap<&'static str, Vec<u8>> {
     frames
 }
 
-/// Fails with every difference at once, so that a change of the wire is quickly written down.
+/// Fails with all differences at once, so that a change of the wire can be copied into the document.
 fn assert_same(found: BTreeMap<&str, Vec<u8>>, expected: Vec<(&str, Vec<u8>)>) {
     let mut problems: Vec<String> = expected
         .iter()
@@ -146,7 +146,7 @@ fn status() -> VehicleStatus {
     }
 }
 
-/// A place in metres.
+/// A point in whole metres.
 fn place(east_m: i32, north_m: i32) -> DecimetrePoint {
     DecimetrePoint::new(10 * east_m, 10 * north_m)
 }
@@ -173,7 +173,7 @@ fn session(encrypt: bool) -> SessionKey {
     key().session(MISSION.0, 1, SURFACE_NONCE, VEHICLE_NONCE, encrypt)
 }
 
-/// A frame as the code writes it; what the code reads from it is the same again.
+/// Writes a frame and checks that it reads the same.
 fn frame(header: Header, size: usize, short: bool, seal: Seal<'_>, chunks: &[(ChunkKind, Vec<u8>)]) -> Vec<u8> {
     let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header.clone() }, size);
     for (kind, payload) in chunks {
@@ -242,7 +242,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let found = rows(section("### 11.1", "### 11.2"));
     let mut found: BTreeMap<&str, Vec<u8>> =
         found.into_iter().map(|(what, bytes)| (what, pairs(bytes).expect("digits"))).collect();
-    // What is inside of the map codec has a test there.
+    // Formats inside of the map codec have tests there.
     found.retain(|what, _| {
         !what.starts_with("head of a map chunk's payload") && !what.starts_with("the same, a payload")
     });
@@ -340,7 +340,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "stamp of a vehicle: clock 16 777 215 ms, frame 9 heard 258 ms before",
             stamp(auv(), heard(16_777_215, 9, 258), 6),
         ),
-        ("statement: horizon low ABC, nothing lost", statement(0xABC, vec![])),
+        ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
         ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),
         (
             "statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code with k = 2",
@@ -366,7 +366,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "the same with a path from there to (2.4, -3.4) and (-0.6, -3.4) m",
             pose(Some((1.0, -2.0)), &[(2.4, -3.4), (-0.6, -3.4)], false),
         ),
-        ("the same with a path of which nothing is told but that it goes on", pose(Some((1.0, -2.0)), &[], true)),
+        ("the same with an empty path that continues", pose(Some((1.0, -2.0)), &[], true)),
         (
             "the first pose with an autopilot that does not answer",
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
@@ -442,7 +442,7 @@ fn frames_with_a_crc_are_those_of_the_document() {
         ..header(Address::SURFACE, 3)
     };
     let map = Header { base: 2, remaining: 1, ..header(auv(), 2) };
-    let nothing = Header { turn: Some(40), ..header(auv(), 2) };
+    let empty = Header { turn: Some(40), ..header(auv(), 2) };
     let expected = vec![
         ("hello of the surface", frame(surface_hello(false), 64, true, crc(0), &[])),
         ("hello of the vehicle", frame(vehicle_hello(false), 64, true, crc(SURFACE_SESSION), &[])),
@@ -453,7 +453,7 @@ fn frames_with_a_crc_are_those_of_the_document() {
             "map frame in the middle of a turn",
             frame(map, 48, false, crc(SURFACE_SESSION), &[(ChunkKind::Map, map_payload())]),
         ),
-        ("frame that says nothing", frame(nothing, 64, true, crc(SURFACE_SESSION), &[])),
+        ("frame without content", frame(empty, 64, true, crc(SURFACE_SESSION), &[])),
         ("call", frame(call(false), 64, true, crc(0), &[])),
         ("here", frame(here(false), 64, true, crc(CALL_SESSION), &[])),
     ];
@@ -508,6 +508,6 @@ fn golden_values_of_the_keys_are_those_of_the_document() {
 }
 
 #[test]
-fn the_document_is_of_the_version_that_the_code_speaks() {
+fn the_document_has_the_wire_version_of_the_code() {
     assert!(DOCUMENT.starts_with(&format!("# The wire of scenecast, version {WIRE_VERSION}\n")));
 }

@@ -14,10 +14,9 @@ use scenecast_protocol::wire::Address;
 
 /// Bytes of bulk that may be in an S2C modem: about a train on its way and another one that waits.
 const POOL_BYTES: usize = 16_384;
-/// Frames of the surface that may be in an S2C modem: what waits is written when its time has come.
+/// Frames of the surface in an S2C modem at most: later frames are written when the modem has room.
 const SURFACE_POOL_FRAMES: u32 = 1;
 
-/// Whose modem is whose.
 pub fn address_book(config: &Config) -> AddressBook {
     AddressBook { surface: config.modem.surface_address }
 }

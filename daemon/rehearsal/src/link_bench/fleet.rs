@@ -23,13 +23,13 @@ pub struct FleetRow {
     /// Share of frames lost each way, collisions not counted.
     pub loss: f64,
     /// Seconds until all were known.
-    pub found_s: f64,
+    pub discovered_s: f64,
     /// Time that a turn of each takes with changing hands.
     pub fair_share_s: f64,
     /// Greatest age of any vehicle's map, once each was heard.
-    pub oldest_s: f64,
-    /// `oldest_s` over `fair_share_s`.
-    pub oldest_shares: f64,
+    pub max_age_s: f64,
+    /// `max_age_s` over `fair_share_s`.
+    pub max_age_shares: f64,
     /// Useful payload of all over what the channel could carry of it.
     pub efficiency: f64,
     /// Worst window of any transmitter over what the budget allows with one transmission more.
@@ -45,8 +45,8 @@ impl Ages {
     /// Time since a frame of its state was taken or the state was known to be equal.
     fn sample(&mut self, water: &Water) {
         for vehicle in &water.vehicles {
-            let taken = water.surface.vehicle(vehicle.address).and_then(|v| v.replica().taken());
-            let settled = water.surface.vehicle(vehicle.address).is_some() && vehicle.link.is_converged();
+            let taken = water.surface.end().vehicle(vehicle.address).and_then(|v| v.replica().taken());
+            let settled = water.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
             let age = water.now.since(taken.unwrap_or(Instant::ZERO));
             self.oldest = self.oldest.max(if settled { Duration::ZERO } else { age });
         }
@@ -63,13 +63,13 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     water.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
     let began = water.now;
     let is_known = |w: &Water| {
-        w.vehicles.iter().all(|v| w.surface.vehicle(v.address).is_some_and(|p| p.replica().taken().is_some()))
+        w.vehicles.iter().all(|v| w.surface.end().vehicle(v.address).is_some_and(|p| p.replica().taken().is_some()))
     };
     water.run_until(began + Duration::from_secs(3600), is_known);
     let found = water.now.since(began);
     water.run(Duration::from_secs(120));
     let useful = |w: &Water| -> f64 {
-        w.vehicles.iter().filter_map(|v| w.surface.vehicle(v.address)).map(|v| v.replica().useful_bytes()).sum()
+        w.vehicles.iter().filter_map(|v| w.surface.end().vehicle(v.address)).map(|v| v.replica().useful_bytes()).sum()
     };
     let (from, before) = (water.now, useful(&water));
     water.grants = Default::default();
@@ -85,10 +85,10 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
         range_km: 1.0,
         frame_bytes: 256,
         loss,
-        found_s: round(found.as_secs_f64()),
+        discovered_s: round(found.as_secs_f64()),
         fair_share_s: round(fair_share_s),
-        oldest_s: round(ages.oldest.as_secs_f64()),
-        oldest_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
+        max_age_s: round(ages.oldest.as_secs_f64()),
+        max_age_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
         efficiency: round(useful_bps / (10_000.0 * (1.0 - loss))),
         budget_use: round(budget_use(&water)),
     }
