@@ -21,7 +21,7 @@ pub(super) enum FenceCommand {
     Set {
         /// GeoJSON file
         file: PathBuf,
-        /// Read coordinates as metres east and north of the origin
+        /// The coordinates are metres east and north of the origin
         #[arg(long)]
         metres: bool,
     },
@@ -129,7 +129,7 @@ pub(super) async fn hold(session: &Session, hold: bool) -> Result<(), UserError>
 
 pub(super) async fn abort(session: &Session, yes: bool) -> Result<(), UserError> {
     if !yes {
-        return Err(UserError::Input("an abort ends the survey; confirm it with --yes".to_owned()));
+        return Err(UserError::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
     }
     client::send_constraints(session, ConstraintsOrder { hold: false, abort: true }).await
 }

@@ -45,7 +45,7 @@ pub(super) struct Ctl {
     /// Print JSON
     #[arg(long, global = true)]
     json: bool,
-    /// Address of the vehicle; required if there are several
+    /// Address of the vehicle, if there are several
     #[arg(long, global = true, value_name = "N")]
     vehicle: Option<u8>,
     /// Maximum wait for an order to be applied [default: 0; for an image 600]
@@ -112,7 +112,7 @@ enum Command {
         #[command(subcommand)]
         change: Option<FenceCommand>,
     },
-    /// Set the point that the vehicle returns to.
+    /// Move the point that the vehicle returns to.
     #[command(after_help = "Example: scenecast ctl return-point set 12.5 -40 --wait 120")]
     ReturnPoint {
         #[command(subcommand)]
@@ -153,19 +153,19 @@ Example: scenecast ctl settings
 
 #[derive(Debug, Args)]
 struct SettingsArgs {
-    /// Weight of labels that are common elsewhere in the map, 1e-9 to 1e3; 0: as configured
+    /// Preference for labels that are used elsewhere, 1e-9 to 1e3; 0: as configured
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     alpha: Option<f64>,
-    /// Prior count of each word in each label, 1e-9 to 1e3; 0: as configured
+    /// Prior weight of each word in a label, 1e-9 to 1e3; 0: as configured
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     beta: Option<f64>,
     /// Weight of a new label, 1e-12 to 1e3; 0: as configured
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     gamma: Option<f64>,
-    /// Words that are resampled per second of mission time, 1 to 1e8; 0: as configured
+    /// Words resampled a second of mission time, 1 to 1e8; 0: as configured
     #[arg(long, value_name = "WORDS/S", allow_negative_numbers = true)]
     refine: Option<f64>,
-    /// Maximum rate of camera frames into the scene model, 0.01 to 30; 0: as configured
+    /// Camera frames a second that the scene model sees at most, 0.01 to 30; 0: as configured
     #[arg(long, value_name = "1/S", allow_negative_numbers = true)]
     frames: Option<f64>,
     /// Cells to send: fine, coarse-to-fine, coarse (every fourth in both directions); "": as configured
