@@ -1,8 +1,9 @@
 //! The operator's page in headless Chromium: the stories of `tests/browser`, against the mock and against real processes.
 
 use scenecast_tests::{Process, free_port, http, run, scratch, state, wait_until, workspace};
+use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::time::Duration;
@@ -82,4 +83,57 @@ fn a_surface_with_a_token_asks_the_browser_for_it() {
     let _surface = Process::start(&arguments);
     wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
     assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
+}
+
+/// The modules of the page with the modules that each imports.
+fn page_modules() -> BTreeMap<PathBuf, Vec<PathBuf>> {
+    let root = workspace().join("daemon/console/page/js");
+    let mut modules = BTreeMap::new();
+    let mut folders = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("the page's folder").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).expect("a module is text");
+            let imported = text.lines().filter(|line| line.starts_with("import "));
+            let names = imported.filter_map(|line| line.rsplit('"').nth(1));
+            let names = names.map(|name| folder.join(name).canonicalize().expect("an imported module exists"));
+            modules.insert(path.canonicalize().expect("it was listed"), names.collect());
+        }
+    }
+    modules
+}
+
+/// Removes all nodes that lead to no circle; the others are left.
+fn circles<T: Ord + Clone>(mut graph: BTreeMap<T, Vec<T>>) -> Vec<T> {
+    loop {
+        let before = graph.len();
+        let nodes: std::collections::BTreeSet<T> = graph.keys().cloned().collect();
+        graph.retain(|_, imported| imported.iter().any(|name| nodes.contains(name)));
+        if graph.len() == before {
+            return graph.into_keys().collect();
+        }
+    }
+}
+
+#[test]
+fn modules_and_folders_of_the_page_form_no_circle() {
+    let modules = page_modules();
+    assert!(modules.len() > 40, "only {} modules", modules.len());
+    assert_eq!(circles(modules.clone()), Vec::<PathBuf>::new());
+    let root = workspace().join("daemon/console/page/js").canonicalize().expect("the page's folder");
+    // A module directly below js/ stands for itself.
+    let room = |path: &Path| match path.parent() {
+        Some(folder) if folder != root => folder.to_owned(),
+        _ => path.to_owned(),
+    };
+    let mut folders: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
+    for (module, imported) in &modules {
+        let others = imported.iter().map(|path| room(path)).filter(|other| *other != room(module));
+        folders.entry(room(module)).or_default().extend(others);
+    }
+    assert_eq!(circles(folders), Vec::<PathBuf>::new());
 }

@@ -1,18 +1,18 @@
-// A vehicle on the map: track, uncertainty, way ahead, itself with heading.
+// A vehicle on the map: track, uncertainty, planned path, position with heading.
 
-import { FONT, haloText } from "./overlays.js";
+import { FONT, haloText } from "../canvas.js";
 import { ageOf, isStale } from "../store.js";
 import { span } from "../format.js";
-import { drawWay } from "./way.js";
+import { drawPath } from "./path.js";
 
-export function drawCraft(c, view, ink, vehicle, chosen) {
+export function drawVehicle(c, view, ink, vehicle, chosen) {
   const stale = isStale(vehicle);
   c.globalAlpha = chosen ? 1 : 0.6;
   drawTrack(c, view, ink, vehicle.track);
   if (vehicle.status) {
     const s = vehicle.status;
-    const tone = stale ? ink.stale : ink.craft;
-    drawWay(c, view, ink, s, stale);
+    const tone = stale ? ink.stale : ink.vehicle;
+    drawPath(c, view, ink, s, stale);
     drawSigma(c, view, s, tone);
     drawHull(c, view, ink, s, tone);
     drawName(c, view, ink, vehicle, stale);
@@ -20,10 +20,10 @@ export function drawCraft(c, view, ink, vehicle, chosen) {
   c.globalAlpha = 1;
 }
 
-/** The surface vehicle where its GPS has it: its bow, and two standard deviations. */
+/** The surface vehicle at its GPS position, with its heading and two standard deviations. */
 export function drawSurface(c, view, ink, surface) {
   const [px, py] = view.toScreen(surface.x_m, surface.y_m);
-  drawSigma(c, view, surface, ink.craft);
+  drawSigma(c, view, surface, ink.vehicle);
   if (surface.heading_deg !== null) {
     const bow = (surface.heading_deg * Math.PI) / 180;
     for (const [style, width] of [[ink.sea, 5], [ink.text, 2]]) {
@@ -38,7 +38,7 @@ export function drawSurface(c, view, ink, surface) {
   c.lineWidth = 3;
   c.strokeStyle = ink.sea;
   c.strokeRect(px - 7, py - 7, 14, 14);
-  c.fillStyle = ink.craft;
+  c.fillStyle = ink.vehicle;
   c.fillRect(px - 6, py - 6, 12, 12);
   c.lineWidth = 1.25;
   c.strokeStyle = ink.text;

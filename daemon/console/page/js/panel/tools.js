@@ -2,17 +2,17 @@
 
 import { cloud, fitCloud, toggleCloud, zoomCloud } from "../cloud/cloud.js";
 import { $, h, show } from "../dom.js";
-import { openExport } from "../export/menu.js";
+import { fit, follow, options, redraw, toggle, view } from "../map/chart.js";
+import { layer, layerNames, setLayer } from "../map/layers.js";
+import { measure, toggleMeasure } from "../map/measure.js";
 import { store } from "../store.js";
-import { fit, follow, options, redraw, toggle, view } from "./chart.js";
-import { layer, layerNames, setLayer } from "./layers.js";
-import { measure, toggleMeasure } from "./measure.js";
+import { openExport } from "./export.js";
 
 const buttons = {};
 const zoom = (factor) => () => {
   if (cloud.on) return zoomCloud(factor);
   view.zoomAt(view.width / 2, view.height / 2, factor);
-  store.tell("view");
+  store.emit("view");
   redraw();
 };
 
@@ -37,7 +37,7 @@ export function startTools() {
     button("follow", "Follow", "Keep the vehicle in the middle (F)", after(follow)),
     layers,
     button("grid", "Grid", "Grid in metres", after(() => toggle("grid"))),
-    button("rings", "Rings", "Range rings about the surface, or about the vehicle where the surface is not known", after(() => toggle("rings"))),
+    button("rings", "Rings", "Range rings around the surface, or around the vehicle if the position of the surface is unknown", after(() => toggle("rings"))),
     button("cloud", "3-D", "Point cloud of the cells", after(toggleCloud)),
     button("measure", "Measure", "Measure distance and bearing (M)", after(toggleMeasure)),
     button("export", "Export", "PNG, CSV, GeoJSON, PLY", openExport),

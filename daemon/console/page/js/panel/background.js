@@ -1,27 +1,25 @@
-// What left-over bits are spent on, in an order that is moved up and down or left out.
+// The background streams that use spare capacity, in an order that the operator changes.
 
 import { h, show, text } from "../dom.js";
 
-const WHAT = {
-  finer: "finer cells, while the map comes coarsely",
+const NAMES = {
+  finer: "finer cells, while the map is coarse",
   depth: "depth",
-  exemplars: "pictures of new labels",
+  exemplars: "images of new labels",
   confidence: "confidence",
   curiosity: "curiosity",
 };
-const KINDS = Object.keys(WHAT);
+const KINDS = Object.keys(NAMES);
 
-/** `value` gives the order, `change` takes another. */
-export function spendBox(value, change) {
+/** `value()` returns the streams in order, `change(streams)` sets them. */
+export function backgroundBox(value, change) {
   const list = h("ol", {});
-  const none = h("p.note", {}, "Nothing: left-over bits are saved.");
-  const node = h("div.spend", { role: "group", "aria-label": "What left-over bits are spent on" },
-    h("h3", {}, "Left-over bits, first to last"), list, none);
+  const none = h("p.note", {}, "None: spare capacity stays unused.");
+  const node = h("div.background", { role: "group", "aria-label": "Use of spare capacity" },
+    h("h3", {}, "Spare capacity, first to last"), list, none);
   return { node, refresh };
 
   function refresh(order) {
-    show(node, order !== null);
-    if (order === null) return;
     show(none, order.length === 0);
     const key = order.join();
     if (list.dataset.key === key) return;
@@ -39,12 +37,12 @@ export function spendBox(value, change) {
       change(order);
     };
     const toggle = () => change(place === null ? [...value(), kind] : value().filter((k) => k !== kind));
-    const button = (act, name, sign, onclick, off) => h("button", { type: "button", title: name, "aria-label": `${name}: ${WHAT[kind]}`, data: { act: `${act}-${kind}` }, disabled: off, onclick }, sign);
-    const box = h("input", { type: "checkbox", checked: place !== null, "aria-label": WHAT[kind], data: { act: `use-${kind}` }, onchange: toggle });
+    const button = (act, name, sign, onclick, off) => h("button", { type: "button", title: name, "aria-label": `${name}: ${NAMES[kind]}`, data: { act: `${act}-${kind}` }, disabled: off, onclick }, sign);
+    const box = h("input", { type: "checkbox", checked: place !== null, "aria-label": NAMES[kind], data: { act: `use-${kind}` }, onchange: toggle });
     const name = h("span", {});
-    text(name, WHAT[kind]);
+    text(name, NAMES[kind]);
     const last = value().length - 1;
-    return h("li", { data: { spend: kind } }, h("label", {}, box, name),
+    return h("li", { data: { stream: kind } }, h("label", {}, box, name),
       button("up", "Earlier", "\u2191", () => move(-1), place === null || place === 0),
       button("down", "Later", "\u2193", () => move(1), place === null || place === last));
   }

@@ -1,17 +1,17 @@
-// Where a vehicle is going: to its waypoint, a cross, and what it plans from there. All of it is as old as its pose.
+// The planned path of a vehicle: to its waypoint, a cross, and on from there. It is as old as the status.
 
-/** Places from the vehicle on: itself, its waypoint, its path. */
-export const wayOf = (s) => (s.waypoint ? [[s.x_m, s.y_m], s.waypoint, ...(s.path ?? [])] : []);
+/** The places of the path: the vehicle, its waypoint, the further waypoints. */
+export const pathOf = (s) => (s.waypoint ? [[s.x_m, s.y_m], s.waypoint, ...(s.path ?? [])] : []);
 
-/** Metres of a way. */
-export const lengthOf = (way) => way.slice(1).reduce((sum, [x, y], i) => sum + Math.hypot(x - way[i][0], y - way[i][1]), 0);
+/** Length in metres. */
+export const lengthOf = (places) => places.slice(1).reduce((sum, [x, y], i) => sum + Math.hypot(x - places[i][0], y - places[i][1]), 0);
 
-export function drawWay(c, view, ink, s, stale) {
-  const way = wayOf(s).map(([x, y]) => view.toScreen(x, y));
-  if (way.length === 0) return;
-  const [here, waypoint, ...path] = way;
+export function drawPath(c, view, ink, s, stale) {
+  const places = pathOf(s).map(([x, y]) => view.toScreen(x, y));
+  if (places.length === 0) return;
+  const [here, waypoint, ...path] = places;
   c.lineJoin = "round";
-  // The ground is whole, so that dashes show on a track that went the same way.
+  // The background is solid, so that dashes show on a track along the same line.
   for (const [style, width, near, far] of [[ink.sea, 4, [], []], [stale ? ink.stale : ink.text, 1.75, [3, 4], [8, 5]]]) {
     c.strokeStyle = style;
     c.fillStyle = style;
@@ -19,7 +19,7 @@ export function drawWay(c, view, ink, s, stale) {
     dashed(c, near, [here, waypoint]);
     dashed(c, far, [waypoint, ...path]);
     for (const [x, y] of path) dot(c, x, y, width + 1);
-    if (s.path_goes_on && path.length > 0) arrowHead(c, way.at(-2), way.at(-1));
+    if (s.path_continues && path.length > 0) arrowHead(c, places.at(-2), places.at(-1));
     cross(c, ...waypoint);
   }
 }
@@ -38,7 +38,7 @@ function dot(c, x, y, radius) {
   c.fill();
 }
 
-/** The plan has more than is drawn. */
+/** Marks a plan that continues beyond the last place. */
 function arrowHead(c, [fromX, fromY], [x, y]) {
   const course = Math.atan2(y - fromY, x - fromX);
   const tip = [x + 12 * Math.cos(course), y + 12 * Math.sin(course)];
