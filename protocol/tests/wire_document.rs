@@ -2,13 +2,13 @@
 
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, Limits,
-    PlaneSet, PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState,
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, LayerMask,
+    Limits, PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState,
     Utility, VersionedSlot,
 };
-use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerChunk, LayerKind, LayerScale};
 use scenecast_protocol::map_codec;
-use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, ModeReason,
@@ -284,9 +284,15 @@ fn parts_of_a_frame_are_those_of_the_document() {
     };
     let utility =
         Utility { epoch: 1, exploration: 20, curiosity: 0, weights: [(3, 80), (5, -20)].into_iter().collect() };
-    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), spend: SpendOrder::default() };
-    let curious = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
-    let curious = Budget { spend: curious.unwrap(), ..budget };
+    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), background: BackgroundOrder::default() };
+    let curious = BackgroundOrder::new(&[
+        BackgroundStream::Curiosity,
+        BackgroundStream::Finer,
+        BackgroundStream::Depth,
+        BackgroundStream::Exemplars,
+        BackgroundStream::Confidence,
+    ]);
+    let curious = Budget { background: curious.unwrap(), ..budget };
     let fix = Fix { position: WorldPoint::new(-12.3, 400.0), sigma_m: 1.5, age_s: 0.82 };
     let requests = ExemplarRequests {
         epoch: 1,
@@ -295,17 +301,17 @@ fn parts_of_a_frame_are_those_of_the_document() {
             ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 },
         ],
     };
-    let plane = |chunk: PlaneChunk<'_>| {
+    let layer = |chunk: LayerChunk<'_>| {
         let bytes = chunk.encode();
-        assert_eq!(PlaneChunk::decode(&bytes), Some(chunk));
+        assert_eq!(LayerChunk::decode(&bytes), Some(chunk));
         bytes
     };
-    let depth = PlaneScale::Depth { step_dm: 5, first: 24 };
-    assert_eq!((depth.bounds(1), PlaneScale::Confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
+    let depth = LayerScale::Depth { step_dm: 5, first: 24 };
+    assert_eq!((depth.bounds(1), LayerScale::Confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
     let settings = Settings {
         planner: Change::To(PlannerKind::Horizon),
         cells: Change::To(CellBand::Coarse),
-        planes: Change::To(PlaneSet { depth: true, ..PlaneSet::default() }),
+        layers: Change::To(LayerMask { depth: true, ..LayerMask::default() }),
         alpha: Change::To(Figure::new(0.01).unwrap()),
         gamma: Change::Configured,
         frames_per_s: Change::To(Figure::new(0.25).unwrap()),
@@ -350,13 +356,13 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ("head of a map chunk of 26 bytes", head(26, 1, false)),
         ("head of a map chunk of 27 bytes", head(27, 2, false)),
         ("head of a map chunk of 300 bytes", head(300, 2, false)),
-        ("head of a plane chunk: a patch of confidence", plane(PlaneChunk::Patch(PlaneScale::Confidence, &[]))),
+        ("head of a layer chunk: a patch of confidence", layer(LayerChunk::Patch(LayerScale::Confidence, &[]))),
         (
-            "head of a plane chunk: a patch of depth, steps of 0.5 m, level 1 from 12 m on",
-            plane(PlaneChunk::Patch(depth, &[])),
+            "head of a layer chunk: a patch of depth, steps of 0.5 m, level 1 from 12 m on",
+            layer(LayerChunk::Patch(depth, &[])),
         ),
-        ("head of a plane chunk: a patch of curiosity", plane(PlaneChunk::Patch(PlaneScale::Curiosity, &[]))),
-        ("plane chunk: the digest of confidence is 27A6", plane(PlaneChunk::Digest(PlaneKind::Confidence, 0x27A6))),
+        ("head of a layer chunk: a patch of curiosity", layer(LayerChunk::Patch(LayerScale::Curiosity, &[]))),
+        ("layer chunk: the digest of confidence is 27A6", layer(LayerChunk::Digest(LayerKind::Confidence, 0x27A6))),
         (
             "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
             pose(None, &[], false),

@@ -38,11 +38,11 @@ fn settings_are_fitted_to_a_budget_sent_and_told_as_in_force() {
     let refused = ctl(port, &["settings", "--alpha", "5000"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(said(&refused).contains("alpha 5000: it takes 0.000000001 to 1000"), "{}", said(&refused));
-    let sent = ctl(port, &["settings", "--gamma", "1e-5", "--planes", "none", "--wait", "80"]);
+    let sent = ctl(port, &["settings", "--gamma", "1e-5", "--layers", "none", "--wait", "80"]);
     assert_eq!(sent.status.code(), Some(0), "{}", said(&sent));
     let told = ctl(port, &["settings", "--json"]);
     let told: Value = serde_json::from_slice(&told.stdout).unwrap();
-    assert_eq!((&told["in_force"]["gamma"], &told["in_force"]["planes"]), (&1e-5.into(), &"none".into()));
+    assert_eq!((&told["in_force"]["gamma"], &told["in_force"]["layers"]), (&1e-5.into(), &"none".into()));
     assert_eq!((&told["asked"]["gamma"], &told["asked"]["alpha"]), (&1e-5.into(), &Value::Null));
 
     let nothing = ctl(port, &["settings", "--fit", "1"]);

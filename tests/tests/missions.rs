@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use scenecast_config::Config;
-use scenecast_protocol::map::PlaneScale;
+use scenecast_protocol::map::LayerScale;
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report};
 use serde_json::Value;
@@ -72,20 +72,20 @@ fn whole_missions_pass_with_either_codec() {
 }
 
 #[test]
-fn planes_arrive_and_labels_do_not_wait_for_them() {
+fn layers_arrive_and_labels_do_not_wait_for_them() {
     let without = fly(&["map.planes=[]"], 8);
-    assert_eq!(without["map"]["planes"], serde_json::json!({}));
-    for sets in [&["map.plane_shares=[0, 0, 0]"], &["map.plane_shares=[10, 5, 0]"]] {
+    assert_eq!(without["map"]["layers"], serde_json::json!({}));
+    for sets in [&["map.layer_shares=[0, 0, 0]"], &["map.layer_shares=[10, 5, 0]"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
-        for plane in ["confidence", "depth"] {
-            let plane = &with["map"]["planes"][plane];
-            assert_eq!(plane["agreement_final"], 1.0, "{plane}");
-            assert!(plane["agreement_mean"].as_f64().unwrap() > 0.8, "{plane}");
-            assert_eq!(plane["cells"], with["survey"]["explored_cells"]);
+        for layer in ["confidence", "depth"] {
+            let layer = &with["map"]["layers"][layer];
+            assert_eq!(layer["agreement_final"], 1.0, "{layer}");
+            assert!(layer["agreement_mean"].as_f64().unwrap() > 0.8, "{layer}");
+            assert_eq!(layer["cells"], with["survey"]["explored_cells"]);
         }
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
-        assert!(mean(&with) > mean(&without) - 0.02, "{} with planes, {} without", mean(&with), mean(&without));
+        assert!(mean(&with) > mean(&without) - 0.02, "{} with layers, {} without", mean(&with), mean(&without));
     }
 }
 
@@ -93,14 +93,14 @@ fn planes_arrive_and_labels_do_not_wait_for_them() {
 fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_differs() {
     let without = fly(&[], 8);
     assert_eq!(without.to_string(), fly(&[r#"map.planes=["confidence", "depth"]"#], 8).to_string());
-    assert_eq!(without["map"]["planes"]["curiosity"], Value::Null);
+    assert_eq!(without["map"]["layers"]["curiosity"], Value::Null);
     for sets in
-        [r#"link.spend=["finer", "depth", "exemplars", "confidence", "curiosity"]"#, "map.plane_shares=[0, 0, 10]"]
+        [r#"link.spend=["finer", "depth", "exemplars", "confidence", "curiosity"]"#, "map.layer_shares=[0, 0, 10]"]
     {
         let with = fly(&[sets], 8);
         assert_sound(&with);
-        let plane = &with["map"]["planes"]["curiosity"];
-        assert_eq!((&plane["agreement_final"], &plane["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
+        let layer = &with["map"]["layers"]["curiosity"];
+        assert_eq!((&layer["agreement_final"], &layer["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
         assert!(mean(&with) > mean(&without) - 0.02, "{} with curiosity, {} without", mean(&with), mean(&without));
     }
@@ -112,10 +112,10 @@ fn levels_of_curiosity_tell_the_cells_of_a_reef_apart() {
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 8, record: None }).unwrap();
     mission.advance(Instant::from_secs_f64(119.0)).unwrap();
     let vehicle = mission.vehicle();
-    let plane = vehicle.planes().find(|p| p.scale() == PlaneScale::Curiosity).unwrap();
+    let layer = vehicle.layers().find(|p| p.scale() == LayerScale::Curiosity).unwrap();
     let mut cells = [0; 17];
-    plane.target().iter().for_each(|(_, level)| cells[usize::from(level)] += 1);
-    let common = cells.iter().filter(|&&n| n * 20 > plane.target().explored()).count();
+    layer.target().iter().for_each(|(_, level)| cells[usize::from(level)] += 1);
+    let common = cells.iter().filter(|&&n| n * 20 > layer.target().explored()).count();
     assert!((3..=6).contains(&common), "{cells:?}");
 }
 

@@ -5,7 +5,7 @@ use scenecast_core::tuning_table::TuningTable;
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
-use scenecast_protocol::schedule::SpendOrder;
+use scenecast_protocol::schedule::BackgroundOrder;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -52,8 +52,8 @@ pub fn authenticity(config: &Config) -> Result<Option<Authenticity>, UserError> 
 }
 
 /// What left-over bits are spent on; the file was checked when it was read.
-pub fn background(config: &Config) -> SpendOrder {
-    SpendOrder::from_names(&config.link.spend).unwrap_or_default()
+pub fn background(config: &Config) -> BackgroundOrder {
+    BackgroundOrder::from_names(&config.link.spend).unwrap_or_default()
 }
 
 /// The vehicles that the surface speaks with from the beginning, by address and name.

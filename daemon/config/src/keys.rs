@@ -254,7 +254,7 @@ pub const KEYS: &[Key] = &[
         "planes that may be sent beside the labels: confidence, how sure the model is of a label, in quarters; depth of the sea floor; curiosity, how badly the model explains a cell, in whole bits a word; one without a share is sent where link.spend names it",
     ),
     key(
-        "map.plane_shares",
+        "map.layer_shares",
         "%",
         Range(0.0, 100.0),
         "ar",

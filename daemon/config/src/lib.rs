@@ -21,8 +21,8 @@ pub use place::{autopilot_place, is_gpsd, origin, position_places};
 pub use print::print;
 pub use token_file::{load_token, read_token};
 
-use scenecast_protocol::map::PlaneKind;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::map::LayerKind;
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use serde::{Deserialize, Serialize};
 
 /// Every setting; see [`KEYS`] for meaning, unit and range of each.
@@ -105,7 +105,7 @@ section! {
         /// Least shares in percent of directive, status, fix, map, exemplar.
         shares: [u8; 5] = Shares::default().0,
         /// What left-over bits are spent on, in this order.
-        spend: Vec<String> = SpendOrder::default().names(),
+        spend: Vec<String> = BackgroundOrder::default().names(),
         /// Seconds between two statuses.
         status_period_s: f64 = 10.0,
         /// Longest turn in seconds.
@@ -195,10 +195,10 @@ section! {
         coarse_after_s: f64 = 0.0,
         /// `fine` or `coarse`.
         cells: String = "fine".into(),
-        /// Planes that are sent beside the labels.
-        planes: Vec<String> = PlaneKind::ALL.map(|p| p.name().to_owned()).to_vec(),
+        /// Layers that are sent beside the labels.
+        planes: Vec<String> = LayerKind::ALL.map(|p| p.name().to_owned()).to_vec(),
         /// Percent of the map's share for confidence, depth and curiosity; 0 = what nobody else needs.
-        plane_shares: [u8; 3] = [0; 3],
+        layer_shares: [u8; 3] = [0; 3],
         /// Step of the plane of depths, metres.
         depth_step_m: f64 = 0.5,
     }

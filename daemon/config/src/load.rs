@@ -49,7 +49,7 @@ fn check_together(config: &Config) -> Result<(), UserError> {
     }
     let link = &config.link;
     check_shares("link.shares", &link.shares)?;
-    check_shares("map.plane_shares", &config.map.plane_shares)?;
+    check_shares("map.layer_shares", &config.map.layer_shares)?;
     if link.key_file.is_empty() && (link.encrypt || link.authenticate == "all") {
         let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
         let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
@@ -305,10 +305,10 @@ mod tests {
         assert!(said.ends_with("it takes a list of different ones of confidence, depth, curiosity"), "{said}");
         assert!(message(&["map.planes=[\"depth\", \"depth\"]"]).contains("different ones"));
         assert!(message(&["map.planes=depth"]).contains("a list"));
-        let said = message(&["map.plane_shares=[60, 0, 50]"]);
-        assert!(said.contains("map.plane_shares = [60, 0, 50]") && said.contains("110 %"), "{said}");
-        let config = load(None, &["map.planes=[]".into(), "map.plane_shares=[20, 10, 0]".into()]).unwrap();
-        assert_eq!((config.map.planes.len(), config.map.plane_shares), (0, [20, 10, 0]));
+        let said = message(&["map.layer_shares=[60, 0, 50]"]);
+        assert!(said.contains("map.layer_shares = [60, 0, 50]") && said.contains("110 %"), "{said}");
+        let config = load(None, &["map.planes=[]".into(), "map.layer_shares=[20, 10, 0]".into()]).unwrap();
+        assert_eq!((config.map.planes.len(), config.map.layer_shares), (0, [20, 10, 0]));
     }
 
     #[test]

@@ -2,14 +2,14 @@
 
 use super::export::Cells;
 use super::fit;
+use super::layers;
 use super::orders::{BudgetOrder, ExemplarOrder, ExemplarWish};
-use super::planes;
 use super::snapshot::seconds;
 use super::state::Accepted;
 use scenecast_core::label_picture::MOST_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
@@ -128,8 +128,8 @@ fn request(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder, now: 
 
 fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
-    let spend = order.spend.as_deref().map(SpendOrder::from_names).transpose();
-    if let Err(why) = spend.and_then(|spend| surface.set_budget(order.budget_bps, shares, spend, now)) {
+    let background = order.background.as_deref().map(BackgroundOrder::from_names).transpose();
+    if let Err(why) = background.and_then(|background| surface.set_budget(order.budget_bps, shares, background, now)) {
         return Reply::Refused(why);
     }
     let issued = |a: Address| surface.view(a)?.slots().find(|s| s.id == SlotId::Budget).map(|s| s.version);
@@ -150,7 +150,7 @@ fn cells(surface: &Surface, address: Address, cell_m: f64, now: Instant) -> Opti
         cell_m,
         moved_m: (0.0, 0.0),
         labels: told.cells().map(|cell| grid.get(cell)).collect(),
-        age_s: planes::ages(view.replica(), told, now),
-        planes: planes::planes(&view, told, now),
+        age_s: layers::ages(view.replica(), told, now),
+        layers: layers::layers(&view, told, now),
     })
 }

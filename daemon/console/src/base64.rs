@@ -1,4 +1,4 @@
-//! Base64 (RFC 4648, section 4) for planes of the map in JSON.
+//! Base64 (RFC 4648, section 4) for layers of the map in JSON.
 
 const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 

@@ -208,7 +208,7 @@ fn orders() -> Vec<Operation> {
         order(
             "/api/v1/vehicles/{id}/settings",
             "set_settings",
-            "Changes how the vehicle builds its map, which cells and planes of it it tells, and how it chooses its way. What is \
+            "Changes how the vehicle builds its map, which cells and layers of it it tells, and how it chooses its way. What is \
              left out or null stays as it is there; 0 or an empty text is as the vehicle is configured. Labels keep their meaning.",
             schema::<SettingsOrder>,
             || post(server::settings),

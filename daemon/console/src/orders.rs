@@ -73,11 +73,11 @@ pub struct BudgetOrder {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shares: Option<SharesOrder>,
     /// What bits that nobody else needs are spent on, in this order: different ones of finer (the cells between those of a
-    /// coarse map), depth, confidence and curiosity (planes without a share), exemplars (images of new labels that nobody
+    /// coarse map), depth, confidence and curiosity (layers without a share), exemplars (images of new labels that nobody
     /// asked for). What is not named gets none, but for finer cells, which then go before all others. Left out: as it was
     /// sent last.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub spend: Option<Vec<String>>,
+    pub background: Option<Vec<String>>,
 }
 
 /// Least shares in percent while each class has something to send; together at most 100.

@@ -367,7 +367,7 @@ fn link(surface: &Surface, meter: &LinkMeter, now: Instant) -> state::Link {
         budget_bps: surface.budget_bps(),
         budget_window_s: meter.window_s(),
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
-        spend: surface.spend().names(),
+        background: surface.background().names(),
         strangers: surface.strangers(),
         up: direction(0, numbered, numbered.saturating_sub(heard), &|s, c| of_class(&s.received_by_class, c)),
         down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),

@@ -4,7 +4,7 @@ mod link;
 mod map;
 
 pub use link::{Backlog, Direction, Link, Rates, VehicleLink, Water};
-pub use map::{Map, MapEvent, MapSummary, Placement, Plane};
+pub use map::{Layer, Map, MapEvent, MapSummary, Placement};
 
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
 use schemars::JsonSchema;

@@ -2,11 +2,11 @@
 
 use super::mission::Mission;
 use scenecast_core::drop_counts::dropped;
-use scenecast_scoring::mutual_information_nats;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
-use scenecast_protocol::map::{LabelGrid, PlaneSource};
+use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
+use scenecast_scoring::mutual_information_nats;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -96,16 +96,16 @@ fn map(m: &Mission) -> Value {
         "agreement_final": round(m.meter.agreement()),
         "agreement_mean": round(m.meter.agreement_mean_of_survey()),
         "age_s": summary(m.meter.delays(m.now()).summary()),
-        "planes": m.vehicle.planes().map(|p| plane(m, p)).collect::<BTreeMap<_, _>>(),
+        "layers": m.vehicle.layers().map(|p| layer(m, p)).collect::<BTreeMap<_, _>>(),
     })
 }
 
-/// A plane by its name: cells with a level, how well the operator's copy follows, and what that takes.
-fn plane(m: &Mission, plane: &PlaneSource) -> (&'static str, Value) {
-    let kind = plane.scale().kind();
+/// A layer by its name: cells with a level, how well the operator's copy follows, and what that takes.
+fn layer(m: &Mission, layer: &LayerSource) -> (&'static str, Value) {
+    let kind = layer.scale().kind();
     let bytes = m.vehicle.stats().bytes_by_class.get(&kind.into()).copied().unwrap_or(0);
-    let mut figures = json!({ "payload_bytes": bytes, "cells": plane.target().explored() });
-    if let (Some(meter), Some(figures)) = (m.plane_meters.get(&kind), figures.as_object_mut()) {
+    let mut figures = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
+    if let (Some(meter), Some(figures)) = (m.layer_meters.get(&kind), figures.as_object_mut()) {
         figures.insert("agreement_final".into(), round(meter.agreement()).into());
         figures.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
         figures.insert("age_s".into(), summary(meter.delays(m.now()).summary()));

@@ -147,7 +147,7 @@ mod tests {
             hold: true,
             budget_bps: Some(500),
             shares: Some([10, 5, 5, 50, 20]),
-            spend: Some(0x3200),
+            background: Some(0x3200),
             abort: false,
             settings: vec![0x40, 0],
             limits: vec![0, 4],

@@ -135,10 +135,10 @@ impl Host {
 
     /// Budget and shares of the configuration are in force, whatever the surface said before.
     fn follow(&mut self, config: &Config) {
-        let spend = scenecast_config::background(config);
-        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), spend };
-        let extras = budget.spend.names().join(", ");
-        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {extras}", budget.bits_per_s, budget.shares.0);
+        let background = scenecast_config::background(config);
+        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), background };
+        let streams = budget.background.names().join(", ");
+        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {streams}", budget.bits_per_s, budget.shares.0);
         self.vehicle.set_budget(budget, self.clock.now());
     }
 

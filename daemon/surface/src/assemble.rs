@@ -38,6 +38,6 @@ pub fn assemble(
     };
     let link = SurfaceLink::new(link, seed, now);
     let mut surface = Surface::new(link, vehicles).with_tuning_table(table);
-    surface.set_spend(background(config));
+    surface.set_background(background(config));
     Ok(surface)
 }

@@ -1,7 +1,7 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlaneSet, PlannerKind, Settings};
-use scenecast_protocol::map::PlaneKind;
+use scenecast_protocol::directive::{CellBand, Change, Figure, LayerMask, OrderStatus, PlannerKind, Settings};
+use scenecast_protocol::map::LayerKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +15,8 @@ pub struct SettingsOrder {
     /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
     /// first where there is much to say. The cells of its model stay.
     pub cells: Option<String>,
-    /// Planes that it tells beside the labels: none, or different ones of confidence, depth, curiosity with commas between.
-    pub planes: Option<String>,
+    /// Layers that it tells beside the labels: none, or different ones of confidence, depth, curiosity with commas between.
+    pub layers: Option<String>,
     /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
     pub alpha: Option<f64>,
     /// Prior weight of each word in a label, 1e-9 to 1e3.
@@ -29,15 +29,15 @@ pub struct SettingsOrder {
     pub frames_per_s: Option<f64>,
 }
 
-/// The planes of these names, with commas between.
-fn plane_set(names: &str) -> Option<PlaneSet> {
+/// The layers of these names, with commas between.
+fn layer_mask(names: &str) -> Option<LayerMask> {
     let names: Vec<&str> = if names == "none" { Vec::new() } else { names.split(',').map(str::trim).collect() };
-    let set = PlaneSet::of(|kind| names.contains(&kind.name()));
+    let set = LayerMask::of(|kind| names.contains(&kind.name()));
     (set.kinds().count() == names.len()).then_some(set)
 }
 
-fn plane_names(set: PlaneSet) -> String {
-    let names: Vec<&str> = set.kinds().map(PlaneKind::name).collect();
+fn layer_names(set: LayerMask) -> String {
+    let names: Vec<&str> = set.kinds().map(LayerKind::name).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(",") }
 }
 
@@ -47,10 +47,10 @@ impl SettingsOrder {
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
-            planes: choice(
-                "planes",
-                &self.planes,
-                plane_set,
+            layers: choice(
+                "layers",
+                &self.layers,
+                layer_mask,
                 "none, or different ones of confidence, depth, curiosity",
             )?,
             ..Settings::default()
@@ -104,7 +104,7 @@ impl From<&Settings> for SettingsOrder {
         Self {
             planner: told(settings.planner, String::new(), |p| text(p.name())),
             cells: told(settings.cells, String::new(), |c| text(c.name())),
-            planes: told(settings.planes, String::new(), plane_names),
+            layers: told(settings.layers, String::new(), layer_names),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -181,8 +181,8 @@ mod tests {
             refused(r#"{"cells": "huge"}"#),
             "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
         );
-        for planes in ["perplexity", "depth,depth", "depth,", "none,depth"] {
-            let said = refused(&format!(r#"{{"planes": "{planes}"}}"#));
+        for layers in ["perplexity", "depth,depth", "depth,", "none,depth"] {
+            let said = refused(&format!(r#"{{"layers": "{layers}"}}"#));
             assert!(said.contains("none, or different ones of confidence, depth, curiosity"), "{said}");
         }
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
@@ -191,11 +191,11 @@ mod tests {
 
     #[test]
     fn an_order_is_told_as_it_was_typed() {
-        let typed = r#"{"planner":"","cells":"coarse","planes":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
+        let typed = r#"{"planner":"","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
         assert_eq!(SettingsOrder::from(&order.read().unwrap()), order);
-        let planes = |names: &str| read(&format!(r#"{{"planes": "{names}"}}"#)).unwrap();
-        let told = |names: &str| SettingsOrder::from(&planes(names)).planes.unwrap();
+        let layers = |names: &str| read(&format!(r#"{{"layers": "{names}"}}"#)).unwrap();
+        let told = |names: &str| SettingsOrder::from(&layers(names)).layers.unwrap();
         assert_eq!(["none", "curiosity, depth"].map(told), ["none", "depth,curiosity"]);
         assert_eq!(read("{}").unwrap(), Settings::default());
     }
@@ -225,9 +225,9 @@ mod tests {
         send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
         desk.handle_settled(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"planes": "confidence,depth"}"#, Some(OrderStatus::Applied));
+        send(&mut desk, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
         send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
-        assert_eq!(desk.in_force(), None, "the vehicle may follow the planes already");
+        assert_eq!(desk.in_force(), None, "the vehicle may follow the layers already");
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
         desk.handle_settled(refused);
         send(&mut desk, r#"{"alpha": 0}"#, Some(refused));

@@ -11,7 +11,7 @@ use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot,
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement};
 use std::collections::{BTreeMap, VecDeque};
@@ -36,7 +36,7 @@ pub struct Surface {
     pub(super) link: SurfaceLink,
     pub(super) desks: BTreeMap<Address, Desk>,
     outputs: VecDeque<SurfaceOutput>,
-    spend: SpendOrder,
+    background: BackgroundOrder,
     /// Where the surface is and where it sees the vehicles, if it has a GPS.
     relay: Option<Relay>,
     tuning: TuningTable,
@@ -46,8 +46,8 @@ impl Surface {
     /// A surface that speaks with these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
-        let (tuning, spend) = (TuningTable::default(), SpendOrder::default());
-        Self { link, desks, outputs: VecDeque::new(), spend, relay: None, tuning }
+        let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
+        Self { link, desks, outputs: VecDeque::new(), background, relay: None, tuning }
     }
 
     /// Knows what settings of the scene model reach.
@@ -82,7 +82,7 @@ impl Surface {
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
-    /// Counts up whenever the operator's map of a vehicle or a plane of it changes.
+    /// Counts up whenever the operator's map of a vehicle or a layer of it changes.
     pub fn map_version(&self, vehicle: Address) -> u64 {
         let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
         wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
@@ -199,23 +199,23 @@ impl Surface {
         self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
-    /// What the vehicles spend left-over bits on, as it was configured or sent last.
-    pub fn spend(&self) -> SpendOrder {
-        self.spend
+    /// The order of the background streams of the vehicles, as it was configured or sent last.
+    pub fn background(&self) -> BackgroundOrder {
+        self.background
     }
 
-    /// What the next budget that is sent says of left-over bits, unless it is given.
-    pub fn set_spend(&mut self, spend: SpendOrder) {
-        self.spend = spend;
+    /// The order of the background streams in the next budget, unless that gives another.
+    pub fn set_background(&mut self, background: BackgroundOrder) {
+        self.background = background;
     }
 
     /// Changes the bit budget of the surface and of every vehicle, and if they are given the least shares of the classes and
-    /// what left-over bits are spent on.
+    /// the order of the background streams.
     pub fn set_budget(
         &mut self,
         bits_per_s: u32,
         shares: Option<Shares>,
-        spend: Option<SpendOrder>,
+        background: Option<BackgroundOrder>,
         now: Instant,
     ) -> Result<(), String> {
         if !(10..=10_000_000).contains(&bits_per_s) {
@@ -227,12 +227,12 @@ impl Surface {
             return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
         }
         let vehicles: Vec<Address> = self.desks.keys().copied().collect();
-        let spend = spend.unwrap_or(self.spend);
-        let slot = Slot::Budget(Budget { bits_per_s, shares, spend });
+        let background = background.unwrap_or(self.background);
+        let slot = Slot::Budget(Budget { bits_per_s, shares, background });
         vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
         self.link.set_budget(bits_per_s, now);
         self.link.set_shares(shares);
-        self.spend = spend;
+        self.background = background;
         Ok(())
     }
 

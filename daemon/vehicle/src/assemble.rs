@@ -3,12 +3,12 @@
 use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, background, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
-use scenecast_protocol::directive::{PlaneSet, PlannerKind, Reaction};
+use scenecast_protocol::directive::{LayerMask, PlannerKind, Reaction};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
+use scenecast_protocol::map::{LayerKind, LayerScale, LayerSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::MissionId;
 use std::time::Duration;
@@ -35,7 +35,7 @@ pub fn assemble(
     };
     let codec = config.map.codec.parse().unwrap_or_default();
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
-    link.set_planes(planes(config, codec));
+    link.set_layers(layers(config, codec));
     link.source_mut().set_debounce(Duration::from_secs_f64(config.map.settle_s));
     let planner = PlannerKind::from_name(&config.survey.planner).unwrap_or(PlannerKind::Horizon);
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
@@ -46,9 +46,9 @@ pub fn assemble(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
-    link.set_spend(durable.spend.and_then(SpendOrder::from_code).unwrap_or_else(|| background(config)));
+    link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or_else(|| background(config)));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, told_planes(config));
+    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, told_layers(config));
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }
@@ -75,21 +75,21 @@ fn habits(config: &Config) -> Habits {
     }
 }
 
-/// The planes of the map that are told.
-fn told_planes(config: &Config) -> PlaneSet {
-    PlaneSet::of(|kind| config.map.planes.iter().any(|name| name == kind.name()))
+/// The layers of the map that are told.
+fn told_layers(config: &Config) -> LayerMask {
+    LayerMask::of(|kind| config.map.planes.iter().any(|name| name == kind.name()))
 }
 
-/// Every plane that the operator could ask for, and its part of the map's share in percent.
-fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u8)> {
+/// Every layer that the operator could ask for, and its part of the map's share in percent.
+fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = (LayerSource, u8)> {
     let map = &config.map;
     let settle = Duration::from_secs_f64(map.settle_s);
     let scale = |kind| match kind {
-        PlaneKind::Confidence => PlaneScale::Confidence,
-        PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),
-        PlaneKind::Curiosity => PlaneScale::Curiosity,
+        LayerKind::Confidence => LayerScale::Confidence,
+        LayerKind::Depth => LayerScale::depth_around(config.survey.depth_m, map.depth_step_m),
+        LayerKind::Curiosity => LayerScale::Curiosity,
     };
-    let planes = PlaneKind::ALL.into_iter().zip(map.plane_shares);
-    let possible = planes.filter(|_| map.stream == "delta");
-    possible.map(move |(kind, share)| (PlaneSource::new(scale(kind), codec, settle), share))
+    let layers = LayerKind::ALL.into_iter().zip(map.layer_shares);
+    let possible = layers.filter(|_| map.stream == "delta");
+    possible.map(move |(kind, share)| (LayerSource::new(scale(kind), codec, settle), share))
 }

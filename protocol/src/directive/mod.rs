@@ -21,7 +21,7 @@ pub use outbox::{OrderStatus, PendingSlot, SlotOutbox, SlotProgress};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
 pub use settings::{Budget, Constraints, PlannerKind};
-pub use tuning::{CellBand, Change, PlaneSet, Settings, SettingsFault};
+pub use tuning::{CellBand, Change, LayerMask, Settings, SettingsFault};
 pub use utility::Utility;
 
 use crate::bytes::{Reader, Truncated};
@@ -292,7 +292,7 @@ mod tests {
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),
             cells: Change::To(CellBand::CoarseToFine),
-            planes: Change::To(PlaneSet::default()),
+            layers: Change::To(LayerMask::default()),
             alpha: figure,
             beta: figure,
             gamma: figure,

@@ -1,7 +1,7 @@
 //! Short slots that set how a vehicle behaves.
 
 use crate::bytes::{Reader, Truncated};
-use crate::schedule::{Shares, SpendOrder};
+use crate::schedule::{BackgroundOrder, Shares};
 
 /// Orders that never wait for anything longer.
 ///
@@ -72,14 +72,14 @@ pub struct Budget {
     /// Least share of each class while it has something to send.
     pub shares: Shares,
     /// What bits that nobody else needs are spent on.
-    pub spend: SpendOrder,
+    pub background: BackgroundOrder,
 }
 
 impl Budget {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(self.bits_per_s.min(0xFF_FFFF).to_be_bytes().get(1..).unwrap_or_default());
         out.extend_from_slice(&self.shares.0);
-        out.extend_from_slice(&self.spend.code().to_be_bytes());
+        out.extend_from_slice(&self.background.code().to_be_bytes());
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
@@ -88,7 +88,7 @@ impl Budget {
         for share in &mut shares {
             *share = r.u8()?;
         }
-        let spend = SpendOrder::from_code(r.u16()?).ok_or(Truncated)?;
-        Ok(Self { bits_per_s, shares: Shares(shares), spend })
+        let background = BackgroundOrder::from_code(r.u16()?).ok_or(Truncated)?;
+        Ok(Self { bits_per_s, shares: Shares(shares), background })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Figure, PlannerKind};
 use crate::bytes::{Reader, Truncated};
-use crate::map::PlaneKind;
+use crate::map::LayerKind;
 use std::ops::RangeInclusive;
 
 /// What an order says of one setting.
@@ -78,9 +78,9 @@ impl CellBand {
     }
 }
 
-/// Planes that are told beside the labels.
+/// Layers that are told beside the labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PlaneSet {
+pub struct LayerMask {
     /// How sure the model is of a label.
     pub confidence: bool,
     /// Depth of the sea floor.
@@ -89,27 +89,27 @@ pub struct PlaneSet {
     pub curiosity: bool,
 }
 
-impl PlaneSet {
-    /// The planes for which it holds.
-    pub fn of(has: impl Fn(PlaneKind) -> bool) -> Self {
+impl LayerMask {
+    /// The layers for which it holds.
+    pub fn of(has: impl Fn(LayerKind) -> bool) -> Self {
         Self {
-            confidence: has(PlaneKind::Confidence),
-            depth: has(PlaneKind::Depth),
-            curiosity: has(PlaneKind::Curiosity),
+            confidence: has(LayerKind::Confidence),
+            depth: has(LayerKind::Depth),
+            curiosity: has(LayerKind::Curiosity),
         }
     }
 
-    /// The planes among them, in wire order.
-    pub fn kinds(self) -> impl Iterator<Item = PlaneKind> {
-        PlaneKind::ALL.into_iter().filter(move |&kind| self.has(kind))
+    /// The layers among them, in wire order.
+    pub fn kinds(self) -> impl Iterator<Item = LayerKind> {
+        LayerKind::ALL.into_iter().filter(move |&kind| self.has(kind))
     }
 
-    /// Whether a plane is among them.
-    pub fn has(self, kind: PlaneKind) -> bool {
+    /// Whether a layer is among them.
+    pub fn has(self, kind: LayerKind) -> bool {
         match kind {
-            PlaneKind::Confidence => self.confidence,
-            PlaneKind::Depth => self.depth,
-            PlaneKind::Curiosity => self.curiosity,
+            LayerKind::Confidence => self.confidence,
+            LayerKind::Depth => self.depth,
+            LayerKind::Curiosity => self.curiosity,
         }
     }
 }
@@ -131,7 +131,7 @@ pub struct SettingsFault {
 /// ```text
 ///         7   6   5   4   3   2   1   0
 ///       +-----------+-----------+-------+
-/// byte 0| planner   | cells     | planes|
+/// byte 0| planner   | cells     | layers|
 ///       +---+---+---+---+---+---+---+---+
 /// byte 1| C | D | Q | a | b | g | r | f |
 ///       +---+---+---+---+---+---+---+---+
@@ -139,7 +139,7 @@ pub struct SettingsFault {
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
-/// * planes: 0 stay, 1 as configured, 2 those of C (confidence), D (depth) and Q (curiosity).
+/// * layers: 0 stay, 1 as configured, 2 those of C (confidence), D (depth) and Q (curiosity).
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -148,8 +148,8 @@ pub struct Settings {
     pub planner: Change<PlannerKind>,
     /// Which cells it tells.
     pub cells: Change<CellBand>,
-    /// Which planes it tells.
-    pub planes: Change<PlaneSet>,
+    /// Which layers it tells.
+    pub layers: Change<LayerMask>,
     /// Preference for labels that are used elsewhere.
     pub alpha: Change<Figure>,
     /// Prior weight of each word in a label.
@@ -180,7 +180,7 @@ impl Settings {
         Self {
             planner: self.planner.then(later.planner),
             cells: self.cells.then(later.cells),
-            planes: self.planes.then(later.planes),
+            layers: self.layers.then(later.layers),
             alpha: self.alpha.then(later.alpha),
             beta: self.beta.then(later.beta),
             gamma: self.gamma.then(later.gamma),
@@ -215,8 +215,8 @@ impl Settings {
     pub fn to_bytes(&self) -> Vec<u8> {
         let planner = self.planner.code(|p| p as u8);
         let cells = self.cells.code(|c| c as u8);
-        let planes = self.planes.code(|_| 0);
-        let set = self.planes.value().unwrap_or_default();
+        let layers = self.layers.code(|_| 0);
+        let set = self.layers.value().unwrap_or_default();
         let mut given = u8::from(set.confidence) << 7 | u8::from(set.depth) << 6 | u8::from(set.curiosity) << 5;
         let mut numbers = Vec::new();
         for (index, (_, change, _)) in self.figures().into_iter().enumerate() {
@@ -225,16 +225,16 @@ impl Settings {
             }
             Figure::encode(change, &mut numbers);
         }
-        let mut out = vec![planner << 5 | cells << 2 | planes, given];
+        let mut out = vec![planner << 5 | cells << 2 | layers, given];
         out.append(&mut numbers);
         out
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
         let (choices, given) = (r.u8()?, r.u8()?);
-        let set = PlaneSet { confidence: given & 0x80 != 0, depth: given & 0x40 != 0, curiosity: given & 0x20 != 0 };
-        let planes = Change::from_code(choices & 3, |code| (code == 0).then_some(set))?;
-        if planes.value().is_none() && set != PlaneSet::default() {
+        let set = LayerMask { confidence: given & 0x80 != 0, depth: given & 0x40 != 0, curiosity: given & 0x20 != 0 };
+        let layers = Change::from_code(choices & 3, |code| (code == 0).then_some(set))?;
+        if layers.value().is_none() && set != LayerMask::default() {
             return Err(Truncated);
         }
         let mut figure = |bit: u8| if given & bit != 0 { Figure::decode(r) } else { Ok(Change::Keep) };
@@ -246,7 +246,7 @@ impl Settings {
             frames_per_s: figure(0x01)?,
             planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
             cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
-            planes,
+            layers,
         })
     }
 
@@ -279,17 +279,17 @@ mod tests {
         let choices = (
             change(proptest::sample::select(PlannerKind::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
-            change(any::<[bool; 3]>().prop_map(|[confidence, depth, curiosity]| PlaneSet {
+            change(any::<[bool; 3]>().prop_map(|[confidence, depth, curiosity]| LayerMask {
                 confidence,
                 depth,
                 curiosity,
             })),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
-        (choices, figures).prop_map(|((planner, cells, planes), (alpha, beta, gamma, refine, frames))| Settings {
+        (choices, figures).prop_map(|((planner, cells, layers), (alpha, beta, gamma, refine, frames))| Settings {
             planner,
             cells,
-            planes,
+            layers,
             alpha,
             beta,
             gamma,
@@ -303,7 +303,7 @@ mod tests {
         let settings = Settings {
             planner: Change::To(PlannerKind::Horizon),
             cells: Change::To(CellBand::Coarse),
-            planes: Change::To(PlaneSet { depth: true, ..PlaneSet::default() }),
+            layers: Change::To(LayerMask { depth: true, ..LayerMask::default() }),
             alpha: to(0.01),
             gamma: Change::Configured,
             frames_per_s: to(0.25),
@@ -313,8 +313,8 @@ mod tests {
         assert_eq!(settings.to_bytes(), bytes);
         assert_eq!(Settings::from_bytes(&bytes), Some(settings));
         assert_eq!(Settings::default().to_bytes(), [0, 0]);
-        let curious = PlaneSet::of(|kind| kind == PlaneKind::Curiosity);
-        assert_eq!(Settings { planes: Change::To(curious), ..Settings::default() }.to_bytes(), [2, 0x20]);
+        let curious = LayerMask::of(|kind| kind == LayerKind::Curiosity);
+        assert_eq!(Settings { layers: Change::To(curious), ..Settings::default() }.to_bytes(), [2, 0x20]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Shares of the classes in what is sent.
 
-use crate::map::PlaneKind;
+use crate::map::LayerKind;
 
 /// What bits are spent on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -40,8 +40,8 @@ impl Class {
     ];
     /// The classes that have a share of what is sent.
     pub const SHARED: [Self; 5] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar];
-    /// The classes that have a share of the map's share: its planes.
-    pub const PLANES: [Self; 3] = [Self::Confidence, Self::Depth, Self::Curiosity];
+    /// The classes that have a share of the map's share: its layers.
+    pub const LAYERS: [Self; 3] = [Self::Confidence, Self::Depth, Self::Curiosity];
 
     /// Name for people and reports.
     pub fn name(self) -> &'static str {
@@ -59,12 +59,12 @@ impl Class {
     }
 }
 
-impl From<PlaneKind> for Class {
-    fn from(plane: PlaneKind) -> Self {
-        match plane {
-            PlaneKind::Confidence => Self::Confidence,
-            PlaneKind::Depth => Self::Depth,
-            PlaneKind::Curiosity => Self::Curiosity,
+impl From<LayerKind> for Class {
+    fn from(layer: LayerKind) -> Self {
+        match layer {
+            LayerKind::Confidence => Self::Confidence,
+            LayerKind::Depth => Self::Depth,
+            LayerKind::Curiosity => Self::Curiosity,
         }
     }
 }
@@ -97,10 +97,10 @@ impl Shares {
 #[derive(Debug, Clone, Default)]
 pub struct ClassShares {
     shares: Shares,
-    /// Percent of the map's share for each of [`Class::PLANES`].
-    planes: [u8; Class::PLANES.len()],
+    /// Percent of the map's share for each of [`Class::LAYERS`].
+    layers: [u8; Class::LAYERS.len()],
     /// Bytes that a class was owed and did not get while it waited.
-    owed: [f64; Class::SHARED.len() + Class::PLANES.len()],
+    owed: [f64; Class::SHARED.len() + Class::LAYERS.len()],
 }
 
 impl ClassShares {
@@ -112,19 +112,19 @@ impl ClassShares {
         Self { shares, ..Self::default() }
     }
 
-    /// Gives planes of the map a part of its share, percent; together 100 at most. A plane without one takes what
+    /// Gives layers of the map a part of its share, percent; together 100 at most. A layer without one takes what
     /// nobody else needs.
-    pub fn set_planes(&mut self, planes: [u8; Class::PLANES.len()]) {
-        self.planes = planes;
+    pub fn set_layers(&mut self, layers: [u8; Class::LAYERS.len()]) {
+        self.layers = layers;
     }
 
-    /// The share of a class in 0..=1, planes taken from the map.
+    /// The share of a class in 0..=1, layers taken from the map.
     fn of(&self, class: Class) -> f64 {
         let map = self.shares.of(Class::Map);
         let part = |percent: &u8| map * f64::from(*percent) / 100.0;
-        match Class::PLANES.iter().position(|&c| c == class) {
-            Some(plane) => self.planes.get(plane).map_or(0.0, part),
-            None if class == Class::Map => map - self.planes.iter().map(part).sum::<f64>(),
+        match Class::LAYERS.iter().position(|&c| c == class) {
+            Some(layer) => self.layers.get(layer).map_or(0.0, part),
+            None if class == Class::Map => map - self.layers.iter().map(part).sum::<f64>(),
             None => self.shares.of(class),
         }
     }
@@ -161,7 +161,7 @@ impl ClassShares {
     }
 
     fn slot(&self, class: Class) -> Option<usize> {
-        Class::SHARED.iter().chain(&Class::PLANES).position(|&c| c == class)
+        Class::SHARED.iter().chain(&Class::LAYERS).position(|&c| c == class)
     }
 }
 
@@ -193,10 +193,10 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
+    fn a_layer_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
         let waiting = [Class::Map, Class::Confidence, Class::Depth];
         let mut keeper = ClassShares::new(Shares::default());
-        keeper.set_planes([0, 10, 0]);
+        keeper.set_layers([0, 10, 0]);
         let mut sent = BTreeMap::<Class, usize>::new();
         for _ in 0..1000 {
             let class = keeper.next(&waiting).unwrap();

@@ -48,7 +48,7 @@ pub(super) fn changes(before: &State, after: &State) -> Vec<Change> {
         let shares: Vec<String> = after.link.shares.iter().map(|(c, p)| format!("{c} {p} %")).collect();
         add(None, "budget", format!("the shares are {}", shares.join(", ")));
     }
-    if before.link.spend != after.link.spend {
+    if before.link.background != after.link.background {
         add(None, "budget", format!("left-over bits go to {}", figures::spend(&after.link)));
     }
     for new in &after.vehicles {

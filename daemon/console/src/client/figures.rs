@@ -102,7 +102,7 @@ fn image(e: &Exemplar, now_s: f64) -> String {
 
 /// What left-over bits go to.
 pub(super) fn spend(link: &Link) -> String {
-    if link.spend.is_empty() { "nothing".to_owned() } else { link.spend.join(", then ") }
+    if link.background.is_empty() { "nothing".to_owned() } else { link.background.join(", then ") }
 }
 
 /// Three times as long without a frame as is usual.

@@ -69,7 +69,8 @@ impl Ctl {
     pub async fn budget(&self) -> Result<(), UserError> {
         let state = self.state().await?;
         let link = &state.link;
-        let value = serde_json::json!({ "budget_bps": link.budget_bps, "shares": link.shares, "spend": link.spend });
+        let value =
+            serde_json::json!({ "budget_bps": link.budget_bps, "shares": link.shares, "background": link.background });
         self.tell(&value, || {
             let shares = link.shares.iter().map(|(class, percent)| format!("{class:<10} at least {percent} %\n"));
             let theirs = state.vehicles.iter().filter_map(|v| Some((v, v.status.as_ref()?)));
@@ -100,7 +101,7 @@ impl Ctl {
         };
         let shares = (!change.shares.is_empty()).then_some(shares);
         let budget_bps = change.bits_per_s.unwrap_or(link.budget_bps);
-        let order = BudgetOrder { budget_bps, shares, spend: change.spend };
+        let order = BudgetOrder { budget_bps, shares, background: change.spend };
         let accepted = self.client.post("/api/v1/budget", &order).await?;
         self.follow(accepted).await
     }

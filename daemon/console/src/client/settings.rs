@@ -56,7 +56,7 @@ fn merged(named: SettingsOrder, fitting: SettingsOrder) -> SettingsOrder {
     SettingsOrder {
         planner: named.planner.or(fitting.planner),
         cells: named.cells.or(fitting.cells),
-        planes: named.planes.or(fitting.planes),
+        layers: named.layers.or(fitting.layers),
         alpha: named.alpha.or(fitting.alpha),
         beta: named.beta.or(fitting.beta),
         gamma: named.gamma.or(fitting.gamma),
@@ -72,7 +72,7 @@ fn named(order: &SettingsOrder) -> [(&'static str, Option<String>); 8] {
     [
         ("planner", text(&order.planner)),
         ("cells", text(&order.cells)),
-        ("planes", text(&order.planes)),
+        ("layers", text(&order.layers)),
         ("alpha", number(order.alpha)),
         ("beta", number(order.beta)),
         ("gamma", number(order.gamma)),
@@ -113,10 +113,10 @@ mod tests {
     fn what_is_named_goes_before_what_fits() {
         let fitting =
             SettingsOrder { alpha: Some(0.1), gamma: Some(1e-4), cells: Some("coarse".into()), ..Default::default() };
-        let named = SettingsOrder { alpha: Some(0.0), planes: Some(String::new()), ..Default::default() };
+        let named = SettingsOrder { alpha: Some(0.0), layers: Some(String::new()), ..Default::default() };
         let order = merged(named, fitting);
         assert_eq!((order.alpha, order.gamma, order.cells.as_deref()), (Some(0.0), Some(1e-4), Some("coarse")));
         let said = lines(&order, |name, value| format!("{name} {value}; "));
-        assert_eq!(said, "cells coarse; planes as configured; alpha as configured; gamma 0.0001; ");
+        assert_eq!(said, "cells coarse; layers as configured; alpha as configured; gamma 0.0001; ");
     }
 }

@@ -5,7 +5,7 @@ use super::regions::{Polygon, regions};
 use super::{Cells, Explored};
 use crate::state::Origin;
 use scenecast_core::label_picture;
-use scenecast_protocol::map::{LabelGrid, PlaneKind};
+use scenecast_protocol::map::{LabelGrid, LayerKind};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -69,24 +69,24 @@ pub(crate) fn ply(cells: &Cells) -> String {
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );
-    let depth = cells.planes.iter().find(|p| p.name == PlaneKind::Depth.name());
+    let depth = cells.layers.iter().find(|p| p.name == LayerKind::Depth.name());
     for Explored { at, x, y, label, .. } in cells.explored() {
         let [red, green, blue] = scenecast_core::palette::colour(label);
-        let up = depth.and_then(|plane| plane.value(at)).map_or(0.0, |depth| -depth);
+        let up = depth.and_then(|layer| layer.value(at)).map_or(0.0, |depth| -depth);
         let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
     }
     out
 }
 
-/// A line for each explored cell: the middle in metres, label, age in seconds, what is known of each plane.
+/// A line for each explored cell: the middle in metres, label, age in seconds, what is known of each layer.
 pub(crate) fn csv(cells: &Cells) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
-    cells.planes.iter().for_each(|plane| out.extend([",", plane.name]));
+    cells.layers.iter().for_each(|layer| out.extend([",", layer.name]));
     for Explored { at, x, y, label, age_s } in cells.explored() {
         let age = if age_s == u16::MAX { String::new() } else { age_s.to_string() };
         let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");
-        for plane in &cells.planes {
-            let value = plane.value(at).map_or(String::new(), |value| format!("{value:.3}"));
+        for layer in &cells.layers {
+            let value = layer.value(at).map_or(String::new(), |value| format!("{value:.3}"));
             let _ = write!(out, ",{value}");
         }
     }

@@ -28,12 +28,12 @@ pub struct Cells {
     /// Seconds since each was heard of, 65535 = never.
     pub age_s: Vec<u16>,
     /// What else is known of them.
-    pub planes: Vec<Plane>,
+    pub layers: Vec<Layer>,
 }
 
 /// A quantity of each cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plane {
+pub struct Layer {
     /// What it is.
     pub name: &'static str,
     /// Its unit, empty if it has none.
@@ -50,15 +50,15 @@ pub struct Plane {
     pub age_s: Vec<u16>,
 }
 
-impl Plane {
+impl Layer {
     /// The value of a cell, if it is known.
     pub(super) fn value(&self, at: usize) -> Option<f64> {
         let shade = self.shades.get(at).filter(|shade| **shade < 255)?;
         Some(self.min + (self.max - self.min) * f64::from(*shade) / 254.0)
     }
 
-    fn told(&self) -> state::Plane {
-        state::Plane {
+    fn told(&self) -> state::Layer {
+        state::Layer {
             name: self.name.to_owned(),
             unit: self.unit.to_owned(),
             min: self.min,
@@ -87,7 +87,7 @@ impl Cells {
             cell_m: self.cell_m,
             labels: base64::encode(&self.labels),
             age_s: ages(&self.age_s),
-            planes: self.planes.iter().map(Plane::told).collect(),
+            layers: self.layers.iter().map(Layer::told).collect(),
         }
     }
 

@@ -16,7 +16,7 @@ pub struct Link {
     /// What bits that nobody else needs are spent on, in this order: finer, depth, exemplars, confidence,
     /// curiosity.
     #[serde(default)]
-    pub spend: Vec<String>,
+    pub background: Vec<String>,
     /// Frames of no known vehicle, or unreadable.
     pub strangers: u64,
     /// From the vehicles, as the surface heard it.

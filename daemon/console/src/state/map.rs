@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// A map without its cells.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MapSummary {
-    /// Counts up whenever a label or a plane changes.
+    /// Counts up whenever a label or a layer changes.
     pub version: u64,
     /// Edge of a cell, metres.
     pub cell_m: f64,
@@ -42,7 +42,7 @@ pub struct Placement {
 /// A map with its cells, row by row from the south-west.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Map {
-    /// Counts up whenever a label or a plane changes.
+    /// Counts up whenever a label or a layer changes.
     pub version: u64,
     /// When the ages were true.
     pub at_s: f64,
@@ -61,13 +61,13 @@ pub struct Map {
     /// Base64: two bytes a cell, little-endian: seconds since the cell was heard of, 65535 = never.
     pub age_s: String,
     /// What else was heard of the cells.
-    pub planes: Vec<Plane>,
+    pub layers: Vec<Layer>,
 }
 
 /// A quantity of each cell that a vehicle tells of where labels leave room. It may be older than the label of its cell, and
 /// then speaks of an earlier one; where a cell has no label it does not count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Plane {
+pub struct Layer {
     /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor;
     /// `curiosity`: how badly the model explains what the cell shows, the mean surprise of a word in bits (the binary
     /// logarithm of the perplexity).
@@ -87,7 +87,7 @@ pub struct Plane {
     pub age_s: String,
 }
 
-/// A map, or a plane of it, has changed.
+/// A map, or a layer of it, has changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MapEvent {
     /// Address of the vehicle.

@@ -4,7 +4,7 @@ use super::arrival::{LABELS, Setting, Water};
 use crate::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
-use scenecast_protocol::schedule::{Class, Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{AskState, Wish};
 
@@ -22,7 +22,8 @@ fn patch(i: u32) -> RgbImage {
 fn water(setting: Setting, seed: u64) -> Water {
     let patches: Vec<RgbImage> = (0..30).map(patch).collect();
     let mut water = Water::new(setting, &patches, seed).unwrap();
-    let budget = Budget { bits_per_s: 10_000, shares: Shares::default(), spend: SpendOrder::new(&[]).unwrap() };
+    let budget =
+        Budget { bits_per_s: 10_000, shares: Shares::default(), background: BackgroundOrder::new(&[]).unwrap() };
     water.vehicle.set_budget(budget, water.now);
     water.run_until(Instant::from_secs_f64(120.0), |_| false);
     assert_eq!(exemplar_bytes(&water), 0);
@@ -31,7 +32,7 @@ fn water(setting: Setting, seed: u64) -> Water {
 
 /// The operator says what left-over bits are spent on.
 fn spend(water: &mut Water, names: &[&str]) {
-    let spend = SpendOrder::from_names(names).unwrap();
+    let spend = BackgroundOrder::from_names(names).unwrap();
     water.surface.set_budget(10_000, None, Some(spend), water.now).unwrap();
 }
 

@@ -12,7 +12,7 @@ use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, ReceptionOutcome, NodePosition, RandomStream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 

@@ -6,7 +6,7 @@ use scenecast_core::UserError;
 use scenecast_files::RecordedFrame;
 use scenecast_motion::Motion;
 use scenecast_protocol::directive::SlotId;
-use scenecast_protocol::map::{LabelGrid, PlaneReplica};
+use scenecast_protocol::map::{LabelGrid, LayerReplica};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
 use scenecast_vehicle::VehicleOutput;
@@ -260,12 +260,12 @@ impl Mission {
         let versions = (self.vehicle.map_version(), self.picture_version);
         self.meter.look(self.vehicle.map(), operator, versions, self.now);
         let (view, nothing) = (self.surface.view(self.address), LabelGrid::default());
-        for plane in self.vehicle.planes() {
-            let kind = plane.scale().kind();
-            let heard = view.and_then(|v| v.plane(kind));
-            let versions = (plane.version(), heard.map_or(0, PlaneReplica::version));
-            let meter = self.plane_meters.entry(kind).or_default();
-            meter.look(plane.target(), heard.map_or(&nothing, |h| h.levels().shown()), versions, self.now);
+        for layer in self.vehicle.layers() {
+            let kind = layer.scale().kind();
+            let heard = view.and_then(|v| v.layer(kind));
+            let versions = (layer.version(), heard.map_or(0, LayerReplica::version));
+            let meter = self.layer_meters.entry(kind).or_default();
+            meter.look(layer.target(), heard.map_or(&nothing, |h| h.levels().shown()), versions, self.now);
         }
     }
 }

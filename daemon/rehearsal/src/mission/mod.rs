@@ -23,7 +23,7 @@ use scenecast_files::{Recorder, Recording};
 use scenecast_motion::Motion;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::map::PlaneKind;
+use scenecast_protocol::map::LayerKind;
 use scenecast_protocol::schedule::Audit;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -72,7 +72,7 @@ pub struct Mission {
     pub(super) motion: Motion,
     pub(super) log: FramesLog,
     pub(super) meter: Meter,
-    pub(super) plane_meters: BTreeMap<PlaneKind, Meter>,
+    pub(super) layer_meters: BTreeMap<LayerKind, Meter>,
     pub(super) audits: [Audit; 2],
     pub(super) applied: Vec<AppliedSlot>,
     pub(super) issued: BTreeMap<(SlotId, u16), Instant>,
@@ -165,7 +165,7 @@ impl Mission {
             audits: [Audit::new(window), Audit::new(window)],
             log: FramesLog::default(),
             meter: Meter::default(),
-            plane_meters: BTreeMap::new(),
+            layer_meters: BTreeMap::new(),
             applied: Vec::new(),
             issued: BTreeMap::new(),
             png_full_bytes: 0,
@@ -299,7 +299,7 @@ impl Mission {
         if self.ended.is_none() {
             self.look();
             self.meter.end_survey();
-            self.plane_meters.values_mut().for_each(Meter::end_survey);
+            self.layer_meters.values_mut().for_each(Meter::end_survey);
             self.ended = Some(self.now);
             self.vehicle.finish_survey();
             self.pump();

@@ -19,7 +19,7 @@ use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::{LabelGrid, PlaneSource};
+use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::PlannedPath;
 use serde::{Deserialize, Serialize};
@@ -51,7 +51,7 @@ pub struct Durable {
     /// Least shares in force in percent, if somebody has changed them.
     pub shares: Option<[u8; 5]>,
     /// What left-over bits are spent on, as on the wire, if somebody has changed it.
-    pub spend: Option<u16>,
+    pub background: Option<u16>,
     /// Settings in force, as on the wire; empty: all as configured.
     pub settings: Vec<u8>,
     /// Limits in force, as on the wire; empty: none.
@@ -191,9 +191,9 @@ impl Vehicle {
         self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
     }
 
-    /// The planes of the map that are told.
-    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
-        self.link.planes()
+    /// The layers of the map that are told.
+    pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
+        self.link.layers()
     }
 
     /// Versions of that map so far.

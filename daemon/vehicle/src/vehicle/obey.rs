@@ -129,11 +129,11 @@ impl Vehicle {
         self.link.set_budget(budget.bits_per_s, now);
         self.follow_telling();
         self.link.set_shares(budget.shares);
-        self.link.set_spend(budget.spend);
+        self.link.set_background(budget.background);
         self.tend_gallery();
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
-        self.durable.spend = Some(budget.spend.code());
+        self.durable.background = Some(budget.background.code());
     }
 }
 

@@ -4,7 +4,7 @@ use super::raw::{self, Script};
 use scenecast_protocol::directive::{SlotState, VersionedSlot};
 use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
-use scenecast_protocol::map::{PlaneChunk, PlaneReplica};
+use scenecast_protocol::map::{LayerChunk, LayerReplica};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
@@ -152,12 +152,12 @@ pub fn status(data: &[u8]) {
     }
 }
 
-/// A plane chunk that is read can be written and reads the same; what it says is taken or refused, levels in bounds.
-pub fn plane_chunk(data: &[u8]) {
-    let Some(chunk) = PlaneChunk::decode(data) else { return };
+/// A layer chunk that is read can be written and reads the same; what it says is taken or refused, levels in bounds.
+pub fn layer_chunk(data: &[u8]) {
+    let Some(chunk) = LayerChunk::decode(data) else { return };
     assert_eq!(chunk.encode(), data);
-    if let PlaneChunk::Patch(scale, patch) = chunk {
-        let mut replica = PlaneReplica::new(scale);
+    if let LayerChunk::Patch(scale, patch) = chunk {
+        let mut replica = LayerReplica::new(scale);
         let taken = replica.apply(1, scale, patch, Instant::ZERO);
         assert!(taken || replica.levels().shown().is_empty());
         assert!(replica.levels().shown().iter().all(|(_, level)| scale.bounds(level).is_some()));

@@ -4,7 +4,7 @@ use super::peer::{MISSION, Peer, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, MapSource, PlaneScale, PlaneSource, Replica, StateReplica, StateSource};
+use scenecast_protocol::map::{Cell, LayerScale, LayerSource, MapSource, Replica, StateReplica, StateSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
@@ -112,10 +112,10 @@ impl Grow for MapSource {
     }
 }
 
-/// The planes of a vehicle that has any.
-pub fn planes() -> impl Iterator<Item = (PlaneSource, u8)> {
-    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5), PlaneScale::Curiosity];
-    scales.into_iter().map(|scale| (PlaneSource::new(scale, Codec::Png, Duration::from_secs(2)), 20))
+/// The layers of a vehicle that has any.
+pub fn layers() -> impl Iterator<Item = (LayerSource, u8)> {
+    let scales = [LayerScale::Confidence, LayerScale::depth_around(20.0, 0.5), LayerScale::Curiosity];
+    scales.into_iter().map(|scale| (LayerSource::new(scale, Codec::Png, Duration::from_secs(2)), 20))
 }
 
 pub type Vehicle<S = Pile> = VehicleLink<S>;

@@ -146,7 +146,7 @@ enum Command {
 
 const SETTINGS_EXAMPLES: &str = "\
 Example: scenecast ctl settings
-         scenecast ctl settings --gamma 1e-5 --frames 0.2 --planes none --wait 120
+         scenecast ctl settings --gamma 1e-5 --frames 0.2 --layers none --wait 120
          scenecast ctl settings --alpha 0 --cells \"\"     both as the vehicle is configured
          scenecast ctl settings --fit                    what fits the map's share of the budget
          scenecast ctl settings --fit 800 --dry-run      what would fit 800 bit/s";
@@ -171,9 +171,9 @@ struct SettingsArgs {
     /// Cells that are told: fine, coarse-to-fine, coarse (every fourth both ways); "": as configured
     #[arg(long, value_name = "BAND")]
     cells: Option<String>,
-    /// Planes that are told: none, or different ones of confidence, depth, curiosity with commas between; "": as configured
-    #[arg(long, value_name = "PLANES")]
-    planes: Option<String>,
+    /// Layers that are told: none, or different ones of confidence, depth, curiosity with commas between; "": as configured
+    #[arg(long, value_name = "LAYERS")]
+    layers: Option<String>,
     /// lawnmower, greedy, horizon; "": as configured
     #[arg(long, value_name = "NAME")]
     planner: Option<String>,
@@ -191,7 +191,7 @@ impl SettingsArgs {
         let order = SettingsOrder {
             planner: self.planner,
             cells: self.cells,
-            planes: self.planes,
+            layers: self.layers,
             alpha: self.alpha,
             beta: self.beta,
             gamma: self.gamma,

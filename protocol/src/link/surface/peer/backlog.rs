@@ -33,7 +33,7 @@ impl ReportedBacklog {
 /// Bytes that have come in so far, modulo 4 GiB.
 fn received(stats: &LinkStats) -> Backlog {
     let of = |class| stats.received_by_class.get(&class).copied().unwrap_or_default();
-    let other: u64 = Class::PLANES.into_iter().chain([Class::Exemplar]).map(of).sum();
+    let other: u64 = Class::LAYERS.into_iter().chain([Class::Exemplar]).map(of).sum();
     Backlog { map_bytes: of(Class::Map) as u32, other_bytes: other as u32 }
 }
 

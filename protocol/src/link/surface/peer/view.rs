@@ -4,7 +4,7 @@ use super::VehiclePeer;
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
-use crate::map::{PlaneKind, PlaneReplica, Replica, StateReplica};
+use crate::map::{LayerKind, LayerReplica, Replica, StateReplica};
 use crate::time::Instant;
 use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
@@ -27,12 +27,12 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
         &self.0.content.replica
     }
 
-    /// The operator's copy of a plane of the map; `None` before its first chunk.
-    pub fn plane(&self, kind: PlaneKind) -> Option<&'a PlaneReplica> {
-        self.0.content.planes.get(kind)
+    /// The operator's copy of a layer of the map; `None` before its first chunk.
+    pub fn layer(&self, kind: LayerKind) -> Option<&'a LayerReplica> {
+        self.0.content.layers.get(kind)
     }
 
-    /// Counts changes of the replicated state and its planes.
+    /// Counts changes of the replicated state and its layers.
     pub fn map_version(&self) -> u64 {
         self.0.content.map_version()
     }

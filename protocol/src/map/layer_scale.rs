@@ -1,10 +1,10 @@
-//! What the levels of a plane mean.
+//! What the levels of a layer mean.
 
 use super::{MAX_LABEL, UNEXPLORED};
 
-/// Which quantity a plane holds.
+/// Which quantity a layer holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum PlaneKind {
+pub enum LayerKind {
     /// How sure the model is of the label.
     Confidence,
     /// Depth of the sea floor below the surface.
@@ -13,8 +13,8 @@ pub enum PlaneKind {
     Curiosity,
 }
 
-impl PlaneKind {
-    /// Every plane, in the order of their numbers on the wire.
+impl LayerKind {
+    /// Every layer, in the order of their numbers on the wire.
     pub const ALL: [Self; 3] = [Self::Confidence, Self::Depth, Self::Curiosity];
 
     /// Name for people and reports.
@@ -35,9 +35,9 @@ impl PlaneKind {
     }
 }
 
-/// What the levels of a plane mean; level 0 is not known.
+/// What the levels of a layer mean; level 0 is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PlaneScale {
+pub enum LayerScale {
     /// Level 1 to 4: quarters of 0..=1.
     Confidence,
     /// Level 1 to 254: level n is from `(first + n - 1) * step` to one step more.
@@ -52,7 +52,7 @@ pub enum PlaneScale {
     Curiosity,
 }
 
-impl PlaneScale {
+impl LayerScale {
     /// A quantity has to leave its level by this share of a step before it has another one.
     const HYSTERESIS: f64 = 0.2;
 
@@ -64,11 +64,11 @@ impl PlaneScale {
     }
 
     /// Which quantity it is of.
-    pub fn kind(self) -> PlaneKind {
+    pub fn kind(self) -> LayerKind {
         match self {
-            Self::Confidence => PlaneKind::Confidence,
-            Self::Depth { .. } => PlaneKind::Depth,
-            Self::Curiosity => PlaneKind::Curiosity,
+            Self::Confidence => LayerKind::Confidence,
+            Self::Depth { .. } => LayerKind::Depth,
+            Self::Curiosity => LayerKind::Curiosity,
         }
     }
 
@@ -123,28 +123,28 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const DEPTH: PlaneScale = PlaneScale::Depth { step_dm: 5, first: 24 };
+    const DEPTH: LayerScale = LayerScale::Depth { step_dm: 5, first: 24 };
 
     #[test]
     fn levels_are_quarters_of_confidence_steps_of_depth_and_bits_of_curiosity() {
-        let levels = |scale: PlaneScale, quantities: &[f64]| -> Vec<u8> {
+        let levels = |scale: LayerScale, quantities: &[f64]| -> Vec<u8> {
             quantities.iter().map(|&quantity| scale.level(quantity, 0)).collect()
         };
-        assert_eq!(levels(PlaneScale::Confidence, &[0.0, 0.24, 0.25, 0.74, 0.75, 1.0]), [1, 1, 2, 3, 4, 4]);
-        assert_eq!(levels(PlaneScale::Confidence, &[-0.1, 1.1, f64::NAN]), [0, 0, 0]);
+        assert_eq!(levels(LayerScale::Confidence, &[0.0, 0.24, 0.25, 0.74, 0.75, 1.0]), [1, 1, 2, 3, 4, 4]);
+        assert_eq!(levels(LayerScale::Confidence, &[-0.1, 1.1, f64::NAN]), [0, 0, 0]);
         assert_eq!(levels(DEPTH, &[12.0, 12.49, 12.5, 138.99]), [1, 1, 2, 254]);
         assert_eq!(levels(DEPTH, &[11.9, 139.0, f64::INFINITY]), [0, 0, 0]);
-        assert_eq!(levels(PlaneScale::Curiosity, &[0.0, 0.99, 1.0, 6.5, 15.9, 16.0, 40.0]), [1, 1, 2, 7, 16, 16, 16]);
-        assert_eq!(levels(PlaneScale::Curiosity, &[-0.1, f64::NAN]), [0, 0]);
-        assert_eq!((DEPTH.bounds(2), PlaneScale::Curiosity.bounds(7)), (Some((12.5, 13.0)), Some((6.0, 7.0))));
-        assert_eq!((DEPTH.bounds(0), DEPTH.bounds(255), PlaneScale::Confidence.bounds(5)), (None, None, None));
+        assert_eq!(levels(LayerScale::Curiosity, &[0.0, 0.99, 1.0, 6.5, 15.9, 16.0, 40.0]), [1, 1, 2, 7, 16, 16, 16]);
+        assert_eq!(levels(LayerScale::Curiosity, &[-0.1, f64::NAN]), [0, 0]);
+        assert_eq!((DEPTH.bounds(2), LayerScale::Curiosity.bounds(7)), (Some((12.5, 13.0)), Some((6.0, 7.0))));
+        assert_eq!((DEPTH.bounds(0), DEPTH.bounds(255), LayerScale::Confidence.bounds(5)), (None, None, None));
     }
 
     #[test]
     fn the_scale_of_depths_reaches_as_far_up_as_down_or_begins_at_the_surface() {
-        assert_eq!(PlaneScale::depth_around(1000.0, 0.5), PlaneScale::Depth { step_dm: 5, first: 1873 });
-        assert_eq!(PlaneScale::depth_around(20.0, 0.5), PlaneScale::Depth { step_dm: 5, first: 0 });
-        assert_eq!(PlaneScale::depth_around(11_000.0, 0.1), PlaneScale::Depth { step_dm: 1, first: 65_535 });
+        assert_eq!(LayerScale::depth_around(1000.0, 0.5), LayerScale::Depth { step_dm: 5, first: 1873 });
+        assert_eq!(LayerScale::depth_around(20.0, 0.5), LayerScale::Depth { step_dm: 5, first: 0 });
+        assert_eq!(LayerScale::depth_around(11_000.0, 0.1), LayerScale::Depth { step_dm: 1, first: 65_535 });
     }
 
     #[test]
@@ -152,13 +152,13 @@ mod tests {
         let mut level = 0;
         let mut changes = 0;
         for i in 0..100 {
-            let next = PlaneScale::Confidence.level(if i % 2 == 0 { 0.73 } else { 0.77 }, level);
+            let next = LayerScale::Confidence.level(if i % 2 == 0 { 0.73 } else { 0.77 }, level);
             changes += u32::from(next != level);
             level = next;
         }
         assert_eq!((changes, level), (1, 3));
-        assert_eq!(PlaneScale::Confidence.level(0.81, level), 4);
-        assert_eq!([6.9, 7.1, 7.25].map(|bits| PlaneScale::Curiosity.level(bits, 7)), [7, 7, 8]);
+        assert_eq!(LayerScale::Confidence.level(0.81, level), 4);
+        assert_eq!([6.9, 7.1, 7.25].map(|bits| LayerScale::Curiosity.level(bits, 7)), [7, 7, 8]);
     }
 
     proptest! {
