@@ -2,11 +2,11 @@
 
 mod pair;
 
-use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
+use pair::{Pair, Setup, Water, auv, hold, layer, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;
-use scenecast_protocol::map::{Cell, LayerKind, LayerScale, LayerSource};
+use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerSource, Steps};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class};
 use std::time::Duration;
@@ -138,7 +138,7 @@ fn layers_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() 
             pair.run(pair.now + Duration::from_secs(10), false);
         }
         assert_budget(&pair, 4_000);
-        [Class::Map, Class::Confidence, Class::Depth]
+        [Class::Map, Class::Layer(LayerId::CONFIDENCE), Class::Layer(LayerId::DEPTH)]
             .map(|c| *pair.vehicle.stats().bytes_by_class.get(&c).unwrap_or(&0))
     };
     let [labels, confidence, depth] = sent([0, 0]);
@@ -158,36 +158,68 @@ fn sent(pair: &Pair, class: Class) -> u64 {
 fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_not_name() {
     let setup = Setup { layers: Some([0, 0]), ..Setup::new(256, 4_000, Codec::Context) };
     let mut pair = Pair::new(3, setup, Water { loss: 0.1, ..CALM });
-    pair.vehicle.set_background(BackgroundOrder::new(&[BackgroundStream::Exemplars, BackgroundStream::Depth]).unwrap());
+    pair.vehicle.set_background(
+        BackgroundOrder::new(&[BackgroundStream::Exemplars, BackgroundStream::Layer(LayerId::DEPTH)]).unwrap(),
+    );
     pair.vehicle.set_map(speckled(20, 1), pair.now);
     pair.set_layers(100, 1);
     pair.vehicle.push_background_object((0..9_000u32).map(|i| ((i * i) >> 3) as u8).collect());
     for _ in 0..400 {
         pair.run(pair.now + Duration::from_secs(1), false);
-        let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Depth));
+        let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Layer(LayerId::DEPTH)));
         // Ends of frames into which no part of the object fits, and what waits for its verdicts, are left over, too.
         assert!(object >= 9_000 || depth <= object / 20, "{depth} bytes of depth after {object} of the object");
     }
-    assert!(sent(&pair, Class::Depth) > 500, "then it is its turn");
-    assert_eq!(sent(&pair, Class::Confidence) / 100, 0, "but for what says that nothing was sent");
+    assert!(sent(&pair, Class::Layer(LayerId::DEPTH)) > 500, "then it is its turn");
+    assert_eq!(sent(&pair, Class::Layer(LayerId::CONFIDENCE)) / 100, 0, "but for what says that nothing was sent");
     assert_budget(&pair, 4_000);
 }
 
 #[test]
 fn curiosity_is_told_where_the_operator_asks_for_it_and_nowhere_else() {
     let mut pair = Pair::new(4, Setup::new(256, 4_000, Codec::Context), Water { loss: 0.2, ..CALM });
-    pair.vehicle.set_layers([(LayerSource::new(LayerScale::Curiosity, Codec::Context, Duration::ZERO), 0)]);
+    pair.vehicle.add_layer(layer(LayerId::CURIOSITY, 0, Codec::Context, Duration::ZERO));
     pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
     let bits = (0..400).map(|i| (Cell::new(i % 20, i / 20), f64::from(i % 7) + f64::from(i / 80)));
-    pair.vehicle.set_layer(LayerKind::Curiosity, bits, pair.now);
+    pair.vehicle.set_layer(LayerId::CURIOSITY, bits, pair.now);
     pair.run(pair.now + Duration::from_secs(200), true);
     assert!(pair.is_converged(), "nobody waits for it");
-    assert_eq!(sent(&pair, Class::Curiosity), 0);
-    pair.vehicle.set_background(BackgroundOrder::new(&[BackgroundStream::Curiosity]).unwrap());
+    assert_eq!(sent(&pair, Class::Layer(LayerId::CURIOSITY)), 0);
+    pair.vehicle.set_background(BackgroundOrder::new(&[BackgroundStream::Layer(LayerId::CURIOSITY)]).unwrap());
     assert!(!pair.is_converged());
     pair.run(pair.now + Duration::from_secs(200), true);
-    assert!(pair.is_converged() && sent(&pair, Class::Curiosity) > 50);
+    assert!(pair.is_converged() && sent(&pair, Class::Layer(LayerId::CURIOSITY)) > 50);
     assert_budget(&pair, 4_000);
+}
+
+#[test]
+fn a_layer_made_under_way_arrives_in_small_frames_over_restarts() {
+    let setup = Setup { layers: Some([10, 0]), ..Setup::new(32, 2_000, Codec::Context) };
+    let mut pair = Pair::new(6, setup, Water { loss: 0.3, reordering: 0.1, ..CALM });
+    pair.vehicle.set_map(patchy(8, 0).iter(), pair.now);
+    pair.set_layers(8, 1);
+    pair.run(pair.now + Duration::from_secs(30), false);
+    let id = LayerId::new(15).unwrap();
+    let descriptor = LayerDescriptor {
+        name: "chlorophyll".into(),
+        unit: "mg/m³".into(),
+        steps: Steps::Doubling,
+        share: 10,
+        ..layer(LayerId::CURIOSITY, 0, Codec::Png, Duration::ZERO).descriptor().clone()
+    };
+    let made = || LayerSource::new(id, descriptor.clone(), Codec::Context, Duration::ZERO);
+    assert!(pair.vehicle.add_layer(made()) && !pair.vehicle.add_layer(made()), "an index has one layer");
+    pair.vehicle.set_layer(id, (0..64).map(|i| (Cell::new(i % 8, i / 8), f64::from(i))), pair.now);
+    for _ in 0..3 {
+        pair.run(pair.now + Duration::from_secs(60), false);
+        pair.restart_surface();
+    }
+    pair.run(pair.now + Duration::from_secs(4_000), true);
+    assert!(pair.is_converged());
+    let view = pair.surface.vehicle(auv()).unwrap();
+    assert_eq!((view.layers().id("chlorophyll"), view.layers().get(id)), (Some(id), Some(&descriptor)));
+    assert_eq!(view.layer(id).unwrap().levels().shown().explored(), 64);
+    assert_eq!(view.stats().resyncs, 0);
 }
 
 #[test]
@@ -218,7 +250,7 @@ fn a_new_epoch_takes_the_layers_away_before_the_first_new_label() {
     pair.set_layers(20, 0);
     pair.run(pair.now + Duration::from_secs(200), true);
     let level = |pair: &Pair, cell: Cell| {
-        let layer = pair.surface.vehicle(auv()).unwrap().layer(LayerKind::Confidence);
+        let layer = pair.surface.vehicle(auv()).unwrap().layer(LayerId::CONFIDENCE);
         layer.map_or(0, |p| p.levels().shown().get(cell))
     };
     assert!(pair.is_converged() && level(&pair, Cell::new(0, 0)) > 0);

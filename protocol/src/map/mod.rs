@@ -10,7 +10,6 @@ mod digest;
 #[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
 mod dirty;
 mod layer;
-mod layer_scale;
 mod replica;
 mod source;
 mod stream;
@@ -19,8 +18,10 @@ mod value;
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
 pub use debounce::MAX_CONFIDENCE;
 pub use digest::MapDigest;
-pub use layer::{LayerChunk, LayerReplica, LayerSource};
-pub use layer_scale::{LayerKind, LayerScale};
+pub use layer::{
+    Assembly, BUILT_IN_LAYERS, BuiltInLayer, Decimal, DescriptorPart, LayerCarried, LayerChunk, LayerDescriptor,
+    LayerId, LayerMask, LayerReplica, LayerSet, LayerSource, Palette, Quantity, Spread, Steps, UpperEnd,
+};
 pub use replica::Replica;
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};

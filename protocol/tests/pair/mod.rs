@@ -8,7 +8,7 @@ use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, LabelGrid, LayerKind, LayerScale, LayerSource};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerSet, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
@@ -97,7 +97,7 @@ pub(crate) struct Pair {
     serial: u64,
     durable: SlotInboxState,
     /// What the layers were last set to.
-    quantities: Vec<(LayerKind, Vec<(Cell, f64)>)>,
+    quantities: Vec<(LayerId, Vec<(Cell, f64)>)>,
 }
 
 enum Event {
@@ -156,15 +156,15 @@ impl Pair {
             (0..side * side).map(cell).map(quantity).collect::<Vec<_>>()
         };
         self.quantities = vec![
-            (LayerKind::Confidence, cells(|x, y, p| ((x * 0.7 + y * 1.3 + p).sin() + 1.0) / 2.0)),
-            (LayerKind::Depth, cells(|x, y, p| 20.0 + (x * 0.11 + p).sin() * 4.0 + y * 0.2)),
+            (LayerId::CONFIDENCE, cells(|x, y, p| ((x * 0.7 + y * 1.3 + p).sin() + 1.0) / 2.0)),
+            (LayerId::DEPTH, cells(|x, y, p| 20.0 + (x * 0.11 + p).sin() * 4.0 + y * 0.2)),
         ];
         self.tell_layers();
     }
 
     fn tell_layers(&mut self) {
-        for (kind, cells) in &self.quantities {
-            self.vehicle.set_layer(*kind, cells.iter().copied(), self.now);
+        for (id, cells) in &self.quantities {
+            self.vehicle.set_layer(*id, cells.iter().copied(), self.now);
         }
     }
 
@@ -190,7 +190,7 @@ impl Pair {
 
     fn layers_agree(&self) -> bool {
         let view = self.surface.vehicle(auv()).unwrap();
-        self.vehicle.layers().all(|layer| match view.layer(layer.scale().kind()) {
+        self.vehicle.layers().all(|layer| match view.layer(layer.id()) {
             Some(heard) => heard.levels().shown() == layer.target(),
             None => layer.target().is_empty(),
         })
@@ -353,10 +353,19 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
     link.source_mut().set_debounce(setup.settle);
-    let scales = [LayerScale::Confidence, LayerScale::depth_around(20.0, 0.5)];
-    let source = |scale| LayerSource::new(scale, setup.codec, setup.settle);
-    link.set_layers(setup.layers.into_iter().flat_map(|shares| scales.map(source).into_iter().zip(shares)));
+    for (id, share) in [LayerId::CONFIDENCE, LayerId::DEPTH].into_iter().zip(setup.layers.into_iter().flatten()) {
+        assert!(link.add_layer(layer(id, share, setup.codec, setup.settle)));
+    }
     link
+}
+
+/// A built-in layer; depths about 20 m.
+pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, settle: Duration) -> LayerSource {
+    let descriptor = match id {
+        LayerId::DEPTH => LayerDescriptor::depth_around(20.0, 0.5),
+        _ => LayerSet::default().get(id).unwrap().clone(),
+    };
+    LayerSource::new(id, LayerDescriptor { share, ..descriptor }, codec, settle)
 }
 
 fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {

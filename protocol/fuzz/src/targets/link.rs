@@ -4,7 +4,9 @@ use super::peer::{MISSION, Peer, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, LayerScale, LayerSource, MapSource, Replica, StateReplica, StateSource};
+use scenecast_protocol::map::{
+    Cell, LayerDescriptor, LayerId, LayerSet, LayerSource, MapSource, Replica, StateReplica, StateSource,
+};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
@@ -113,9 +115,11 @@ impl Grow for MapSource {
 }
 
 /// The layers of a vehicle that has any.
-pub fn layers() -> impl Iterator<Item = (LayerSource, u8)> {
-    let scales = [LayerScale::Confidence, LayerScale::depth_around(20.0, 0.5), LayerScale::Curiosity];
-    scales.into_iter().map(|scale| (LayerSource::new(scale, Codec::Png, Duration::from_secs(2)), 20))
+pub fn layers() -> Vec<LayerSource> {
+    let (settle, share) = (Duration::from_secs(2), 100 / LayerId::COUNT as u8);
+    let source =
+        |layer: LayerDescriptor, id| LayerSource::new(id, LayerDescriptor { share, ..layer }, Codec::Png, settle);
+    LayerSet::default().iter().map(|(id, layer)| source(layer.clone(), id)).collect()
 }
 
 pub type Vehicle<S = Pile> = VehicleLink<S>;

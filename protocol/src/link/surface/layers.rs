@@ -1,33 +1,42 @@
 //! The layers of a vehicle's map, as the surface holds them.
 
-use crate::map::{LayerChunk, LayerKind, LayerReplica};
+use crate::map::{Assembly, DescriptorPart, LayerChunk, LayerId, LayerReplica, LayerSet};
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
-/// What became of a layer chunk.
+/// The result of handling a layer chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Heard {
-    /// It is carried out.
-    Taken,
-    /// It is of no layer that is known here.
-    Unknown,
-    /// The two ends differ.
+pub(super) enum LayerOutcome {
+    Accepted,
+    /// It makes no sense, or is of a layer that the vehicle has not announced.
+    Skipped,
+    /// It contradicts the layer, so the two ends hold different states.
     OutOfStep,
 }
 
-/// Layers that a vehicle has spoken of in this pair of runs.
+/// The layers that a vehicle has announced in this pair of runs.
 #[derive(Debug, Default)]
 pub(super) struct Layers {
-    replicas: BTreeMap<LayerKind, LayerReplica>,
+    set: LayerSet,
+    /// Descriptions of which parts are here.
+    announced: BTreeMap<LayerId, Assembly>,
+    replicas: BTreeMap<LayerId, LayerReplica>,
     version: u64,
 }
 
 impl Layers {
-    pub(super) fn get(&self, kind: LayerKind) -> Option<&LayerReplica> {
-        self.replicas.get(&kind)
+    /// Most cells of all layers together, but for those of one patch, beside the bounds of each layer.
+    const MAX_CELLS: usize = 3 << 23;
+
+    pub(super) fn get(&self, id: LayerId) -> Option<&LayerReplica> {
+        self.replicas.get(&id)
     }
 
-    /// Counts changes of what is shown.
+    pub(super) fn set(&self) -> &LayerSet {
+        &self.set
+    }
+
+    /// Counts changes of the shown levels.
     pub(super) fn version(&self) -> u64 {
         self.version
     }
@@ -36,22 +45,42 @@ impl Layers {
         self.replicas.values_mut().for_each(|r| r.advance_base(horizon));
     }
 
-    pub(super) fn handle_chunk(&mut self, number: u64, payload: &[u8], now: Instant) -> Heard {
-        let is_equal = match LayerChunk::decode(payload) {
-            None => return Heard::Unknown,
-            Some(LayerChunk::Digest(kind, digest)) => digest == self.get(kind).map_or(0, LayerReplica::base_digest),
-            Some(LayerChunk::Patch(scale, patch)) => {
-                let replica = self.replicas.entry(scale.kind()).or_insert_with(|| LayerReplica::new(scale));
+    pub(super) fn handle_chunk(&mut self, number: u64, payload: &[u8], now: Instant) -> LayerOutcome {
+        let Some(chunk) = LayerChunk::decode(payload) else { return LayerOutcome::Skipped };
+        if let LayerChunk::Descriptor(id, part) = chunk {
+            return self.handle_descriptor(id, &part);
+        }
+        let cells: usize = self.replicas.values().map(|r| r.levels().received_cells()).sum();
+        let Some(replica) = self.replicas.get_mut(&chunk.id()) else { return LayerOutcome::Skipped };
+        let is_consistent = match chunk {
+            LayerChunk::Digest(_, digest) => digest == replica.base_digest(),
+            LayerChunk::Patch(_, patch) => {
                 let before = replica.version();
-                let applied = replica.apply(number, scale, patch, now);
+                let is_applied = cells <= Self::MAX_CELLS && replica.apply(number, patch, now);
                 self.version += u64::from(replica.version() != before);
-                applied
+                is_applied
             }
+            LayerChunk::Descriptor(..) => true,
         };
-        if is_equal { Heard::Taken } else { Heard::OutOfStep }
+        if is_consistent { LayerOutcome::Accepted } else { LayerOutcome::OutOfStep }
     }
 
-    /// Forgets everything: the vehicle began afresh.
+    /// A part of an announced layer comes again if the vehicle has not heard of the first one; it changes nothing.
+    fn handle_descriptor(&mut self, id: LayerId, part: &DescriptorPart<'_>) -> LayerOutcome {
+        if let Some(replica) = self.get(id) {
+            let is_same = replica.descriptor().digest() == part.digest;
+            return if is_same { LayerOutcome::Accepted } else { LayerOutcome::OutOfStep };
+        }
+        let Some(taken) = self.announced.entry(id).or_default().take(part) else { return LayerOutcome::Skipped };
+        if let Some(descriptor) = taken {
+            self.announced.remove(&id);
+            self.set.insert(id, descriptor.clone());
+            self.replicas.insert(id, LayerReplica::new(descriptor));
+        }
+        LayerOutcome::Accepted
+    }
+
+    /// Forgets everything: the vehicle has begun a new run.
     pub(super) fn clear(&mut self) {
         *self = Self { version: self.version + 1, ..Self::default() };
     }
@@ -60,39 +89,54 @@ impl Layers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::map::{Cell, LayerScale, LayerSource, StateSource};
+    use crate::map::{Cell, LayerDescriptor, LayerSource, StateSource};
     use crate::map_codec::Codec;
     use std::time::Duration;
 
-    fn depths(from_dm: u16) -> LayerSource {
-        let scale = LayerScale::Depth { step_dm: 5, first: from_dm };
-        let mut source = LayerSource::new(scale, Codec::Png, Duration::ZERO);
-        source.set((0..20).map(|i| (Cell::new(i, -i), 20.0 + f64::from(i))), Instant::ZERO);
+    fn depths(middle_m: f64) -> LayerSource {
+        let descriptor = LayerDescriptor::depth_around(middle_m, 0.5);
+        let mut source = LayerSource::new(LayerId::DEPTH, descriptor, Codec::Png, Duration::ZERO);
+        source.set((0..20).map(|i| (Cell::new(i, -i), middle_m + f64::from(i))), Instant::ZERO);
         source
     }
 
+    fn announce(layers: &mut Layers, source: &mut LayerSource) {
+        let (chunk, carried) = source.next_chunk(200, Instant::ZERO).unwrap();
+        assert_eq!(layers.handle_chunk(1, &chunk, Instant::ZERO), LayerOutcome::Accepted);
+        source.handle_fate(carried, true, Instant::ZERO);
+    }
+
     #[test]
-    fn a_layer_that_is_not_known_is_passed_over_and_one_on_another_scale_is_not() {
-        let mut layers = Layers::default();
-        let (chunk, carried) = depths(0).next_chunk(200, Instant::ZERO).unwrap();
-        assert_eq!(layers.handle_chunk(1, &[&[4], &chunk[1..]].concat(), Instant::ZERO), Heard::Unknown);
-        assert_eq!((layers.handle_chunk(1, &chunk, Instant::ZERO), layers.version()), (Heard::Taken, 1));
-        let shown = layers.get(LayerKind::Depth).unwrap().levels().shown();
-        assert!(carried.iter().all(|&(cell, level)| shown.get(cell) == level));
-        let (chunk, _) = depths(1).next_chunk(200, Instant::ZERO).unwrap();
-        assert_eq!(layers.handle_chunk(2, &chunk, Instant::ZERO), Heard::OutOfStep);
+    fn a_layer_is_skipped_until_it_is_announced() {
+        let (mut layers, mut source, mut other) = (Layers::default(), depths(80.0), depths(90.0));
+        let (descriptor, carried) = source.next_chunk(200, Instant::ZERO).unwrap();
+        source.handle_fate(carried, true, Instant::ZERO);
+        let (chunk, _) = source.next_chunk(200, Instant::ZERO).unwrap();
+        assert_eq!(layers.handle_chunk(1, &chunk, Instant::ZERO), LayerOutcome::Skipped);
+        assert_eq!(layers.handle_chunk(2, &source.digest_chunk(), Instant::ZERO), LayerOutcome::Skipped);
+        assert!(layers.get(LayerId::DEPTH).is_none());
+        assert_eq!(layers.handle_chunk(3, &descriptor, Instant::ZERO), LayerOutcome::Accepted);
+        assert_eq!(layers.set().get(LayerId::DEPTH), Some(source.descriptor()));
+        assert_eq!((layers.handle_chunk(4, &chunk, Instant::ZERO), layers.version()), (LayerOutcome::Accepted, 1));
+        let shown = layers.get(LayerId::DEPTH).unwrap().levels().shown();
+        assert!(source.target().iter().all(|(cell, level)| shown.get(cell) == level));
+        assert_eq!(layers.handle_chunk(5, &descriptor, Instant::ZERO), LayerOutcome::Accepted, "said again");
+        let (descriptor, _) = other.next_chunk(200, Instant::ZERO).unwrap();
+        assert_eq!(layers.handle_chunk(6, &descriptor, Instant::ZERO), LayerOutcome::OutOfStep, "another scale");
         layers.clear();
-        assert_eq!((layers.get(LayerKind::Depth).is_none(), layers.version()), (true, 2));
+        assert_eq!((layers.get(LayerId::DEPTH).is_none(), layers.version()), (true, 2));
+        assert_eq!(layers.set(), &LayerSet::default());
     }
 
     #[test]
     fn a_digest_is_held_against_the_base() {
-        let (mut layers, mut source) = (Layers::default(), depths(0));
+        let (mut layers, mut source) = (Layers::default(), depths(20.0));
+        announce(&mut layers, &mut source);
         let (chunk, carried) = source.next_chunk(200, Instant::ZERO).unwrap();
         layers.handle_chunk(1, &chunk, Instant::ZERO);
         source.handle_fate(carried, true, Instant::ZERO);
-        assert_eq!(layers.handle_chunk(2, &source.digest_chunk(), Instant::ZERO), Heard::OutOfStep);
+        assert_eq!(layers.handle_chunk(2, &source.digest_chunk(), Instant::ZERO), LayerOutcome::OutOfStep);
         layers.advance_base(1);
-        assert_eq!(layers.handle_chunk(3, &source.digest_chunk(), Instant::ZERO), Heard::Taken);
+        assert_eq!(layers.handle_chunk(3, &source.digest_chunk(), Instant::ZERO), LayerOutcome::Accepted);
     }
 }

@@ -21,7 +21,7 @@ impl<S: StateSource> VehicleContent<S> {
         now: Instant,
     ) -> impl Iterator<Item = BackgroundStream> {
         let (spare, refining) = (budget.is_plentiful(now), self.is_refining());
-        let finer = self.background.iter().position(|e| e == BackgroundStream::Finer).filter(|_| refining);
+        let finer = self.background.iter().position(|s| s == BackgroundStream::Finer).filter(|_| refining);
         let allowed = move |place: usize| spare || finer.is_some_and(|finer| place <= finer);
         let in_order = self.background.iter().enumerate();
         in_order
@@ -34,9 +34,9 @@ impl<S: StateSource> VehicleContent<S> {
             BackgroundStream::Finer if self.is_refining() => self.source.backlog_bytes(),
             BackgroundStream::Finer => 0,
             BackgroundStream::Exemplars => self.objects.background_backlog_bytes(),
-            BackgroundStream::Depth | BackgroundStream::Confidence | BackgroundStream::Curiosity => {
-                let of_stream = |p: &&LayerOut| p.is_told && !p.has_share && p.class() == stream.class();
-                self.layers.iter().find(of_stream).map_or(0, |p| p.source.backlog_bytes())
+            BackgroundStream::Layer(id) => {
+                let of_stream = |l: &&LayerOut| l.is_selected && !l.has_share() && l.source.id() == id;
+                self.layers.iter().find(of_stream).map_or(0, |l| l.source.backlog_bytes())
             }
         }
     }
@@ -52,7 +52,7 @@ impl<S: StateSource> VehicleContent<S> {
     /// Whether no layer and no background object waits that may be sent, and none is outstanding.
     pub(super) fn background_is_quiet(&self, budget: &BitBudget, now: Instant) -> bool {
         let objects = self.objects.has_no_background() || self.objects.background_backlog_bytes() > 0;
-        let layers = self.layers().all(|p| p.is_quiet() || p.backlog_bytes() > 0) && self.shared_layer_backlog() == 0;
+        let layers = self.layers().all(|l| l.is_quiet() || l.backlog_bytes() > 0) && self.shared_layer_backlog() == 0;
         objects && layers && self.background_backlog(budget, now) == 0
     }
 }

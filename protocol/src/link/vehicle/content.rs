@@ -3,7 +3,7 @@
 use super::layers::LayerOut;
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
-use crate::map::{Cell, LayerKind, StateSource};
+use crate::map::{LayerCarried, LayerId, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
 use crate::schedule::{BackgroundOrder, BackgroundStream, BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
@@ -14,8 +14,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) enum Part<C> {
     Map(C),
-    Layer(LayerKind, Vec<(Cell, u8)>),
-    LayerDigest(LayerKind),
+    Layer(LayerId, LayerCarried),
+    LayerDigest(LayerId),
     Object(ObjectId, SymbolRun),
     Pose,
     Report,
@@ -25,7 +25,7 @@ impl<C> Part<C> {
     pub(super) fn class(&self) -> Class {
         match self {
             Self::Map(_) => Class::Map,
-            Self::Layer(kind, _) | Self::LayerDigest(kind) => (*kind).into(),
+            Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
             Self::Object(..) => Class::Exemplar,
             Self::Pose | Self::Report => Class::Status,
         }
@@ -71,14 +71,14 @@ impl<S: StateSource> VehicleContent<S> {
     /// Releases changes that were held back and are due; returns whether there were any.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> bool {
         let mut released = self.source.handle_timeout(now);
-        self.layers.iter_mut().for_each(|p| released |= p.source.handle_timeout(now));
+        self.layers.iter_mut().for_each(|l| released |= l.source.handle_timeout(now));
         released
     }
 
     /// The surface holds none of our state any more.
     pub(super) fn handle_peer_restart(&mut self, now: Instant) {
         self.source.handle_peer_restart(now);
-        self.layers.iter_mut().for_each(|p| p.source.handle_peer_restart(now));
+        self.layers.iter_mut().for_each(|l| l.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
         self.status.owe_pose(now);
         self.status.owe_report(now);
@@ -117,8 +117,8 @@ impl<S: StateSource> VehicleContent<S> {
     pub(super) fn handle_fate(&mut self, part: Part<S::Carried>, delivered: bool, now: Instant) -> Option<ObjectId> {
         match part {
             Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
-            Part::Layer(kind, carried) => {
-                if let Some(layer) = self.layer_mut(kind) {
+            Part::Layer(id, carried) => {
+                if let Some(layer) = self.layer_mut(id) {
                     layer.source.handle_fate(carried, delivered, now);
                 }
             }
@@ -159,7 +159,7 @@ impl<S: StateSource> VehicleContent<S> {
     ) {
         let mut unfit: Vec<BackgroundStream> = Vec::new();
         loop {
-            let next = self.background_streams(context.budget, context.now).find(|e| !unfit.contains(e));
+            let next = self.background_streams(context.budget, context.now).find(|s| !unfit.contains(s));
             let Some(stream) = next else { return };
             if self.fill_class(stream.class(), true, builder, carried, context) == 0 {
                 unfit.push(stream);
@@ -180,9 +180,7 @@ impl<S: StateSource> VehicleContent<S> {
         match class {
             Class::Status => self.fill_status(builder, carried, context),
             Class::Exemplar => self.fill_object(is_background, builder, carried),
-            Class::Confidence | Class::Depth | Class::Curiosity => {
-                self.fill_layer(class, builder, carried, context.now);
-            }
+            Class::Layer(id) => self.fill_layer(id, builder, carried, context.now),
             _ => self.fill_map(builder, carried, context.now),
         }
         carried.iter().skip(before).map(|(_, n)| n).sum()
@@ -196,7 +194,7 @@ impl<S: StateSource> VehicleContent<S> {
         ]
         .into_iter()
         .filter_map(|(waits, class)| waits.then_some(class))
-        .chain(self.waiting_layers())
+        .chain(self.waiting_layers().map(Class::Layer))
         .collect()
     }
 
@@ -216,7 +214,7 @@ impl<S: StateSource> VehicleContent<S> {
         status.refused_frames = context.refused_frames.min(255) as u8;
         if let Some(bytes) = self.status.fill_report(builder, context.now) {
             carried.push((Part::Report, bytes));
-            self.layers.iter_mut().for_each(|p| p.owes_digest = p.source.is_begun());
+            self.layers.iter_mut().for_each(|l| l.owes_digest = l.source.is_begun());
         }
         if let Some(bytes) = self.status.fill_pose(builder, context.now) {
             carried.push((Part::Pose, bytes));

@@ -22,7 +22,7 @@ pub use event::VehicleEvent;
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
-use crate::map::{Cell, LabelGrid, LayerKind, LayerSource, MapSource, StateSource};
+use crate::map::{Cell, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
@@ -84,21 +84,22 @@ impl<S: StateSource> VehicleLink<S> {
         &mut self.content.source
     }
 
-    /// Replicates these layers beside the state, each with its part of the map's share in percent.
-    pub fn set_layers(&mut self, layers: impl IntoIterator<Item = (LayerSource, u8)>) {
-        self.content.set_layers(layers);
+    /// Replicates a layer beside the state, also while the link is under way; `false` if there is one with its index
+    /// already.
+    pub fn add_layer(&mut self, layer: LayerSource) -> bool {
+        self.repeater.forget();
+        self.content.add_layer(layer)
     }
 
-    /// The layers that are sent: those that have a share or are a background stream.
+    /// The layers that are sent: those that are selected and have a share or are a background stream.
     pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
         self.content.layers()
     }
 
-    /// Selects the layers that are sent from now on; the others pause, and continue where they were when selected
-    /// again.
-    pub fn set_told_layers(&mut self, is_told: impl Fn(LayerKind) -> bool) {
+    /// Selects the layers that are sent from now on; the others pause, and continue where they were when selected again.
+    pub fn select_layers(&mut self, layers: LayerMask) {
         self.repeater.forget();
-        self.content.set_told_layers(is_told);
+        self.content.select_layers(layers);
     }
 
     /// As [`LayerSource::set_coarse_limit`], for each layer.
@@ -106,9 +107,9 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.set_coarse_layers(after_bytes);
     }
 
-    /// Sets quantities of cells of a layer, if it is replicated.
-    pub fn set_layer(&mut self, kind: LayerKind, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
-        if self.content.set_layer(kind, cells, now) {
+    /// Sets quantities of cells of a layer, in its descriptor's unit, if it is replicated.
+    pub fn set_layer(&mut self, id: LayerId, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
+        if self.content.set_layer(id, cells, now) {
             self.repeater.forget();
         }
     }
@@ -296,7 +297,7 @@ impl VehicleLink {
     /// Empties the map and begins a new run, so that label ids can be assigned again.
     pub fn begin_epoch(&mut self, now: Instant) {
         self.content.source.clear(now);
-        self.content.layers.iter_mut().for_each(|p| p.source.clear(now));
+        self.content.layers.iter_mut().for_each(|l| l.source.clear(now));
         self.renew(now);
         self.cancel_objects();
     }

@@ -2,7 +2,7 @@
 
 use super::backlog::ReportedBacklog;
 use super::status::StatusParts;
-use crate::link::surface::layers::{Heard, Layers};
+use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
 use crate::map::{LayerChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
@@ -92,9 +92,9 @@ impl<R: StateReplica> PeerContent<R> {
             ChunkKind::Report => self.handle_report(chunk.payload, stats, now),
             ChunkKind::Object => accepted_if(self.handle_object(vehicle, chunk.payload, events)),
             ChunkKind::Layer => match self.layers.handle_chunk(number, chunk.payload, now) {
-                Heard::Taken => ChunkOutcome::Accepted,
-                Heard::Unknown => ChunkOutcome::Malformed,
-                Heard::OutOfStep => ChunkOutcome::Contradictory,
+                LayerOutcome::Accepted => ChunkOutcome::Accepted,
+                LayerOutcome::Skipped => ChunkOutcome::Malformed,
+                LayerOutcome::OutOfStep => ChunkOutcome::Contradictory,
             },
             ChunkKind::Slot => ChunkOutcome::Malformed,
         }
@@ -133,6 +133,6 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
         ChunkKind::Pose | ChunkKind::Report => Class::Status,
         ChunkKind::Slot => Class::Directive,
         ChunkKind::Object => Class::Exemplar,
-        ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| c.kind().into()),
+        ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| Class::Layer(c.id())),
     }
 }
