@@ -1,8 +1,8 @@
 //! Frames of reference on the horizontal plane.
 //!
-//! The *map frame* is the vehicle's own dead reckoning: it never jumps, so no cell moves once it is mapped. The *world frame*
-//! is the tangent plane at the mission's origin. In both, the first axis points east and the second north. Only a
-//! [`Placement`](crate::wire::Placement) converts one into the other, so a point of the wrong frame does not compile.
+//! The *map frame* is the vehicle's own dead reckoning: it never jumps, so no cell moves once it is mapped. The *world
+//! frame* is the tangent plane at the mission's origin. In both, the first axis points east and the second north. Only
+//! a [`Placement`](crate::wire::Placement) converts one into the other, so a point of the wrong frame does not compile.
 //!
 //! ```
 //! use scenecast_protocol::coordinates::{MapPoint, WorldPoint};

@@ -54,9 +54,9 @@ impl Cell {
 /// A rectangle of cells; `width` and `height` are at least 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Rect {
-    /// Westernmost column.
+    /// The westernmost column, in cells from the origin.
     pub x: i32,
-    /// Southernmost row.
+    /// The southernmost row, in cells from the origin.
     pub y: i32,
     /// Number of columns, at least 1.
     pub width: u32,

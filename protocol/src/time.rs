@@ -21,12 +21,12 @@ impl Instant {
         Self((seconds * 1e6).round() as u64)
     }
 
-    /// Microseconds since the origin.
+    /// The time since the origin in microseconds.
     pub const fn as_micros(self) -> u64 {
         self.0
     }
 
-    /// Seconds since the origin.
+    /// The time since the origin in seconds.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / 1e6
     }

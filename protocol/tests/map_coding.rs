@@ -3,11 +3,11 @@
 use scenecast_protocol::map::{Cell, MapSource, Replica, StateReplica, StateSource};
 use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, Codec, LabelRaster, decode, encode_all};
 use scenecast_protocol::time::Instant;
-use scenecast_training::{Flips, MapRng, Scene, Survey, sampler_noise};
+use scenecast_training::{Flips, MapRng, MapScene, Survey, sampler_noise};
 use std::time::Duration;
 
-/// Maps of a small survey, one a step.
-fn survey(scene: Scene) -> Vec<LabelRaster> {
+/// Maps of a small survey, one for each step.
+fn survey(scene: MapScene) -> Vec<LabelRaster> {
     let scene = scene.draw(&mut MapRng::new(42), 96, 96, 8);
     let mut survey = Survey::new(7, scene, Flips { border: 10_000, anywhere: 2000, settling: 0 }, 12);
     let mut maps = vec![survey.map().clone()];
@@ -37,7 +37,7 @@ fn bytes(codec: Codec, maps: &[LabelRaster], room: usize) -> usize {
 
 #[test]
 fn a_survey_takes_far_fewer_bytes_than_with_png_chunks() {
-    for scene in Scene::ALL {
+    for scene in MapScene::ALL {
         let maps = survey(scene);
         for (room, most) in [(64, 60), (256, 60), (1000, 60)] {
             let (context, png) = (bytes(Codec::Auto, &maps, room), bytes(Codec::Png, &maps, room));
@@ -48,14 +48,14 @@ fn a_survey_takes_far_fewer_bytes_than_with_png_chunks() {
 
 fn maps() -> (LabelRaster, LabelRaster) {
     let mut rng = MapRng::new(3);
-    let before = Scene::Colonies.draw(&mut rng, 60, 40, 6);
+    let before = MapScene::Colonies.draw(&mut rng, 60, 40, 6);
     let mut after = before.clone();
     sampler_noise(&mut rng, &mut after, 50_000, 10_000);
     (before, after)
 }
 
 #[test]
-fn a_file_turns_the_base_into_the_target_whatever_the_codec() {
+fn a_file_of_any_codec_turns_base_into_target() {
     let (before, after) = maps();
     for codec in [Codec::Auto, Codec::Png, Codec::Context] {
         let (file, changed) = ChunkFile::encode(codec, &before, &after, 64).unwrap();
@@ -91,7 +91,7 @@ fn files_cut_off_or_for_another_base_are_refused() {
 
 /// Bytes until the replica's painted map agrees with `share` of the target, and until it is equal.
 fn bytes_until(share: f64, side: i32, coarse_after: Option<usize>, room: usize, scene: usize) -> (usize, usize) {
-    let raster = Scene::ALL[scene].draw(&mut MapRng::new(5), side as usize, side as usize, 8);
+    let raster = MapScene::ALL[scene].draw(&mut MapRng::new(5), side as usize, side as usize, 8);
     let (mut source, mut replica, mut number) = (MapSource::new(Codec::Context), Replica::default(), 0);
     source.set_debounce(Duration::ZERO);
     source.set_coarse_limit(coarse_after);

@@ -1,8 +1,8 @@
-//! The planned path at the surface is the vehicle's, and no other one, on a virtual clock.
+//! The planned path at the surface is the vehicle's, in virtual time.
 
 mod pair;
 
-use pair::{Pair, Setup, Water, auv, patchy, utility};
+use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::map_codec::Codec;
@@ -10,7 +10,7 @@ use scenecast_protocol::schedule::Class;
 use scenecast_protocol::wire::{PlannedPath, VehicleStatus};
 use std::time::Duration;
 
-const STILL: Water = Water {
+const STILL: LossyChannel = LossyChannel {
     loss: 0.0,
     duplication: 0.0,
     reordering: 0.0,
@@ -27,12 +27,12 @@ fn plan(number: u32, points: usize) -> VehicleStatus {
     VehicleStatus { labels: 3, waypoint: Some(MapPoint::new(x, 0.0)), path, ..VehicleStatus::default() }
 }
 
-fn told(pair: &Pair) -> Option<&VehicleStatus> {
+fn told(pair: &LinkedEnds) -> Option<&VehicleStatus> {
     pair.surface.vehicle(auv()).unwrap().status().map(|(status, _)| status)
 }
 
-/// Whether the surface has the waypoint and the path of the vehicle's plan, as far as a path is told.
-fn is_told(pair: &Pair) -> bool {
+/// Whether the surface has the waypoint and the path of the vehicle's plan, as far as a pose has it.
+fn is_told(pair: &LinkedEnds) -> bool {
     let plan = &pair.status;
     told(pair).is_some_and(|told| {
         let n = told.path.points.len();
@@ -45,14 +45,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
-    fn the_operators_path_becomes_the_vehicles_and_is_never_of_two_plans_nor_of_an_older_one(
+    fn the_shown_path_is_one_whole_plan_never_an_older(
         seed: u64,
         loss in 0.0..0.8f64,
         frame_bytes in prop_oneof![Just(96usize), Just(256), Just(1000)],
         steps in proptest::collection::vec((0u8..6, 0usize..10), 12),
     ) {
-        let water = Water { loss, duplication: 0.2, reordering: 0.2, corruption: 0.1, ..STILL };
-        let mut pair = Pair::new(seed, Setup::new(frame_bytes, 10_000, Codec::Context), water);
+        let channel = LossyChannel { loss, duplication: 0.2, reordering: 0.2, corruption: 0.1, ..STILL };
+        let mut pair = LinkedEnds::new(seed, Setup::new(frame_bytes, 10_000, Codec::Context), channel);
         let mut latest = 0;
         for (step, (what, places)) in steps.into_iter().enumerate() {
             let map = patchy(24, step as u64);
@@ -74,15 +74,15 @@ proptest! {
                 _ => {}
             }
         }
-        pair.water = STILL;
+        pair.channel = STILL;
         pair.run(pair.now + Duration::from_secs(60), false);
         prop_assert!(is_told(&pair), "{:?} is not {:?}", told(&pair).map(|t| &t.path), pair.status.path);
     }
 }
 
 #[test]
-fn a_path_that_an_order_has_overtaken_is_not_shown() {
-    let mut pair = Pair::new(3, Setup::new(256, 10_000, Codec::Context), STILL);
+fn a_path_from_before_an_applied_order_is_hidden() {
+    let mut pair = LinkedEnds::new(3, Setup::new(256, 10_000, Codec::Context), STILL);
     pair.status = plan(1, 5);
     pair.run(pair.now + Duration::from_secs(30), false);
     assert!(is_told(&pair));
@@ -103,10 +103,10 @@ fn a_path_that_an_order_has_overtaken_is_not_shown() {
 }
 
 #[test]
-fn a_path_takes_at_most_a_hundredth_of_the_budget_and_no_pose_comes_later_for_it() {
+fn a_path_takes_at_most_a_hundredth_of_the_budget() {
     for budget_bps in [100, 1000, 10_000] {
         let hour = |places: usize| {
-            let mut pair = Pair::new(9, Setup::new(256, budget_bps, Codec::Context), STILL);
+            let mut pair = LinkedEnds::new(9, Setup::new(256, budget_bps, Codec::Context), STILL);
             for minute in 0..60 {
                 // Differences of 25 bits.
                 pair.status = plan(minute, places);

@@ -32,7 +32,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ")
 }
 
-/// Bytes from pairs of digits; `None` if the text is anything else.
+/// Bytes from pairs of digits; `None` if the text has anything else.
 fn pairs(text: &str) -> Option<Vec<u8>> {
     text.split_whitespace().map(|p| u8::from_str_radix(p, 16).ok().filter(|_| p.len() == 2)).collect()
 }
@@ -43,7 +43,7 @@ fn section(from: &str, to: &str) -> &'static str {
     &rest[..rest.find(to).expect(to)]
 }
 
-/// The rows of a table: what stands in the first column, and what stands in backticks in the second.
+/// The rows of a table: the first column, and the part in backticks of the second.
 fn rows(section: &'static str) -> BTreeMap<&'static str, &'static str> {
     let row = |line: &'static str| {
         let (what, bytes) = line.strip_prefix("| ")?.strip_suffix("` |")?.rsplit_once(" | `")?;
@@ -68,7 +68,7 @@ fn frames(section: &'static str) -> BTreeMap<&'static str, Vec<u8>> {
     frames
 }
 
-/// Fails with every difference at once, so that a change of the wire is quickly written down.
+/// Fails with all differences at once, so that a change of the wire can be copied into the document.
 fn assert_same(found: BTreeMap<&str, Vec<u8>>, expected: Vec<(&str, Vec<u8>)>) {
     let mut problems: Vec<String> = expected
         .iter()
@@ -148,7 +148,7 @@ fn status() -> VehicleStatus {
     }
 }
 
-/// A place in metres.
+/// A point in whole metres.
 fn place(east_m: i32, north_m: i32) -> DecimetrePoint {
     DecimetrePoint::new(10 * east_m, 10 * north_m)
 }
@@ -175,7 +175,7 @@ fn session(encrypt: bool) -> SessionKey {
     key().session(MISSION.0, 1, SURFACE_NONCE, VEHICLE_NONCE, encrypt)
 }
 
-/// A frame as the code writes it; what the code reads from it is the same again.
+/// Writes a frame and checks that it reads the same.
 fn frame(header: Header, size: usize, short: bool, seal: Seal<'_>, chunks: &[(ChunkKind, Vec<u8>)]) -> Vec<u8> {
     let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header.clone() }, size);
     for (kind, payload) in chunks {
@@ -244,7 +244,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let found = rows(section("### 11.1", "### 11.2"));
     let mut found: BTreeMap<&str, Vec<u8>> =
         found.into_iter().map(|(what, bytes)| (what, pairs(bytes).expect("digits"))).collect();
-    // What is inside of the map codec has a test there.
+    // Formats inside of the map codec have tests there.
     found.retain(|what, _| {
         !what.starts_with("head of a map chunk's payload") && !what.starts_with("the same, a payload")
     });
@@ -543,6 +543,6 @@ fn golden_values_of_the_keys_are_those_of_the_document() {
 }
 
 #[test]
-fn the_document_is_of_the_version_that_the_code_speaks() {
+fn the_document_has_the_wire_version_of_the_code() {
     assert!(DOCUMENT.starts_with(&format!("# The wire of scenecast, version {WIRE_VERSION}\n")));
 }

@@ -1,9 +1,8 @@
 //! The emulators reply as in the transcripts of known clients. `transcripts/README.md` describes the format.
 
-use sim_channel::modem::Basin;
-use sim_channel::modem::Emulator;
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
+use sim_channel::modem::{Basin, Emulator};
 use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +15,7 @@ struct Replay {
     /// Bytes that each host has received and that are not yet compared.
     received: BTreeMap<u8, Vec<u8>>,
     micromodems: bool,
-    /// File and line number.
+    /// File and line number, for failures.
     location: String,
 }
 

@@ -63,7 +63,7 @@ fn settings_are_fitted_to_a_budget_sent_and_told_as_in_force() {
 }
 
 #[test]
-fn orders_are_followed_until_they_are_applied_and_a_refusal_is_told() {
+fn orders_are_followed_until_applied_or_refused() {
     let port = free_port();
     let _demo = demo(port, &["--duration", "3000"]);
     let label = labels(port)[0];

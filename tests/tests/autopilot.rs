@@ -157,7 +157,7 @@ fn ardusub_is_armed_guided_to_a_waypoint_and_told_where_it_is() {
 }
 
 #[test]
-fn a_vehicle_flies_its_survey_on_ardusub_and_says_so_when_it_goes_silent() {
+fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let Some(python) = python() else { return };
     let dir = scratch("ardusub");
     let [modem, page, mavlink] = [(); 3].map(|()| free_port());

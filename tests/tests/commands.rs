@@ -4,7 +4,7 @@ use scenecast_tests::{assert_refused, run, scratch};
 use std::path::Path;
 
 #[test]
-fn wrong_input_is_answered_with_one_line_that_says_what_is_allowed() {
+fn wrong_input_gets_one_line_with_the_rule() {
     let dir = scratch("wrong-input");
     let out = dir.join("out");
     let out = out.to_str().unwrap();
@@ -65,7 +65,7 @@ fn a_port_in_use_is_named() {
 }
 
 #[test]
-fn the_same_arguments_give_the_same_report_byte_for_byte_but_for_the_wall_clock() {
+fn the_same_arguments_give_the_same_report() {
     let dir = scratch("repeat");
     let report = |name: &str| {
         let out = dir.join(name);
@@ -168,7 +168,7 @@ fn two_grounds(dir: &Path, name: &str) -> (String, String) {
 }
 
 #[test]
-fn a_folder_of_annotated_images_is_scored_and_wrong_ones_are_named() {
+fn annotated_images_are_scored_and_wrong_ones_named() {
     let dir = scratch("score");
     let folder = dir.to_str().unwrap();
     assert_refused(&["scene", "score", "--dir", folder], &["no NAME_label.png"]);

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Crate folders that are checked.
-const CRATES: [&str; 1] = ["protocol"];
+const CRATES: [&str; 4] = ["protocol", "scene-model", "daemon/scoring", "daemon/worlds"];
 
 /// The modules that each module uses, each with a file that does so.
 type Arrows = BTreeMap<String, BTreeMap<String, String>>;

@@ -78,7 +78,7 @@ fn the_page_is_small_and_what_a_browser_has_is_not_sent_again() {
 }
 
 #[test]
-fn a_demo_that_is_too_fast_for_the_machine_still_answers_and_ends_when_interrupted() {
+fn a_demo_faster_than_the_machine_still_answers_and_stops() {
     let port = free_port();
     let mut demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "1000", "--duration", "1000000"]);
     wait_until("labels on the map", Duration::from_secs(60), || {

@@ -51,7 +51,7 @@ fn report(second: u32) -> String {
 }
 
 #[test]
-fn gpsd_that_goes_away_is_asked_again_and_what_is_old_is_not_shown_as_good() {
+fn gpsd_is_reconnected_and_old_positions_are_not_good() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let (_process, state) = surface("gpsd", &format!("gpsd:{}", listener.local_addr().unwrap()));
     let mut stream = watched(&listener);
@@ -76,7 +76,7 @@ fn gpsd_that_goes_away_is_asked_again_and_what_is_old_is_not_shown_as_good() {
 }
 
 #[test]
-fn a_receiver_that_talks_nonsense_is_counted_and_the_surface_goes_on() {
+fn nonsense_of_a_receiver_is_counted() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let (_process, state) = surface("nmea", &format!("tcp:{}", listener.local_addr().unwrap()));
     let (mut stream, _) = listener.accept().unwrap();

@@ -72,7 +72,7 @@ fn null_modem() -> (String, String, [TTYPort; 2]) {
 }
 
 #[test]
-fn a_map_arrives_over_serial_devices_and_equals_the_one_of_the_rehearsal() {
+fn a_map_over_serial_devices_equals_the_rehearsals() {
     let (a, b, _held) = null_modem();
     let link = |device: String| {
         vec!["modem.kind=transparent".to_owned(), format!("modem.device={device}"), "modem.baud=115200".to_owned()]
@@ -116,7 +116,7 @@ fn a_vehicle_that_is_killed_and_comes_back_is_heard_again() {
 }
 
 #[test]
-fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_labels() {
+fn a_killed_vehicle_resumes_from_its_checkpoint() {
     let (recording, expected) = recorded();
     let dir = scratch("checkpoint");
     let (port, page) = (free_port(), free_port());
@@ -160,7 +160,7 @@ fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_la
 }
 
 #[test]
-fn settings_from_the_surface_outlive_the_vehicle_and_do_not_cost_its_checkpoint() {
+fn settings_survive_a_restart_of_the_vehicle() {
     let (recording, _) = recorded();
     let dir = scratch("settings");
     let (port, page) = (free_port(), free_port());

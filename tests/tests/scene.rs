@@ -81,7 +81,7 @@ fn two_classes(dir: &Path) -> (String, String) {
 }
 
 #[test]
-fn words_are_labelled_as_their_classes_whatever_the_number_of_threads() {
+fn labels_follow_the_classes_at_any_number_of_threads() {
     let dir = scratch("scene-words");
     let (words, classes) = two_classes(&dir);
     let out = |name: &str| dir.join(name);
@@ -110,7 +110,7 @@ fn words_are_labelled_as_their_classes_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn the_map_is_indexed_by_label_with_y_up_and_shows_the_fuller_of_stacked_cells() {
+fn the_map_has_y_up_and_shows_the_fuller_of_stacked_cells() {
     let dir = scratch("scene-stacked");
     let line = |x: f64, y: f64, z: f64, word: u32, times: usize| {
         format!("0,{x},{y},{z}{}\n", format!(",{word}").repeat(times))
@@ -138,7 +138,7 @@ fn the_map_is_indexed_by_label_with_y_up_and_shows_the_fuller_of_stacked_cells()
 }
 
 #[test]
-fn a_wrong_words_file_is_refused_with_its_line_and_leaves_nothing() {
+fn a_wrong_words_file_is_refused_with_its_line() {
     let dir = scratch("scene-wrong");
     let out = dir.join("out");
     for (name, content, said) in [
@@ -178,7 +178,7 @@ fn reef(dir: &Path) -> String {
 }
 
 #[test]
-fn a_mosaic_is_labelled_and_scored_and_what_does_not_fit_it_is_refused() {
+fn a_mosaic_is_scored_and_unfit_annotations_are_refused() {
     let dir = scratch("scene-mosaic");
     let (mosaic, classes) = (reef(&dir), path(dir.join("classes.png")));
     let out = dir.join("out");
@@ -228,7 +228,7 @@ fn tum(dir: &Path) -> PathBuf {
 }
 
 #[test]
-fn a_tum_sequence_is_put_where_depth_and_pose_say_and_what_is_missing_is_counted() {
+fn a_tum_sequence_is_projected_and_gaps_are_counted() {
     let dir = scratch("scene-tum");
     let source = tum(&dir);
     let out = dir.join("out");

@@ -6,7 +6,7 @@ use super::layers;
 use super::orders::{BudgetOrder, ExemplarOrder, ExemplarWish};
 use super::snapshot::seconds;
 use super::state::Accepted;
-use scenecast_core::label_picture::MOST_CELLS;
+use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
@@ -64,7 +64,7 @@ pub fn answer(surface: &mut Surface, ask: Ask, cell_m: f64, now: Instant) -> Rep
         Ask::Map(id) => match address(id).and_then(|a| cells(surface, a, cell_m, now)) {
             Some(cells) if cells.bounds.area() != cells.labels.len() as u64 => {
                 let Rect { width, height, .. } = cells.bounds;
-                Reply::Refused(format!("the map spans {width} x {height} cells: at most {MOST_CELLS} are told"))
+                Reply::Refused(format!("the map spans {width} x {height} cells: at most {MAX_CELLS} are told"))
             }
             found => found.map_or(Reply::NotFound, Reply::Map),
         },
@@ -142,7 +142,7 @@ fn cells(surface: &Surface, address: Address, cell_m: f64, now: Instant) -> Opti
     let grid = surface.map(address)?;
     let view = surface.view(address)?;
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
-    let told = if bounds.area() <= MOST_CELLS { bounds } else { Rect { width: 0, ..bounds } };
+    let told = if bounds.area() <= MAX_CELLS { bounds } else { Rect { width: 0, ..bounds } };
     Some(Cells {
         version: surface.map_version(address),
         at_s: seconds(now),

@@ -311,7 +311,7 @@ fn picture(p: &Picture, base: &str) -> state::Picture {
     state::Picture {
         picture: p.number,
         edge_px: edge_px(p.size),
-        can_grow: p.size < Album::LARGEST,
+        can_grow: p.size < Album::MAX_SIZE,
         bytes: p.sent_bytes,
         url: format!("{base}-{}.webp", p.number),
         at_s: seconds(p.came),

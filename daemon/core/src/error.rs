@@ -18,7 +18,6 @@ impl UserError {
         Self::Input(format!("{}: {what}", path.display()))
     }
 
-    /// The process's exit code.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input(_) => 2,

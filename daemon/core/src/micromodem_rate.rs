@@ -5,9 +5,7 @@ use std::time::Duration;
 /// What a packet of one rate carries, in a band of 5 kHz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MicromodemRate {
-    /// 0 to 5.
     pub number: u8,
-    /// Most frames a packet.
     pub frames: u8,
     /// Bytes of a frame; air time is that of whole frames.
     pub frame_bytes: usize,

@@ -12,11 +12,9 @@ use crate::geodesy::LatLon;
 pub enum Sentence {
     /// GGA, and RMC where there is no GGA: a position.
     Position {
-        /// Where.
         place: LatLon,
         /// Time of day of the measurement, seconds of UTC.
         utc_s: Option<f64>,
-        /// Horizontal dilution of precision.
         hdop: Option<f64>,
         /// Whether the solution has corrections: differential, real-time kinematic.
         is_corrected: bool,
@@ -25,7 +23,6 @@ pub enum Sentence {
     NoPosition,
     /// RMC, VTG: the way over ground.
     Motion {
-        /// Metres a second.
         speed_m_s: f64,
         /// Clockwise from true north, radians; `None` while standing.
         course_rad: Option<f64>,
@@ -42,7 +39,6 @@ pub enum NmeaError {
     /// Not text, no `$`, no `*`.
     #[error("no sentence")]
     NoSentence,
-    /// The checksum is another.
     #[error("wrong checksum")]
     Checksum,
     /// A field cannot be read, or is out of its range.
@@ -51,11 +47,10 @@ pub enum NmeaError {
 }
 
 /// Longest line that is taken: the standard allows 82 with its ends, receivers of many digits go beyond.
-pub const LONGEST_LINE: usize = 120;
+pub const MAX_LINE: usize = 120;
 
 const KNOT_M_S: f64 = 1852.0 / 3600.0;
 
-/// XOR of all bytes.
 pub fn checksum(body: &[u8]) -> u8 {
     body.iter().fold(0, |sum, b| sum ^ b)
 }

@@ -6,9 +6,7 @@ pub type ModemAddress = u8;
 /// What an ultra-short baseline told of another modem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsblLine {
-    /// The other modem.
     pub remote: ModemAddress,
-    /// Slant range, metres.
     pub range_m: Option<f64>,
     /// Clockwise from north, rad, -pi..=pi, and above the horizontal, rad; `None` if only the range is good.
     pub direction_rad: Option<(f64, f64)>,

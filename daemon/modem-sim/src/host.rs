@@ -12,12 +12,21 @@ const WAITING_PIECES: usize = 1024;
 /// port's choosing, 0 for a serial one.
 #[derive(Debug)]
 pub enum FromHost {
-    /// Bytes.
-    Bytes { modem: usize, line: u32, bytes: Vec<u8> },
+    Bytes {
+        modem: usize,
+        line: u32,
+        bytes: Vec<u8>,
+    },
     /// A TCP client has come.
-    Joined { modem: usize, stream: TcpStream },
+    Joined {
+        modem: usize,
+        stream: TcpStream,
+    },
     /// A TCP client has gone.
-    Left { modem: usize, line: u32 },
+    Left {
+        modem: usize,
+        line: u32,
+    },
 }
 
 /// The way to one host; its task ends with it.

@@ -28,7 +28,6 @@ use tokio::sync::mpsc;
 /// What the command was told.
 #[derive(Debug)]
 pub struct Options {
-    /// The scenario's file.
     pub scenario: PathBuf,
     /// Folder for symbolic links to devices.
     pub link_dir: Option<PathBuf>,

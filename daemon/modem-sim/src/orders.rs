@@ -5,14 +5,11 @@ use sim_channel::NodePosition;
 use std::io::BufRead;
 use tokio::sync::mpsc;
 
-/// What somebody asks for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// `fault NAME WHAT [NUMBER]`
     Fault(String, Trouble),
     /// `move NAME EAST NORTH DOWN`
     Move(String, NodePosition),
-    /// `quit`
     Quit,
 }
 

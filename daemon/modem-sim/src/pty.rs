@@ -29,7 +29,6 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// A fresh one.
     pub fn open() -> io::Result<Self> {
         let pair = openpty(None, None)?;
         let device = nix::unistd::ttyname(&pair.slave)?;
@@ -39,7 +38,6 @@ impl Pty {
         Ok(Self { master: Arc::new(pair.master), device })
     }
 
-    /// What a client opens.
     pub fn device(&self) -> &Path {
         &self.device
     }

@@ -92,7 +92,6 @@ impl Tank {
         Ok(tank)
     }
 
-    /// When something is due.
     pub fn poll_timeout(&self) -> Option<Duration> {
         let planned = self.plan.keys().next().map(|(at, _)| *at);
         [planned, self.basin.poll_timeout()].into_iter().flatten().min()
@@ -129,7 +128,6 @@ impl Tank {
         }
     }
 
-    /// Something from a port.
     pub fn handle_host(&mut self, from: FromHost, now: Duration) {
         match from {
             FromHost::Bytes { modem, line, bytes } => {

@@ -6,9 +6,7 @@ use sim_channel::RandomStream;
 /// What the vehicle's sensors tell of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Odometry {
-    /// East, metres.
     pub dx_m: f64,
-    /// North, metres.
     pub dy_m: f64,
     /// Heading clockwise from north, radians.
     pub heading_rad: f64,
@@ -20,11 +18,9 @@ pub struct Odometry {
 pub struct Motion {
     /// True place east, metres. Only the camera and the water may look.
     pub x_m: f64,
-    /// True place north, metres.
     pub y_m: f64,
     /// True heading clockwise from north, radians.
     pub heading_rad: f64,
-    /// Way so far, metres.
     pub distance_m: f64,
     speed_m_s: f64,
     scale_error: f64,

@@ -20,7 +20,6 @@ pub fn stretches_outside(track: &[(f64, f64)], fence: &Fence) -> usize {
     outside
 }
 
-/// Metres of a track.
 pub fn length_m(track: &[(f64, f64)]) -> f64 {
     track.windows(2).map(|leg| (leg[1].0 - leg[0].0).hypot(leg[1].1 - leg[0].1)).sum()
 }

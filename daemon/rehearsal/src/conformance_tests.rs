@@ -109,7 +109,7 @@ fn what_does_not_fit_is_refused_to_the_caller() {
 }
 
 #[test]
-fn addresses_that_the_modem_cannot_reach_are_refused_to_the_caller() {
+fn unreachable_addresses_are_refused() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
         let mut driver = driver(&config(sets), Address::SURFACE);
         for bad in [0, 10, 200] {
@@ -120,14 +120,14 @@ fn addresses_that_the_modem_cannot_reach_are_refused_to_the_caller() {
 }
 
 #[test]
-fn a_modem_with_another_address_is_refused_aloud_and_sends_nothing() {
+fn a_modem_with_another_address_is_refused_and_stays_silent() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
         let mut dock = Dock::new(&setting(sets, 0.0), 5).unwrap();
         dock.inject(0, Fault::WrongAddress(7));
         dock.run(60 * SECOND);
         let said = dock.refusals.join(" ");
         assert!(said.contains("is 7 and ours is 1"), "{name}: {said:?}");
-        assert_eq!(dock.docked.station(0).audit().transmissions(), 0, "{name}");
+        assert_eq!(dock.vehicle.audit().transmissions(), 0, "{name}");
     }
 }
 

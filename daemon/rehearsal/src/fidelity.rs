@@ -62,8 +62,8 @@ fn run(
     let mut mission = Mission::new(config, MissionOptions { world: world.clone(), seed, record: None })?;
     mission.run(Duration::ZERO, &mut |_| {})?;
     let operator = mission.operator_map();
-    let [median, p95, max] = mission.meter.delays(mission.now()).summary();
-    let stats = mission.vehicle.stats();
+    let [median, p95, max] = mission.meters.labels.delays(mission.now()).summary();
+    let stats = mission.vehicle().stats();
     let class = if stream == "delta" {
         scenecast_protocol::schedule::Class::Map
     } else {
@@ -72,12 +72,12 @@ fn run(
     Ok(FidelityRow {
         budget_bps,
         stream,
-        agreement_mean: mission.meter.agreement_mean(),
+        agreement_mean: mission.meters.labels.agreement_mean(),
         age_s_median: median,
         age_s_p95: p95,
         age_s_max: max,
         mutual_information_nats: mission.mutual_information(&operator).map(|v| v.0),
-        sent_bits: mission.audits[0].total_bits(),
+        sent_bits: mission.audits()[0].total_bits(),
         map_bytes: stats.bytes_by_class.get(&class).copied().unwrap_or(0),
     })
 }

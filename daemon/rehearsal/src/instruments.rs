@@ -34,7 +34,7 @@ impl Instruments {
     }
 
     /// Position and heading as NMEA 0183, once a second; `astray` is by how much the receiver is led astray.
-    pub(super) fn say(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
+    pub(super) fn report(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
         let [a, b, c, d, e] = [(); 5].map(|()| self.dice.normal());
         let Receiver { sigma_m, hdop, is_corrected, .. } = self.receiver;
         let slow = |error: f64, draw: f64| error * 0.99 + sigma_m * 0.14 * draw;

@@ -5,7 +5,6 @@ mod baseline;
 mod conformance_tests;
 #[cfg(test)]
 mod discovery_tests;
-pub mod docked;
 pub mod exemplar_bench;
 mod fidelity;
 mod frames_log;
@@ -15,6 +14,7 @@ mod localisation;
 mod meter;
 mod mission;
 pub mod modem_bench;
+pub mod modem_rig;
 mod outputs;
 mod panorama;
 pub mod planning_bench;

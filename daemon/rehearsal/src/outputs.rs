@@ -14,10 +14,10 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     let failed = |path: &Path, e: std::io::Error| UserError::Failed(format!("{}: {e}", path.display()));
     std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, format!("cannot be used as a folder: {e}")))?;
     remove_old(dir);
-    let bounds = mission.vehicle.map().bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
-    write_map(&dir.join("vehicle-map.png"), mission.vehicle.map(), bounds)?;
+    let bounds = mission.vehicle().map().bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 });
+    write_map(&dir.join("vehicle-map.png"), mission.vehicle().map(), bounds)?;
     write_map(&dir.join("operator-map.png"), &mission.operator_map(), bounds)?;
-    if mission.world.is_annotated() {
+    if mission.camera.world.is_annotated() {
         write_map(&dir.join("truth.png"), &truth(mission, bounds), bounds)?;
     }
     let panorama = panorama(mission).map_err(|e| UserError::Failed(e.to_string()))?;
@@ -27,7 +27,7 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     for (label, webp) in mission.exemplars() {
         scenecast_files::write_whole(&exemplars.join(format!("label-{label}.webp")), webp)?;
     }
-    scenecast_files::write_whole(&dir.join("frames.log"), mission.log.text().as_bytes())?;
+    scenecast_files::write_whole(&dir.join("frames.log"), mission.frames().text().as_bytes())?;
     let mut figures = report.figures.clone();
     figures["wall"] = wall;
     let text = serde_json::to_string_pretty(&figures).map_err(|e| UserError::Failed(e.to_string()))? + "\n";
@@ -55,6 +55,6 @@ fn write_map(path: &Path, map: &LabelGrid, bounds: Rect) -> Result<(), UserError
 
 /// Classes of the annotation on the cells of the map, shifted by one: 0 = not annotated.
 fn truth(mission: &Mission, bounds: Rect) -> LabelGrid {
-    let class = |cell| mission.world.class_of(cell, mission.cell_m());
+    let class = |cell| mission.camera.world.class_of(cell, mission.cell_m());
     bounds.cells().filter_map(|cell| Some((cell, class(cell)?.saturating_add(1).min(254)))).collect()
 }

@@ -15,7 +15,7 @@ const UNSEEN: Rgb<u8> = Rgb([226, 232, 236]);
 
 /// The picture as a PNG file.
 pub(super) fn panorama(mission: &Mission) -> image::ImageResult<Vec<u8>> {
-    let area = mission.world.area();
+    let area = mission.camera.world.area();
     let metres_per_column = (area.east - area.west) / f64::from(HALF);
     let rows = ((area.north - area.south) / metres_per_column).round().clamp(1.0, 4000.0) as u32;
     let mut picture = RgbImage::from_pixel(2 * HALF + GAP, rows, PAPER);
@@ -25,7 +25,7 @@ pub(super) fn panorama(mission: &Mission) -> image::ImageResult<Vec<u8>> {
         for column in 0..HALF {
             let x = area.west + (f64::from(column) + 0.5) * metres_per_column;
             let y = area.north - (f64::from(row) + 0.5) * metres_per_column;
-            if let Some(floor) = mission.world.colour_at(x, y) {
+            if let Some(floor) = mission.camera.world.colour_at(x, y) {
                 picture.put_pixel(column, row, Rgb(floor));
             }
             let label = operator.get(Cell::new(cell(x), cell(y)));
@@ -33,7 +33,7 @@ pub(super) fn panorama(mission: &Mission) -> image::ImageResult<Vec<u8>> {
             picture.put_pixel(HALF + GAP + column, row, seen);
         }
     }
-    for step in mission.track.windows(2) {
+    for step in mission.logbook.track.windows(2) {
         let place = |(x, y): (f64, f64)| ((x - area.west) / metres_per_column, (area.north - y) / metres_per_column);
         line(&mut picture, place(step[0]), place(step[1]));
     }

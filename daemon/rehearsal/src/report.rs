@@ -22,8 +22,8 @@ pub fn report(mission: &Mission, scenario: &str) -> Report {
     let figures = json!({
         "format": 1,
         "mission": {
-            "duration_s": round(mission.ended.unwrap_or(mission.now()).as_secs_f64()),
-            "drain_s": round(mission.now().since(mission.ended.unwrap_or(mission.now())).as_secs_f64()),
+            "duration_s": round(mission.ended().unwrap_or(mission.now()).as_secs_f64()),
+            "drain_s": round(mission.now().since(mission.ended().unwrap_or(mission.now())).as_secs_f64()),
             "seed": mission.seed,
             "scenario": scenario,
         },
@@ -32,7 +32,7 @@ pub fn report(mission: &Mission, scenario: &str) -> Report {
         "link": link(mission),
         "directives": directives(mission),
         "exemplars": exemplars(mission),
-        "fixes": { "sent": mission.surface.relay().map_or(0, |r| r.fixes()), "applied": mission.vehicle.fixes_applied() },
+        "fixes": { "sent": mission.surface().relay().map_or(0, |r| r.fixes()), "applied": mission.vehicle().fixes_applied() },
         "survey": survey(mission),
     });
     Report { figures }
@@ -51,10 +51,10 @@ impl Mission {
     /// Mutual information of a map's labels with the annotations, `None` if there are none.
     pub fn mutual_information(&self, map: &LabelGrid) -> Option<(f64, f64)> {
         let cell_m = self.cell_m();
-        if !self.world.is_annotated() {
+        if !self.camera.world.is_annotated() {
             return None;
         }
-        let class = |cell| self.world.class_of(cell, cell_m);
+        let class = |cell| self.camera.world.class_of(cell, cell_m);
         let pairs = map.iter().filter_map(|(cell, label)| Some((u32::from(label), u32::from(class(cell)?))));
         let mi = mutual_information_nats(pairs);
         Some((mi.nats, mi.normalised))
@@ -62,17 +62,17 @@ impl Mission {
 
     /// The operator's map.
     pub fn operator_map(&self) -> LabelGrid {
-        self.surface.map(self.address).cloned().unwrap_or_default()
+        self.surface().map(self.address()).cloned().unwrap_or_default()
     }
 }
 
 fn scene(m: &Mission) -> Value {
-    let mi = m.mutual_information(m.vehicle.map());
+    let mi = m.mutual_information(m.vehicle().map());
     let operator = m.mutual_information(&m.operator_map());
     json!({
         "cells": m.mapper.cells(),
         "words": m.mapper.words(),
-        "labels": m.update.as_ref().map_or(0, |u| u.labels),
+        "labels": m.logbook.update.as_ref().map_or(0, |u| u.labels),
         "perplexity": round(m.mapper.perplexity()),
         "mutual_information_nats": mi.map(|v| round(v.0)),
         "normalised_mutual_information": mi.map(|v| round(v.1)),
@@ -81,31 +81,31 @@ fn scene(m: &Mission) -> Value {
 }
 
 fn map(m: &Mission) -> Value {
-    let bounds = m.vehicle.map().bounds();
-    let stats = m.vehicle.stats();
+    let bounds = m.vehicle().map().bounds();
+    let stats = m.vehicle().stats();
     json!({
         "width": bounds.map_or(0, |b| b.width),
         "height": bounds.map_or(0, |b| b.height),
         "cell_m": m.cell_m(),
         "codec": m.config.map.codec,
-        "versions": m.vehicle.map_version(),
+        "versions": m.vehicle().map_version(),
         "updates_sent": stats.chunks_sent,
-        "flips_suppressed": m.vehicle.flips_suppressed(),
+        "flips_suppressed": m.vehicle().flips_suppressed(),
         "payload_bytes": stats.bytes_by_class.get(&Class::Map).copied().unwrap_or(0),
-        "png_full_bytes": m.png_full_bytes,
-        "agreement_final": round(m.meter.agreement()),
-        "agreement_mean": round(m.meter.agreement_mean_of_survey()),
-        "age_s": summary(m.meter.delays(m.now()).summary()),
-        "layers": m.vehicle.layers().map(|p| layer(m, p)).collect::<BTreeMap<_, _>>(),
+        "png_full_bytes": m.logbook.png_full_bytes,
+        "agreement_final": round(m.meters.labels.agreement()),
+        "agreement_mean": round(m.meters.labels.agreement_mean_of_survey()),
+        "age_s": summary(m.meters.labels.delays(m.now()).summary()),
+        "layers": m.vehicle().layers().map(|p| layer(m, p)).collect::<BTreeMap<_, _>>(),
     })
 }
 
 /// A layer by its name: cells with a level, how well the operator's copy follows, and what that takes.
 fn layer(m: &Mission, layer: &LayerSource) -> (&'static str, Value) {
     let kind = layer.scale().kind();
-    let bytes = m.vehicle.stats().bytes_by_class.get(&kind.into()).copied().unwrap_or(0);
+    let bytes = m.vehicle().stats().bytes_by_class.get(&kind.into()).copied().unwrap_or(0);
     let mut figures = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
-    if let (Some(meter), Some(figures)) = (m.layer_meters.get(&kind), figures.as_object_mut()) {
+    if let (Some(meter), Some(figures)) = (m.meters.layers.get(&kind), figures.as_object_mut()) {
         figures.insert("agreement_final".into(), round(meter.agreement()).into());
         figures.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
         figures.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
@@ -115,8 +115,8 @@ fn layer(m: &Mission, layer: &LayerSource) -> (&'static str, Value) {
 
 fn by_class(m: &Mission) -> BTreeMap<&'static str, u64> {
     let mut sums: BTreeMap<&'static str, u64> = Class::ALL.into_iter().map(|c| (c.name(), 0)).collect();
-    let surface = m.surface.view(m.address).map(|v| v.stats().bytes_by_class.clone()).unwrap_or_default();
-    for (class, bytes) in m.vehicle.stats().bytes_by_class.iter().chain(&surface) {
+    let surface = m.surface().view(m.address()).map(|v| v.stats().bytes_by_class.clone()).unwrap_or_default();
+    for (class, bytes) in m.vehicle().stats().bytes_by_class.iter().chain(&surface) {
         *sums.entry(class.name()).or_default() += bytes;
     }
     sums
@@ -125,36 +125,36 @@ fn by_class(m: &Mission) -> BTreeMap<&'static str, u64> {
 fn link(m: &Mission) -> Value {
     let seconds = m.now().as_secs_f64().max(1e-9);
     let delivered = |stats: &scenecast_protocol::link::LinkStats| stats.delivered_by_class.values().sum::<u64>();
-    let down = m.surface.view(m.address).map_or(0, |v| delivered(v.stats()));
-    let goodput = (delivered(m.vehicle.stats()) + down) as f64 * 8.0 / seconds;
-    let [up_audit, down_audit] = &m.audits;
+    let down = m.surface().view(m.address()).map_or(0, |v| delivered(v.stats()));
+    let goodput = (delivered(m.vehicle().stats()) + down) as f64 * 8.0 / seconds;
+    let [up_audit, down_audit] = m.audits();
     let worst = up_audit.worst_window_bps().max(down_audit.worst_window_bps());
-    let view = m.surface.view(m.address);
+    let view = m.surface().view(m.address());
     let at_surface = view.as_ref().map(|v| v.stats().clone()).unwrap_or_default();
     let one = |i: usize| {
-        let audit = &m.audits[i];
-        let heard_by = [&at_surface, m.vehicle.stats()][i];
+        let audit = m.audits()[i];
+        let heard_by = [&at_surface, m.vehicle().stats()][i];
         let (loss, goodput) = (&heard_by.loss_in, &heard_by.goodput_in);
         json!({
             "sent_bps": round(audit.total_bits() as f64 / seconds),
             "worst_window_bps": round(audit.worst_window_bps()),
             "largest_transmission_bits": audit.largest_bits(),
-            "frames_sent": m.log.sent[i],
-            "frames_lost": m.log.lost[i],
+            "frames_sent": m.frames().sent[i],
+            "frames_lost": m.frames().lost[i],
             "loss_measured": round(loss.share()),
             "goodput_last_minute_bps": round(goodput.bits_per_s(m.now())),
             "dropped": dropped(heard_by),
         })
     };
     json!({
-        "capacity_bps": m.modem.bit_rate_bps,
+        "capacity_bps": m.modem().bit_rate_bps,
         "budget_bps": m.config.link.budget_bps,
         "budget_window_s": m.config.link.budget_window_s,
-        "frame_bytes": m.modem.frame_bytes,
+        "frame_bytes": m.modem().frame_bytes,
         "sent_bps": round((up_audit.total_bits() + down_audit.total_bits()) as f64 / seconds),
         "worst_window_bps": round(worst),
-        "frames_sent": m.log.sent.iter().sum::<u64>(),
-        "frames_lost": m.log.lost.iter().sum::<u64>(),
+        "frames_sent": m.frames().sent.iter().sum::<u64>(),
+        "frames_lost": m.frames().lost.iter().sum::<u64>(),
         "goodput_bps": round(goodput),
         "bytes_by_class": by_class(m),
         "round_trip_s": view.and_then(|v| v.round_trip()).map(|d| round(d.as_secs_f64())),
@@ -164,13 +164,14 @@ fn link(m: &Mission) -> Value {
 }
 
 fn directives(m: &Mission) -> Value {
-    let issued = m.issued.keys().filter(|(id, _)| *id != SlotId::Fix).count();
-    let applied: Vec<_> = m.applied.iter().filter(|a| a.id != SlotId::Fix && a.state == SlotState::Applied).collect();
+    let issued = m.logbook.issued.keys().filter(|(id, _)| *id != SlotId::Fix).count();
+    let applied: Vec<_> =
+        m.logbook.applied.iter().filter(|a| a.id != SlotId::Fix && a.state == SlotState::Applied).collect();
     let mut delays = super::Delays::default();
     let mut seen = BTreeMap::<(SlotId, u16), u32>::new();
     for a in &applied {
         *seen.entry((a.id, a.version)).or_default() += 1;
-        if let Some(&issued) = m.issued.get(&(a.id, a.version)) {
+        if let Some(&issued) = m.logbook.issued.get(&(a.id, a.version)) {
             delays.push(a.at.since(issued).as_secs_f64());
         }
     }
@@ -178,13 +179,13 @@ fn directives(m: &Mission) -> Value {
         "issued": issued,
         "applied": seen.len(),
         "applied_twice": seen.values().filter(|&&n| n > 1).count(),
-        "refused": m.applied.iter().filter(|a| a.id != SlotId::Fix && matches!(a.state, SlotState::Refused(_))).count(),
+        "refused": m.logbook.applied.iter().filter(|a| a.id != SlotId::Fix && matches!(a.state, SlotState::Refused(_))).count(),
         "latency_s": summary(delays.summary()),
     })
 }
 
 fn exemplars(m: &Mission) -> Value {
-    let pages = || m.surface.desk(m.address).into_iter().flat_map(|d| d.album.pages()).map(|(_, page)| page);
+    let pages = || m.surface().desk(m.address()).into_iter().flat_map(|d| d.album.pages()).map(|(_, page)| page);
     let pictures = || pages().flat_map(|page| &page.pictures);
     let delivered = pictures().filter(|p| p.asked).count();
     json!({
@@ -199,9 +200,9 @@ fn survey(m: &Mission) -> Value {
     json!({
         "distance_m": round(m.motion.distance_m),
         "planner": m.config.survey.planner,
-        "waypoints": m.legs.len(),
+        "waypoints": m.logbook.legs.len(),
         "waypoints_outside_fence": m.legs_outside_fence(),
-        "explored_cells": m.vehicle.map().explored(),
+        "explored_cells": m.vehicle().map().explored(),
         "utility_collected": round(m.utility_collected()),
     })
 }
@@ -209,7 +210,7 @@ fn survey(m: &Mission) -> Value {
 impl Mission {
     /// The newest image of each label of which the surface has one: WebP files.
     pub fn exemplars(&self) -> impl Iterator<Item = (u8, &[u8])> {
-        let desk = self.surface.desk(self.address);
+        let desk = self.surface().desk(self.address());
         let pages = desk.into_iter().flat_map(|d| d.album.pages());
         pages.filter_map(|(label, page)| Some((label, page.picture(None)?.webp.as_slice())))
     }
@@ -217,17 +218,17 @@ impl Mission {
     /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out, or do not lead back
     /// where a fix has shown the vehicle to be outside.
     pub fn legs_outside_fence(&self) -> usize {
-        let Some(fence) = self.surface.desk(self.address).and_then(|d| d.fence.as_ref()) else { return 0 };
+        let Some(fence) = self.surface().desk(self.address()).and_then(|d| d.fence.as_ref()) else { return 0 };
         let outside = |from, to| scenecast_motion::stretches_outside(&[from, to], fence) > 0;
         let is_out = |&&(from, to): &&super::mission::Leg| {
             if outside(from, from) { outside(to, to) } else { outside(from, to) }
         };
-        self.legs.iter().skip(self.legs_before_fence).filter(is_out).count()
+        self.logbook.legs.iter().skip(self.logbook.legs_before_fence).filter(is_out).count()
     }
 
     /// Explored cells, each weighted by what the operator's last utility says its label is worth.
     pub fn utility_collected(&self) -> f64 {
-        let Some(utility) = self.vehicle.utility() else { return 0.0 };
-        self.vehicle.cells().map(|(_, label)| utility.weight(label)).sum()
+        let Some(utility) = self.vehicle().utility() else { return 0.0 };
+        self.vehicle().cells().map(|(_, label)| utility.weight(label)).sum()
     }
 }

@@ -113,7 +113,7 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn the_camera_sees_what_lies_north_at_the_top_and_turns_with_the_heading() {
+    fn the_camera_has_north_at_the_top_and_turns_with_the_heading() {
         let image = RgbImage::from_fn(200, 200, |x, y| Rgb([x as u8, y as u8, 0]));
         let world = World { image, metres_per_pixel: 0.1, classes: None };
         let north = world.view(10.0, 10.0, 0.0, 64, 64);

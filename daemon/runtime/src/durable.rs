@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_epoch_goes_on_with_a_checkpoint_of_the_same_mission_and_epoch_alone() {
+    fn only_a_checkpoint_of_the_same_mission_continues_the_epoch() {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk).unwrap();
         let last = Durable { epoch: 4, labels: 7, ..durable };

@@ -3,18 +3,17 @@
 mod checkpoint;
 mod clock;
 mod durable;
-mod flight;
+#[cfg(feature = "surface")]
+mod instruments;
 mod journal;
 #[cfg(test)]
-mod kept_labels;
+mod kept_label_tests;
 mod mapping;
-pub mod modem;
+mod modem;
 mod pilot;
 mod port;
-#[cfg(feature = "surface")]
-mod position;
 #[cfg(all(test, feature = "surface"))]
-mod power_cuts;
+mod power_cut_tests;
 mod refusals;
 mod reload;
 mod restore;

@@ -1,25 +1,29 @@
-//! `scenecast asv`
+//! `scenecast asv`: ports, page, files and clock around the surface's host.
 
 use super::clock::Clock;
+use super::instruments::{Instruments, relay};
 use super::journal::create_folder;
-use super::modem::Modem;
-use super::pilot::SimulatedAutopilot;
-use super::position::Position;
+use super::modem::{self, ModemPort};
+use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
+use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_core::world_file;
-use scenecast_drivers::modem::ModemEvent;
-use scenecast_protocol::time::Instant;
+use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{Surface, SurfaceOutput};
+use scenecast_surface::SurfaceOutput;
+use scenecast_surface::position::Follow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
+
+/// The page gets a new snapshot at least this often.
+const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Runs the surface until it is interrupted.
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -46,6 +50,9 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             super::random_bits(),
             clock.now(),
         )?;
+        if let Some(relay) = relay(&config)? {
+            surface.set_relay(relay);
+        }
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
@@ -55,123 +62,157 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
-        let modem = super::modem::open(&config, Address::SURFACE, profile, clock).await?;
-        let position = Position::open(&config, &mut surface, simulated, clock)?;
+        let modem = ModemPort::open(&config, clock.now()).await?;
+        let instruments = Instruments::open(&config)?;
+        let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
+        let ports = Ports { modem, instruments, pilot: PilotPort::open(&config, autopilot.is_some())? };
         let vehicle = scenecast_config::vehicle_address(&config)?;
+        let p = &config.position;
+        let follow = p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m));
+        let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
+        let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let refusals = Refusals::default();
-        Host { surface, modem, console, clock, dir, facts, meter, bits: profile, refusals, position, vehicle }
-            .run(stop)
-            .await
+        SurfaceShell { host, ports, console, clock, dir, facts, meter, refusals }.run(stop).await
     })
 }
 
-struct Host {
-    surface: Surface,
-    modem: Modem,
+struct Ports {
+    modem: ModemPort,
+    instruments: Instruments,
+    pilot: PilotPort,
+}
+
+/// Moves bytes, reads the clock, writes files and answers the page; every decision is the host's.
+struct SurfaceShell {
+    host: SurfaceHost,
+    ports: Ports,
     console: Option<Console>,
     clock: Clock,
     dir: PathBuf,
     facts: MissionFacts,
     meter: LinkMeter,
-    bits: scenecast_protocol::mac::ModemProfile,
     refusals: Refusals,
-    position: Position,
-    /// The vehicle to stay above.
-    vehicle: Address,
 }
 
-impl Host {
+impl SurfaceShell {
     async fn run(mut self, mut stop: Stop) -> Result<(), UserError> {
-        let mut second = tokio::time::interval(Duration::from_secs(1));
-        second.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        let mut publish = tokio::time::interval(PUBLISH_INTERVAL);
+        publish.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
-            let changed = self.pump()?;
-            if changed {
+            if self.pump()? {
                 self.publish();
             }
             let now = self.clock.now();
-            let wake = self.surface.poll_timeout(now).map(|(at, _)| at).filter(|&at| at > now);
-            let wake = wake.unwrap_or_else(|| self.clock.now() + Duration::from_secs(1));
+            let wake = self.host.poll_timeout(now).unwrap_or(now + Duration::from_secs(1));
             tokio::select! {
                 () = stop.asked() => {
-                    self.modem.log_audit();
+                    modem::log_audit(self.host.link());
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
-                _ = second.tick() => self.publish(),
-                event = self.modem.next() => self.handle_modem(event?),
+                _ = publish.tick() => self.publish(),
+                report = self.ports.modem.next() => {
+                    ModemPort::handle(report, self.host.link_mut(), self.clock.now());
+                }
+                report = self.ports.instruments.next() => {
+                    self.ports.instruments.handle(report, &mut self.host, self.clock.now());
+                }
+                report = self.ports.pilot.next() => self.handle_pilot(report),
                 (ask, reply) = next_request(&mut self.console) => self.answer(ask, reply),
-                () = self.position.next(&mut self.surface, self.vehicle) => {}
             }
+            self.host.handle_timeout(self.clock.now());
         }
     }
 
-    fn handle_modem(&mut self, event: ModemEvent) {
+    fn handle_pilot(&mut self, report: FromPort) {
         let now = self.clock.now();
-        match event {
-            ModemEvent::Sent => self.surface.handle_transmit_outcome(now),
-            ModemEvent::Received(bytes) => self.handle_frame(&bytes),
-            ModemEvent::Poll(frames) => self.surface.handle_poll(frames),
-            ModemEvent::Repeated(bits) => self.surface.handle_repeated(bits, now),
-            ModemEvent::Fix(end, line) => self.surface.handle_range(end, &line, now),
-            ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
+        match report {
+            FromPort::Open => self.host.handle_pilot_open(now),
+            FromPort::Bytes(bytes) => self.host.handle_pilot_bytes(&bytes, now),
+            FromPort::Closed => {}
         }
-    }
-
-    fn handle_frame(&mut self, bytes: &[u8]) {
-        let now = self.clock.now();
-        self.meter.heard(self.bits.bits_on_air(bytes.len()), now);
-        self.surface.handle_frame(bytes, now);
-        let views = self.surface.vehicles().filter_map(|(a, _)| self.surface.view(a));
-        views.for_each(|v| self.refusals.note(v.stats()));
     }
 
     fn answer(&mut self, ask: Ask, reply: oneshot::Sender<Reply>) {
         // A browser that has gone away needs no answer.
-        let _ = reply.send(answer(&mut self.surface, ask, self.facts.cell_m, self.clock.now()));
+        let _ = reply.send(answer(self.host.surface_mut(), ask, self.facts.cell_m, self.clock.now()));
     }
 
     fn publish(&mut self) {
         if let Some(console) = &self.console {
-            let snapshot = snapshot(&self.surface, &self.facts, &self.meter, self.clock.now());
+            let snapshot = snapshot(self.host.surface(), &self.facts, &self.meter, self.clock.now());
             console.snapshots.send_replace(Arc::new(snapshot));
         }
     }
 
-    /// Carries out what the surface asks for; says whether the page has something new to show.
+    /// Acts on every event of the host and writes what it has for the ports. Returns whether the page has something new to
+    /// show.
     fn pump(&mut self) -> Result<bool, UserError> {
-        let now: Instant = self.clock.now();
-        let mut changed = false;
-        while let Some(output) = self.surface.poll_output() {
-            changed = true;
-            match output {
-                SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
-                SurfaceOutput::VehicleFound(vehicle) => {
-                    tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
+        let now = self.clock.now();
+        let mut is_changed = self.handle_events()?;
+        while let Some(bytes) = self.host.poll_output(now) {
+            self.ports.modem.write(bytes);
+        }
+        self.ports.modem.reopen_if_silent(self.host.link(), now);
+        while let Some(bytes) = self.host.poll_pilot_output() {
+            self.ports.pilot.write(bytes);
+        }
+        is_changed |= self.handle_events()?;
+        Ok(is_changed)
+    }
+
+    fn handle_events(&mut self) -> Result<bool, UserError> {
+        let mut is_changed = false;
+        while let Some(event) = self.host.poll_event() {
+            match event {
+                SurfaceHostEvent::Role(output) => {
+                    is_changed = true;
+                    self.handle_output(output)?;
                 }
-                SurfaceOutput::ExemplarHere(vehicle, label) => {
-                    tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
+                SurfaceHostEvent::Following(x, y) => {
+                    tracing::info!("following: to {x:.0} m east, {y:.0} m north");
                 }
-                SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
+                SurfaceHostEvent::Frame(event) => {
+                    modem::log(&event)?;
+                    self.measure(&event);
+                }
+                SurfaceHostEvent::Pilot(event) => pilot::log(event),
             }
         }
-        self.modem.set_budget(self.surface.budget_bps());
-        if self.modem.takes_cycles()
-            && let Some(cycle) = self.surface.poll_cycle(now)
-        {
-            self.modem.begin_cycle(cycle);
+        Ok(is_changed)
+    }
+
+    fn handle_output(&self, output: SurfaceOutput) -> Result<(), UserError> {
+        match output {
+            SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
+            SurfaceOutput::VehicleFound(vehicle) => {
+                tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
+            }
+            SurfaceOutput::ExemplarHere(vehicle, label) => {
+                tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
+            }
+            SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
-        while self.modem.takes_frames()
-            && let Some(transmit) = self.surface.poll_transmit(now)
-        {
-            self.meter.sent(self.bits.bits_on_air(transmit.bytes.len()), now);
-            self.modem.send(transmit);
+        Ok(())
+    }
+
+    fn measure(&mut self, event: &FrameEvent) {
+        let now = self.clock.now();
+        let bits_on_air = |bytes: usize| self.host.link().profile().bits_on_air(bytes);
+        match *event {
+            FrameEvent::Sent { bytes, .. } => self.meter.sent(bits_on_air(bytes), now),
+            FrameEvent::Received { bytes } => {
+                self.meter.heard(bits_on_air(bytes), now);
+                let surface = self.host.surface();
+                let views = surface.vehicles().filter_map(|(a, _)| surface.view(a));
+                views.for_each(|v| self.refusals.note(v.stats()));
+            }
+            _ => {}
         }
-        Ok(changed)
     }
 
     fn write_map(&self, vehicle: Address) -> Result<(), UserError> {
-        let Some(map) = self.surface.map(vehicle) else { return Ok(()) };
+        let Some(map) = self.host.surface().map(vehicle) else { return Ok(()) };
         let png = match label_picture::encode(map) {
             Ok(png) => png,
             // What came through the water ends no run.
@@ -181,8 +222,8 @@ impl Host {
             }
         };
         let file = |extension| self.dir.join(format!("operator-map-{}.{extension}", vehicle.number()));
-        if let (Some(plane), Some(bounds)) = (self.surface.relay().and_then(|r| r.plane()), map.bounds()) {
-            let placement = self.surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
+        if let (Some(plane), Some(bounds)) = (self.host.surface().relay().and_then(|r| r.plane()), map.bounds()) {
+            let placement = self.host.surface().view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
             let text = world_file(plane, placement, bounds, self.facts.cell_m);
             scenecast_files::write_whole(&file("pgw"), text.as_bytes())?;
         }

@@ -1,26 +1,27 @@
-//! `scenecast auv`
+//! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::Clock;
 use super::durable::{Keeper, Run};
-use super::flight::Flight;
 use super::journal::Folder;
 use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
-use super::modem::Modem;
-use super::pilot::SimulatedAutopilot;
+use super::modem::{self, ModemPort};
+use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
 use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
-use scenecast_config::Config;
-use scenecast_core::Area;
-use scenecast_core::UserError;
-use scenecast_drivers::modem::ModemEvent;
-use scenecast_files::Recording;
+use crate::port::FromPort;
+use scenecast_config::{Config, origin, survey_depth_m};
+use scenecast_core::{Area, TangentPlane, UserError};
+use scenecast_files::{RecordedFrame, Recording};
+use scenecast_host::{CameraPose, FrameEvent, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::Shares;
-use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{Vehicle, VehicleOutput};
 use std::path::Path;
+use std::time::Duration;
+
+/// The host is asked again at least this often.
+const MAX_SLEEP: Duration = Duration::from_secs(1);
 
 /// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
@@ -51,17 +52,23 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         if is_again {
             vehicle.assume_budget_spent(clock.now());
         }
-        let at_end = recording.is_some();
-        let camera = Camera::new(recording, clock, mapper.last_s());
+        let is_recorded = recording.is_some();
+        let mut camera = Camera::new(recording, clock, mapper.last_s());
         mapper.tune(vehicle.settings());
         let mapper = MapperThread::start(mapper, keep)?;
-        let modem = super::modem::open(&config, address, profile, clock).await?;
-        let (reload, refusals) = (Reload::new(load)?, Refusals::default());
-        let flight = Flight::open(&config, simulated, clock)?;
-        let (behind, missed) = (0, 0);
-        let host =
-            Host { vehicle, camera, mapper, modem, clock, keeper, reload, refusals, flight, at_end, behind, missed };
-        host.run(stop).await
+        let modem = ModemPort::open(&config, clock.now()).await?;
+        let station = modem_station(&config, address, profile)?;
+        let reload = Reload::new(load)?;
+        let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
+        let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some())? };
+        let layer = origin(&config)?.map(TangentPlane::new);
+        let pilot = autopilot.map(|a| VehiclePilot::new(a, layer, survey_depth_m(&config), clock.now()));
+        let mut host = VehicleHost::new(vehicle, station, pilot);
+        if is_recorded && camera.is_over() {
+            host.handle_camera_end();
+        }
+        let refusals = Refusals::default();
+        VehicleShell { host, camera, mapper, ports, clock, keeper, reload, refusals, missed: 0 }.run(stop).await
     })
 }
 
@@ -71,129 +78,130 @@ fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, U
     area.ok_or_else(|| UserError::Input(missing.to_owned()))
 }
 
-struct Host {
-    vehicle: Vehicle,
+struct Ports {
+    modem: ModemPort,
+    pilot: PilotPort,
+}
+
+/// Moves bytes, reads the clock and syncs files; every decision is the host's.
+struct VehicleShell {
+    host: VehicleHost,
     camera: Camera,
     mapper: MapperThread,
-    modem: Modem,
+    ports: Ports,
     clock: Clock,
     keeper: Keeper<Folder>,
     reload: Reload,
     refusals: Refusals,
-    flight: Flight,
-    /// Whether the end of the camera's frames is the end of the survey.
-    at_end: bool,
-    /// Camera frames that the scene model has not seen yet.
-    behind: u32,
     /// Camera frames that could not be read.
     missed: u64,
 }
 
-impl Host {
+impl VehicleShell {
     async fn run(mut self, mut stop: Stop) -> Result<(), UserError> {
         loop {
             self.pump()?;
-            let wake = self.vehicle.poll_timeout().map(|(at, _)| at).filter(|&at| at > self.clock.now());
-            let wake = wake.unwrap_or_else(|| self.clock.now() + std::time::Duration::from_secs(1));
+            let now = self.clock.now();
+            let wake = self.host.poll_timeout(now).unwrap_or(now + MAX_SLEEP);
             tokio::select! {
                 () = stop.asked() => {
-                    self.modem.log_audit();
+                    modem::log_audit(self.host.link());
                     self.mapper.finish();
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
-                event = self.modem.next() => self.handle_modem(event?),
-                config = self.reload.next() => self.follow(&config),
-                () = self.flight.next() => self.flight.steer(&mut self.vehicle),
-                mut frame = self.camera.next() => {
-                    self.behind += 1;
-                    self.flight.place_camera(&self.vehicle, &mut frame);
-                    let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
+                report = self.ports.modem.next() => {
+                    ModemPort::handle(report, self.host.link_mut(), self.clock.now());
                 }
+                report = self.ports.pilot.next() => self.handle_pilot(report),
+                config = self.reload.next() => self.follow(&config),
+                frame = self.camera.next() => self.handle_camera(frame),
                 seen = self.mapper.seen.recv() => match seen {
                     Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
                     Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
             }
+            self.host.handle_timeout(self.clock.now());
         }
     }
 
-    fn handle_modem(&mut self, event: ModemEvent) {
+    fn handle_pilot(&mut self, report: FromPort) {
         let now = self.clock.now();
-        match event {
-            ModemEvent::Sent => self.vehicle.handle_transmit_outcome(now),
-            ModemEvent::Received(bytes) => {
-                self.vehicle.handle_frame(&bytes, now);
-                self.refusals.note(self.vehicle.stats());
-            }
-            ModemEvent::Poll(frames) => self.vehicle.handle_poll(frames),
-            ModemEvent::Repeated(bits) => self.vehicle.handle_repeated(bits, now),
-            ModemEvent::Fix(..) | ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
+        match report {
+            FromPort::Open => self.host.handle_pilot_open(now),
+            FromPort::Bytes(bytes) => self.host.handle_pilot_bytes(&bytes, now),
+            FromPort::Closed => {}
         }
     }
 
-    /// Budget and shares of the configuration are in force, whatever the surface said before.
+    /// Budget and shares of the configuration take the place of those that the surface ordered.
     fn follow(&mut self, config: &Config) {
-        let background = scenecast_config::background(config);
-        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), background };
-        let streams = budget.background.names().join(", ");
-        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {streams}", budget.bits_per_s, budget.shares.0);
-        self.vehicle.set_budget(budget, self.clock.now());
+        let spend = scenecast_config::background(config);
+        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), spend };
+        let extras = budget.spend.names().join(", ");
+        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {extras}", budget.bits_per_s, budget.shares.0);
+        self.host.handle_budget(budget, self.clock.now());
+    }
+
+    fn handle_camera(&mut self, mut frame: RecordedFrame) {
+        let pose = self.host.handle_camera(pose_of(&frame));
+        (frame.x_m, frame.y_m) = (pose.x_m, pose.y_m);
+        (frame.heading_rad, frame.depth_m) = (pose.heading_rad, pose.depth_m);
+        let _ = self.mapper.orders.send(ToMapper::Frame(Box::new(frame)));
+        if self.camera.is_over() {
+            self.host.handle_camera_end();
+        }
     }
 
     fn handle_seen(&mut self, seen: Seen) {
         let now = self.clock.now();
-        if let Some(f) = &seen.frame {
-            self.behind -= 1;
-            if !self.flight.is_piloted() {
-                self.vehicle.set_pose(f.x_m, f.y_m, f.heading_rad, f.depth_m, now);
-            }
-        }
-        self.vehicle.handle_map(&seen.update, now);
-        self.vehicle.handle_exemplars(seen.exemplars);
-        self.finish_at_end();
+        self.host.handle_mapped(seen.frame.as_ref().map(pose_of), &seen.update, seen.exemplars, now);
     }
 
     /// One bad frame does not end a mission.
     fn handle_missed(&mut self, problem: &UserError) {
-        self.behind -= 1;
         self.missed += 1;
         tracing::error!("a camera frame was passed over, {} so far: {problem}", self.missed);
-        self.finish_at_end();
+        self.host.handle_missed();
     }
 
-    fn finish_at_end(&mut self) {
-        if self.at_end && self.behind == 0 && self.camera.is_over() {
-            self.at_end = false;
-            tracing::info!("the recorded mission has ended");
-            self.vehicle.finish_survey();
-            let _ = self.mapper.orders.send(ToMapper::Keep);
-        }
-    }
-
+    /// Acts on every event of the host, then writes what it has for the ports.
     fn pump(&mut self) -> Result<(), UserError> {
-        let now: Instant = self.clock.now();
-        self.vehicle.steer(now);
-        while let Some(output) = self.vehicle.poll_output() {
-            match output {
-                VehicleOutput::Persist => {
-                    self.keeper.save(self.vehicle.durable())?;
-                    self.vehicle.handle_persisted();
+        let now = self.clock.now();
+        self.host.steer(now);
+        self.handle_events()?;
+        while let Some(bytes) = self.host.poll_output(now) {
+            self.ports.modem.write(bytes);
+        }
+        self.ports.modem.reopen_if_silent(self.host.link(), now);
+        while let Some(bytes) = self.host.poll_pilot_output() {
+            self.ports.pilot.write(bytes);
+        }
+        self.handle_events()
+    }
+
+    fn handle_events(&mut self) -> Result<(), UserError> {
+        while let Some(event) = self.host.poll_event() {
+            match event {
+                VehicleHostEvent::Persist => {
+                    self.keeper.save(self.host.vehicle().durable())?;
+                    self.host.handle_persisted();
                 }
-                VehicleOutput::Tune(settings) => {
+                VehicleHostEvent::Tune(settings) => {
                     let _ = self.mapper.orders.send(ToMapper::Tune(settings));
                 }
-                VehicleOutput::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
-                VehicleOutput::Waypoint(at) => {
-                    self.flight.set_rising(false);
-                    tracing::info!("waypoint {:.1} m east, {:.1} m north", at.x_m, at.y_m);
+                VehicleHostEvent::SurveyEnded => {
+                    tracing::info!("the recorded mission has ended");
+                    let _ = self.mapper.orders.send(ToMapper::Keep);
                 }
-                VehicleOutput::Hold => {
-                    self.flight.set_rising(false);
-                    tracing::info!("hold");
+                VehicleHostEvent::Applied(a) => tracing::info!("{} {}: {:?}", a.id.name(), a.version, a.state),
+                VehicleHostEvent::Waypoint(at) => {
+                    tracing::info!("waypoint {:.1} m east, {:.1} m north", at.x_m, at.y_m)
                 }
-                VehicleOutput::Fixed(fix, _) => {
+                VehicleHostEvent::Hold => tracing::info!("hold"),
+                VehicleHostEvent::Surface => tracing::info!("come up"),
+                VehicleHostEvent::Fixed(fix, _) => {
                     tracing::debug!(
                         "fix: {:.1} m east, {:.1} m north, +-{:.1} m",
                         fix.position.east_m,
@@ -201,18 +209,20 @@ impl Host {
                         fix.sigma_m
                     );
                 }
-                VehicleOutput::Surface => {
-                    self.flight.set_rising(true);
-                    tracing::info!("come up");
+                VehicleHostEvent::Frame(event) => {
+                    modem::log(&event)?;
+                    if matches!(event, FrameEvent::Received { .. }) {
+                        self.refusals.note(self.host.vehicle().stats());
+                    }
                 }
+                VehicleHostEvent::Pilot(event) => pilot::log(event),
             }
-        }
-        self.modem.set_budget(self.vehicle.budget_bps());
-        while self.modem.takes_frames()
-            && let Some(transmit) = self.vehicle.poll_transmit(now)
-        {
-            self.modem.send(transmit);
         }
         Ok(())
     }
+}
+
+fn pose_of(frame: &RecordedFrame) -> CameraPose {
+    let RecordedFrame { x_m, y_m, heading_rad, depth_m, .. } = *frame;
+    CameraPose { x_m, y_m, heading_rad, depth_m }
 }

@@ -93,7 +93,7 @@ impl Demo {
         while let Ok((ask, reply)) = console.requests.try_recv() {
             let cell_m = self.facts.cell_m;
             // A browser that has gone away needs no answer.
-            let _ = reply.send(answer(self.mission.surface(), ask, cell_m, now));
+            let _ = reply.send(answer(self.mission.surface_mut(), ask, cell_m, now));
             changed = true;
         }
         let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH);
@@ -107,7 +107,7 @@ impl Demo {
     /// The page's link panel shows what the surface knows: what it heard, and what it sent.
     fn count(&mut self) {
         let now = self.mission.now();
-        let totals = [self.mission.heard_bits(), self.mission.audits()[1].total_bits()];
+        let totals = [self.mission.received_bits(), self.mission.audits()[1].total_bits()];
         if totals[0] > self.counted[0] {
             self.meter.heard(totals[0] - self.counted[0], now);
         }

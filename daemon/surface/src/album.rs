@@ -33,9 +33,7 @@ pub enum AskState {
 pub struct Asked {
     /// What the vehicle is asked.
     pub request: ExemplarRequest,
-    /// How far it is.
     pub state: AskState,
-    /// When that last changed.
     pub changed: Instant,
 }
 
@@ -46,11 +44,9 @@ pub struct Picture {
     pub number: u8,
     /// Its size: an edge of 64 << `size` pixels.
     pub size: u8,
-    /// The file.
     pub webp: Vec<u8>,
     /// Bytes of it that came over the water.
     pub sent_bytes: usize,
-    /// When it came.
     pub came: Instant,
     /// Whether somebody had asked for it.
     pub asked: bool,
@@ -74,13 +70,13 @@ pub struct Album {
 
 impl Album {
     /// Requests at a time: as many as a vehicle takes.
-    const MOST_ASKED: usize = 8;
+    const MAX_ASKED: usize = 8;
     /// Images that are kept of a label.
-    const MOST_OF_LABEL: usize = 8;
+    const MAX_OF_LABEL: usize = 8;
     /// Bytes that are kept; the oldest images go.
-    const MOST_BYTES: usize = 1 << 20;
+    const MAX_BYTES: usize = 1 << 20;
     /// The largest size that is asked for.
-    pub const LARGEST: u8 = 1;
+    pub const MAX_SIZE: u8 = 1;
 
     /// What there is of a label.
     pub fn page(&self, label: u8) -> Option<&Page> {
@@ -95,7 +91,7 @@ impl Album {
     /// Asks for an image of a label in place of what was asked of it before. The error is one line for the operator.
     pub fn ask(&mut self, label: u8, wish: Wish, now: Instant) -> Result<(), String> {
         let others = self.pages.iter().filter(|(l, p)| **l != label && p.is_open()).count();
-        if others >= Self::MOST_ASKED {
+        if others >= Self::MAX_ASKED {
             return Err(format!("{others} images are on their way: wait for one, or cancel one"));
         }
         let mut request = ExemplarRequest { label, ..ExemplarRequest::default() };
@@ -105,7 +101,7 @@ impl Album {
                 Some(number) => format!("picture {number} of label {label} is not here"),
                 None => format!("no image of label {label} is here yet: ask for one first"),
             })?;
-            if picture.size >= Self::LARGEST {
+            if picture.size >= Self::MAX_SIZE {
                 let edge = edge_px(picture.size);
                 return Err(format!(
                     "picture {} of label {label} is as large as they come: {edge} pixels",
@@ -165,7 +161,7 @@ impl Album {
         let sent_bytes = exemplar.encode().len();
         page.pictures.retain(|p| p.number != number);
         page.pictures.push(Picture { number, size, webp, sent_bytes, came: now, asked });
-        if page.pictures.len() > Self::MOST_OF_LABEL {
+        if page.pictures.len() > Self::MAX_OF_LABEL {
             page.pictures.remove(0);
         }
         self.make_room();
@@ -175,7 +171,7 @@ impl Album {
     fn make_room(&mut self) {
         let bytes =
             |pages: &BTreeMap<u8, Page>| pages.values().flat_map(|p| &p.pictures).map(|p| p.webp.len()).sum::<usize>();
-        while bytes(&self.pages) > Self::MOST_BYTES {
+        while bytes(&self.pages) > Self::MAX_BYTES {
             let with_some = self.pages.values_mut().filter(|page| !page.pictures.is_empty());
             let Some(page) = with_some.min_by_key(|page| page.pictures.first().map(|p| p.came)) else { return };
             page.pictures.remove(0);
@@ -208,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_is_met_by_its_own_answer_and_a_larger_one_takes_the_place_of_the_smaller() {
+    fn a_request_takes_its_own_reply_and_a_larger_image_replaces() {
         let mut album = Album::default();
         assert_eq!(
             album.ask(5, Wish::Larger(None), NOW).unwrap_err(),
@@ -234,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cancelled_or_refused_is_wanted_no_more_and_what_is_here_stays() {
+    fn cancelled_and_refused_requests_end_and_images_stay() {
         let mut album = Album::default();
         assert!(album.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
         assert!(!album.page(5).unwrap().pictures[0].asked);
@@ -278,8 +274,8 @@ mod tests {
             }
         }
         let kept: Vec<&Picture> = album.pages().flat_map(|(_, page)| &page.pictures).collect();
-        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= Album::MOST_BYTES);
+        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= Album::MAX_BYTES);
         assert!(kept.len() > 60 && kept.iter().all(|p| p.number > 15), "the newest are kept");
-        assert!(album.pages().all(|(_, page)| page.pictures.len() <= Album::MOST_OF_LABEL));
+        assert!(album.pages().all(|(_, page)| page.pictures.len() <= Album::MAX_OF_LABEL));
     }
 }

@@ -14,7 +14,6 @@ use std::collections::VecDeque;
 /// The operator's papers about one vehicle.
 #[derive(Debug)]
 pub struct Desk {
-    /// Name for people.
     pub name: String,
     /// The utility that was sent last.
     pub utility: Utility,
@@ -28,11 +27,9 @@ pub struct Desk {
     pub limits_in_force: Option<(u16, Limits)>,
     /// The settings that were asked for, and those in force.
     pub settings: SettingsDesk,
-    /// Images of labels.
     pub album: Album,
     /// Where the vehicle said it was: time, east, north.
     pub track: VecDeque<(Instant, f64, f64)>,
-    /// Epoch of the labels.
     pub epoch: u8,
     /// The last whole map, where the vehicle sends those.
     pub whole: Option<LabelGrid>,
@@ -48,7 +45,6 @@ impl Desk {
     /// Places of the track that are kept.
     const TRACK: usize = 500;
 
-    /// An empty desk.
     pub fn new(name: String) -> Self {
         Self {
             name,

@@ -31,7 +31,6 @@ pub enum SurfaceOutput {
     Changed(Address),
 }
 
-/// The surface.
 pub struct Surface {
     pub(super) link: SurfaceLink,
     pub(super) desks: BTreeMap<Address, Desk>,
@@ -61,7 +60,6 @@ impl Surface {
         format!("vehicle {}", vehicle.number())
     }
 
-    /// The vehicles.
     pub fn vehicles(&self) -> impl Iterator<Item = (Address, &Desk)> {
         self.desks.iter().map(|(&a, d)| (a, d))
     }
@@ -236,12 +234,10 @@ impl Surface {
         Ok(())
     }
 
-    /// Sends a position fix.
     pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, String> {
         self.issue(vehicle, Slot::Fix(fix), now)
     }
 
-    /// Gives it a GPS.
     pub fn set_relay(&mut self, relay: Relay) {
         self.relay = Some(relay);
     }
@@ -256,7 +252,6 @@ impl Surface {
         self.relay.as_mut().map_or(b"", |relay| relay.handle_gps_open())
     }
 
-    /// Bytes of the GPS.
     pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
         self.relay.iter_mut().for_each(|relay| relay.handle_gps(bytes, now));
     }
@@ -297,7 +292,6 @@ impl Surface {
         Some(cells)
     }
 
-    /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
         while let Some(event) = self.link.poll_event() {

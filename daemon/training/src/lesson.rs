@@ -1,17 +1,17 @@
-//! What the prior is trained on: changes as a mission has them, over procedural maps.
+//! Lessons for the prior: changes as a mission has them, over procedural maps.
 
-use crate::{Flips, MapRng, Scene, Survey, sampler_noise};
+use crate::{Flips, MapRng, MapScene, Survey, sampler_noise};
 use scenecast_protocol::map::{Cell, Rect};
 use scenecast_protocol::map_codec::LabelRaster;
 
 /// A change of a part of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lesson {
-    /// The map both ends hold.
+    /// The map that both ends hold.
     pub base: LabelRaster,
-    /// The map as it becomes; equal to the base outside `rect`.
+    /// The map after the change; equal to the base outside `rect`.
     pub target: LabelRaster,
-    /// The patch to code.
+    /// The patch that the coder codes.
     pub rect: Rect,
 }
 
@@ -20,15 +20,21 @@ pub fn lessons(seed: u64) -> Vec<Lesson> {
     let mut rng = MapRng::new(seed);
     let (width, height) = (rng.within(48, 224), rng.within(48, 224));
     let labels = rng.pick(&[2, 3, 4, 6, 8, 8, 10, 12, 16, 16, 24]);
-    let scene =
-        rng.pick(&[Scene::SpatialCrp, Scene::Potts, Scene::Potts, Scene::Fractal, Scene::Colonies, Scene::Colonies]);
+    let scene = rng.pick(&[
+        MapScene::SpatialCrp,
+        MapScene::Potts,
+        MapScene::Potts,
+        MapScene::Fractal,
+        MapScene::Colonies,
+        MapScene::Colonies,
+    ]);
     let mut raster = scene.draw(&mut rng, width, height, labels);
     let (border, anywhere) = (rng.pick(&[0, 0, 20_000, 100_000]), rng.pick(&[0, 0, 1000, 10_000]));
     sampler_noise(&mut rng, &mut raster, border, anywhere);
     if rng.happens(300_000) { stills(&mut rng, &raster) } else { surveys(&mut rng, raster) }
 }
 
-/// Parts of a scene from nothing.
+/// Parts of a scene on an unexplored base.
 fn stills(rng: &mut MapRng, raster: &LabelRaster) -> Vec<Lesson> {
     let mut target = raster.clone();
     if rng.happens(400_000) {
@@ -46,7 +52,7 @@ fn stills(rng: &mut MapRng, raster: &LabelRaster) -> Vec<Lesson> {
 
 const STEADY: Flips = Flips { border: 0, anywhere: 0, settling: 0 };
 
-/// Steps of a survey, or several at once.
+/// One step or several steps of a survey.
 fn surveys(rng: &mut MapRng, raster: LabelRaster) -> Vec<Lesson> {
     let flips = Flips {
         border: rng.pick(&[0, 1000, 5000, 5000, 10_000, 30_000, 30_000, 60_000]),

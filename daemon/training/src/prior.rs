@@ -8,8 +8,8 @@ pub const PRIOR_SCENES: u64 = 1500;
 
 /// The table of a prior, trained on the lessons of `scenes` procedural scenes. The same seed gives the same table.
 ///
-/// `progress` is called with the progress in thousandths. Floating point is used for sums and quotients here, and nowhere in
-/// the coder.
+/// `progress` is called with the progress in thousandths. Floating point is used for sums and quotients here,
+/// and nowhere in the coder.
 pub fn train_prior(seed: u64, scenes: u64, progress: &mut dyn FnMut(u64)) -> Vec<u8> {
     let mut prior = TrainablePrior::blank();
     let mut pass = 0;

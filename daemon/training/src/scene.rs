@@ -1,26 +1,26 @@
-//! Procedural scenes: spatial CRP samples, Potts fields, fractal fields, colonies on a ground; with sampler noise.
+//! Procedural scenes: spatial CRP samples, Potts fields, fractal fields, colonies; with sampler noise.
 
 use crate::MapRng;
 use scenecast_protocol::map_codec::LabelRaster;
 
-/// How a scene comes about.
+/// The random process that draws a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scene {
-    /// Cells take labels from their neighbourhood or, rarely, a new one.
+pub enum MapScene {
+    /// Each cell takes the label of a neighbour or, rarely, a new one (Chinese restaurant process).
     SpatialCrp,
-    /// Neighbours agree, with some heat.
+    /// Neighbours agree, up to a temperature.
     Potts,
-    /// The highest of several fractal fields wins.
+    /// The highest of several fractal fields decides the label.
     Fractal,
-    /// Patches of all sizes on a ground.
+    /// Patches of all sizes on one background label.
     Colonies,
 }
 
-impl Scene {
-    /// Every kind of scene.
+impl MapScene {
+    /// Every kind of scene, in a fixed order.
     pub const ALL: [Self; 4] = [Self::SpatialCrp, Self::Potts, Self::Fractal, Self::Colonies];
 
-    /// A fully seen map with up to `labels` labels, at least 2.
+    /// A fully explored map with up to `labels` labels, at least 2.
     pub fn draw(self, rng: &mut MapRng, width: usize, height: usize, labels: usize) -> LabelRaster {
         let names = names(rng, labels);
         let mut raster = match self {
@@ -34,14 +34,14 @@ impl Scene {
     }
 }
 
-/// Label ids in a random order: usually the lowest, sometimes anywhere.
+/// Label ids in random order: usually the lowest, sometimes any.
 fn names(rng: &mut MapRng, labels: usize) -> Vec<u8> {
     let end = if rng.happens(800_000) { labels } else { 254 };
     let mut pool: Vec<u8> = (1..=end as u8).collect();
     (0..labels).map(|_| pool.swap_remove(rng.below(pool.len()))).collect()
 }
 
-/// Every cell takes the label of one around it, `sweeps` times over.
+/// Each cell takes the label of a neighbour, in `sweeps` sweeps.
 fn settle(rng: &mut MapRng, raster: &mut LabelRaster, sweeps: usize, heat: usize, labels: usize) {
     for _ in 0..sweeps * raster.labels.len() {
         let i = rng.below(raster.labels.len());
@@ -156,7 +156,7 @@ fn colonies(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Lab
     let count = width * height / rng.pick(&[60, 200, 600, 2000]) + 1;
     let largest = rng.pick(&[6, 12, 30]);
     for _ in 0..count {
-        // Many small ones, few large ones.
+        // Many small colonies, few large ones.
         let size = 1 + largest * largest / (largest + rng.below(largest * largest));
         let (across, along) = (rng.within(size, size * 2 + 1) as i64, rng.within(size, size * 2 + 1) as i64);
         let lean = rng.below(129) as i64 - 64;
@@ -177,8 +177,8 @@ fn colonies(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Lab
     raster
 }
 
-/// What a sampler does to a map: `border` in a million border cells take a neighbour's label, `anywhere` in a million
-/// cells take any label of the map. Unexplored cells stay so.
+/// Changes a map as a sampler does: of a million border cells, `border` take a neighbour's label; of a million cells,
+/// `anywhere` take any label of the map. Unexplored cells stay unexplored.
 pub fn sampler_noise(rng: &mut MapRng, raster: &mut LabelRaster, border: usize, anywhere: usize) {
     let before = raster.clone();
     let mut known: Vec<u8> = before.labels.iter().copied().filter(|&label| label != 0).collect();

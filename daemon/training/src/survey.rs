@@ -1,35 +1,35 @@
-//! A survey step by step: a swath of new cells, and the sampler changing its mind about old ones.
+//! A survey step by step: a swath of new cells, and the sampler's changes of old ones.
 
 use crate::MapRng;
 use crate::scene::{neighbours, sampler_noise};
 use scenecast_protocol::map_codec::LabelRaster;
 
-/// What a step does besides showing new cells.
+/// The changes of explored cells in each step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Flips {
     /// Border cells in a million that take a neighbour's label.
     pub border: usize,
-    /// Seen cells in a million that take any label.
+    /// Explored cells in a million that take any label.
     pub anywhere: usize,
-    /// Seen cells in a million that take the label of most of their neighbours.
+    /// Explored cells in a million that take the label of most of their neighbours.
     pub settling: usize,
 }
 
-/// A lawn-mower survey over a scene.
+/// A lawnmower survey over a scene.
 #[derive(Debug, Clone)]
 pub struct Survey {
     scene: LabelRaster,
     seen: LabelRaster,
     rng: MapRng,
     flips: Flips,
-    /// Height of a leg and length of a step, cells.
+    /// Height of a leg and length of a step in cells.
     swath: usize,
     stride: usize,
     step: usize,
 }
 
 impl Survey {
-    /// A survey that has seen nothing yet and is done after about `steps` steps.
+    /// A survey with an unexplored map, which is complete after about `steps` steps.
     pub fn new(seed: u64, scene: LabelRaster, flips: Flips, steps: usize) -> Self {
         let (width, height) = (scene.width, scene.height);
         let legs = (1..=steps).min_by_key(|&legs| {
@@ -42,12 +42,12 @@ impl Survey {
         Self { scene, seen, rng: MapRng::new(seed), flips, swath, stride, step: 0 }
     }
 
-    /// The map as the vehicle has it.
+    /// The map as the vehicle sees it.
     pub fn map(&self) -> &LabelRaster {
         &self.seen
     }
 
-    /// One step on.
+    /// Advances the survey by one step.
     pub fn advance(&mut self) {
         sampler_noise(&mut self.rng, &mut self.seen, self.flips.border, self.flips.anywhere);
         settle(&mut self.rng, &mut self.seen, self.flips.settling);

@@ -55,7 +55,6 @@ pub fn assemble(
     Ok(vehicle)
 }
 
-/// What the camera sees.
 fn footprint(config: &Config) -> Footprint {
     let mpp = config.camera.metres_per_pixel;
     Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }

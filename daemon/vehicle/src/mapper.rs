@@ -29,7 +29,6 @@ pub struct MapUpdate {
     pub cells: Vec<(Cell, u8)>,
     /// How sure the model is of these labels, 0 to 1, depths of the sea floor there, metres, and mean surprise of a word, bits.
     pub layers: BTreeMap<LayerKind, Vec<(Cell, f64)>>,
-    /// Labels given so far.
     pub labels: u8,
     /// How badly the model explains each cell.
     pub perplexity: Vec<(Cell, f32)>,
@@ -213,12 +212,10 @@ impl Mapper {
         self.book.epoch()
     }
 
-    /// Cells with words.
     pub fn cells(&self) -> usize {
         self.model.cells()
     }
 
-    /// Words held.
     pub fn words(&self) -> u64 {
         self.model.words()
     }

@@ -34,7 +34,6 @@ pub struct Navigator {
 /// What became of a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FixVerdict {
-    /// It corrects the estimate.
     Used,
     /// It is of a time that the vehicle does not remember.
     TooOld,
@@ -63,7 +62,7 @@ impl Navigator {
     /// How far it may have drifted while it was off, metres.
     const RESUMED_SIGMA_M: f64 = 50.0;
     /// Farther from the origin is no mission, metres.
-    const FARTHEST_M: f64 = 800_000.0;
+    const MAX_DISTANCE_M: f64 = 800_000.0;
 
     /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of way.
     pub fn new(x_m: f64, y_m: f64, depth_m: f64, drift: f64) -> Self {
@@ -171,7 +170,7 @@ impl Navigator {
     /// A fix of where in the world the vehicle was at `taken`.
     pub fn handle_fix(&mut self, at: WorldPoint, sigma_m: f64, taken: Instant, now: Instant) -> FixVerdict {
         let (x_m, y_m) = at.xy();
-        let is_place = x_m.abs() <= Self::FARTHEST_M && y_m.abs() <= Self::FARTHEST_M;
+        let is_place = x_m.abs() <= Self::MAX_DISTANCE_M && y_m.abs() <= Self::MAX_DISTANCE_M;
         if !is_place || !sigma_m.is_finite() || sigma_m < 0.0 {
             return FixVerdict::Absurd;
         }
@@ -250,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fix_moves_the_placement_and_neither_the_vehicle_nor_its_map() {
+    fn a_fix_moves_the_placement_but_not_the_map() {
         let mut nav = under_way();
         assert_eq!((nav.position(), nav.placement()), (MapPoint::new(60.0, 0.0), None));
         nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
@@ -264,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn fixes_tell_what_is_wrong_with_the_sensors_and_the_way_becomes_straight() {
+    fn fixes_calibrate_the_sensors_and_straighten_the_track() {
         // A compass that is off by two degrees, on a way of 1 km to the east.
         let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.03);
         let (sin, cos) = 2f64.to_radians().sin_cos();
@@ -299,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_that_nobody_measured_makes_the_place_uncertain_until_a_fix() {
+    fn unmeasured_motion_is_uncertain_until_a_fix() {
         let mut nav = under_way();
         nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.sigma_m();

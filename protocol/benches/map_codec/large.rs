@@ -1,9 +1,9 @@
-//! A large map with a few changes everywhere: how soon the first chunk is ready, and what memory it takes.
+//! A large map with a few changes everywhere: time to the first chunk, and memory.
 
 use scenecast_protocol::map::{Cell, MapSource, StateSource};
 use scenecast_protocol::map_codec::{Codec, LabelRaster};
 use scenecast_protocol::time::Instant;
-use scenecast_training::{MapRng, Scene, sampler_noise};
+use scenecast_training::{MapRng, MapScene, sampler_noise};
 
 const SIDE: usize = 2048;
 
@@ -11,7 +11,7 @@ const SIDE: usize = 2048;
 pub(crate) fn measure() {
     println!("{SIDE} x {SIDE} cells, 1 % changed");
     let mut rng = MapRng::new(5);
-    let patch = Scene::Colonies.draw(&mut rng, 256, 256, 8);
+    let patch = MapScene::Colonies.draw(&mut rng, 256, 256, 8);
     let mut source = MapSource::new(Codec::Auto);
     for row in 0..SIDE {
         let cells: Vec<_> = (0..SIDE).map(|column| (at(column, row), patch.get(column % 256, row % 256))).collect();
@@ -40,7 +40,7 @@ fn at(column: usize, row: usize) -> Cell {
     Cell::new(column as i32, row as i32)
 }
 
-/// Present and highest memory of the process, where the system tells.
+/// Current and highest memory of the process, where the system reports it.
 fn memory() -> String {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let lines = status.lines().filter(|line| line.starts_with("VmRSS") || line.starts_with("VmHWM"));

@@ -1,6 +1,7 @@
 //! Bytes and CPU time of map chunks on survey series, stills and a large map, against the best PNG.
 //!
-//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli takes nearly all of the time.
+//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli
+//! takes nearly all of the time.
 #![allow(clippy::disallowed_methods)]
 
 mod large;
@@ -10,7 +11,7 @@ mod zopfli_bytes;
 use cpu_time::ThreadTime;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::map_codec::{Codec, LabelRaster, decode, encode_all};
-use scenecast_training::{Flips, MapRng, Scene, Survey};
+use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use std::time::Duration;
 use zopfli_bytes::zopfli_bytes;
 
@@ -97,7 +98,7 @@ fn procedural(seeds: u64) {
         let mut totals = Totals::default();
         for seed in 0..seeds {
             let mut rng = MapRng::new(900 + seed);
-            let scene = Scene::ALL[seed as usize % 4].draw(&mut rng, SIDE, SIDE, 8);
+            let scene = MapScene::ALL[seed as usize % 4].draw(&mut rng, SIDE, SIDE, 8);
             totals.add(&series(&survey(seed, scene, flips)));
         }
         totals.print(name);
@@ -105,7 +106,7 @@ fn procedural(seeds: u64) {
     }
     all.print("all");
     println!("stills from nothing, {SIDE} x {SIDE}");
-    for (i, scene) in Scene::ALL.into_iter().enumerate() {
+    for (i, scene) in MapScene::ALL.into_iter().enumerate() {
         let mut totals = Totals::default();
         for seed in 0..seeds {
             let raster = scene.draw(&mut MapRng::new(700 + i as u64 * 10 + seed), SIDE, SIDE, 8);

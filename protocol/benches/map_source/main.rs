@@ -1,4 +1,4 @@
-//! How long a vehicle with a large map takes to say the next thing, and how much memory that takes.
+//! Time and memory of a vehicle with a large map to choose its next chunk.
 //!
 //! `cargo bench -p scenecast-protocol --bench map_source`
 #![allow(clippy::disallowed_methods)]
@@ -6,13 +6,13 @@
 use scenecast_protocol::map::{Cell, MapSource, StateSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
-use scenecast_training::{MapRng, Scene};
+use scenecast_training::{MapRng, MapScene};
 use std::time::Duration;
 
 const SIDE: usize = 2048;
 
 fn main() {
-    let tile = Scene::ALL[0].draw(&mut MapRng::new(1), 512, 512, 8);
+    let tile = MapScene::ALL[0].draw(&mut MapRng::new(1), 512, 512, 8);
     let label = |i: usize| tile.get(i % SIDE % 512, i / SIDE % 512).max(1);
     let cell = |i: usize| Cell::new((i % SIDE) as i32 - 900, (i / SIDE) as i32 - 900);
     for (codec, room) in [(Codec::Context, 64), (Codec::Context, 256), (Codec::Auto, 1000), (Codec::Png, 256)] {
@@ -42,7 +42,7 @@ fn main() {
     }
 }
 
-/// The surface holds everything: chunks of thousands of cells would take long here.
+/// Makes the surface hold everything; chunks of thousands of cells would take too long here.
 fn accept_all(source: &mut MapSource) {
     let cells: Vec<_> = source.target().iter().collect();
     source.handle_fate(cells, true, Instant::ZERO);
@@ -56,7 +56,6 @@ fn time<R>(name: &str, parts: u32, work: impl FnOnce() -> R) -> R {
     result
 }
 
-/// Resident memory of the process.
 fn memory_mb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));

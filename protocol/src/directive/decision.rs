@@ -8,7 +8,7 @@ pub enum SlotState {
     /// No version was received in this session of the surface.
     #[default]
     Unknown,
-    /// In force.
+    /// The vehicle has put it in force.
     Applied,
     /// Refused; the previous version stays in force.
     Refused(RefusalReason),

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn eight_vertices_and_a_return_point_fit_a_frame_of_64_bytes_under_a_key() {
+    fn eight_vertices_and_a_return_point_fit_a_keyed_frame() {
         let r = 8_000.0f64;
         let octagon = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
         let vertices =
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fence_that_no_vehicle_could_obey_is_refused_by_what_is_wrong() {
+    fn a_fence_that_no_vehicle_can_obey_is_refused() {
         let fence = |f: Polygon, k: &[Polygon], home: Option<(i32, i32)>| {
             let return_point = home.map(|(x, y)| DecimetrePoint::new(x, y));
             Fence { fence: Some(f), keep_outs: k.to_vec(), return_point }.check()

@@ -84,7 +84,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn what_is_typed_with_three_digits_is_what_is_in_force() {
+    fn three_typed_digits_come_into_force_exactly() {
         for text in ["0.01", "1e-12", "0.0005", "5e-5", "0.123", "999", "1000", "30", "50000", "1e8", "9.99e19", "0.3"]
         {
             let value: f64 = text.parse().unwrap();

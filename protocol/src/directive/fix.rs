@@ -16,7 +16,7 @@ use crate::coordinates::WorldPoint;
 /// The age is written at the moment of transmission, so the clocks of the two ends need not agree.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fix {
-    /// The measured position.
+    /// The measured position, in steps of a decimetre.
     pub position: WorldPoint,
     /// Standard deviation in metres, in steps of 0.25 m.
     pub sigma_m: f64,

@@ -5,11 +5,11 @@ use crate::bytes::{Reader, Truncated};
 /// A reaction of the vehicle's failsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reaction {
-    /// Stays at its position.
+    /// The vehicle stays at its position.
     Hold,
-    /// Goes to the return point and stays there.
+    /// The vehicle goes to the return point and stays there.
     Return,
-    /// Rises to the water surface.
+    /// The vehicle rises to the water surface.
     Surface,
 }
 
@@ -43,9 +43,9 @@ impl Reaction {
 /// A range of depth or altitude, in decimetres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Band {
-    /// The lowest allowed value.
+    /// The lowest allowed value in decimetres.
     pub low_dm: u16,
-    /// The highest allowed value.
+    /// The highest allowed value in decimetres.
     pub high_dm: u16,
 }
 
@@ -126,7 +126,7 @@ impl Limits {
         Ok(())
     }
 
-    /// Encodes the payload.
+    /// Encodes the payload of the slot.
     pub fn to_bytes(&self) -> Vec<u8> {
         let given = [
             self.depth.is_some(),

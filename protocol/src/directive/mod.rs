@@ -27,7 +27,7 @@ pub use utility::Utility;
 use crate::bytes::{Reader, Truncated};
 use crate::schedule::Class;
 
-/// The number of slots.
+/// The number of slots of the directive.
 pub const SLOTS: usize = 8;
 
 /// A slot of the directive; a newer version supersedes the older one of the same slot only.
@@ -79,7 +79,7 @@ impl SlotId {
         matches!(self, Self::Utility | Self::Constraints | Self::Settings | Self::Limits | Self::Fence)
     }
 
-    /// The name for people.
+    /// The name for people and in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Utility => "utility",
@@ -155,17 +155,17 @@ impl RefusalReason {
 pub enum Slot {
     /// Weights of labels, exploration and curiosity.
     Utility(Utility),
-    /// Hold and abort.
+    /// Orders to hold or to abort.
     Constraints(Constraints),
     /// Settings of mapping and planning.
     Settings(Settings),
     /// Bit budget, shares and background streams.
     Budget(Budget),
-    /// Requested exemplars.
+    /// The exemplars that the operator requests.
     Requests(ExemplarRequests),
-    /// A measured position.
+    /// A position that the surface has measured.
     Fix(Fix),
-    /// Limits and reactions.
+    /// Limits, and reactions to their breach.
     Limits(Limits),
     /// Fence, keep-outs and return point.
     Fence(Fence),
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn every_setting_at_once_leaves_room_in_a_frame_of_48_bytes() {
+    fn all_settings_at_once_fit_a_frame_of_48_bytes() {
         let figure = Change::To(Figure::new(0.01).unwrap());
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),

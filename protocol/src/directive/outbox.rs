@@ -40,11 +40,11 @@ pub struct SlotProgress {
 /// A slot that waits for transmission, encoded as of now.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PendingSlot {
-    /// The slot to send.
+    /// The slot that the chunk belongs to.
     pub id: SlotId,
-    /// The version to send.
+    /// The version within the series of this run.
     pub version: u16,
-    /// The encoded chunk.
+    /// The encoded payload of the chunk.
     pub bytes: Vec<u8>,
 }
 
@@ -88,8 +88,8 @@ impl SlotOutbox {
         self.progress().any(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
     }
 
-    /// The slots that the vehicle is not known to have received, commands before fixes, encoded as of `now`; without
-    /// those sent after `again_before`.
+    /// The slots that the vehicle is not known to have received, commands before fixes, encoded as of `now`;
+    /// without those sent after `again_before`.
     pub fn pending(&self, now: Instant, again_before: Instant) -> Vec<PendingSlot> {
         self.progress()
             .filter(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))

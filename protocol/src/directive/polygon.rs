@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_polygon_is_refused_by_what_is_wrong() {
+    fn invalid_polygons_are_refused_with_the_fault() {
         use PolygonFault::*;
         assert_eq!(polygon(&[(0, 0), (10, 0)]).check(), Err(Vertices(2)));
         assert_eq!(polygon(&[]).check(), Err(Vertices(0)));
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_inside_on_the_edge_or_outside() {
+    fn a_point_is_inside_on_the_edge_or_outside() {
         let u = polygon(&[(0, 0), (30, 0), (30, 30), (20, 30), (20, 10), (10, 10), (10, 30), (0, 30)]);
         assert_eq!(u.check(), Ok(()));
         for (x, y, inside) in [

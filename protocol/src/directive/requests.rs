@@ -12,14 +12,14 @@ use crate::bytes::{Reader, Truncated};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ExemplarRequest {
-    /// The label, 1..=254.
+    /// The label that the exemplar should show, 1..=254.
     pub label: u8,
     /// Serial number of the request, 1..=255.
     pub serial: u8,
     /// The largest edge is 64 << `size` pixels; 0..=3.
     pub size: u8,
-    /// The number of the exemplar, at most [`ExemplarRequest::MAX_PICTURE`]; 0 is the best one that the surface does
-    /// not have.
+    /// The number of the exemplar, at most [`ExemplarRequest::MAX_PICTURE`]; 0 is the best one that
+    /// the surface does not have.
     pub picture: u8,
 }
 

@@ -47,8 +47,8 @@ impl<T> Flight<T> {
         self.next += 1;
     }
 
-    /// Takes the peer's verdict. Returns the content of newly judged frames in the order of their numbers, and whether
-    /// each arrived.
+    /// Takes the peer's verdict. Returns the content of newly judged frames in the order of their
+    /// numbers, and whether each arrived.
     pub fn handle_statement(&mut self, statement: &AckStatement) -> Vec<(T, bool)> {
         let ahead = u64::from(statement.horizon_low.wrapping_sub(self.horizon as u16) & 0xFFF);
         let horizon = self.horizon + ahead;

@@ -1,5 +1,5 @@
-//! The handshake: which run of the peer this end communicates with. A hello names a run, and a numbered frame proves
-//! it.
+//! The handshake: which run of the peer this end communicates with. A hello names a run, and
+//! a numbered frame proves it.
 
 use super::run::{Identity, LinkRun};
 use crate::seal::SessionKey;
@@ -27,8 +27,8 @@ pub enum HandshakeOutcome {
 pub(super) struct Handshake<T> {
     own: Identity,
     run: Option<LinkRun<T>>,
-    /// At the vehicle: the run offered in answer to a hello, until a numbered frame proves that the surface has
-    /// accepted it.
+    /// At the vehicle: the run offered in answer to a hello, until a numbered frame proves that
+    /// the surface has accepted it.
     offered: Option<LinkRun<T>>,
     /// At the vehicle: `run` serves only to receive grants, because this end has begun a new one.
     leaving: bool,

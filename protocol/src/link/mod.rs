@@ -26,7 +26,7 @@ pub use window::{LinkWindow, WindowRefusal};
 
 use crate::schedule::Class;
 
-/// A frame to transmit.
+/// A frame that the host must transmit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Transmit {
     /// The receiver; a modem that addresses frames itself needs it.
@@ -46,7 +46,7 @@ pub enum TransmitKind {
     Hello,
     /// Grants a turn and carries no slot.
     Grant,
-    /// Acknowledges received frames only.
+    /// Only acknowledges received frames, without any chunk.
     Acknowledgement,
     /// The unchanged copy of an earlier frame.
     Repeat,
@@ -71,7 +71,7 @@ impl TransmitKind {
 /// The reason for a wakeup.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wakeup {
-    /// The granted turn begins.
+    /// The turn begins that the surface has granted.
     Turn,
     /// The surface may grant the next turn.
     Grant,

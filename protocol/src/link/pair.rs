@@ -53,7 +53,7 @@ pub struct LinkPair<T> {
     owes_hello: bool,
     /// Consecutive frames that seem to come from another run of the peer.
     strays: u32,
-    /// Counters and estimates.
+    /// Counters and estimates of this link.
     pub stats: LinkStats,
 }
 
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn tags_verify_across_every_turn_of_the_frame_counter() {
+    fn tags_verify_across_every_wrap_of_the_frame_counter() {
         let key = Arc::new(MissionKey::from_bytes([9; 16]));
         let authenticity = Some(Authenticity { key, all: true, encrypt: true });
         let auv = Address::vehicle(3).unwrap();

@@ -5,7 +5,7 @@ use crate::seal::{Direction, MissionKey, SessionKey};
 use crate::wire::{Envelope, Frame, MissionId, Seal, SessionId, unwrap_number};
 use std::sync::Arc;
 
-/// How frames are authenticated.
+/// The key and the scope of authentication.
 #[derive(Debug, Clone)]
 pub struct Authenticity {
     /// The mission key, which both ends share.

@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 pub struct SlotInboxState {
     /// The series of the surface's current run.
     pub series: Option<u16>,
-    /// Series that have ended.
+    /// Series of ended runs, oldest first.
     pub retired: VecDeque<u16>,
     /// The latest version received, by slot.
     pub versions: [Option<u16>; SLOTS],

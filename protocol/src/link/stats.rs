@@ -52,11 +52,11 @@ impl From<FrameError> for DropReason {
 pub struct LinkStats {
     /// Frames put on air, copies not included.
     pub frames_sent: u64,
-    /// Frames that were accepted.
+    /// Received frames that verified and were accepted.
     pub frames_received: u64,
     /// The highest frame number received of each run, added up; the excess over [`Self::frames_received`] was lost.
     pub frames_numbered: u64,
-    /// Received bytes, by class.
+    /// Bytes of accepted frames, by class.
     pub received_by_class: BTreeMap<Class, u64>,
     /// Own frames that the peer declared lost.
     pub frames_lost: u64,
@@ -82,12 +82,12 @@ pub struct LinkStats {
     pub loss_in: Loss,
     /// Useful bits that the peer declared received.
     pub goodput_out: Goodput,
-    /// Useful bits received.
+    /// Useful bits of accepted frames.
     pub goodput_in: Goodput,
 }
 
 impl LinkStats {
-    /// Counts a dropped frame.
+    /// Counts a dropped frame by its reason.
     pub fn drop(&mut self, reason: DropReason) {
         *self.dropped.entry(reason).or_default() += 1;
     }

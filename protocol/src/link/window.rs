@@ -125,17 +125,17 @@ mod tests {
         ) {
             let mut flight = Flight::<u64>::default();
             let mut window = LinkWindow::default();
-            let mut water: Vec<(u64, u16)> = Vec::new();
+            let mut channel: Vec<(u64, u16)> = Vec::new();
             let mut taken = BTreeSet::new();
             let mut fates = Vec::new();
             for (what, pick, room) in events {
                 match what {
                     0..5 if !flight.is_full() => {
-                        water.push((flight.next_number(), flight.base_distance()));
+                        channel.push((flight.next_number(), flight.base_distance()));
                         flight.push(flight.next_number());
                     }
-                    5..8 if !water.is_empty() => {
-                        let (number, distance) = water.remove(pick % water.len());
+                    5..8 if !channel.is_empty() => {
+                        let (number, distance) = channel.remove(pick % channel.len());
                         if window.accept(number as u16, distance).is_ok() {
                             prop_assert!(taken.insert(number), "frame {} taken twice", number);
                         }
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn both_ends_agree_across_every_turn_of_the_counters() {
+    fn both_ends_agree_across_every_wrap_of_the_counters() {
         let (mut flight, mut window) = (Flight::<u64>::default(), LinkWindow::default());
         let mut judged = 0;
         for i in 0..200_000u64 {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_durable_is_not_acknowledged() {
+    fn undurable_frames_are_not_acknowledged() {
         let mut w = LinkWindow::default();
         let first = w.accept(1, 1).unwrap();
         w.hold_back(first);

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_moment_comes_back_through_the_peers_clock() {
+    fn times_convert_to_the_peers_clock_and_back() {
         let now = Instant::from_secs_f64(90_000.5);
         let mut map = ClockMap::default();
         map.measure(1_000, Duration::from_millis(500), now);

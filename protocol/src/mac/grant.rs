@@ -22,8 +22,8 @@ impl Grant {
     /// Bits on air for each unit of the header's `remaining` byte from the surface.
     const REMAINING_BITS: u64 = 32;
 
-    /// The header's `remaining` byte for a surface turn of which `bits_on_air` follow: rounded up, 255 means that or
-    /// more.
+    /// The header's `remaining` byte for a surface turn of which `bits_on_air` follow: rounded up,
+    /// 255 means that or more.
     pub fn code_remaining(bits_on_air: u64) -> u8 {
         bits_on_air.div_ceil(Self::REMAINING_BITS).min(255) as u8
     }

@@ -50,8 +50,8 @@ enum MediumState {
 pub struct Master {
     config: MasterConfig,
     state: MediumState,
-    /// Recent measurements of the two-way propagation time. The least one counts, because every error makes it look
-    /// longer.
+    /// Recent measurements of the two-way propagation time. The least one counts, because every
+    /// error makes it look longer.
     round_trips: VecDeque<Duration>,
     unanswered: u32,
     granted_airtime: Duration,
@@ -116,8 +116,8 @@ impl Master {
         }
     }
 
-    /// The earliest retry of a vehicle that does not answer, while others wait. The interval doubles with each grant,
-    /// up to 128 s.
+    /// The earliest retry of a vehicle that does not answer, while others wait. The interval doubles with each
+    /// grant, up to 128 s.
     pub fn retry_at(&self) -> Instant {
         let Some(begun) = self.begun.filter(|_| self.unanswered >= 3) else { return Instant::ZERO };
         begun + Duration::from_secs(1 << (self.unanswered - 1).min(7))
@@ -131,8 +131,8 @@ impl Master {
         }
     }
 
-    /// The length of the next turn in quarter seconds: long compared to the cost of a handover, shorter where several
-    /// vehicles share the medium.
+    /// The length of the next turn in quarter seconds: long compared to the cost of a handover, shorter where
+    /// several vehicles share the medium.
     pub fn grant(&self, profile: &ModemProfile, vehicles: usize) -> u8 {
         let cost = self.round_trip().unwrap_or(self.config.max_propagation * 2) + profile.turn_around * 2;
         let least = profile.frame_airtime() + Duration::from_secs(1);

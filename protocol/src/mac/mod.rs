@@ -21,8 +21,8 @@ pub enum Access {
     /// The surface grants turns, and a vehicle transmits only in its turn. A full-duplex link works this way too.
     #[default]
     Shared,
-    /// The modem does half duplex and repetition by itself; each end transmits as long as the modem's pool takes
-    /// frames.
+    /// The modem does half duplex and repetition by itself; each end transmits as long as
+    /// the modem's pool takes frames.
     ModemOwned {
         /// Frames in the modem at a time: about a turn's worth, so that queued frames do not become outdated.
         pool_frames: u32,

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_put_in_is_listed_in_order_until_taken_out() {
+    fn cells_are_listed_in_order_until_removed() {
         let mut set = TileSet::default();
         for cell in [255, 0, 64, 63, 7] {
             set.set(cell, true);

@@ -1,7 +1,7 @@
 //! The replicated label map and its layers.
 //!
-//! [`MapSource`] is the vehicle's side and [`Replica`] the surface's. The link replicates any state that has these two
-//! sides ([`StateSource`], [`StateReplica`]).
+//! [`MapSource`] is the vehicle's side and [`Replica`] the surface's. The link replicates any state that has
+//! these two sides ([`StateSource`], [`StateReplica`]).
 
 mod bits;
 mod coarse;

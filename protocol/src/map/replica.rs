@@ -5,8 +5,8 @@ use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
-/// The most cells that a replica knows, and the most changes that wait for the base: a few bytes can claim a whole
-/// patch.
+/// The most cells that a replica knows, and the most changes that wait for the base: a few bytes
+/// can claim a whole patch.
 const MAX_CELLS: usize = 1 << 23;
 
 /// The replica's knowledge of a cell besides its label.
@@ -119,7 +119,7 @@ mod tests {
     use crate::map_codec::{Codec, encode};
 
     #[test]
-    fn chunks_that_claim_more_cells_than_a_map_has_are_refused() {
+    fn chunks_that_claim_too_many_cells_are_refused() {
         let target: LabelGrid = (0..100).map(|i| (Cell::new(i % 10, i / 10), 7)).collect();
         let chunk = encode(Codec::Png, &LabelGrid::default(), &target, Cell::new(5, 5), 200, &|_| true).unwrap();
         let mut replica = Replica { logged: MAX_CELLS - 150, ..Replica::default() };

@@ -86,8 +86,8 @@ impl MapSource {
         self.set_confident(cells.into_iter().map(|(cell, label)| (cell, label, 0)), now)
     }
 
-    /// As [`Self::set`], with the model's confidence in each label, 0 to [`MAX_CONFIDENCE`]; certain labels are not
-    /// held back.
+    /// As [`Self::set`], with the model's confidence in each label, 0 to [`MAX_CONFIDENCE`]; certain
+    /// labels are not held back.
     pub fn set_confident(&mut self, cells: impl IntoIterator<Item = (Cell, u8, u8)>, now: Instant) -> usize {
         let mut changed = 0;
         for (cell, label, confidence) in cells {

@@ -27,8 +27,8 @@ pub trait StateSource: Debug {
         None
     }
 
-    /// The approximate number of bytes that wait for transmission, without those held back; rather too many than too
-    /// few.
+    /// The approximate number of bytes that wait for transmission, without those held back; rather
+    /// too many than too few.
     fn backlog_bytes(&self) -> usize;
 
     /// Whether the waiting content is large and only refines an overview that is already sent.

@@ -2,8 +2,8 @@
 
 use super::UNEXPLORED;
 
-/// The value of a change between labels without interest. It is positive so that age, which multiplies it, lets no cell
-/// starve.
+/// The value of a change between labels without interest. It is positive so that age, which multiplies
+/// it, lets no cell starve.
 const FLOOR: f64 = 0.2;
 /// The value of correcting a label, relative to that of showing a new cell.
 const CORRECTION: f64 = 0.5;
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn new_cells_come_before_lonely_flips_and_age_comes_before_both() {
+    fn age_outranks_new_cells_and_these_isolated_flips() {
         let interest = Interest::new(|label| if label == 7 { 0.8 } else { 0.0 });
         let value = |old: u8, new: u8, since_s: f64| {
             let mut value = Value::default();

@@ -62,7 +62,7 @@ pub enum ChunkFileError {
     /// Not even one cell fits into the room.
     #[error("a chunk of {0} bytes holds no cell")]
     Room(usize),
-    /// A chunk is refused.
+    /// A chunk does not decode against the base.
     #[error("chunk {index}: {error}")]
     Chunk {
         /// Index of the chunk, from 0.
@@ -124,7 +124,7 @@ impl ChunkFile {
         Ok(LabelRaster::from_grid(&map, width, height))
     }
 
-    /// Encodes the file.
+    /// Encodes the file with its checksum at the end.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::from(MAGIC);
         out.push(VERSION);

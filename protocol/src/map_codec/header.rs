@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_typical_head_keeps_its_golden_bytes() {
+    fn a_typical_header_keeps_its_golden_bytes() {
         let patch = Rect { x: 200, y: -3, width: 40, height: 24 };
         let header = ChunkHeader { body: Body::Context, stride: Stride::One, patch, check: 0xA5 };
         // 1 | 0 | 010 | 011001000 | 111111101 | 01 | 100111 | 010111 | 10100101 | 000
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn heads_of_any_size_read_back() {
+    fn headers_of_any_size_read_back() {
         for (x, y) in [(0, 0), (127, -128), (128, 0), (-1024, 1023), (-1025, 9), (40_000, -1), (i32::MAX, i32::MIN)] {
             for (width, height) in [(1, 1), (16, 16), (17, 3), (64, 65), (1024, 64)] {
                 for stride in [Stride::One, Stride::Four] {

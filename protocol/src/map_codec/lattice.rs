@@ -2,8 +2,8 @@
 
 use crate::grid::{Cell, LabelGrid};
 
-/// Every n-th cell of a map, n = 1 or 4, numbered without gaps: cell (x, y) of the lattice is cell (n x, n y) of the
-/// map.
+/// Every n-th cell of a map, n = 1 or 4, numbered without gaps: cell (x, y) of the lattice is cell (n x,
+/// n y) of the map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lattice<'a> {
     grid: &'a LabelGrid,
@@ -21,7 +21,7 @@ pub enum Stride {
 }
 
 impl Stride {
-    /// The distance in cells.
+    /// The distance in cells of the map.
     pub const fn cells(self) -> i32 {
         match self {
             Self::One => 1,

@@ -109,7 +109,6 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Every change in `rect`.
     pub(super) fn between(base: Lattice<'_>, target: Lattice<'_>, rect: Rect) -> Self {
         let (width, height) = (rect.width as usize, rect.height as usize);
         let copy = |grid: Lattice<'_>| grid.copy_area(i64::from(rect.x), i64::from(rect.y), width, height);

@@ -25,8 +25,8 @@ pub(super) fn add_repair<'a>(to: &mut [u8], repair: u8, sources: impl Iterator<I
     }
 }
 
-/// The source symbols with the indices `missing`, in that order, from as many repair symbols and all `known` source
-/// symbols.
+/// The source symbols with the indices `missing`, in that order, from as many repair symbols
+/// and all `known` source symbols.
 pub(super) fn recover<'a>(
     missing: &[u8],
     mut repairs: Vec<Placed<Vec<u8>>>,

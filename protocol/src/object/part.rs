@@ -80,7 +80,7 @@ impl<'a> Part<'a> {
         out
     }
 
-    /// Encodes header and symbols.
+    /// Encodes the part as the payload of a chunk.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Self::header(self.id, self.layout, usize::from(self.first), Self::HEADER + self.data.len());
         out.extend_from_slice(self.data);

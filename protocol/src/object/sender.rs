@@ -47,7 +47,7 @@ impl ObjectSender {
         Some(ObjectId::of(serial))
     }
 
-    /// Stops sending an object.
+    /// Stops sending an object; an unknown one is ignored.
     pub fn cancel(&mut self, id: ObjectId) {
         self.objects.retain(|o| ObjectId::of(o.serial) != id);
     }
@@ -91,8 +91,8 @@ impl ObjectSender {
         }
     }
 
-    /// The next part of at most `room` bytes, header included, of an object with a share. It stays the same until it is
-    /// marked in flight.
+    /// The next part of at most `room` bytes, header included, of an object with a share. It stays the same until
+    /// it is marked in flight.
     pub fn next_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
         self.next_part_of(false, room)
     }

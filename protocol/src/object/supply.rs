@@ -10,7 +10,7 @@ pub(super) struct Supply {
     arrive: f64,
     /// Symbols of a block that are lost together.
     run: f64,
-    /// Standard deviations to cover.
+    /// Margin of the plan in standard deviations.
     margin: f64,
 }
 
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exactly_what_is_missing_is_sent_where_nothing_is_lost() {
+    fn a_lossless_link_sends_exactly_the_missing_symbols() {
         let supply = Supply::new(0.0, 11, 2);
         assert!((0..200).all(|n| supply.in_flight(n) == n));
     }

@@ -161,7 +161,7 @@ proptest! {
 }
 
 #[test]
-fn no_repair_symbol_is_sent_where_nothing_is_lost() {
+fn a_lossless_link_sends_no_repair_symbol() {
     for (len, room) in [(1, 14), (700, 14), (700, 49), (5000, 240), (MAX_OBJECT, 1000)] {
         let mut link = LossyLink::new(1, 0.0);
         let object = link.chance.object(len);
@@ -211,7 +211,7 @@ fn cost(len: usize, room: usize, loss: f64) -> Cost {
 }
 
 #[test]
-fn one_pass_is_enough_for_most_objects_at_the_loss_that_is_told() {
+fn one_pass_completes_most_objects_at_the_expected_loss() {
     for (len, room) in [(700, 49), (700, 113), (4000, 113), (4000, 240), (MAX_OBJECT, 240), (MAX_OBJECT, 1000)] {
         let Cost { complete, one_pass, in_all } = cost(len, room, 0.3);
         let case =
@@ -221,7 +221,7 @@ fn one_pass_is_enough_for_most_objects_at_the_loss_that_is_told() {
 }
 
 #[test]
-fn late_parts_of_a_complete_object_begin_nothing() {
+fn late_parts_of_a_complete_object_are_ignored() {
     let mut link = LossyLink::new(3, 0.0);
     link.sender.set_loss(0.5);
     let object = link.chance.object(900);
@@ -255,7 +255,7 @@ fn a_name_that_is_used_again_is_another_object() {
 }
 
 #[test]
-fn an_object_is_given_up_before_its_name_is_used_again() {
+fn an_object_is_dropped_before_its_name_is_reused() {
     let mut sender = ObjectSender::default();
     let first = sender.push(vec![1; 50]).unwrap();
     for later in 1..3000 {
@@ -279,7 +279,7 @@ fn the_head_is_known_before_the_rest() {
 }
 
 #[test]
-fn a_restart_of_the_peer_begins_anew_and_old_fates_count_nothing() {
+fn a_restart_of_the_peer_voids_earlier_fates() {
     let mut link = LossyLink::new(6, 0.0);
     let object = link.chance.object(700);
     link.sender.push(object.clone()).unwrap();
@@ -295,7 +295,7 @@ fn a_restart_of_the_peer_begins_anew_and_old_fates_count_nothing() {
 }
 
 #[test]
-fn what_is_cancelled_at_the_receiver_stays_away() {
+fn a_cancelled_object_is_not_received_again() {
     let mut link = LossyLink::new(7, 0.0);
     let object = link.chance.object(700);
     let id = link.sender.push(object).unwrap();

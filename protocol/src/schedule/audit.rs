@@ -4,8 +4,8 @@ use crate::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Counts bits on air where frames enter the modem, and keeps the largest sum of any window. It shares no code with the
-/// budget.
+/// Counts bits on air where frames enter the modem, and keeps the largest sum of any window. It shares
+/// no code with the budget.
 #[derive(Debug, Clone)]
 pub struct Audit {
     window: Duration,

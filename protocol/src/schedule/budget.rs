@@ -36,7 +36,7 @@ impl BitBudget {
         self.spend((self.capacity() / 1_000_000).max(0) as u64, now);
     }
 
-    /// The rate in bit/s.
+    /// The rate of the budget in bit/s.
     pub fn bits_per_s(&self) -> u32 {
         self.bits_per_s
     }
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_budget_is_used_to_the_last_bit_over_a_long_run() {
+    fn the_whole_budget_is_used_over_a_long_run() {
         let mut budget = BitBudget::new(100, Duration::from_secs(10), Instant::ZERO);
         let (mut now, mut sent) = (Instant::ZERO, 0);
         while now < Instant::from_secs_f64(3600.0) {

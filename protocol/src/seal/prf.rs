@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn joined_parts_tell_where_each_ends() {
+    fn joined_parts_keep_their_boundaries() {
         assert_eq!(join(&[b"ab", b"", b"c"]), [0, 0, 0, 2, b'a', b'b', 0, 0, 0, 0, 0, 0, 0, 1, b'c']);
         assert_ne!(join(&[b"ab", b"c"]), join(&[b"a", b"bc"]));
     }

@@ -43,7 +43,7 @@ fn golden_bytes() {
 }
 
 #[test]
-fn nobody_sees_the_secret_in_what_is_printed_for_debugging() {
+fn debug_output_hides_the_secret() {
     let said = format!("{:?} {:?}", key(), session(true));
     assert_eq!(said, format!("MissionKey({:08x}) SessionKey {{ encrypt: true, .. }}", key().fingerprint()));
 }
@@ -66,7 +66,7 @@ fn every_input_of_a_session_changes_its_key() {
 }
 
 #[test]
-fn what_an_encrypted_session_sealed_no_plain_one_opens() {
+fn no_plain_session_opens_an_encrypted_frame() {
     let mut body = *b"body";
     let tag = session(true).seal(Direction::Up, 1, b"head", &mut body);
     assert!(!session(false).open(Direction::Up, 1, b"head", &mut body, &tag));
@@ -114,7 +114,7 @@ fn random_forgeries_are_refused() {
 
 proptest! {
     #[test]
-    fn what_was_sealed_opens(
+    fn a_sealed_frame_opens(
         encrypt: bool, direction in direction(), number: u64, head in vec(any::<u8>(), 0..40), body in vec(any::<u8>(), 0..300),
     ) {
         let mut sealed = body.clone();

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn every_problem_names_its_line_and_what_is_allowed() {
+    fn every_error_names_its_line_and_the_allowed_form() {
         assert_eq!(error(""), Some(KeyError::Missing));
         assert_eq!(error("# a\n#b"), Some(KeyError::Missing));
         assert_eq!(error("\nhello"), Some(KeyError::NotAKey { line: 2 }));

@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tenth_lost_of_five_hundred_frames_takes_under_forty_bytes() {
+    fn fifty_losses_in_500_frames_take_under_40_bytes() {
         let lost: Vec<u16> = (0..50).map(|i| i * 10 + (i * 7 % 5)).collect();
         let mut bytes = Vec::new();
         assert!(AckStatement { horizon_low: 0, lost }.encode(40, &mut bytes));

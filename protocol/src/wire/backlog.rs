@@ -12,7 +12,7 @@ use crate::bytes::{Reader, Truncated};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Backlog {
-    /// Bytes of map labels.
+    /// Bytes of labels of the map.
     pub map_bytes: u32,
     /// Bytes of layers and images.
     pub other_bytes: u32,
@@ -56,7 +56,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_backlog_comes_back_no_smaller_and_by_at_most_an_eighth_larger(bytes in 0u32..=491_520) {
+        fn a_backlog_is_rounded_up_by_at_most_an_eighth(bytes in 0u32..=491_520) {
             let back = value(code(bytes));
             prop_assert!(back >= bytes && back - bytes <= bytes / 8, "{bytes} became {back}");
         }

@@ -3,7 +3,7 @@
 /// The longest header of a chunk in bytes.
 pub const MAX_CHUNK_HEADER: usize = 2;
 
-/// The kinds of chunks.
+/// The kinds of chunks that a frame can carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChunkKind {
     /// A patch of the label map.
@@ -142,7 +142,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_last_chunk_that_fills_the_frame_has_a_one_byte_header() {
+    fn a_last_chunk_filling_the_frame_has_a_short_header() {
         let mut out = Vec::new();
         assert!(push_chunk(ChunkKind::Map, &[7; 200], 201, &mut out));
         assert_eq!((out.len(), out[0]), (201, 0b001_11111));

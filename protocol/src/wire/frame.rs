@@ -114,7 +114,7 @@ pub struct Envelope<'a> {
 /// A frame whose seal was verified.
 #[derive(Debug, Clone)]
 pub struct Frame<'a> {
-    /// The verified header.
+    /// The header, verified together with the chunks.
     pub header: Header,
     body: Cow<'a, [u8]>,
 }
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_64_bytes_spends_at_most_14_on_everything_but_payload() {
+    fn a_frame_of_64_bytes_has_50_bytes_of_payload() {
         let mut b = FrameBuilder::new(&header(), 64);
         let payload = vec![1; room_for_payload(b.room())];
         assert!(b.push(ChunkKind::Map, &payload));

@@ -12,7 +12,7 @@ use std::num::NonZeroU16;
 pub struct Address(u8);
 
 impl Address {
-    /// The surface end.
+    /// The address of the surface end.
     pub const SURFACE: Self = Self(0);
     /// All vehicles; never a sender.
     pub const EVERYBODY: Self = Self(15);
@@ -103,11 +103,11 @@ impl FrameKind {
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// The sending end.
+    /// The address of the sending end.
     pub from: Address,
     /// The receiving end, or everybody.
     pub to: Address,
-    /// The sender's session.
+    /// The session of the sender's run.
     pub session: SessionId,
     /// Low 16 bits of the frame's number; 0 in a hello.
     pub number: u16,

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_vehicle_writes_is_refused() {
+    fn unusual_encodings_of_a_path_are_refused() {
         let wider_than_need_be = [0x23, 0x8E, 0xE5, 0x88, 0x00];
         let (nothing, standing_still, padded) = ([0x00], [0x10, 0x80], [0x23, 0x1D, 0x94, 0x40, 0x01]);
         let (zero_wide, cut, too_long) = ([0x10, 0x00], [0x23, 0x1D], [0x80, 0x00]);
@@ -131,7 +131,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn as_much_as_fits_the_room_comes_back_and_the_rest_is_said_to_follow(
+        fn a_path_is_cut_to_the_room_and_marked(
             steps in proptest::collection::vec((-30_000i32..30_000, -300i32..300), 0..12),
             continues: bool,
             room in 0usize..60,

@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn versions_count_the_moves_and_leave_zero_out() {
+    fn versions_count_the_moves_and_skip_zero() {
         let first = Placement::moved_to(None, WorldPoint::new(1.0, 2.0));
         assert_eq!(first.version, 1);
         assert_eq!(Placement::moved_to(Some(Placement { version: 255, ..first }), WorldPoint::default()).version, 1);

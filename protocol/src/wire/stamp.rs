@@ -23,14 +23,14 @@ const CLOCK_BITS: u32 = 24;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// The surface's stamp.
+    /// A stamp in a frame of the surface.
     Surface {
         /// Clock in milliseconds, low 24 bits.
         clock_ms: u32,
         /// One-way propagation time, once it was measured.
         one_way: Option<Duration>,
     },
-    /// A vehicle's stamp.
+    /// A stamp in a frame of a vehicle.
     Vehicle {
         /// Clock in milliseconds, low 24 bits.
         clock_ms: u32,

@@ -21,7 +21,7 @@ pub enum VehicleMode {
     Surface,
     /// An abort has stopped the vehicle.
     Abort,
-    /// The survey is complete.
+    /// The survey is complete, and the vehicle stays.
     Done,
 }
 
@@ -114,13 +114,13 @@ impl ModeReason {
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
-    /// The current activity.
+    /// The activity of the vehicle at present.
     pub mode: VehicleMode,
     /// Whether the autopilot does not answer, so that the mode is not carried out.
     pub autopilot_silent: bool,
     /// The reason for the mode.
     pub reason: ModeReason,
-    /// The estimated position.
+    /// The estimated position in the map frame.
     pub position: MapPoint,
     /// Depth below the water surface in metres.
     pub depth_m: f64,
@@ -191,8 +191,8 @@ impl VehicleStatus {
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 
-    /// Encodes the pose; values out of range are clamped. If `room` is too small, the waypoint or the end of the path
-    /// is left out.
+    /// Encodes the pose; values out of range are clamped. If `room` is too small, the waypoint or the end of
+    /// the path is left out.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
         let waypoint = self.waypoint.filter(|_| room >= Self::POSE);
         let flags = u8::from(waypoint.is_some()) << 4 | u8::from(self.autopilot_silent) << 3;
@@ -212,9 +212,9 @@ impl VehicleStatus {
         out
     }
 
-    /// Encodes a report of at most `room` bytes on the decided slots from `first` on, and on the placement. Also
-    /// returns the slot with which the next report must begin, 0 if this one is complete. `None` means that not even
-    /// one slot fits.
+    /// Encodes a report of at most `room` bytes on the decided slots from `first` on, and on the placement.
+    /// Also returns the slot with which the next report must begin, 0 if this one is complete. `None` means
+    /// that not even one slot fits.
     pub fn encode_report(&self, room: usize, first: usize) -> Option<(Vec<u8>, usize)> {
         let known = |&(_, s): &(usize, &SlotReport)| s.state != SlotState::Unknown;
         let decided: Vec<(usize, &SlotReport)> = self.slots.iter().enumerate().skip(first).filter(known).collect();

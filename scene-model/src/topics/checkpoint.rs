@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn new_priors_act_as_if_the_model_was_built_with_them() {
+    fn new_priors_act_as_in_a_model_built_with_them() {
         for (alpha, beta, gamma) in [(0.3, 0.1, 0.01), (0.01, 2.0, 0.01), (0.01, 0.1, 5.0), (2.0, 0.02, 0.0)] {
             let mut tuned = model(5);
             let (before, topics) = (tuned.save(), tuned.snapshot().topics);

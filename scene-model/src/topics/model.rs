@@ -187,8 +187,7 @@ impl SceneModel {
 
     /// Adds words that were seen at the time `t_s`, in seconds, and gives each a first label.
     ///
-    /// Words that the model cannot hold are counted and skipped. The
-    /// time matters for [`SceneModel::last_seen_s`] alone.
+    /// Words that the model cannot hold are counted and skipped. The time is used for [`SceneModel::last_seen_s`] alone.
     pub fn insert(&mut self, t_s: f64, observations: &[Observation]) -> Inserted {
         self.last_seen_s = self.last_seen_s.max(t_s);
         let mut outcome = Inserted::default();
@@ -328,9 +327,9 @@ impl SceneModel {
 
     /// Returns the label map flattened to two dimensions, sorted by `(y, x)`.
     ///
-    /// The label of a cell is the mode of the MAP labels of its words. Where cells lie above each other, the
-    /// label with the most words in the column wins, ties to the upper cell. Only cells that have changed since
-    /// the last call are evaluated.
+    /// The label of a cell is the mode of the MAP labels of its words. Where cells lie above each other, the label with
+    /// the most words in the column wins, ties to the upper cell. Only the cells that were resampled since the last call
+    /// are evaluated, and after [`SceneModel::refine`] a share of the others in turn.
     #[must_use]
     pub fn label_map(&self) -> Vec<FlatCell> {
         self.fresh_map().flatten(&self.cells)

@@ -20,7 +20,7 @@ pub fn host(mut modem: impl Emulator, data: &[u8]) {
 /// Feeds a frame from the channel.
 pub fn channel(mut modem: impl Emulator, data: &[u8]) {
     let now = Duration::from_secs(5);
-    let place = NodePosition::default();
+    let position = NodePosition::default();
     let outcome = ReceptionOutcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };
     let arrival = Arrival {
         transmission: 1,
@@ -29,8 +29,8 @@ pub fn channel(mut modem: impl Emulator, data: &[u8]) {
         at: now,
         sent_at: now - Duration::from_secs(2),
         range_m: 100.0,
-        sender: place,
-        receiver: place,
+        sender: position,
+        receiver: position,
         airtime: Duration::from_secs(1),
         outcome,
     };
@@ -42,5 +42,5 @@ fn drain(modem: &mut impl Emulator, now: Duration) {
     modem.handle_timeout(now);
     while modem.poll_transmit(now).is_some() {}
     while modem.poll_event().is_some() {}
-    modem.poll_host_bytes(HostId::FIRST, now);
+    let _ = modem.poll_host_bytes(HostId::FIRST, now);
 }

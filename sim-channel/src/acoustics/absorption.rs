@@ -2,12 +2,13 @@
 
 /// Absorption in dB/km at `frequency_khz`, valid from a few hundred Hz to about 50 kHz.
 ///
-/// Source: W. H. Thorp 1967, in the form of Brekhovskikh and Lysanov, "Fundamentals of Ocean Acoustics"; for 4 degrees
-/// Celsius and 35 ppt near the surface.
-///
 /// ```
 /// assert!((sim_channel::acoustics::thorp_db_per_km(26.0) - 6.53).abs() < 0.01);
 /// ```
+///
+/// Source: W. H. Thorp 1967, in the form of Brekhovskikh and Lysanov, "Fundamentals of Ocean Acoustics"; for 4 degrees
+/// Celsius and 35 ppt near the surface.
+#[must_use]
 pub fn thorp_db_per_km(frequency_khz: f64) -> f64 {
     let f2 = frequency_khz * frequency_khz;
     0.11 * f2 / (1.0 + f2) + 44.0 * f2 / (4100.0 + f2) + 2.75e-4 * f2 + 0.003

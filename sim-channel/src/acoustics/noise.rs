@@ -7,8 +7,9 @@ use super::sum_db;
 /// `wind_m_s` is the wind speed at the surface, `shipping` 0 (none)..=1 (heavy). Turbulence, shipping, waves and thermal
 /// noise add as powers.
 ///
-/// Source: G. M. Wenz 1962, in the empirical form of R. Coates, "Underwater Acoustic Systems", as used by M. Stojanovic
-/// 2007.
+/// Source: G. M. Wenz 1962, in the empirical form of R. Coates, "Underwater Acoustic Systems", as M. Stojanovic used it
+/// in 2007.
+#[must_use]
 pub fn wenz_db(frequency_khz: f64, wind_m_s: f64, shipping: f64) -> f64 {
     let f = frequency_khz.max(1e-3);
     let turbulence = 17.0 - 30.0 * f.log10();
@@ -21,6 +22,7 @@ pub fn wenz_db(frequency_khz: f64, wind_m_s: f64, shipping: f64) -> f64 {
 /// Typical wind speed in m/s at a sea state 0..=6; higher states give the speed of 6.
 ///
 /// Source: middle of the wind ranges in knots given with the noise curves of Wenz and of Knudsen (Urick).
+#[must_use]
 pub fn wind_of_sea_state(sea_state: u8) -> f64 {
     const KNOTS: [f64; 7] = [0.5, 5.0, 8.5, 13.5, 19.0, 24.5, 37.5];
     const M_S_PER_KNOT: f64 = 0.514_444;

@@ -7,6 +7,7 @@ use super::absorption::thorp_db_per_km;
 /// `exponent` is 1 for cylindrical and 2 for spherical spreading; 1.5 is usual in practice. Within a metre the loss is 0.
 ///
 /// Source: R. J. Urick, "Principles of Underwater Sound".
+#[must_use]
 pub fn transmission_loss_db(range_m: f64, frequency_khz: f64, exponent: f64) -> f64 {
     let range_m = range_m.max(1.0);
     exponent * 10.0 * range_m.log10() + thorp_db_per_km(frequency_khz) * (range_m - 1.0) / 1000.0

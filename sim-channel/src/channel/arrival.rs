@@ -75,6 +75,7 @@ pub enum ReceptionOutcome {
 
 /// Why a frame did not arrive; if several reasons hold, the first of this list is reported.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
+#[non_exhaustive]
 pub enum LossReason {
     /// A scheduled outage covered part of the reception. Such a frame disturbs no other.
     Outage,

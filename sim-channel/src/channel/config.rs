@@ -6,8 +6,8 @@ use std::time::Duration;
 
 /// The conditions of a channel.
 ///
-/// [`Channel::set_config`](super::Channel::set_config) changes them while the channel runs;
-/// [`presets`](super::presets) names common situations.
+/// [`Channel::set_config`](super::Channel::set_config) changes them while the channel runs; [`presets`](super::presets)
+/// has the conditions of common situations.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ChannelConfig {
     /// Speed of sound, m/s; 1300..=1700 in water. Default 1500.
@@ -26,7 +26,7 @@ pub struct ChannelConfig {
     pub reorder_delay: Duration,
     /// Slant range beyond which no signal is detected, m. Default: no limit.
     pub max_range_m: f64,
-    /// Scheduled silences. Default none.
+    /// Scheduled silences of links, nodes or the channel. Default none.
     pub outages: Vec<Outage>,
 }
 

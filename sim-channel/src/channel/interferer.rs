@@ -6,8 +6,6 @@ use std::time::Duration;
 
 /// A node with Poisson traffic of random bytes, which other modems receive as noise.
 ///
-/// [`Basin`](crate::modem::Basin) drives it. Without a basin, place its node and put its frames on air:
-///
 /// ```
 /// use sim_channel::{Channel, ChannelConfig, Duration, Interferer, NodeId, NodePosition};
 ///
@@ -19,6 +17,8 @@ use std::time::Duration;
 /// channel.transmit(noise.node(), bytes, airtime, at);
 /// assert!(noise.poll_transmit(at).is_none() && noise.poll_timeout() > Some(at + airtime));
 /// ```
+///
+/// [`Basin`](crate::modem::Basin) drives it. Without a basin, place its node and put its frames on air:
 #[derive(Debug)]
 pub struct Interferer {
     node: NodeId,
@@ -31,6 +31,7 @@ pub struct Interferer {
 
 impl Interferer {
     /// An interferer at `node` whose frames of `bytes` random bytes take `airtime`, with `mean_gap` between them on average.
+    #[must_use]
     pub fn new(node: NodeId, bytes: usize, airtime: Duration, mean_gap: Duration, seed: u64) -> Self {
         const PURPOSE: u64 = 0x7a1c;
         let rng = RandomStream::new(seed, &[PURPOSE, u64::from(node.0)]);
@@ -40,16 +41,19 @@ impl Interferer {
     }
 
     /// The node whose position it transmits from.
+    #[must_use]
     pub fn node(&self) -> NodeId {
         self.node
     }
 
     /// Time of its next transmission; never `None`.
+    #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
         Some(self.next)
     }
 
     /// Bytes and airtime of the transmission that is due by `now`; `None` before its time.
+    #[must_use]
     pub fn poll_transmit(&mut self, now: Duration) -> Option<(Vec<u8>, Duration)> {
         if now < self.next {
             return None;

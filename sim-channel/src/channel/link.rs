@@ -1,8 +1,7 @@
 //! One direction between two nodes: its instance of the loss model and its own random streams.
 
 use super::ChannelConfig;
-use crate::loss::LossModel;
-use crate::loss::{FrameContext, FrameFate, LinkLoss};
+use crate::loss::{FrameContext, FrameFate, LinkLoss, LossModel};
 use crate::nodes::NodeId;
 use crate::random::RandomStream;
 

@@ -13,8 +13,7 @@ pub use config::ChannelConfig;
 pub use interferer::Interferer;
 pub use outage::{Outage, OutageScope};
 
-use crate::loss::LossModel;
-use crate::loss::{FrameContext, FrameFate};
+use crate::loss::{FrameContext, FrameFate, LossModel};
 use crate::nodes::{NodeId, NodePosition, Track};
 use link::DirectedLink;
 use reception::{Reception, Span};
@@ -23,9 +22,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// An acoustic channel between placed nodes, in virtual time.
-///
-/// Every call takes a `now` that never goes back. A transmission that begins before a time must be put on air before
-/// arrivals are polled at that time, because it may collide with them.
 ///
 /// ```
 /// use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
@@ -41,6 +37,9 @@ use std::time::Duration;
 /// assert_eq!((arrival.to, arrival.range_m), (NodeId(2), 1500.0));
 /// assert!(channel.poll_timeout().is_none());
 /// ```
+///
+/// Every call takes a `now` that never goes back. A transmission that begins before a time must be put on air before
+/// arrivals are polled at that time, because it may collide with them.
 #[derive(Debug)]
 pub struct Channel {
     config: ChannelConfig,
@@ -61,6 +60,7 @@ pub struct Channel {
 
 impl Channel {
     /// A channel without nodes; all random draws in it come from `seed`.
+    #[must_use]
     pub fn new(config: ChannelConfig, seed: u64) -> Self {
         Self {
             config,
@@ -80,6 +80,7 @@ impl Channel {
     }
 
     /// The conditions for transmissions from now on.
+    #[must_use]
     pub fn config(&self) -> &ChannelConfig {
         &self.config
     }
@@ -112,8 +113,9 @@ impl Channel {
         self.positions.insert(node, position);
     }
 
-    /// Adds a node that moves along a track; [`advance`](Self::advance) and every [`transmit`](Self::transmit) bring its
-    /// position up to date.
+    /// Adds a node that moves along a track.
+    ///
+    /// [`advance`](Self::advance) and every [`transmit`](Self::transmit) bring its position up to date.
     pub fn follow_track(&mut self, node: NodeId, track: Track, now: Duration) {
         self.tracks.insert(node, track);
         self.advance(now);
@@ -135,22 +137,26 @@ impl Channel {
     }
 
     /// Position of a node as of the last update; `None` if it is not placed.
+    #[must_use]
     pub fn position(&self, node: NodeId) -> Option<NodePosition> {
         self.positions.get(&node).copied()
     }
 
     /// Slant range in metres; `None` if either node is not placed.
+    #[must_use]
     pub fn range_m(&self, a: NodeId, b: NodeId) -> Option<f64> {
         Some(self.positions.get(&a)?.range_m(self.positions.get(&b)?))
     }
 
     /// Travel time of sound over `range_m` metres, at most a day.
+    #[must_use]
     pub fn propagation(&self, range_m: f64) -> Duration {
         const DAY: Duration = Duration::from_secs(86_400);
         Duration::try_from_secs_f64(range_m / self.config.sound_speed_m_s).unwrap_or(DAY).min(DAY)
     }
 
     /// Whether a node is transmitting at `now`.
+    #[must_use]
     pub fn is_busy(&self, node: NodeId, now: Duration) -> bool {
         self.on_air.get(&node).is_some_and(|spans| spans.iter().any(|span| span.start <= now && now < span.end))
     }
@@ -184,6 +190,7 @@ impl Channel {
     }
 
     /// Time of the next arrival, or of the next onset if onsets are reported; `None` if no signal is under way.
+    #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
         let underway = self.underway.keys().next().map(|(at, _)| *at);
         let ready = self.ready.keys().next().map(|(at, ..)| *at);
@@ -197,6 +204,7 @@ impl Channel {
     }
 
     /// The next signal that has begun by `now` at a receiver that is not transmitting, in order of time.
+    #[must_use]
     pub fn poll_onset(&mut self, now: Duration) -> Option<Onset> {
         while let Some(entry) = self.onsets.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((at, number), end) = entry.remove_entry();
@@ -215,6 +223,7 @@ impl Channel {
     }
 
     /// The next arrival complete by `now`, in order of time; ties in order of transmission, receiver and copy.
+    #[must_use]
     pub fn poll_arrival(&mut self, now: Duration) -> Option<Arrival> {
         while let Some(entry) = self.underway.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((_, number), reception) = entry.remove_entry();
@@ -273,8 +282,8 @@ impl Channel {
 
     /// Adds a reception to those under way and marks collisions in both directions.
     ///
-    /// Signals of one sender stay in order on their way and do not collide, though motion may make their rounded spans
-    /// touch.
+    /// Signals of one sender stay in order on their way and do not collide, although motion may make their rounded
+    /// spans touch each other.
     fn enter(&mut self, mut new: Reception) {
         let own = self.on_air.get(&new.to).map(Vec::as_slice).unwrap_or_default();
         new.self_deaf = self.config.half_duplex && own.iter().any(|span| span.overlaps(&new.span));

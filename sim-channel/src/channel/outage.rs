@@ -29,6 +29,7 @@ pub struct Outage {
 
 /// The links that an outage silences.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum OutageScope {
     /// Every link of the channel.
     All,
@@ -45,11 +46,13 @@ pub enum OutageScope {
 
 impl Outage {
     /// Silence of the whole channel from `from` (inclusive) to `until` (exclusive).
+    #[must_use]
     pub fn all(from: Duration, until: Duration) -> Self {
         Self { from, until, scope: OutageScope::All }
     }
 
     /// `to` never receives `from`, while the other direction works.
+    #[must_use]
     pub fn one_way(from: NodeId, to: NodeId) -> Self {
         Self { from: Duration::ZERO, until: Duration::MAX, scope: OutageScope::Link { from, to } }
     }

@@ -13,8 +13,7 @@
 
 use crate::acoustics::wind_of_sea_state;
 use crate::channel::{ChannelConfig, Outage};
-use crate::loss::LossModel;
-use crate::loss::{GilbertElliott, Snr, ThreeState};
+use crate::loss::{GilbertElliott, LossModel, Snr, ThreeState};
 use std::time::Duration;
 
 /// A function that makes the conditions of a preset.
@@ -40,6 +39,7 @@ pub fn by_name(name: &str) -> Option<ChannelConfig> {
 /// Still fresh water close to a gateway: 3 % independent loss, 1447 m/s.
 ///
 /// Source: 97 % delivery next to a gateway in the FRONT sea trials (2002); speed of sound in fresh water at 10 degrees.
+#[must_use]
 pub fn calm_lake() -> ChannelConfig {
     ChannelConfig {
         sound_speed_m_s: 1447.0,
@@ -62,9 +62,10 @@ pub fn shallow_harbour() -> ChannelConfig {
     ChannelConfig { loss: model.into(), ..ChannelConfig::default() }
 }
 
-/// The shallow harbour with a ship that drowns all signals for 90 s every 15 minutes of the first day.
+/// The shallow harbour with a ship that masks all signals for 90 s every 15 minutes of the first day.
 ///
 /// Source: `shallow_harbour`; the timetable is assumed.
+#[must_use]
 pub fn busy_port() -> ChannelConfig {
     const SHIP_INTERVAL: Duration = Duration::from_secs(15 * 60);
     const SHIP_PASSAGE: Duration = Duration::from_secs(90);
@@ -76,6 +77,7 @@ pub fn busy_port() -> ChannelConfig {
 /// An 18-34 kHz modem on a noisy hull in sea state 3: at 5 km about half of the instant messages get through.
 ///
 /// Source: the sonar equation with Thorp absorption and Wenz noise; the source level and 8 dB of own noise are assumed.
+#[must_use]
 pub fn edge_of_range() -> ChannelConfig {
     let model = Snr { wind_m_s: wind_of_sea_state(3), extra_noise_db: 8.0, fading_std_db: 4.0, ..Snr::default() };
     ChannelConfig { loss: model.into(), ..ChannelConfig::default() }
@@ -84,6 +86,7 @@ pub fn edge_of_range() -> ChannelConfig {
 /// A good season at 5 km: 86 % delivery, loss in bursts.
 ///
 /// Source: FRONT sea trials (2002), delivery in spring; the dwell of about a minute is assumed.
+#[must_use]
 pub fn open_sea_spring() -> ChannelConfig {
     bursts(0.86, Duration::from_secs(90))
 }
@@ -91,6 +94,7 @@ pub fn open_sea_spring() -> ChannelConfig {
 /// A bad season at 5 km: 25 % delivery, loss in bursts.
 ///
 /// Source: FRONT sea trials (2002), delivery in winter; the dwell of about a minute is assumed.
+#[must_use]
 pub fn open_sea_winter() -> ChannelConfig {
     bursts(0.25, Duration::from_secs(90))
 }
@@ -98,6 +102,7 @@ pub fn open_sea_winter() -> ChannelConfig {
 /// Sea state 6 over a short link: wind noise and deep, fast fading.
 ///
 /// Source: Wenz noise at a wind of 19 m/s; fading of 6 dB over 3 s is assumed for a moving surface.
+#[must_use]
 pub fn storm() -> ChannelConfig {
     let model = Snr {
         wind_m_s: wind_of_sea_state(6),
@@ -111,6 +116,7 @@ pub fn storm() -> ChannelConfig {
 /// Cold, quiet water under rough ice: 1439 m/s, long good states, long shadows, and frames that arrive twice or late.
 ///
 /// Source: Mackenzie sound speed at -1.8 degrees Celsius and 34 ppt; the shadows (40 s in 160 s, 70 % loss) are assumed.
+#[must_use]
 pub fn under_ice() -> ChannelConfig {
     let model = GilbertElliott {
         dwell_good: Duration::from_secs(120),
@@ -188,8 +194,8 @@ mod tests {
     #[test]
     fn ships_add_their_share_of_outage() {
         let LossModel::ThreeState(model) = shallow_harbour().loss else { panic!("three states") };
-        let drowned = (90.0 + 0.86) / 900.0;
-        expect(busy_port(), 1000.0, drowned + (1.0 - drowned) * model.loss_rate());
+        let masked = (90.0 + 0.86) / 900.0;
+        expect(busy_port(), 1000.0, masked + (1.0 - masked) * model.loss_rate());
     }
 
     #[test]

@@ -30,7 +30,7 @@ pub(super) struct Reception {
     pub transmission: u64,
     pub from: NodeId,
     pub to: NodeId,
-    /// Sender, then receiver.
+    /// Of the sender, then of the receiver.
     pub positions: [NodePosition; 2],
     pub span: Span,
     pub sent_at: Duration,

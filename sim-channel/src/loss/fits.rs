@@ -22,6 +22,7 @@ pub struct FittedLink<Model> {
 
 /// An error in a table of fitted links; lines count from 1.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum FitError {
     /// A line does not have the columns of this layout.
     #[error("line {line}: {found} columns, expected {expected}")]

@@ -7,9 +7,6 @@ use std::time::Duration;
 
 /// Gilbert-Elliott loss: a good and a bad state with dwells in seconds.
 ///
-/// The state at the moment when a frame begins to arrive decides. The model runs in continuous time, so that the loss
-/// does not depend on the frame rate. Source: E. N. Gilbert 1960, E. O. Elliott 1963.
-///
 /// ```
 /// use sim_channel::Duration;
 /// use sim_channel::loss::GilbertElliott;
@@ -22,6 +19,9 @@ use std::time::Duration;
 /// };
 /// assert_eq!((model.bad_share(), model.loss_rate()), (0.25, 0.2));
 /// ```
+///
+/// The state at the moment when a frame begins to arrive decides. The model runs in continuous time, so that the loss
+/// does not depend on the frame rate. Source: E. N. Gilbert 1960, E. O. Elliott 1963.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GilbertElliott {
     /// Mean length of a stay in the good state.
@@ -36,19 +36,23 @@ pub struct GilbertElliott {
 
 impl GilbertElliott {
     /// Long-run share of frames lost, 0..=1.
+    #[must_use]
     pub fn loss_rate(&self) -> f64 {
         let bad = self.bad_share();
         bad * self.loss_bad + (1.0 - bad) * self.loss_good
     }
 
     /// Long-run share of time in the bad state, 0..=1.
+    #[must_use]
     pub fn bad_share(&self) -> f64 {
         let (good, bad) = (self.dwell_good.as_secs_f64(), self.dwell_bad.as_secs_f64());
         if good + bad > 0.0 { bad / (good + bad) } else { 0.5 }
     }
 
-    /// Mean number of frames lost in a row, for frames `spacing` apart, if the good state loses none and the bad state
-    /// all.
+    /// Mean number of frames lost in a row, for frames `spacing` apart.
+    ///
+    /// It holds for a good state that loses no frame and a bad state that loses all.
+    #[must_use]
     pub fn mean_burst_frames(&self, spacing: Duration) -> f64 {
         let rate = 1.0 / self.dwell_good.as_secs_f64() + 1.0 / self.dwell_bad.as_secs_f64();
         let leaves = (1.0 - self.bad_share()) * (1.0 - (-rate * spacing.as_secs_f64()).exp());

@@ -35,8 +35,9 @@ use std::time::Duration;
 /// assert!(half != sonar && config.loss != half);
 /// ```
 #[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
 pub enum LossModel {
-    /// Every frame is received.
+    /// Every frame that is in range is received.
     #[default]
     None,
     /// Each frame is lost independently of the others.

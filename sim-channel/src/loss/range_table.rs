@@ -22,6 +22,7 @@ pub struct RangeTable {
 
 /// An error in a table of delivery ratios.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum RangeTableError {
     /// A line is not a range in metres and a ratio 0..=1; lines count from 1.
     #[error("line {line}: expected range_m and delivery ratio 0..=1")]
@@ -54,6 +55,7 @@ impl RangeTable {
     }
 
     /// Share of frames that are delivered at `range_m`, 0..=1.
+    #[must_use]
     pub fn delivery(&self, range_m: f64) -> f64 {
         let after = self.points.partition_point(|(range, _)| *range <= range_m);
         let below = after.checked_sub(1).and_then(|index| self.points.get(index));

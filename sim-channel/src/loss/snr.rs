@@ -7,12 +7,6 @@ use std::time::Duration;
 
 /// The sonar equation, slow fading and uncorrelated bit errors.
 ///
-/// * Signal: source level - spreading - Thorp absorption + fading.
-/// * Noise: Wenz over the band.
-/// * Energy per bit: the energy of the airtime divided by the bits of the frame, less `implementation_loss_db`.
-/// * Fading: a normal variable in dB with an exponential autocorrelation (lognormal shadowing, as measured by
-///   P. Qarabaqi and M. Stojanovic 2013).
-///
 /// ```
 /// use sim_channel::Duration;
 /// use sim_channel::loss::Snr;
@@ -21,6 +15,12 @@ use std::time::Duration;
 /// let loss = |range_m| modem.loss_rate(range_m, 64, Duration::from_millis(860));
 /// assert!(loss(500.0) < 0.01 && loss(12_000.0) > 0.9);
 /// ```
+///
+/// * Signal: source level - spreading - Thorp absorption + fading.
+/// * Noise: Wenz over the band.
+/// * Energy per bit: the energy of the airtime divided by the bits of the frame, less `implementation_loss_db`.
+/// * Fading: a normal variable in dB with an exponential autocorrelation (lognormal shadowing, as measured by
+///   P. Qarabaqi and M. Stojanovic 2013).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Snr {
     /// Source level, dB re 1 uPa at 1 m; 160..=190 for modems.
@@ -68,6 +68,7 @@ impl Default for Snr {
 
 impl Snr {
     /// Mean signal-to-noise ratio in the receiver's band at `range_m`, dB.
+    #[must_use]
     pub fn snr_db(&self, range_m: f64) -> f64 {
         let loss = transmission_loss_db(range_m, self.frequency_khz, self.spreading);
         let density = wenz_db(self.frequency_khz, self.wind_m_s, self.shipping) + self.extra_noise_db;
@@ -75,6 +76,7 @@ impl Snr {
     }
 
     /// Probability 0..=1 that a frame of `bytes` over `airtime` is lost at the ratio `snr_db`; 1 if it is not detected.
+    #[must_use]
     pub fn frame_loss(&self, snr_db: f64, bytes: usize, airtime: Duration) -> f64 {
         if snr_db < self.detection_snr_db {
             return 1.0;
@@ -84,8 +86,10 @@ impl Snr {
         frame_error_rate(eb_n0_db, bytes)
     }
 
-    /// Long-run share of frames lost at `range_m`: [`frame_loss`](Self::frame_loss) averaged over the fading by the
-    /// trapezoid rule.
+    /// Long-run share of frames lost at `range_m`.
+    ///
+    /// It is [`frame_loss`](Self::frame_loss) averaged over the fading by the trapezoid rule.
+    #[must_use]
     pub fn loss_rate(&self, range_m: f64, bytes: usize, airtime: Duration) -> f64 {
         let mean = self.snr_db(range_m);
         let (mut sum, mut weight) = (0.0, 0.0);

@@ -26,11 +26,13 @@ pub struct ThreeState {
 
 impl ThreeState {
     /// Long-run share of time in each state, 0..=1.
+    #[must_use]
     pub fn shares(&self) -> [f64; 3] {
         self.chain().stationary()
     }
 
     /// Long-run share of frames lost, 0..=1.
+    #[must_use]
     pub fn loss_rate(&self) -> f64 {
         self.shares().iter().zip(&self.loss).map(|(share, loss)| share * loss).sum()
     }

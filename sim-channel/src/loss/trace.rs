@@ -10,9 +10,6 @@ use thiserror::Error;
 
 /// A record of the frames that got through and of those that did not.
 ///
-/// A frame has the fate of the last record at or before the time at which it begins to arrive. After its end the record
-/// starts again, one mean spacing later.
-///
 /// ```
 /// use sim_channel::Duration;
 /// use sim_channel::loss::Trace;
@@ -20,6 +17,9 @@ use thiserror::Error;
 /// let trace = Trace::from_csv("time_s,delivered\n0,1\n2,0\n4,1\n6,1").unwrap();
 /// assert_eq!((trace.loss_rate(), trace.period()), (0.25, Duration::from_secs(8)));
 /// ```
+///
+/// A frame has the fate of the last record at or before the time at which it begins to arrive. After its end the record
+/// starts again, one mean spacing later.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Trace {
     records: Arc<[TraceRecord]>,
@@ -35,6 +35,7 @@ struct TraceRecord {
 
 /// An error in a record of losses.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum TraceError {
     /// A line is not `time,delivered`; lines count from 1.
     #[error("line {line}: expected time_s,delivered (0 or 1)")]
@@ -84,11 +85,13 @@ impl Trace {
     }
 
     /// Share of the records that were lost, 0..=1.
+    #[must_use]
     pub fn loss_rate(&self) -> f64 {
         self.records.iter().filter(|record| !record.delivered).count() as f64 / self.records.len() as f64
     }
 
     /// Time after which the record starts again.
+    #[must_use]
     pub fn period(&self) -> Duration {
         self.period
     }

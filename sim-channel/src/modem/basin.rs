@@ -8,10 +8,6 @@ use std::time::Duration;
 
 /// A test basin: a channel and the emulated modems in it. It moves bytes between them in order of time.
 ///
-/// The host loop is: write with [`handle_host_bytes`](Self::handle_host_bytes), pass time with
-/// [`advance`](Self::advance) at each [`poll_timeout`](Self::poll_timeout), and read with
-/// [`poll_host_bytes`](Self::poll_host_bytes).
-///
 /// ```
 /// use sim_channel::modem::Basin;
 /// use sim_channel::modem::transparent::{Transparent, TransparentConfig};
@@ -31,6 +27,10 @@ use std::time::Duration;
 /// }
 /// assert_eq!(received, b"hello");
 /// ```
+///
+/// The host loop is: write with [`handle_host_bytes`](Self::handle_host_bytes), pass time with
+/// [`advance`](Self::advance) at each [`poll_timeout`](Self::poll_timeout), and read with
+/// [`poll_host_bytes`](Self::poll_host_bytes).
 pub struct Basin {
     channel: Channel,
     modems: BTreeMap<NodeId, Box<dyn Emulator>>,
@@ -42,6 +42,7 @@ pub struct Basin {
 
 impl Basin {
     /// A basin without modems. Place the nodes in the channel before their modems transmit.
+    #[must_use]
     pub fn new(mut channel: Channel) -> Self {
         channel.report_onsets();
         Self {
@@ -70,6 +71,7 @@ impl Basin {
     }
 
     /// The latest time that a call has passed in.
+    #[must_use]
     pub fn now(&self) -> Duration {
         self.now
     }
@@ -101,22 +103,26 @@ impl Basin {
     }
 
     /// Number of bytes that the first host of `node` may write now; more would be lost.
+    #[must_use]
     pub fn host_room(&self, node: NodeId) -> usize {
         self.modems.get(&node).map_or(0, |modem| modem.host_room(HostId::FIRST))
     }
 
     /// Takes the bytes that have reached the first host of `node` by [`now`](Self::now).
+    #[must_use]
     pub fn poll_host_bytes(&mut self, node: NodeId) -> Vec<u8> {
         self.poll_bytes_for(node, HostId::FIRST)
     }
 
     /// Takes the bytes that have reached `host` of `node` by [`now`](Self::now).
+    #[must_use]
     pub fn poll_bytes_for(&mut self, node: NodeId, host: HostId) -> Vec<u8> {
         let now = self.now;
         self.modems.get_mut(&node).map(|modem| modem.poll_host_bytes(host, now)).unwrap_or_default()
     }
 
     /// The next node whose modem closes the TCP connections of its hosts, as an S2C does when it restarts.
+    #[must_use]
     pub fn poll_hang_up(&mut self) -> Option<NodeId> {
         self.hung_up.pop()
     }
@@ -131,6 +137,7 @@ impl Basin {
     }
 
     /// Time of the next event; a host may have bytes to read then.
+    #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
         let hosts = self.modems.values().filter_map(|modem| modem.poll_host_timeout());
         self.next_due().into_iter().chain(hosts).min()

@@ -15,7 +15,7 @@ use std::time::Duration;
 pub struct TransparentConfig {
     /// Baud rate, 8N1; `None` without pacing.
     pub baud: Option<u32>,
-    /// Acoustic bit rate, bit/s.
+    /// Acoustic bit rate without preamble, bit/s.
     pub bit_rate: u32,
     /// Airtime of the preamble of each packet.
     pub preamble: Duration,
@@ -71,6 +71,7 @@ const BOOT_TIME: Duration = Duration::from_secs(2);
 
 impl Transparent {
     /// A pipe that is switched on and ready.
+    #[must_use]
     pub fn new(config: TransparentConfig) -> Self {
         const PURPOSE: u64 = 0x7a9e;
         Self {

@@ -15,17 +15,19 @@ pub struct NodePosition {
     pub x_m: f64,
     /// Metres north of the origin.
     pub y_m: f64,
-    /// Metres below the surface.
+    /// Depth in metres below the surface.
     pub z_m: f64,
 }
 
 impl NodePosition {
     /// The position `x_m` east and `y_m` north of the origin, `z_m` below the surface.
+    #[must_use]
     pub const fn new(x_m: f64, y_m: f64, z_m: f64) -> Self {
         Self { x_m, y_m, z_m }
     }
 
     /// Slant range along a straight ray, m.
+    #[must_use]
     pub fn range_m(&self, other: &NodePosition) -> f64 {
         let (dx, dy, dz) = (self.x_m - other.x_m, self.y_m - other.y_m, self.z_m - other.z_m);
         (dx * dx + dy * dy + dz * dz).sqrt()

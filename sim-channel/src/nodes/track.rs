@@ -23,12 +23,14 @@ pub struct Track {
 
 impl Track {
     /// A track through `waypoints`, which may come in any order.
+    #[must_use]
     pub fn new(mut waypoints: Vec<(Duration, NodePosition)>) -> Self {
         waypoints.sort_by_key(|(at, _)| *at);
         Self { waypoints }
     }
 
     /// Position of the node at `now`; `None` if the track has no waypoint.
+    #[must_use]
     pub fn at(&self, now: Duration) -> Option<NodePosition> {
         let after = self.waypoints.partition_point(|(at, _)| *at <= now);
         let next = self.waypoints.get(after);

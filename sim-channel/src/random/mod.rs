@@ -6,8 +6,6 @@ use std::f64::consts::TAU;
 
 /// One random stream (xoshiro256++), named by a seed and a path of numbers.
 ///
-/// Streams with different paths are independent, so that a draw on one link never shifts the draws of another.
-///
 /// ```
 /// use sim_channel::RandomStream;
 ///
@@ -15,11 +13,14 @@ use std::f64::consts::TAU;
 /// assert_eq!(a.uniform(), b.uniform());
 /// assert!((0..1000).all(|_| a.below(6) < 6));
 /// ```
+///
+/// Streams with different paths are independent, so that a draw on one link never shifts the draws of another.
 #[derive(Clone, Debug)]
 pub struct RandomStream(Xoshiro256PlusPlus);
 
 impl RandomStream {
     /// The stream of `seed` at `path`; equal arguments give equal streams.
+    #[must_use]
     pub fn new(seed: u64, path: &[u64]) -> Self {
         let mixed = path.iter().fold(split_mix(seed), |state, step| split_mix(state ^ split_mix(*step)));
         Self(Xoshiro256PlusPlus::seed_from_u64(mixed))

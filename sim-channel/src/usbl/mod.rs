@@ -51,6 +51,7 @@ pub struct UsblFix {
 
 impl UsblFix {
     /// East, north and up of the target relative to the head, m.
+    #[must_use]
     pub fn east_north_up_m(&self) -> [f64; 3] {
         let flat = self.range_m * self.elevation_rad.cos();
         [flat * self.bearing_rad.sin(), flat * self.bearing_rad.cos(), self.range_m * self.elevation_rad.sin()]
@@ -77,6 +78,7 @@ pub struct UsblHead {
 
 impl UsblHead {
     /// A head that draws its errors from `seed`.
+    #[must_use]
     pub fn new(config: UsblConfig, seed: u64) -> Self {
         const PURPOSE: u64 = 0x05b1;
         Self { config, rng: RandomStream::new(seed, &[PURPOSE]) }
@@ -111,6 +113,7 @@ impl UsblHead {
 }
 
 /// Time that one two-way exchange occupies the channel: airtime of query and reply, turn-around, two ways of travel.
+#[must_use]
 pub fn exchange_time(query: Duration, turn_around: Duration, reply: Duration, one_way: Duration) -> Duration {
     query + turn_around + reply + 2 * one_way
 }

@@ -145,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn outlines_have_the_area_of_their_cells_and_never_touch_themselves(
+        fn outlines_enclose_their_cells_without_touching_themselves(
             labels in proptest::collection::vec(0u8..4, 12 * 9)
         ) {
             for (label, polygons) in regions(&labels, 12, 9) {

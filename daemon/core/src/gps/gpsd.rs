@@ -11,7 +11,7 @@ use serde::Deserialize;
 pub const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
 
 /// Longest line that is taken: a sky view of many satellites has some kilobytes.
-pub const LONGEST_LINE: usize = 16_384;
+pub const MAX_LINE: usize = 16_384;
 
 /// Members of a report that are of use; units of gpsd: degrees, metres, metres a second.
 #[derive(Deserialize)]
@@ -35,7 +35,6 @@ struct Report {
 pub struct Said {
     /// As sentences of NMEA 0183 would.
     pub sentences: Vec<Sentence>,
-    /// Of the position.
     pub sigma_m: Option<f64>,
 }
 
@@ -88,7 +87,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// From gpsd_json(5).
     const TPV: &str = r#"{"class":"TPV","device":"/dev/pts/1","time":"2005-06-08T10:34:48.283Z","ept":0.005,"lat":46.498293369,"lon":7.567411672,"alt":1343.127,"eph":36.000,"epv":32.321,"track":10.3788,"speed":0.091,"climb":-0.085,"mode":3}"#;
 
     #[test]

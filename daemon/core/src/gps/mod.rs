@@ -12,9 +12,7 @@ use std::time::Duration;
 /// The language of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GpsLanguage {
-    /// NMEA 0183 lines.
     Nmea,
-    /// gpsd's JSON.
     Gpsd,
 }
 
@@ -36,7 +34,6 @@ pub enum GpsFault {
 }
 
 impl GpsFault {
-    /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Checksum => "checksum",
@@ -52,11 +49,9 @@ impl GpsFault {
 /// A position that can be believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GpsFix {
-    /// Where.
     pub place: LatLon,
     /// Standard deviation in each direction, metres.
     pub sigma_m: f64,
-    /// When it was told.
     pub at: Instant,
 }
 
@@ -93,8 +88,8 @@ impl Gps {
     /// A receiver that has said nothing.
     pub fn new(language: GpsLanguage) -> Self {
         let longest = match language {
-            GpsLanguage::Nmea => nmea::LONGEST_LINE,
-            GpsLanguage::Gpsd => gpsd::LONGEST_LINE,
+            GpsLanguage::Nmea => nmea::MAX_LINE,
+            GpsLanguage::Gpsd => gpsd::MAX_LINE,
         };
         Self {
             language,
@@ -118,7 +113,6 @@ impl Gps {
             .chain((self.lines.overlong() > 0).then_some((GpsFault::Overlong, self.lines.overlong())))
     }
 
-    /// The last good position.
     pub fn fix(&self) -> Option<GpsFix> {
         self.fix
     }
@@ -281,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_stays_while_the_receiver_says_it_moves_is_frozen_and_a_vessel_at_anchor_is_not() {
+    fn a_frozen_receiver_is_refused_but_a_vessel_at_anchor_is_not() {
         for (knots, frozen) in [(4.0, true), (0.0, false)] {
             let mut gps = Gps::new(GpsLanguage::Nmea);
             for s in 0..20 {
@@ -293,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_refused_and_a_place_that_stays_there_is_believed_in_the_end() {
+    fn a_jump_is_refused_until_the_new_position_persists() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         gps.handle_bytes(gga(29.5, 0).as_bytes(), at(0.0));
         assert!(gps.handle_bytes(gga(29.6, 1).as_bytes(), at(1.0)).is_empty(), "11 km in a second");

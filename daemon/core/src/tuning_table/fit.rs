@@ -158,7 +158,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_tells_most_within_the_budget_is_chosen_and_says_what_it_gives_up() {
+    fn the_best_row_within_the_budget_is_chosen_with_its_loss() {
         let fit = |bits_per_s| known().fit(0.25, bits_per_s).unwrap();
         let alpha = |fit: &Fit| fit.chosen.map(|row| row.setting.alpha);
         assert_eq!(alpha(&fit(14_000.0)), Some(1.0));

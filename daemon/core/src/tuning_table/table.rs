@@ -9,9 +9,8 @@ const TITLE: &str = "# scenecast tuning table 2";
 const HEAD: &str = "inputs,cell_m,alpha,beta,gamma,refine_words_per_s,frames_per_s,cells,mutual_information_nats,\
 normalised_mutual_information,null_mutual_information_nats,mosaic_mutual_information_nats,labels,map_bytes,stream_bps";
 /// Most lines that are read.
-const MOST_ROWS: usize = 100_000;
+const MAX_ROWS: usize = 100_000;
 
-/// One setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Edge of a cell of the model, metres.
@@ -60,9 +59,7 @@ pub struct Measurement {
 /// A setting with its figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// The setting.
     pub setting: Setting,
-    /// Its figures.
     pub measurement: Measurement,
 }
 
@@ -105,20 +102,18 @@ impl TuningTable {
         for (index, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
             let (inputs, row) = parse(line).map_err(|what| (index + 1, what))?;
             table.insert(inputs, row);
-            if table.rows.len() > MOST_ROWS {
-                return Err((index + 1, format!("more than {MOST_ROWS} lines")));
+            if table.rows.len() > MAX_ROWS {
+                return Err((index + 1, format!("more than {MAX_ROWS} lines")));
             }
         }
         Ok(table)
     }
 
-    /// The table's text.
     pub fn text(&self) -> String {
         let lines = self.rows.iter().map(|(inputs, row)| line(inputs, row));
         format!("{TITLE}\n{HEAD}\n{}", lines.collect::<String>())
     }
 
-    /// The rows.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().map(|(_, row)| row)
     }
@@ -212,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_line_of_the_table_is_refused_with_its_number_and_what_is_allowed() {
+    fn a_malformed_row_is_refused_with_its_line_and_the_rule() {
         let text = filled().text();
         let refused = |from: &str, to: &str| TuningTable::read(&text.replacen(from, to, 1)).unwrap_err();
         assert_eq!(refused("table 2", "table 3").0, 1);

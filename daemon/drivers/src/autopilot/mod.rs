@@ -44,9 +44,7 @@ impl Goal {
 /// A stretch of way, as the autopilot measured it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// East, metres.
     pub dx_m: f64,
-    /// North, metres.
     pub dy_m: f64,
     /// Heading clockwise from north, radians.
     pub heading_rad: f64,
@@ -56,7 +54,6 @@ pub struct Step {
     pub unseen: Duration,
 }
 
-/// How an autopilot does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Health {
     /// Nothing was heard of it yet.
@@ -97,16 +94,12 @@ pub trait Autopilot: Send {
     /// Bytes of it, in pieces of any size. Anything may be in them.
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
 
-    /// Time has passed.
     fn handle_timeout(&mut self, now: Instant);
 
-    /// When [`Self::handle_timeout`] is due.
     fn poll_timeout(&self) -> Instant;
 
-    /// What it has ready.
     fn tray(&mut self) -> &mut Tray;
 
-    /// Bytes to send.
     fn poll_output(&mut self) -> Option<Vec<u8>> {
         self.tray().outputs.pop_front()
     }
@@ -127,9 +120,7 @@ pub trait Autopilot: Send {
     /// Where on the Earth the vehicle is, as known from fixes, with its standard deviation in metres.
     fn handle_place(&mut self, place: LatLon, sigma_m: f64, now: Instant);
 
-    /// How it does.
     fn health(&self, now: Instant) -> Health;
 
-    /// What happened so far.
     fn counters(&self) -> Counters;
 }

@@ -39,7 +39,7 @@ impl Nmea {
     pub fn new(answers: bool, silence: Duration, now: Instant) -> Self {
         Self {
             gps: Gps::new(GpsLanguage::Nmea),
-            lines: Lines::new(nmea::LONGEST_LINE),
+            lines: Lines::new(nmea::MAX_LINE),
             answers,
             silence,
             heard: None,

@@ -23,9 +23,7 @@ pub enum Class {
 /// Whom a transmission is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Destination {
-    /// One modem.
     Modem(ModemAddress),
-    /// Every modem in range.
     Everybody,
 }
 
@@ -34,12 +32,7 @@ pub enum Destination {
 pub enum Refusal {
     /// It is larger than the modem carries.
     #[error("a frame of {bytes} bytes is larger than the modem's {most}")]
-    TooLong {
-        /// Bytes given.
-        bytes: usize,
-        /// Most bytes that fit.
-        most: usize,
-    },
+    TooLong { bytes: usize, most: usize },
     /// There is nothing in it.
     #[error("a frame without bytes")]
     Empty,
@@ -51,12 +44,10 @@ pub enum Refusal {
     NotReady,
 }
 
-/// Something heard.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reception {
     /// Sender; `None` where the modem does not tell.
     pub src: Option<ModemAddress>,
-    /// What was heard.
     pub bytes: Bytes,
     /// How well, as the modem tells it: more is better.
     pub quality: Option<i32>,
@@ -81,9 +72,7 @@ pub enum Event {
     Delivered(Token),
     /// It did not get there.
     Failed(Token),
-    /// Nobody knows.
     Unknown(Token),
-    /// Something was heard.
     Received(Reception),
     /// A position of another modem.
     Usbl(UsblLine),
@@ -104,10 +93,8 @@ pub trait Driver: Send {
     /// How the medium is shared, and units of transmission.
     fn profile(&self) -> ModemProfile;
 
-    /// Whether transmissions are taken.
     fn is_ready(&self) -> bool;
 
-    /// Takes a transmission.
     fn send(&mut self, dst: Destination, bytes: Vec<u8>, class: Class, now: Instant) -> Result<Token, Refusal>;
 
     /// Whether a cycle may begin; only modems that poll have any.
@@ -118,7 +105,6 @@ pub trait Driver: Send {
     /// Has the modem begin a cycle between these two.
     fn begin_cycle(&mut self, _from: ModemAddress, _to: Destination, _cycle: Cycle, _now: Instant) {}
 
-    /// The port was opened.
     fn handle_open(&mut self, now: Instant);
 
     /// The port was closed, or failed.
@@ -127,7 +113,6 @@ pub trait Driver: Send {
     /// Takes what came over the port.
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
 
-    /// Lets time pass.
     fn handle_timeout(&mut self, now: Instant);
 
     /// When [`Self::handle_timeout`] has something to do.

@@ -7,7 +7,6 @@
 /// Bytes that framing adds at most to a frame of up to 1016 bytes: two delimiters, a code for each 254 bytes.
 pub const OVERHEAD_BYTES: u64 = 7;
 
-/// The byte between frames.
 pub const DELIMITER: u8 = b'+';
 
 /// A frame between two delimiters.

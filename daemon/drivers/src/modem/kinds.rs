@@ -17,7 +17,6 @@ const POOL_BYTES: usize = 16_384;
 /// Frames of the surface that may be in an S2C modem: what waits is written when its time has come.
 const SURFACE_POOL_FRAMES: u32 = 1;
 
-/// Whose modem is whose.
 pub fn address_book(config: &Config) -> AddressBook {
     AddressBook { surface: config.modem.surface_address }
 }

@@ -12,9 +12,7 @@ use std::time::Duration;
 /// How frames are told from one another.
 #[derive(Debug)]
 enum Shape {
-    /// By delimiters.
     Stream(Deframer),
-    /// Each is a datagram.
     Datagrams,
 }
 

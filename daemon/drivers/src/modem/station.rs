@@ -39,7 +39,6 @@ impl AddressBook {
 pub enum ModemEvent {
     /// A transmission has left the modem, or never will.
     Sent,
-    /// Bytes were heard.
     Received(Bytes),
     /// The modem asks for so many frames.
     Poll(u32),
@@ -47,9 +46,7 @@ pub enum ModemEvent {
     Repeated(u64),
     /// Where the head has found another end.
     Fix(Address, UsblLine),
-    /// The modem is ready.
     Ready,
-    /// The modem was lost.
     Lost,
     /// Something that a person must change.
     Refused(String),
@@ -106,7 +103,6 @@ impl Station {
         self.driver.may_begin_cycle(now)
     }
 
-    /// Begins a cycle.
     pub fn begin_cycle(&mut self, cycle: Cycle, now: Instant) {
         let Destination::Modem(from) = self.book.modem_of(cycle.from) else { return };
         self.driver.begin_cycle(from, self.book.modem_of(cycle.to), cycle, now);
@@ -135,13 +131,11 @@ impl Station {
         }
     }
 
-    /// The port was opened.
     pub fn handle_open(&mut self, now: Instant) {
         self.driver.handle_open(now);
         self.collect();
     }
 
-    /// The port was closed.
     pub fn handle_closed(&mut self, now: Instant) {
         self.driver.handle_closed(now);
         self.collect();
@@ -153,7 +147,6 @@ impl Station {
         self.collect();
     }
 
-    /// Lets time pass.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.driver.handle_timeout(now);
         self.collect();

@@ -19,14 +19,11 @@ use std::time::Duration;
 use toml::de::DeTable;
 
 /// Most modems and strangers together: each is a node of the channel.
-const MOST_NODES: usize = 100;
+const MAX_NODES: usize = 100;
 
-/// A whole scenario.
 #[derive(Debug)]
 pub struct Scenario {
-    /// Of everything random.
     pub seed: u64,
-    /// The water.
     pub channel: ChannelConfig,
     /// Links that lose in their own way.
     pub links: Vec<(NodeId, NodeId, LossModel)>,
@@ -68,8 +65,8 @@ impl Scenario {
         let faults = file.tables("fault")?.into_iter().map(|table| trouble::read(table, &names));
         let faults = faults.collect::<Result<Vec<_>, _>>()?;
         file.finish()?;
-        if modems.len() + strangers.len() > MOST_NODES {
-            return Err(source.problem(0, format!("more than {MOST_NODES} modems and strangers are not allowed")));
+        if modems.len() + strangers.len() > MAX_NODES {
+            return Err(source.problem(0, format!("more than {MAX_NODES} modems and strangers are not allowed")));
         }
         Ok(Self { seed, channel, links, modems, strangers, faults })
     }

@@ -40,7 +40,6 @@ impl<'a> Reader<'a> {
         Self { source, name, at, table, known: RefCell::new(Vec::new()) }
     }
 
-    /// The file.
     pub fn path(&self) -> &'a Path {
         self.source.path
     }
@@ -102,7 +101,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// One of several words.
     pub fn choice<T: Clone>(&self, key: &'static str, words: &[(&str, T)]) -> Found<T> {
         let Some((value, _)) = self.value(key) else { return Ok(None) };
         let given = match value.get_ref() {
@@ -113,7 +111,6 @@ impl<'a> Reader<'a> {
         given.map(|(_, t)| Some(t.clone())).ok_or_else(|| self.wrong(key, format!("one of {}", all.join(", "))))
     }
 
-    /// True or false.
     pub fn flag(&self, key: &'static str) -> Found<bool> {
         let Some((value, _)) = self.value(key) else { return Ok(None) };
         match value.get_ref() {

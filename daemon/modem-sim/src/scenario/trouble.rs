@@ -1,7 +1,7 @@
 //! `[[fault]]`, and the same in words for a running emulation.
 
 use super::reader::Reader;
-use super::water::LONGEST_S;
+use super::water::MAX_S;
 use super::{index_of, seconds};
 use scenecast_core::UserError;
 use std::time::Duration;
@@ -72,7 +72,7 @@ impl Trouble {
         let (name, rest) = words.split_first().ok_or_else(wrong)?;
         let number = match rest {
             [] => None,
-            [number] => Some(number.parse().ok().filter(|n| (0.0..=LONGEST_S).contains(n)).ok_or_else(wrong)?),
+            [number] => Some(number.parse().ok().filter(|n| (0.0..=MAX_S).contains(n)).ok_or_else(wrong)?),
             _ => return Err(wrong()),
         };
         Self::new(name, number).ok_or_else(wrong)
@@ -81,14 +81,14 @@ impl Trouble {
 
 /// A fault of `[[fault]]`: when, to which modem, what.
 pub(super) fn read(table: Reader<'_>, names: &[&str]) -> Result<(Duration, usize, Trouble), UserError> {
-    let at = table.number("at_s", 0.0..=LONGEST_S, "s")?;
-    let at = at.ok_or_else(|| table.missing("at_s", format!("a number from 0 to {LONGEST_S} s")))?;
+    let at = table.number("at_s", 0.0..=MAX_S, "s")?;
+    let at = at.ok_or_else(|| table.missing("at_s", format!("a number from 0 to {MAX_S} s")))?;
     let modem = index_of(&table, "modem", names)?;
     let words = TROUBLES.map(|(name, _, unit)| (name, (name, unit)));
     let takes = format!("one of {}", Trouble::names());
     let (name, unit) = table.choice("what", &words)?.ok_or_else(|| table.missing("what", takes.clone()))?;
     let number = match unit {
-        "s" => table.number("for_s", 0.0..=LONGEST_S, "s")?,
+        "s" => table.number("for_s", 0.0..=MAX_S, "s")?,
         "address" => table.whole("address", 1..=254, "")?.map(|address| address as f64),
         _ => None,
     };

@@ -7,15 +7,15 @@ use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
+use scenecast_host::{SurfaceHost, VehicleHost, VehicleHostEvent, channel_station};
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::exemplar::edge_px;
-use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{Page, Surface, Wish};
-use scenecast_vehicle::{Durable, MapUpdate, Vehicle, VehicleOutput};
+use scenecast_surface::{Page, Wish};
+use scenecast_vehicle::{Durable, MapUpdate};
 use serde::Serialize;
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
@@ -77,7 +77,7 @@ pub fn arrivals(
 ) -> Result<Arrivals, UserError> {
     let mut water = Water::new(setting, patches, seed)?;
     water.run_until(Instant::from_secs_f64(WARM_UP_S), |_| false);
-    let (began, before) = (water.now, water.sent_bits);
+    let (began, before) = (water.now, water.sent_bits());
     let mut took = Vec::new();
     for i in 0..setting.requests {
         let next = water.now + Duration::from_secs_f64(1.0 + 40.0 * water.dice.uniform());
@@ -94,7 +94,7 @@ pub fn arrivals(
         seconds: Spread::of(took.iter().map(|(s, _)| *s)),
         within_30_s: within as f64 / setting.requests.max(1) as f64,
         bytes: Spread::of(took.iter().map(|(_, n)| *n as f64)),
-        sent_bps: (water.sent_bits - before) as f64 / water.now.since(began).as_secs_f64().max(1.0),
+        sent_bps: (water.sent_bits() - before) as f64 / water.now.since(began).as_secs_f64().max(1.0),
         loss: water.lost as f64 / water.frames.max(1) as f64,
     })
 }
@@ -103,16 +103,13 @@ pub fn arrivals(
 pub(super) struct Water {
     setting: Setting,
     pub(super) now: Instant,
-    pub(super) vehicle: Vehicle,
-    pub(super) surface: Surface,
+    pub(super) vehicle: VehicleHost,
+    pub(super) surface: SurfaceHost,
     pub(super) address: Address,
-    modem: ModemProfile,
     channel: Channel,
-    transmitting: [Option<Instant>; 2],
     next_change: Instant,
     next_fix: Instant,
     dice: RandomStream,
-    sent_bits: u64,
     frames: u64,
     lost: u64,
 }
@@ -135,7 +132,7 @@ impl Water {
         );
         channel.place(SURFACE, NodePosition::default());
         channel.place(VEHICLE, NodePosition::new(config.channel.range_m, 0.0, -16.0));
-        let mut vehicle = scenecast_vehicle::assemble(
+        let vehicle = scenecast_vehicle::assemble(
             &config,
             scenecast_config::authenticity(&config)?,
             modem,
@@ -144,30 +141,34 @@ impl Water {
             seed ^ 0x0A0B,
             now,
         )?;
+        let surface = scenecast_surface::assemble(
+            &config,
+            scenecast_config::authenticity(&config)?,
+            scenecast_config::tuning_table(&config)?,
+            modem,
+            seed ^ 0x5EA,
+            now,
+        )?;
+        let window = Duration::from_secs_f64(config.link.budget_window_s);
+        let mut vehicle = VehicleHost::new(vehicle, channel_station(modem, window, now), None);
         vehicle.handle_exemplars(gallery(patches));
         Ok(Self {
             setting,
             now,
             vehicle,
-            surface: scenecast_surface::assemble(
-                &config,
-                scenecast_config::authenticity(&config)?,
-                scenecast_config::tuning_table(&config)?,
-                modem,
-                seed ^ 0x5EA,
-                now,
-            )?,
+            surface: SurfaceHost::new(surface, channel_station(modem, window, now), None),
             address: scenecast_config::vehicle_address(&config)?,
-            modem,
             channel,
-            transmitting: [None; 2],
             next_change: now,
             next_fix: now,
             dice: RandomStream::new(seed, &[5]),
-            sent_bits: 0,
             frames: 0,
             lost: 0,
         })
+    }
+
+    fn sent_bits(&self) -> u64 {
+        self.vehicle.link().audit().total_bits()
     }
 
     /// A label of the map.
@@ -178,9 +179,9 @@ impl Water {
     /// Asks for an image; seconds and bytes that it took, if it came.
     pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, UserError> {
         let asked = self.now;
-        self.surface.request_exemplar(self.address, label, wish, asked).map_err(UserError::Failed)?;
+        self.surface.surface_mut().request_exemplar(self.address, label, wish, asked).map_err(UserError::Failed)?;
         if !self.run_until(asked + GIVE_UP, |w| w.is_met(label)) {
-            self.surface.cancel_exemplar(self.address, label, self.now).map_err(UserError::Failed)?;
+            self.surface.surface_mut().cancel_exemplar(self.address, label, self.now).map_err(UserError::Failed)?;
             return Ok(None);
         }
         let bytes = self.page(label).and_then(|page| page.picture(None)).map(|p| p.sent_bytes);
@@ -188,7 +189,7 @@ impl Water {
     }
 
     pub(super) fn page(&self, label: u8) -> Option<&Page> {
-        self.surface.desk(self.address)?.album.page(label)
+        self.surface.surface().desk(self.address)?.album.page(label)
     }
 
     fn is_met(&self, label: u8) -> bool {
@@ -220,28 +221,16 @@ impl VirtualTime for Water {
     }
 
     fn next_event(&self) -> Instant {
-        let links = [
-            self.vehicle.poll_timeout().filter(|_| self.transmitting[0].is_none()),
-            self.surface.poll_timeout(self.now).filter(|_| self.transmitting[1].is_none()),
-        ];
-        let links = links.into_iter().flatten().map(|(at, _)| at).filter(|&at| at > self.now);
+        let hosts = [self.vehicle.poll_timeout(self.now), self.surface.poll_timeout(self.now)];
         let channel = self.channel.poll_timeout().map(Instant::from);
-        let regular = [self.next_change, self.next_fix];
-        let all = links.chain(self.transmitting.into_iter().flatten()).chain(channel).chain(regular);
+        let all = hosts.into_iter().chain([channel]).flatten().chain([self.next_change, self.next_fix]);
         all.min().unwrap_or(self.next_change)
     }
 
     fn handle_events(&mut self) {
         let now = self.now;
-        for (node, ends_at) in self.transmitting.into_iter().enumerate() {
-            if ends_at.is_some_and(|at| at <= now) {
-                self.transmitting[node] = None;
-                match node {
-                    0 => self.vehicle.handle_transmit_outcome(now),
-                    _ => self.surface.handle_transmit_outcome(now),
-                }
-            }
-        }
+        self.vehicle.handle_timeout(now);
+        self.surface.handle_timeout(now);
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
             let delivered = matches!(arrival.outcome, ReceptionOutcome::Delivered { .. });
             if arrival.to == SURFACE {
@@ -250,15 +239,15 @@ impl VirtualTime for Water {
             }
             let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             match arrival.to {
-                SURFACE => self.surface.handle_frame(&bytes, now),
-                _ => self.vehicle.handle_frame(&bytes, now),
+                SURFACE => self.surface.link_mut().handle_bytes(&bytes, now),
+                _ => self.vehicle.link_mut().handle_bytes(&bytes, now),
             }
         }
         if now >= self.next_fix {
             self.next_fix = now + Duration::from_secs_f64(FIX_S);
             let fix = Fix { position: WorldPoint::new(8.0, 8.0), sigma_m: 1.0, age_s: 0.5 };
             // Before the vehicle is known there is no slot for it.
-            let _ = self.surface.send_fix(self.address, fix, now);
+            let _ = self.surface.surface_mut().send_fix(self.address, fix, now);
         }
         if now >= self.next_change {
             self.next_change = now + Duration::from_secs_f64(CHANGE_S);
@@ -267,28 +256,20 @@ impl VirtualTime for Water {
     }
 
     fn pump(&mut self) {
-        while let Some(output) = self.vehicle.poll_output() {
-            if output == VehicleOutput::Persist {
+        while let Some(event) = self.vehicle.poll_event() {
+            if event == VehicleHostEvent::Persist {
                 self.vehicle.handle_persisted();
             }
         }
-        while self.surface.poll_output().is_some() {}
-        for node in 0..2 {
-            if self.transmitting[node].is_some() {
-                continue;
-            }
-            let transmit = match node {
-                0 => self.vehicle.poll_transmit(self.now),
-                _ => self.surface.poll_transmit(self.now),
-            };
-            let Some(transmit) = transmit else { continue };
-            let airtime = self.modem.airtime(transmit.bytes.len());
-            if node == 0 {
-                self.sent_bits += self.modem.bits_on_air(transmit.bytes.len());
-            }
-            let from = if node == 0 { VEHICLE } else { SURFACE };
-            self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
-            self.transmitting[node] = Some(self.now + airtime);
+        while self.surface.poll_event().is_some() {}
+        let profiles = [*self.vehicle.link().profile(), *self.surface.link().profile()];
+        while let Some(bytes) = self.vehicle.poll_output(self.now) {
+            let airtime = profiles[0].airtime(bytes.len());
+            self.channel.transmit(VEHICLE, bytes, airtime, self.now.into());
+        }
+        while let Some(bytes) = self.surface.poll_output(self.now) {
+            let airtime = profiles[1].airtime(bytes.len());
+            self.channel.transmit(SURFACE, bytes, airtime, self.now.into());
         }
     }
 }

@@ -4,7 +4,7 @@ use super::arrival::{LABELS, Setting, Water};
 use crate::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
-use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
+use scenecast_protocol::schedule::{Class, Shares, BackgroundOrder};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{AskState, Wish};
 
@@ -22,9 +22,8 @@ fn patch(i: u32) -> RgbImage {
 fn water(setting: Setting, seed: u64) -> Water {
     let patches: Vec<RgbImage> = (0..30).map(patch).collect();
     let mut water = Water::new(setting, &patches, seed).unwrap();
-    let budget =
-        Budget { bits_per_s: 10_000, shares: Shares::default(), background: BackgroundOrder::new(&[]).unwrap() };
-    water.vehicle.set_budget(budget, water.now);
+    let budget = Budget { bits_per_s: 10_000, shares: Shares::default(), spend: BackgroundOrder::new(&[]).unwrap() };
+    water.vehicle.handle_budget(budget, water.now);
     water.run_until(Instant::from_secs_f64(120.0), |_| false);
     assert_eq!(exemplar_bytes(&water), 0);
     water
@@ -33,7 +32,7 @@ fn water(setting: Setting, seed: u64) -> Water {
 /// The operator says what left-over bits are spent on.
 fn spend(water: &mut Water, names: &[&str]) {
     let spend = BackgroundOrder::from_names(names).unwrap();
-    water.surface.set_budget(10_000, None, Some(spend), water.now).unwrap();
+    water.surface.surface_mut().set_budget(10_000, None, Some(spend), water.now).unwrap();
 }
 
 fn wait(water: &mut Water, seconds: f64) {
@@ -42,7 +41,7 @@ fn wait(water: &mut Water, seconds: f64) {
 }
 
 fn exemplar_bytes(water: &Water) -> u64 {
-    water.vehicle.stats().bytes_by_class.get(&Class::Exemplar).copied().unwrap_or(0)
+    water.vehicle.vehicle().stats().bytes_by_class.get(&Class::Exemplar).copied().unwrap_or(0)
 }
 
 fn state(water: &Water, label: u8) -> Option<AskState> {
@@ -50,7 +49,7 @@ fn state(water: &Water, label: u8) -> Option<AskState> {
 }
 
 #[test]
-fn a_small_image_comes_first_then_it_grows_and_another_one_comes_though_the_camera_sees_nothing_more() {
+fn a_small_image_grows_and_another_follows_after_the_survey() {
     let mut water = water(IDLE, 1);
     let (_, small) = water.get(3, Wish::Another).unwrap().unwrap();
     let first = water.page(3).unwrap().picture(None).unwrap().clone();
@@ -69,11 +68,11 @@ fn what_is_cancelled_costs_no_more_bits() {
     let loaded = Setting { loaded: true, ..IDLE };
     let mut water = water(loaded, 2);
     water.get(4, Wish::Another).unwrap().unwrap();
-    water.surface.request_exemplar(water.address, 4, Wish::Larger(None), water.now).unwrap();
+    water.surface.surface_mut().request_exemplar(water.address, 4, Wish::Larger(None), water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
     assert!(water.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
-    let version = water.surface.cancel_exemplar(water.address, 4, water.now).unwrap();
-    let heard = |w: &Water| w.vehicle.durable().inbox.versions[4] == Some(version);
+    let version = water.surface.surface_mut().cancel_exemplar(water.address, 4, water.now).unwrap();
+    let heard = |w: &Water| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
     assert!(water.run_until(until, heard), "the vehicle hears of it");
     let then = exemplar_bytes(&water);
     wait(&mut water, 120.0);
@@ -83,11 +82,11 @@ fn what_is_cancelled_costs_no_more_bits() {
 }
 
 #[test]
-fn a_vehicle_without_an_image_says_so_and_sends_it_when_it_has_one() {
+fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
     let mut water = water(IDLE, 3);
-    let gallery = water.vehicle.exemplars().clone();
+    let gallery = water.vehicle.vehicle().exemplars().clone();
     water.vehicle.handle_exemplars(Default::default());
-    water.surface.request_exemplar(water.address, 2, Wish::Another, water.now).unwrap();
+    water.surface.surface_mut().request_exemplar(water.address, 2, Wish::Another, water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
     assert!(water.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));
     wait(&mut water, 60.0);
@@ -98,7 +97,7 @@ fn a_vehicle_without_an_image_says_so_and_sends_it_when_it_has_one() {
 }
 
 #[test]
-fn bits_that_are_left_over_show_every_label_once_and_give_way_to_what_is_asked_for() {
+fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut water = water(IDLE, 4);
     spend(&mut water, &["exemplars"]);
     let until = water.now + std::time::Duration::from_secs(120);
@@ -115,13 +114,13 @@ fn bits_that_are_left_over_show_every_label_once_and_give_way_to_what_is_asked_f
 }
 
 #[test]
-fn while_the_map_waits_what_nobody_asked_for_gets_only_ends_of_frames_that_no_cell_fits_into() {
+fn while_the_map_waits_background_images_get_only_frame_ends() {
     let loaded = Setting { loaded: true, ..IDLE };
     let map_bytes = |names: &[&str]| {
         let mut water = water(loaded, 5);
         spend(&mut water, names);
         wait(&mut water, 120.0);
-        let map = water.vehicle.stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
+        let map = water.vehicle.vehicle().stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
         assert!(exemplar_bytes(&water) < map / 100, "{} beside {map}", exemplar_bytes(&water));
         map
     };

@@ -45,8 +45,8 @@ impl Ages {
     /// Time since a frame of its state was taken or the state was known to be equal.
     fn sample(&mut self, water: &Water) {
         for vehicle in &water.vehicles {
-            let taken = water.surface.vehicle(vehicle.address).and_then(|v| v.replica().taken());
-            let settled = water.surface.vehicle(vehicle.address).is_some() && vehicle.link.is_converged();
+            let taken = water.surface.end().vehicle(vehicle.address).and_then(|v| v.replica().taken());
+            let settled = water.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
             let age = water.now.since(taken.unwrap_or(Instant::ZERO));
             self.oldest = self.oldest.max(if settled { Duration::ZERO } else { age });
         }
@@ -63,13 +63,13 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     water.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
     let began = water.now;
     let is_known = |w: &Water| {
-        w.vehicles.iter().all(|v| w.surface.vehicle(v.address).is_some_and(|p| p.replica().taken().is_some()))
+        w.vehicles.iter().all(|v| w.surface.end().vehicle(v.address).is_some_and(|p| p.replica().taken().is_some()))
     };
     water.run_until(began + Duration::from_secs(3600), is_known);
     let found = water.now.since(began);
     water.run(Duration::from_secs(120));
     let useful = |w: &Water| -> f64 {
-        w.vehicles.iter().filter_map(|v| w.surface.vehicle(v.address)).map(|v| v.replica().useful_bytes()).sum()
+        w.vehicles.iter().filter_map(|v| w.surface.end().vehicle(v.address)).map(|v| v.replica().useful_bytes()).sum()
     };
     let (from, before) = (water.now, useful(&water));
     water.grants = Default::default();

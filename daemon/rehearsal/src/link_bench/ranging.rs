@@ -55,6 +55,6 @@ fn measure(loss: f64, time: Duration, seed: u64) -> Result<RangingRow, IssueErro
         efficiency_with_fixes: round(with),
         cost: round(1.0 - with / without),
         round_trip_error_ms: round(error_ms(water.view().and_then(|v| v.round_trip()), truth)),
-        one_way_error_ms: round(error_ms(water.vehicle().link.one_way(), truth / 2)),
+        one_way_error_ms: round(error_ms(water.vehicle().host.end().one_way(), truth / 2)),
     })
 }

@@ -1,8 +1,9 @@
 //! How fast the link runs on one core of this machine.
 
 use super::opaque::OpaqueReplica;
-use super::water::{Setting, Vehicle, Water, auv, surface_config};
+use super::water::{Setting, Vehicle, Water, auv, surface};
 use crate::VirtualTime;
+use scenecast_host::LinkHost;
 use scenecast_protocol::link::SurfaceLink;
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
@@ -44,10 +45,10 @@ fn frames_per_s(frame_bytes: usize) -> f64 {
     (wire.frames - frames) as f64 / began.elapsed().as_secs_f64()
 }
 
-/// Two ends under load with nothing but airtime between them.
+/// Two ends under load, and a frame arrives when its airtime has passed.
 struct Wire {
     now: Instant,
-    surface: SurfaceLink<OpaqueReplica>,
+    surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     vehicle: Vehicle,
     modem: ModemProfile,
     /// Frames on air by when they end and whether the surface sent them.
@@ -61,7 +62,7 @@ impl Wire {
         let now = Instant::ZERO;
         let mut vehicle = Vehicle::new(&setting, auv(), 1, now);
         vehicle.load = Some(LOAD);
-        let surface = SurfaceLink::new(surface_config(&setting), 2, now);
+        let surface = surface(&setting, 2, now);
         Self { now, surface, vehicle, modem: setting.modem(), on_air: BTreeMap::new(), frames: 0 }
     }
 
@@ -75,14 +76,15 @@ impl Wire {
     }
 
     fn pump(&mut self) {
-        while self.surface.poll_event().is_some() {}
-        if let Some(transmit) = self.surface.poll_transmit(self.now) {
-            self.put_on_air(true, transmit.bytes);
+        while self.surface.end_mut().poll_event().is_some() {}
+        while let Some(bytes) = self.surface.poll_output(self.now) {
+            self.put_on_air(true, bytes);
         }
         self.vehicle.handle_news(self.now);
-        if let Some(transmit) = self.vehicle.link.poll_transmit(self.now) {
-            self.put_on_air(false, transmit.bytes);
+        while let Some(bytes) = self.vehicle.host.poll_output(self.now) {
+            self.put_on_air(false, bytes);
         }
+        while self.surface.poll_event().is_some() || self.vehicle.host.poll_event().is_some() {}
     }
 
     fn put_on_air(&mut self, by_surface: bool, bytes: Vec<u8>) {
@@ -91,24 +93,18 @@ impl Wire {
     }
 
     fn next_event(&self) -> Instant {
-        let timers = self.vehicle.link.poll_timeout().into_iter().chain(self.surface.poll_timeout(self.now));
-        let timers = timers.map(|(at, _)| at).filter(|&at| at > self.now);
-        let end = self.on_air.keys().next().map(|&(at, _)| at);
-        timers.chain(end).min().unwrap_or(self.now + Duration::from_millis(200))
+        let hosts = [self.vehicle.host.poll_timeout(self.now), self.surface.poll_timeout(self.now)];
+        hosts.into_iter().flatten().min().unwrap_or(self.now + Duration::from_millis(200))
     }
 
     fn handle_frames(&mut self) {
+        self.surface.handle_timeout(self.now);
+        self.vehicle.host.handle_timeout(self.now);
         while let Some(entry) = self.on_air.first_entry().filter(|e| e.key().0 <= self.now) {
             let ((_, by_surface), bytes) = entry.remove_entry();
             match by_surface {
-                true => {
-                    self.surface.handle_transmit_outcome(self.now);
-                    self.vehicle.link.handle_frame(&bytes, self.now);
-                }
-                false => {
-                    self.vehicle.link.handle_transmit_outcome(self.now);
-                    self.surface.handle_frame(&bytes, self.now);
-                }
+                true => self.vehicle.host.handle_bytes(&bytes, self.now),
+                false => self.surface.handle_bytes(&bytes, self.now),
             }
         }
     }
@@ -124,6 +120,6 @@ mod tests {
         wire.run(Duration::from_secs(600));
         let share = wire.frames as f64 * 256.0 * 8.0 / 10_000.0 / 600.0;
         assert!((0.8..1.2).contains(&share), "{share}");
-        assert!(wire.surface.vehicle(auv()).is_some_and(|v| v.replica().useful_bytes() > 400_000.0));
+        assert!(wire.surface.end().vehicle(auv()).is_some_and(|v| v.replica().useful_bytes() > 400_000.0));
     }
 }

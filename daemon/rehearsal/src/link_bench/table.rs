@@ -124,12 +124,12 @@ impl Place {
 pub fn budget_use(water: &Water) -> f64 {
     let budget = f64::from(water.setting().budget_bps) * WINDOW.as_secs_f64();
     let of = |audit: &Audit| audit.worst_window_bits() as f64 / (budget + audit.largest_bits() as f64);
-    water.vehicles.iter().map(|v| of(&v.audit)).fold(of(&water.audit), f64::max)
+    water.vehicles.iter().map(|v| of(v.host.audit())).fold(of(water.surface.audit()), f64::max)
 }
 
 fn resyncs(water: &Water) -> u64 {
     let at_surface = water.view().map_or(0, |v| v.stats().resyncs);
-    at_surface + water.vehicles.iter().map(|v| v.link.stats().resyncs).sum::<u64>()
+    at_surface + water.vehicles.iter().map(|v| v.host.end().stats().resyncs).sum::<u64>()
 }
 
 /// To a thousandth, so that a table says no more than it knows.

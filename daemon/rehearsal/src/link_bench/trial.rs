@@ -82,7 +82,7 @@ impl Water {
         while self.now < until {
             if fix_every.is_some() {
                 let fix = Fix { position: WorldPoint::new(10.0, -20.0), sigma_m: 1.0, age_s: 0.5 };
-                self.surface.issue(auv(), Slot::Fix(fix), self.now)?;
+                self.surface.end_mut().issue(auv(), Slot::Fix(fix), self.now)?;
             }
             self.run((fix_every.unwrap_or(time)).min(until.since(self.now)));
         }
@@ -98,7 +98,7 @@ impl Water {
             let issued = self.now;
             let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
             let slot = Slot::Utility(Utility { weights, ..Utility::default() });
-            let version = self.surface.issue(auv(), slot, issued)?;
+            let version = self.surface.end_mut().issue(auv(), slot, issued)?;
             self.run_until(issued + GIVE_UP, |w| {
                 w.view().is_some_and(|v| v.slots().any(|s| s.status == OrderStatus::Applied))
             });
@@ -130,7 +130,7 @@ impl Water {
         let stopped: Instant = self.now;
         let vehicle = self.vehicle();
         vehicle.load = None;
-        vehicle.link.source_mut().take_back(keep);
+        vehicle.host.end_mut().source_mut().take_back(keep);
         let bytes = self.missing();
         let mut seen = None;
         self.run_until(stopped + GIVE_UP, |w| {
@@ -142,7 +142,7 @@ impl Water {
 
     /// Bytes that the replica lacks.
     fn missing(&self) -> usize {
-        let target = self.vehicles[0].link.source().target();
+        let target = self.vehicles[0].host.end().source().target();
         self.view().map_or(usize::MAX, |v| v.replica().missing(target))
     }
 }

@@ -3,13 +3,14 @@
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
 use crate::VirtualTime;
-use scenecast_protocol::directive::{SlotId, SlotState};
+use scenecast_host::{FrameEvent, LinkEnd, LinkHost, channel_station};
+use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::link::{
-    PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, Transmit, VehicleConfig, VehicleEvent,
-    VehicleLink,
+    PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::schedule::{Audit, Shares};
+use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
@@ -69,26 +70,22 @@ impl Setting {
 pub struct Vehicle {
     /// Its address.
     pub address: Address,
-    /// Its end of the link.
-    pub link: VehicleLink<OpaqueSource>,
+    /// Its end of the link at its modem.
+    pub host: LinkHost<VehicleLink<OpaqueSource>>,
     /// Bytes that always wait, while it is under load.
     pub load: Option<usize>,
     /// When a slot was last applied, by slot and version.
     pub applied: BTreeMap<(SlotId, u16), Instant>,
-    /// What it put on air.
-    pub audit: Audit,
 }
 
 /// The ends and the channel between them.
 pub struct Water {
     /// The time.
     pub now: Instant,
-    /// The surface's end of the link.
-    pub surface: SurfaceLink<OpaqueReplica>,
+    /// The surface's end of the link at its modem.
+    pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     /// The vehicles, in the order of their addresses.
     pub vehicles: Vec<Vehicle>,
-    /// What the surface put on air.
-    pub audit: Audit,
     /// Where airtime and frames went.
     pub tally: Tally,
     /// Turns that were granted, and the time that they add up to.
@@ -96,8 +93,6 @@ pub struct Water {
     setting: Setting,
     modem: ModemProfile,
     channel: Channel,
-    /// When each transmission ends, and whose it is.
-    ending: BTreeMap<(Instant, NodeId), ()>,
     /// When each end last took in a frame that was meant for it.
     heard: BTreeMap<NodeId, Instant>,
 }
@@ -135,15 +130,13 @@ impl Water {
         }
         Self {
             now,
-            surface: SurfaceLink::new(surface_config(setting), draw(), now),
+            surface: surface(setting, draw(), now),
             vehicles,
-            audit: Audit::new(WINDOW),
             tally: Tally::default(),
             grants: (0, Duration::ZERO),
             setting: setting.clone(),
             modem: setting.modem(),
             channel,
-            ending: BTreeMap::new(),
             heard: BTreeMap::new(),
         }
     }
@@ -160,26 +153,25 @@ impl Water {
 
     /// The only vehicle as the surface knows it.
     pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
-        self.surface.vehicle(auv())
+        self.surface.end().vehicle(auv())
     }
 
-    fn note_grant(&mut self, transmit: &Transmit) {
-        let header = Envelope::decode(&transmit.bytes, |_| true).map(|e| e.header);
+    fn note_grant(&mut self, bytes: &[u8]) {
+        let header = Envelope::decode(bytes, |_| true).map(|e| e.header);
         if let Some(quarters) = header.ok().filter(|h| h.to.is_vehicle() && h.remaining == 0).and_then(|h| h.turn) {
             self.grants.0 += 1;
             self.grants.1 += Duration::from_millis(250) * u32::from(quarters);
         }
     }
 
-    fn transmit(&mut self, from: NodeId, transmit: Transmit) {
-        assert!(transmit.bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
-        let airtime = self.modem.airtime(transmit.bytes.len());
+    fn transmit(&mut self, from: NodeId, bytes: Vec<u8>, kind: &'static str) {
+        assert!(bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
+        let airtime = self.modem.airtime(bytes.len());
         let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
         self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
-        *self.tally.airtime.entry((who, transmit.kind.name())).or_default() += airtime;
-        self.ending.insert((self.now + airtime, from), ());
-        self.channel.transmit(from, transmit.bytes, airtime, self.now.into());
+        *self.tally.airtime.entry((who, kind)).or_default() += airtime;
+        self.channel.transmit(from, bytes, airtime, self.now.into());
     }
 }
 
@@ -194,20 +186,15 @@ impl VirtualTime for Water {
 
     /// The next moment at which something happens, at most a while away.
     fn next_event(&self) -> Instant {
-        let timers = self.vehicles.iter().filter_map(|v| v.link.poll_timeout());
-        let timers = timers.chain(self.surface.poll_timeout(self.now)).map(|(at, _)| at).filter(|&at| at > self.now);
-        let ending = self.ending.first_key_value().map(|((at, _), ())| *at);
+        let hosts = self.vehicles.iter().filter_map(|v| v.host.poll_timeout(self.now));
         let arrival = self.channel.poll_timeout().map(Instant::from);
-        timers.chain(ending).chain(arrival).min().unwrap_or(self.now + Duration::from_millis(200))
+        let all = hosts.chain(self.surface.poll_timeout(self.now)).chain(arrival);
+        all.min().unwrap_or(self.now + Duration::from_millis(200))
     }
 
     fn handle_events(&mut self) {
-        while let Some(entry) = self.ending.first_entry().filter(|e| e.key().0 <= self.now) {
-            match entry.remove_entry().0.1 {
-                SURFACE => self.surface.handle_transmit_outcome(self.now),
-                NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_transmit_outcome(self.now),
-            }
-        }
+        self.surface.handle_timeout(self.now);
+        self.vehicles.iter_mut().for_each(|v| v.host.handle_timeout(self.now));
         while let Some(arrival) = self.channel.poll_arrival(self.now.into()) {
             match arrival.to {
                 SURFACE => self.tally.up.count(&arrival.outcome),
@@ -219,34 +206,43 @@ impl VirtualTime for Water {
                 self.heard.insert(arrival.to, self.now);
             }
             match arrival.to {
-                SURFACE => self.surface.handle_frame(&bytes, self.now),
-                NodeId(number) => self.vehicles[usize::from(number) - 1].link.handle_frame(&bytes, self.now),
+                SURFACE => self.surface.handle_bytes(&bytes, self.now),
+                NodeId(number) => self.vehicles[usize::from(number) - 1].host.handle_bytes(&bytes, self.now),
             }
         }
     }
 
     /// Lets every end say what it may say now.
     fn pump(&mut self) {
-        while let Some(event) = self.surface.poll_event() {
+        while let Some(event) = self.surface.end_mut().poll_event() {
             if let SurfaceEvent::VehicleRestarted(_) = event {
                 self.tally.restarts += 1;
             }
         }
-        if let Some(transmit) = self.surface.poll_transmit(self.now) {
-            self.note_grant(&transmit);
-            self.audit.record(self.modem.bits_on_air(transmit.bytes.len()), self.now);
-            self.transmit(SURFACE, transmit);
+        while let Some((bytes, kind)) = poll_frame(&mut self.surface, self.now) {
+            self.note_grant(&bytes);
+            self.transmit(SURFACE, bytes, kind);
         }
         for i in 0..self.vehicles.len() {
-            let vehicle = &mut self.vehicles[i];
-            vehicle.handle_news(self.now);
-            if let Some(transmit) = vehicle.link.poll_transmit(self.now) {
-                vehicle.audit.record(self.modem.bits_on_air(transmit.bytes.len()), self.now);
-                let node = NodeId(vehicle.address.number());
-                self.transmit(node, transmit);
+            self.vehicles[i].handle_news(self.now);
+            while let Some((bytes, kind)) = poll_frame(&mut self.vehicles[i].host, self.now) {
+                let node = NodeId(self.vehicles[i].address.number());
+                self.transmit(node, bytes, kind);
             }
         }
     }
+}
+
+/// The next frame of a host on a bare channel, and its kind.
+fn poll_frame<E: LinkEnd>(host: &mut LinkHost<E>, now: Instant) -> Option<(Vec<u8>, &'static str)> {
+    let bytes = host.poll_output(now)?;
+    let mut kind = "";
+    while let Some(event) = host.poll_event() {
+        if let FrameEvent::Sent { kind: of_frame, .. } = event {
+            kind = of_frame.name();
+        }
+    }
+    Some((bytes, kind))
 }
 
 impl Vehicle {
@@ -263,27 +259,34 @@ impl Vehicle {
             authenticity: None,
         };
         let link = VehicleLink::with_source(config, OpaqueSource::default(), seed, SlotInboxState::default(), now);
-        Self { address, link, load: None, applied: BTreeMap::new(), audit: Audit::new(WINDOW) }
+        let host = LinkHost::new(link, channel_station(setting.modem(), WINDOW, now));
+        Self { address, host, load: None, applied: BTreeMap::new() }
     }
 
-    /// Applies what came in, and sees to it that there is something to say.
+    /// Applies the slots that came in, and fills the source while it is under load.
     pub(super) fn handle_news(&mut self, now: Instant) {
-        while let Some(event) = self.link.poll_event() {
+        let link = self.host.end_mut();
+        while let Some(event) = link.poll_event() {
             if let VehicleEvent::Slot { id, version, .. } = event {
-                self.link.decide(id, SlotState::Applied, now);
-                self.link.handle_persisted();
+                link.decide(id, SlotState::Applied, now);
+                link.handle_persisted();
                 self.applied.insert((id, version), now);
             }
         }
-        self.link.set_status(VehicleStatus::default());
+        link.set_status(VehicleStatus::default());
         if let Some(bytes) = self.load {
-            self.link.source_mut().fill(bytes);
+            link.source_mut().fill(bytes);
         }
     }
 }
 
-/// The surface of a setting.
-pub(super) fn surface_config(setting: &Setting) -> SurfaceConfig {
+/// The surface of a setting at its modem.
+pub(super) fn surface(setting: &Setting, seed: u64, now: Instant) -> LinkHost<SurfaceLink<OpaqueReplica>> {
+    let link = SurfaceLink::new(surface_config(setting), seed, now);
+    LinkHost::new(link, channel_station(setting.modem(), WINDOW, now))
+}
+
+fn surface_config(setting: &Setting) -> SurfaceConfig {
     let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),

@@ -331,13 +331,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_relay_keeps_the_error_below_a_third_and_outliers_do_it_little_harm() {
+    fn the_relay_cuts_the_error_to_a_third_despite_outliers() {
         let found = localisation(1, 4, &mut |_| {});
         assert!(found.reached, "{found:?}");
     }
 
     #[test]
-    fn dead_reckoning_drifts_by_its_percentage_and_the_same_seed_gives_the_same_way() {
+    fn dead_reckoning_drifts_by_its_percentage_repeatably() {
         let (tracks, _) = fly_with_outliers(3, 0.1);
         let (x, y) = *tracks.truth.last().unwrap();
         let (rx, ry) = *tracks.reckoned.last().unwrap();

@@ -76,7 +76,7 @@ impl Ship {
         let (off, left) = self.astray;
         self.astray.1 = left.saturating_sub(1);
         let off = if left == 0 { (0.0, 0.0) } else { off };
-        let said = self.instruments.say(self.at, self.heading_rad, off, second);
+        let said = self.instruments.report(self.at, self.heading_rad, off, second);
         self.relay.handle_gps(said.as_bytes(), now);
     }
 

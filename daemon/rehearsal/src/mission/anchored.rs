@@ -49,10 +49,10 @@ impl Anchored {
         (Self { at, instruments, head, seconds: 0, sighted: None }, Relay::new(relay))
     }
 
-    /// What GPS and compass say, once a second.
-    pub(super) fn say(&mut self) -> String {
+    /// NMEA sentences of GPS and compass, to be asked once a second.
+    pub(super) fn report(&mut self) -> String {
         self.seconds += 1;
-        self.instruments.say((self.at.x_m, self.at.y_m), 0.0, (0.0, 0.0), self.seconds)
+        self.instruments.report((self.at.x_m, self.at.y_m), 0.0, (0.0, 0.0), self.seconds)
     }
 
     /// The vehicle answers from where it is now; its answer is under way for `travel`.

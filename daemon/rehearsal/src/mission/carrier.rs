@@ -1,81 +1,150 @@
-//! A mission through drivers and emulated modems instead of bare water.
+//! The medium between the two hosts: a bare channel, or emulated modems in one.
 
-use super::{Mission, channel_config};
-use crate::docked::{Docked, SURFACE, VEHICLE};
+use crate::frames_log::FramesLog;
+use crate::modem_rig::{ModemRig, SURFACE, VEHICLE};
 use scenecast_config::Config;
 use scenecast_core::UserError;
-use scenecast_drivers::modem::ModemEvent;
+use scenecast_drivers::modem::Station;
+use scenecast_host::{SurfaceHost, VehicleHost, channel_station};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
-use sim_channel::Channel;
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, ReceptionOutcome};
+use std::collections::VecDeque;
+use std::time::Duration;
 
-/// The modems, if the configuration names a make; TCP and UDP are no modems: there the water is bare.
-pub(super) fn docked(config: &Config, seed: u64, now: Instant) -> Result<Option<Docked>, UserError> {
-    match config.modem.kind.as_str() {
-        "tcp" | "udp" => Ok(None),
-        _ => Docked::new(config, Channel::new(channel_config(config), seed), seed, now).map(Some),
+const NODES: [NodeId; 2] = [NodeId(1), NodeId(0)];
+
+/// Kinds `tcp` and `udp` are no modems: there the channel is bare, and an output of a host is a frame.
+enum Medium {
+    Channel(Channel),
+    Modems(ModemRig),
+}
+
+/// Carries bytes between the hosts, and logs the frames.
+pub(crate) struct Carrier {
+    medium: Medium,
+    pub(crate) log: FramesLog,
+    /// Transmissions of each end that the log does not know yet.
+    unlogged: [VecDeque<u64>; 2],
+}
+
+impl Carrier {
+    /// The medium that the configuration names, and the stations of vehicle and surface.
+    pub(super) fn new(config: &Config, seed: u64, now: Instant) -> Result<(Self, [Station; 2]), UserError> {
+        let channel = Channel::new(channel_config(config), seed);
+        let (medium, stations) = match config.modem.kind.as_str() {
+            "tcp" | "udp" => {
+                let profile = scenecast_config::modem_profile(config, config.channel.bit_rate);
+                let window = Duration::from_secs_f64(config.link.budget_window_s);
+                (Medium::Channel(channel), [(); 2].map(|()| channel_station(profile, window, now)))
+            }
+            _ => {
+                let (rig, stations) = ModemRig::new(config, channel, seed, now)?;
+                (Medium::Modems(rig), stations)
+            }
+        };
+        let carrier = Self { medium, log: FramesLog::default(), unlogged: Default::default() };
+        Ok((carrier, stations))
+    }
+
+    /// Puts an end somewhere.
+    pub(super) fn place(&mut self, end: usize, position: NodePosition) {
+        match &mut self.medium {
+            Medium::Channel(channel) => channel.place(NODES[end], position),
+            Medium::Modems(rig) => rig.place(end, position),
+        }
+    }
+
+    /// Slant range between the ends, metres.
+    pub(super) fn range_m(&mut self) -> f64 {
+        let range_m = match &mut self.medium {
+            Medium::Channel(channel) => channel.range_m(NODES[SURFACE], NODES[VEHICLE]),
+            Medium::Modems(rig) => rig.range_m(),
+        };
+        range_m.unwrap_or(0.0)
+    }
+
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        match &self.medium {
+            Medium::Channel(channel) => channel.poll_timeout().map(Instant::from),
+            Medium::Modems(rig) => rig.poll_timeout(),
+        }
+    }
+
+    /// Lets time pass in medium and hosts, and gives the hosts what arrives.
+    pub(super) fn deliver(&mut self, vehicle: &mut VehicleHost, surface: &mut SurfaceHost, now: Instant) {
+        match &mut self.medium {
+            Medium::Channel(channel) => {
+                vehicle.handle_timeout(now);
+                surface.handle_timeout(now);
+                while let Some(arrival) = channel.poll_arrival(now.into()) {
+                    self.log.handle_fate(&arrival);
+                    let ReceptionOutcome::Delivered { bytes, .. } = &arrival.outcome else { continue };
+                    if arrival.to == NODES[VEHICLE] {
+                        vehicle.link_mut().handle_bytes(bytes, now);
+                    } else {
+                        surface.link_mut().handle_bytes(bytes, now);
+                    }
+                }
+            }
+            Medium::Modems(rig) => {
+                rig.handle_timeout(now);
+                rig.read(VEHICLE, vehicle.link_mut(), now);
+                rig.read(SURFACE, surface.link_mut(), now);
+            }
+        }
+    }
+
+    /// Takes what the hosts have for their ports. A host reports each of its frames in an event afterwards, which
+    /// [`Self::log_sent`] waits for.
+    pub(super) fn collect(&mut self, vehicle: &mut VehicleHost, surface: &mut SurfaceHost, now: Instant) {
+        self.write(VEHICLE, *vehicle.link().profile(), || vehicle.poll_output(now), now);
+        self.write(SURFACE, *surface.link().profile(), || surface.poll_output(now), now);
+    }
+
+    fn write(
+        &mut self,
+        end: usize,
+        profile: ModemProfile,
+        mut poll_output: impl FnMut() -> Option<Vec<u8>>,
+        now: Instant,
+    ) {
+        while let Some(bytes) = poll_output() {
+            match &mut self.medium {
+                Medium::Channel(channel) => {
+                    let airtime = profile.airtime(bytes.len());
+                    let transmission = channel.transmit(NODES[end], bytes, airtime, now.into());
+                    self.unlogged[end].push_back(transmission);
+                }
+                Medium::Modems(rig) => rig.write(end, &bytes),
+            }
+        }
+        if let Medium::Modems(rig) = &mut self.medium {
+            rig.flush(end, now);
+        }
+    }
+
+    /// An end has handed a frame to its modem or to the channel.
+    pub(super) fn log_sent(&mut self, end: usize, bytes: usize, kind: &'static str, now: Instant) {
+        match self.unlogged[end].pop_front() {
+            Some(transmission) => {
+                self.log.handle_sent(transmission, end == VEHICLE, bytes, kind, now.as_secs_f64());
+            }
+            None => self.log.sent[end] += 1,
+        }
     }
 }
 
-/// What the links must know: the vehicle's, the surface's.
-pub(super) fn profiles(docked: &mut Docked) -> [ModemProfile; 2] {
-    [VEHICLE, SURFACE].map(|end| *docked.station(end).profile())
-}
-
-impl Mission {
-    /// Takes what the modems tell.
-    pub(super) fn handle_modems(&mut self) {
-        let now = self.now;
-        let Some(mut docked) = self.docked.take() else { return };
-        docked.handle_timeout(now);
-        for end in [VEHICLE, SURFACE] {
-            while let Some(event) = docked.poll_event(end) {
-                self.handle_modem(end, event, now);
-            }
-        }
-        self.docked = Some(docked);
-    }
-
-    fn handle_modem(&mut self, end: usize, event: ModemEvent, now: Instant) {
-        let at_vehicle = end == VEHICLE;
-        match event {
-            ModemEvent::Sent if at_vehicle => self.vehicle.handle_transmit_outcome(now),
-            ModemEvent::Sent => self.surface.handle_transmit_outcome(now),
-            ModemEvent::Received(bytes) if at_vehicle => self.vehicle.handle_frame(&bytes, now),
-            ModemEvent::Received(bytes) => {
-                self.heard_bits += self.modem.bits_on_air(bytes.len());
-                self.surface.handle_frame(&bytes, now);
-            }
-            ModemEvent::Poll(frames) if at_vehicle => self.vehicle.handle_poll(frames),
-            ModemEvent::Poll(frames) => self.surface.handle_poll(frames),
-            ModemEvent::Repeated(bits) if at_vehicle => self.vehicle.handle_repeated(bits, now),
-            ModemEvent::Repeated(bits) => self.surface.handle_repeated(bits, now),
-            ModemEvent::Fix(vehicle, line) => self.surface.handle_range(vehicle, &line, now),
-            ModemEvent::Ready | ModemEvent::Lost | ModemEvent::Refused(_) => {}
-        }
-    }
-
-    /// Gives the modems what the ends have to say.
-    pub(super) fn speak_through_modems(&mut self) {
-        let now = self.now;
-        let Some(mut docked) = self.docked.take() else { return };
-        if docked.station(SURFACE).takes_cycles(now)
-            && let Some(cycle) = self.surface.poll_cycle(now)
-        {
-            docked.station(SURFACE).begin_cycle(cycle, now);
-        }
-        for end in [VEHICLE, SURFACE] {
-            while docked.station(end).takes_frames() {
-                let next =
-                    if end == VEHICLE { self.vehicle.poll_transmit(now) } else { self.surface.poll_transmit(now) };
-                let Some(transmit) = next else { break };
-                self.log.sent[end] += 1;
-                self.audits[end].record(self.modem.bits_on_air(transmit.bytes.len()), now);
-                // What a modem refuses is lost, and the link repairs it.
-                let _ = docked.station(end).send(transmit, now);
-            }
-        }
-        docked.write(now);
-        self.docked = Some(docked);
+fn channel_config(config: &Config) -> ChannelConfig {
+    let c = &config.channel;
+    ChannelConfig {
+        sound_speed_m_s: c.sound_speed_m_s,
+        half_duplex: c.half_duplex,
+        loss: if c.loss > 0.0 { LossModel::Independent { probability: c.loss } } else { LossModel::None },
+        corruption: c.corruption,
+        duplication: c.duplication,
+        reordering: c.reordering,
+        reorder_delay: Duration::from_secs(5),
+        ..ChannelConfig::default()
     }
 }

@@ -1,16 +1,18 @@
 //! The link under load of opaque bytes through drivers and emulated modems.
 
 use crate::VirtualTime;
-use crate::docked::{Docked, SURFACE, VEHICLE};
 use crate::link_bench::{OpaqueReplica, OpaqueSource, Summary};
+use crate::modem_rig::{ModemRig, SURFACE, VEHICLE};
 use scenecast_config::Config;
 use scenecast_core::UserError;
-use scenecast_drivers::modem::ModemEvent;
-use scenecast_protocol::directive::{Slot, SlotId, SlotState, Utility};
+use scenecast_drivers::modem::Station;
+use scenecast_host::{FrameEvent, LinkHost};
+use scenecast_protocol::directive::SlotState;
+use scenecast_protocol::directive::{Slot, SlotId, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
-use scenecast_protocol::mac::{Access, MasterConfig};
+use scenecast_protocol::mac::MasterConfig;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
@@ -24,20 +26,20 @@ const LOAD: usize = 25_000;
 /// Time after which a directive counts as lost.
 const GIVE_UP: Duration = Duration::from_secs(600);
 
-/// What the modems and the water between them are like.
+/// Properties of the modems and of the channel between them.
 #[derive(Debug, Clone)]
 pub struct DockSetting {
     /// Of both ends.
     pub config: Config,
     /// Slant range, m.
     pub range_m: f64,
-    /// Share of frames that the water loses, each way.
+    /// Share of frames that the channel loses, each way.
     pub loss: f64,
 }
 
 impl DockSetting {
-    /// The water.
-    pub(super) fn water(&self) -> ChannelConfig {
+    /// The channel.
+    pub(super) fn channel(&self) -> ChannelConfig {
         let loss = LossModel::Independent { probability: self.loss };
         ChannelConfig { loss: if self.loss > 0.0 { loss } else { LossModel::None }, ..ChannelConfig::default() }
     }
@@ -47,12 +49,12 @@ impl DockSetting {
 pub struct Dock {
     /// The time.
     pub now: Instant,
-    /// The modems.
-    pub docked: Docked,
-    /// The vehicle's link.
-    pub vehicle: VehicleLink<OpaqueSource>,
-    /// The surface's link.
-    pub surface: SurfaceLink<OpaqueReplica>,
+    /// The modems and the channel between them.
+    pub rig: ModemRig,
+    /// The vehicle's link at its modem.
+    pub vehicle: LinkHost<VehicleLink<OpaqueSource>>,
+    /// The surface's link at its modem.
+    pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     /// Bytes that always wait at the vehicle.
     pub load: Option<usize>,
     /// When each slot was applied, each time.
@@ -71,27 +73,32 @@ impl Dock {
     /// Ends that have not met.
     pub fn new(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
-        let docked = Docked::new(&setting.config, Channel::new(setting.water(), seed), seed, now)?;
-        Self::at(setting, docked, seed, now)
+        let rig = ModemRig::new(&setting.config, Channel::new(setting.channel(), seed), seed, now)?;
+        Self::at(setting, rig, seed, now)
     }
 
     /// The same at these modems.
     pub fn with_modems(setting: &DockSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
-        let docked = Docked::with_modems(&setting.config, Channel::new(setting.water(), seed), modems, now)?;
-        Self::at(setting, docked, seed, now)
+        let rig = ModemRig::with_modems(&setting.config, Channel::new(setting.channel(), seed), modems, now)?;
+        Self::at(setting, rig, seed, now)
     }
 
-    fn at(setting: &DockSetting, mut docked: Docked, seed: u64, now: Instant) -> Result<Self, UserError> {
+    fn at(
+        setting: &DockSetting,
+        (mut rig, [at_vehicle, at_surface]): (ModemRig, [Station; 2]),
+        seed: u64,
+        now: Instant,
+    ) -> Result<Self, UserError> {
         let config = &setting.config;
-        docked.place(VEHICLE, NodePosition::new(0.0, 0.0, 10.0));
-        docked.place(SURFACE, NodePosition::new(setting.range_m, 0.0, 10.0));
+        rig.place(VEHICLE, NodePosition::new(0.0, 0.0, 10.0));
+        rig.place(SURFACE, NodePosition::new(setting.range_m, 0.0, 10.0));
         let address = scenecast_config::vehicle_address(config)?;
         let (mission, window) = (MissionId(7), Duration::from_secs_f64(config.link.budget_window_s));
         let vehicle = VehicleConfig {
             address,
             mission,
-            modem: *docked.station(VEHICLE).profile(),
+            modem: *at_vehicle.profile(),
             budget_bps: config.link.budget_bps,
             budget_window: window,
             shares: Shares::default(),
@@ -100,7 +107,7 @@ impl Dock {
         };
         let surface = SurfaceConfig {
             mission,
-            modem: *docked.station(SURFACE).profile(),
+            modem: *at_surface.profile(),
             budget_bps: config.link.budget_bps,
             budget_window: window,
             shares: Shares::default(),
@@ -112,9 +119,12 @@ impl Dock {
         let source = OpaqueSource::default();
         Ok(Self {
             now,
-            vehicle: VehicleLink::with_source(vehicle, source, seed ^ 0xA, SlotInboxState::default(), now),
-            surface: SurfaceLink::new(surface, seed ^ 0xB, now),
-            docked,
+            vehicle: LinkHost::new(
+                VehicleLink::with_source(vehicle, source, seed ^ 0xA, SlotInboxState::default(), now),
+                at_vehicle,
+            ),
+            surface: LinkHost::new(SurfaceLink::new(surface, seed ^ 0xB, now), at_surface),
+            rig,
             load: None,
             applied: BTreeMap::new(),
             heard: [now; 2],
@@ -135,50 +145,14 @@ impl Dock {
 
     /// The vehicle as the surface knows it.
     pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
-        self.surface.vehicle(self.address)
+        self.surface.end().vehicle(self.address)
     }
 
-    fn handle_modem(&mut self, end: usize, event: ModemEvent) {
-        let now = self.now;
-        match (event, end) {
-            (ModemEvent::Sent, VEHICLE) => self.vehicle.handle_transmit_outcome(now),
-            (ModemEvent::Sent, _) => self.surface.handle_transmit_outcome(now),
-            (ModemEvent::Received(bytes), _) => {
-                self.heard[end] = now;
-                if end == VEHICLE {
-                    self.vehicle.handle_frame(&bytes, now)
-                } else {
-                    self.surface.handle_frame(&bytes, now)
-                }
-            }
-            (ModemEvent::Poll(frames), VEHICLE) => self.vehicle.handle_poll(frames),
-            (ModemEvent::Poll(frames), _) => self.surface.handle_poll(frames),
-            (ModemEvent::Repeated(bits), VEHICLE) => self.vehicle.handle_repeated(bits, now),
-            (ModemEvent::Repeated(bits), _) => self.surface.handle_repeated(bits, now),
-            (ModemEvent::Refused(what), _) => self.refusals.push(what),
-            (ModemEvent::Fix(..) | ModemEvent::Ready | ModemEvent::Lost, _) => {}
-        }
-    }
-
-    fn speak(&mut self) {
-        let now = self.now;
-        let polled = self.docked.station(SURFACE).profile().access == Access::Polled;
-        if polled
-            && self.docked.station(SURFACE).takes_cycles(now)
-            && let Some(cycle) = self.surface.poll_cycle(now)
-        {
-            self.docked.station(SURFACE).begin_cycle(cycle, now);
-        }
-        while self.docked.station(SURFACE).takes_frames()
-            && let Some(transmit) = self.surface.poll_transmit(now)
-        {
-            // What a modem refuses is lost, and the link repairs it.
-            let _ = self.docked.station(SURFACE).send(transmit, now);
-        }
-        while self.docked.station(VEHICLE).takes_frames()
-            && let Some(transmit) = self.vehicle.poll_transmit(now)
-        {
-            let _ = self.docked.station(VEHICLE).send(transmit, now);
+    fn note(&mut self, end: usize, event: FrameEvent) {
+        match event {
+            FrameEvent::Received { .. } => self.heard[end] = self.now,
+            FrameEvent::ModemRefused { reason, .. } => self.refusals.push(reason),
+            _ => {}
         }
     }
 
@@ -208,22 +182,25 @@ impl Dock {
     pub fn issue(&mut self) -> Option<u16> {
         let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
         let slot = Slot::Utility(Utility { weights, ..Utility::default() });
-        self.surface.issue(self.address, slot, self.now).ok()
+        self.surface.end_mut().issue(self.address, slot, self.now).ok()
     }
 
     /// Breaks something of a modem.
     pub fn inject(&mut self, end: usize, fault: Fault) {
-        self.docked.inject(end, fault, self.now);
+        self.rig.inject(end, fault, self.now);
     }
 
     /// Pulls a cable, or puts it back.
     pub fn plug(&mut self, end: usize, plugged: bool) {
-        self.docked.plug(end, plugged, self.now);
+        match end {
+            VEHICLE => self.rig.plug(end, &mut self.vehicle, plugged, self.now),
+            _ => self.rig.plug(end, &mut self.surface, plugged, self.now),
+        }
     }
 
     /// Most of the vehicle's bits in any window, over what the budget allows.
     pub fn budget_use(&mut self) -> f64 {
-        self.docked.station(VEHICLE).audit().worst_window_bits() as f64 / self.budget_bits
+        self.vehicle.audit().worst_window_bits() as f64 / self.budget_bits
     }
 }
 
@@ -237,34 +214,44 @@ impl VirtualTime for Dock {
     }
 
     fn next_event(&self) -> Instant {
-        let links = self.vehicle.poll_timeout().into_iter().chain(self.surface.poll_timeout(self.now));
-        let links = links.map(|(at, _)| at).filter(|&at| at > self.now);
-        links.chain(self.docked.poll_timeout()).min().unwrap_or(self.now + Duration::from_secs(1))
+        let hosts = [self.vehicle.poll_timeout(self.now), self.surface.poll_timeout(self.now)];
+        hosts.into_iter().chain([self.rig.poll_timeout()]).flatten().min().unwrap_or(self.now + Duration::from_secs(1))
     }
 
     fn handle_events(&mut self) {
-        self.docked.handle_timeout(self.now);
+        self.rig.handle_timeout(self.now);
+        self.rig.read(VEHICLE, &mut self.vehicle, self.now);
+        self.rig.read(SURFACE, &mut self.surface, self.now);
     }
 
     fn pump(&mut self) {
-        for end in [VEHICLE, SURFACE] {
-            while let Some(event) = self.docked.poll_event(end) {
-                self.handle_modem(end, event);
-            }
-        }
         while let Some(event) = self.vehicle.poll_event() {
+            self.note(VEHICLE, event);
+        }
+        while let Some(event) = self.surface.poll_event() {
+            self.note(SURFACE, event);
+        }
+        let vehicle = self.vehicle.end_mut();
+        while let Some(event) = vehicle.poll_event() {
             if let VehicleEvent::Slot { id, version, .. } = event {
-                self.vehicle.decide(id, SlotState::Applied, self.now);
-                self.vehicle.handle_persisted();
+                vehicle.decide(id, SlotState::Applied, self.now);
+                vehicle.handle_persisted();
                 self.applied.entry((id, version)).or_default().push(self.now);
             }
         }
-        while self.surface.poll_event().is_some() {}
-        self.vehicle.set_status(VehicleStatus::default());
+        while self.surface.end_mut().poll_event().is_some() {}
+        vehicle.set_status(VehicleStatus::default());
         if let Some(bytes) = self.load {
-            self.vehicle.source_mut().fill(bytes);
+            vehicle.source_mut().fill(bytes);
         }
-        self.speak();
-        self.docked.write(self.now);
+        while let Some(bytes) = self.surface.poll_output(self.now) {
+            self.rig.write(SURFACE, &bytes);
+        }
+        while let Some(bytes) = self.vehicle.poll_output(self.now) {
+            self.rig.write(VEHICLE, &bytes);
+        }
+        for end in [VEHICLE, SURFACE] {
+            self.rig.flush(end, self.now);
+        }
     }
 }

@@ -140,14 +140,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bursts_carry_most_of_what_the_modem_carries_and_directives_pass_them() {
+    fn bursts_fill_the_modem_and_directives_overtake_them() {
         let row = measure_burst(2, Duration::from_secs(1200), 60).unwrap();
         assert!(row.share >= 0.8, "{row:?}");
         assert!(row.directive_p95_s < 25.0, "{row:?}");
     }
 
     #[test]
-    fn a_survey_through_slow_modems_is_nearly_right_all_along_and_ends_with_equal_maps() {
+    fn a_survey_through_slow_modems_ends_with_equal_maps() {
         let im = ["modem.kind=s2c", "modem.s2c_mode=im"];
         let rate_1 = ["modem.kind=micromodem", "modem.rate=1"];
         for sets in [im, rate_1] {

@@ -16,7 +16,7 @@ const FULL: Duration = Duration::from_millis(500);
 /// Bits a second of payload that the other host gets over `time`, after the connection is up.
 pub fn push(setting: &DockSetting, seed: u64, time: Duration) -> f64 {
     const WARM_UP: Duration = Duration::from_secs(60);
-    let mut basin = Basin::new(Channel::new(setting.water(), seed));
+    let mut basin = Basin::new(Channel::new(setting.channel(), seed));
     for (node, x) in [(FROM, 0.0), (TO, setting.range_m)] {
         basin.channel().place(node, NodePosition::new(x, 0.0, 10.0));
         let baud = Some(setting.config.modem.baud);

@@ -128,7 +128,7 @@ fn a_record_torn_at_any_byte_leaves_the_one_before() {
 }
 
 #[test]
-fn a_new_file_that_is_cut_short_at_any_step_leaves_the_old_state_or_the_new_one() {
+fn a_write_cut_at_any_step_leaves_the_old_or_the_new_state() {
     let mut outcomes = Vec::new();
     for steps in 0.. {
         let mut confirmed = false;

@@ -82,6 +82,14 @@ impl Port {
         }
     }
 
+    /// What an optional port reports next; never without one. Safe to abandon.
+    pub async fn next_of(port: &mut Option<Self>) -> FromPort {
+        match port {
+            Some(port) => port.next().await,
+            None => std::future::pending().await,
+        }
+    }
+
     /// Writes bytes; says whether the port took them. What it does not take is stale by the time that it would.
     pub fn write(&self, bytes: Vec<u8>) -> bool {
         self.to.try_send(ToPort::Bytes(bytes.into())).is_ok()

@@ -11,12 +11,10 @@ use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// How the relay works.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RelayConfig {
     /// Origin of the world frame; `None`: the first good position.
     pub origin: Option<LatLon>,
-    /// What the GPS speaks.
     pub language: GpsLanguage,
     /// How the USBL head is mounted.
     pub mounting: Mounting,
@@ -37,12 +35,10 @@ pub enum RelayFault {
     Outlier,
     /// It is too uncertain to be of use.
     TooVague,
-    /// It came too late.
     TooOld,
 }
 
 impl RelayFault {
-    /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Usbl(fault) => fault.name(),
@@ -58,7 +54,6 @@ impl RelayFault {
 #[derive(Debug)]
 struct Seen {
     filter: PlaneFilter,
-    /// As its status said.
     depth: Option<(f64, Instant)>,
     sighted: Option<Instant>,
     fixed: Option<Instant>,
@@ -123,7 +118,6 @@ impl Relay {
         self.faults.iter().map(|(&f, &n)| (f, n))
     }
 
-    /// Fixes given so far.
     pub fn fixes(&self) -> u64 {
         self.fixes
     }
@@ -153,7 +147,6 @@ impl Relay {
         self.gps.handle_open()
     }
 
-    /// Bytes of the GPS.
     pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
         for fix in self.gps.handle_bytes(bytes, now) {
             let plane = self.plane.get_or_insert_with(|| TangentPlane::new(fix.place));

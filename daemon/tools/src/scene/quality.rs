@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 pub(crate) type Quality = SceneScore;
 
 /// Most cells times classes that are counted.
-const MOST_COUNTS: u64 = 1 << 27;
+const MAX_COUNTS: u64 = 1 << 27;
 /// Class of cells that have none.
 const NONE: u8 = 255;
 
@@ -52,7 +52,7 @@ impl Sheet {
         layers.dedup();
         let classes = places.iter().map(|place| u64::from(place.1) + 1).max().unwrap_or(1);
         let cells = u64::from(bounds.width) * u64::from(bounds.height) * layers.len() as u64;
-        if cells * classes > MOST_COUNTS {
+        if cells * classes > MAX_COUNTS {
             let what =
                 format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
             return Err(UserError::Input(what));
@@ -104,7 +104,7 @@ mod tests {
     use scene_model::topics::SceneConfig;
 
     #[test]
-    fn labels_that_follow_the_classes_tell_everything_in_every_layer() {
+    fn labels_equal_to_the_classes_have_full_information() {
         let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 0.01, ..SceneConfig::default() };
         let mut model = SceneModel::new(config).unwrap();
         let (mut seen, mut places) = (Vec::new(), Vec::new());

@@ -27,7 +27,7 @@ mod tests {
     use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 
     #[test]
-    fn an_image_fits_its_budget_and_is_a_file_again_at_the_other_end() {
+    fn an_image_fits_its_budget_and_decodes_at_the_other_end() {
         let patch = RgbImage::from_fn(128, 128, |x, y| image::Rgb([(x * 2) as u8, (y * 2) as u8, ((x ^ y) * 2) as u8]));
         for size in [0, 1, 2] {
             let (cut, small) = middle(&patch, size).unwrap();

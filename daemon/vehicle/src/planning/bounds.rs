@@ -53,7 +53,6 @@ impl Bounds {
     }
 }
 
-/// Metres between two places.
 pub fn distance(a: Point, b: Point) -> f64 {
     (a.0 - b.0).hypot(a.1 - b.1)
 }

@@ -26,7 +26,6 @@ pub struct Question<'a> {
     pub lattice: &'a Lattice,
     /// What is to be gained.
     pub worth: &'a Worth,
-    /// Where the way begins.
     pub from: Node,
     /// Ways from the place where it must be able to end.
     pub home: &'a Ways,
@@ -109,7 +108,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
-        fn every_way_is_allowed_leaves_the_way_home_and_is_the_same_again(
+        fn every_plan_is_allowed_leaves_a_return_path_and_repeats(
             corner in (1i32..15, 1i32..8), start in 0usize..100_000, left_m in 0.0f64..80.0,
             weights in (-100i8..=100, -100i8..=100),
         ) {

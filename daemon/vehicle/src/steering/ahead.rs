@@ -16,7 +16,6 @@ impl Corners {
         Self { start, places: Vec::new(), metres: 0.0 }
     }
 
-    /// Where it ends.
     fn end(&self) -> Point {
         self.places.last().copied().unwrap_or(self.start)
     }
@@ -64,18 +63,18 @@ pub struct PathAhead {
 impl Steering {
     /// The plan after the waypoint that [`Self::next`] gave last, from which `left_m` metres may be gone.
     pub fn ahead(&self, waypoint: Point, left_m: f64) -> PathAhead {
-        let left_m = left_m - self.home_leg_m;
+        let left_m = left_m - self.grounds.last_leg_m();
         let mut way = Corners::new(waypoint);
-        self.plan.iter().for_each(|&node| way.go(self.lattice.place(node)));
+        self.plan.iter().for_each(|&node| way.go(self.grounds.lattice().place(node)));
         let Some(&(mut end)) = self.plan.back() else { return way.told() };
-        for goal in self.planner.beyond() {
+        for goal in self.choice.planner().beyond() {
             if way.is_full() {
                 break;
             }
-            let straight = self.lattice.straight(end, goal);
-            for node in straight.unwrap_or_else(|| self.lattice.ways(end).to(goal)) {
-                let place = self.lattice.place(node);
-                if !self.leaves_way_home(node, way.metres + distance(way.end(), place), left_m) {
+            let straight = self.grounds.lattice().straight(end, goal);
+            for node in straight.unwrap_or_else(|| self.grounds.lattice().ways(end).to(goal)) {
+                let place = self.grounds.lattice().place(node);
+                if !self.grounds.leaves_return(node, way.metres + distance(way.end(), place), left_m) {
                     return way.told();
                 }
                 way.go(place);
@@ -89,9 +88,9 @@ impl Steering {
     pub fn ahead_home(&self, waypoint: Point) -> PathAhead {
         let mut way = Corners::new(waypoint);
         let home = self.home();
-        if let Some((_, end, nodes)) = self.way_home(waypoint) {
-            nodes.into_iter().for_each(|node| way.go(self.lattice.place(node)));
-            if self.bounds.allows_exit(home, self.lattice.place(end)) {
+        if let Some((_, end, nodes)) = self.grounds.return_path(waypoint) {
+            nodes.into_iter().for_each(|node| way.go(self.grounds.lattice().place(node)));
+            if self.grounds.bounds().allows_exit(home, self.grounds.lattice().place(end)) {
                 way.go(home);
             }
         }

@@ -166,7 +166,6 @@ impl Vehicle {
         self.forget_way();
     }
 
-    /// It goes nowhere now.
     fn forget_way(&mut self) {
         (self.waypoint, self.path) = (None, PlannedPath::default());
     }

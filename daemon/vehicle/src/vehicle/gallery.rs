@@ -57,7 +57,7 @@ pub(super) struct Gallery {
 
 impl Gallery {
     /// Most requests at a time.
-    pub(super) const MOST_REQUESTS: usize = 8;
+    pub(super) const MAX_REQUESTS: usize = 8;
 
     /// The pictures of each label from now on, the best first.
     pub(super) fn set_pictures(&mut self, pictures: BTreeMap<u8, Vec<Picture>>) {

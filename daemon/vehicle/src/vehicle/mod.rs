@@ -32,7 +32,6 @@ pub use place::LastPlace;
 /// What must survive a restart of the vehicle, so that nothing is applied twice and no label changes its meaning.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Durable {
-    /// Slots seen.
     pub inbox: SlotInboxState,
     /// Epoch of the label ids in use.
     pub epoch: u8,
@@ -74,9 +73,7 @@ pub enum VehicleOutput {
     Persist,
     /// Go there, metres east and north in the map's frame.
     Waypoint(MapPoint),
-    /// Stay where you are.
     Hold,
-    /// Come up.
     Surface,
     /// Have the scene model follow these settings; what they do not name is as configured. A run begins with
     /// [`Vehicle::settings`].
@@ -90,17 +87,12 @@ pub enum VehicleOutput {
 /// A decision about a slot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AppliedSlot {
-    /// Which slot.
     pub id: SlotId,
-    /// Which version of it.
     pub version: u16,
-    /// The decision.
     pub state: SlotState,
-    /// When.
     pub at: Instant,
 }
 
-/// The vehicle.
 pub struct Vehicle {
     link: VehicleLink,
     navigator: Navigator,
@@ -211,7 +203,6 @@ impl Vehicle {
         self.link.is_converged() && self.whole_png.as_ref().is_none_or(WholePng::is_converged)
     }
 
-    /// Counters of the link.
     pub fn stats(&self) -> &LinkStats {
         self.link.stats()
     }
@@ -226,7 +217,6 @@ impl Vehicle {
         self.link.assume_budget_spent(now);
     }
 
-    /// The utility in force.
     pub fn utility(&self) -> Option<&Utility> {
         self.utility.as_ref()
     }
@@ -293,7 +283,6 @@ impl Vehicle {
         gallery.tend(durable.epoch, weight, link);
     }
 
-    /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
         if let Some(at) = self.link.last_received() {

@@ -165,7 +165,7 @@ fn order() -> impl Strategy<Value = Slot> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn no_waypoint_leads_out_of_the_fence_into_a_keep_out_or_beyond_a_limit(
+    fn no_waypoint_leaves_the_fence_or_exceeds_a_limit(
         orders in proptest::collection::vec((0u32..160, order()), 1..12),
         drift in 0.0f64..0.05, seed: u64, fixes: bool,
     ) {
@@ -195,7 +195,7 @@ fn small_fence() -> Fence {
 }
 
 #[test]
-fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
+fn a_breach_is_reported_until_the_operator_answers() {
     let mut sea = Sea::new(0.0, 1);
     sea.tell(Slot::Fence(small_fence()));
     sea.step();
@@ -212,7 +212,7 @@ fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
 }
 
 #[test]
-fn an_order_takes_the_path_away_until_there_is_a_new_one_and_a_vehicle_that_stays_has_none() {
+fn an_order_clears_the_path_until_a_new_one_is_planned() {
     let mut sea = Sea::new(0.0, 1);
     sea.see(1);
     sea.step();
@@ -234,7 +234,7 @@ fn an_order_takes_the_path_away_until_there_is_a_new_one_and_a_vehicle_that_stay
 }
 
 #[test]
-fn a_fence_stays_where_it_is_in_the_world_when_a_fix_moves_the_map() {
+fn a_fence_stays_in_the_world_when_a_fix_moves_the_map() {
     let mut sea = Sea::new(0.0, 1);
     sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
     sea.tell(Slot::Fence(small_fence()));
@@ -274,7 +274,7 @@ fn silence_and_abort_bring_the_vehicle_home_or_up() {
 }
 
 #[test]
-fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
+fn the_last_good_fence_survives_a_refusal_and_a_restart() {
     let mut sea = Sea::new(0.0, 1);
     sea.tell(Slot::Fence(small_fence()));
     let far = Fence {
@@ -294,7 +294,7 @@ fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
 }
 
 #[test]
-fn settings_out_of_range_are_refused_and_those_in_force_survive_a_restart() {
+fn bad_settings_are_refused_and_good_ones_survive_a_restart() {
     let figure = |value: f64| Change::To(Figure::new(value).unwrap());
     let mut sea = Sea::new(0.0, 1);
     let asked = Settings {

@@ -26,9 +26,7 @@ impl Vehicle {
             Slot::Requests(requests) if requests.wanted.iter().any(|r| r.label == 0 || r.label > self.labels) => {
                 Err(RefusalReason::UnknownLabel)
             }
-            Slot::Requests(requests) if requests.wanted.len() > Gallery::MOST_REQUESTS => {
-                Err(RefusalReason::OutOfRange)
-            }
+            Slot::Requests(requests) if requests.wanted.len() > Gallery::MAX_REQUESTS => Err(RefusalReason::OutOfRange),
             Slot::Requests(requests) => {
                 let series = self.link.persistent_state().series;
                 self.gallery.replace_requests(requests, series, &mut self.link);

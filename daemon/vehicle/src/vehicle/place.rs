@@ -73,7 +73,6 @@ impl Vehicle {
         self.telling.seen.iter()
     }
 
-    /// The position estimate.
     pub fn navigator(&self) -> &Navigator {
         &self.navigator
     }

@@ -1,4 +1,4 @@
-//! What the true peer of an end knows: it can seal anything.
+//! The knowledge of an end's true peer, with which any frame can be sealed.
 
 use super::raw::{self, Script};
 use scenecast_protocol::link::{Authenticity, Flight};
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 pub const MISSION: MissionId = MissionId(7);
 
-/// How frames are sealed, by two bits.
+/// The four ways of sealing frames, by two bits.
 pub fn authenticity(choice: u8) -> Option<Authenticity> {
     let key = Arc::new(MissionKey::from_bytes([9; 16]));
     (choice & 3 != 0).then(|| Authenticity { key, all: choice & 3 > 1, encrypt: choice & 3 == 3 })
@@ -22,17 +22,17 @@ pub fn vehicle() -> Address {
     Address::vehicle(1).expect("a vehicle")
 }
 
-type Run = (SessionId, u64);
+type FuzzRun = (SessionId, u64);
 
 /// Seals frames as the peer of the end under test does.
-pub struct Peer {
+pub struct FuzzPeer {
     pub us: Address,
     pub end: Address,
     authenticity: Option<Authenticity>,
-    own: Run,
-    theirs: Run,
-    /// The end's last call for vehicles that it does not know.
-    call: Option<Run>,
+    own: FuzzRun,
+    theirs: FuzzRun,
+    /// The end's last discovery call.
+    call: Option<FuzzRun>,
     /// Our frames; the end's statements judge them.
     flight: Flight<()>,
     /// Highest number of the end's frames.
@@ -41,14 +41,14 @@ pub struct Peer {
     sealed: BTreeSet<Vec<u8>>,
 }
 
-impl Peer {
+impl FuzzPeer {
     pub fn new(us: Address, end: Address, authenticity: Option<Authenticity>) -> Self {
         let nobody = (SessionId::from_random(1), 0);
         let (flight, sealed) = (Flight::default(), BTreeSet::new());
         Self { us, end, authenticity, own: nobody, theirs: nobody, call: None, flight, heard: 0, sealed }
     }
 
-    /// A frame that the true peer has sent, before it was replaced by us.
+    /// Notes a frame that the true peer has sent, before this one replaced it.
     pub fn note_sent(&mut self, bytes: &[u8]) {
         self.sealed.insert(bytes.to_vec());
         let Ok(envelope) = Envelope::decode(bytes, |_| true) else { return };
@@ -62,7 +62,7 @@ impl Peer {
         }
     }
 
-    /// A frame that the end has sent.
+    /// Notes a frame that the end has sent.
     pub fn note_heard(&mut self, bytes: &[u8]) {
         let ours = |to| to == self.us || to == Address::EVERYBODY;
         let envelope = Envelope::decode(bytes, ours).expect("a frame for its peer");
@@ -78,13 +78,13 @@ impl Peer {
         }
     }
 
-    fn begin_run(&mut self, run: Run) {
+    fn begin_run(&mut self, run: FuzzRun) {
         if run != self.own {
             (self.own, self.flight, self.heard) = (run, Flight::default(), 0);
         }
     }
 
-    /// Whether these bytes prove that they come from a holder of the key, or nothing must prove that.
+    /// Whether these bytes come from a holder of the key, or no key is needed.
     pub fn may_be_believed(&self, bytes: &[u8]) -> bool {
         !self.is_keyed(false) || self.sealed.contains(bytes)
     }
@@ -93,7 +93,7 @@ impl Peer {
         self.authenticity.as_ref().is_some_and(|a| hello || a.all || self.us == Address::SURFACE)
     }
 
-    /// A hello; a bit of `what` begins a new run, another one calls everybody or answers a call.
+    /// A hello. Bits of `what` select a new run, and the answer to a discovery call or a frame to everybody.
     pub fn hello(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
         let keyed = self.is_keyed(true);
         if what & 1 != 0 {
@@ -120,7 +120,7 @@ impl Peer {
         bytes
     }
 
-    /// A numbered frame whose header follows `what` and the script, and whose body is the script's.
+    /// A numbered frame whose header follows `what` and the script, with a body from the script.
     pub fn numbered(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
         let mut header = self.header(what, script);
         let mut number = self.flight.next_number();

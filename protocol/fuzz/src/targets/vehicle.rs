@@ -1,6 +1,6 @@
 //! A script against the vehicle's end.
 
-use super::link::{End, Grow, Pile, Setup, Surface, Vehicle, layers, run};
+use super::link::{FuzzEnd, Grow, Pile, Setup, Surface, Vehicle, layers, run};
 use super::peer::vehicle;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{RefusalReason, SlotId, SlotState};
@@ -10,12 +10,12 @@ use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, PlannedPath, VehicleStatus};
 
-/// What a vehicle hears never harms it: the first byte is the setup, the others are the script.
+/// No received bytes harm a vehicle. The first byte is the setup, the others are the script.
 pub fn vehicle_link(data: &[u8]) {
     vehicle_events(data);
 }
 
-/// As [`vehicle_link`]; says how many events the script led to.
+/// As [`vehicle_link`]; returns the number of events.
 pub fn vehicle_events(data: &[u8]) -> usize {
     let Some((&choice, script)) = data.split_first() else { return 0 };
     let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
@@ -27,7 +27,7 @@ pub fn vehicle_events(data: &[u8]) -> usize {
     run(setup, vehicle, surface, peer, script)
 }
 
-impl<S: Grow> End for Vehicle<S> {
+impl<S: Grow> FuzzEnd for Vehicle<S> {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.handle_frame(bytes, now);
     }

@@ -19,7 +19,7 @@ pub struct SurfaceConfig {
     pub budget_window: Duration,
     /// Least share of each class while it has something to send.
     pub shares: Shares,
-    /// How turns are granted.
+    /// Limits of turns and pauses in medium access.
     pub master: MasterConfig,
     /// The vehicles that are contacted from the beginning.
     pub vehicles: Vec<Address>,

@@ -10,7 +10,7 @@ pub enum SurfaceEvent {
     VehicleFound(Address),
     /// The operator's map of a vehicle has changed.
     MapChanged(Address),
-    /// A status came in.
+    /// A pose or a report came in, and both are known.
     Status(Address),
     /// A vehicle has applied or refused a slot.
     SlotDecided(Address, SlotId),
@@ -22,7 +22,7 @@ pub enum SurfaceEvent {
         vehicle: Address,
         /// Its first [`Self::OBJECT_HEAD`] bytes, once they are held.
         head: Option<Vec<u8>>,
-        /// Bytes held.
+        /// Bytes of it that the surface holds.
         held: usize,
         /// Bytes of the whole object.
         total: usize,
@@ -45,9 +45,9 @@ pub enum IssueError {
     /// It does not fit into a frame.
     #[error("it takes {bytes} bytes, and a frame has room for {room}: set a larger link.frame_bytes or say less")]
     TooLarge {
-        /// Bytes of the slot.
+        /// Length of the encoded slot in bytes.
         bytes: usize,
-        /// Bytes that fit.
+        /// Room for a slot in a frame, in bytes.
         room: usize,
     },
 }

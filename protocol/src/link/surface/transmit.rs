@@ -92,8 +92,8 @@ impl<R: StateReplica> SurfaceLink<R> {
         true
     }
 
-    /// The next frame for a modem that does half duplex by itself: one goes out whenever there is a reason and its pool
-    /// has room.
+    /// The next frame for a modem that does half duplex by itself: one goes out whenever there is a reason
+    /// and its pool has room.
     fn poll_pool(&mut self, pool_frames: u32, now: Instant) -> Option<Transmit> {
         if self.in_modem.len() >= pool_frames as usize {
             return None;

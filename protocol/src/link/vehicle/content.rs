@@ -130,8 +130,8 @@ impl<S: StateSource> VehicleContent<S> {
         None
     }
 
-    /// Fills a frame as far as possible: the shares choose the class, and within a class the most valuable chunk goes
-    /// first.
+    /// Fills a frame as far as possible: the shares choose the class, and within a class the
+    /// most valuable chunk goes first.
     pub(super) fn fill(&mut self, builder: &mut FrameBuilder, context: &FillContext<'_>) -> Carried<S::Carried> {
         let mut carried = Carried::new();
         let mut unfit: Vec<Class> = Vec::new();

@@ -1,8 +1,8 @@
 //! The vehicle's end of the link.
 //!
-//! [`VehicleLink`] joins parts that own their state: `content` (what waits to be sent), `repeat` (copies of the frames
-//! of a turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn` writes frames, `receive`
-//! handles them.
+//! [`VehicleLink`] joins parts that own their state: `content` (what waits to be sent), `repeat` (copies
+//! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn`
+//! writes frames, `receive` handles them.
 
 mod background;
 mod config;
@@ -73,7 +73,7 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    /// The replicated state.
+    /// The replicated state as the vehicle holds it.
     pub fn source(&self) -> &S {
         &self.content.source
     }
@@ -144,12 +144,12 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.objects.push_background(bytes)
     }
 
-    /// Stops sending every object.
+    /// Stops sending every object, requested or not.
     pub fn cancel_objects(&mut self) {
         self.content.objects.cancel_all();
     }
 
-    /// Stops sending an object.
+    /// Stops sending an object; an unknown one is ignored.
     pub fn cancel_object(&mut self, id: ObjectId) {
         self.content.objects.cancel(id);
     }
@@ -284,8 +284,8 @@ impl VehicleLink {
         Self::with_source(config, MapSource::new(codec), seed, restored, now)
     }
 
-    /// Sets labels of cells; returns how many changed. Cells that the surface does not hold yet are sent when there is
-    /// room.
+    /// Sets labels of cells; returns how many changed. Cells that the surface does not hold yet are
+    /// sent when there is room.
     pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
         let changed = self.content.source.set(cells, now);
         if changed > 0 {

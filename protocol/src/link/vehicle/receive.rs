@@ -121,8 +121,8 @@ impl<S: StateSource> VehicleLink<S> {
         self.answer_due = Some(now);
     }
 
-    /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second, by itself if
-    /// need be.
+    /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second,
+    /// by itself if need be.
     fn owe_answer(&mut self, now: Instant) {
         if matches!(self.config.modem.access, Access::ModemOwned { .. })
             && (self.pair.unstated() > 0 || self.pair.must_greet())

@@ -11,14 +11,14 @@ fn square(side: i32, label: impl Fn(i32) -> u8) -> Vec<(Cell, u8)> {
 }
 
 /// A source and a replica with a reliable link between them.
-struct Ends {
+struct TestEnds {
     source: MapSource,
     replica: Replica,
     number: u64,
     sent_cells: usize,
 }
 
-impl Ends {
+impl TestEnds {
     fn new(settle_s: f64) -> Self {
         let mut source = MapSource::new(Codec::Context);
         source.set_debounce(Duration::from_secs_f64(settle_s));
@@ -67,11 +67,11 @@ proptest! {
 
     /// Steps: seconds that pass, labels that change, whether the chunks of the step arrive.
     #[test]
-    fn once_the_model_rests_the_replica_becomes_equal_within_the_longest_wait(
+    fn the_replica_converges_once_the_model_is_stable(
         settle_s in prop_oneof![Just(0.0), 0.1f64..20.0],
         steps in proptest::collection::vec((0.0f64..8.0, any::<u64>(), 0u8..3, any::<bool>()), 1..40),
     ) {
-        let mut ends = Ends::new(settle_s);
+        let mut ends = TestEnds::new(settle_s);
         let mut now = 1.0;
         for (passed, labels, sends, fate) in steps {
             now += passed;
@@ -89,10 +89,10 @@ proptest! {
     }
 
     #[test]
-    fn nothing_starves_beside_cells_that_are_worth_more_and_change_all_the_time(
+    fn no_cell_starves_beside_busy_valuable_ones(
         weights in proptest::collection::vec(0.0f64..1.0, 8), settle_s in 0.0f64..3.0, busy in 1i32..40, seed: u64,
     ) {
-        let mut ends = Ends::new(settle_s);
+        let mut ends = TestEnds::new(settle_s);
         ends.source.set_interest(|label| weights[usize::from(label) % 8]);
         ends.source.set([(Cell::new(500, 500), 9)], at(0.0));
         ends.send_all(at(0.0));
@@ -110,8 +110,8 @@ proptest! {
 }
 
 #[test]
-fn a_flip_that_is_taken_back_costs_nothing_and_one_that_stands_is_sent() {
-    let mut ends = Ends::new(5.0);
+fn only_flips_that_last_are_sent() {
+    let mut ends = TestEnds::new(5.0);
     ends.source.set(square(8, |_| 1), at(0.0));
     ends.send_all(at(0.0));
     assert!(ends.is_equal(), "what was never seen goes out at once");
@@ -132,8 +132,8 @@ fn a_flip_that_is_taken_back_costs_nothing_and_one_that_stands_is_sent() {
 }
 
 #[test]
-fn a_cell_that_never_rests_is_told_now_and_then() {
-    let mut ends = Ends::new(2.0);
+fn a_cell_that_keeps_flipping_is_sent_sometimes() {
+    let mut ends = TestEnds::new(2.0);
     ends.source.set([(Cell::new(0, 0), 1)], at(0.0));
     ends.send_all(at(0.0));
     for step in 0..600 {
@@ -146,7 +146,7 @@ fn a_cell_that_never_rests_is_told_now_and_then() {
 }
 
 #[test]
-fn choosing_the_next_chunk_looks_at_the_tiles_that_changed_and_no_others() {
+fn choosing_a_chunk_inspects_changed_tiles_only() {
     let mut source = MapSource::new(Codec::Context);
     source.set(square(1024, |i| (i / 50 % 6) as u8 + 1), at(0.0));
     source.handle_peer_restart(at(0.0));

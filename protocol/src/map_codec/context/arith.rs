@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn decisions_read_back_and_every_ending_but_the_right_one_is_refused() {
+    fn decisions_read_back_and_wrong_endings_are_refused() {
         for seed in 0..400 {
             let said = decisions(seed, seed as usize % 97);
             let mut head = BitWriter::default();

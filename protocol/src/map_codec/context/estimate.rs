@@ -16,7 +16,7 @@ const RATE: [u32; 1024] = {
 /// The estimated probability of `true` in one context.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BitEstimate {
-    /// The probability in 1/2^32.
+    /// The probability of `true` in units of 1/2^32.
     pub p: u32,
     /// Decisions that the estimate is worth, at most [`Self::MAX_VISITS`].
     pub visits: u16,

@@ -39,8 +39,6 @@ impl Votes {
         votes.labels[..votes.count].sort_by_key(|&(_, weight)| std::cmp::Reverse(weight));
         votes
     }
-
-    /// Candidates with their weights.
     pub(super) fn ranked(&self) -> &[(u8, u8)] {
         &self.labels[..self.count]
     }

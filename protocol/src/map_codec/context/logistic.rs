@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn log_odds_and_probability_undo_each_other() {
+    fn logit_and_probability_are_inverse() {
         for p in [1u32, 2, 9, 100, 3000, 32_768, 60_000, 65_500, 65_534] {
             let back = probability(logit(p << 16 | 0x8000));
             assert!(back.abs_diff(p) <= 1 + p.min(65_536 - p) / 100, "{p} came back as {back}");

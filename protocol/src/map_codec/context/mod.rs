@@ -1,5 +1,5 @@
-//! The `context` coder: binary decisions with mixed contexts (Mahoney, PAQ), in integers, from a shipped prior for each
-//! chunk.
+//! The `context` coder: binary decisions with mixed contexts (Mahoney, PAQ), in integers, from a
+//! shipped prior for each chunk.
 
 mod arith;
 mod calm;

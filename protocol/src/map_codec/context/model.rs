@@ -128,6 +128,6 @@ fn new_label(coder: &mut impl BitCoder, canvas: &Canvas, held: u8, wanted: u8) -
     None
 }
 
-/// Groups of new labels: the logarithm of the size, and the probability of this group in 1/65536; the last one is
-/// certain.
+/// Groups of new labels: the logarithm of the size, and the probability of this group in 1/65536;
+/// the last one is certain.
 const NEW_LABELS: [(u32, u32); 6] = [(2, 26_000), (2, 32_000), (3, 45_000), (4, 45_000), (5, 40_000), (8, 65_535)];

@@ -26,8 +26,8 @@ pub(super) struct Prior {
     pub(super) label: StagePrior,
 }
 
-/// Written by `scenecast map train-prior --seed 1 --out prior.bin`. It is part of the wire format: another table makes
-/// another coder.
+/// Written by `scenecast map train-prior --seed 1 --out prior.bin`. It is part of the wire format:
+/// another table makes another coder.
 const TABLE: &[u8] = include_bytes!("prior.bin");
 
 static SHIPPED: LazyLock<Prior> = LazyLock::new(|| Prior::from_bytes(TABLE).unwrap_or_else(Prior::blank));

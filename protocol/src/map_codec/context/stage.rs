@@ -33,7 +33,6 @@ pub(super) struct StageLayout {
 }
 
 impl StageLayout {
-    /// Mixer inputs in use.
     pub(super) fn inputs(&self) -> usize {
         self.direct.len() + self.keyed.len() + 1
     }
@@ -88,14 +87,12 @@ pub(super) struct Stage {
     last: Last,
     /// How fast weights follow, in 1/2^20 of logit times error.
     pub(super) weight_rate: i32,
-    /// Decisions counted for training.
     pub(super) counts: Option<Box<VisitCounts>>,
 }
 
 /// Counts of decisions in each context within one chunk: all of them, and those that were `true`.
 #[derive(Debug, Clone, Default)]
 pub struct VisitCounts {
-    /// By context.
     direct: Vec<(u32, u32)>,
     /// By the context whose estimate a keyed one starts from, and by key.
     keyed: BTreeMap<(usize, u32), (u32, u32)>,
@@ -245,8 +242,8 @@ fn follow<const N: usize>(weights: &mut [i32; N], logit: &[i32; N], error: i32) 
 }
 
 impl VisitCounts {
-    /// Each context with its decisions and those that were `true`; a context that starts several keyed ones comes up
-    /// once for each key.
+    /// Each context with its decisions and those that were `true`; a context that starts several keyed ones comes
+    /// up once for each key.
     pub fn iter(&self) -> impl Iterator<Item = (usize, u32, u32)> + '_ {
         let direct = self.direct.iter().enumerate().map(|(context, &(visits, ones))| (context, visits, ones));
         direct.chain(self.keyed.iter().map(|(&(start, _), &(visits, ones))| (start, visits, ones)))

@@ -125,8 +125,6 @@ fn stored(label: u8) -> u8 {
 fn stride(rect: Rect, depth: Depth) -> usize {
     1 + (rect.width as usize * usize::from(depth.0)).div_ceil(8)
 }
-
-/// Length of all scanlines.
 pub(super) fn packed_len(rect: Rect, depth: Depth) -> usize {
     stride(rect, depth) * rect.height as usize
 }

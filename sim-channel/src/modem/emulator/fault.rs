@@ -4,6 +4,7 @@ use std::time::Duration;
 
 /// A fault to inject; durations count from the moment of injection.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum Fault {
     /// Refuses every message for this long, with `BUSY` (S2C) or an error (Micromodem).
     Busy(Duration),

@@ -47,33 +47,41 @@ pub trait Emulator: Send {
     /// Detaches a host; the first host always stays.
     fn detach(&mut self, host: HostId);
 
-    /// Takes bytes that a host wrote. Bytes beyond [`host_room`](Self::host_room) are lost, as on a line without flow
-    /// control.
+    /// Takes bytes that a host wrote.
+    ///
+    /// Bytes beyond [`host_room`](Self::host_room) are lost, as on a line without flow control.
     fn handle_host_bytes(&mut self, host: HostId, bytes: &[u8], now: Duration);
 
     /// Number of bytes that a host may write now.
+    #[must_use]
     fn host_room(&self, host: HostId) -> usize;
 
     /// Takes the bytes that have reached a host by `now`, paced by the baud rate.
+    #[must_use]
     fn poll_host_bytes(&mut self, host: HostId, now: Duration) -> Vec<u8>;
 
     /// Time at which more bytes will have reached any host; `None` if none are on their way.
+    #[must_use]
     fn poll_host_timeout(&self) -> Option<Duration>;
 
-    /// Takes the beginning of a signal at this modem. Without this call the modem reports the beginning together with the
-    /// end.
+    /// Takes the beginning of a signal at this modem.
+    ///
+    /// Without this call the modem reports the beginning of the signal together with its end.
     fn handle_onset(&mut self, onset: &Onset, now: Duration);
 
     /// Takes the end of a reception at this modem, delivered or lost.
     fn handle_arrival(&mut self, arrival: &Arrival, now: Duration);
 
     /// The next transmission that the modem puts on air at `now`; call until `None`, after every other call.
+    #[must_use]
     fn poll_transmit(&mut self, now: Duration) -> Option<Transmission>;
 
     /// The next event for the owner of port and transducer; call until `None`, after every other call.
+    #[must_use]
     fn poll_event(&mut self) -> Option<ModemEvent>;
 
     /// Time at which [`handle_timeout`](Self::handle_timeout) must be called; `None` if no task is scheduled.
+    #[must_use]
     fn poll_timeout(&self) -> Option<Duration>;
 
     /// Passes time up to `now` and runs the tasks that are due.
@@ -94,6 +102,7 @@ pub struct Transmission {
 
 /// An action that an emulator requests from the owner of its port and transducer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum ModemEvent {
     /// Close the TCP connections of the hosts; a serial line stays open.
     HangUp,

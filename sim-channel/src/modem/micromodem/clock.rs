@@ -36,7 +36,6 @@ impl ModemClock {
         (CivilTime::of_unix_s(time.as_secs()), time.subsec_micros())
     }
 
-    /// `HHMMSS`
     pub(super) fn hhmmss(&self, now: Duration) -> String {
         let (c, _) = self.at(now);
         format!("{:02}{:02}{:02}", c.hour, c.minute, c.second)
@@ -54,13 +53,13 @@ impl ModemClock {
         format!("{:04}{:02}{:02}{:02}{:02}{:02}.{us:06}", c.year, c.month, c.day, c.hour, c.minute, c.second)
     }
 
-    /// `YYYYMMDD,HHMMSS.ffff`, as in `CAXST`.
+    /// The time as `YYYYMMDD,HHMMSS.ffff`, as in `CAXST`.
     pub(super) fn date_and_time(&self, now: Duration) -> String {
         let (c, _) = self.at(now);
         format!("{:04}{:02}{:02},{}", c.year, c.month, c.day, self.hhmmss_fraction(now))
     }
 
-    /// `YYYY-MM-DDTHH:MM:SSZ`
+    /// The time as `YYYY-MM-DDTHH:MM:SSZ`, as in `CATMQ`.
     pub(super) fn iso(&self, now: Duration) -> String {
         let (c, _) = self.at(now);
         format!("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", c.year, c.month, c.day, c.hour, c.minute, c.second)
@@ -95,7 +94,6 @@ impl CivilTime {
         days * DAY_S + u64::from(self.hour * 3600 + self.minute * 60 + self.second)
     }
 
-    /// The inverse of `unix_s`.
     fn of_unix_s(unix_s: u64) -> Self {
         let days = unix_s / DAY_S + 719_468;
         let era_day = days % 146_097;

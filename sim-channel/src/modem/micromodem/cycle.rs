@@ -35,7 +35,7 @@ impl CycleService {
         self.cycle = None;
     }
 
-    /// `$CCCYC,<cmd>,<src>,<dst>,<rate>,<ack>,<nframes>`
+    /// The host orders a cycle: `$CCCYC,<cmd>,<src>,<dst>,<rate>,<ack>,<nframes>`.
     pub(super) fn on_command(&mut self, base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
         let fields = (sentence.number(1), sentence.number(2), sentence.number(3), sentence.number::<u8>(4));
         let (Some(src), Some(dst), Some(rate), Some(ack)) = fields else {
@@ -86,7 +86,7 @@ impl CycleService {
         self.cycle = Some(OpenCycle { packet, rate, requested_frames, request: 0, ack_wanted: init.ack });
     }
 
-    /// `$CADRQ,<HHMMSS>,<src>,<dst>,<ack>,<max bytes>,<frame>`
+    /// Requests the next frame from the host: `$CADRQ,<HHMMSS>,<src>,<dst>,<ack>,<max bytes>,<frame>`.
     pub(super) fn request_data(&mut self, base: &mut MicromodemBase, now: Duration) {
         self.requests += 1;
         let time = base.clock.hhmmss(now);

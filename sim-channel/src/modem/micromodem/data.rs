@@ -10,7 +10,7 @@ use std::time::Duration;
 /// From a packet's content to the reply that the modem sends by itself.
 pub(super) const TURN_AROUND: Duration = Duration::from_millis(300);
 
-/// `$CACYC,0,<src>,<dst>,<rate>,<ack>,<nframes>`
+/// Reports a cycle init that was received: `$CACYC,0,<src>,<dst>,<rate>,<ack>,<nframes>`.
 pub(super) fn report_cycle(base: &mut MicromodemBase, packet: &Packet, ack: bool, now: Duration) {
     let Packet { src, dst, rate, frame_count, .. } = packet;
     base.report(&format!("CACYC,0,{src},{dst},{rate},{},{frame_count}", u8::from(ack)), now);

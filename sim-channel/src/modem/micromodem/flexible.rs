@@ -9,7 +9,7 @@ use super::statistics;
 use super::transmitter::QueuedPacket;
 use std::time::Duration;
 
-/// `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`
+/// The host sends flexible data: `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`.
 pub(super) fn on_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let fields = (sentence.number::<u8>(0), sentence.number::<u8>(1), from_hex(sentence.text(4)));
     let (Some(dst), Some(rate), Some(data)) = fields else {
@@ -50,7 +50,7 @@ pub(super) fn on_packet(base: &mut MicromodemBase, packet: &Packet, signal: &Pac
     statistics::report_reception(base, packet, signal, 5, now);
 }
 
-/// `crc_ok;nbytes;data` for each frame.
+/// The frames as triples `crc_ok;nbytes;data`, joined by `;`.
 fn triples(frames: &[Option<Vec<u8>>], base64: bool) -> String {
     let triple = |frame: &Option<Vec<u8>>| match frame {
         Some(bytes) => format!("1;{};{}", bytes.len(), if base64 { to_base64(bytes) } else { to_hex(bytes) }),
@@ -59,7 +59,7 @@ fn triples(frames: &[Option<Vec<u8>>], base64: bool) -> String {
     frames.iter().map(triple).collect::<Vec<_>>().join(";")
 }
 
-/// RFC 4648, with padding.
+/// Base64 of RFC 4648, with padding.
 fn to_base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let group = |chunk: &[u8]| {

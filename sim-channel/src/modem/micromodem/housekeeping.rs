@@ -80,7 +80,7 @@ pub(super) fn on_sleep(base: &mut MicromodemBase, sentence: &NmeaSentence, now: 
     }
 }
 
-/// `$CCCLK,yyyy,mm,dd,HH,MM,SS`
+/// The host sets the clock: `$CCCLK,yyyy,mm,dd,HH,MM,SS`.
 fn on_set_clock(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let mut numbers = [0; 6];
     let whole = numbers.iter_mut().enumerate().all(|(index, slot)| {
@@ -97,7 +97,7 @@ fn on_set_clock(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duratio
     }
 }
 
-/// `$CCTMS,<time>,<0 now, 1 at the next pulse>`
+/// The host sets the clock: `$CCTMS,<time>,<0 now, 1 at the next pulse>`.
 fn on_set_time(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let text = sentence.text(0);
     let civil = CivilTime::parse_iso(text);

@@ -9,7 +9,7 @@ use super::statistics;
 use super::transmitter::QueuedPacket;
 use std::time::Duration;
 
-/// `$CCMPC,<src>,<dst>`
+/// The host orders a ping: `$CCMPC,<src>,<dst>`.
 pub(super) fn on_ping_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let (Some(src), Some(dst)) = (sentence.number(0), sentence.number(1)) else {
         return base.report_error("NMEA", 1, "CCMPC: wrong field", now);
@@ -18,7 +18,7 @@ pub(super) fn on_ping_command(base: &mut MicromodemBase, sentence: &NmeaSentence
     base.transmitter.push(QueuedPacket::mini(Packet::new(PacketKind::Ping, src, dst)));
 }
 
-/// `$CCMUC,<src>,<dst>,<HHHH>`, up to 1FFF.
+/// The host sends 13 bits: `$CCMUC,<src>,<dst>,<HHHH>`, up to 1FFF.
 pub(super) fn on_user_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
     let bits = u16::from_str_radix(sentence.text(2), 16).ok().filter(|bits| *bits <= 0x1FFF);
     let (Some(src), Some(dst), Some(bits)) = (sentence.number(0), sentence.number(1), bits) else {
@@ -30,7 +30,7 @@ pub(super) fn on_user_command(base: &mut MicromodemBase, sentence: &NmeaSentence
     base.transmitter.push(QueuedPacket::mini(packet));
 }
 
-/// `$CAMPA,<src>,<dst>`; the modem replies by itself.
+/// Reports a ping, `$CAMPA,<src>,<dst>`, to which the modem replies by itself.
 pub(super) fn on_ping(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
     base.report(&format!("CAMPA,{},{}", packet.src, packet.dst), now);
     statistics::report_reception(base, packet, signal, 2, now);
@@ -38,13 +38,13 @@ pub(super) fn on_ping(base: &mut MicromodemBase, packet: &Packet, signal: &Packe
     base.board.schedule(now + TURN_AROUND, MicromodemTask::Reply(Box::new(reply)));
 }
 
-/// `$CAMPR,<src>,<dst>,<one-way travel time, s>`
+/// Reports the reply to a ping: `$CAMPR,<src>,<dst>,<one-way travel time, s>`.
 pub(super) fn on_ping_reply(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
-    base.report(&format!("CAMPR,{},{},{:.4}", packet.src, packet.dst, signal.travel.as_secs_f64()), now);
+    base.report(&format!("CAMPR,{},{},{:.4}", packet.src, packet.dst, signal.one_way.as_secs_f64()), now);
     statistics::report_reception(base, packet, signal, 2, now);
 }
 
-/// `$CAMUA,<src>,<dst>,<HHHH>`
+/// Reports 13 bits of user data: `$CAMUA,<src>,<dst>,<HHHH>`.
 pub(super) fn on_user(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
     if let Some(Some(bytes)) = packet.frames.first() {
         let bits = bytes.iter().fold(0u16, |bits, byte| bits << 8 | u16::from(*byte));

@@ -63,6 +63,7 @@ pub struct MicromodemConfig {
 
 impl MicromodemConfig {
     /// A Micromodem 2 with `address` at 19200 baud, its clock at the start of 2025.
+    #[must_use]
     pub fn new(address: u8) -> Self {
         Self {
             generation: Generation::Two,
@@ -75,6 +76,7 @@ impl MicromodemConfig {
     }
 
     /// A Micromodem 1 with `address`, otherwise as [`new`](Self::new).
+    #[must_use]
     pub fn first_generation(address: u8) -> Self {
         Self { generation: Generation::One, version: "0.94.0.04".to_string(), ..Self::new(address) }
     }
@@ -82,15 +84,16 @@ impl MicromodemConfig {
 
 /// Airtime of a packet of `frames` frames at `rate` (0..=6), for schedules and budgets.
 ///
-/// `None` for a rate above 6, and for a number of frames that a packet cannot hold. Source: a fixed time for each frame,
-/// from packet sizes and nominal bit rates in a band of 5 kHz.
-///
 /// ```
 /// use sim_channel::modem::micromodem::packet_airtime;
 ///
 /// assert_eq!(packet_airtime(1, 3).unwrap().as_millis(), 3100);
 /// assert_eq!(packet_airtime(1, 4), None);
 /// ```
+///
+/// `None` for a rate above 6, and for a number of frames that a packet cannot hold. Source: a fixed time for each frame,
+/// from packet sizes and nominal bit rates in a band of 5 kHz.
+#[must_use]
 pub fn packet_airtime(rate: u8, frames: u8) -> Option<Duration> {
     PacketRate::of(rate).filter(|rate| (1..=rate.max_frames).contains(&frames)).map(|rate| rate.airtime(frames))
 }
@@ -121,6 +124,7 @@ pub struct Micromodem {
 
 impl Micromodem {
     /// A modem that has just been switched on and is ready.
+    #[must_use]
     pub fn new(config: MicromodemConfig) -> Self {
         Self {
             base: MicromodemBase::new(config),

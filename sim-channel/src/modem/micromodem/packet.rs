@@ -29,7 +29,6 @@ pub(crate) struct Packet {
 pub(crate) enum PacketKind {
     /// Minipacket before an FSK packet, or a request for an uplink.
     CycleInit,
-    /// Frames of data.
     Data,
     /// One frame with the numbers of the frames received.
     Ack,

@@ -12,22 +12,22 @@ const OUT_OF_RANGE: &str = "ERROR OUT OF RANGE";
 const POOL_RANGE: std::ops::RangeInclusive<usize> = 8096..=2_097_152;
 
 /// The reply to a command.
-enum Reply {
+enum CommandReply {
     Bytes(Vec<u8>),
     /// Lines, closed by an empty one.
     Lines(String),
     None,
 }
 
-impl From<&str> for Reply {
+impl From<&str> for CommandReply {
     fn from(text: &str) -> Self {
-        Reply::Bytes(text.as_bytes().to_vec())
+        CommandReply::Bytes(text.as_bytes().to_vec())
     }
 }
 
-impl From<String> for Reply {
+impl From<String> for CommandReply {
     fn from(text: String) -> Self {
-        Reply::Bytes(text.into_bytes())
+        CommandReply::Bytes(text.into_bytes())
     }
 }
 
@@ -84,21 +84,20 @@ impl S2c {
             _ => self.plain_command(&name, value, now),
         };
         match reply {
-            Reply::Bytes(body) => self.base.reply(&name, body, now),
-            Reply::Lines(body) => self.base.reply(&name, body, now),
-            Reply::None => {}
+            CommandReply::Bytes(body) => self.base.reply(&name, body, now),
+            CommandReply::Lines(body) => self.base.reply(&name, body, now),
+            CommandReply::None => {}
         }
     }
 
-    /// `AT?..`
-    fn query(&mut self, key: &str, now: Duration) -> Reply {
+    fn query(&mut self, key: &str, now: Duration) -> CommandReply {
         match key {
-            "S" if self.base.config.interpreter == Interpreter::Net => Reply::Lines(self.status(now)),
+            "S" if self.base.config.interpreter == Interpreter::Net => CommandReply::Lines(self.status(now)),
             "S" => self.status(now).into(),
-            "P" => Reply::Lines(self.reception.multipath()),
-            "ZSL" => Reply::Lines(self.protocol_ids()),
-            "NOISE" => Reply::Bytes(self.noise()),
-            _ => self.value(key, now).map_or(UNKNOWN_COMMAND.into(), Reply::from),
+            "P" => CommandReply::Lines(self.reception.multipath()),
+            "ZSL" => CommandReply::Lines(self.protocol_ids()),
+            "NOISE" => CommandReply::Bytes(self.noise()),
+            _ => self.value(key, now).map_or(UNKNOWN_COMMAND.into(), CommandReply::from),
         }
     }
 
@@ -155,7 +154,6 @@ impl S2c {
         })
     }
 
-    /// `AT!..`
     fn set(&mut self, key: &str, value: &str, now: Duration) -> &'static str {
         if self.base.config.needs_control && !self.base.options.control() {
             return "ERROR NOT ACCEPTED";
@@ -172,7 +170,7 @@ impl S2c {
         }
     }
 
-    /// `!UT<seconds>[.fraction]`
+    /// Sets the physical clock: `!UT<seconds>[.fraction]`.
     fn set_clock(&mut self, value: &str, now: Duration) -> &'static str {
         match value.parse().ok().and_then(|seconds: f64| Duration::try_from_secs_f64(seconds).ok()) {
             Some(time) if time < Duration::from_secs(1 << 40) => {
@@ -184,7 +182,6 @@ impl S2c {
         }
     }
 
-    /// `AT@..`
     fn set_option(&mut self, key: &str, value: &str) -> &'static str {
         if key == "ZL" {
             return self.set_pool(value);
@@ -207,19 +204,18 @@ impl S2c {
         }
     }
 
-    /// `AT&..`
-    fn store(&mut self, key: &str) -> Reply {
+    fn store(&mut self, key: &str) -> CommandReply {
         let base = &mut self.base;
         match key {
             "W" => base.stored = base.settings.clone(),
             "F" => base.settings = Settings::factory(base.config.address, base.config.remote),
-            "V" => return Reply::Lines(base.settings.listing()),
+            "V" => return CommandReply::Lines(base.settings.listing()),
             _ => return UNKNOWN_COMMAND.into(),
         }
         "OK".into()
     }
 
-    fn plain_command(&mut self, name: &str, value: &str, now: Duration) -> Reply {
+    fn plain_command(&mut self, name: &str, value: &str, now: Duration) -> CommandReply {
         let at_interpreter = self.base.config.interpreter == Interpreter::At;
         match (name, value) {
             ("A", "") => self.enter(ReceiverMode::Listen).into(),
@@ -227,7 +223,7 @@ impl S2c {
             ("D", "") => self.enter(ReceiverMode::Deaf).into(),
             ("O", "") if at_interpreter => {
                 self.base.port.set_mode(PortMode::Data);
-                Reply::None
+                CommandReply::None
             }
             ("C", "") if at_interpreter => {
                 self.base.port.set_mode(PortMode::Command);
@@ -238,7 +234,7 @@ impl S2c {
             ("I7", "") => "EvoLogics GmbH (emulated)".into(),
             ("Z0", "") => {
                 self.base.board.schedule(now, S2cTask::Reboot);
-                Reply::None
+                CommandReply::None
             }
             ("Z1", "") => self.drop_bursts(now).into(),
             ("Z3", "") => {

@@ -43,8 +43,9 @@ impl S2c {
         notices::piggyback(&mut self.base, frame, signal, now);
     }
 
-    /// A frame for another modem: the host gets broadcast messages, and in promiscuous mode all messages; a connection
-    /// between others means back-off.
+    /// A frame for another modem.
+    ///
+    /// The host gets broadcast messages, and in promiscuous mode all messages. A connection between others means back-off.
     fn on_overheard(&mut self, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
         let wanted = frame.dst == 255 || self.base.settings.get("RP") == 1;
         match frame.kind {
@@ -68,7 +69,7 @@ impl S2c {
         let mut ack = base.frame(FrameKind::InstantAck, frame.src);
         ack.tag = frame.seq as u8;
         let ack = messages.piggyback.attach(ack);
-        let out = QueuedFrame { frame: ack, airtime: timing::ACK, label: "ack", then: AfterSending::Nothing };
+        let out = QueuedFrame { frame: ack, airtime: timing::ACK, label: "ack", then: AfterSending::Done };
         if frame.seq & OPENS_TURN == 0 || !bursts.connected_to(frame.src) {
             base.transmitter.push_first(out);
         } else {

@@ -1,7 +1,7 @@
 //! EvoLogics S2C: the AT and NET interpreters over an emulated acoustic layer.
 //!
 //! Syntax, replies and notifications follow what fielded drivers send and parse. The acoustic layer is a model: instant
-//! messages with the measured air times, and connections with trains of packets, selective acknowledgement and turns.
+//! messages with the measured airtimes, and connections with trains of packets, selective acknowledgement and turns.
 //!
 //! ```text
 //!   host -> base::CommandPort -> commands -> messages, burst -> base::Transmitter -> channel
@@ -30,11 +30,12 @@ use std::time::Duration;
 
 /// Airtime of an instant message of `bytes` (1..=64), for schedules and budgets.
 ///
-/// Source: a fit to the table of measured durations shipped with a fielded driver, 161 ms + 10.9 ms a byte.
-///
 /// ```
 /// assert_eq!(sim_channel::modem::s2c::instant_airtime(64).as_millis(), 858);
 /// ```
+///
+/// Source: a fit to the table of measured durations shipped with a fielded driver, 161 ms + 10.9 ms a byte.
+#[must_use]
 pub fn instant_airtime(bytes: usize) -> Duration {
     base::timing::instant(bytes)
 }
@@ -63,6 +64,7 @@ pub struct S2c {
 
 impl S2c {
     /// A modem that has just been switched on and is ready.
+    #[must_use]
     pub fn new(config: S2cConfig) -> Self {
         Self {
             reception: ReceptionLog::default(),
@@ -74,6 +76,7 @@ impl S2c {
     }
 
     /// The present local address, `?AL`.
+    #[must_use]
     pub fn address(&self) -> u8 {
         self.base.address()
     }
@@ -112,7 +115,7 @@ impl S2c {
     fn on_sent(&mut self, then: AfterSending, now: Duration) {
         let Self { base, messages, bursts, .. } = self;
         match then {
-            AfterSending::Nothing => {}
+            AfterSending::Done => {}
             AfterSending::Instant(number) => {
                 let allowance = bursts.turn_allowance(base);
                 messages.instant.on_sent(base, number, allowance, now);

@@ -18,11 +18,8 @@ const SIGNED: u8 = 1;
 /// A frame with a right check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Who sent it.
     pub system: u8,
-    /// Which part of it.
     pub component: u8,
-    /// Number of the message.
     pub id: u32,
     /// Its fields; trailing zeros may be missing.
     pub payload: Vec<u8>,
@@ -35,7 +32,6 @@ pub struct Refused {
     pub checksum: u64,
     /// Frames with a feature that is not understood.
     pub incompatible: u64,
-    /// Bytes between frames.
     pub garbage: u64,
 }
 
@@ -48,7 +44,6 @@ pub struct Deframer {
 
 /// What stands at the front of the bytes held.
 enum Front {
-    /// More bytes are needed.
     Incomplete,
     /// A frame of so many bytes, `None` if its message is not known.
     Whole(usize, Option<Frame>),
@@ -62,7 +57,6 @@ impl Deframer {
         self.refused
     }
 
-    /// The stream begins anew.
     pub fn clear(&mut self) {
         self.held.clear();
     }
@@ -183,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn version_one_signatures_and_unknown_messages_are_passed_over_whole() {
+    fn version_one_signed_and_unknown_messages_are_skipped() {
         let mut v1 = vec![V1, 9, 7, 1, 1, 0, 0, 0, 0, 0, 6, 8, 0, 4, 3];
         v1.extend(check(&v1[1..], 50).to_le_bytes());
         let mut signed = bytes(HEARTBEAT);

@@ -82,11 +82,8 @@ struct Due {
     gps: Instant,
 }
 
-/// MAV_CMD_DO_SET_MODE.
 const SET_MODE: u16 = 176;
-/// MAV_CMD_COMPONENT_ARM_DISARM.
 const ARM: u16 = 400;
-/// MAV_CMD_SET_MESSAGE_INTERVAL.
 const INTERVAL: u16 = 511;
 /// Component of this end: MAV_COMP_ID_ONBOARD_COMPUTER.
 const OWN_COMPONENT: u8 = 191;
@@ -291,7 +288,6 @@ impl Mavlink {
     }
 }
 
-/// Degrees times ten million.
 fn units(place: LatLon) -> (i32, i32) {
     ((place.lat_deg * 1e7).round() as i32, (place.lon_deg * 1e7).round() as i32)
 }

@@ -31,7 +31,6 @@ struct Begun {
     from: ModemAddress,
     to: ModemAddress,
     frames: u8,
-    /// Whether we fill it.
     ours: bool,
     /// When it was begun, and when it is over at the latest.
     at: Instant,
@@ -47,7 +46,6 @@ struct Request {
     dst: ModemAddress,
 }
 
-/// What is under way.
 #[derive(Debug, Default)]
 pub(super) struct Cycles {
     begun: Option<Begun>,
@@ -59,7 +57,6 @@ pub(super) struct Cycles {
     polled: bool,
     /// Given by the link, not yet asked for.
     pub offered: VecDeque<Given>,
-    /// In the modem.
     taken: Vec<Token>,
     /// When the packet with `taken` has left at the latest.
     leaves: Option<Instant>,
@@ -95,7 +92,6 @@ impl Cycles {
 }
 
 impl Micromodem {
-    /// `$CCCYC,0,<src>,<dst>,<rate>,<ack>,<nframes>`
     pub(super) fn start_cycle(&mut self, from: ModemAddress, to: ModemAddress, frames: u32, now: Instant) {
         const TRIES: u8 = 30;
         self.start(from, to, frames.clamp(1, u32::from(self.config.rate.frames)) as u8, TRIES, now);
@@ -157,7 +153,6 @@ impl Micromodem {
         }
     }
 
-    /// `$CADRQ,<HHMMSS>,<src>,<dst>,<ack>,<max bytes>,<frame>`
     fn handle_request(&mut self, s: &Sentence) {
         let (Some(src), Some(dst)) = (s.number(1), s.number(2)) else { return };
         self.cycles.request = Some(Request { src, dst });
@@ -185,7 +180,6 @@ impl Micromodem {
         }
     }
 
-    /// `$CARXD,<src>,<dst>,<ack>,<frame>,<hex>`
     fn handle_frame(&mut self, s: &Sentence) {
         let (Some(src), Some(dst)) = (s.number::<u8>(0), s.number::<u8>(1)) else { return };
         if src == self.config.address {
@@ -198,7 +192,6 @@ impl Micromodem {
         self.events.push_back(Event::Received(reception));
     }
 
-    /// The packet has left.
     fn handle_left(&mut self) {
         let taken = std::mem::take(&mut self.cycles.taken);
         self.events.extend(taken.into_iter().map(Event::Sent));

@@ -22,7 +22,6 @@ pub(super) struct BurstStreams {
 }
 
 impl BurstStreams {
-    /// Drops half frames.
     pub(super) fn clear(&mut self) {
         self.streams.clear();
     }

@@ -4,7 +4,6 @@ use scenecast_core::ModemAddress;
 pub use scenecast_core::{S2C_BURST_FRAME_BYTES as BURST_FRAME_BYTES, S2C_INSTANT_BYTES as INSTANT_BYTES};
 use std::time::Duration;
 
-/// How bulk goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum S2cMode {
     /// In records of bursts; the modem does half duplex and repeats by itself.
@@ -18,13 +17,11 @@ pub enum S2cMode {
 pub struct S2cConfig {
     /// The address that the modem must have.
     pub address: ModemAddress,
-    /// How bulk goes.
     pub mode: S2cMode,
     /// Source level 0..=3: 3 is the least, and the only one for air.
     pub source_level: u8,
     /// Highest address of the network, the same on all modems.
     pub highest_address: u8,
-    /// Data packets a train.
     pub cluster: u8,
     /// Longest data packet, the same on all modems, milliseconds.
     pub packet_ms: u16,
@@ -42,7 +39,6 @@ pub struct S2cConfig {
 ///
 /// Source: a fit to the table of measured durations shipped with a fielded driver.
 pub const INSTANT_BPS: f64 = 8.0 / 0.0109;
-/// See [`INSTANT_BPS`].
 pub const INSTANT_OVERHEAD_BITS: u64 = 119;
 /// Bits around a frame in a burst: delimiters, stuffing, heads of pieces.
 pub const BURST_OVERHEAD_BITS: u64 = 8 * 12;

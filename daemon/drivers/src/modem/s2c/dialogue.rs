@@ -17,7 +17,6 @@ const MAX_RECORD_BYTES: usize = 1030;
 pub(super) enum Pending {
     /// `+++AT?MODE`, which not every port understands.
     Interpreter,
-    /// `AT?MODE`
     Mode,
     Setup(Step),
     Beat(Step),

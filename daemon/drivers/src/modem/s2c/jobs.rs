@@ -9,7 +9,6 @@ use std::collections::{BTreeMap, VecDeque};
 #[derive(Debug, Clone)]
 pub(super) struct Job {
     pub token: Token,
-    /// 255: everybody.
     pub dst: ModemAddress,
     pub bytes: Vec<u8>,
     pub class: Class,
@@ -46,7 +45,6 @@ pub(super) struct Jobs {
 }
 
 impl Jobs {
-    /// Ends the pauses.
     pub(super) fn resume(&mut self, now: Instant) {
         (self.message_pause, self.record_pause) = (now, now);
     }

@@ -40,7 +40,6 @@ impl LineParser {
         self.buffer.clear();
     }
 
-    /// Bytes that are kept.
     pub fn kept(&self) -> usize {
         self.buffer.len()
     }
@@ -50,7 +49,6 @@ impl LineParser {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The next complete thing.
     pub fn next_line(&mut self) -> Option<Line> {
         if self.ties { self.next_wrapped() } else { self.next_plain() }
     }

@@ -36,14 +36,11 @@ const SETTLE: Duration = Duration::from_millis(300);
 const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longest wait however much else the modem has to say: the reply may have been lost on the line.
 const MAX_REPLY_WAIT: Duration = Duration::from_secs(9);
-/// From `ATO` to data.
 const DATA_MODE: Duration = Duration::from_millis(1500);
 /// After a wrong address, or a setting that was not taken.
 const AFTER_REFUSAL: Duration = Duration::from_secs(10);
-/// Address of everybody.
 const EVERYBODY: ModemAddress = 255;
 
-/// Where the driver stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// The port is not open.
@@ -52,9 +49,7 @@ enum Phase {
     Settling(Instant),
     /// Asks which interpreter there is.
     Discovering,
-    /// Works through the start-up.
     SettingUp(usize),
-    /// At work.
     Ready,
 }
 

@@ -5,7 +5,6 @@ use super::config::S2cConfig;
 /// What a reply must be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Expect {
-    /// `OK` or `[*]OK`.
     Ok,
     /// That, or an error: older firmware does not know it.
     Tolerated,
@@ -13,7 +12,6 @@ pub(super) enum Expect {
     Value(u32),
     /// The address that we were given.
     Address,
-    /// The packet counter.
     Counter,
 }
 
@@ -24,7 +22,6 @@ pub(super) struct Step {
     pub expect: Expect,
 }
 
-/// What a reply shows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Verdict {
     Good,
@@ -76,7 +73,6 @@ pub(super) fn beat(config: &S2cConfig, number: usize) -> Step {
 }
 
 impl Step {
-    /// Judges a reply.
     pub(super) fn judge(&self, reply: &str, config: &S2cConfig) -> Verdict {
         let number: Option<u32> = reply.strip_prefix("[*]").unwrap_or(reply).trim().parse().ok();
         let good = match self.expect {

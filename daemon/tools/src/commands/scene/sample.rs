@@ -12,7 +12,7 @@ const CUSTOMERS: u32 = 16;
 /// Edge of the picture aimed at, pixels.
 const PICTURE_PX: u32 = 960;
 /// Most pixels of a picture.
-const MOST_PIXELS: u64 = 1 << 24;
+const MAX_PIXELS: u64 = 1 << 24;
 /// Palette index of the space between worlds; labels have 1 to 254.
 const PAPER: u8 = 255;
 
@@ -90,8 +90,8 @@ impl Sheet {
         let gap = (PICTURE_PX / 80).max(1);
         let length = |cells: u32, worlds: u32| worlds * (cells * scale + gap) + gap;
         let (width, height) = (length(size.0, grid.0), length(size.1, grid.1));
-        if u64::from(width) * u64::from(height) > MOST_PIXELS {
-            let what = format!("--size and --grid make {width} x {height} pixels, more than the {MOST_PIXELS} allowed");
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            let what = format!("--size and --grid make {width} x {height} pixels, more than the {MAX_PIXELS} allowed");
             return Err(UserError::Input(what));
         }
         Ok(Self { across: grid.0, size, scale, gap, width, height })

@@ -38,7 +38,7 @@ impl Default for Grid {
 }
 
 /// Most settings of a grid.
-const MOST: usize = 100_000;
+const MAX: usize = 100_000;
 
 impl Grid {
     /// The grid in a file, or the paper's; what it does not name is as configured.
@@ -98,8 +98,8 @@ impl Grid {
         }
         let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len()]);
         let count = count.map(|n| n.max(1)).fold(1usize, usize::saturating_mul);
-        if count > MOST {
-            return Err(format!(": {count} settings; at most {MOST} are allowed"));
+        if count > MAX {
+            return Err(format!(": {count} settings; at most {MAX} are allowed"));
         }
         grid.drop_repeats();
         Ok(grid)

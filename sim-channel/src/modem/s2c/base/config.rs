@@ -40,6 +40,7 @@ pub struct S2cConfig {
 
 impl S2cConfig {
     /// A modem with `address` on a NET port at 19200 baud, without a USBL head.
+    #[must_use]
     pub fn new(address: u8) -> Self {
         Self {
             address,

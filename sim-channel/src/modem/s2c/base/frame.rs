@@ -50,19 +50,16 @@ impl Network {
 pub(crate) enum FrameKind {
     /// Instant message: tag 0 ack, 1 noack, 2 force.
     Instant,
-    /// Acknowledges an instant message.
     InstantAck,
     /// Synchronous instant message: seq is the sender's clock, us.
     Synchronous,
     /// Requests a connection: tag is the session.
     Request,
-    /// Grants the connection.
     Grant,
     /// A data packet of a train.
     Packet,
     /// Opens a turn: seq is the first packet missing, held those beyond it.
     Turn,
-    /// Ends the connection.
     Disconnect,
 }
 

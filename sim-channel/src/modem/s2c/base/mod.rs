@@ -17,7 +17,7 @@ mod transmitter;
 pub(crate) use condition::{Condition, ReceiverMode};
 pub use config::{Interpreter, S2cConfig};
 pub(crate) use frame::{FrameKind, Network, S2cFrame};
-pub(crate) use options::Options;
+pub(crate) use options::PortOptions;
 pub(crate) use port::{CommandPort, PortMode};
 pub(crate) use settings::{SettingError, Settings};
 pub(crate) use signal::{PendingFix, ReceivedSignal, VELOCITY};
@@ -38,7 +38,7 @@ pub(crate) struct S2cBase {
     pub settings: Settings,
     /// The settings that `AT&W` saved; a restart loads them.
     pub stored: Settings,
-    pub options: Options,
+    pub options: PortOptions,
     pub condition: Condition,
     pub transmitter: Transmitter,
     /// Physical clock of the modem minus virtual time.
@@ -54,7 +54,7 @@ impl S2cBase {
             port: CommandPort::new(config.interpreter),
             stored: settings.clone(),
             settings,
-            options: Options::default(),
+            options: PortOptions::default(),
             condition: Condition::default(),
             transmitter: Transmitter::default(),
             clock_offset: Duration::ZERO,
@@ -94,8 +94,7 @@ impl S2cBase {
         S2cFrame::new(kind, self.address(), dst, self.network())
     }
 
-    /// Whether a message may be sent to `dst`: a node of the network other than this one, or 255 where broadcast is
-    /// allowed.
+    /// Whether a message may be sent to `dst`: to another node of the network, or to 255 where broadcast is allowed.
     pub(crate) fn may_address(&self, dst: u8, broadcast_allowed: bool) -> bool {
         let node = (1..=self.settings.byte("AM")).contains(&dst) && dst != self.address();
         node || (dst == 255 && broadcast_allowed)

@@ -1,7 +1,7 @@
 //! The switches `@Z..` and `@CTRL` of the port; a restart clears them.
 
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Options {
+pub(crate) struct PortOptions {
     extended: bool,
     usbl: bool,
     networking: bool,
@@ -9,8 +9,8 @@ pub(crate) struct Options {
     control: bool,
 }
 
-impl Options {
-    /// `@ZX`: extended notifications.
+impl PortOptions {
+    /// `@ZX`: notifications of each transmission and reception.
     pub(crate) fn extended(&self) -> bool {
         self.extended
     }

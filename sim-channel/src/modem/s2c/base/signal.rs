@@ -12,10 +12,8 @@ pub(crate) const VELOCITY: &str = "0.0000";
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceivedSignal {
     pub airtime: Duration,
-    /// End of the reception.
     pub received_at: Duration,
-    /// One way.
-    pub travel: Duration,
+    pub one_way: Duration,
     /// Received level, dB; -20 within 10 m, -85 at the least.
     pub rssi: i32,
     pub integrity: i32,
@@ -31,7 +29,7 @@ impl ReceivedSignal {
         Self {
             airtime: arrival.airtime,
             received_at: arrival.at,
-            travel: flight,
+            one_way: flight,
             rssi,
             integrity: 230 + rssi,
             sender: arrival.sender,

@@ -16,7 +16,7 @@ pub(crate) struct QueuedFrame {
 /// The step that follows the end of a transmission.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum AfterSending {
-    Nothing,
+    Done,
     /// The instant message of that number waits for its acknowledgement.
     Instant(u8),
     /// The train or probe of that turn waits for its acknowledgement.
@@ -25,7 +25,6 @@ pub(crate) enum AfterSending {
     Acknowledged(u64),
     /// The connection request of that epoch waits for its grant.
     Request(u32),
-    /// The connection is over.
     Closed,
 }
 
@@ -54,7 +53,7 @@ impl Transmitter {
         self.queue.retain(|out| !kinds.contains(&out.frame.kind));
     }
 
-    /// Takes the next frame and occupies the transducer for its air time; `None` while it is occupied.
+    /// Takes the next frame and occupies the transducer for its airtime; `None` while it is occupied.
     pub(crate) fn begin(&mut self, now: Duration) -> Option<QueuedFrame> {
         if self.is_busy(now) {
             return None;

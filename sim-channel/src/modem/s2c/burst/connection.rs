@@ -7,7 +7,6 @@ use std::time::Duration;
 
 #[derive(Debug, Default)]
 pub(super) enum AcousticLink {
-    /// No connection.
     #[default]
     Listen,
     /// A request has been sent.
@@ -92,7 +91,7 @@ impl Connection {
             turn: if initiator { TurnState::Sending } else { TurnState::Receiving },
             number,
             unanswered: 0,
-            travel: signal.travel,
+            travel: signal.one_way,
             last_received_at: signal.received_at,
             deferred: Vec::new(),
         }
@@ -131,7 +130,7 @@ impl Connection {
     /// A frame of the peer has come.
     pub(super) fn on_peer_frame(&mut self, signal: &ReceivedSignal) {
         self.unanswered = 0;
-        self.travel = signal.travel;
+        self.travel = signal.one_way;
         self.last_received_at = signal.received_at;
     }
 

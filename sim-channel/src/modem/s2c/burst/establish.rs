@@ -9,7 +9,7 @@ use crate::modem::s2c::base::{
 use crate::modem::s2c::messages::Messages;
 use std::time::Duration;
 
-/// A connection whose peer was silent for so long does not keep others out.
+/// A connection whose peer was silent for this long gives way to another one.
 const STALE_TIMEOUT: Duration = Duration::from_secs(15);
 /// Frames that have no meaning once a connection ends or is taken over.
 const CONNECTION_FRAMES: [FrameKind; 3] = [FrameKind::Request, FrameKind::Packet, FrameKind::Turn];
@@ -100,8 +100,8 @@ impl BurstService {
         let mut grant = base.frame(FrameKind::Grant, frame.src);
         grant.tag = frame.tag;
         let grant = messages.piggyback.attach(grant);
-        base.send(grant, timing::HEADER, "connect", AfterSending::Nothing);
-        self.listen_at_most(base, Duration::from_secs(3) + 2 * signal.travel, now);
+        base.send(grant, timing::HEADER, "connect", AfterSending::Done);
+        self.listen_at_most(base, Duration::from_secs(3) + 2 * signal.one_way, now);
     }
 
     /// The peer granted our request.
@@ -157,7 +157,7 @@ impl BurstService {
         self.on_listen(base, messages, now);
     }
 
-    /// Tells the peer that the connection ends.
+    /// Sends the peer a disconnection, as the initiator of an idle connection does.
     pub(super) fn send_disconnect(&mut self, base: &mut S2cBase) {
         if let Some(connection) = self.link.connection_mut() {
             connection.enter(TurnState::Sending);
@@ -197,7 +197,7 @@ impl BurstService {
         if let Some((peer, session)) = ended {
             let mut frame = base.frame(FrameKind::Disconnect, peer);
             frame.tag = session;
-            base.send(frame, timing::HEADER, "disconnect", AfterSending::Nothing);
+            base.send(frame, timing::HEADER, "disconnect", AfterSending::Done);
         }
         self.on_listen(base, messages, now);
     }

@@ -31,7 +31,7 @@ pub(crate) struct BurstService {
 }
 
 impl BurstService {
-    /// `*SEND`: returns the reply.
+    /// Takes a record of `*SEND`; returns the reply.
     pub(crate) fn submit(&mut self, base: &mut S2cBase, command: SendCommand, now: Duration) -> &'static str {
         if !base.may_address(command.dst, false) {
             return "ERROR WRONG DESTINATION ADDRESS";
@@ -136,7 +136,7 @@ impl BurstService {
         }
     }
 
-    /// The state in `AT?S`.
+    /// The state of the acoustic link in `AT?S`.
     pub(crate) fn state_name(&self, receiver: ReceiverMode, now: Duration) -> &'static str {
         match (&self.link, receiver) {
             (_, ReceiverMode::Noise) => "NOISE",

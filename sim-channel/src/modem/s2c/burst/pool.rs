@@ -46,8 +46,8 @@ impl BurstPool {
         true
     }
 
-    /// Adds raw bytes to the last record if that still waits and has room: a line of the host is one record, in however
-    /// many pieces it comes.
+    /// Adds raw bytes to the last record if that still waits and has room, so that a line of the host is one record in
+    /// however many pieces it comes.
     pub(super) fn join(&mut self, dst: u8, pid: u8, piece: &[u8], limit: usize) -> bool {
         let room = limit.saturating_sub(self.bytes());
         let joins = |last: &&mut BurstRecord| {

@@ -25,8 +25,7 @@ impl Sender {
         !self.unacked.is_empty()
     }
 
-    /// At most `count` packets of at most `capacity` bytes: first the unacknowledged ones, then new ones with records to
-    /// `peer`.
+    /// At most `count` packets of at most `capacity` bytes: the unacknowledged ones, then new ones with records to `peer`.
     pub(super) fn train(
         &mut self,
         queue: &mut VecDeque<BurstRecord>,
@@ -76,8 +75,9 @@ impl Sender {
         record.map(|record| self.begun.push_back((record, None))).is_some()
     }
 
-    /// All packets before `base` have arrived, and those behind it that have a bit in `held`. Returns the records that are
-    /// complete.
+    /// All packets before `base` have arrived, and those behind it that have a bit in `held`.
+    ///
+    /// Returns the records that are complete at the peer.
     pub(super) fn acknowledge(&mut self, base: u32, held: u64) -> Vec<BurstRecord> {
         if base > self.next || base < self.base {
             return Vec::new();

@@ -7,7 +7,7 @@ use crate::modem::s2c::messages::Messages;
 use crate::modem::s2c::receiver::notices;
 use std::time::Duration;
 
-/// Time for an acknowledgement beyond two ways of travel: turn-round, an instant message, the acknowledgement, a margin.
+/// Time for an acknowledgement beyond two ways of travel: turn-around, an instant message, the acknowledgement, a margin.
 const ACK_ALLOWANCE: Duration = Duration::from_millis(1600);
 /// How much longer the modem that did not request an idle connection keeps it open.
 const ACCEPTOR_ALLOWANCE: Duration = Duration::from_secs(10);
@@ -21,7 +21,7 @@ impl BurstService {
         }
     }
 
-    /// Listens to the peer for at most `timeout`; then it is this modem's turn, whatever was lost.
+    /// Listens to the peer for at most `timeout`; then it is this modem's turn, even if frames were lost.
     pub(crate) fn listen_at_most(&mut self, base: &mut S2cBase, timeout: Duration, now: Duration) {
         if let Some(connection) = self.link.connection_mut() {
             let number = connection.enter(TurnState::Receiving);
@@ -43,7 +43,7 @@ impl BurstService {
         }
     }
 
-    /// Sends all that is due in this turn, or rests if nothing is.
+    /// Sends the frames that are due in this turn, or rests if there are none.
     fn take_turn(
         &mut self,
         base: &mut S2cBase,
@@ -71,7 +71,7 @@ impl BurstService {
             (frame.tag, frame.follow, frame.seq, frame.held) = (session, follow, next, held);
             let frame = messages.piggyback.attach(frame);
             let then = match last {
-                Some(_) => AfterSending::Nothing,
+                Some(_) => AfterSending::Done,
                 None if opens_with_message => AfterSending::Train(number),
                 None => AfterSending::Acknowledged(number),
             };
@@ -83,7 +83,7 @@ impl BurstService {
                 (session, follow - 1 - index as u8, seq, u64::from(next));
             let airtime = timing::packet(payload.len(), capacity, packet_ms);
             frame.payload = payload;
-            let then = if Some(index) == last { AfterSending::Train(number) } else { AfterSending::Nothing };
+            let then = if Some(index) == last { AfterSending::Train(number) } else { AfterSending::Done };
             base.send(frame, airtime, "data", then);
         }
         if last.is_none() && !sends_ack {

@@ -24,7 +24,7 @@ pub(crate) enum HostInput {
     WrongFormat,
     /// Raw burst data, in data mode.
     Data(Vec<u8>),
-    /// `+++` between two silences.
+    /// `+++` with a silence before and behind it.
     Escape,
 }
 
@@ -32,7 +32,6 @@ pub(crate) enum HostInput {
 pub(crate) enum ReadMode {
     /// Raw data with `+++AT` commands in it.
     Data,
-    /// `AT` commands only.
     Commands,
 }
 

@@ -94,8 +94,9 @@ impl InstantSlot {
         base.send(frame, timing::instant(pending.data.len()), "im", AfterSending::Instant(pending.number));
     }
 
-    /// The message has left. `turn_allowance` is how much later an acknowledgement may come because the peer's turn of
-    /// a connection comes first.
+    /// The message has left.
+    ///
+    /// An acknowledgement may come later by `turn_allowance`, if the peer's turn of a connection comes first.
     pub(crate) fn on_sent(&mut self, base: &mut S2cBase, number: u8, turn_allowance: Duration, now: Duration) {
         let Some(pending) = self.pending.as_ref().filter(|pending| pending.number == number) else { return };
         if pending.flag != InstantFlag::Ack {

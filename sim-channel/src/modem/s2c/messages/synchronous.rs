@@ -57,7 +57,7 @@ impl SynchronousSlot {
         frame.seq = base.clock_us(now);
         let airtime = timing::instant(message.data.len());
         frame.payload = message.data;
-        base.transmitter.push_first(QueuedFrame { frame, airtime, label: "ims", then: AfterSending::Nothing });
+        base.transmitter.push_first(QueuedFrame { frame, airtime, label: "ims", then: AfterSending::Done });
     }
 
     pub(super) fn cancel(&mut self, base: &mut S2cBase, now: Duration) {

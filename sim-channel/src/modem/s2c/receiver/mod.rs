@@ -88,7 +88,7 @@ impl ReceptionLog {
 
     /// Remembers the travel time of a frame that replied to one of ours.
     pub(crate) fn note_exchange(&mut self, signal: &ReceivedSignal) {
-        self.last.travel_us = signal.travel.as_micros() as u64;
+        self.last.travel_us = signal.one_way.as_micros() as u64;
     }
 
     /// The value behind `?` of the last signal.

@@ -4,14 +4,14 @@ use crate::modem::s2c::base::{Interpreter, ReceivedSignal, S2cBase, S2cFrame, VE
 use crate::modem::s2c::input::InstantFlag;
 use std::time::Duration;
 
-/// `RECVIM`
+/// `RECVIM`: an instant message.
 pub(crate) fn instant(base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
     let flag = InstantFlag::ALL.get(usize::from(frame.tag)).map_or("noack", |flag| flag.name());
     let between = format!("{flag},{}", signal.airtime.as_micros());
     message(base, "RECVIM", frame, &between, signal, now);
 }
 
-/// `RECVIMS`
+/// `RECVIMS`: a synchronous message, with the time of its arrival.
 pub(crate) fn synchronous(base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
     let clock = base.clock_us(signal.received_at.saturating_sub(signal.airtime));
     let between = format!("{clock},{}", signal.airtime.as_micros());
@@ -27,7 +27,7 @@ fn message(base: &mut S2cBase, keyword: &str, frame: &S2cFrame, between: &str, s
     base.notify([head.as_bytes(), &frame.payload].concat(), now);
 }
 
-/// `RECVPBM`
+/// `RECVPBM`: the piggyback message of a frame, if it has one.
 pub(crate) fn piggyback(base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
     let Some((pid, data)) = &frame.piggyback else { return };
     let len = length_field(base, *pid, data.len());
@@ -43,7 +43,7 @@ pub(crate) fn record(base: &mut S2cBase, src: u8, pid: u8, data: &[u8], signal: 
         return;
     }
     let len = length_field(base, pid, data.len());
-    let (own, rate, travel) = (base.address(), base.config.bit_rate, signal.travel.as_micros());
+    let (own, rate, travel) = (base.address(), base.config.bit_rate, signal.one_way.as_micros());
     let head = format!("RECV,{len},{src},{own},{rate},{},{},{travel},{VELOCITY},", signal.rssi, signal.integrity);
     base.notify([head.as_bytes(), data].concat(), now);
 }

@@ -1,4 +1,4 @@
-//! Positions from the USBL head: `USBLLONG` and its companions, after an exchange that was answered.
+//! Positions from the USBL head: `USBLLONG` and its companions, after each exchange in both directions.
 
 use crate::modem::s2c::base::{PendingFix, ReceivedSignal, S2cBase, S2cTask};
 use crate::usbl::UsblHead;
@@ -28,7 +28,8 @@ impl UsblReporter {
     pub(crate) fn measure(&mut self, base: &mut S2cBase, remote: u8, signal: &ReceivedSignal, now: Duration) {
         let Some(head) = self.head.as_mut().filter(|_| base.options.usbl()) else { return };
         let fix = head.measure(&signal.receiver, &signal.sender, signal.received_at);
-        let pending = PendingFix { remote, fix, travel: signal.travel, rssi: signal.rssi, integrity: signal.integrity };
+        let pending =
+            PendingFix { remote, fix, travel: signal.one_way, rssi: signal.rssi, integrity: signal.integrity };
         base.board.schedule(fix.ready_at.max(now), S2cTask::UsblFix(Box::new(pending)));
     }
 
@@ -75,9 +76,9 @@ fn fix_times(measured: &PendingFix, now: Duration) -> String {
 /// The head stands level and looks north, so that its own frame is east, north, up.
 fn long(measured: &PendingFix) -> String {
     let [east, north, up] = measured.fix.east_north_up_m();
-    let place = format!("{east:.4},{north:.4},{up:.4}");
+    let position = format!("{east:.4},{north:.4},{up:.4}");
     let (us, accuracy) = (measured.travel.as_micros(), measured.fix.accuracy_m);
-    format!("{place},{place},0.0000,0.0000,0.0000,{us},{},{},{accuracy:.4}", measured.rssi, measured.integrity)
+    format!("{position},{position},0.0000,0.0000,0.0000,{us},{},{},{accuracy:.4}", measured.rssi, measured.integrity)
 }
 
 /// Bearing counts from -pi to pi.
@@ -94,7 +95,7 @@ fn delays() -> String {
     format!("1{}", format!(",{INVALID_DELAY}").repeat(8))
 }
 
-/// Measurement type and the place by each of six triples of hydrophones, which agree.
+/// Measurement type, and the position from each of six triples of hydrophones, which all agree.
 fn positions(measured: &PendingFix) -> String {
     let [east, north, up] = measured.fix.east_north_up_m();
     format!("1{}", format!(",{east:.4},{north:.4},{up:.4}").repeat(6))

@@ -142,11 +142,11 @@ proptest! {
         let mut modem = S2c::new(S2cConfig::new(2));
         for bytes in frames {
             let now = rig.basin.now();
-            let place = crate::nodes::NodePosition::default();
+            let position = crate::nodes::NodePosition::default();
             let outcome = crate::channel::ReceptionOutcome::Delivered { bytes, copy: 0, corrupted: true };
             let arrival = crate::channel::Arrival {
                 transmission: 1, from: ONE, to: NodeId(2), at: now, sent_at: now, range_m: 1.0,
-                sender: place, receiver: place, airtime: SECOND, outcome,
+                sender: position, receiver: position, airtime: SECOND, outcome,
             };
             modem.handle_arrival(&arrival, now);
         }

@@ -1,7 +1,7 @@
 //! The plan that the operator is shown is the vehicle's, through losses, a new utility and a hold.
 
 use super::Mission;
-use super::tuned::mission;
+use super::tuned_tests::mission;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::wire::{PlannedPath, VehicleMode};
 use std::collections::VecDeque;
@@ -20,8 +20,8 @@ impl Mission {
     fn watch_plans(&mut self, had: &mut VecDeque<Plan>, seconds: u32) -> usize {
         let mut seen: Vec<Plan> = Vec::new();
         for _ in 0..seconds * 5 {
-            self.advance(self.now + Duration::from_millis(200)).unwrap();
-            had.push_back(plan(self.vehicle.waypoint(), self.vehicle.path()));
+            self.advance(self.now() + Duration::from_millis(200)).unwrap();
+            had.push_back(plan(self.vehicle().waypoint(), self.vehicle().path()));
             if had.len() > 200 {
                 had.pop_front();
             }
@@ -36,30 +36,30 @@ impl Mission {
     }
 
     fn shown_plan(&self) -> Option<Plan> {
-        let (status, _) = self.surface.view(self.address)?.status()?;
+        let (status, _) = self.surface().view(self.address)?.status()?;
         Some(plan(status.waypoint, &status.path))
     }
 }
 
 #[test]
-fn what_the_operator_sees_is_a_plan_of_the_vehicle_and_soon_the_one_in_force() {
+fn the_shown_plan_is_the_vehicles_and_soon_the_current_one() {
     let mut mission = mission(&["channel.loss=0.1"]);
     let mut had = VecDeque::new();
     assert!(mission.watch_plans(&mut had, 90) > 1, "the legs of the lawnmower");
-    let (address, now) = (mission.address, mission.now);
-    mission.surface.set_utility(address, &[(1, 0.8)].into(), (0.2, 0.0), now).unwrap();
+    let (address, now) = (mission.address, mission.now());
+    mission.surface_mut().set_utility(address, &[(1, 0.8)].into(), (0.2, 0.0), now).unwrap();
     assert!(mission.watch_plans(&mut had, 120) > 4, "the planner changes its mind");
-    mission.surface.set_hold(address, true, mission.now).unwrap();
+    mission.surface.surface_mut().set_hold(address, true, mission.times.now).unwrap();
     mission.watch_plans(&mut had, 60);
-    let (status, _) = mission.surface.view(address).unwrap().status().unwrap();
+    let (status, _) = mission.surface().view(address).unwrap().status().unwrap();
     assert_eq!((status.mode, mission.shown_plan()), (VehicleMode::Hold, Some(Plan::default())));
-    mission.surface.set_hold(address, false, mission.now).unwrap();
+    mission.surface.surface_mut().set_hold(address, false, mission.times.now).unwrap();
     let in_force = |m: &Mission| {
-        m.shown_plan().is_some_and(|p| p.1.len() > 1 && p == plan(m.vehicle.waypoint(), m.vehicle.path()))
+        m.shown_plan().is_some_and(|p| p.1.len() > 1 && p == plan(m.vehicle().waypoint(), m.vehicle().path()))
     };
-    let give_up = mission.now + Duration::from_secs(10);
+    let give_up = mission.now() + Duration::from_secs(10);
     while !in_force(&mission) {
-        assert!(mission.now < give_up, "{:?} after ten seconds", mission.shown_plan());
-        mission.advance(mission.now + Duration::from_millis(200)).unwrap();
+        assert!(mission.now() < give_up, "{:?} after ten seconds", mission.shown_plan());
+        mission.advance(mission.now() + Duration::from_millis(200)).unwrap();
     }
 }

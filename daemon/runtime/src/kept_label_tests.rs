@@ -7,11 +7,13 @@ use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, TopicId};
 use scenecast_config::Config;
 use scenecast_core::Area;
+use scenecast_host::{VehicleHost, VehicleHostEvent, channel_station};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{MapUpdate, Vehicle, VehicleOutput};
+use scenecast_vehicle::MapUpdate;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 const FRAMES: u32 = 40;
 /// Frames from one checkpoint to the next.
@@ -120,8 +122,10 @@ impl World {
             scenecast_config::vehicle_address(&self.config).unwrap(),
         )
         .unwrap();
-        let mut vehicle =
+        let vehicle =
             scenecast_vehicle::assemble(&self.config, None, profile, area, durable, 1, Instant::ZERO).unwrap();
+        let station = channel_station(profile, Duration::from_secs(10), Instant::ZERO);
+        let mut host = VehicleHost::new(vehicle, station, None);
         for frame in 1..=FRAMES {
             self.disk.step(Step::Host).ok()?;
             let update = scene.see(&mut self.chance, &mut self.born);
@@ -130,7 +134,7 @@ impl World {
             if first && frame % CHECKPOINT_EVERY == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;
             }
-            self.tell(&mut vehicle, &mut keeper, &update, &scene)?;
+            self.publish(&mut host, &mut keeper, &update, &scene)?;
             if !first && frame % CHECKPOINT_EVERY == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;
             }
@@ -138,24 +142,24 @@ impl World {
         Some(())
     }
 
-    /// The link's thread hears of a map, does what the vehicle asks for, and then frames may go out.
-    fn tell(
+    /// The link's thread takes a map and does what the host asks for; then frames may go out.
+    fn publish(
         &mut self,
-        vehicle: &mut Vehicle,
+        host: &mut VehicleHost,
         keeper: &mut Keeper<Disk>,
         update: &MapUpdate,
         scene: &Scene,
     ) -> Option<()> {
-        vehicle.handle_map(update, Instant::ZERO);
-        while let Some(output) = vehicle.poll_output() {
-            if output == VehicleOutput::Persist {
-                keeper.save(vehicle.durable()).ok()?;
-                vehicle.handle_persisted();
+        host.handle_map(update, Instant::ZERO);
+        while let Some(event) = host.poll_event() {
+            if event == VehicleHostEvent::Persist {
+                keeper.save(host.vehicle().durable()).ok()?;
+                host.handle_persisted();
             }
         }
         self.disk.step(Step::Host).ok()?;
-        let epoch = vehicle.durable().epoch;
-        for (_, label) in vehicle.map().iter() {
+        let epoch = host.vehicle().durable().epoch;
+        for (_, label) in host.vehicle().map().iter() {
             let meaning = scene.meaning(label).unwrap();
             let first = *self.told.entry((epoch, label)).or_insert(meaning);
             assert_eq!(first, meaning, "label {label} of epoch {epoch} changed its meaning");
@@ -187,7 +191,7 @@ fn a_label_keeps_its_meaning_wherever_the_power_is_cut() {
 }
 
 #[test]
-fn with_a_checkpoint_labels_go_on_in_the_same_epoch_and_without_one_a_new_epoch_begins() {
+fn labels_continue_with_a_checkpoint_and_begin_again_without() {
     let mut world = World::new(5);
     world.run().unwrap();
     world.run().unwrap();

@@ -34,42 +34,42 @@ impl Mission {
     /// Sends an order and flies until the vehicle has said that it follows it.
     fn tune(&mut self, order: &str) {
         let order: SettingsOrder = serde_json::from_str(order).unwrap();
-        let (address, now) = (self.address, self.now);
-        self.surface.set_settings(address, &order, now).unwrap();
+        let (address, now) = (self.address, self.now());
+        self.surface_mut().set_settings(address, &order, now).unwrap();
         let give_up = now + Duration::from_secs(120);
         let is_in_force = |m: &Self| {
-            let desk = &m.surface.desk(address).unwrap().settings;
+            let desk = &m.surface().desk(address).unwrap().settings;
             desk.in_force() == Some(desk.asked())
         };
         while !is_in_force(self) {
-            assert!(self.now < give_up, "not in force after two minutes");
-            self.advance(self.now + Duration::from_secs(1)).unwrap();
+            assert!(self.now() < give_up, "not in force after two minutes");
+            self.advance(self.now() + Duration::from_secs(1)).unwrap();
         }
-        assert_eq!(self.vehicle.settings(), self.surface.desk(address).unwrap().settings.asked());
+        assert_eq!(self.vehicle().settings(), self.surface().desk(address).unwrap().settings.asked());
     }
 
     /// Ends the survey and lets the link say what it has.
     fn drain(&mut self) {
         self.end_survey();
-        let give_up = self.now + Duration::from_secs(3600);
-        while !self.is_drained() && self.now < give_up {
-            self.advance(self.now + Duration::from_secs(1)).unwrap();
+        let give_up = self.now() + Duration::from_secs(3600);
+        while !self.is_drained() && self.now() < give_up {
+            self.advance(self.now() + Duration::from_secs(1)).unwrap();
         }
-        assert!(same(self.vehicle.map(), self.operators()), "the operator's map is the vehicle's");
+        assert!(same(self.vehicle().map(), self.operators()), "the operator's map is the vehicle's");
     }
 
     fn operators(&self) -> &LabelGrid {
-        self.surface.map(self.address).unwrap()
+        self.surface().map(self.address).unwrap()
     }
 
     fn heard_of(&self, kind: LayerKind) -> u64 {
-        self.surface.view(self.address).and_then(|v| v.layer(kind)).map_or(0, |p| p.version())
+        self.surface().view(self.address).and_then(|v| v.layer(kind)).map_or(0, |p| p.version())
     }
 
     fn settings_applied(&self) -> usize {
         let of_settings =
             |a: &&scenecast_vehicle::AppliedSlot| a.id == SlotId::Settings && a.state == SlotState::Applied;
-        self.applied.iter().filter(of_settings).count()
+        self.logbook.applied.iter().filter(of_settings).count()
     }
 }
 
@@ -78,28 +78,29 @@ fn same(a: &LabelGrid, b: &LabelGrid) -> bool {
 }
 
 #[test]
-fn priors_frame_rate_and_layers_change_under_way_and_the_maps_agree() {
+fn priors_frame_rate_and_layers_change_during_a_mission() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
-    let (frames, labels) = (mission.track.len(), mission.mapper.current().labels);
+    let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
     assert!(frames >= 50 && labels > 1 && mission.heard_of(LayerKind::Confidence) > 0);
     mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
     // What was in the water when the vehicle began to follow has come in.
-    mission.fly_to(mission.now.as_secs_f64() + 30.0);
-    let (since, frames, confidence) = (mission.now, mission.track.len(), mission.heard_of(LayerKind::Confidence));
+    mission.fly_to(mission.now().as_secs_f64() + 30.0);
+    let (since, frames, confidence) =
+        (mission.now(), mission.logbook.track.len(), mission.heard_of(LayerKind::Confidence));
     let depth = mission.heard_of(LayerKind::Depth);
     mission.fly_to(since.as_secs_f64() + 100.0);
-    assert!((9..=11).contains(&(mission.track.len() - frames)), "one frame in ten seconds is seen");
+    assert!((9..=11).contains(&(mission.logbook.track.len() - frames)), "one frame in ten seconds is seen");
     assert_eq!(mission.heard_of(LayerKind::Confidence), confidence, "a layer that is not told costs nothing");
     assert!(mission.heard_of(LayerKind::Depth) > depth);
     mission.tune(r#"{"frames_per_s": 0, "layers": "", "gamma": 0}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "what an order does not name stays");
-    mission.fly_to(mission.now.as_secs_f64() + 60.0);
+    mission.fly_to(mission.now().as_secs_f64() + 60.0);
     assert!(mission.heard_of(LayerKind::Confidence) > confidence);
     mission.drain();
-    let told = mission.vehicle.layers().find(|p| p.scale().kind() == LayerKind::Confidence).unwrap().target().clone();
-    let heard = mission.surface.view(mission.address).unwrap().layer(LayerKind::Confidence).unwrap();
+    let told = mission.vehicle().layers().find(|p| p.scale().kind() == LayerKind::Confidence).unwrap().target().clone();
+    let heard = mission.surface().view(mission.address).unwrap().layer(LayerKind::Confidence).unwrap();
     assert!(same(&told, heard.levels().shown()), "a layer goes on from where it rested");
     assert_eq!((mission.mapper.epoch(), mission.settings_applied()), (0, 2), "labels keep their meaning");
     assert!(mission.mapper.current().labels >= labels);
@@ -110,10 +111,10 @@ fn only_coarse_cells_are_told_until_all_are_wanted_again() {
     let mut mission = mission(&["survey.speed_m_s=1"]);
     mission.fly_to(60.0);
     mission.tune(r#"{"cells": "coarse"}"#);
-    let known = mission.vehicle.map().clone();
+    let known = mission.vehicle().map().clone();
     mission.fly_to(200.0);
     let seen = mission.mapper.current().cells.len();
-    let told = mission.vehicle.map();
+    let told = mission.vehicle().map();
     assert!(told.explored() < seen * 2 / 3, "{} of {seen} cells are told", told.explored());
     for (cell, label) in mission.mapper.current().cells {
         let is_told = Stride::Four.on_lattice(cell).is_some() || known.get(cell) != 0;
@@ -132,7 +133,7 @@ fn coarse_cells_need_far_fewer_bits() {
         let mut mission = mission(&["channel.loss=0", "map.planes=[]", cells]);
         mission.fly_to(200.0);
         mission.drain();
-        mission.surface.view(mission.address).unwrap().stats().received_by_class
+        mission.surface().view(mission.address).unwrap().stats().received_by_class
             [&scenecast_protocol::schedule::Class::Map]
     };
     let (fine, coarse) = (bytes("map.cells=fine"), bytes("map.cells=coarse"));

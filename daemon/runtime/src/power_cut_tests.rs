@@ -7,13 +7,14 @@ use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
+use scenecast_host::{SurfaceHost, VehicleHost, VehicleHostEvent, channel_station};
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Fix, OrderStatus, SlotId};
+use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::Surface;
-use scenecast_vehicle::{Durable, MapUpdate, Vehicle, VehicleOutput};
+use scenecast_vehicle::{Durable, MapUpdate};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -22,17 +23,18 @@ const PROPAGATION: Duration = Duration::from_millis(200);
 /// Ticks within which everything must have settled, whatever was cut.
 const MOST_TICKS: u32 = 9000;
 const LABELS: u8 = 200;
+const WINDOW: Duration = Duration::from_secs(10);
 
-/// What goes through the water, and what is at its end.
-enum Event {
-    Sent { by_vehicle: bool },
-    Arrives { at_vehicle: bool, bytes: Vec<u8> },
+/// A frame on its way.
+struct Arrival {
+    at_vehicle: bool,
+    bytes: Vec<u8>,
 }
 
 /// The vehicle's computer while it has power.
 struct Onboard {
     keeper: Keeper<Disk>,
-    vehicle: Vehicle,
+    host: VehicleHost,
     saved: Durable,
     /// Epoch of the label ids that the scene model gives.
     book_epoch: u8,
@@ -47,7 +49,7 @@ enum End {
 
 struct World {
     config: Config,
-    surface: Surface,
+    surface: SurfaceHost,
     onboard: Onboard,
     disk: Disk,
     chance: Chance,
@@ -56,7 +58,7 @@ struct World {
     /// Percent of frames that are lost.
     loss: usize,
     ticks: u32,
-    on_air: BTreeMap<(Instant, u32), Event>,
+    on_air: BTreeMap<(Instant, u32), Arrival>,
     serial: u32,
     starts: u32,
     /// Slots that the vehicle has acted on.
@@ -73,15 +75,11 @@ impl World {
         let config = scenecast_config::load(None, &sets).unwrap();
         let disk = Disk::default();
         let mut chance = Chance::new(seed);
-        let surface = scenecast_surface::assemble(
-            &config,
-            None,
-            TuningTable::shipped(),
-            scenecast_config::modem_profile(&config, config.modem.bit_rate),
-            seed,
-            Instant::ZERO,
-        )
-        .unwrap();
+        let surface =
+            scenecast_surface::assemble(&config, None, TuningTable::shipped(), profile(&config), seed, Instant::ZERO)
+                .unwrap();
+        let station = channel_station(profile(&config), WINDOW, Instant::ZERO);
+        let surface = SurfaceHost::new(surface, station, None);
         cuts.reverse();
         let onboard = start(&config, &disk, &mut chance, &mut cuts, 0, Instant::ZERO);
         let (on_air, acted, told) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
@@ -119,7 +117,7 @@ impl World {
             self.tick();
         }
         let last = [(SlotId::Constraints, 2), (SlotId::Budget, 2), (SlotId::Fix, 1), (SlotId::Utility, 1)];
-        for slot in self.surface.view(self.auv()).unwrap().slots() {
+        for slot in self.surface.surface().view(self.auv()).unwrap().slots() {
             assert!(last.contains(&(slot.id, slot.version)), "{slot:?}");
         }
         assert!(!self.onboard.saved.hold, "the last version is in force");
@@ -127,46 +125,51 @@ impl World {
     }
 
     fn is_settled(&self) -> bool {
-        let mut slots = self.surface.view(self.auv()).unwrap().slots();
+        let mut slots = self.surface.surface().view(self.auv()).unwrap().slots();
         slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
     }
 
     fn tick(&mut self) {
         self.ticks += 1;
         self.operate();
+        self.surface.handle_timeout(self.now());
         while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= Instant::ZERO + TICK * self.ticks) {
-            match due.remove() {
-                Event::Sent { by_vehicle: true } => self.onboard.vehicle.handle_transmit_outcome(self.now()),
-                Event::Sent { by_vehicle: false } => self.surface.handle_transmit_outcome(self.now()),
-                Event::Arrives { at_vehicle: true, bytes } => self.run_vehicle(Some(&bytes)),
-                Event::Arrives { at_vehicle: false, bytes } => self.surface.handle_frame(&bytes, self.now()),
+            let Arrival { at_vehicle, bytes } = due.remove();
+            match at_vehicle {
+                true => self.run_vehicle(Some(&bytes)),
+                false => {
+                    let now = self.now();
+                    self.surface.link_mut().handle_bytes(&bytes, now);
+                }
             }
         }
         self.run_vehicle(None);
-        while self.surface.poll_output().is_some() {}
-        if let Some(t) = self.surface.poll_transmit(self.now()) {
-            self.transmit(t.bytes, false);
+        while self.surface.poll_event().is_some() {}
+        while let Some(bytes) = self.surface.poll_output(self.now()) {
+            self.transmit(bytes, false);
         }
-        let shown: BTreeSet<u8> = self.surface.map(self.auv()).unwrap().iter().map(|(_, label)| label).collect();
+        let shown: BTreeSet<u8> =
+            self.surface.surface().map(self.auv()).unwrap().iter().map(|(_, label)| label).collect();
         assert!(shown.len() <= 1, "labels of several epochs on one map: {shown:?}");
     }
 
     /// What the operator does.
     fn operate(&mut self) {
         let (auv, now) = (self.auv(), self.now());
+        let surface = self.surface.surface_mut();
         match self.ticks {
             30 => {
-                self.surface.set_hold(auv, true, now).unwrap();
-                self.surface.set_budget(5000, None, None, now).unwrap();
+                surface.set_hold(auv, true, now).unwrap();
+                surface.set_budget(5000, None, None, now).unwrap();
             }
             60 => drop(
-                self.surface
+                surface
                     .send_fix(auv, Fix { position: WorldPoint::new(1.0, 1.0), sigma_m: 1.0, age_s: 0.1 }, now)
                     .unwrap(),
             ),
-            90 => drop(self.surface.set_hold(auv, false, now).unwrap()),
-            120 => drop(self.surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
-            150 => self.surface.set_budget(9000, None, None, now).unwrap(),
+            90 => drop(surface.set_hold(auv, false, now).unwrap()),
+            120 => drop(surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
+            150 => surface.set_budget(9000, None, None, now).unwrap(),
             _ => {}
         }
     }
@@ -187,38 +190,41 @@ impl World {
 
     fn try_vehicle(&mut self, frame: Option<&[u8]>) -> Result<Option<Vec<u8>>, End> {
         let now = self.now();
+        self.onboard.host.handle_timeout(now);
         if let Some(bytes) = frame {
             self.host_step()?;
-            self.onboard.vehicle.handle_frame(bytes, now);
+            self.onboard.host.link_mut().handle_bytes(bytes, now);
         }
         if self.ticks.is_multiple_of(50) {
             self.host_step()?;
             self.see();
         }
-        self.onboard.vehicle.steer(now);
-        while let Some(output) = self.onboard.vehicle.poll_output() {
-            self.host_step()?;
-            self.carry_out(output)?;
+        self.onboard.host.steer(now);
+        while let Some(event) = self.onboard.host.poll_event() {
+            if !matches!(event, VehicleHostEvent::Frame(_)) {
+                self.host_step()?;
+                self.carry_out(event)?;
+            }
         }
-        let Some(t) = self.onboard.vehicle.poll_transmit(now) else { return Ok(None) };
+        let Some(bytes) = self.onboard.host.poll_output(now) else { return Ok(None) };
         self.host_step()?;
-        assert_eq!(&self.onboard.saved, self.onboard.vehicle.durable(), "told before it was safe");
+        assert_eq!(&self.onboard.saved, self.onboard.host.vehicle().durable(), "sent before it was safe");
         let told_in = *self.told.entry(self.onboard.saved.epoch).or_insert(self.starts);
         assert_eq!(told_in, self.starts, "an epoch comes twice");
-        Ok(Some(t.bytes))
+        Ok(Some(bytes))
     }
 
-    fn carry_out(&mut self, output: VehicleOutput) -> Result<(), End> {
-        let Onboard { keeper, vehicle, saved, .. } = &mut self.onboard;
-        if output == VehicleOutput::Persist {
+    fn carry_out(&mut self, event: VehicleHostEvent) -> Result<(), End> {
+        let Onboard { keeper, host, saved, .. } = &mut self.onboard;
+        if event == VehicleHostEvent::Persist {
             let off = |problem| if self.disk.is_off() { End::PowerCut } else { End::UserError(problem) };
-            keeper.save(vehicle.durable()).map_err(off)?;
-            *saved = vehicle.durable().clone();
-            vehicle.handle_persisted();
+            keeper.save(host.vehicle().durable()).map_err(off)?;
+            *saved = host.vehicle().durable().clone();
+            host.handle_persisted();
             return Ok(());
         }
-        assert_eq!(saved, vehicle.durable(), "done before it was safe: {output:?}");
-        if let VehicleOutput::Applied(applied) = output {
+        assert_eq!(saved, host.vehicle().durable(), "done before it was safe: {event:?}");
+        if let VehicleHostEvent::Applied(applied) = event {
             assert!(self.acted.insert((applied.id, applied.version)), "applied twice: {applied:?}");
         }
         Ok(())
@@ -234,7 +240,7 @@ impl World {
         let cells = (0..40).map(|i| (Cell::new(i % 8, i / 8), label)).collect();
         let (layers, perplexity) = (BTreeMap::new(), Vec::new());
         let update = MapUpdate { t_s: 0.0, epoch: onboard.book_epoch, cells, layers, perplexity, labels: LABELS };
-        onboard.vehicle.handle_map(&update, Instant::ZERO + TICK * self.ticks);
+        onboard.host.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 
     fn host_step(&self) -> Result<(), End> {
@@ -246,22 +252,19 @@ impl World {
         self.starts += 1;
         self.onboard = start(&self.config, &self.disk, &mut self.chance, &mut self.cuts, self.starts, now);
         assert!(self.onboard.saved.epoch > before, "the epoch goes back or stays");
-        self.on_air.retain(|_, e| !matches!(e, Event::Sent { by_vehicle: true }));
     }
 
     fn transmit(&mut self, bytes: Vec<u8>, by_vehicle: bool) {
-        let end =
-            self.now() + scenecast_config::modem_profile(&self.config, self.config.modem.bit_rate).airtime(bytes.len());
-        self.schedule(end, Event::Sent { by_vehicle });
+        let end = self.now() + profile(&self.config).airtime(bytes.len());
         if self.chance.below(100) >= self.loss {
-            self.schedule(end + PROPAGATION, Event::Arrives { at_vehicle: !by_vehicle, bytes });
+            self.serial += 1;
+            self.on_air.insert((end + PROPAGATION, self.serial), Arrival { at_vehicle: !by_vehicle, bytes });
         }
     }
+}
 
-    fn schedule(&mut self, at: Instant, event: Event) {
-        self.serial += 1;
-        self.on_air.insert((at, self.serial), event);
-    }
+fn profile(config: &Config) -> ModemProfile {
+    scenecast_config::modem_profile(config, config.modem.bit_rate)
 }
 
 /// Starts the vehicle's program, again and again while the power goes.
@@ -283,12 +286,13 @@ fn start(
         match Keeper::begin_run(disk.clone(), 1, None) {
             Ok(Run { keeper, durable, .. }) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
-                let profile = scenecast_config::modem_profile(config, config.modem.bit_rate);
+                let profile = profile(config);
                 let seed = chance.below(1 << 30) as u64;
                 let vehicle =
                     scenecast_vehicle::assemble(config, None, profile, area, durable.clone(), seed, now).unwrap();
+                let host = VehicleHost::new(vehicle, channel_station(profile, WINDOW, now), None);
                 let book_epoch = durable.epoch;
-                return Onboard { keeper, vehicle, saved: durable, book_epoch };
+                return Onboard { keeper, host, saved: durable, book_epoch };
             }
             Err(problem) => assert!(disk.is_off(), "{problem}"),
         }
@@ -296,7 +300,7 @@ fn start(
 }
 
 #[test]
-fn a_power_cut_at_any_step_applies_nothing_twice_and_renames_no_label() {
+fn a_power_cut_applies_nothing_twice_and_keeps_label_meanings() {
     let mut whole = World::new(1, 0, Vec::new());
     whole.run();
     assert_eq!(whole.acted.len(), 6, "every version comes through");
@@ -312,7 +316,7 @@ fn a_power_cut_at_any_step_applies_nothing_twice_and_renames_no_label() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
     #[test]
-    fn power_cuts_and_losses_apply_nothing_twice_and_rename_no_label(
+    fn power_cuts_and_losses_apply_nothing_twice(
         seed: u64, loss in 0usize..40, cuts in proptest::collection::vec(0usize..80, 1..8),
     ) {
         World::new(seed, loss, cuts).run();
@@ -320,7 +324,7 @@ proptest! {
 }
 
 #[test]
-fn a_disk_that_fails_ends_the_run_with_a_problem_and_the_next_run_applies_what_it_missed() {
+fn a_failing_disk_ends_the_run_and_the_next_run_catches_up() {
     for (seed, failing) in (0..50).flat_map(|seed| [(seed, Step::Sync), (seed, Step::Append)]) {
         let mut world = World::new(seed, 0, Vec::new());
         while world.ticks < 29 {

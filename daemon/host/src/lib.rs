@@ -1,0 +1,33 @@
+//! One host for each role, as a state machine without IO.
+//!
+//! A host joins a role ([`scenecast_vehicle::Vehicle`] or `scenecast_surface::Surface`) with its modem, its autopilot, its
+//! persistent state and the hand-over to the mapper. The runtime drives the hosts with ports, disks and a clock; the
+//! rehearsal drives the same hosts in virtual time. An owner repeats three steps after everything that happened:
+//!
+//! ```text
+//! host.handle_*(.., now)                  bytes of a port, a frame of the camera, a map of the mapper, a timeout
+//! while host.poll_event() is an event     act on it; Persist: make the state durable, then host.handle_persisted()
+//! while host.poll_output(now) is bytes    write them to the modem's port; likewise poll_pilot_output() for the autopilot
+//! ```
+//!
+//! and then waits until a port has bytes or `host.poll_timeout(now)` has come.
+//!
+//! | type | joins |
+//! |---|---|
+//! | [`LinkHost`] | any end of the link and a modem station; the only place that asks a link for frames |
+//! | [`VehicleHost`] | the vehicle's role, its modem and autopilot, persistence, the mapper |
+//! | `SurfaceHost` | the surface's role, its modem, the instruments and the autopilot of the surface vehicle |
+
+mod link_end;
+mod link_host;
+mod pilot;
+#[cfg(feature = "surface")]
+mod surface;
+mod vehicle;
+
+pub use link_end::LinkEnd;
+pub use link_host::{FrameEvent, LinkHost, channel_station, modem_station};
+pub use pilot::PilotEvent;
+#[cfg(feature = "surface")]
+pub use surface::{Follower, SurfaceHost, SurfaceHostEvent};
+pub use vehicle::{CameraPose, VehicleHost, VehicleHostEvent, VehiclePilot};

@@ -1,0 +1,223 @@
+//! An end of the link and its modem.
+
+use crate::LinkEnd;
+use scenecast_config::Config;
+use scenecast_core::UserError;
+use scenecast_drivers::modem::paced::Paced;
+use scenecast_drivers::modem::{AddressBook, ModemEvent, Refusal, Station, address_book, driver};
+use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::schedule::Audit;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// News of frames and of the modem, for meters and logs. No link needs an answer to it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FrameEvent {
+    /// A frame was handed to the modem.
+    Sent {
+        /// Its length.
+        bytes: usize,
+        /// Its kind, as the link names it.
+        kind: scenecast_protocol::link::TransmitKind,
+    },
+    /// The modem refused the frame that was handed over last. The link repairs it like a lost one.
+    NotSent(Refusal),
+    /// A frame came in and was given to the link.
+    Received {
+        /// Its length.
+        bytes: usize,
+    },
+    /// For the first time, more bits than the budget allows are on air in a window.
+    OverBudget {
+        /// Mean bit rate of the fullest window.
+        worst_window_bps: f64,
+    },
+    /// The modem is set up and takes frames.
+    ModemReady,
+    /// The modem no longer answers; [`Self::ModemReady`] follows when it is set up again.
+    ModemLost,
+    /// The modem refuses something that a person must change; the reason is a line for that person.
+    ModemRefused {
+        /// One line.
+        reason: String,
+        /// Whether the modem has worked before.
+        was_ready: bool,
+    },
+}
+
+/// An end of the link at its modem: the only place that asks a link for frames.
+#[derive(Debug)]
+pub struct LinkHost<E> {
+    end: E,
+    station: Station,
+    budget: BudgetWatch,
+    was_ready: bool,
+    events: VecDeque<FrameEvent>,
+}
+
+impl<E: LinkEnd> LinkHost<E> {
+    /// Joins an end with its modem; the station's audit counts the bits on air.
+    pub fn new(end: E, station: Station) -> Self {
+        Self { end, station, budget: BudgetWatch::default(), was_ready: false, events: VecDeque::new() }
+    }
+
+    /// The role or link.
+    pub fn end(&self) -> &E {
+        &self.end
+    }
+
+    /// The role or link, for orders and measurements.
+    pub fn end_mut(&mut self) -> &mut E {
+        &mut self.end
+    }
+
+    /// Properties of the modem that the link reckons with.
+    pub fn profile(&self) -> &ModemProfile {
+        self.station.profile()
+    }
+
+    /// The account of the bits on air.
+    pub fn audit(&self) -> &Audit {
+        self.station.audit()
+    }
+
+    /// Bits that the modem repeated by itself, charged to the budget beside those of [`Self::audit`].
+    pub fn repeated_bits(&self) -> u64 {
+        self.station.repeated_bits()
+    }
+
+    /// The modem's port was opened.
+    pub fn handle_open(&mut self, now: Instant) {
+        self.station.handle_open(now);
+        self.deliver(now);
+    }
+
+    /// The modem's port was closed, or failed.
+    pub fn handle_closed(&mut self, now: Instant) {
+        self.station.handle_closed(now);
+        self.deliver(now);
+    }
+
+    /// Takes bytes of the modem's port, in pieces of any size.
+    pub fn handle_bytes(&mut self, bytes: &[u8], now: Instant) {
+        self.station.handle_bytes(bytes, now);
+        self.deliver(now);
+    }
+
+    /// Lets time pass in the modem's driver.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.station.handle_timeout(now);
+        self.deliver(now);
+    }
+
+    /// When the host must be asked for output again, or [`Self::handle_timeout`] is due. A moment of the link that has
+    /// passed led to no frame: the link then waits for another event.
+    pub fn poll_timeout(&self, now: Instant) -> Option<Instant> {
+        let link = self.end.poll_timeout(now).filter(|&at| at > now);
+        link.into_iter().chain(self.station.poll_timeout()).min()
+    }
+
+    /// Whether the modem's port has been silent for so long that it should be closed and opened again.
+    pub fn wants_reopening(&self, now: Instant) -> bool {
+        self.station.wants_reopening(now)
+    }
+
+    /// Asks the link for cycles and frames while the modem takes any, then returns the next bytes for the modem's port.
+    pub fn poll_output(&mut self, now: Instant) -> Option<Vec<u8>> {
+        self.fill(now);
+        self.poll_modem_output(now)
+    }
+
+    /// Bytes of the driver alone, while the link must not speak.
+    pub(crate) fn poll_modem_output(&mut self, now: Instant) -> Option<Vec<u8>> {
+        self.station.poll_output(now)
+    }
+
+    /// The next news of frames and modem.
+    pub fn poll_event(&mut self) -> Option<FrameEvent> {
+        self.events.pop_front()
+    }
+
+    fn fill(&mut self, now: Instant) {
+        self.budget.allow(self.end.budget_bps(), self.station.audit());
+        if self.station.takes_cycles(now)
+            && let Some(cycle) = self.end.poll_cycle(now)
+        {
+            self.station.begin_cycle(cycle, now);
+        }
+        while self.station.takes_frames()
+            && let Some(transmit) = self.end.poll_transmit(now)
+        {
+            self.events.push_back(FrameEvent::Sent { bytes: transmit.bytes.len(), kind: transmit.kind });
+            if let Err(refusal) = self.station.send(transmit, now) {
+                self.events.push_back(FrameEvent::NotSent(refusal));
+            }
+            self.events.extend(self.budget.check(self.station.audit()));
+            self.deliver(now);
+        }
+    }
+
+    /// Hands the link everything that the modem reports.
+    fn deliver(&mut self, now: Instant) {
+        while let Some(event) = self.station.poll_event() {
+            match event {
+                ModemEvent::Sent => self.end.handle_transmit_outcome(now),
+                ModemEvent::Received(bytes) => {
+                    self.events.push_back(FrameEvent::Received { bytes: bytes.len() });
+                    self.end.handle_frame(&bytes, now);
+                }
+                ModemEvent::Poll(frames) => self.end.handle_poll(frames),
+                ModemEvent::Repeated(bits) => self.end.handle_repeated(bits, now),
+                ModemEvent::Fix(end, line) => self.end.handle_range(end, &line, now),
+                ModemEvent::Ready => {
+                    self.was_ready = true;
+                    self.events.push_back(FrameEvent::ModemReady);
+                }
+                ModemEvent::Lost => self.events.push_back(FrameEvent::ModemLost),
+                ModemEvent::Refused(reason) => {
+                    self.events.push_back(FrameEvent::ModemRefused { reason, was_ready: self.was_ready });
+                }
+            }
+        }
+    }
+}
+
+/// Notices once that more is on air than the budget allows.
+#[derive(Debug, Default)]
+struct BudgetWatch {
+    /// The largest budget so far, bits a window.
+    window_bits: f64,
+    is_exceeded: bool,
+}
+
+impl BudgetWatch {
+    fn allow(&mut self, bits_per_s: u32, audit: &Audit) {
+        self.window_bits = self.window_bits.max(f64::from(bits_per_s) * audit.window().as_secs_f64());
+    }
+
+    fn check(&mut self, audit: &Audit) -> Option<FrameEvent> {
+        let is_exceeded = audit.worst_window_bits() as f64 > self.window_bits + audit.largest_bits() as f64;
+        let is_news = is_exceeded && !std::mem::replace(&mut self.is_exceeded, true);
+        is_news.then(|| FrameEvent::OverBudget { worst_window_bps: audit.worst_window_bps() })
+    }
+}
+
+/// The station of the modem that the configuration names, its port still closed.
+///
+/// # Errors
+/// An end whose modem can have no address.
+pub fn modem_station(config: &Config, end: Address, profile: ModemProfile) -> Result<Station, UserError> {
+    let audit = Audit::new(Duration::from_secs_f64(config.link.budget_window_s));
+    Ok(Station::new(driver(config, end, profile)?, address_book(config), audit))
+}
+
+/// A station without a modem, for a simulated channel: each output is the bytes of one frame, which is on air from then on
+/// for [`ModemProfile::airtime`]. Its port is open.
+pub fn channel_station(profile: ModemProfile, window: Duration, now: Instant) -> Station {
+    let driver = Paced::datagrams(profile, profile.bit_rate_bps);
+    let mut station = Station::new(Box::new(driver), AddressBook { surface: 0 }, Audit::new(window));
+    station.handle_open(now);
+    station
+}

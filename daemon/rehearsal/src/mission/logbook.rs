@@ -1,0 +1,63 @@
+//! The record that a mission's report is made from.
+
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::link::PeerView;
+use scenecast_protocol::time::Instant;
+use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle};
+use std::collections::BTreeMap;
+
+/// From where to where in the world, metres east and north.
+pub type Leg = ((f64, f64), (f64, f64));
+
+/// Everything that happened in a mission and is counted at its end.
+#[derive(Default)]
+pub(crate) struct Logbook {
+    /// Each decision of the vehicle about a slot.
+    pub(crate) applied: Vec<AppliedSlot>,
+    /// When the operator issued each version of a slot.
+    pub(crate) issued: BTreeMap<(SlotId, u16), Instant>,
+    /// Each waypoint: from, to, by the vehicle's own position estimate.
+    pub(crate) legs: Vec<Leg>,
+    /// Number of legs when the vehicle put the last fence in force.
+    pub(crate) legs_before_fence: usize,
+    /// Estimated position of the vehicle at each frame that the mapper took.
+    pub(crate) track: Vec<(f64, f64)>,
+    /// The mapper's last update.
+    pub(crate) update: Option<MapUpdate>,
+    /// Bytes that the map would have taken as a PNG file at each of its versions.
+    pub(crate) png_full_bytes: u64,
+    map_version: u64,
+    /// Bits on air of the frames that the surface received.
+    pub(crate) received_bits: u64,
+}
+
+impl Logbook {
+    pub(super) fn note_waypoint(&mut self, vehicle: &Vehicle, to: MapPoint) {
+        let navigator = vehicle.navigator();
+        self.legs.push((navigator.to_world(navigator.position()).xy(), navigator.to_world(to).xy()));
+    }
+
+    pub(super) fn note_applied(&mut self, applied: AppliedSlot) {
+        if applied.id == SlotId::Fence {
+            self.legs_before_fence = self.legs.len();
+        }
+        self.applied.push(applied);
+    }
+
+    pub(super) fn note_issued(&mut self, view: &PeerView<'_>) {
+        for slot in view.slots() {
+            self.issued.entry((slot.id, slot.version)).or_insert(slot.issued);
+        }
+    }
+
+    /// The mapper has taken a frame, and the vehicle its update.
+    pub(super) fn note_update(&mut self, vehicle: &Vehicle, update: MapUpdate) {
+        if vehicle.map_version() != self.map_version {
+            self.map_version = vehicle.map_version();
+            let png = scenecast_core::label_picture::encode(vehicle.map());
+            self.png_full_bytes += png.map_or(0, |png| png.len() as u64);
+        }
+        self.update = Some(update);
+    }
+}

@@ -1,0 +1,86 @@
+//! GPS and compass of the surface vehicle, and the settings of the relay that they feed.
+
+use crate::port::{FromPort, Port};
+use scenecast_config::{Config, is_gpsd, origin, position_places};
+use scenecast_core::UserError;
+use scenecast_core::gps::GpsLanguage;
+use scenecast_host::SurfaceHost;
+use scenecast_protocol::time::Instant;
+use scenecast_surface::position::{Mounting, Relay, RelayConfig};
+use std::time::Duration;
+
+/// Speed of sound that modems reckon with, m/s.
+const MODEM_SOUND_M_S: f64 = 1500.0;
+/// A receiver that is silent for so long is opened again.
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(15);
+
+/// The ports of the instruments that are configured.
+pub(super) struct Instruments {
+    gps: Option<Port>,
+    compass: Option<Port>,
+}
+
+/// A report of an instrument's port.
+pub(super) enum FromInstrument {
+    Gps(FromPort),
+    Compass(FromPort),
+}
+
+impl Instruments {
+    /// Opens what is configured.
+    pub(super) fn open(config: &Config) -> Result<Self, UserError> {
+        let [gps, compass] = position_places(config)?;
+        Ok(Self {
+            gps: gps.map(|place| Port::open_when_there("GPS", place, Some(SILENCE_TIMEOUT))),
+            compass: compass.map(|place| Port::open_when_there("compass", place, Some(SILENCE_TIMEOUT))),
+        })
+    }
+
+    /// What an instrument reports next; never without any. Safe to abandon.
+    pub(super) async fn next(&mut self) -> FromInstrument {
+        tokio::select! {
+            report = Port::next_of(&mut self.gps) => FromInstrument::Gps(report),
+            report = Port::next_of(&mut self.compass) => FromInstrument::Compass(report),
+        }
+    }
+
+    /// Hands the host the report of an instrument.
+    pub(super) fn handle(&self, report: FromInstrument, host: &mut SurfaceHost, now: Instant) {
+        match report {
+            FromInstrument::Gps(FromPort::Bytes(bytes)) => host.handle_gps(&bytes, now),
+            FromInstrument::Gps(FromPort::Open) => {
+                let hello = host.handle_gps_open();
+                if let (false, Some(gps)) = (hello.is_empty(), &self.gps) {
+                    gps.write(hello.to_vec());
+                }
+            }
+            FromInstrument::Compass(FromPort::Bytes(bytes)) => host.handle_compass(&bytes, now),
+            FromInstrument::Gps(FromPort::Closed) | FromInstrument::Compass(_) => {}
+        }
+    }
+}
+
+/// The relay of a surface that has a GPS.
+pub(super) fn relay(config: &Config) -> Result<Option<Relay>, UserError> {
+    let [gps, _] = position_places(config)?;
+    let language = if is_gpsd(config) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
+    gps.map(|_| relay_config(config, language).map(Relay::new)).transpose()
+}
+
+fn relay_config(config: &Config, language: GpsLanguage) -> Result<RelayConfig, UserError> {
+    let p = &config.position;
+    let sound_ratio = if p.sound_speed_m_s > 0.0 { p.sound_speed_m_s / MODEM_SOUND_M_S } else { 1.0 };
+    Ok(RelayConfig {
+        origin: origin(config)?,
+        language,
+        mounting: Mounting {
+            lever_m: p.usbl_lever_m,
+            depth_m: p.usbl_depth_m,
+            from_bow: p.usbl_from_bow,
+            turn_rad: p.usbl_turn_deg.to_radians(),
+            sound_ratio,
+        },
+        most_sigma_m: p.most_sigma_m,
+        period: Duration::from_secs_f64(p.fix_period_s),
+    })
+}
