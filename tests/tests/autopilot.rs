@@ -188,7 +188,7 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let _auv = Process::start(&["auv", "--config", &auv]);
     let mut peer = Peer::start(&python, mavlink, 3.0);
     let status = || {
-        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        let (_, body) = http(page, "GET", "/api/v2/state", "", "")?;
         Some(serde_json::from_slice::<Value>(&body).ok()?["vehicles"][0]["status"].clone())
     };
     let limit = Duration::from_secs(90);

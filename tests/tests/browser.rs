@@ -9,10 +9,10 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);
-/// The stories measure: one browser at a time.
+/// One browser at a time, since the stories measure CPU time.
 static BROWSER: Mutex<()> = Mutex::new(());
 
-/// What is missing here to run a browser; a failure where nothing may be skipped.
+/// Whether this machine cannot run the stories; in CI that is a failure.
 fn is_skipped() -> bool {
     let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
     let packages = workspace().join("tests/browser/node_modules/playwright-core");
@@ -22,35 +22,35 @@ fn is_skipped() -> bool {
         () if !packages.exists() => "no packages: run npm ci in tests/browser".to_owned(),
         () => return false,
     };
-    let said = format!("SKIPPED: stories of the page in a browser: {missing}\n");
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{said}");
-    // Straight to the terminal: the test's own output is not shown while it passes.
-    let _ = std::io::stderr().write_all(said.as_bytes());
+    let line = format!("SKIPPED: stories of the page in a browser: {missing}\n");
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
+    // The harness hides the captured output of a test that passes.
+    let _ = std::io::stderr().write_all(line.as_bytes());
     true
 }
 
-/// Tells the stories that fit; fails with those that did not hold, else says how many held.
-fn assert_stories_hold(arguments: &[&str]) {
+/// Runs the stories for the given target. Prints their number and measurements, or fails with their output.
+fn assert_stories_pass(arguments: &[&str]) {
     let _one = BROWSER.lock().unwrap_or_else(|e| e.into_inner());
     let script = workspace().join("tests/browser/run.mjs");
     let output = Command::new("node").arg(script).arg("--require").args(arguments).output().expect("node runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    let counts = said.lines().last().unwrap_or_default();
-    assert!(!counts.starts_with("0 passed"), "no story was told: {said}");
-    let measured = said.lines().filter(|l| l.contains("figures: ")).map(|l| format!("{l}\n"));
+    let log = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{log}");
+    let counts = log.lines().last().unwrap_or_default();
+    assert!(!counts.starts_with("0 passed"), "no story ran: {log}");
+    let measured = log.lines().filter(|l| l.contains("figures: ")).map(|l| format!("{l}\n"));
     let _ = std::io::stderr().write_all(format!("{}{counts}\n", measured.collect::<String>()).as_bytes());
 }
 
 #[test]
-fn every_story_holds_against_the_mock() {
+fn every_story_passes_against_the_mock() {
     if !is_skipped() {
-        assert_stories_hold(&[]);
+        assert_stories_pass(&[]);
     }
 }
 
 #[test]
-fn every_story_that_needs_no_mock_holds_against_a_demo() {
+fn every_story_without_mock_passes_against_a_demo() {
     if is_skipped() {
         return;
     }
@@ -59,11 +59,11 @@ fn every_story_that_needs_no_mock_holds_against_a_demo() {
     wait_until("labels on the map", LIMIT, || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 3))
     });
-    assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}")]);
+    assert_stories_pass(&["--url", &format!("http://127.0.0.1:{port}")]);
 }
 
 #[test]
-fn a_surface_with_a_token_asks_the_browser_for_it() {
+fn a_surface_with_a_token_shows_the_login() {
     if is_skipped() {
         return;
     }
@@ -82,7 +82,7 @@ fn a_surface_with_a_token_asks_the_browser_for_it() {
     arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
     let _surface = Process::start(&arguments);
     wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
-    assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
+    assert_stories_pass(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
 }
 
 /// The modules of the page with the modules that each imports.

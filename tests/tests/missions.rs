@@ -34,7 +34,7 @@ fn assert_sound(figures: &Value) {
     for end in ["up", "down"] {
         let limit = link["budget_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
         let largest = link[end]["largest_transmission_bits"].as_f64().unwrap();
-        let worst = link[end]["worst_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
+        let worst = link[end]["max_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
         assert!(worst <= limit + largest, "{end}: {worst} bits in a window");
     }
 }
@@ -43,7 +43,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 18, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_maps_are_equal_once_the_channel_has_drained(
+    fn the_operators_map_equals_the_vehicles_once_the_channel_has_drained(
         seed in 0u64..1000,
         loss in prop_oneof![Just("0"), Just("0.1"), Just("0.3")],
         frame in prop_oneof![Just("64"), Just("256"), Just("1000")],
@@ -90,7 +90,7 @@ fn layers_arrive_and_labels_do_not_wait_for_them() {
 }
 
 #[test]
-fn curiosity_is_sent_only_with_a_share_or_as_background() {
+fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_differs() {
     let without = fly(&[], 8);
     assert_eq!(without.to_string(), fly(&[r#"map.planes=["confidence", "depth"]"#], 8).to_string());
     assert_eq!(without["map"]["layers"]["curiosity"], Value::Null);
@@ -127,7 +127,7 @@ fn the_same_seed_gives_the_same_report() {
 }
 
 #[test]
-fn directives_images_and_fixes_make_the_round_trip() {
+fn directives_images_and_fixes_reach_the_vehicle_and_what_it_answers_comes_back() {
     let figures = fly(&["survey.duration_s=400"], 4);
     assert_sound(&figures);
     assert_eq!(figures["directives"]["issued"], figures["directives"]["applied"], "{figures}");

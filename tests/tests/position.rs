@@ -23,7 +23,7 @@ fn surface(name: &str, gps: &str) -> (Process, impl Fn() -> Value + use<>) {
     std::fs::write(&file, text).unwrap();
     let process = Process::start(&["asv", "--config", file.to_str().unwrap()]);
     let state = move || {
-        let Some((_, body)) = http(page, "GET", "/api/v1/state", "", "") else { return Value::Null };
+        let Some((_, body)) = http(page, "GET", "/api/v2/state", "", "") else { return Value::Null };
         serde_json::from_slice(&body).unwrap_or_default()
     };
     (process, state)
@@ -62,16 +62,16 @@ fn gpsd_is_reconnected_and_old_positions_are_not_good() {
     };
     wait_until("a good position", LIMIT, || {
         feed(&mut stream);
-        state()["position"]["is_good"] == true
+        state()["position"]["is_valid"] == true
     });
     let now = state();
     assert!((now["mission"]["origin"]["lat_deg"].as_f64().unwrap() - 29.5).abs() < 1e-9, "{now}");
     drop(stream);
-    wait_until("the position is old", LIMIT, || state()["position"]["is_good"] == false);
+    wait_until("the position is old", LIMIT, || state()["position"]["is_valid"] == false);
     let mut again = watched(&listener);
     wait_until("it is good again", LIMIT, || {
         feed(&mut again);
-        state()["position"]["is_good"] == true
+        state()["position"]["is_valid"] == true
     });
 }
 
@@ -87,9 +87,9 @@ fn nonsense_of_a_receiver_is_counted() {
     stream.write_all(nmea::line("GPGGA,120000.00,nan,N,inf,E,1,09,1.0,0.0,M,0.0,M,,").as_bytes()).unwrap();
     stream.write_all(nmea::line("GPGGA,120000.00,,,,,0,00,99.9,,,,,,").as_bytes()).unwrap();
     stream.write_all(good.as_bytes()).unwrap();
-    wait_until("a good position after the nonsense", LIMIT, || state()["position"]["is_good"] == true);
-    let refused = state()["position"]["refused"].clone();
-    let expected = serde_json::json!({ "checksum": 1, "overlong": 1, "unreadable": 2, "no_position": 1 });
+    wait_until("a good position after the nonsense", LIMIT, || state()["position"]["is_valid"] == true);
+    let refused = state()["position"]["rejected"].clone();
+    let expected = serde_json::json!({ "checksum": 1, "too_long": 1, "malformed": 2, "no_position": 1 });
     assert_eq!(refused, expected);
 }
 

@@ -18,9 +18,9 @@ fn name(reason: DropReason) -> &'static str {
         DropReason::OldSession => "old_session",
         DropReason::Duplicate => "duplicate",
         DropReason::Late => "late",
-        DropReason::NoBase => "no_base",
-        DropReason::UnknownSender => "stranger",
+        DropReason::NoBase => "base_missing",
+        DropReason::UnknownSender => "unknown_sender",
         DropReason::Unauthenticated => "unauthenticated",
-        DropReason::Keyed => "keyed",
+        DropReason::Keyed => "key_missing",
     }
 }

@@ -137,7 +137,7 @@ fn link(m: &Mission) -> Value {
         let (loss, goodput) = (&heard_by.loss_in, &heard_by.goodput_in);
         json!({
             "sent_bps": round(audit.total_bits() as f64 / seconds),
-            "worst_window_bps": round(audit.worst_window_bps()),
+            "max_window_bps": round(audit.worst_window_bps()),
             "largest_transmission_bits": audit.largest_bits(),
             "frames_sent": m.frames().sent[i],
             "frames_lost": m.frames().lost[i],
@@ -152,7 +152,7 @@ fn link(m: &Mission) -> Value {
         "budget_window_s": m.config.link.budget_window_s,
         "frame_bytes": m.modem().frame_bytes,
         "sent_bps": round((up_audit.total_bits() + down_audit.total_bits()) as f64 / seconds),
-        "worst_window_bps": round(worst),
+        "max_window_bps": round(worst),
         "frames_sent": m.frames().sent.iter().sum::<u64>(),
         "frames_lost": m.frames().lost.iter().sum::<u64>(),
         "goodput_bps": round(goodput),
@@ -191,7 +191,7 @@ fn exemplars(m: &Mission) -> Value {
     json!({
         "requested": delivered + pages().filter(|page| page.asked.is_some()).count(),
         "delivered": delivered,
-        "unasked": pictures().filter(|p| !p.asked).count(),
+        "unrequested": pictures().filter(|p| !p.asked).count(),
         "bytes": pictures().map(|p| p.sent_bytes).sum::<usize>(),
     })
 }

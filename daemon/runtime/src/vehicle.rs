@@ -61,8 +61,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let reload = Reload::new(load)?;
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
         let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some())? };
-        let layer = origin(&config)?.map(TangentPlane::new);
-        let pilot = autopilot.map(|a| VehiclePilot::new(a, layer, survey_depth_m(&config), clock.now()));
+        let plane = origin(&config)?.map(TangentPlane::new);
+        let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, survey_depth_m(&config), clock.now()));
         let mut host = VehicleHost::new(vehicle, station, pilot);
         if is_recorded && camera.is_over() {
             host.handle_camera_end();

@@ -1,6 +1,6 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, LayerMask, OrderStatus, PlannerKind, Settings};
+use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, LayerMask, PlannerKind, Settings};
 use scenecast_protocol::map::LayerKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,7 +15,7 @@ pub struct SettingsOrder {
     /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
     /// first where there is much to say. The cells of its model stay.
     pub cells: Option<String>,
-    /// Layers that it tells beside the labels: none, or different ones of confidence, depth, curiosity with commas between.
+    /// The layers that it sends in addition to the labels: none, or different ones of confidence, depth, curiosity, separated by commas.
     pub layers: Option<String>,
     /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
     pub alpha: Option<f64>,

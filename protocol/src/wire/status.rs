@@ -74,7 +74,7 @@ impl ModeReason {
             Self::Time => Some("time"),
             Self::Silence => Some("silence"),
             Self::Band => Some("depth or altitude"),
-            Self::NoPath => Some("no way"),
+            Self::NoPath => Some("no path"),
         }
     }
 }

@@ -37,8 +37,8 @@ impl GpsFault {
     pub fn name(self) -> &'static str {
         match self {
             Self::Checksum => "checksum",
-            Self::Unreadable => "unreadable",
-            Self::Overlong => "overlong",
+            Self::Unreadable => "malformed",
+            Self::Overlong => "too_long",
             Self::NoPosition => "no_position",
             Self::Frozen => "frozen",
             Self::Jump => "jump",
@@ -254,7 +254,7 @@ mod tests {
             found.extend(gps.handle_bytes(piece, at(1.0)));
         }
         assert_eq!(found.len(), 2);
-        assert_eq!((found[0].sigma_m, faults(&gps)), (3.0, vec![("unreadable", 1)]));
+        assert_eq!((found[0].sigma_m, faults(&gps)), (3.0, vec![("malformed", 1)]));
     }
 
     #[test]
@@ -263,7 +263,7 @@ mod tests {
         let wrong = gga(29.5, 1).replace("4.92", "5.92").replace("$GP", "$GN");
         assert!(gps.handle_bytes(wrong.as_bytes(), at(0.0)).is_empty());
         assert!(gps.handle_bytes(&[&[b'$'; 4000][..], b"\r\n"].concat(), at(0.0)).is_empty());
-        assert_eq!(faults(&gps), [("checksum", 1), ("overlong", 1)]);
+        assert_eq!(faults(&gps), [("checksum", 1), ("too_long", 1)]);
     }
 
     #[test]
@@ -316,7 +316,7 @@ mod tests {
         assert!((found[0].sigma_m - 2.0).abs() < 1e-9);
         assert_eq!(gps.heading_rad(at(0.0)), Some(std::f64::consts::PI));
         gps.handle_bytes(b"{\"class\":\"TPV\",\"mode\":0}\n{\"class\":\n", at(1.0));
-        assert_eq!(faults(&gps), [("unreadable", 1), ("no_position", 1)]);
+        assert_eq!(faults(&gps), [("malformed", 1), ("no_position", 1)]);
     }
 
     proptest! {

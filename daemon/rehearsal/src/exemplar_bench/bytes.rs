@@ -41,7 +41,7 @@ pub struct Sizes {
     /// What the vehicle sends.
     pub sent: Option<Spread>,
     /// Share of what it sends that looks as like as that.
-    pub good_share: f64,
+    pub similar_share: f64,
     /// The similarity of what it sends: median and least.
     pub ssim: [f64; 2],
 }
@@ -147,7 +147,7 @@ impl Measured {
             patches: self.sent.len(),
             fewest: Spread::of(self.fewest.iter().map(|&n| n as f64)),
             sent: Spread::of(self.sent.iter().map(|&n| n as f64)),
-            good_share: good as f64 / self.ssim.len().max(1) as f64,
+            similar_share: good as f64 / self.ssim.len().max(1) as f64,
             ssim: [at(self.ssim.len() / 2), at(0)],
         }
     }

@@ -16,7 +16,7 @@ pub struct Spread {
     /// A twentieth is beyond.
     pub p95: f64,
     /// Greatest.
-    pub worst: f64,
+    pub max: f64,
 }
 
 impl Spread {
@@ -26,6 +26,6 @@ impl Spread {
         values.sort_by(f64::total_cmp);
         let last = values.len().checked_sub(1)?;
         let at = |share: f64| (values[(share * last as f64).round() as usize] * 100.0).round() / 100.0;
-        Some(Self { median: at(0.5), p95: at(0.95), worst: at(1.0) })
+        Some(Self { median: at(0.5), p95: at(0.95), max: at(1.0) })
     }
 }

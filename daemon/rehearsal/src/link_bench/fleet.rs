@@ -23,13 +23,13 @@ pub struct FleetRow {
     /// Share of frames lost each way, collisions not counted.
     pub loss: f64,
     /// Seconds until all were known.
-    pub found_s: f64,
+    pub discovered_s: f64,
     /// Time that a turn of each takes with changing hands.
     pub fair_share_s: f64,
     /// Greatest age of any vehicle's map, once each was heard.
-    pub oldest_s: f64,
-    /// `oldest_s` over `fair_share_s`.
-    pub oldest_shares: f64,
+    pub max_age_s: f64,
+    /// `max_age_s` over `fair_share_s`.
+    pub max_age_shares: f64,
     /// Useful payload of all over what the channel could carry of it.
     pub efficiency: f64,
     /// Worst window of any transmitter over what the budget allows with one transmission more.
@@ -85,10 +85,10 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
         range_km: 1.0,
         frame_bytes: 256,
         loss,
-        found_s: round(found.as_secs_f64()),
+        discovered_s: round(found.as_secs_f64()),
         fair_share_s: round(fair_share_s),
-        oldest_s: round(ages.oldest.as_secs_f64()),
-        oldest_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
+        max_age_s: round(ages.oldest.as_secs_f64()),
+        max_age_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
         efficiency: round(useful_bps / (10_000.0 * (1.0 - loss))),
         budget_use: round(budget_use(&water)),
     }

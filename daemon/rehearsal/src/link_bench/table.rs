@@ -45,7 +45,7 @@ pub struct Row {
     /// Issue to applied: 95th percentile.
     pub directive_p95_s: f64,
     /// Issue to known at the surface: 95th percentile.
-    pub known_p95_s: f64,
+    pub directive_known_p95_s: f64,
     /// Last change to equality: 95th percentile.
     pub converge_p95_s: f64,
     /// Share of stops that kept the bound of convergence.
@@ -55,7 +55,7 @@ pub struct Row {
     /// Times that the two ends were found to differ.
     pub resyncs: u64,
     /// Frames that began sooner than the modem turns around.
-    pub hasty: u64,
+    pub early_frames: u64,
 }
 
 /// Where and how a row is measured.
@@ -110,12 +110,12 @@ impl Place {
             efficiency: round(useful_bps / (f64::from(BIT_RATE_BPS) * (1.0 - loss))),
             directive_median_s: round(directives.applied.median()),
             directive_p95_s: round(directives.applied.p95()),
-            known_p95_s: round(directives.known.p95()),
+            directive_known_p95_s: round(directives.known.p95()),
             converge_p95_s: round(convergence.time.p95()),
             converge_within: round(convergence.within),
             budget_use: round(waters.iter().map(budget_use).fold(0.0, f64::max)),
             resyncs: waters.iter().map(resyncs).sum(),
-            hasty: waters.iter().map(|w| w.tally.hasty).sum(),
+            early_frames: waters.iter().map(|w| w.tally.early_frames).sum(),
         })
     }
 }

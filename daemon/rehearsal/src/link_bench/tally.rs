@@ -40,7 +40,7 @@ pub struct Tally {
     /// Time on air by sender (`surface`, `vehicle`) and kind of frame.
     pub airtime: BTreeMap<(&'static str, &'static str), Duration>,
     /// Frames that began sooner after a frame for the same end had come in than its modem turns around.
-    pub hasty: u64,
+    pub early_frames: u64,
     /// From the surface.
     pub down: Frames,
     /// Times that the surface forgot what it had of a vehicle, or met it.

@@ -168,7 +168,7 @@ impl Water {
         assert!(bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
         let airtime = self.modem.airtime(bytes.len());
         let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
-        self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
+        self.tally.early_frames += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
         *self.tally.airtime.entry((who, kind)).or_default() += airtime;
         self.channel.transmit(from, bytes, airtime, self.now.into());

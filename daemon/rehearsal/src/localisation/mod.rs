@@ -85,7 +85,7 @@ pub struct Localisation {
     /// Error with outliers over that without outliers: the means.
     pub outlier_ratio: f64,
     /// The least favourable ratios of a single run: `with`, `with_outliers`.
-    pub worst: BTreeMap<&'static str, f64>,
+    pub max: BTreeMap<&'static str, f64>,
     /// Whether `ratio` is at most 1/3 and `outlier_ratio` at most 1.2.
     pub reached: bool,
 }
@@ -105,7 +105,7 @@ pub fn localisation(seed: u64, seeds: u64, progress: &mut dyn FnMut(f64)) -> Loc
         mean_m: [("without", round(without)), ("with", round(with)), ("with_outliers", round(dirty))].into(),
         ratio,
         outlier_ratio,
-        worst: [
+        max: [
             ("with", worst(&|r| r.with_m / r.without_m)),
             ("with_outliers", worst(&|r| r.with_outliers_m / r.with_m)),
         ]

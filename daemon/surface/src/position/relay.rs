@@ -44,7 +44,7 @@ impl RelayFault {
             Self::Usbl(fault) => fault.name(),
             Self::NoGps => "no_gps",
             Self::Outlier => "outlier",
-            Self::TooVague => "too_vague",
+            Self::TooVague => "too_uncertain",
             Self::TooOld => "too_old",
         }
     }

@@ -53,7 +53,7 @@ pub enum UsblFault {
 impl UsblFault {
     pub fn name(self) -> &'static str {
         match self {
-            Self::Unreadable => "unreadable",
+            Self::Unreadable => "malformed",
             Self::RangeOnly => "range_only",
             Self::Depth => "depth",
             Self::NoHeading => "no_heading",

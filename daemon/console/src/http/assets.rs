@@ -1,14 +1,14 @@
 //! The files of the page, embedded in the binary.
 
 use super::compress::tagged;
-use super::server::not_found;
+use super::response::not_found;
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use crc::{CRC_32_ISCSI, Crc};
 
 static FILES: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
-/// Content type and bytes of a file of the page; the empty path is its index.
+/// Content type and bytes of a file of the page; the empty path means index.html.
 pub(super) fn find(path: &str) -> Option<(&'static str, &'static [u8])> {
     let path = if path.is_empty() { "index.html" } else { path };
     let &(name, bytes) = FILES.iter().find(|(name, _)| *name == path)?;

@@ -1,4 +1,4 @@
-//! From metres of the mission to latitude and longitude, and the projection that says so.
+//! From metres in the world frame to latitude and longitude, and the projection in well-known text.
 
 use crate::state::Origin;
 
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_those_of_proj() {
+    fn coordinates_equal_those_of_proj() {
         // `cs2cs +proj=tmerc +lat_0=LAT +lon_0=-10.25 +k=1 +datum=WGS84` of PROJ 9.
         let known = [
             (0.0, 3000.0, 2000.0, -10.223050541142952, 0.0180873875207037),

@@ -1,4 +1,4 @@
-//! Answers in fewer bytes: gzip where the client takes it, and nothing where it has the same already.
+//! Responses in fewer bytes: gzip for clients that accept it, and status 304 for those that have the same content.
 
 use axum::body::{Body, Bytes, to_bytes};
 use axum::extract::Request;
@@ -9,10 +9,10 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use std::io::Write;
 
-/// Fewer bytes than this are not worth it.
-const LEAST: usize = 512;
-/// More than any answer has.
-const MOST: usize = 1 << 28;
+/// Shorter responses are sent as they are.
+const MIN_BYTES: usize = 512;
+/// Longer than any response.
+const MAX_BYTES: usize = 1 << 28;
 
 /// Bytes in gzip (RFC 1952); `None` if there is no memory for them.
 pub(super) fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
@@ -21,8 +21,8 @@ pub(super) fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
     encoder.finish().ok()
 }
 
-/// Whether the client takes gzip.
-pub(super) fn takes_gzip(headers: &HeaderMap) -> bool {
+/// Whether the client accepts gzip.
+pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     let offered = headers.get_all(header::ACCEPT_ENCODING).iter().filter_map(|v| v.to_str().ok());
     offered.flat_map(|list| list.split(',')).any(|one| {
         let (name, weight) = one.split_once(';').unwrap_or((one, ""));
@@ -30,9 +30,9 @@ pub(super) fn takes_gzip(headers: &HeaderMap) -> bool {
     })
 }
 
-/// Compresses whole answers of text.
+/// Compresses responses of text.
 pub(super) async fn compress(request: Request, next: Next) -> Response {
-    let wanted = takes_gzip(request.headers());
+    let wanted = accepts_gzip(request.headers());
     let mut response = next.run(request).await;
     if !is_text(response.headers()) {
         return response;
@@ -42,8 +42,8 @@ pub(super) async fn compress(request: Request, next: Next) -> Response {
         return response;
     }
     let (mut parts, body) = response.into_parts();
-    let Ok(bytes) = to_bytes(body, MOST).await else { return StatusCode::INTERNAL_SERVER_ERROR.into_response() };
-    let Some(packed) = (bytes.len() >= LEAST).then(|| gzip(&bytes)).flatten() else {
+    let Ok(bytes) = to_bytes(body, MAX_BYTES).await else { return StatusCode::INTERNAL_SERVER_ERROR.into_response() };
+    let Some(packed) = (bytes.len() >= MIN_BYTES).then(|| gzip(&bytes)).flatten() else {
         return Response::from_parts(parts, Body::from(bytes));
     };
     parts.headers.remove(header::CONTENT_LENGTH);
@@ -57,13 +57,13 @@ fn is_text(headers: &HeaderMap) -> bool {
     text && !kind.starts_with("text/event-stream")
 }
 
-/// An answer that the client may keep as long as `tag` is the same; only the tag if the client has it.
-pub(super) fn tagged(headers: &HeaderMap, tag: &str, answer: impl FnOnce() -> Response) -> Response {
+/// A response that the client may keep while `tag` is the same; status 304 if it has the response.
+pub(super) fn tagged(headers: &HeaderMap, tag: &str, response: impl FnOnce() -> Response) -> Response {
     // The same content in another encoding has the same tag, so it is a weak one (RFC 9110, section 8.8.1).
     let tag = format!("W/\"{tag}\"");
     let held = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|v| v.to_str().ok());
     let is_held = held.flat_map(|list| list.split(',')).any(|one| one.trim() == tag);
-    let mut response = if is_held { StatusCode::NOT_MODIFIED.into_response() } else { answer() };
+    let mut response = if is_held { StatusCode::NOT_MODIFIED.into_response() } else { response() };
     if response.status().is_success() || is_held {
         let headers = response.headers_mut();
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
@@ -74,10 +74,10 @@ pub(super) fn tagged(headers: &HeaderMap, tag: &str, answer: impl FnOnce() -> Re
     response
 }
 
-/// Text in gzip if the client takes it, of which both forms are at hand.
+/// A text of which both forms exist: in gzip if the client accepts it.
 pub(super) fn either(headers: &HeaderMap, kind: &'static str, plain: &Bytes, packed: &Bytes) -> Response {
     let kind = (header::CONTENT_TYPE, kind);
-    if takes_gzip(headers) {
+    if accepts_gzip(headers) {
         return ([kind, (header::CONTENT_ENCODING, "gzip")], packed.clone()).into_response();
     }
     ([kind], plain.clone()).into_response()
@@ -88,17 +88,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gzip_goes_only_to_those_who_take_it() {
-        let takes = |value: &'static str| {
-            takes_gzip(&HeaderMap::from_iter([(header::ACCEPT_ENCODING, HeaderValue::from_static(value))]))
+    fn gzip_is_sent_only_to_clients_that_accept_it() {
+        let accepts = |value: &'static str| {
+            accepts_gzip(&HeaderMap::from_iter([(header::ACCEPT_ENCODING, HeaderValue::from_static(value))]))
         };
-        assert!(takes("gzip, deflate, br") && takes("br;q=1, GZIP;q=0.5"));
-        assert!(!takes("identity") && !takes("gzip;q=0, br") && !takes("x-gzip-like"));
-        assert!(!takes_gzip(&HeaderMap::new()));
+        assert!(accepts("gzip, deflate, br") && accepts("br;q=1, GZIP;q=0.5"));
+        assert!(!accepts("identity") && !accepts("gzip;q=0, br") && !accepts("x-gzip-like"));
+        assert!(!accepts_gzip(&HeaderMap::new()));
     }
 
     #[test]
-    fn what_is_held_is_not_sent_again() {
+    fn a_client_with_the_same_tag_receives_status_304() {
         let held =
             |value: &'static str| HeaderMap::from_iter([(header::IF_NONE_MATCH, HeaderValue::from_static(value))]);
         let status = |headers| tagged(&headers, "a1", || "text".into_response()).status();

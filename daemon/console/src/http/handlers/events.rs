@@ -1,9 +1,10 @@
 //! Changes as server-sent events.
 
-use super::connections::EVENTS;
-use super::server::{Shared, refusal};
-use super::snapshot::Snapshot;
-use super::state::MapEvent;
+use crate::http::connections::EVENT_STREAM;
+use crate::http::response::error;
+use crate::http::shared::Shared;
+use crate::snapshot::Snapshot;
+use crate::state::MapEvent;
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::{StatusCode, header};
@@ -13,49 +14,51 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use tokio::sync::{OwnedSemaphorePermit, watch};
 
-/// Most streams at a time.
-pub(super) const MOST: usize = 64;
+/// Open streams at a time.
+pub(in crate::http) const MAX_STREAMS: usize = 64;
 
-/// What a reader has been told.
+/// The stream of one reader.
 struct Feed {
     snapshots: watch::Receiver<Arc<Snapshot>>,
-    told: BTreeMap<u8, u64>,
+    /// The version of each vehicle's map in the last event.
+    versions: BTreeMap<u8, u64>,
     queue: VecDeque<Bytes>,
-    first: bool,
-    _seat: OwnedSemaphorePermit,
+    is_first: bool,
+    _permit: OwnedSemaphorePermit,
 }
 
-/// Events as they come: always the newest state, and which maps have changed. A slow reader misses states, never the last.
-pub(super) async fn events(State(shared): State<Shared>) -> Response {
-    let Ok(seat) = shared.streams.clone().try_acquire_owned() else {
-        return refusal(StatusCode::SERVICE_UNAVAILABLE, &format!("{MOST} streams of events are open: no more are"));
+/// The latest state after each change, and the maps that have changed. A slow reader misses states, but never the last one.
+pub(in crate::http) async fn events(State(shared): State<Shared>) -> Response {
+    let Ok(permit) = shared.streams.clone().try_acquire_owned() else {
+        let line = format!("{MAX_STREAMS} streams of events are open, which is the maximum");
+        return error(StatusCode::SERVICE_UNAVAILABLE, &line);
     };
-    let (told, queue) = (BTreeMap::new(), VecDeque::new());
-    let feed = Feed { snapshots: shared.snapshots, told, queue, first: true, _seat: seat };
+    let (versions, queue) = (BTreeMap::new(), VecDeque::new());
+    let feed = Feed { snapshots: shared.snapshots, versions, queue, is_first: true, _permit: permit };
     let stream = futures_util::stream::unfold(feed, |mut feed| async move {
         while feed.queue.is_empty() {
             feed.next().await?;
         }
         feed.queue.pop_front().map(|bytes| (Ok::<_, Infallible>(bytes), feed))
     });
-    ([(header::CONTENT_TYPE, EVENTS)], Body::from_stream(stream)).into_response()
+    ([(header::CONTENT_TYPE, EVENT_STREAM)], Body::from_stream(stream)).into_response()
 }
 
 impl Feed {
-    /// Waits for a new state; `None` when there will be none.
+    /// Waits for a new state; `None` at the end of the program.
     async fn next(&mut self) -> Option<()> {
-        if !std::mem::take(&mut self.first) {
+        if !std::mem::take(&mut self.is_first) {
             self.snapshots.changed().await.ok()?;
         }
         let snapshot = self.snapshots.borrow_and_update().clone();
         if snapshot.json.is_empty() {
             return Some(());
         }
-        // The text is the same for all readers, so they share it.
+        // All readers share the text.
         let (begin, end) = (Bytes::from_static(b"event: state\ndata: "), Bytes::from_static(b"\n\n"));
         self.queue.extend([begin, snapshot.json.clone(), end]);
         for v in &snapshot.state.vehicles {
-            if self.told.insert(v.id, v.map.version) != Some(v.map.version) {
+            if self.versions.insert(v.id, v.map.version) != Some(v.map.version) {
                 let event = MapEvent { vehicle: v.id, version: v.map.version };
                 let data = serde_json::to_string(&event).unwrap_or_default();
                 self.queue.push_back(format!("event: map\ndata: {data}\n\n").into());
