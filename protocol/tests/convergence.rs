@@ -2,7 +2,7 @@
 
 mod pair;
 
-use pair::{LinkedEnds, Setup, LossyChannel, auv, hold, layer, patchy, utility};
+use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, layer, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;

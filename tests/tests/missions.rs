@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use scenecast_config::Config;
-use scenecast_protocol::map::LayerScale;
+use scenecast_protocol::map::LayerId;
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report};
 use serde_json::Value;
@@ -112,7 +112,7 @@ fn levels_of_curiosity_tell_the_cells_of_a_reef_apart() {
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 8, record: None }).unwrap();
     mission.advance(Instant::from_secs_f64(119.0)).unwrap();
     let vehicle = mission.vehicle();
-    let layer = vehicle.layers().find(|p| p.scale() == LayerScale::Curiosity).unwrap();
+    let layer = vehicle.layers().find(|p| p.id() == LayerId::CURIOSITY).unwrap();
     let mut cells = [0; 17];
     layer.target().iter().for_each(|(_, level)| cells[usize::from(level)] += 1);
     let common = cells.iter().filter(|&&n| n * 20 > layer.target().explored()).count();

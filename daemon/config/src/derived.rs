@@ -5,6 +5,7 @@ use scenecast_core::tuning_table::TuningTable;
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
+use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::schedule::BackgroundOrder;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
@@ -53,7 +54,7 @@ pub fn authenticity(config: &Config) -> Result<Option<Authenticity>, UserError> 
 
 /// What left-over bits are spent on; the file was checked when it was read.
 pub fn background(config: &Config) -> BackgroundOrder {
-    BackgroundOrder::from_names(&config.link.spend).unwrap_or_default()
+    BackgroundOrder::from_names(&config.link.spend, &LayerSet::default()).unwrap_or_default()
 }
 
 /// The vehicles that the surface speaks with from the beginning, by address and name.

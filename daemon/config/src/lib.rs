@@ -21,7 +21,7 @@ pub use place::{autopilot_place, is_gpsd, origin, position_places};
 pub use print::print;
 pub use token_file::{load_token, read_token};
 
-use scenecast_protocol::map::LayerKind;
+use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use serde::{Deserialize, Serialize};
 
@@ -105,7 +105,7 @@ section! {
         /// Least shares in percent of directive, status, fix, map, exemplar.
         shares: [u8; 5] = Shares::default().0,
         /// What left-over bits are spent on, in this order.
-        spend: Vec<String> = BackgroundOrder::default().names(),
+        spend: Vec<String> = BackgroundOrder::default().names(&LayerSet::default()),
         /// Seconds between two statuses.
         status_period_s: f64 = 10.0,
         /// Longest turn in seconds.
@@ -196,13 +196,27 @@ section! {
         /// `fine` or `coarse`.
         cells: String = "fine".into(),
         /// Layers that are sent beside the labels.
-        planes: Vec<String> = LayerKind::ALL.map(|p| p.name().to_owned()).to_vec(),
+        planes: Vec<String> = LayerSet::default().iter().map(|(_, layer)| layer.name.clone().into_owned()).collect(),
         /// Percent of the map's share for confidence, depth and curiosity; 0 = what nobody else needs.
         layer_shares: [u8; 3] = [0; 3],
         /// Step of the plane of depths, metres.
         depth_step_m: f64 = 0.5,
     }
 }
+
+impl Map {
+    /// The part of a layer in the map's share, percent.
+    pub fn layer_share(&self, name: &str) -> u8 {
+        let [confidence, depth, curiosity] = self.layer_shares;
+        match name {
+            "confidence" => confidence,
+            "depth" => depth,
+            "curiosity" => curiosity,
+            _ => 0,
+        }
+    }
+}
+
 section! {
     /// The camera.
     Camera {

@@ -6,10 +6,10 @@ use crate::layers;
 use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder};
 use crate::snapshot::seconds;
 use crate::state::AcceptedOrder;
-use scenecast_core::label_picture::MOST_CELLS;
+use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
-use scenecast_protocol::schedule::{Shares, BackgroundOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
@@ -124,7 +124,8 @@ fn order_exemplar(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder
 
 fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
-    let background = order.background.as_deref().map(BackgroundOrder::from_names).transpose();
+    let background =
+        order.background.as_deref().map(|names| BackgroundOrder::from_names(names, &surface.layers())).transpose();
     let changed = background.and_then(|background| surface.set_budget(order.budget_bps, shares, background, now));
     if let Err(reason) = changed {
         return Reply::Refused(reason);
@@ -138,9 +139,9 @@ fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option
     let grid = surface.map(vehicle)?;
     let view = surface.view(vehicle)?;
     let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
-    if bounds.area() > MOST_CELLS {
+    if bounds.area() > MAX_CELLS {
         let Rect { width, height, .. } = bounds;
-        return Some(Reply::Refused(format!("the map spans {width} x {height} cells: at most {MOST_CELLS} are sent")));
+        return Some(Reply::Refused(format!("the map spans {width} x {height} cells: at most {MAX_CELLS} are sent")));
     }
     Some(Reply::Map(MapCells {
         version: surface.map_version(vehicle),

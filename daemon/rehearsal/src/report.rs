@@ -101,23 +101,24 @@ fn map(m: &Mission) -> Value {
 }
 
 /// A layer by its name: cells with a level, how well the operator's copy follows, and what that takes.
-fn layer(m: &Mission, layer: &LayerSource) -> (&'static str, Value) {
-    let kind = layer.scale().kind();
-    let bytes = m.vehicle().stats().bytes_by_class.get(&kind.into()).copied().unwrap_or(0);
+fn layer(m: &Mission, layer: &LayerSource) -> (String, Value) {
+    let id = layer.id();
+    let bytes = m.vehicle().stats().bytes_by_class.get(&Class::Layer(id)).copied().unwrap_or(0);
     let mut figures = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
-    if let (Some(meter), Some(figures)) = (m.meters.layers.get(&kind), figures.as_object_mut()) {
+    if let (Some(meter), Some(figures)) = (m.meters.layers.get(&id), figures.as_object_mut()) {
         figures.insert("agreement_final".into(), round(meter.agreement()).into());
         figures.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
         figures.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
     }
-    (kind.name(), figures)
+    (layer.descriptor().name.clone().into_owned(), figures)
 }
 
-fn by_class(m: &Mission) -> BTreeMap<&'static str, u64> {
-    let mut sums: BTreeMap<&'static str, u64> = Class::ALL.into_iter().map(|c| (c.name(), 0)).collect();
+fn by_class(m: &Mission) -> BTreeMap<String, u64> {
+    let layers = m.surface().view(m.address()).map(|v| v.layers().clone()).unwrap_or_default();
+    let mut sums: BTreeMap<String, u64> = Class::all(&layers).map(|class| (class.name_in(&layers), 0)).collect();
     let surface = m.surface().view(m.address()).map(|v| v.stats().bytes_by_class.clone()).unwrap_or_default();
     for (class, bytes) in m.vehicle().stats().bytes_by_class.iter().chain(&surface) {
-        *sums.entry(class.name()).or_default() += bytes;
+        *sums.entry(class.name_in(&layers)).or_default() += bytes;
     }
     sums
 }

@@ -1,7 +1,7 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, LayerMask, PlannerKind, Settings};
-use scenecast_protocol::map::LayerKind;
+use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlannerKind, Settings};
+use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -29,29 +29,29 @@ pub struct SettingsOrder {
     pub frames_per_s: Option<f64>,
 }
 
-/// The layers of these names, with commas between.
-fn layer_mask(names: &str) -> Option<LayerMask> {
+/// The layers of these names, with commas between; `None` if one is unknown or named twice.
+fn layer_mask(names: &str, layers: &LayerSet) -> Option<LayerMask> {
     let names: Vec<&str> = if names == "none" { Vec::new() } else { names.split(',').map(str::trim).collect() };
-    let set = LayerMask::of(|kind| names.contains(&kind.name()));
-    (set.kinds().count() == names.len()).then_some(set)
+    layers.mask(names.iter().copied()).ok().filter(|mask| mask.iter().count() == names.len())
 }
 
-fn layer_names(set: LayerMask) -> String {
-    let names: Vec<&str> = set.kinds().map(LayerKind::name).collect();
+fn layer_names(mask: LayerMask, layers: &LayerSet) -> String {
+    let names: Vec<String> = mask.iter().map(|id| layers.name(id)).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(",") }
 }
 
 impl SettingsOrder {
     /// The slot's content.
-    pub fn read(&self) -> Result<Settings, String> {
+    pub fn read(&self, layers: &LayerSet) -> Result<Settings, String> {
+        let names: Vec<&str> = layers.iter().map(|(_, layer)| &*layer.name).collect();
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
             layers: choice(
                 "layers",
                 &self.layers,
-                layer_mask,
-                "none, or different ones of confidence, depth, curiosity",
+                |names| layer_mask(names, layers),
+                &format!("none, or different ones of {}", names.join(", ")),
             )?,
             ..Settings::default()
         };
@@ -90,8 +90,9 @@ fn choice<T>(
     }
 }
 
-impl From<&Settings> for SettingsOrder {
-    fn from(settings: &Settings) -> Self {
+impl SettingsOrder {
+    /// Settings as they would be typed, with the names of these layers.
+    pub fn of(settings: &Settings, layers: &LayerSet) -> Self {
         fn told<T, U>(change: Change<T>, configured: U, tell: impl FnOnce(T) -> U) -> Option<U> {
             match change {
                 Change::Keep => None,
@@ -104,7 +105,7 @@ impl From<&Settings> for SettingsOrder {
         Self {
             planner: told(settings.planner, String::new(), |p| text(p.name())),
             cells: told(settings.cells, String::new(), |c| text(c.name())),
-            layers: told(settings.layers, String::new(), layer_names),
+            layers: told(settings.layers, String::new(), |mask| layer_names(mask, layers)),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -161,7 +162,7 @@ mod tests {
     use scenecast_protocol::directive::RefusalReason;
 
     fn read(json: &str) -> Result<Settings, String> {
-        serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read()
+        serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read(&LayerSet::default())
     }
 
     #[test]
@@ -183,7 +184,7 @@ mod tests {
         );
         for layers in ["perplexity", "depth,depth", "depth,", "none,depth"] {
             let said = refused(&format!(r#"{{"layers": "{layers}"}}"#));
-            assert!(said.contains("none, or different ones of confidence, depth, curiosity"), "{said}");
+            assert!(said.contains("none, or different ones of depth, confidence, curiosity"), "{said}");
         }
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
         assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));
@@ -193,9 +194,9 @@ mod tests {
     fn an_order_is_told_as_it_was_typed() {
         let typed = r#"{"planner":"","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
-        assert_eq!(SettingsOrder::from(&order.read().unwrap()), order);
+        assert_eq!(SettingsOrder::of(&order.read(&LayerSet::default()).unwrap(), &LayerSet::default()), order);
         let layers = |names: &str| read(&format!(r#"{{"layers": "{names}"}}"#)).unwrap();
-        let told = |names: &str| SettingsOrder::from(&layers(names)).layers.unwrap();
+        let told = |names: &str| SettingsOrder::of(&layers(names), &LayerSet::default()).layers.unwrap();
         assert_eq!(["none", "curiosity, depth"].map(told), ["none", "depth,curiosity"]);
         assert_eq!(read("{}").unwrap(), Settings::default());
     }

@@ -10,7 +10,7 @@ use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::LabelGrid;
+use scenecast_protocol::map::{LabelGrid, LayerSet};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement};
@@ -172,7 +172,8 @@ impl Surface {
 
     /// Changes settings of a vehicle; what the order does not name stays as it is there.
     pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
-        let order = order.read()?;
+        let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
+        let order = order.read(view.layers())?;
         let last = self.life_of(vehicle, SlotId::Settings);
         let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
@@ -190,6 +191,18 @@ impl Surface {
     /// The settings of the scene model that tell most of those whose stream takes at most `bits_per_s`.
     pub fn fit(&self, cell_m: f64, bits_per_s: f64) -> Result<Fit, NoRow> {
         self.tuning.fit(cell_m, bits_per_s)
+    }
+
+    /// The built-in layers and those that vehicles have announced, by the index of the first vehicle with such a layer.
+    pub fn layers(&self) -> LayerSet {
+        let mut all = LayerSet::default();
+        let views = self.link.vehicles().filter_map(|vehicle| self.link.vehicle(vehicle));
+        for (id, layer) in views.flat_map(|view| view.layers().iter()) {
+            if all.id(&layer.name).is_none() {
+                all.insert(id, layer.clone());
+            }
+        }
+        all
     }
 
     /// How far the last order of a slot has come.

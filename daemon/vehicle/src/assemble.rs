@@ -3,10 +3,10 @@
 use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, background, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
-use scenecast_protocol::directive::{LayerMask, PlannerKind, Reaction};
+use scenecast_protocol::directive::{PlannerKind, Reaction};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::map::{LayerKind, LayerScale, LayerSource};
+use scenecast_protocol::map::{LayerDescriptor, LayerId, LayerMask, LayerSet, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -35,7 +35,9 @@ pub fn assemble(
     };
     let codec = config.map.codec.parse().unwrap_or_default();
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
-    link.set_layers(layers(config, codec));
+    for layer in layers(config, codec) {
+        link.add_layer(layer);
+    }
     link.source_mut().set_debounce(Duration::from_secs_f64(config.map.settle_s));
     let planner = PlannerKind::from_name(&config.survey.planner).unwrap_or(PlannerKind::Horizon);
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
@@ -48,7 +50,7 @@ pub fn assemble(
     };
     link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or_else(|| background(config)));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, told_layers(config));
+    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, selected_layers(config));
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }
@@ -74,21 +76,23 @@ fn habits(config: &Config) -> Habits {
     }
 }
 
-/// The layers of the map that are told.
-fn told_layers(config: &Config) -> LayerMask {
-    LayerMask::of(|kind| config.map.planes.iter().any(|name| name == kind.name()))
+/// The layers that are sent unless the operator selects others. The names were checked when the file was read.
+fn selected_layers(config: &Config) -> LayerMask {
+    let built_in = LayerSet::default();
+    config.map.planes.iter().filter_map(|name| built_in.id(name)).collect()
 }
 
-/// Every layer that the operator could ask for, and its part of the map's share in percent.
-fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = (LayerSource, u8)> {
+/// Every layer that the operator could request, with its part of the map's share.
+fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
-    let settle = Duration::from_secs_f64(map.settle_s);
-    let scale = |kind| match kind {
-        LayerKind::Confidence => LayerScale::Confidence,
-        LayerKind::Depth => LayerScale::depth_around(config.survey.depth_m, map.depth_step_m),
-        LayerKind::Curiosity => LayerScale::Curiosity,
-    };
-    let layers = LayerKind::ALL.into_iter().zip(map.layer_shares);
-    let possible = layers.filter(|_| map.stream == "delta");
-    possible.map(move |(kind, share)| (LayerSource::new(scale(kind), codec, settle), share))
+    let debounce = Duration::from_secs_f64(map.settle_s);
+    let possible = if map.stream == "delta" { LayerMask(u16::MAX) } else { LayerMask::default() };
+    LayerId::all().filter(move |&id| possible.has(id)).filter_map(move |id| {
+        let built_in = match id {
+            LayerId::DEPTH => LayerDescriptor::depth_around(config.survey.depth_m, map.depth_step_m),
+            _ => LayerSet::default().get(id)?.clone(),
+        };
+        let share = config.map.layer_share(&built_in.name);
+        Some(LayerSource::new(id, LayerDescriptor { share, ..built_in }, codec, debounce))
+    })
 }

@@ -40,7 +40,7 @@ fn image(p: &Picture, base: &str) -> ExemplarImage {
     ExemplarImage {
         number: p.number,
         edge_px: edge_px(p.size),
-        can_enlarge: p.size < Album::LARGEST,
+        can_enlarge: p.size < Album::MAX_SIZE,
         bytes: p.sent_bytes,
         url: format!("{base}-{}.webp", p.number),
         at_s: seconds(p.came),

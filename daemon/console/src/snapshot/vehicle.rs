@@ -11,7 +11,7 @@ use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
-use scenecast_surface::{Desk, Surface};
+use scenecast_surface::{Desk, SettingsOrder, Surface};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
     let all = surface.vehicles();
@@ -61,8 +61,8 @@ fn orders(desk: &Desk, view: &PeerView<'_>) -> VehicleOrders {
         limits_in_force: in_force(&desk.limits_in_force),
         planner: desk.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: VehicleSettings {
-            requested: desk.settings.asked().into(),
-            in_force: desk.settings.in_force().map(Into::into),
+            requested: SettingsOrder::of(desk.settings.asked(), view.layers()),
+            in_force: desk.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
         },
         directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
     }

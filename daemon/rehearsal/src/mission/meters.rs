@@ -1,7 +1,7 @@
 //! How well the operator's map follows the vehicle's, layer by layer.
 
 use crate::meter::Meter;
-use scenecast_protocol::map::{LabelGrid, LayerKind, LayerReplica};
+use scenecast_protocol::map::{LabelGrid, LayerId, LayerReplica};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::Surface;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 #[derive(Default)]
 pub(crate) struct Meters {
     pub(crate) labels: Meter,
-    pub(crate) layers: BTreeMap<LayerKind, Meter>,
+    pub(crate) layers: BTreeMap<LayerId, Meter>,
     /// Changes of the operator's map so far.
     operator_version: u64,
 }
@@ -30,10 +30,10 @@ impl Meters {
         self.labels.look(vehicle.map(), operator, versions, now);
         let (view, empty) = (surface.view(address), LabelGrid::default());
         for layer in vehicle.layers() {
-            let kind = layer.scale().kind();
-            let replica = view.and_then(|v| v.layer(kind));
+            let id = layer.id();
+            let replica = view.and_then(|v| v.layer(id));
             let versions = (layer.version(), replica.map_or(0, LayerReplica::version));
-            let meter = self.layers.entry(kind).or_default();
+            let meter = self.layers.entry(id).or_default();
             meter.look(layer.target(), replica.map_or(&empty, |r| r.levels().shown()), versions, now);
         }
     }

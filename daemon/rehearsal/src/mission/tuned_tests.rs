@@ -4,7 +4,7 @@ use super::{Mission, MissionOptions};
 use crate::World;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
-use scenecast_protocol::map::{LabelGrid, LayerKind};
+use scenecast_protocol::map::{LabelGrid, LayerId};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SettingsOrder;
@@ -62,7 +62,7 @@ impl Mission {
         self.surface().map(self.address).unwrap()
     }
 
-    fn heard_of(&self, kind: LayerKind) -> u64 {
+    fn heard_of(&self, kind: LayerId) -> u64 {
         self.surface().view(self.address).and_then(|v| v.layer(kind)).map_or(0, |p| p.version())
     }
 
@@ -82,25 +82,25 @@ fn priors_frame_rate_and_layers_change_under_way_and_the_maps_agree() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
-    assert!(frames >= 50 && labels > 1 && mission.heard_of(LayerKind::Confidence) > 0);
+    assert!(frames >= 50 && labels > 1 && mission.heard_of(LayerId::CONFIDENCE) > 0);
     mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
     // What was in the water when the vehicle began to follow has come in.
     mission.fly_to(mission.now().as_secs_f64() + 30.0);
     let (since, frames, confidence) =
-        (mission.now(), mission.logbook.track.len(), mission.heard_of(LayerKind::Confidence));
-    let depth = mission.heard_of(LayerKind::Depth);
+        (mission.now(), mission.logbook.track.len(), mission.heard_of(LayerId::CONFIDENCE));
+    let depth = mission.heard_of(LayerId::DEPTH);
     mission.fly_to(since.as_secs_f64() + 100.0);
     assert!((9..=11).contains(&(mission.logbook.track.len() - frames)), "one frame in ten seconds is seen");
-    assert_eq!(mission.heard_of(LayerKind::Confidence), confidence, "a layer that is not told costs nothing");
-    assert!(mission.heard_of(LayerKind::Depth) > depth);
+    assert_eq!(mission.heard_of(LayerId::CONFIDENCE), confidence, "a layer that is not told costs nothing");
+    assert!(mission.heard_of(LayerId::DEPTH) > depth);
     mission.tune(r#"{"frames_per_s": 0, "layers": "", "gamma": 0}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "what an order does not name stays");
     mission.fly_to(mission.now().as_secs_f64() + 60.0);
-    assert!(mission.heard_of(LayerKind::Confidence) > confidence);
+    assert!(mission.heard_of(LayerId::CONFIDENCE) > confidence);
     mission.drain();
-    let told = mission.vehicle().layers().find(|p| p.scale().kind() == LayerKind::Confidence).unwrap().target().clone();
-    let heard = mission.surface().view(mission.address).unwrap().layer(LayerKind::Confidence).unwrap();
+    let told = mission.vehicle().layers().find(|p| p.id() == LayerId::CONFIDENCE).unwrap().target().clone();
+    let heard = mission.surface().view(mission.address).unwrap().layer(LayerId::CONFIDENCE).unwrap();
     assert!(same(&told, heard.levels().shown()), "a layer goes on from where it rested");
     assert_eq!((mission.mapper.epoch(), mission.settings_applied()), (0, 2), "labels keep their meaning");
     assert!(mission.mapper.current().labels >= labels);

@@ -50,7 +50,7 @@ pub struct Durable {
     /// Least shares in force in percent, if somebody has changed them.
     pub shares: Option<[u8; 5]>,
     /// What left-over bits are spent on, as on the wire, if somebody has changed it.
-    pub background: Option<u16>,
+    pub background: Option<u128>,
     /// Settings in force, as on the wire; empty: all as configured.
     pub settings: Vec<u8>,
     /// Limits in force, as on the wire; empty: none.

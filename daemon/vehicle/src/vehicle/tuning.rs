@@ -2,8 +2,8 @@
 
 use super::{Vehicle, VehicleOutput};
 use crate::MapUpdate;
-use scenecast_protocol::directive::{CellBand, LayerMask, RefusalReason, Settings};
-use scenecast_protocol::map::{Cell, LabelGrid, LayerKind, UNEXPLORED};
+use scenecast_protocol::directive::{CellBand, RefusalReason, Settings};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerMask, UNEXPLORED};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ pub(super) struct Telling {
     pub(super) seen: LabelGrid,
     /// Versions of that so far.
     pub(super) version: u64,
-    layers: BTreeMap<LayerKind, Vec<(Cell, f64)>>,
+    layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     /// As configured: seconds of the budget, 0: never coarse.
     coarse_after_s: f64,
     is_coarse: bool,
@@ -107,7 +107,7 @@ impl Vehicle {
         let layers = self.telling.settings.layers.value().unwrap_or(self.telling.told_layers);
         self.link.source_mut().set_coarse_limit(limit);
         self.link.set_coarse_layers(is_coarse.then_some(0));
-        self.link.set_told_layers(|kind| layers.has(kind));
+        self.link.select_layers(layers);
     }
 
     /// Hands the link what is to be told of what was seen.
@@ -122,10 +122,10 @@ impl Vehicle {
         };
         let cells: Vec<(Cell, u8)> = telling.seen.iter().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
         link.set_map(cells, now);
-        for (&kind, cells) in &telling.layers {
+        for (&id, cells) in &telling.layers {
             let cells: Vec<(Cell, f64)> =
                 cells.iter().copied().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
-            link.set_layer(kind, cells, now);
+            link.set_layer(id, cells, now);
         }
     }
 }
