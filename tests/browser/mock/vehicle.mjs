@@ -6,10 +6,10 @@ import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
 import { Settings } from "./settings.mjs";
 
-const LAYERS = [
-  { name: "confidence", unit: "", min: 0.125, max: 0.875, step: 0.25, at: confidence },
-  { name: "depth", unit: "m", min: 10, max: 25, at: floorDepth },
-  { name: "curiosity", unit: "bit", min: 2.5, max: 10.5, step: 1, at: surprise },
+export const LAYERS = [
+  { name: "depth", unit: "m", low: 10, step: 0.5, levels: 30, palette: "cividis", spread: "scale", is_depth: true, at: floorDepth },
+  { name: "confidence", unit: "", low: 0, step: 0.25, levels: 4, palette: "cividis", spread: "scale", is_depth: false, at: confidence },
+  { name: "curiosity", unit: "bit", low: 2, step: 1, levels: 9, palette: "inferno", spread: "common", is_depth: false, at: surprise },
 ];
 
 export class Vehicle {

@@ -304,11 +304,11 @@ export default [
       await s.page.selectOption("#layer", "curiosity");
       await s.shows("#legend", /curiosity\s*up to \d bit\s*\d+ bit and more/);
       const tone = () => s.inPage(async ({ store }, { x, y }) => {
-        const { lookOf } = await import("/js/map/planes.js");
+        const { lookOf } = await import("/js/map/layer-look.js");
         const { cellAt } = await import("/js/map/readout.js");
         const level = cellAt(store.map, x, y).layers.find((p) => p.name === "curiosity");
         const of = store.map.layers.find((p) => p.name === "curiosity");
-        return lookOf(of).tone(Math.round(((level.value - of.min) / (of.max - of.min)) * 254), false);
+        return lookOf(of).tone(level.level, false);
       }, cell);
       const fresh = await s.until("its colour", async () => {
         const seen = await pixel(s, cell.px, cell.py);
