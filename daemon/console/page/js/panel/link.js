@@ -7,8 +7,11 @@ import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
 
 const CLASSES = ["status", "directive", "fix", "exemplar", "overhead"];
-/** The map, its layers, and all else. */
-const classNames = (link) => ["map", ...Object.keys(link.up.bytes_by_class).filter((c) => c !== "map" && !CLASSES.includes(c)).sort(), ...CLASSES];
+/** The map, the layers that the surface lists or has received, and all other classes. */
+function classNames(link) {
+  const layers = [...store.snapshot.layers.map((l) => l.name), ...Object.keys(link.up.bytes_by_class)];
+  return [...new Set(["map", ...layers.filter((c) => c !== "map" && !CLASSES.includes(c)).sort(), ...CLASSES])];
+}
 const classLine = (c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
