@@ -4,7 +4,7 @@ use super::arrival::{LABELS, Setting, Water};
 use crate::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
-use scenecast_protocol::schedule::{Class, Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{AskState, Wish};
 
@@ -22,7 +22,8 @@ fn patch(i: u32) -> RgbImage {
 fn water(setting: Setting, seed: u64) -> Water {
     let patches: Vec<RgbImage> = (0..30).map(patch).collect();
     let mut water = Water::new(setting, &patches, seed).unwrap();
-    let budget = Budget { bits_per_s: 10_000, shares: Shares::default(), spend: SpendOrder::new(&[]).unwrap() };
+    let budget =
+        Budget { bits_per_s: 10_000, shares: Shares::default(), background: BackgroundOrder::new(&[]).unwrap() };
     water.vehicle.handle_budget(budget, water.now);
     water.run_until(Instant::from_secs_f64(120.0), |_| false);
     assert_eq!(exemplar_bytes(&water), 0);
@@ -30,9 +31,9 @@ fn water(setting: Setting, seed: u64) -> Water {
 }
 
 /// The operator says what left-over bits are spent on.
-fn spend(water: &mut Water, names: &[&str]) {
-    let spend = SpendOrder::from_names(names).unwrap();
-    water.surface.surface_mut().set_budget(10_000, None, Some(spend), water.now).unwrap();
+fn background(water: &mut Water, names: &[&str]) {
+    let background = BackgroundOrder::from_names(names, &scenecast_protocol::map::LayerSet::default()).unwrap();
+    water.surface.surface_mut().set_budget(10_000, None, Some(background), water.now).unwrap();
 }
 
 fn wait(water: &mut Water, seconds: f64) {
@@ -99,7 +100,7 @@ fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
 #[test]
 fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut water = water(IDLE, 4);
-    spend(&mut water, &["exemplars"]);
+    background(&mut water, &["exemplars"]);
     let until = water.now + std::time::Duration::from_secs(120);
     assert!(water.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
     let (seconds, _) = water.get(LABELS, Wish::Another).unwrap().unwrap();
@@ -118,7 +119,7 @@ fn while_the_map_waits_background_images_get_only_frame_ends() {
     let loaded = Setting { loaded: true, ..IDLE };
     let map_bytes = |names: &[&str]| {
         let mut water = water(loaded, 5);
-        spend(&mut water, names);
+        background(&mut water, names);
         wait(&mut water, 120.0);
         let map = water.vehicle.vehicle().stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
         assert!(exemplar_bytes(&water) < map / 100, "{} beside {map}", exemplar_bytes(&water));
