@@ -361,7 +361,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             stamp(Address::SURFACE, clock(1, None).expect("a stamp"), 5),
         ),
         (
-            "stamp of a vehicle: clock 16 777 215 ms, frame 9 heard 258 ms before",
+            "stamp of a vehicle: clock 16 777 215 ms, frame 9 received 258 ms before",
             stamp(auv(), heard(16_777_215, 9, 258), 6),
         ),
         ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
