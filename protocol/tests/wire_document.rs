@@ -2,8 +2,8 @@
 
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, Limits,
-    PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState, Utility,
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, Limits, PlannerKind,
+    Polygon, Reaction, RefusalReason, SLOTS, Settings, ShortDecimal, Slot, SlotId, SlotReport, SlotState, Utility,
     VersionedSlot,
 };
 use scenecast_protocol::map::{
@@ -109,8 +109,8 @@ fn clock(clock_ms: u32, one_way_ms: Option<u64>) -> Option<Stamp> {
     Some(Stamp::Surface { clock_ms, one_way: one_way_ms.map(Duration::from_millis) })
 }
 
-fn heard(clock_ms: u32, heard: u8, held_ms: u64) -> Stamp {
-    Stamp::Vehicle { clock_ms, heard, held: Duration::from_millis(held_ms) }
+fn vehicle_stamp(clock_ms: u32, last_received: u8, held_ms: u64) -> Stamp {
+    Stamp::Vehicle { clock_ms, last_received, held: Duration::from_millis(held_ms) }
 }
 
 fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement> {
@@ -235,7 +235,7 @@ fn first_of_surface(keyed: bool) -> Header {
 }
 
 fn answer_of_vehicle(keyed: bool) -> Header {
-    let (turn, stamp, ack) = (Some(4), Some(heard(7_200, 2, 200)), all_up_to(2, vec![]));
+    let (turn, stamp, ack) = (Some(4), Some(vehicle_stamp(7_200, 2, 200)), all_up_to(2, vec![]));
     Header { turn, stamp, ack, keyed, ..header(auv(), 1) }
 }
 
@@ -330,9 +330,9 @@ fn parts_of_a_frame_are_those_of_the_document() {
         planner: Change::To(PlannerKind::Horizon),
         cells: Change::To(CellBand::Coarse),
         layers: Change::To(LayerMask::from_iter([LayerId::DEPTH])),
-        alpha: Change::To(Figure::new(0.01).unwrap()),
+        alpha: Change::To(ShortDecimal::new(0.01).unwrap()),
         gamma: Change::Configured,
-        frames_per_s: Change::To(Figure::new(0.25).unwrap()),
+        frames_per_s: Change::To(ShortDecimal::new(0.25).unwrap()),
         ..Settings::default()
     };
     let limits = Limits {
@@ -362,7 +362,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         (
             "stamp of a vehicle: clock 16 777 215 ms, frame 9 heard 258 ms before",
-            stamp(auv(), heard(16_777_215, 9, 258), 6),
+            stamp(auv(), vehicle_stamp(16_777_215, 9, 258), 6),
         ),
         ("statement: horizon low ABC, nothing lost", statement(0xABC, vec![])),
         ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),

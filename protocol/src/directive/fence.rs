@@ -107,7 +107,7 @@ impl Fence {
         self.fence.iter().chain(&self.keep_outs)
     }
 
-    /// Encodes the payload. A fence that [`Self::check`] refuses is cut to what the layout can state.
+    /// Encodes the payload. A fence that [`Self::check`] refuses is cut to the limits of the layout.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bits = BitWriter::default();
         let keep_outs = self.keep_outs.len().min(Self::MAX_KEEP_OUTS);

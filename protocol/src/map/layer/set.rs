@@ -25,7 +25,7 @@ impl LayerId {
         (0..Self::COUNT).filter_map(Self::new)
     }
 
-    /// 0 to 15.
+    /// The index of the layer, 0 to 15.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
@@ -59,7 +59,7 @@ impl FromIterator<LayerId> for LayerMask {
 pub struct LayerSet(BTreeMap<LayerId, LayerDescriptor>);
 
 impl Default for LayerSet {
-    /// The built-in layers.
+    /// The built-in layers: depth, confidence, curiosity.
     fn default() -> Self {
         Self(BUILT_IN_LAYERS.iter().map(|layer| (layer.id, layer.descriptor.clone())).collect())
     }
