@@ -225,6 +225,15 @@ impl Slot {
 /// +-----+---------+-------------------------------+---------------
 ///   version       | payload ...
 /// ```
+///
+/// ```
+/// use scenecast_protocol::directive::{Constraints, Slot, VersionedSlot};
+///
+/// let hold = Slot::Constraints(Constraints { hold: true, abort: false });
+/// let bytes = VersionedSlot::encode(0xABCD, 1, &hold);
+/// assert_eq!(bytes, [0x20, 0xAB, 0xCD, 0, 1, 0x80]);
+/// assert_eq!(VersionedSlot::decode(&bytes).unwrap().content, Some(hold));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct VersionedSlot {
     /// The slot, also where the payload is unreadable.

@@ -138,6 +138,16 @@ pub struct SettingsFault {
 ///   is layer 0; 3 only if the mask has other layers than these three.
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
+///
+/// ```
+/// use scenecast_protocol::directive::{Change, PlannerKind, Settings, ShortDecimal};
+///
+/// let first = Settings { alpha: Change::To(ShortDecimal::new(0.1).unwrap()), ..Settings::default() };
+/// let second = Settings { planner: Change::To(PlannerKind::Horizon), ..Settings::default() };
+/// let both = first.then(&second);
+/// assert_eq!((both.alpha, both.planner), (first.alpha, second.planner));
+/// assert_eq!(Settings::from_bytes(&both.to_bytes()), Some(both));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Settings {
     /// The planner that chooses the next waypoints.

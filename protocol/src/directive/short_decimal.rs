@@ -9,6 +9,14 @@ use std::fmt;
 /// ```text
 /// bit 15: 0; bits 14-10: e; bits 9-0: m, 100..=999. The value is m x 10^(e - 14); all bits 0: as configured.
 /// ```
+///
+/// ```
+/// use scenecast_protocol::directive::ShortDecimal;
+///
+/// assert_eq!(ShortDecimal::new(0.0025).unwrap().value(), 0.0025);
+/// assert_eq!(ShortDecimal::new(1.23456).unwrap().value(), 1.23, "three digits");
+/// assert_eq!(ShortDecimal::new(-1.0), None);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ShortDecimal {
     digits: u16,

@@ -32,6 +32,21 @@ pub enum Access {
 }
 
 /// The properties of a modem that the link depends on.
+///
+/// ```
+/// use scenecast_protocol::mac::{Access, ModemProfile};
+/// use std::time::Duration;
+///
+/// let modem = ModemProfile {
+///     frame_bytes: 64,
+///     bit_rate_bps: 1000.0,
+///     overhead_bits: 100,
+///     turn_around: Duration::from_millis(300),
+///     access: Access::Shared,
+/// };
+/// assert_eq!(modem.bits_on_air(50), 500);
+/// assert_eq!(modem.frame_airtime(), Duration::from_millis(612));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModemProfile {
     /// The size of a full frame in bytes.

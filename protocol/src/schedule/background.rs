@@ -76,6 +76,17 @@ impl BackgroundStream {
 /// long form, if there is any other stream, as many bytes as it takes:
 ///     a bit 1, five bits: number of streams, five bits for each: 0 to 15 that layer, 16 finer cells, 17 exemplars, zeros
 /// ```
+///
+/// ```
+/// use scenecast_protocol::map::LayerSet;
+/// use scenecast_protocol::schedule::BackgroundOrder;
+///
+/// let layers = LayerSet::default();
+/// let order = BackgroundOrder::from_names(&["exemplars", "depth"], &layers)?;
+/// assert_eq!(order.names(&layers), ["exemplars", "depth"]);
+/// assert!(BackgroundOrder::from_names(&["depth", "depth"], &layers).is_err());
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BackgroundOrder([Option<BackgroundStream>; BackgroundOrder::MAX_STREAMS]);
 

@@ -55,6 +55,14 @@ impl Class {
 
 /// Least share of each of [`Class::SHARED`] in percent of the bytes that an end sends, while the class has something to
 /// send. They add up to 100 at most; the rest goes to the class that comes first.
+///
+/// ```
+/// use scenecast_protocol::schedule::{Class, Shares};
+///
+/// let shares = Shares([20, 5, 5, 50, 20]);
+/// assert!(shares.is_sound());
+/// assert_eq!((shares.of(Class::Map), shares.of(Class::Overhead)), (0.5, 0.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shares(pub [u8; 5]);
 
