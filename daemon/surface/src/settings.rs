@@ -15,7 +15,7 @@ pub struct SettingsOrder {
     /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
     /// first where there is much to say. The cells of its model stay.
     pub cells: Option<String>,
-    /// The layers that it sends in addition to the labels: none, or different ones of confidence, depth, curiosity, separated by commas.
+    /// The layers that it sends in addition to the labels: none, or names of layers in any order, separated by commas.
     pub layers: Option<String>,
     /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
     pub alpha: Option<f64>,
@@ -118,14 +118,14 @@ impl SettingsOrder {
 /// The operator's papers about the settings of a vehicle. Each order that goes out holds all that this surface has asked for,
 /// so a newer one may take the place of one that the vehicle never heard.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SettingsDesk {
+pub struct SettingsRecord {
     asked: Settings,
     in_force: Settings,
     /// An order was superseded of which nobody knows whether the vehicle follows it.
     is_unsure: bool,
 }
 
-impl SettingsDesk {
+impl SettingsRecord {
     /// All that this surface has asked for.
     pub fn asked(&self) -> &Settings {
         &self.asked
@@ -160,6 +160,7 @@ impl SettingsDesk {
 mod tests {
     use super::*;
     use scenecast_protocol::directive::RefusalReason;
+    use scenecast_protocol::map::BUILT_IN_LAYERS;
 
     fn read(json: &str) -> Result<Settings, String> {
         serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read(&LayerSet::default())
@@ -182,9 +183,11 @@ mod tests {
             refused(r#"{"cells": "huge"}"#),
             "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
         );
+        let names: Vec<&str> = BUILT_IN_LAYERS.iter().map(|layer| &*layer.descriptor.name).collect();
+        let allowed = format!("none, or different ones of {}", names.join(", "));
         for layers in ["perplexity", "depth,depth", "depth,", "none,depth"] {
             let said = refused(&format!(r#"{{"layers": "{layers}"}}"#));
-            assert!(said.contains("none, or different ones of depth, confidence, curiosity"), "{said}");
+            assert!(said.contains(&allowed), "{said}");
         }
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
         assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));
@@ -203,37 +206,41 @@ mod tests {
 
     #[test]
     fn what_is_allowed_is_what_the_configuration_allows() {
-        use scenecast_config::{Allowed, KEYS};
+        use scenecast_config::Key;
         let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
         for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().numbers()) {
-            let key = KEYS.iter().find(|k| k.name == name).unwrap();
+            let key = Key::find(name).unwrap();
             // 0 words a second is a configuration's way to have no refinement.
             let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };
-            assert_eq!(key.allowed, Allowed::Range(low, *range.end()), "{name}");
+            assert_eq!(key.rule.range, (low, *range.end()), "{name}");
         }
     }
 
     #[test]
     fn what_is_in_force_is_what_the_vehicle_said_last() {
         let order = |json: &str| read(json).unwrap();
-        let mut desk = SettingsDesk::default();
-        let send = |desk: &mut SettingsDesk, json: &str, last| {
-            let settings = desk.next_order(&order(json), last);
-            desk.handle_sent(settings, last);
+        let mut record = SettingsRecord::default();
+        let send = |record: &mut SettingsRecord, json: &str, last| {
+            let settings = record.next_order(&order(json), last);
+            record.handle_sent(settings, last);
         };
-        send(&mut desk, r#"{"alpha": 0.5}"#, None);
-        assert_eq!(desk.in_force(), Some(&Settings::default()));
-        send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
-        desk.handle_settled(OrderStatus::Applied);
-        assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
-        send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
-        assert_eq!(desk.in_force(), None, "the vehicle may follow the layers already");
+        send(&mut record, r#"{"alpha": 0.5}"#, None);
+        assert_eq!(record.in_force(), Some(&Settings::default()));
+        send(&mut record, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
+        record.handle_settled(OrderStatus::Applied);
+        assert_eq!(
+            record.in_force(),
+            Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)),
+            "the first was never sent alone"
+        );
+        send(&mut record, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
+        send(&mut record, r#"{"beta": 1}"#, Some(OrderStatus::Received));
+        assert_eq!(record.in_force(), None, "the vehicle may follow the layers already");
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
-        desk.handle_settled(refused);
-        send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
-        assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        desk.handle_settled(OrderStatus::Applied);
-        assert_eq!(desk.in_force(), Some(desk.asked()));
+        record.handle_settled(refused);
+        send(&mut record, r#"{"alpha": 0}"#, Some(refused));
+        assert_eq!(record.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
+        record.handle_settled(OrderStatus::Applied);
+        assert_eq!(record.in_force(), Some(record.asked()));
     }
 }
