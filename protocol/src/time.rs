@@ -41,6 +41,7 @@ impl Instant {
     }
 
     /// Time since `earlier`, zero if it lies in the future.
+    #[must_use]
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_micros(self.0.saturating_sub(earlier.0))
     }

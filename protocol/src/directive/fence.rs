@@ -55,6 +55,7 @@ pub struct Fence {
 
 /// Why a fence is refused. Keep-outs are counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FenceFault {
     /// The fence is not a valid polygon.
     #[error("fence: {0}")]

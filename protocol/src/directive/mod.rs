@@ -19,7 +19,8 @@ pub use decision::{SlotReport, SlotState};
 pub use fence::{Fence, FenceFault};
 pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
-pub use outbox::{OrderStatus, PendingSlot, SlotOutbox, SlotProgress};
+pub use outbox::{OrderStatus, SlotProgress};
+pub(crate) use outbox::{PendingSlot, SlotOutbox};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
 pub use settings::{CellBand, Change, PlannerKind, Settings, SettingsFault};
@@ -248,6 +249,7 @@ pub struct VersionedSlot {
 
 impl VersionedSlot {
     /// Encodes `slot` at `version` of `series`.
+    #[must_use]
     pub fn encode(series: u16, version: u16, slot: &Slot) -> Vec<u8> {
         let mut out = vec![(slot.id() as u8) << 5];
         out.extend_from_slice(&series.to_be_bytes());

@@ -9,9 +9,11 @@ mod grant;
 mod master;
 
 pub use clock_map::ClockMap;
-pub use floor::Floor;
-pub use grant::{Grant, quarter_seconds};
-pub use master::{Master, MasterConfig};
+pub(crate) use floor::Floor;
+pub use grant::Grant;
+pub(crate) use grant::quarter_seconds;
+pub(crate) use master::Master;
+pub use master::MasterConfig;
 
 use std::time::Duration;
 
@@ -63,12 +65,14 @@ pub struct ModemProfile {
 
 impl ModemProfile {
     /// Bits on air of a transmission of `bytes`. In a polled cycle every frame occupies the airtime of a full one.
+    #[must_use]
     pub fn bits_on_air(&self, bytes: usize) -> u64 {
         let bytes = if self.access == Access::Polled { bytes.max(self.frame_bytes) } else { bytes };
         bytes as u64 * 8 + self.overhead_bits
     }
 
     /// The airtime of a transmission of `bytes`.
+    #[must_use]
     pub fn airtime(&self, bytes: usize) -> Duration {
         self.time_of(self.bits_on_air(bytes))
     }

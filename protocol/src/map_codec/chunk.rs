@@ -19,6 +19,7 @@ pub struct MapChunk {
 
 /// Why a chunk is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DecodeError {
     /// The bytes end inside the header.
     #[error("map chunk ends early")]

@@ -41,6 +41,7 @@ pub struct ChunkFile {
 
 /// Why a file of chunks cannot be made or used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChunkFileError {
     /// It does not begin with the magic.
     #[error("not a file of map chunks")]

@@ -6,6 +6,7 @@ use std::io::Cursor;
 
 /// Why a PNG file is not a label map.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RasterPngError {
     /// Not a PNG file, or a damaged or too large one.
     #[error("not a readable PNG: {0}")]

@@ -65,6 +65,7 @@ impl BitBudget {
     }
 
     /// The earliest time at which a transmission of `bits` may begin, not before `now`.
+    #[must_use]
     pub fn earliest(&self, bits: u64, now: Instant) -> Instant {
         let mut at = now;
         let short = millionths(bits).min(self.capacity()) - self.tokens - self.gained(now);

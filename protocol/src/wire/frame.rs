@@ -16,6 +16,7 @@ static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
 /// Why received bytes are not a frame for this end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// Too short, or the header exceeds the frame.
     #[error("the frame is too short")]

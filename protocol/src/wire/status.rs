@@ -167,6 +167,7 @@ pub struct VehicleStatus {
 
 /// Why bytes are not a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StatusError {
     /// They are too short or too long.
     #[error("the status has another length")]

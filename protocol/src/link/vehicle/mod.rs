@@ -228,6 +228,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// The next event; the host calls this until it returns `None`.
+    #[must_use]
     pub fn poll_event(&mut self) -> Option<VehicleEvent> {
         self.events.pop_front()
     }
@@ -265,6 +266,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// When [`Self::poll_transmit`] may next have a frame, unless the link waits for the surface.
+    #[must_use]
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
         self.next_wakeup().map(|at| (at, Wakeup::Turn))
     }

@@ -25,6 +25,7 @@ struct FramePlan {
 impl<S: StateSource> VehicleLink<S> {
     /// The next frame, if it is our turn, there is a reason to transmit and the budget allows it. The host calls this
     /// after every event and at [`Self::poll_timeout`] until it returns `None`.
+    #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let modem = self.config.modem;
         if self.content.handle_timeout(now) {
