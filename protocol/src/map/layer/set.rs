@@ -91,8 +91,8 @@ impl LayerSet {
         self.0.insert(id, layer);
     }
 
-    /// Adds a layer under the next free index; `None` if there are 16 already, or the description is not sound, or another
-    /// layer has the name.
+    /// Adds a layer under the next free index; `None` if there are 16 already, if the description is not sound, or if
+    /// another layer of the set has the same name.
     pub fn add(&mut self, layer: LayerDescriptor) -> Option<LayerId> {
         let free = LayerId::all().find(|&id| self.get(id).is_none())?;
         let is_new = layer.is_sound() && self.id(&layer.name).is_none();
