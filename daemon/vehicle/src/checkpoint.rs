@@ -107,7 +107,7 @@ mod tests {
     use crate::MapUpdate;
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
-    use scenecast_protocol::directive::{Change, Figure, Settings};
+    use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
     use scenecast_protocol::map::LayerId;
 
     fn config(sets: &[&str]) -> Config {
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_checkpoint_survives_other_priors() {
-        let figure = |value: f64| Change::To(Figure::new(value).unwrap());
+        let figure = |value: f64| Change::To(ShortDecimal::new(value).unwrap());
         let settings = Settings { gamma: figure(0.2), alpha: figure(0.5), ..Settings::default() };
         let mut whole = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..4).for_each(|at| drop(frame(&mut whole, at)));
@@ -205,7 +205,8 @@ mod tests {
         };
         assert_eq!(taken(&mut mapper), 20);
         for (rate, frames) in [(30.0, 20), (0.5, 20), (0.25, 10), (0.3, 12), (0.05, 2)] {
-            mapper.tune(&Settings { frames_per_s: Change::To(Figure::new(rate).unwrap()), ..Settings::default() });
+            mapper
+                .tune(&Settings { frames_per_s: Change::To(ShortDecimal::new(rate).unwrap()), ..Settings::default() });
             mapper.last_s = None;
             assert_eq!(taken(&mut mapper), frames, "{rate} 1/s of 0.5");
         }

@@ -10,7 +10,7 @@ use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{Measures, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
-use scenecast_protocol::directive::{Change, Figure, Settings};
+use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LayerId};
 use std::collections::BTreeMap;
 
@@ -114,7 +114,7 @@ impl Mapper {
 
     /// Follows settings that were checked; what they do not name is as configured. Topics and their labels stay.
     pub fn tune(&mut self, settings: &Settings) {
-        let or = |change: Change<Figure>, configured: f64| change.value().map_or(configured, Figure::value);
+        let or = |change: Change<ShortDecimal>, configured: f64| change.value().map_or(configured, ShortDecimal::value);
         let [alpha, beta, gamma] = self.configured.priors;
         let priors = (or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma));
         if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
@@ -122,7 +122,7 @@ impl Mapper {
             tracing::error!("the scene model keeps its priors: {e}");
         }
         self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
-        self.frames_per_s = settings.frames_per_s.value().map(Figure::value).or(self.configured.frames_per_s);
+        self.frames_per_s = settings.frames_per_s.value().map(ShortDecimal::value).or(self.configured.frames_per_s);
     }
 
     /// Whether a frame taken at mission time `t_s` is to be seen: of each interval of the frame rate the first one is.

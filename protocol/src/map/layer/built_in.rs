@@ -10,7 +10,7 @@ pub struct BuiltInLayer {
     pub id: LayerId,
     /// Its description; a vehicle may announce another one, for example with other depths.
     pub descriptor: LayerDescriptor,
-    /// One sentence for people.
+    /// One sentence about the layer for people.
     pub summary: &'static str,
 }
 
