@@ -39,7 +39,7 @@ pub trait LinkEnd {
     fn poll_timeout(&self, now: Instant) -> Option<Instant>;
 }
 
-/// What both kinds of ends have under the same names.
+/// Methods that every end has under the same names.
 macro_rules! forward {
     () => {
         fn budget_bps(&self) -> u32 {

@@ -17,7 +17,6 @@ use std::time::Duration;
 pub enum FrameEvent {
     /// A frame was handed to the modem.
     Sent {
-        /// Its length.
         bytes: usize,
         /// Its kind, as the link names it.
         kind: &'static str,
@@ -25,10 +24,7 @@ pub enum FrameEvent {
     /// The modem refused the frame that was handed over last. The link repairs it like a lost one.
     NotSent(Refusal),
     /// A frame came in and was given to the link.
-    Received {
-        /// Its length.
-        bytes: usize,
-    },
+    Received { bytes: usize },
     /// For the first time, more bits than the budget allows are on air in a window.
     OverBudget {
         /// Mean bit rate of the fullest window.
@@ -40,7 +36,6 @@ pub enum FrameEvent {
     ModemLost,
     /// The modem refuses something that a person must change; the reason is a line for that person.
     ModemRefused {
-        /// One line.
         reason: String,
         /// Whether the modem has worked before.
         was_ready: bool,
@@ -63,7 +58,6 @@ impl<E: LinkEnd> LinkHost<E> {
         Self { end, station, budget: BudgetWatch::default(), was_ready: false, events: VecDeque::new() }
     }
 
-    /// The role or link.
     pub fn end(&self) -> &E {
         &self.end
     }

@@ -9,9 +9,7 @@ use std::collections::VecDeque;
 pub enum PilotEvent {
     /// A line that a person should read.
     Note(String),
-    /// Its health has changed.
     Health {
-        /// The health now.
         health: Health,
         /// The counters so far, as one line.
         counters: String,

@@ -1,4 +1,4 @@
-//! The surface's host.
+//! The host of the surface: role, modem and the surface vehicle's autopilot.
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
@@ -13,13 +13,11 @@ use std::collections::VecDeque;
 /// Requests and news of a surface's host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SurfaceHostEvent {
-    /// News of the role.
     Role(SurfaceOutput),
     /// The surface vehicle sails there, metres east and north in the world's frame.
     Following(f64, f64),
     /// News of frames and modem.
     Frame(FrameEvent),
-    /// News of the autopilot.
     Pilot(PilotEvent),
 }
 
@@ -78,7 +76,6 @@ impl SurfaceHost {
         Self { link: LinkHost::new(surface, station), follower, events: VecDeque::new() }
     }
 
-    /// The role.
     pub fn surface(&self) -> &Surface {
         self.link.end()
     }

@@ -1,4 +1,4 @@
-//! The vehicle's host.
+//! The host of the vehicle: role, modem, autopilot, persistent state and mapper.
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
@@ -11,7 +11,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle, VehicleOutput};
 use std::collections::{BTreeMap, VecDeque};
 
-/// An older fix does not tell the autopilot where it is, seconds.
+/// An older fix is not passed on to the autopilot, seconds.
 const MAX_FIX_AGE_S: f64 = 60.0;
 
 /// Requests and news of a vehicle's host.
@@ -24,7 +24,6 @@ pub enum VehicleHostEvent {
     Waypoint(f64, f64),
     /// The vehicle stays where it is.
     Hold,
-    /// The vehicle comes up.
     Surface,
     /// Have the mapper follow these settings; those that are not named are as configured.
     Tune(Settings),
@@ -36,20 +35,15 @@ pub enum VehicleHostEvent {
     Fixed(Fix, Instant),
     /// News of frames and modem.
     Frame(FrameEvent),
-    /// News of the autopilot.
     Pilot(PilotEvent),
 }
 
 /// Where a camera frame was taken, in the map's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraPose {
-    /// East, metres.
     pub x_m: f64,
-    /// North, metres.
     pub y_m: f64,
-    /// Clockwise from north, radians.
     pub heading_rad: f64,
-    /// Below the surface, metres.
     pub depth_m: f64,
 }
 
@@ -121,7 +115,6 @@ impl VehicleHost {
         Self { link, pilot, mapper: MapperQueue::default(), is_persisting: false, events: VecDeque::new() }
     }
 
-    /// The role.
     pub fn vehicle(&self) -> &Vehicle {
         self.link.end()
     }

@@ -1,14 +1,12 @@
-//! How the vehicle of a rehearsal really moves, and what its own sensors make of it.
+//! The true motion of a simulated vehicle, and the odometry of its drifting sensors.
 
 use scenecast_core::wrap_rad;
 use sim_channel::Stream;
 
-/// What the vehicle's sensors tell of a step.
+/// The measured displacement of a step, in error by the drift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Odometry {
-    /// East, metres.
     pub dx_m: f64,
-    /// North, metres.
     pub dy_m: f64,
     /// Heading clockwise from north, radians.
     pub heading_rad: f64,
@@ -20,11 +18,10 @@ pub struct Odometry {
 pub struct Motion {
     /// True place east, metres. Only the camera and the water may look.
     pub x_m: f64,
-    /// True place north, metres.
     pub y_m: f64,
     /// True heading clockwise from north, radians.
     pub heading_rad: f64,
-    /// Way so far, metres.
+    /// Length of the true path so far, metres.
     pub distance_m: f64,
     speed_m_s: f64,
     scale_error: f64,
@@ -36,9 +33,9 @@ pub struct Motion {
     /// East and north, metres a second.
     current: (f64, f64),
     /// Where it believes to be, for a vehicle that reckons by itself.
-    believed: (f64, f64),
+    estimated: (f64, f64),
     rising: bool,
-    dice: Stream,
+    rng: Stream,
 }
 
 /// Speed up and down, metres a second: that of a small vehicle.
@@ -47,9 +44,9 @@ const VERTICAL_M_S: f64 = 0.3;
 impl Motion {
     /// At rest at a place; `drift` is the error of dead reckoning a metre of way.
     pub fn new(x_m: f64, y_m: f64, speed_m_s: f64, drift: f64, seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[1]);
-        let scale_error = drift * dice.normal();
-        let heading_error_rad = drift * dice.normal();
+        let mut rng = Stream::new(seed, &[1]);
+        let scale_error = drift * rng.normal();
+        let heading_error_rad = drift * rng.normal();
         Self {
             x_m,
             y_m,
@@ -62,9 +59,9 @@ impl Motion {
             target: None,
             turn_rate: None,
             current: (0.0, 0.0),
-            believed: (0.0, 0.0),
+            estimated: (0.0, 0.0),
             rising: false,
-            dice,
+            rng,
         }
     }
 
@@ -82,14 +79,14 @@ impl Motion {
 
     /// Sets the way to go from where it believes to be, or stops.
     pub fn set_way(&mut self, way: Option<(f64, f64)>) {
-        let (x, y) = self.believed;
+        let (x, y) = self.estimated;
         self.set_target(way.map(|(east, north)| (x + east, y + north)));
     }
 
     /// Moves for `dt_s` seconds by its own reckoning.
     pub fn step_on(&mut self, dt_s: f64) -> Odometry {
-        let step = self.step(self.believed, dt_s);
-        self.believed = (self.believed.0 + step.dx_m, self.believed.1 + step.dy_m);
+        let step = self.step(self.estimated, dt_s);
+        self.estimated = (self.estimated.0 + step.dx_m, self.estimated.1 + step.dy_m);
         step
     }
 
@@ -115,14 +112,14 @@ impl Motion {
         depth_m + (aim - depth_m).clamp(-VERTICAL_M_S * dt_s, VERTICAL_M_S * dt_s)
     }
 
-    /// Moves for `dt_s` seconds; `believed` is where the vehicle believes to be, which is what it steers by.
-    pub fn step(&mut self, believed: (f64, f64), dt_s: f64) -> Odometry {
+    /// Moves for `dt_s` seconds; it steers by `estimated`, its own position estimate.
+    pub fn step(&mut self, estimated: (f64, f64), dt_s: f64) -> Odometry {
         self.x_m += self.current.0 * dt_s;
         self.y_m += self.current.1 * dt_s;
         let Some((tx, ty)) = self.target else {
             return Odometry { dx_m: 0.0, dy_m: 0.0, heading_rad: self.heading_rad };
         };
-        let (to_x, to_y) = (tx - believed.0, ty - believed.1);
+        let (to_x, to_y) = (tx - estimated.0, ty - estimated.1);
         let way = (self.speed_m_s * dt_s).min(to_x.hypot(to_y));
         if way > 1e-9 {
             let off = wrap_rad(to_x.atan2(to_y) - self.heading_rad);
@@ -138,7 +135,7 @@ impl Motion {
         self.x_m += way * true_sin;
         self.y_m += way * true_cos;
         self.distance_m += way;
-        let measured = way * (1.0 + self.scale_error) + self.drift * way.sqrt() * 0.3 * self.dice.normal();
+        let measured = way * (1.0 + self.scale_error) + self.drift * way.sqrt() * 0.3 * self.rng.normal();
         Odometry { dx_m: measured * sin, dy_m: measured * cos, heading_rad: self.heading_rad }
     }
 }
@@ -150,12 +147,12 @@ mod tests {
     fn error_after_1_km(drift: f64, seed: u64) -> f64 {
         let mut motion = Motion::new(0.0, 0.0, 1.0, drift, seed);
         motion.set_target(Some((1e6, 0.0)));
-        let mut believed = (0.0, 0.0);
+        let mut estimated = (0.0, 0.0);
         for _ in 0..2000 {
-            let o = motion.step(believed, 0.5);
-            believed = (believed.0 + o.dx_m, believed.1 + o.dy_m);
+            let o = motion.step(estimated, 0.5);
+            estimated = (estimated.0 + o.dx_m, estimated.1 + o.dy_m);
         }
-        (believed.0 - motion.x_m).hypot(believed.1 - motion.y_m)
+        (estimated.0 - motion.x_m).hypot(estimated.1 - motion.y_m)
     }
 
     #[test]

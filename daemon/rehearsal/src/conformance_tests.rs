@@ -1,7 +1,7 @@
-//! What every driver must do, each at its emulator, in virtual time.
+//! Requirements for every driver, each at its emulator, in virtual time.
 
-use crate::VirtualTime;
-use crate::modem_bench::{Dock, DockSetting};
+use crate::modem_bench::{ModemBench, ModemSetting};
+use crate::virtual_time::VirtualTime;
 use scenecast_config::Config;
 use scenecast_drivers::modem;
 use scenecast_drivers::modem::{Class, Destination, Driver, Event, Refusal, Token};
@@ -19,7 +19,7 @@ const SECOND: Duration = Duration::from_secs(1);
 /// After a fault, traffic goes on within so long.
 const RESUMES: Duration = Duration::from_secs(10);
 
-/// What modems need by themselves: a Micromodem for a cycle of each end, for nothing is heard before the end of a packet;
+/// Time that modems need by themselves: a Micromodem for a cycle of each end, for no packet is received before its end;
 /// an S2C that speaks to one that has forgotten their connection, for a train and for its patience.
 fn cycle(name: &str) -> Duration {
     match name {
@@ -44,8 +44,8 @@ fn config(sets: &[&str]) -> Config {
     scenecast_config::load(None, &sets).unwrap()
 }
 
-fn setting(sets: &[&str], loss: f64) -> DockSetting {
-    DockSetting { config: config(sets), range_m: 500.0, loss }
+fn setting(sets: &[&str], loss: f64) -> ModemSetting {
+    ModemSetting { config: config(sets), range_m: 500.0, loss }
 }
 
 fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
@@ -56,27 +56,27 @@ fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
 }
 
 /// Two ends that speak with each other.
-fn speaking(sets: &[&str], loss: f64) -> Dock {
-    let mut dock = Dock::new(&setting(sets, loss), 5).unwrap();
-    dock.load = Some(2000);
-    let met = dock.run_until(Instant::from_secs_f64(900.0), |d| useful(d) > 10.0);
+fn speaking(sets: &[&str], loss: f64) -> ModemBench {
+    let mut bench = ModemBench::new(&setting(sets, loss), 5).unwrap();
+    bench.load = Some(2000);
+    let met = bench.run_until(Instant::from_secs_f64(900.0), |d| useful(d) > 10.0);
     assert!(met, "{sets:?}: nothing got through");
-    dock
+    bench
 }
 
-fn useful(dock: &Dock) -> f64 {
-    dock.view().map_or(0.0, |v| v.replica().useful_bytes())
+fn useful(bench: &ModemBench) -> f64 {
+    bench.view().map_or(0.0, |v| v.replica().useful_bytes())
 }
 
 /// Whether the surface hears something new of the vehicle within `most`.
-fn resumes_within(dock: &mut Dock, most: Duration) -> bool {
-    let heard = dock.heard[1];
-    let until = dock.now + most;
-    dock.run_until(until, |d| d.heard[1] > heard)
+fn resumes_within(bench: &mut ModemBench, most: Duration) -> bool {
+    let heard = bench.heard[1];
+    let until = bench.now + most;
+    bench.run_until(until, |d| d.heard[1] > heard)
 }
 
-fn nothing_applied_twice(dock: &Dock) {
-    for (slot, times) in &dock.applied {
+fn nothing_applied_twice(bench: &ModemBench) {
+    for (slot, times) in &bench.applied {
         assert_eq!(times.len(), 1, "{slot:?} was applied at {times:?}");
     }
 }
@@ -84,13 +84,13 @@ fn nothing_applied_twice(dock: &Dock) {
 #[test]
 fn ends_meet_and_what_is_said_and_commanded_arrives() {
     for (name, sets) in KINDS {
-        let mut dock = speaking(sets, 0.1);
-        let version = dock.issue().unwrap();
-        let until = dock.now + 200 * SECOND;
-        let applied = dock.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
+        let mut bench = speaking(sets, 0.1);
+        let version = bench.issue().unwrap();
+        let until = bench.now + 200 * SECOND;
+        let applied = bench.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
         assert!(applied, "{name}: the directive was not applied");
-        nothing_applied_twice(&dock);
-        assert!(dock.refusals.is_empty(), "{name}: {:?}", dock.refusals);
+        nothing_applied_twice(&bench);
+        assert!(bench.refusals.is_empty(), "{name}: {:?}", bench.refusals);
     }
 }
 
@@ -109,7 +109,7 @@ fn what_does_not_fit_is_refused_to_the_caller() {
 }
 
 #[test]
-fn addresses_that_the_modem_cannot_reach_are_refused_to_the_caller() {
+fn addresses_out_of_reach_are_refused() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
         let mut driver = driver(&config(sets), Address::SURFACE);
         for bad in [0, 10, 200] {
@@ -120,42 +120,42 @@ fn addresses_that_the_modem_cannot_reach_are_refused_to_the_caller() {
 }
 
 #[test]
-fn a_modem_with_another_address_is_refused_aloud_and_sends_nothing() {
+fn a_modem_with_a_wrong_address_is_refused() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
-        let mut dock = Dock::new(&setting(sets, 0.0), 5).unwrap();
-        dock.inject(0, Fault::WrongAddress(7));
-        dock.run(60 * SECOND);
-        let said = dock.refusals.join(" ");
+        let mut bench = ModemBench::new(&setting(sets, 0.0), 5).unwrap();
+        bench.inject(0, Fault::WrongAddress(7));
+        bench.run(60 * SECOND);
+        let said = bench.refusals.join(" ");
         assert!(said.contains("is 7 and ours is 1"), "{name}: {said:?}");
-        assert_eq!(dock.vehicle.audit().transmissions(), 0, "{name}");
+        assert_eq!(bench.vehicle.audit().transmissions(), 0, "{name}");
     }
 }
 
-/// Traffic goes on by itself within ten seconds, and what a modem needs to begin a cycle or a connection, after a fault.
-fn survives(fault: impl Fn(&mut Dock), lasts: Duration) {
+/// Traffic resumes by itself within ten seconds and the time that a modem needs to begin a cycle or a connection, after a fault.
+fn survives(fault: impl Fn(&mut ModemBench), lasts: Duration) {
     for (name, sets) in KINDS {
         for end in [0, 1] {
-            let mut dock = speaking(sets, 0.0);
-            dock.issue().unwrap();
-            dock.run(Duration::from_millis(3700));
-            dock.issue().unwrap();
-            DockFault(&mut dock, end).apply(&fault);
-            dock.run(lasts);
-            assert!(resumes_within(&mut dock, RESUMES + cycle(name)), "{name}: end {end} does not come back");
-            let version = dock.issue().unwrap();
-            let until = dock.now + 120 * SECOND;
-            let applied = dock.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
+            let mut bench = speaking(sets, 0.0);
+            bench.issue().unwrap();
+            bench.run(Duration::from_millis(3700));
+            bench.issue().unwrap();
+            FaultAt(&mut bench, end).apply(&fault);
+            bench.run(lasts);
+            assert!(resumes_within(&mut bench, RESUMES + cycle(name)), "{name}: end {end} does not come back");
+            let version = bench.issue().unwrap();
+            let until = bench.now + 120 * SECOND;
+            let applied = bench.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
             assert!(applied, "{name}: end {end}: no directive gets through");
-            nothing_applied_twice(&dock);
+            nothing_applied_twice(&bench);
         }
     }
 }
 
-/// Tells a fault which end it is at.
-struct DockFault<'a>(&'a mut Dock, usize);
+/// A bench whose fault is at one end.
+struct FaultAt<'a>(&'a mut ModemBench, usize);
 
-impl DockFault<'_> {
-    fn apply(self, fault: &impl Fn(&mut Dock)) {
+impl FaultAt<'_> {
+    fn apply(self, fault: &impl Fn(&mut ModemBench)) {
         self.0.struck = self.1;
         fault(self.0);
     }
@@ -218,14 +218,14 @@ fn ports_of_both_interpreters_understand_each_other() {
     for sets in [KINDS[0].1, KINDS[1].1] {
         for (vehicle, surface) in [(At, At), (At, Net), (Net, At)] {
             let modems = [modem(1, vehicle), modem(10, surface)];
-            let mut dock = Dock::with_modems(&setting(sets, 0.0), modems, 5).unwrap();
-            dock.load = Some(2000);
-            dock.run(120 * SECOND);
-            let version = dock.issue().unwrap();
-            dock.run(60 * SECOND);
+            let mut bench = ModemBench::with_modems(&setting(sets, 0.0), modems, 5).unwrap();
+            bench.load = Some(2000);
+            bench.run(120 * SECOND);
+            let version = bench.issue().unwrap();
+            bench.run(60 * SECOND);
             let what = format!("{sets:?} {vehicle:?} {surface:?}");
-            assert!(useful(&dock) > 2000.0, "{what}: {} bytes got through", useful(&dock));
-            assert!(dock.applied.contains_key(&(SlotId::Utility, version)), "{what}: the directive was not applied");
+            assert!(useful(&bench) > 2000.0, "{what}: {} bytes got through", useful(&bench));
+            assert!(bench.applied.contains_key(&(SlotId::Utility, version)), "{what}: the directive was not applied");
         }
     }
 }
@@ -273,7 +273,7 @@ fn every_transmission_has_one_end() {
     }
 }
 
-/// Replies of a modem that takes everything and tells nothing of what became of it.
+/// Replies of a modem that takes everything and never reports an outcome.
 fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
     while let Some(bytes) = driver.poll_output(now) {
         let text = String::from_utf8_lossy(&bytes).into_owned();

@@ -9,7 +9,7 @@ use scenecast_vehicle::Durable;
 use std::time::Duration;
 
 #[test]
-fn a_vehicle_that_answers_a_call_gets_a_desk_and_its_status_is_shown() {
+fn a_discovered_vehicle_gets_a_record_and_a_status() {
     let load = |sets: &[&str]| {
         scenecast_config::load(None, &sets.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()).unwrap()
     };

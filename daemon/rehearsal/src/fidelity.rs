@@ -19,15 +19,13 @@ pub struct FidelityRow {
     pub agreement_mean: f64,
     /// Seconds until a change at the vehicle shows at the operator's: median.
     pub age_s_median: f64,
-    /// The same: 95th percentile.
     pub age_s_p95: f64,
-    /// The same: maximum.
     pub age_s_max: f64,
     /// Of the operator's map at the end of the survey with the truth, nats.
     pub mutual_information_nats: Option<f64>,
     /// Bits that the vehicle put on air.
     pub sent_bits: u64,
-    /// Bytes of directives, exemplars and fixes are the same for both; this is what carried the map.
+    /// Bytes of directives, exemplars and fixes are the same for both; these carried the map.
     pub map_bytes: u64,
 }
 

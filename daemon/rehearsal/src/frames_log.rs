@@ -1,10 +1,10 @@
-//! One line a frame.
+//! The log of a mission's frames, one line a frame.
 
 use sim_channel::Arrival;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What is kept of a frame until its fate is known.
+/// A frame whose fate is not known yet.
 #[derive(Debug, Clone)]
 struct Sent {
     at_s: f64,
@@ -63,7 +63,7 @@ impl FramesLog {
         sent.write(&fate, &mut self.text);
     }
 
-    /// The log so far; what is still under way is `open`.
+    /// The log so far; frames still on their way are `open`.
     pub fn text(&self) -> String {
         let mut text = self.text.clone();
         for sent in self.open.values() {

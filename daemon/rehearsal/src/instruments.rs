@@ -1,4 +1,4 @@
-//! GPS receiver and compass of a rehearsed surface vehicle: what they say of where it is.
+//! GPS receiver and compass of a rehearsed surface vehicle: their NMEA sentences.
 
 use scenecast_core::{LatLon, TangentPlane, nmea};
 use sim_channel::Stream;
@@ -6,36 +6,35 @@ use sim_channel::Stream;
 /// Standard deviation of the compass, degrees.
 const COMPASS_SIGMA_DEG: f64 = 0.5;
 
-/// What a receiver is and how good it is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Receiver {
     /// Where x = y = 0 of the world is.
     pub(super) origin: LatLon,
     /// White noise, metres; beside it an error of as much that changes over minutes.
     pub(super) sigma_m: f64,
-    /// What it says of its quality: dilution of precision, and whether it has corrections.
+    /// The quality that it reports: dilution of precision, and whether it has corrections.
     pub(super) hdop: f64,
     pub(super) is_corrected: bool,
 }
 
-/// Says sentences, with a chance of its own.
+/// Writes sentences, with random errors of its own.
 #[derive(Debug)]
 pub(super) struct Instruments {
     receiver: Receiver,
     plane: TangentPlane,
-    dice: Stream,
+    rng: Stream,
     slow_error: (f64, f64),
 }
 
 impl Instruments {
     pub(super) fn new(receiver: Receiver, seed: u64) -> Self {
         let plane = TangentPlane::new(receiver.origin);
-        Self { receiver, plane, dice: Stream::new(seed, &[9]), slow_error: (0.0, 0.0) }
+        Self { receiver, plane, rng: Stream::new(seed, &[9]), slow_error: (0.0, 0.0) }
     }
 
     /// Position and heading as NMEA 0183, once a second; `astray` is by how much the receiver is led astray.
     pub(super) fn report(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
-        let [a, b, c, d, e] = [(); 5].map(|()| self.dice.normal());
+        let [a, b, c, d, e] = [(); 5].map(|()| self.rng.normal());
         let Receiver { sigma_m, hdop, is_corrected, .. } = self.receiver;
         let slow = |error: f64, draw: f64| error * 0.99 + sigma_m * 0.14 * draw;
         self.slow_error = (slow(self.slow_error.0, a), slow(self.slow_error.1, b));

@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 pub struct Delays(Vec<f32>);
 
 impl Delays {
-    /// Takes a delay in.
     pub fn push(&mut self, seconds: f64) {
         self.0.push(seconds as f32);
     }
@@ -40,10 +39,10 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Looks at both maps; `versions` tell whether either has changed since the last look.
+    /// Looks at both maps; unequal `versions` mean that either has changed since the last look.
     pub fn look(&mut self, vehicle: &LabelGrid, operator: &LabelGrid, versions: (u64, u64), now: Instant) {
         if let Some(last) = self.last.replace(now) {
-            // Before the vehicle has a map there is nothing to agree about.
+            // Agreement is undefined before the vehicle has a map.
             let passed = if self.mapped { now.since(last).as_secs_f64() } else { 0.0 };
             self.integral += self.agreement * passed;
             self.seconds += passed;
@@ -77,12 +76,11 @@ impl Meter {
         if self.seconds > 0.0 { self.integral / self.seconds } else { 0.0 }
     }
 
-    /// The survey is over: what comes now no longer counts for the mean.
+    /// The survey is over: later changes do not count for the mean.
     pub fn end_survey(&mut self) {
         self.survey_mean = Some(self.agreement_mean());
     }
 
-    /// [`Self::agreement_mean`] over the survey.
     pub fn agreement_mean_of_survey(&self) -> f64 {
         self.survey_mean.unwrap_or_else(|| self.agreement_mean())
     }
@@ -102,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn agreement_and_delay_follow_a_cell_from_difference_to_agreement() {
+    fn agreement_and_delay_follow_a_cell() {
         let at = |s: f64| Instant::from_secs_f64(s);
         let (mut vehicle, mut operator) = (LabelGrid::default(), LabelGrid::default());
         let mut meter = Meter::default();

@@ -34,9 +34,9 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
     scenecast_files::write_whole(&dir.join("report.json"), text.as_bytes())
 }
 
-/// Removes what an earlier run left that this one may not write again.
+/// Removes files of an earlier run that this one may not write again.
 fn remove_old(dir: &Path) {
-    // What is not there need not be removed; what cannot be removed is complained of when it is written.
+    // A file that cannot be removed causes an error later, when it is written.
     let _ = std::fs::remove_file(dir.join("truth.png"));
     for entry in std::fs::read_dir(dir.join("exemplars")).into_iter().flatten().flatten() {
         let name = entry.file_name();

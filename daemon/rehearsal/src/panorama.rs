@@ -6,9 +6,7 @@ use scenecast_core::palette::colour;
 use scenecast_protocol::map::Cell;
 use std::io::Cursor;
 
-/// Columns of each half.
 const HALF: u32 = 520;
-/// Columns between the halves.
 const GAP: u32 = 12;
 const PAPER: Rgb<u8> = Rgb([255; 3]);
 const UNSEEN: Rgb<u8> = Rgb([226, 232, 236]);

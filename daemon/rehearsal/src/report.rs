@@ -60,7 +60,6 @@ impl Mission {
         Some((mi.nats, mi.normalised))
     }
 
-    /// The operator's map.
     pub fn operator_map(&self) -> LabelGrid {
         self.surface().map(self.address()).cloned().unwrap_or_default()
     }
@@ -100,7 +99,7 @@ fn map(m: &Mission) -> Value {
     })
 }
 
-/// A plane by its name: cells with a level, how well the operator's copy follows, and what that takes.
+/// A layer by its name: cells with a level, how well the operator's copy follows, and the bytes for it.
 fn plane(m: &Mission, plane: &PlaneSource) -> (&'static str, Value) {
     let kind = plane.scale().kind();
     let bytes = m.vehicle().stats().bytes_by_class.get(&kind.into()).copied().unwrap_or(0);
@@ -226,7 +225,7 @@ impl Mission {
         self.logbook.legs.iter().skip(self.logbook.legs_before_fence).filter(is_out).count()
     }
 
-    /// Explored cells, each weighted by what the operator's last utility says its label is worth.
+    /// Explored cells, each weighted by its label's value in the operator's last utility.
     pub fn utility_collected(&self) -> f64 {
         let Some(utility) = self.vehicle().utility() else { return 0.0 };
         self.vehicle().cells().map(|(_, label)| utility.weight(label)).sum()

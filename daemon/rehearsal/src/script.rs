@@ -7,16 +7,14 @@ use scenecast_surface::{FenceOrder, LimitsOrder, Surface, Wish};
 use std::collections::BTreeMap;
 use std::collections::VecDeque;
 
-/// What the scripted operator does.
+/// An act of the scripted operator.
 #[derive(Debug, Clone, PartialEq)]
 enum Act {
     /// Favours the label with this rank by area (0 = the largest) and turns from the largest.
     Favour(usize),
     /// Asks for an image of the label with this rank.
     Show(usize),
-    /// Sends a fence.
     Fence(FenceOrder),
-    /// Sends limits.
     Limits(LimitsOrder),
 }
 
@@ -69,7 +67,7 @@ impl Script {
         self.acts.front().map(|(at, _)| *at)
     }
 
-    /// Does what is due; what the map does not allow yet is tried again ten seconds later.
+    /// Performs the acts that are due; an act that the map does not allow yet is tried again ten seconds later.
     pub fn handle_timeout(&mut self, surface: &mut Surface, vehicle: Address, now: Instant) {
         while self.acts.front().is_some_and(|(at, _)| *at <= now) {
             let Some((at, act)) = self.acts.pop_front() else { return };

@@ -17,7 +17,6 @@ pub struct SimulatedAutopilot {
 }
 
 impl SimulatedAutopilot {
-    /// Seconds between two steps.
     const STEP_S: f64 = 0.5;
     /// Dives and rises so fast, m/s.
     const DIVES_M_S: f64 = 0.3;

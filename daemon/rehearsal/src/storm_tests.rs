@@ -1,4 +1,4 @@
-//! Drivers under random and mutated lines: nothing panics, memory is bounded, and they still come back to work.
+//! Drivers under random and mutated lines: none panics, memory is bounded, and they still come back to work.
 
 use scenecast_core::MicromodemRate;
 use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser, format_sentence};
@@ -36,15 +36,14 @@ const SEEDS: [&[u8]; 22] = [
     b"$CACST,6,0,20250606230123.348554,06,32767,45,0102,0123,07,00,00,00,00,1,001,000,0,3,1,0,150*00\r\n",
 ];
 
-/// Draws whole numbers.
-struct Dice(Stream);
+struct LineRng(Stream);
 
-impl Dice {
+impl LineRng {
     fn below(&mut self, n: usize) -> usize {
         self.0.below(n)
     }
 
-    /// A line of the seeds, changed a little or much; sentences mostly with a right checksum, or nothing would be read.
+    /// A line of the seeds, changed a little or much; most sentences have a right checksum, or none would be read.
     fn line(&mut self) -> Vec<u8> {
         let mut line = SEEDS[self.below(SEEDS.len())].to_vec();
         for _ in 0..self.below(4) {
@@ -95,7 +94,7 @@ fn drivers() -> [Box<dyn Driver>; 3] {
     ]
 }
 
-/// Feeds a driver like a host that keeps to the rules; says how often it was ready.
+/// Feeds a driver like a host that keeps to the rules; returns how often it was ready.
 fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
     driver.handle_bytes(line, now);
     let mut told = 0;
@@ -116,27 +115,27 @@ fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
 
 #[test]
 fn any_lines_are_survived_by_drivers() {
-    let mut dice = Dice(Stream::new(1, &[1]));
+    let mut rng = LineRng(Stream::new(1, &[1]));
     let mut drivers = drivers();
     let mut now = Instant::from_secs_f64(1.0);
     drivers.iter_mut().for_each(|d| d.handle_open(now));
     for _ in 0..lines() {
-        let line = dice.line();
+        let line = rng.line();
         for driver in &mut drivers {
             feed(driver.as_mut(), &line, now);
         }
-        now = now + Duration::from_millis(dice.below(300) as u64);
+        now = now + Duration::from_millis(rng.below(300) as u64);
     }
 }
 
 #[test]
 fn any_lines_are_survived_by_parsers_in_bounded_memory() {
-    let mut dice = Dice(Stream::new(2, &[1]));
+    let mut rng = LineRng(Stream::new(2, &[1]));
     let (mut plain, mut wrapped, mut sentences) =
         (LineParser::default(), LineParser::default(), SentenceParser::default());
     wrapped.set_ties(true);
     for i in 0..lines() {
-        let line = dice.line();
+        let line = rng.line();
         for parser in [&mut plain, &mut wrapped] {
             parser.push(&line);
             while parser.next_line().is_some() {}

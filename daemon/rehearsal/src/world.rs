@@ -64,7 +64,7 @@ impl World {
         inside.then(|| self.image.get_pixel_checked(column as u32, line as u32)).flatten().map(|p| p.0)
     }
 
-    /// What a down-looking camera sees at a place (metres) and heading (radians clockwise from north). Beyond its limits
+    /// The view of a down-looking camera at a place (metres) and heading (radians clockwise from north). Beyond its limits
     /// the image is mirrored.
     pub fn view(&self, x_m: f64, y_m: f64, heading_rad: f64, width: u32, height: u32) -> RgbImage {
         let (w, h) = self.image.dimensions();
@@ -83,7 +83,7 @@ impl World {
         view
     }
 
-    /// The class of most annotated pixels of a cell; `None` outside the image or where nothing is annotated.
+    /// The class of most annotated pixels of a cell; `None` outside the image or the annotated parts.
     pub fn class_of(&self, cell: Cell, cell_m: f64) -> Option<u8> {
         let classes = self.classes.as_ref()?;
         let (w, h) = (self.image.width() as i64, self.image.height() as i64);
@@ -113,7 +113,7 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn the_camera_sees_what_lies_north_at_the_top_and_turns_with_the_heading() {
+    fn north_is_at_the_top_and_turns_with_the_heading() {
         let image = RgbImage::from_fn(200, 200, |x, y| Rgb([x as u8, y as u8, 0]));
         let world = World { image, metres_per_pixel: 0.1, classes: None };
         let north = world.view(10.0, 10.0, 0.0, 64, 64);

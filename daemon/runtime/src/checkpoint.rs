@@ -4,12 +4,10 @@ use super::journal::Storage;
 use scenecast_core::UserError;
 use std::io;
 
-/// The file's name.
 const NAME: &str = "scene.checkpoint";
 /// The name that it is written under.
 const PART: &str = "scene.checkpoint.part";
 
-/// Keeps checkpoints.
 pub(super) struct CheckpointFile<S: Storage> {
     storage: S,
 }

@@ -16,7 +16,6 @@ impl Clock {
         Self { began: std::time::Instant::now(), scale }
     }
 
-    /// Mission time now.
     pub fn now(&self) -> Instant {
         Instant::from_secs_f64(self.began.elapsed().as_secs_f64() * self.scale)
     }

@@ -1,4 +1,4 @@
-//! The vehicle's durable state: what is read of it at the start, and kept while it runs.
+//! The vehicle's durable state: read at the start of a run, and kept during it.
 
 use super::journal::{Damage, Journal, JournalError, Storage};
 use scenecast_core::UserError;
@@ -8,9 +8,9 @@ use std::path::Path;
 /// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.
 const JOURNAL: &str = "vehicle.journal";
 /// The file of builds before there was a journal.
-const BEFORE: &str = "vehicle.state";
-/// Length at which the journal begins anew: 64 records of a block.
-const MOST_BYTES: usize = 64 * 4096;
+const EARLIER_FILE: &str = "vehicle.state";
+/// Length at which the journal is rewritten: 64 records of a block.
+const MAX_BYTES: usize = 64 * 4096;
 
 /// Keeps the durable state of a run.
 pub(super) struct Keeper<S: Storage> {
@@ -18,7 +18,7 @@ pub(super) struct Keeper<S: Storage> {
 }
 
 /// A run that has begun.
-pub(super) struct Run<S: Storage> {
+pub(super) struct StartedRun<S: Storage> {
     pub(super) keeper: Keeper<S>,
     pub(super) durable: Durable,
     /// Whether there was a run before it.
@@ -26,13 +26,17 @@ pub(super) struct Run<S: Storage> {
 }
 
 impl<S: Storage> Keeper<S> {
-    /// Begins a run: what survived the last one. `checkpoint` is the lineage and the epoch of a scene model that goes on;
+    /// Begins a run with the state that survived the last one. `checkpoint` is the lineage and the epoch of a scene model that continues;
     /// if they are those of the last run the epoch goes on too, otherwise it is one that no run before has used.
     ///
     /// The first run of a mission has the given `lineage`, which is random.
-    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> Result<Run<S>, UserError> {
+    pub(super) fn begin_run(
+        storage: S,
+        lineage: u64,
+        checkpoint: Option<(u64, u8)>,
+    ) -> Result<StartedRun<S>, UserError> {
         let place = storage.path(JOURNAL);
-        let opened = Journal::open(storage, JOURNAL, MOST_BYTES);
+        let opened = Journal::open(storage, JOURNAL, MAX_BYTES);
         let (journal, state) = opened.map_err(|e| for_people(&place, e))?;
         let is_again = state.is_some();
         let durable = match state {
@@ -53,9 +57,9 @@ impl<S: Storage> Keeper<S> {
             }
         };
         let mut keeper = Self { journal };
-        // Label ids of another model mean something else: an epoch is safe before it is told to anybody.
+        // Label ids of another model mean something else: an epoch is on disk before it is published.
         keeper.save(&durable)?;
-        Ok(Run { keeper, durable, is_again })
+        Ok(StartedRun { keeper, durable, is_again })
     }
 
     /// Makes the state durable: a power cut before this has returned leaves the last one or this one.
@@ -74,8 +78,8 @@ fn decode(state: &[u8]) -> Option<Durable> {
 }
 
 fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
-    let place = storage.path(BEFORE);
-    match storage.read(BEFORE) {
+    let place = storage.path(EARLIER_FILE);
+    match storage.read(EARLIER_FILE) {
         Ok(None) => Ok(()),
         Ok(Some(_)) => Err(UserError::file(
             &place,
@@ -115,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn the_epoch_goes_on_with_a_checkpoint_of_the_same_mission_and_epoch_alone() {
+    fn only_a_checkpoint_of_this_mission_continues_the_epoch() {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk).unwrap();
         let last = Durable { epoch: 4, labels: 7, ..durable };

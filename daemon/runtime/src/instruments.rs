@@ -27,7 +27,7 @@ pub(super) enum FromInstrument {
 }
 
 impl Instruments {
-    /// Opens what is configured.
+    /// Opens the ports of the configured instruments.
     pub(super) fn open(config: &Config) -> Result<Self, UserError> {
         let [gps, compass] = position_places(config)?;
         Ok(Self {
@@ -36,7 +36,7 @@ impl Instruments {
         })
     }
 
-    /// What an instrument reports next; never without any. Safe to abandon.
+    /// The next report of an instrument; without any, it waits for ever. Safe to abandon.
     pub(super) async fn next(&mut self) -> FromInstrument {
         tokio::select! {
             report = Port::next_of(&mut self.gps) => FromInstrument::Gps(report),

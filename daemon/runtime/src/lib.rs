@@ -34,7 +34,7 @@ use scenecast_core::UserError;
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 /// Longest wait for other threads at the end.
-const LONGEST_END: std::time::Duration = std::time::Duration::from_secs(1);
+const SHUTDOWN_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(1);
 
 /// Random bits for sessions: not secret, only different each run.
 pub fn random_bits() -> u64 {
@@ -50,6 +50,6 @@ pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result
     let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
     let result = runtime.block_on(future);
     // A name that is being looked up would hold the end up for as long as the network likes.
-    runtime.shutdown_timeout(LONGEST_END);
+    runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
     result
 }

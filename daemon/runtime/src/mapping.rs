@@ -13,26 +13,23 @@ use std::collections::BTreeMap;
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
-/// What the thread is told.
+/// A request to the mapper's thread.
 pub(super) enum ToMapper {
-    /// Follow these settings.
     Tune(Settings),
-    /// The camera saw something.
     Frame(Box<RecordedFrame>),
-    /// Keep a checkpoint now.
     Keep,
 }
 
-/// What the thread tells.
+/// A report of the mapper's thread.
 pub(super) enum FromMapper {
     /// The map, after a camera frame or at the start.
-    Seen(Seen),
+    Mapped(Mapped),
     /// A camera frame that could not be read.
     Missed(UserError),
 }
 
-/// What the thread has made of a camera frame.
-pub(super) struct Seen {
+/// The mapper's results after a camera frame.
+pub(super) struct Mapped {
     /// None at the start, when the map is that of a checkpoint.
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
@@ -40,27 +37,25 @@ pub(super) struct Seen {
     pub(super) exemplars: BTreeMap<u8, Vec<Exemplar>>,
 }
 
-/// The thread's two ends.
 pub(super) struct MapperThread {
     pub(super) orders: mpsc::UnboundedSender<ToMapper>,
-    pub(super) seen: mpsc::Receiver<FromMapper>,
+    pub(super) mapped: mpsc::Receiver<FromMapper>,
     thread: JoinHandle<()>,
 }
 
 impl MapperThread {
-    /// Starts the thread.
     pub(super) fn start(mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
         let (orders, incoming) = mpsc::unbounded_channel();
-        let (outgoing, seen) = mpsc::channel(4);
+        let (outgoing, mapped) = mpsc::channel(4);
         let work = move || Work { mapper, keep, outgoing }.run(incoming);
         let thread = std::thread::Builder::new().name("scene-model".to_owned()).spawn(work);
         let thread = thread.map_err(|e| UserError::Failed(format!("the scene model's thread did not start: {e}")))?;
-        Ok(Self { orders, seen, thread })
+        Ok(Self { orders, mapped, thread })
     }
 
-    /// Waits until the thread has kept what it knows.
+    /// Waits until the thread has kept its last checkpoint.
     pub(super) fn finish(self) {
-        drop((self.orders, self.seen));
+        drop((self.orders, self.mapped));
         if self.thread.join().is_err() {
             tracing::error!("the scene model's thread has panicked: what it knew since the last checkpoint is lost");
         }
@@ -109,19 +104,19 @@ struct Work {
 }
 
 impl Work {
-    /// Works until nobody listens any more, then keeps what it knows.
+    /// Works until the host is gone, then keeps a last checkpoint.
     fn run(mut self, mut incoming: mpsc::UnboundedReceiver<ToMapper>) {
         let mut is_heard = true;
         if self.mapper.last_s().is_some() {
-            is_heard = self.tell(FromMapper::Seen(self.seen(None)));
+            is_heard = self.tell(FromMapper::Mapped(self.mapped(None)));
         }
         while is_heard && let Some(order) = incoming.blocking_recv() {
             match order {
                 ToMapper::Tune(settings) => self.mapper.tune(&settings),
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
-                // A frame that the frame rate leaves out changes nothing but where the vehicle is.
+                // A frame that the frame rate leaves out only changes the vehicle's pose.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_heard = self.tell(FromMapper::Seen(self.seen(Some(*frame))));
+                    is_heard = self.tell(FromMapper::Mapped(self.mapped(Some(*frame))));
                 }
                 ToMapper::Frame(frame) => {
                     let told = self.see(*frame);
@@ -143,18 +138,18 @@ impl Work {
             Ok(image) => {
                 let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
                 self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
-                FromMapper::Seen(self.seen(Some(frame)))
+                FromMapper::Mapped(self.mapped(Some(frame)))
             }
             Err(problem) => FromMapper::Missed(problem),
         }
     }
 
-    fn seen(&self, frame: Option<RecordedFrame>) -> Seen {
-        Seen { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
+    fn mapped(&self, frame: Option<RecordedFrame>) -> Mapped {
+        Mapped { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
     }
 }
 
-/// The frames of the camera, in order, each at its time; nothing if there is no camera.
+/// The frames of the camera, in order, each at its time; none without a camera.
 pub(super) struct Camera {
     frames: std::iter::Peekable<std::vec::IntoIter<RecordedFrame>>,
     clock: Clock,
@@ -163,11 +158,12 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// A camera that plays a recording, if there is one: behind the frame of `seen_s`, if an earlier run has seen that one.
+    /// A camera that plays a recording, if there is one. Playback resumes after the frame of `seen_s`, the last one in the
+    /// checkpoint.
     pub(super) fn new(recording: Option<Recording>, clock: Clock, seen_s: Option<f64>) -> Self {
         let mut frames = recording.map(|r| r.frames).unwrap_or_default();
-        let seen = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
-        let began_s = match seen {
+        let mapped = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
+        let began_s = match mapped {
             Some(index) => frames.drain(..=index).next_back().map_or(0.0, |frame| frame.t_s),
             None => 0.0,
         };

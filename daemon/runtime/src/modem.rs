@@ -25,7 +25,7 @@ impl ModemPort {
         Ok(Self { port, reopened: now })
     }
 
-    /// What the port reports next; safe to abandon.
+    /// The next report of the port. Safe to abandon.
     pub(super) async fn next(&mut self) -> FromPort {
         self.port.next().await
     }

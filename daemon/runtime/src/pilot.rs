@@ -47,7 +47,7 @@ impl PilotPort {
         Ok(Self { port: place.map(|place| Port::open_when_there("autopilot", place, None)) })
     }
 
-    /// What the port reports next; never without one. Safe to abandon.
+    /// The next report of the port; without one, it waits for ever. Safe to abandon.
     pub(super) async fn next(&mut self) -> FromPort {
         Port::next_of(&mut self.port).await
     }

@@ -27,7 +27,7 @@ impl Reload {
         Ok(Self { load })
     }
 
-    /// The configuration as it is now, once it is asked for; one that cannot be read is logged and changes nothing.
+    /// The configuration as it is now, once it is asked for; one that cannot be read is logged and ignored.
     pub(super) async fn next(&mut self) -> Config {
         loop {
             self.hang_up().await;

@@ -1,7 +1,7 @@
 //! The scene model at the start of a run: that of the last checkpoint, or a new one.
 
 use super::checkpoint::CheckpointFile;
-use super::durable::{Keeper, Run};
+use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
 use super::mapping::Keep;
 use scenecast_config::Config;
@@ -10,17 +10,17 @@ use scenecast_files::configured_vocabulary;
 use scenecast_vehicle::{Mapper, NoCheckpoint, Restored};
 use std::path::Path;
 
-/// What a run begins with.
+/// The state at the start of a run.
 pub(super) struct Start {
-    pub(super) run: Run<Folder>,
+    pub(super) run: StartedRun<Folder>,
     pub(super) mapper: Mapper,
     pub(super) keep: Keep,
 }
 
 /// Begins a run in the folder of its state.
 ///
-/// A checkpoint that cannot be gone on from costs the map that was learnt, and nothing that was promised: labels begin a
-/// new epoch. So it is said in the log, and does not keep the vehicle from its mission.
+/// An unusable checkpoint loses the map that was learnt but breaks no promise, for labels then begin a new epoch. So it is
+/// logged as an error, and the mission starts.
 pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     let refused = |e: std::io::Error| UserError::file(dir, e);
     let folder = Folder::hold(dir).map_err(refused)?;

@@ -13,7 +13,6 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Listens from now on.
     #[cfg(unix)]
     pub fn new() -> Result<Self, UserError> {
         use tokio::signal::unix::{SignalKind, signal};
@@ -24,7 +23,6 @@ impl Stop {
         })
     }
 
-    /// Listens from now on.
     #[cfg(not(unix))]
     pub fn new() -> Result<Self, UserError> {
         let interrupt = tokio::signal::windows::ctrl_c();

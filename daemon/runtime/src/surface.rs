@@ -145,7 +145,7 @@ impl SurfaceShell {
         }
     }
 
-    /// Acts on every event of the host and writes what it has for the ports. Returns whether the page has something new to
+    /// Acts on every event of the host and writes the bytes for the ports. Returns whether the page has something new to
     /// show.
     fn pump(&mut self) -> Result<bool, UserError> {
         let now = self.clock.now();
@@ -215,7 +215,7 @@ impl SurfaceShell {
         let Some(map) = self.host.surface().map(vehicle) else { return Ok(()) };
         let png = match label_picture::encode(map) {
             Ok(png) => png,
-            // What came through the water ends no run.
+            // Received data must not end the run.
             Err(e) => {
                 tracing::warn!("operator-map-{}.png is not written: {e}", vehicle.number());
                 return Ok(());

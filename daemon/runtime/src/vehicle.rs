@@ -1,9 +1,9 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::Clock;
-use super::durable::{Keeper, Run};
+use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
-use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
+use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
@@ -31,7 +31,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         warn_without_key(&config);
         let dir = Path::new(&config.runtime.state_dir);
         let Start { run, mut mapper, keep } = start(&config, dir)?;
-        let Run { keeper, durable, is_again } = run;
+        let StartedRun { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
@@ -116,8 +116,8 @@ impl VehicleShell {
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => self.handle_camera(frame),
-                seen = self.mapper.seen.recv() => match seen {
-                    Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
+                mapped = self.mapper.mapped.recv() => match mapped {
+                    Some(FromMapper::Mapped(mapped)) => self.handle_seen(mapped),
                     Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
@@ -154,9 +154,9 @@ impl VehicleShell {
         }
     }
 
-    fn handle_seen(&mut self, seen: Seen) {
+    fn handle_seen(&mut self, mapped: Mapped) {
         let now = self.clock.now();
-        self.host.handle_mapped(seen.frame.as_ref().map(pose_of), &seen.update, seen.exemplars, now);
+        self.host.handle_mapped(mapped.frame.as_ref().map(pose_of), &mapped.update, mapped.exemplars, now);
     }
 
     /// One bad frame does not end a mission.
@@ -166,7 +166,7 @@ impl VehicleShell {
         self.host.handle_missed();
     }
 
-    /// Acts on every event of the host, then writes what it has for the ports.
+    /// Acts on every event of the host, then writes the bytes for the ports.
     fn pump(&mut self) -> Result<(), UserError> {
         let now = self.clock.now();
         self.host.steer(now);

@@ -5,17 +5,14 @@ mod bytes;
 #[cfg(test)]
 mod tests;
 
-pub use arrival::{Arrivals, Setting, arrivals};
-pub use bytes::{Bytes, Sizes, Source, photos, sizes};
+pub use arrival::{ArrivalSetting, Arrivals, arrivals};
+pub use bytes::{Bytes, PatchSource, Sizes, photos, sizes};
 
 /// The middle of the values, one of them that is exceeded by a twentieth, and the greatest.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Spread {
-    /// Median.
     pub median: f64,
-    /// A twentieth is beyond.
     pub p95: f64,
-    /// Greatest.
     pub worst: f64,
 }
 

@@ -1,7 +1,7 @@
-//! A budget that binds: what the link makes of it, and whether it keeps it.
+//! A binding budget: the link's efficiency within it, and whether the link keeps it.
 
+use super::bench::{LinkBench, LinkSetting};
 use super::table::{budget_use, round};
-use super::water::{Setting, Water};
 use scenecast_protocol::link::IssueError;
 use serde::Serialize;
 use sim_channel::LossModel;
@@ -10,7 +10,6 @@ use std::time::Duration;
 /// Half duplex at 10 kbit/s on air, of which each end may use a part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BudgetRow {
-    /// Slant range.
     pub range_km: f64,
     /// Bytes of a full frame.
     pub frame_bytes: usize,
@@ -18,9 +17,9 @@ pub struct BudgetRow {
     pub loss: f64,
     /// Bit budget of each end.
     pub budget_bps: u32,
-    /// Useful payload over what the vehicle's budget could carry of it.
+    /// Useful payload over the payload that the vehicle's budget could carry.
     pub efficiency: f64,
-    /// Worst window of any transmitter over what the budget allows with one transmission more.
+    /// Worst window of any transmitter over the budget plus one transmission.
     pub budget_use: f64,
 }
 
@@ -37,16 +36,16 @@ pub fn measure_budgets(time: Duration, seed: u64) -> Result<Vec<BudgetRow>, Issu
 
 fn measure(budget_bps: u32, frame_bytes: usize, time: Duration, seed: u64) -> Result<BudgetRow, IssueError> {
     let loss = 0.1;
-    let mut setting = Setting::new(1000.0, frame_bytes, LossModel::Independent { probability: loss });
+    let mut setting = LinkSetting::new(1000.0, frame_bytes, LossModel::Independent { probability: loss });
     setting.budget_bps = budget_bps;
-    let mut water = Water::under_load(&setting, seed);
-    let flow = water.measure_flow(time, None)?;
+    let mut bench = LinkBench::under_load(&setting, seed);
+    let flow = bench.measure_flow(time, None)?;
     Ok(BudgetRow {
         range_km: 1.0,
         frame_bytes,
         loss,
         budget_bps,
         efficiency: round(flow.useful_bps / (f64::from(budget_bps) * (1.0 - loss))),
-        budget_use: round(budget_use(&water)),
+        budget_use: round(budget_use(&bench)),
     })
 }

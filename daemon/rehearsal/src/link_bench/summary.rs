@@ -1,11 +1,9 @@
 //! Order statistics of a sample.
 
-/// A sorted sample.
 #[derive(Debug, Clone)]
 pub struct Summary(Vec<f64>);
 
 impl Summary {
-    /// Of these figures.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         Self(values)
@@ -17,12 +15,10 @@ impl Summary {
         self.0.get(rank.max(1) - 1).copied().unwrap_or_default()
     }
 
-    /// The middle one.
     pub fn median(&self) -> f64 {
         self.quantile(0.5)
     }
 
-    /// 95th percentile.
     pub fn p95(&self) -> f64 {
         self.quantile(0.95)
     }

@@ -1,13 +1,13 @@
-//! What became of the time on the medium and of the frames in it.
+//! Account of the airtime and of the frames on the medium.
 
 use sim_channel::{LossReason, Outcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Frames of one direction, counted where they were meant to arrive.
+/// Frames of one direction, counted at the end that they were meant for.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Frames {
-    /// Frames that arrived or did not.
+pub struct FrameCount {
+    /// Frames that arrived or were lost.
     pub sent: u64,
     /// Lost by the water.
     pub lost: u64,
@@ -15,8 +15,8 @@ pub struct Frames {
     pub talked_over: u64,
 }
 
-impl Frames {
-    /// Counts what became of a frame.
+impl FrameCount {
+    /// Counts the outcome of a frame.
     pub fn count(&mut self, outcome: &Outcome) {
         self.sent += 1;
         match outcome {
@@ -32,7 +32,7 @@ impl Frames {
     }
 }
 
-/// Time on air by what it was for, and frames by direction.
+/// Airtime by end and kind of frame, and frames by direction.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     /// Time on air by sender (`surface`, `vehicle`) and kind of frame.
@@ -40,9 +40,9 @@ pub struct Tally {
     /// Frames that began sooner after a frame for the same end had come in than its modem turns around.
     pub hasty: u64,
     /// From the surface.
-    pub down: Frames,
-    /// Times that the surface forgot what it had of a vehicle, or met it.
+    pub down: FrameCount,
+    /// Times that the surface forgot the state of a vehicle, or met one.
     pub restarts: u64,
     /// From the vehicles.
-    pub up: Frames,
+    pub up: FrameCount,
 }

@@ -1,8 +1,8 @@
-//! What is measured of one setting.
+//! The measurements of one setting.
 
+use super::bench::{LinkBench, LinkSetting, auv};
 use super::summary::Summary;
-use super::water::{Setting, Water, auv};
-use crate::VirtualTime;
+use crate::virtual_time::VirtualTime;
 use scenecast_protocol::directive::{Fix, LifeLine, Slot, SlotId, Utility};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::map::StateReplica;
@@ -15,37 +15,32 @@ const LOAD: usize = 20_000;
 /// Time until both ends know each other and their estimates have settled.
 const WARM_UP: Duration = Duration::from_secs(120);
 /// Time after which a trial is given up.
-const GIVE_UP: Duration = Duration::from_secs(900);
+const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(900);
 
 /// How long and how often each thing is measured.
 #[derive(Debug, Clone, Copy)]
-pub struct Effort {
+pub struct LinkEffort {
     /// Time over which the efficiency is measured.
     pub saturated: Duration,
-    /// Directives.
     pub directives: usize,
     /// Times that the source stops changing.
     pub stops: usize,
 }
 
-impl Effort {
-    /// Of the golden table.
+impl LinkEffort {
     pub const TABLE: Self = Self { saturated: Duration::from_secs(1200), directives: 60, stops: 40 };
 }
 
 /// How a saturated link did.
 #[derive(Debug, Clone, Copy)]
 pub struct Flow {
-    /// Useful bits a second.
     pub useful_bps: f64,
     /// Share of the vehicle's frames that the water lost.
     pub loss: f64,
 }
 
-/// Latencies of directives, seconds.
 #[derive(Debug, Clone)]
 pub struct Directives {
-    /// From issue to applied.
     pub applied: Summary,
     /// From issue to known at the surface.
     pub known: Summary,
@@ -60,13 +55,13 @@ pub struct Convergence {
     pub within: f64,
 }
 
-impl Water {
+impl LinkBench {
     /// Ends under load that know each other.
-    pub fn under_load(setting: &Setting, seed: u64) -> Self {
-        let mut water = Self::new(setting, seed);
-        water.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
-        water.run(WARM_UP);
-        water
+    pub fn under_load(setting: &LinkSetting, seed: u64) -> Self {
+        let mut bench = Self::new(setting, seed);
+        bench.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
+        bench.run(WARM_UP);
+        bench
     }
 
     /// Useful bytes at the replica so far.
@@ -90,15 +85,15 @@ impl Water {
     }
 
     /// Issues `count` directives, each a random while after the last one is known to be applied.
-    pub fn measure_directives(&mut self, count: usize, dice: &mut Stream) -> Result<Directives, IssueError> {
+    pub fn measure_directives(&mut self, count: usize, rng: &mut Stream) -> Result<Directives, IssueError> {
         let (mut applied, mut known) = (Vec::new(), Vec::new());
         for _ in 0..count {
-            self.run(Duration::from_secs_f64(1.0 + dice.uniform() * 30.0));
+            self.run(Duration::from_secs_f64(1.0 + rng.uniform() * 30.0));
             let issued = self.now;
             let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
             let slot = Slot::Utility(Utility { weights, ..Utility::default() });
             let version = self.surface.end_mut().issue(auv(), slot, issued)?;
-            self.run_until(issued + GIVE_UP, |w| {
+            self.run_until(issued + GIVE_UP_TIMEOUT, |w| {
                 w.view().is_some_and(|v| v.slots().any(|s| s.life == LifeLine::Applied))
             });
             known.push(self.now.since(issued).as_secs_f64());
@@ -109,13 +104,13 @@ impl Water {
     }
 
     /// Stops the source `count` times at a random moment with a random number of bytes waiting, and waits for equality.
-    pub fn measure_convergence(&mut self, count: usize, loss: f64, dice: &mut Stream) -> Convergence {
+    pub fn measure_convergence(&mut self, count: usize, loss: f64, rng: &mut Stream) -> Convergence {
         let mut times = Vec::new();
         let mut within = 0;
         for _ in 0..count {
             self.vehicle().load = Some(LOAD);
-            self.run(Duration::from_secs_f64(20.0 + dice.uniform() * 30.0));
-            let keep = (8.0 * 500f64.powf(dice.uniform())) as usize;
+            self.run(Duration::from_secs_f64(20.0 + rng.uniform() * 30.0));
+            let keep = (8.0 * 500f64.powf(rng.uniform())) as usize;
             let (time, bytes) = self.stop_and_converge(keep);
             let bound = base_s(loss) + 1.5 * bytes as f64 * 8.0 / (10_000.0 * (1.0 - loss));
             within += usize::from(time <= bound);
@@ -132,7 +127,7 @@ impl Water {
         vehicle.host.end_mut().source_mut().take_back(keep);
         let bytes = self.missing();
         let mut seen = None;
-        self.run_until(stopped + GIVE_UP, |w| {
+        self.run_until(stopped + GIVE_UP_TIMEOUT, |w| {
             let version = w.view().map(|v| v.replica().version());
             seen.replace(version) != Some(version) && w.missing() == 0
         });
@@ -146,7 +141,7 @@ impl Water {
     }
 }
 
-/// The part of the bound of convergence that does not depend on what is left to say, seconds: 10, 20, 60 at 10, 30, 50 %.
+/// The part of the bound of convergence that does not depend on the backlog, seconds: 10, 20, 60 at 10, 30, 50 %.
 pub fn base_s(loss: f64) -> f64 {
     match loss {
         l if l <= 0.1 => 10.0,

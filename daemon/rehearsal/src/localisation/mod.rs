@@ -1,6 +1,6 @@
 //! How far the vehicle's position is off, with and without the localisation relay.
 //!
-//! The parts are those that go to sea: sentences of a GPS are read, the relay fuses them with what a USBL head tells, the
+//! The parts are those that go to sea: sentences of a GPS are read, the relay fuses them with the USBL head's measurements, the
 //! fix is written and read as on the wire, and the vehicle's navigator takes it late. Simulated are the way, the sensors,
 //! the loss on the link and the time that a fix waits for its turn.
 
@@ -21,17 +21,16 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Length of the way, metres.
-const WAY_M: u32 = 3000;
+const TRACK_M: u32 = 3000;
 /// Metres a second, and so seconds a metre.
 const SPEED_M_S: f64 = 1.0;
 /// Drift of the vehicle's own reckoning a metre of way.
 const DRIFT: f64 = 0.01;
-/// Seconds between two fixes.
 const FIX_PERIOD_S: u32 = 10;
 /// Probability that a fix is lost on its way down.
 const LOSS: f64 = 0.1;
 /// Longest that a fix waits for its turn, seconds.
-const LONGEST_WAIT_S: f64 = 8.0;
+const MAX_WAIT_S: f64 = 8.0;
 const DEPTH_M: f64 = 30.0;
 const SOUND_M_S: f64 = 1500.0;
 
@@ -57,25 +56,22 @@ impl Tracks {
     }
 }
 
-/// What a run came to; metres, means over the way.
+/// Mean errors of a run over the track, metres.
 #[derive(Debug, Clone, Serialize)]
 pub struct LocalisationRun {
-    /// Seed of everything random.
     pub seed: u64,
     /// Error by dead reckoning alone.
     pub without_m: f64,
-    /// Error with the relay.
     pub with_m: f64,
     /// Error with the relay when one fix of ten is an outlier.
     pub with_outliers_m: f64,
-    /// Of the run with outliers: fixes sent, used, and what the relay and the vehicle kept from being used, by reason.
+    /// Of the run with outliers: fixes sent, used, and kept from use by the relay and the vehicle, by reason.
     pub outliers: BTreeMap<&'static str, u64>,
 }
 
 /// All runs and their means.
 #[derive(Debug, Clone, Serialize)]
 pub struct Localisation {
-    /// One for each seed.
     pub runs: Vec<LocalisationRun>,
     /// Means over the runs, metres: `without`, `with`, `with_outliers`.
     pub mean_m: BTreeMap<&'static str, f64>,
@@ -133,39 +129,39 @@ fn run(seed: u64) -> LocalisationRun {
 /// A way of 3 km in which a share of the fixes are outliers: in equal parts echoes at the head, a GPS that is led astray,
 /// and fixes that are off although neither was noticed.
 pub fn fly_with_outliers(seed: u64, outliers: f64) -> (Tracks, BTreeMap<&'static str, u64>) {
-    Way::new(seed, outliers).fly()
+    LocalisationTrial::new(seed, outliers).fly()
 }
 
-/// What is wrong with a fix.
+/// The fault of a fix.
 #[derive(Clone, Copy)]
 enum Outlier {
     /// Bearing and elevation, radians, are those of an echo.
     Echo(f64, f64),
     /// The GPS is led astray: direction and distance, each 0..1.
     Astray(f64, f64),
-    /// The relay was fooled: what it sends is off by so much east and north, metres.
+    /// The relay was fooled: its fix is off by so much east and north, metres.
     Fooled(f64, f64),
 }
 
-/// What chance does to a fix.
+/// The random events of a fix.
 #[derive(Clone, Copy)]
-struct Lot {
+struct FixDraw {
     outlier: Option<Outlier>,
     is_lost: bool,
     wait_s: f64,
 }
 
-impl Lot {
+impl FixDraw {
     /// As many draws whatever comes out, so that runs with and without outliers meet the same noise.
-    fn draw(dice: &mut Stream, outliers: f64) -> Self {
-        let [lot, kind, a, b, loss, wait] = [(); 6].map(|()| dice.uniform());
+    fn draw(rng: &mut Stream, outliers: f64) -> Self {
+        let [draw, kind, a, b, loss, wait] = [(); 6].map(|()| rng.uniform());
         let turn = a * std::f64::consts::TAU;
         let outlier = match (kind * 3.0) as u32 {
             0 => Outlier::Astray(a, b),
             1 => Outlier::Echo(turn, (1.0 - 2.0 * b).asin()),
             _ => Outlier::Fooled((15.0 + 185.0 * b) * turn.sin(), (15.0 + 185.0 * b) * turn.cos()),
         };
-        Self { outlier: (lot < outliers).then_some(outlier), is_lost: loss < LOSS, wait_s: wait * LONGEST_WAIT_S }
+        Self { outlier: (draw < outliers).then_some(outlier), is_lost: loss < LOSS, wait_s: wait * MAX_WAIT_S }
     }
 }
 
@@ -177,9 +173,9 @@ struct UnderWay {
     travel: Duration,
 }
 
-struct Way {
+struct LocalisationTrial {
     outliers: f64,
-    dice: Stream,
+    rng: Stream,
     sensors: Sensors,
     head: UsblHead,
     ship: Ship,
@@ -190,12 +186,12 @@ struct Way {
     counts: BTreeMap<&'static str, u64>,
 }
 
-impl Way {
+impl LocalisationTrial {
     fn new(seed: u64, outliers: f64) -> Self {
         let usbl = UsblConfig { outlier_probability: 0.0, ..UsblConfig::default() };
         Self {
             outliers,
-            dice: Stream::new(seed, &[7]),
+            rng: Stream::new(seed, &[7]),
             sensors: Sensors::new(seed),
             head: UsblHead::new(usbl, seed),
             ship: Ship::new(seed),
@@ -209,7 +205,7 @@ impl Way {
 
     fn fly(mut self) -> (Tracks, BTreeMap<&'static str, u64>) {
         let mut at = (0.0, 0.0);
-        for second in 1..=(f64::from(WAY_M) / SPEED_M_S) as u32 {
+        for second in 1..=(f64::from(TRACK_M) / SPEED_M_S) as u32 {
             let now = Instant::from_secs_f64(f64::from(second));
             let heading = heading(f64::from(second) * SPEED_M_S);
             let step = (heading.sin() * SPEED_M_S, heading.cos() * SPEED_M_S);
@@ -218,13 +214,13 @@ impl Way {
             for navigator in [&mut self.navigator, &mut self.reckoner] {
                 navigator.handle_odometry(dx, dy, heading, DEPTH_M, now);
             }
-            let lot = (second % FIX_PERIOD_S == 0).then(|| Lot::draw(&mut self.dice, self.outliers));
-            if let Some(Lot { outlier: Some(Outlier::Astray(direction, distance)), .. }) = lot {
+            let draw = (second % FIX_PERIOD_S == 0).then(|| FixDraw::draw(&mut self.rng, self.outliers));
+            if let Some(FixDraw { outlier: Some(Outlier::Astray(direction, distance)), .. }) = draw {
                 self.ship.lead_astray(direction, distance);
             }
             self.ship.step(second, now);
-            if let Some(lot) = lot {
-                self.sight(at, &lot, now);
+            if let Some(draw) = draw {
+                self.sight(at, &draw, now);
             }
             self.deliver(now);
             self.tracks.truth.push(at);
@@ -239,8 +235,8 @@ impl Way {
         (self.tracks, self.counts)
     }
 
-    /// The head hears the vehicle: what the relay makes of it goes under way.
-    fn sight(&mut self, at: (f64, f64), lot: &Lot, now: Instant) {
+    /// The head hears the vehicle, and the relay sends a fix.
+    fn sight(&mut self, at: (f64, f64), draw: &FixDraw, now: Instant) {
         let from = Position::new(self.ship.at.0, self.ship.at.1, 1.0);
         let target = Position::new(at.0, at.1, DEPTH_M);
         let seen = self.head.measure(&from, &target, now.into());
@@ -251,19 +247,19 @@ impl Way {
             accuracy_m: seen.accuracy_m,
             age_s: UsblConfig::default().latency.as_secs_f64(),
         };
-        if let Some(Outlier::Echo(bearing_rad, elevation_rad)) = lot.outlier {
+        if let Some(Outlier::Echo(bearing_rad, elevation_rad)) = draw.outlier {
             (sighting.bearing_rad, sighting.elevation_rad) = (bearing_rad, elevation_rad);
         }
         let told = now + UsblConfig::default().latency;
         let Some(mut fix) = self.ship.sight(&sighting, DEPTH_M, told) else { return };
-        if let Some(Outlier::Fooled(east, north)) = lot.outlier {
+        if let Some(Outlier::Fooled(east, north)) = draw.outlier {
             (fix.x_m, fix.y_m) = (fix.x_m + east, fix.y_m + north);
         }
         *self.counts.entry("sent").or_default() += 1;
-        if lot.is_lost {
+        if draw.is_lost {
             return;
         }
-        let wait = lot.wait_s;
+        let wait = draw.wait_s;
         let leaves = told + Duration::from_secs_f64(wait);
         let slot = VersionedSlot::encode(1, 1, &Slot::Fix(Fix { age_s: fix.age_s + wait, ..fix }));
         let travel = Duration::from_secs_f64(seen.range_m / SOUND_M_S);
@@ -301,7 +297,7 @@ fn heading(way_m: f64) -> f64 {
 /// Sensors whose error grows by the drift with the way whatever its shape: a current that they do not see, which turns
 /// slowly, and beside it a compass and a log that are off by a third of the drift each.
 struct Sensors {
-    dice: Stream,
+    rng: Stream,
     current_towards: f64,
     compass: f64,
     log: f64,
@@ -309,15 +305,15 @@ struct Sensors {
 
 impl Sensors {
     fn new(seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[8]);
-        let current_towards = dice.uniform() * std::f64::consts::TAU;
-        let [compass, log] = [(); 2].map(|()| DRIFT / 3.0 * dice.normal());
-        Self { dice, current_towards, compass, log }
+        let mut rng = Stream::new(seed, &[8]);
+        let current_towards = rng.uniform() * std::f64::consts::TAU;
+        let [compass, log] = [(); 2].map(|()| DRIFT / 3.0 * rng.normal());
+        Self { rng, current_towards, compass, log }
     }
 
     fn measure(&mut self, (dx, dy): (f64, f64)) -> (f64, f64) {
         let way = dx.hypot(dy);
-        self.current_towards += 0.01 * way.sqrt() * self.dice.normal();
+        self.current_towards += 0.01 * way.sqrt() * self.rng.normal();
         let (sin, cos) = self.compass.sin_cos();
         let (x, y) = ((dx * cos - dy * sin) * (1.0 + self.log), (dx * sin + dy * cos) * (1.0 + self.log));
         let unseen = DRIFT * way;
@@ -330,17 +326,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_relay_keeps_the_error_below_a_third_and_outliers_do_it_little_harm() {
+    fn the_relay_keeps_the_error_below_a_third() {
         let found = localisation(1, 4, &mut |_| {});
         assert!(found.reached, "{found:?}");
     }
 
     #[test]
-    fn dead_reckoning_drifts_by_its_percentage_and_the_same_seed_gives_the_same_way() {
+    fn dead_reckoning_drifts_by_its_percentage() {
         let (tracks, _) = fly_with_outliers(3, 0.1);
         let (x, y) = *tracks.truth.last().unwrap();
         let (rx, ry) = *tracks.reckoned.last().unwrap();
-        let drift = (x - rx).hypot(y - ry) / f64::from(WAY_M);
+        let drift = (x - rx).hypot(y - ry) / f64::from(TRACK_M);
         assert!((0.005..0.015).contains(&drift), "{drift} of the way");
         assert_eq!(fly_with_outliers(3, 0.1).0.relayed, tracks.relayed);
     }

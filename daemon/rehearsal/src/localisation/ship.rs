@@ -12,7 +12,6 @@ use std::time::Duration;
 /// Where the rehearsal lies; any place would do.
 const ORIGIN: LatLon = LatLon { lat_deg: 29.5, lon_deg: 34.92 };
 const SPEED_M_S: f64 = 1.5;
-/// A plain receiver.
 const RECEIVER: Receiver = Receiver { origin: ORIGIN, sigma_m: 1.0, hdop: 0.9, is_corrected: false };
 
 pub(super) struct Ship {
@@ -57,7 +56,7 @@ impl Ship {
         self.astray = ((off * sin, off * cos), 5);
     }
 
-    /// One second of way, and what the receiver and the compass say after it.
+    /// Sails for one second, then the receiver and the compass report.
     pub(super) fn step(&mut self, second: u32, now: Instant) {
         let (dx, dy) = (self.target.0 - self.at.0, self.target.1 - self.at.1);
         let distance = dx.hypot(dy);
@@ -80,7 +79,7 @@ impl Ship {
         self.relay.handle_gps(said.as_bytes(), now);
     }
 
-    /// The head told where it sees the vehicle, which says how deep it is.
+    /// The head has measured the vehicle's position, and the vehicle has reported its depth.
     pub(super) fn sight(&mut self, sighting: &UsblSighting, depth_m: f64, now: Instant) -> Option<Fix> {
         self.relay.handle_depth(Self::vehicle(), depth_m, now);
         self.relay.handle_usbl(Self::vehicle(), sighting, now).ok().flatten()

@@ -10,14 +10,14 @@ use sim_channel::Position;
 use sim_channel::usbl::{UsblConfig, UsblFix, UsblHead};
 use std::time::Duration;
 
-/// Where a rehearsal lies that does not say: where equator and first meridian meet.
+/// Origin of a rehearsal that does not set one: equator and first meridian.
 const NOWHERE: LatLon = LatLon { lat_deg: 0.0, lon_deg: 0.0 };
 /// Depth of the head, metres.
 pub(super) const HEAD_M: f64 = 1.0;
 /// Of a fix's standard deviation, the part of the receiver and the part of its slow error; the rest is the head's.
 const GPS_PART: f64 = 0.4;
 
-/// The instruments, and a sighting that the head has not told yet.
+/// The instruments, and a sighting that the head has not reported yet.
 #[derive(Debug)]
 pub(super) struct Anchored {
     at: Position,
@@ -62,7 +62,7 @@ impl Anchored {
         self.sighted = Some(fix);
     }
 
-    /// What the head tells now.
+    /// The sighting that the head reports now.
     pub(super) fn poll_sighting(&mut self, now: Instant) -> Option<UsblSighting> {
         let fix = self.sighted.take_if(|f| Instant::from(f.ready_at) <= now)?;
         Some(UsblSighting {

@@ -11,7 +11,6 @@ use std::path::Path;
 
 /// The next frame of the camera.
 pub(super) enum NextFrame {
-    /// The recording has ended.
     Over,
     /// The next recorded frame is due at this moment.
     DueAt(Instant),
@@ -80,7 +79,6 @@ impl Camera {
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.push(image, frame))
     }
 
-    /// Completes the recording.
     pub(super) fn finish_recording(&self) -> Result<(), UserError> {
         self.recorder.as_ref().map_or(Ok(()), Recorder::finish)
     }

@@ -47,7 +47,6 @@ impl Carrier {
         Ok((carrier, stations))
     }
 
-    /// Puts an end somewhere.
     pub(super) fn place(&mut self, end: usize, position: Position) {
         match &mut self.medium {
             Medium::Channel(channel) => channel.place(NODES[end], position),
@@ -71,7 +70,7 @@ impl Carrier {
         }
     }
 
-    /// Lets time pass in medium and hosts, and gives the hosts what arrives.
+    /// Lets time pass in medium and hosts, and gives the hosts the arriving bytes.
     pub(super) fn deliver(&mut self, vehicle: &mut VehicleHost, surface: &mut SurfaceHost, now: Instant) {
         match &mut self.medium {
             Medium::Channel(channel) => {
@@ -95,7 +94,7 @@ impl Carrier {
         }
     }
 
-    /// Takes what the hosts have for their ports. A host reports each of its frames in an event afterwards, which
+    /// Takes the hosts' output for their ports. A host reports each of its frames in an event afterwards, which
     /// [`Self::log_sent`] waits for.
     pub(super) fn collect(&mut self, vehicle: &mut VehicleHost, surface: &mut SurfaceHost, now: Instant) {
         self.write(VEHICLE, *vehicle.link().profile(), || vehicle.poll_output(now), now);

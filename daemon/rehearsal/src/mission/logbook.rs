@@ -22,7 +22,6 @@ pub(crate) struct Logbook {
     pub(crate) legs_before_fence: usize,
     /// Estimated position of the vehicle at each frame that the mapper took.
     pub(crate) track: Vec<(f64, f64)>,
-    /// The mapper's last update.
     pub(crate) update: Option<MapUpdate>,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,

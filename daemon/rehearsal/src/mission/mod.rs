@@ -39,9 +39,7 @@ use timetable::Timetable;
 
 /// The choices of a rehearsal besides its configuration.
 pub struct MissionOptions {
-    /// The sea floor.
     pub world: World,
-    /// Seed of everything random.
     pub seed: u64,
     /// Folder to record the camera frames in, if they are to be recorded.
     pub record: Option<std::path::PathBuf>,
@@ -107,17 +105,14 @@ impl Mission {
         Ok(mission)
     }
 
-    /// The time.
     pub fn now(&self) -> Instant {
         self.times.now
     }
 
-    /// When the survey ended.
     pub fn ended(&self) -> Option<Instant> {
         self.times.ended
     }
 
-    /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -132,7 +127,6 @@ impl Mission {
         self.logbook.received_bits
     }
 
-    /// The surface.
     pub fn surface(&self) -> &Surface {
         self.surface.surface()
     }
@@ -142,7 +136,6 @@ impl Mission {
         self.surface.surface_mut()
     }
 
-    /// The vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         self.vehicle.vehicle()
     }
@@ -157,7 +150,6 @@ impl Mission {
         self.motion.distance_m
     }
 
-    /// The vehicle's address.
     pub fn address(&self) -> Address {
         self.address
     }
@@ -167,12 +159,11 @@ impl Mission {
         [self.vehicle.link().audit(), self.surface.link().audit()]
     }
 
-    /// Frames sent and lost.
     pub fn frames(&self) -> &FramesLog {
         &self.carrier.log
     }
 
-    /// What the surface had to tell since the last call.
+    /// News of the surface since the last call.
     pub fn take_events(&mut self) -> Vec<SurfaceOutput> {
         std::mem::take(&mut self.events)
     }

@@ -41,7 +41,7 @@ impl Mission {
 }
 
 #[test]
-fn what_the_operator_sees_is_a_plan_of_the_vehicle_and_soon_the_one_in_force() {
+fn the_operator_soon_sees_the_plan_in_force() {
     let mut mission = mission(&["channel.loss=0.1"]);
     let mut had = VecDeque::new();
     assert!(mission.watch_plans(&mut had, 90) > 1, "the legs of the lawnmower");

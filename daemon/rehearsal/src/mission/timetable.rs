@@ -12,7 +12,6 @@ const LOOK_INTERVAL: Duration = Duration::from_secs(1);
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Timetable {
     pub(super) now: Instant,
-    /// When the survey ended.
     pub(super) ended: Option<Instant>,
     pub(super) frame: Instant,
     step: Instant,
@@ -29,7 +28,6 @@ impl Timetable {
         Self { now, ended: None, frame: now, step: now, look: now, fix: Instant::from_secs_f64(period_s), fix_interval }
     }
 
-    /// The next regular event.
     pub(super) fn next_event(&self) -> Instant {
         let fix = self.fix_interval.map(|_| self.fix);
         [self.look, self.step, self.frame].into_iter().chain(fix).min().unwrap_or(self.look)

@@ -1,7 +1,7 @@
 //! The operator tunes a vehicle that is under way: the map follows, both maps agree, labels keep their meaning.
 
 use super::{Mission, MissionOptions};
-use crate::World;
+use crate::world::World;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use scenecast_protocol::map_codec::Stride;
@@ -31,7 +31,7 @@ impl Mission {
         self.advance(Instant::from_secs_f64(seconds)).unwrap();
     }
 
-    /// Sends an order and flies until the vehicle has said that it follows it.
+    /// Sends an order and flies until the vehicle has reported it in force.
     fn tune(&mut self, order: &str) {
         let order: SettingsOrder = serde_json::from_str(order).unwrap();
         let (address, now) = (self.address, self.now());
@@ -48,7 +48,7 @@ impl Mission {
         assert_eq!(self.vehicle().settings(), self.surface().desk(address).unwrap().settings.asked());
     }
 
-    /// Ends the survey and lets the link say what it has.
+    /// Ends the survey and drains the link.
     fn drain(&mut self) {
         self.end_survey();
         let give_up = self.now() + Duration::from_secs(3600);
@@ -78,14 +78,14 @@ fn same(a: &LabelGrid, b: &LabelGrid) -> bool {
 }
 
 #[test]
-fn priors_frame_rate_and_planes_change_under_way_and_the_maps_agree() {
+fn maps_agree_when_settings_change_during_the_survey() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
     assert!(frames >= 50 && labels > 1 && mission.heard_of(PlaneKind::Confidence) > 0);
     mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "planes": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
-    // What was in the water when the vehicle began to follow has come in.
+    // Frames that were on their way when the settings changed have arrived.
     mission.fly_to(mission.now().as_secs_f64() + 30.0);
     let (since, frames, confidence) =
         (mission.now(), mission.logbook.track.len(), mission.heard_of(PlaneKind::Confidence));
@@ -137,6 +137,6 @@ fn coarse_cells_need_far_fewer_bits() {
             [&scenecast_protocol::schedule::Class::Map]
     };
     let (fine, coarse) = (bytes("map.cells=fine"), bytes("map.cells=coarse"));
-    // A sixteenth of the cells, but each alone: labels of neighbours tell less of each other four cells apart.
+    // A sixteenth of the cells, but each alone: labels four cells apart predict each other less.
     assert!(coarse * 2 < fine, "{coarse} bytes of coarse cells, {fine} of all");
 }

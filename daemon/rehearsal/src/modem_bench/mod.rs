@@ -1,12 +1,14 @@
-//! What reaches the other end through drivers and emulated modems, in virtual time.
+//! Throughput and latency through drivers and emulated modems, in virtual time.
 
 mod load;
 mod pusher;
 
-pub use load::{Dock, DockSetting};
+pub use load::{ModemBench, ModemSetting};
 pub use pusher::push;
 
-use crate::{Mission, MissionOptions, World, report};
+use crate::mission::{Mission, MissionOptions};
+use crate::report::report;
+use crate::world::World;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::Serialize;
@@ -15,11 +17,10 @@ use std::time::Duration;
 /// An S2C modem in burst mode under load.
 #[derive(Debug, Clone, Serialize)]
 pub struct BurstRow {
-    /// Distance, m.
     pub range_m: f64,
     /// Share of frames that the water loses, each way.
     pub loss: f64,
-    /// What the modem carries for a host that only keeps its pool full, bit/s.
+    /// Throughput of the modem for a host that only keeps its pool full, bit/s.
     pub raw_bps: f64,
     /// Useful payload that reaches the replica, bit/s.
     pub useful_bps: f64,
@@ -33,10 +34,8 @@ pub struct BurstRow {
     pub budget_use: f64,
 }
 
-/// A survey through modems.
 #[derive(Debug, Clone, Serialize)]
 pub struct SurveyRow {
-    /// Which modem.
     pub modem: String,
     /// Length of the survey, s.
     pub survey_s: f64,
@@ -48,20 +47,15 @@ pub struct SurveyRow {
     pub drain_s: f64,
 }
 
-/// Everything.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModemTable {
-    /// Seed of everything random.
     pub seed: u64,
-    /// Bursts.
     pub burst: BurstRow,
-    /// Surveys.
     pub surveys: Vec<SurveyRow>,
 }
 
 /// Range of every row, m.
 const RANGE_M: f64 = 1000.0;
-/// Loss of every row.
 const LOSS: f64 = 0.1;
 
 /// Measures everything; takes about a minute.
@@ -94,13 +88,13 @@ pub fn scenario(sets: &[&str]) -> Result<Config, UserError> {
 
 /// Throughput against a raw pusher, and latency of `directives` directives meanwhile.
 pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<BurstRow, UserError> {
-    // A budget that does not bind: the modem is what is measured.
+    // The budget does not bind, so that the modem is measured.
     let config = scenario(&["modem.kind=s2c", "link.budget_bps=40000"])?;
-    let setting = DockSetting { config, range_m: RANGE_M, loss: LOSS };
+    let setting = ModemSetting { config, range_m: RANGE_M, loss: LOSS };
     let raw_bps = push(&setting, seed, time);
-    let mut dock = Dock::under_load(&setting, seed)?;
-    let useful_bps = dock.measure_flow(time);
-    let latency = dock.measure_directives(directives, seed);
+    let mut bench = ModemBench::under_load(&setting, seed)?;
+    let useful_bps = bench.measure_flow(time);
+    let latency = bench.measure_directives(directives, seed);
     Ok(BurstRow {
         range_m: RANGE_M,
         loss: LOSS,
@@ -109,11 +103,11 @@ pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<Bur
         share: thousandths(useful_bps / raw_bps),
         directive_median_s: thousandths(latency.median()),
         directive_p95_s: thousandths(latency.p95()),
-        budget_use: thousandths(dock.budget_use()),
+        budget_use: thousandths(bench.budget_use()),
     })
 }
 
-/// A survey of `duration_s` through modems, and what the link takes after it.
+/// A survey of `duration_s` through modems, and the time that the link takes to drain after it.
 pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<SurveyRow, UserError> {
     let mut config = scenario(sets)?;
     config.survey.duration_s = duration_s;
@@ -140,14 +134,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bursts_carry_most_of_what_the_modem_carries_and_directives_pass_them() {
+    fn bursts_use_most_of_the_modem_and_directives_pass() {
         let row = measure_burst(2, Duration::from_secs(1200), 60).unwrap();
         assert!(row.share >= 0.8, "{row:?}");
         assert!(row.directive_p95_s < 25.0, "{row:?}");
     }
 
     #[test]
-    fn a_survey_through_slow_modems_is_nearly_right_all_along_and_ends_with_equal_maps() {
+    fn a_survey_through_slow_modems_ends_with_equal_maps() {
         let im = ["modem.kind=s2c", "modem.s2c_mode=im"];
         let rate_1 = ["modem.kind=micromodem", "modem.rate=1"];
         for sets in [im, rate_1] {

@@ -1,6 +1,6 @@
-//! What an emulated S2C modem itself can carry: a host that does nothing but keep its pool full.
+//! The capacity of an emulated S2C modem, measured by a host that only keeps its pool full.
 
-use super::DockSetting;
+use super::ModemSetting;
 use scenecast_drivers::modem::s2c::{Line, LineParser};
 use sim_channel::modem::Basin;
 use sim_channel::modem::s2c::{S2c, S2cConfig};
@@ -14,7 +14,7 @@ const RECORD: usize = 1000;
 const FULL: Duration = Duration::from_millis(500);
 
 /// Bits a second of payload that the other host gets over `time`, after the connection is up.
-pub fn push(setting: &DockSetting, seed: u64, time: Duration) -> f64 {
+pub fn push(setting: &ModemSetting, seed: u64, time: Duration) -> f64 {
     const WARM_UP: Duration = Duration::from_secs(60);
     let mut basin = Basin::new(Channel::new(setting.channel(), seed));
     for (node, x) in [(FROM, 0.0), (TO, setting.range_m)] {

@@ -8,16 +8,16 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_vehicle::{Course, Footprint, Steering};
 use sim_channel::Stream;
 
-/// Edge of what the camera sees, metres: eight cells.
+/// Edge of the camera's footprint, metres: eight cells.
 const SIGHT_M: f64 = 2.0;
 /// Metres that the vehicle keeps from outlines.
 const CLEARANCE_M: f64 = 0.5;
 /// Share of a full coverage that may be gone.
 const SHARE: f64 = 0.4;
 /// More legs than any drive has.
-const MOST_LEGS: usize = 20_000;
+const MAX_LEGS: usize = 20_000;
 
-/// What a vehicle is told before it starts.
+/// A vehicle's orders before it starts.
 #[derive(Debug, Clone)]
 pub(crate) struct Task {
     pub fence: Fence,
@@ -28,7 +28,7 @@ pub(crate) struct Task {
     pub mean_per_m: f64,
 }
 
-/// What came of it.
+/// The result of a run.
 #[derive(Debug)]
 pub(crate) struct Drive {
     pub track: Vec<(f64, f64)>,
@@ -39,11 +39,11 @@ pub(crate) struct Drive {
 impl Task {
     /// A fence with cut corners, one or two keep-outs, and a start inside.
     pub fn draw(scene: &Scene, seed: u64) -> Self {
-        let mut dice = Stream::new(seed, &[0x91A7]);
+        let mut rng = Stream::new(seed, &[0x91A7]);
         let Area { east, north, .. } = scene.area;
         let place = |x: f64, y: f64| Place::from_metres(x, y).unwrap_or_default();
-        let cut = |dice: &mut Stream| (0.03 + 0.12 * dice.uniform()) * east.min(north);
-        let [a, b, c, d] = [cut(&mut dice), cut(&mut dice), cut(&mut dice), cut(&mut dice)];
+        let cut = |rng: &mut Stream| (0.03 + 0.12 * rng.uniform()) * east.min(north);
+        let [a, b, c, d] = [cut(&mut rng), cut(&mut rng), cut(&mut rng), cut(&mut rng)];
         let fence = [
             (a, 0.0),
             (east - b, 0.0),
@@ -55,10 +55,10 @@ impl Task {
             (0.0, a),
         ];
         let fence = Polygon(fence.iter().map(|&(x, y)| place(x, y)).collect());
-        let keep_outs: Vec<Polygon> = (0..=dice.below(2))
+        let keep_outs: Vec<Polygon> = (0..=rng.below(2))
             .map(|_| {
-                let (x, y) = ((0.2 + 0.6 * dice.uniform()) * east, (0.2 + 0.6 * dice.uniform()) * north);
-                let r = (0.04 + 0.06 * dice.uniform()) * east.min(north);
+                let (x, y) = ((0.2 + 0.6 * rng.uniform()) * east, (0.2 + 0.6 * rng.uniform()) * north);
+                let r = (0.04 + 0.06 * rng.uniform()) * east.min(north);
                 Polygon(vec![place(x - r, y - r), place(x + r, y - 0.5 * r), place(x + 0.4 * r, y + r)])
             })
             .collect();
@@ -66,7 +66,7 @@ impl Task {
         let clear = |p: (f64, f64)| scenecast_vehicle::planning::Bounds::new(&fence, SIGHT_M / 2.0).allows(p);
         let mut start = (east / 2.0, north / 2.0);
         for _ in 0..1000 {
-            start = (dice.uniform() * east, dice.uniform() * north);
+            start = (rng.uniform() * east, rng.uniform() * north);
             if clear(start) {
                 break;
             }
@@ -81,7 +81,6 @@ impl Task {
 }
 
 impl Drive {
-    /// Metres gone.
     pub fn metres(&self) -> f64 {
         length_m(&self.track)
     }
@@ -94,17 +93,17 @@ impl Drive {
     }
 }
 
-/// What the planner is told of the sea floor.
+/// The part of the sea floor that the planner knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Told {
-    /// What the vehicle has seen.
+pub(crate) enum MapKnowledge {
+    /// Cells that the vehicle has seen.
     Seen,
-    /// All of it from the start: no vehicle can, so this is about what the limit lets anybody collect.
+    /// All of it from the start: no vehicle can, so it bounds the utility within the limit.
     All,
 }
 
-/// Drives until what is left is the way back, and back.
-pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -> Drive {
+/// Runs a planner until the rest of the limit is needed for the return path, then returns.
+pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, knowledge: MapKnowledge) -> Drive {
     let sight = Footprint { across: SIGHT_M, along: SIGHT_M };
     let mut steering = Steering::new(scene.area, sight, CELL_M, kind, CLEARANCE_M);
     steering.set_fence(&task.fence);
@@ -112,9 +111,9 @@ pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -
     let mut drive = Drive { track: vec![task.start], utility: 0.0 };
     let (mut at, mut version, mut is_back) = (task.start, 1, false);
     drive.utility += look(scene, at, &mut map);
-    for _ in 0..MOST_LEGS {
+    for _ in 0..MAX_LEGS {
         let left_m = task.limit_m - drive.metres();
-        let known = if told == Told::All { &scene.labels } else { &map };
+        let known = if knowledge == MapKnowledge::All { &scene.labels } else { &map };
         let course = match is_back {
             true => steering.next_home(at),
             false => steering.next(at, (known, version), Some(&scene.utility), left_m),
@@ -132,7 +131,7 @@ pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -
     drive
 }
 
-/// Goes straight and looks every half sight; utility of what was seen for the first time.
+/// Goes straight and looks every half sight; returns the utility of the cells seen for the first time.
 fn go(scene: &Scene, steering: &mut Steering, from: (f64, f64), to: (f64, f64), map: &mut LabelGrid) -> f64 {
     let looks = ((to.0 - from.0).hypot(to.1 - from.1) / (SIGHT_M / 2.0)).ceil().max(1.0) as u32;
     let place = |i: u32| {

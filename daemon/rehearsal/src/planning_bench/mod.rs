@@ -4,7 +4,7 @@ mod drive;
 mod picture;
 mod scene;
 
-use drive::{Drive, Task, Told};
+use drive::{Drive, MapKnowledge, Task};
 pub use picture::picture;
 use scene::Scene;
 use scenecast_core::UserError;
@@ -12,19 +12,17 @@ use scenecast_protocol::directive::PlannerKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Seeds of one run.
 pub const SEEDS: u64 = 32;
 
 /// One scene with one start, driven by every planner.
 #[derive(Debug)]
 pub struct Trial {
-    /// Name of the scene.
     pub name: String,
     /// Utility a metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
     pub utility_per_m: [f64; 3],
-    /// The same of `horizon` if it is told the whole map before it starts.
-    pub told_all_per_m: f64,
-    /// Breaches of fence, keep-outs and limit, by the witness.
+    /// The same of `horizon` if it knows the whole map from the start.
+    pub known_map_per_m: f64,
+    /// Breaches of fence, keep-outs and limit, by the track audit.
     pub violations: usize,
     pub(crate) scene: Scene,
     pub(crate) task: Task,
@@ -34,25 +32,20 @@ pub struct Trial {
 /// Medians over all trials, by planner.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Medians {
-    /// Parallel legs.
     pub lawnmower: f64,
-    /// Best gain a metre.
     pub greedy: f64,
     /// Best way over a horizon.
     pub horizon: f64,
 }
 
-/// What the bench found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlanningTable {
-    /// Utility collected a metre, in units of what a metre brings where all is new, on the mean of the scene: so rare and
+    /// Utility collected a metre, in units of the utility of a metre where all is new, on the mean of the scene: so rare and
     /// common classes weigh alike.
     pub median: Medians,
-    /// Median of `horizon` where it is told the whole map before it starts: what not knowing costs is between the two.
+    /// Median of `horizon` if it knows the whole map from the start: the difference is the cost of not knowing it.
     pub told_all: f64,
-    /// Breaches of any constraint.
     pub violations: usize,
-    /// Seeds.
     pub seeds: u64,
 }
 
@@ -85,7 +78,7 @@ pub fn drive_all(
             let trial = trial(scene, seed.wrapping_add(n));
             violations += trial.violations;
             found.push(trial.utility_per_m);
-            told_all.push(trial.told_all_per_m);
+            told_all.push(trial.known_map_per_m);
             each((n + 1) as f64 / SEEDS as f64, &trial)?;
         }
     }
@@ -96,13 +89,13 @@ pub fn drive_all(
 
 fn trial(scene: Scene, seed: u64) -> Trial {
     let task = Task::draw(&scene, seed);
-    let drives = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind, Told::Seen));
-    let all = drive::drive(&scene, &task, PlannerKind::Horizon, Told::All);
+    let drives = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind, MapKnowledge::Seen));
+    let all = drive::drive(&scene, &task, PlannerKind::Horizon, MapKnowledge::All);
     let rate = |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9);
     let utility_per_m = drives.each_ref().map(rate);
-    let told_all_per_m = rate(&all);
+    let known_map_per_m = rate(&all);
     let violations = drives.iter().chain([&all]).map(|d| d.violations(&task)).sum();
-    Trial { name: scene.name.clone(), utility_per_m, told_all_per_m, violations, scene, task, drives: drives.into() }
+    Trial { name: scene.name.clone(), utility_per_m, known_map_per_m, violations, scene, task, drives: drives.into() }
 }
 
 /// Rounded to a thousandth.
@@ -128,7 +121,7 @@ mod tests {
         assert_eq!(a.violations, 0);
         assert!(a.utility_per_m.iter().all(|&u| u > 0.0), "{:?}", a.utility_per_m);
         let lawnmower = a.utility_per_m[0];
-        assert!(a.told_all_per_m > lawnmower, "{} against {lawnmower}", a.told_all_per_m);
+        assert!(a.known_map_per_m > lawnmower, "{} against {lawnmower}", a.known_map_per_m);
         assert!(a.drives.iter().all(|d| d.metres() > 0.5 * a.task.limit_m), "the limit is made use of");
     }
 }

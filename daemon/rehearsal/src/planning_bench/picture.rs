@@ -9,7 +9,6 @@ use std::io::Cursor;
 
 /// Pixels of a cell's edge.
 const PX: u32 = 5;
-/// Columns between two panels.
 const GAP: u32 = 12;
 const OUTLINE: Rgb<u8> = Rgb([220, 30, 30]);
 const TRACK: Rgb<u8> = Rgb([255; 3]);

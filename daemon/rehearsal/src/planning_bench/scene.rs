@@ -1,6 +1,6 @@
 //! Label maps to drive over.
 
-use crate::World;
+use crate::world::World;
 use image::RgbImage;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::LabelBook;
@@ -16,16 +16,14 @@ use std::path::Path;
 
 /// Edge of a cell, metres: a scene stands for a site of about a hundred cells.
 pub(crate) const CELL_M: f64 = 0.25;
-/// Cells across an image.
 const CELLS: f64 = 100.0;
 /// Times that each word is drawn again.
 const SWEEPS: u64 = 25;
-/// Weight of unseen cells.
 const EXPLORATION: i8 = 5;
 /// Smallest share of the annotated cells that makes a class worth a survey.
-const LEAST_SHARE: f64 = 0.05;
+const MIN_SHARE: f64 = 0.05;
 
-/// A label map as the scene model gives it, and what the operator favours on it.
+/// A label map as the scene model gives it, and the operator's utility on it.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     pub name: String,
@@ -36,7 +34,6 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// An annotated image.
     pub fn from_files(image: &Path, annotations: &Path, seed: u64) -> Result<Self, UserError> {
         let rgb = image::open(image).map_err(|e| UserError::file(image, e))?.to_rgb8();
         let px = (f64::from(rgb.width()) / CELLS).floor().max(4.0);
@@ -113,7 +110,7 @@ fn favour(labels: &LabelGrid, world: &World) -> Utility {
         *counts.entry(label).or_default().entry(class).or_default() += 1.0;
     }
     let cells: f64 = classes.values().sum();
-    let common = classes.iter().filter(|(_, n)| **n >= LEAST_SHARE * cells);
+    let common = classes.iter().filter(|(_, n)| **n >= MIN_SHARE * cells);
     let Some((&favoured, &n)) = common.min_by(|a, b| a.1.total_cmp(b.1)) else { return Utility::default() };
     let share = |of: &BTreeMap<u8, f64>| of.get(&favoured).unwrap_or(&0.0) / of.values().sum::<f64>();
     let best = counts.values().map(share).fold(0.0, f64::max).max(1e-9);

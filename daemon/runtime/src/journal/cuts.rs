@@ -1,26 +1,26 @@
 //! The journal under power cuts and failing disks.
 
-use super::disk::{Chance, Disk, Step};
+use super::disk::{Disk, DiskRng, DiskStep};
 use super::record::{self, BLOCK};
 use super::{Damage, Journal, JournalError, Storage};
 use proptest::prelude::*;
 
 const NAME: &str = "test.journal";
 /// Few records a file, so that new files are begun often.
-const MOST_BYTES: usize = 4 * BLOCK;
+const MAX_BYTES: usize = 4 * BLOCK;
 
 fn open(disk: &Disk) -> (Journal<Disk>, Option<Vec<u8>>) {
-    Journal::open(disk.clone(), NAME, MOST_BYTES).expect("a power cut leaves a journal to go on from")
+    Journal::open(disk.clone(), NAME, MAX_BYTES).expect("a power cut leaves a journal to go on from")
 }
 
 /// A state of its own: no mixture of two is a third.
 fn state(number: u32, length: usize) -> Vec<u8> {
-    let mut chance = Chance::new(u64::from(number) << 20 | length as u64);
-    let noise = (0..length).map(|_| chance.below(256) as u8);
+    let mut rng = DiskRng::new(u64::from(number) << 20 | length as u64);
+    let noise = (0..length).map(|_| rng.below(256) as u8);
     number.to_be_bytes().into_iter().chain(noise).collect()
 }
 
-/// What a journal may hold: the last confirmed state, or one that was being written since.
+/// The states that a journal may hold: the last confirmed one, or one that was being written since.
 struct Expected {
     possible: Vec<Option<Vec<u8>>>,
     written: u32,
@@ -44,20 +44,19 @@ enum Action {
     Persist(usize),
     /// The process ends, the machine goes on.
     Kill,
-    /// Power is cut after some steps of what follows.
+    /// Power is cut after so many further steps.
     CutAfter(usize),
-    /// A step fails once.
-    Fail(Step, usize),
+    Fail(DiskStep, usize),
 }
 
 fn actions() -> impl Strategy<Value = Vec<Action>> {
     let length = || prop_oneof![Just(0usize), 1usize..600, 4060usize..4080, 0usize..9000];
     let step = prop_oneof![
-        Just(Step::Create),
-        Just(Step::Append),
-        Just(Step::Sync),
-        Just(Step::Rename),
-        Just(Step::SyncFolder),
+        Just(DiskStep::Create),
+        Just(DiskStep::Append),
+        Just(DiskStep::Sync),
+        Just(DiskStep::Rename),
+        Just(DiskStep::SyncFolder),
     ];
     let action = prop_oneof![
         6 => length().prop_map(Action::Persist),
@@ -95,7 +94,7 @@ proptest! {
                 continue;
             }
             if disk.is_off() {
-                disk.power_cut(Chance::new(seed ^ i as u64));
+                disk.power_cut(DiskRng::new(seed ^ i as u64));
                 let (again, found) = open(&disk);
                 prop_assert!(expected.possible.contains(&found));
                 expected.possible = vec![found];
@@ -128,7 +127,7 @@ fn a_record_torn_at_any_byte_leaves_the_one_before() {
 }
 
 #[test]
-fn a_new_file_that_is_cut_short_at_any_step_leaves_the_old_state_or_the_new_one() {
+fn a_rewrite_cut_at_any_step_leaves_old_or_new_state() {
     let mut outcomes = Vec::new();
     for steps in 0.. {
         let mut confirmed = false;
@@ -139,7 +138,7 @@ fn a_new_file_that_is_cut_short_at_any_step_leaves_the_old_state_or_the_new_one(
             (0..4).for_each(|_| assert!(expected.persist(&mut journal, 100)));
             disk.cut_after(steps);
             confirmed = expected.persist(&mut journal, 100);
-            disk.power_cut(Chance::new(seed));
+            disk.power_cut(DiskRng::new(seed));
             let (mut journal, found) = open(&disk);
             assert!(expected.possible.contains(&found), "cut before step {steps}");
             outcomes.push((steps, found == Some(state(5, 100))));
@@ -164,7 +163,7 @@ fn the_first_state_is_there_or_nothing_is() {
         let disk = Disk::default();
         disk.cut_after(steps);
         let confirmed = open(&disk).0.persist(b"first").is_ok();
-        disk.power_cut(Chance::new(seed));
+        disk.power_cut(DiskRng::new(seed));
         let found = open(&disk).1;
         assert!(found.as_deref() == Some(b"first") || found.is_none() && !confirmed);
     }
@@ -173,7 +172,7 @@ fn the_first_state_is_there_or_nothing_is() {
 #[test]
 fn after_a_failed_step_nothing_is_confirmed_or_written() {
     for records in [0, 1, 4] {
-        for failing in [Step::Create, Step::Append, Step::Sync, Step::Rename, Step::SyncFolder] {
+        for failing in [DiskStep::Create, DiskStep::Append, DiskStep::Sync, DiskStep::Rename, DiskStep::SyncFolder] {
             let disk = Disk::default();
             let mut expected = Expected { possible: vec![None], written: 0 };
             let (mut journal, _) = open(&disk);
@@ -202,7 +201,7 @@ fn a_state_that_is_safe_already_is_not_written_again() {
     let steps = disk.steps();
     journal.persist(b"same").unwrap();
     assert_eq!(disk.steps(), steps);
-    assert_eq!(steps, [Step::Create, Step::Append, Step::Sync, Step::Rename, Step::SyncFolder]);
+    assert_eq!(steps, [DiskStep::Create, DiskStep::Append, DiskStep::Sync, DiskStep::Rename, DiskStep::SyncFolder]);
 }
 
 #[test]
@@ -211,7 +210,7 @@ fn the_file_stays_within_its_limit() {
     let (mut journal, _) = open(&disk);
     for number in 0..50 {
         journal.persist(&state(number, 10)).unwrap();
-        assert!(disk.read(NAME).unwrap().unwrap().len() <= MOST_BYTES);
+        assert!(disk.read(NAME).unwrap().unwrap().len() <= MAX_BYTES);
     }
     assert_eq!(open(&disk).1, Some(state(49, 10)));
 }
@@ -222,7 +221,7 @@ fn damage_is_an_error_that_says_where() {
     let mut records: Vec<u8> = (1..4).flat_map(|n| record::encode(n, b"state")).collect();
     records[BLOCK + 21] ^= 1;
     disk.put(NAME, &records);
-    let error = Journal::open(disk, NAME, MOST_BYTES).err().unwrap();
+    let error = Journal::open(disk, NAME, MAX_BYTES).err().unwrap();
     assert!(matches!(error, JournalError::Damage(Damage::At { offset: BLOCK })));
     assert!(error.to_string().starts_with("damaged at byte 4096; restore the file"), "{error}");
 }

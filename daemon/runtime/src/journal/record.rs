@@ -1,4 +1,4 @@
-//! Records of the journal, and what is left of them after a power cut.
+//! Records of the journal, and their remains after a power cut.
 
 /// Kind of file, without its version.
 const KIND: &[u8; 6] = b"scVJRN";
@@ -8,7 +8,7 @@ const HEAD: usize = 20;
 const TAIL: usize = 4;
 
 /// Records begin at multiples of this, the size of a page and of the largest usual sector: writing a record never
-/// writes a sector anew that holds a confirmed one.
+/// rewrites a sector that holds a confirmed one.
 pub(super) const BLOCK: usize = 4096;
 
 static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
@@ -16,10 +16,9 @@ static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 /// Why a file is no journal to go on from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Damage {
-    /// Written by another version.
     #[error("the file is of another version of scenecast; use that one, or move the file away to begin a new mission")]
     Version,
-    /// Not what a power cut leaves.
+    /// Damage that no power cut causes.
     #[error("damaged at byte {offset}; restore the file, or move it away to begin a new mission")]
     At {
         /// Where the first unreadable record begins.
@@ -32,14 +31,12 @@ pub(crate) enum Damage {
 pub(super) struct Record<'a> {
     /// One more than that of the record before it, across files.
     pub(super) sequence: u64,
-    /// What it holds.
     pub(super) body: &'a [u8],
 }
 
-/// What a file holds.
+/// The content of a journal file.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Scan<'a> {
-    /// The last whole record.
     pub(super) last: Record<'a>,
     /// Where a record begins that was being written when the power was cut.
     pub(super) torn: Option<usize>,
@@ -93,7 +90,7 @@ pub(super) fn scan(bytes: &[u8]) -> Result<Scan<'_>, Damage> {
             None => break,
         }
     }
-    // A disk may show blocks of a file that is gone; those are told by their sequence.
+    // A disk may show blocks of a file that is gone; their sequence numbers give them away.
     let follows = |offset: usize| at(offset).is_some_and(|r| r.sequence > last.sequence);
     if (offset..bytes.len()).step_by(BLOCK).any(follows) {
         return Err(Damage::At { offset });
@@ -133,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_record_is_damage_and_an_old_block_at_the_end_is_not() {
+    fn a_missing_record_is_damage_but_an_old_block_is_not() {
         let file = |numbers: &[u64]| numbers.iter().flat_map(|&n| encode(n, b"body")).collect::<Vec<u8>>();
         assert_eq!(scan(&file(&[5, 6, 8])), Err(Damage::At { offset: 2 * BLOCK }));
         let with_old = file(&[5, 6, 3]);

@@ -1,4 +1,4 @@
-//! What the journal asks of a file system.
+//! The operations that the journal needs of a file system.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Write};

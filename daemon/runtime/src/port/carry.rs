@@ -1,19 +1,19 @@
 //! Moving bytes between a stream and the host.
 
-use super::{Ends, ToPort, read};
+use super::{PortEnds, ToPort, read};
 use std::io::{self, Write};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::Instant;
 
-/// Longest a stream may take no byte of what is to be written before it counts as dead.
+/// A stream that takes no byte for so long counts as dead.
 const WRITE_LIMIT: Duration = Duration::from_secs(30);
 
-/// Carries bytes both ways until the stream ends or fails, or says nothing for `quiet`, or the host is gone (`Ok`).
+/// Carries bytes both ways until the stream ends or fails, or is silent for `quiet`, or the host is gone (`Ok`).
 pub(super) async fn carry(
     stream: impl AsyncRead + AsyncWrite + Unpin,
     quiet: Option<Duration>,
-    ends: &mut Ends,
+    ends: &mut PortEnds,
 ) -> io::Result<()> {
     if !ends.tell_open().await {
         return Ok(());
@@ -23,7 +23,7 @@ pub(super) async fn carry(
     let mut out = bytes::Bytes::new();
     let (mut heard, mut written) = (Instant::now(), Instant::now());
     loop {
-        // A write that the device takes slowly must not keep what it says from the host. Nothing waits for the line to
+        // A write that the device takes slowly must not hold back its input. No write waits for the line to
         // drain: that would hold up the thread.
         tokio::select! {
             n = writer.write(&out), if !out.is_empty() => {
@@ -57,7 +57,7 @@ pub(super) async fn carry(
     }
 }
 
-/// Ends when nothing has come for too long.
+/// Ends when no byte has come for too long.
 pub(super) async fn silence(heard: Instant, quiet: Option<Duration>) -> io::Error {
     match quiet {
         Some(quiet) => tokio::time::sleep_until(heard + quiet).await,
@@ -71,8 +71,8 @@ pub(super) fn reopening() -> io::Error {
     io::Error::other("it does not answer")
 }
 
-/// Appends what the host writes.
-pub(super) async fn append(mut file: std::fs::File, ends: &mut Ends) -> io::Result<()> {
+/// Appends the bytes that the host writes.
+pub(super) async fn append(mut file: std::fs::File, ends: &mut PortEnds) -> io::Result<()> {
     if !ends.tell_open().await {
         return Ok(());
     }

@@ -1,7 +1,7 @@
-//! What keeps a port open.
+//! Opens a port, and opens it again whenever it fails.
 
 use super::carry::{append, carry};
-use super::{Ends, FromPort, tcp, udp};
+use super::{FromPort, PortEnds, tcp, udp};
 use scenecast_core::PortAddress;
 use std::fs::File;
 use std::io;
@@ -13,7 +13,7 @@ use tokio_serial::{SerialPort, SerialPortBuilderExt, SerialStream};
 /// The first pause before opening again.
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
 /// The longest one, so that a cable that is back is soon noticed.
-const LONGEST_PAUSE: Duration = Duration::from_secs(2);
+const MAX_PAUSE: Duration = Duration::from_secs(2);
 /// Longest wait for a connection: an address that nobody answers at must not take minutes.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 
@@ -26,7 +26,6 @@ pub(super) enum Opened {
     File(File),
 }
 
-/// Opens it once.
 pub(super) async fn open(place: &PortAddress) -> io::Result<Opened> {
     Ok(match place {
         PortAddress::Serial(device, baud) => Opened::Serial(serial(device, *baud)?),
@@ -47,7 +46,7 @@ fn serial(device: &str, baud: u32) -> io::Result<SerialStream> {
     let mut stream = tokio_serial::new(device, baud).open_native_async()?;
     // Two ends may share a pseudo-terminal in a rehearsal; where exclusiveness is not to be had, it is not needed.
     let _ = stream.set_exclusive(false);
-    // Some modems garble what they say while RTS is up and flow control off; a pseudo-terminal has no such line.
+    // Some modems garble their output while RTS is up and flow control off; a pseudo-terminal has no such line.
     let _ = stream.write_request_to_send(false);
     Ok(stream)
 }
@@ -57,7 +56,7 @@ pub(super) struct Keeper {
     pub(super) name: &'static str,
     pub(super) place: PortAddress,
     pub(super) quiet: Option<Duration>,
-    pub(super) ends: Ends,
+    pub(super) ends: PortEnds,
 }
 
 impl Keeper {
@@ -77,16 +76,16 @@ impl Keeper {
                 Err(e) => Err(e),
             };
             let Err(e) = ended else { return };
-            if began.elapsed() > LONGEST_PAUSE {
+            if began.elapsed() > MAX_PAUSE {
                 (pause, said) = (FIRST_PAUSE, false);
             }
-            // One that stays away is said once.
+            // A failure that lasts is logged once.
             match std::mem::replace(&mut said, true) {
                 false => tracing::warn!("{}: {}: {e}; it is opened again when it is there", self.name, self.place),
                 true => tracing::debug!("{}: {}: {e}", self.name, self.place),
             }
             tokio::time::sleep(pause).await;
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            pause = (pause * 2).min(MAX_PAUSE);
         }
     }
 

@@ -12,23 +12,20 @@ use std::io;
 use std::time::Duration;
 use tokio::sync::mpsc;
 
-/// What a port is told.
+/// A request to a port.
 #[derive(Debug)]
 enum ToPort {
-    /// Write this.
     Bytes(Bytes),
     /// Close and open again: nobody answers.
     Reopen,
 }
 
-/// What a port tells.
+/// A report of a port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FromPort {
-    /// It is open.
     Open,
     /// It is closed, and being opened again.
     Closed,
-    /// This was read.
     Bytes(Bytes),
 }
 
@@ -40,7 +37,7 @@ pub struct Port {
 }
 
 /// The far side of a [`Port`].
-struct Ends {
+struct PortEnds {
     to: mpsc::Receiver<ToPort>,
     from: mpsc::Sender<FromPort>,
 }
@@ -60,21 +57,21 @@ impl Port {
         Ok(port)
     }
 
-    /// Opens it as soon as it is there, and again for ever. An instrument that says nothing for `quiet` counts as gone, where
-    /// that is given: an unplugged adapter or a half-open connection may never tell.
+    /// Opens it as soon as it is there, and again for ever. Where `quiet` is given, an instrument
+    /// that is silent for so long counts as gone: an unplugged adapter or a half-open connection may never report an error.
     pub fn open_when_there(name: &'static str, place: PortAddress, quiet: Option<Duration>) -> Self {
         let (port, ends) = Self::pair();
         tokio::spawn(Keeper { name, place, quiet, ends }.run(None));
         port
     }
 
-    fn pair() -> (Self, Ends) {
+    fn pair() -> (Self, PortEnds) {
         let (to, to_port) = mpsc::channel(64);
         let (from_port, from) = mpsc::channel(64);
-        (Self { to, from }, Ends { to: to_port, from: from_port })
+        (Self { to, from }, PortEnds { to: to_port, from: from_port })
     }
 
-    /// The next thing that it tells; safe to abandon.
+    /// The next report of the port. Safe to abandon.
     pub async fn next(&mut self) -> FromPort {
         match self.from.recv().await {
             Some(told) => told,
@@ -82,7 +79,7 @@ impl Port {
         }
     }
 
-    /// What an optional port reports next; never without one. Safe to abandon.
+    /// The next report of an optional port; without one, it waits for ever. Safe to abandon.
     pub async fn next_of(port: &mut Option<Self>) -> FromPort {
         match port {
             Some(port) => port.next().await,
@@ -90,7 +87,7 @@ impl Port {
         }
     }
 
-    /// Writes bytes; says whether the port took them. What it does not take is stale by the time that it would.
+    /// Writes bytes and returns whether the port took them. Refused bytes need not be written again: they would be stale.
     pub fn write(&self, bytes: Vec<u8>) -> bool {
         self.to.try_send(ToPort::Bytes(bytes.into())).is_ok()
     }
@@ -101,14 +98,14 @@ impl Port {
     }
 }
 
-impl Ends {
-    /// The port has been opened: what waited while it was not is stale. Says whether the host is still there.
+impl PortEnds {
+    /// The port has been opened: bytes that waited for it are stale. Returns whether the host is still there.
     async fn tell_open(&mut self) -> bool {
         while self.to.try_recv().is_ok() {}
         self.from.send(FromPort::Open).await.is_ok()
     }
 
-    /// Says whether the host is still there.
+    /// Returns whether the host is still there.
     async fn tell(&self, told: FromPort) -> bool {
         self.from.send(told).await.is_ok()
     }

@@ -1,7 +1,7 @@
-//! Connections that others make.
+//! TCP ports that wait for the other side to connect.
 
 use super::carry::carry;
-use super::{Ends, FromPort};
+use super::{FromPort, PortEnds};
 use std::io;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
@@ -15,7 +15,7 @@ pub(super) async fn accept(
     name: &'static str,
     listener: TcpListener,
     quiet: Option<Duration>,
-    ends: &mut Ends,
+    ends: &mut PortEnds,
 ) -> io::Result<()> {
     let mut next = None;
     loop {
@@ -42,8 +42,8 @@ pub(super) async fn accept(
     }
 }
 
-/// Carries bytes over one connection; says whether the host is gone.
-async fn serve(name: &'static str, stream: TcpStream, quiet: Option<Duration>, ends: &mut Ends) -> bool {
+/// Carries bytes over one connection; returns whether the host is gone.
+async fn serve(name: &'static str, stream: TcpStream, quiet: Option<Duration>, ends: &mut PortEnds) -> bool {
     let _ = stream.set_nodelay(true);
     match carry(stream, quiet, ends).await {
         Ok(()) => true,

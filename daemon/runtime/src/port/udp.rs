@@ -1,7 +1,7 @@
 //! Datagrams, one a frame: for benches, radio links and autopilots.
 
 use super::carry::{reopening, silence};
-use super::{Ends, ToPort, read};
+use super::{PortEnds, ToPort, read};
 use std::io;
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use tokio::time::Instant;
 
 /// The largest datagram that is read.
 const LARGEST: usize = 2048;
-/// After the system told of an error.
+/// Pause after an error of the system.
 const PAUSE: Duration = Duration::from_millis(200);
 
 /// A socket at `own`, or anywhere if that is empty, and the address of `remote`, if it is not.
@@ -34,7 +34,7 @@ pub(super) async fn carry(
     socket: UdpSocket,
     fixed: Option<SocketAddr>,
     quiet: Option<Duration>,
-    ends: &mut Ends,
+    ends: &mut PortEnds,
 ) -> io::Result<()> {
     if !ends.tell_open().await {
         return Ok(());
@@ -62,7 +62,7 @@ pub(super) async fn carry(
                         return Ok(());
                     }
                 }
-                // A peer that is not there yet: the system tells so by an error of the next call.
+                // A peer that is not there yet: the next call returns an error for it.
                 Err(_) => tokio::time::sleep(PAUSE).await,
             },
             e = silence(heard, quiet) => return Err(e),

@@ -2,7 +2,9 @@
 
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_rehearsal::exemplar_bench::{Arrivals, Bytes, Setting, Source, Spread, arrivals, photos, sizes};
+use scenecast_rehearsal::exemplar_bench::{
+    ArrivalSetting, Arrivals, Bytes, PatchSource, Spread, arrivals, photos, sizes,
+};
 use scenecast_tools::Progress;
 use serde_json::json;
 use std::path::PathBuf;
@@ -36,7 +38,7 @@ pub(super) struct ExemplarBench {
 impl ExemplarBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let sources = match self.images.as_slice() {
-            [] => (0..REEFS).map(|i| Source::Reef(self.seed + i)).collect(),
+            [] => (0..REEFS).map(|i| PatchSource::Reef(self.seed + i)).collect(),
             dirs => dirs.iter().map(|dir| photos(dir)).collect::<Result<Vec<_>, _>>()?.concat(),
         };
         let mut progress = Progress::new("pictures");
@@ -46,11 +48,11 @@ impl ExemplarBench {
             return Err(UserError::Failed("no label held long enough to have an image".to_owned()));
         }
         let requests = self.requests as usize;
-        let full = Setting { requests, loss: 0.1, loaded: true, larger: false };
+        let full = ArrivalSetting { requests, loss: 0.1, loaded: true, larger: false };
         let settings = [
             ("full load", full),
-            ("full load, larger", Setting { larger: true, ..full }),
-            ("idle", Setting { loaded: false, ..full }),
+            ("full load, larger", ArrivalSetting { larger: true, ..full }),
+            ("idle", ArrivalSetting { loaded: false, ..full }),
         ];
         let mut rows: Vec<(&str, Arrivals)> = Vec::new();
         let mut progress = Progress::new("requests");

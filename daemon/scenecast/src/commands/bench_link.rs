@@ -2,7 +2,7 @@
 
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkTable, RangingRow, Row, link_table, measure_speed};
+use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkRow, LinkTable, RangingRow, link_table, measure_speed};
 use scenecast_tools::Progress;
 
 /// The link in virtual time with opaque payload of which there is always more: 10 kbit/s half duplex, 0.2 s turn-around,
@@ -61,7 +61,7 @@ fn print_table(table: &LinkTable) {
     print_fleet(&table.fleet);
 }
 
-fn print_row(r: &Row) {
+fn print_row(r: &LinkRow) {
     println!(
         "{:>5} {:>5} {:<11} {:>4.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
         r.range_km,

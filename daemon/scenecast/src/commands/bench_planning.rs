@@ -81,7 +81,7 @@ fn print_trial(t: &Trial) {
     println!(
         "{:<17} {lawnmower:>9.3} {greedy:>8.3} {horizon:>8.3} {:>9.3} {:>18.2} {:>15.2} {:>11}",
         t.name,
-        t.told_all_per_m,
+        t.known_map_per_m,
         horizon / lawnmower.max(1e-9),
         horizon / greedy.max(1e-9),
         t.violations

@@ -2,7 +2,7 @@
 
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
-use crate::VirtualTime;
+use crate::virtual_time::VirtualTime;
 use scenecast_host::{FrameEvent, LinkEnd, LinkHost, channel_station};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::{
@@ -19,21 +19,19 @@ use std::time::Duration;
 const SURFACE: NodeId = NodeId(0);
 /// Bits a second on air.
 pub const BIT_RATE_BPS: u32 = 10_000;
-/// Window of the budget.
 pub const WINDOW: Duration = Duration::from_secs(10);
 /// Speed of sound in every row.
 const SOUND_SPEED_M_S: f64 = 1500.0;
 
-/// What the ends and the water between them are like.
+/// Properties of the ends and of the channel between them.
 #[derive(Debug, Clone)]
-pub struct Setting {
+pub struct LinkSetting {
     /// Slant range of every vehicle.
     pub range_m: f64,
     /// Bytes of a full frame.
     pub frame_bytes: usize,
     /// How frames are lost, each way.
     pub loss: LossModel,
-    /// Vehicles, numbered from 1.
     pub vehicles: u8,
     /// Whether the surface knows none of them at the start and calls so often.
     pub call_every: Option<Duration>,
@@ -41,7 +39,7 @@ pub struct Setting {
     pub budget_bps: u32,
 }
 
-impl Setting {
+impl LinkSetting {
     /// One known vehicle, and a budget that does not bind.
     pub fn new(range_m: f64, frame_bytes: usize, loss: LossModel) -> Self {
         Self { range_m, frame_bytes, loss, vehicles: 1, call_every: None, budget_bps: BIT_RATE_BPS }
@@ -58,16 +56,14 @@ impl Setting {
         }
     }
 
-    /// Two-way propagation.
     pub fn round_trip(&self) -> Duration {
         Duration::from_secs_f64(2.0 * self.range_m / SOUND_SPEED_M_S)
     }
 }
 
-/// A vehicle and what the harness keeps of it.
+/// A vehicle and the bench's record of it.
 #[derive(Debug)]
-pub struct Vehicle {
-    /// Its address.
+pub struct BenchVehicle {
     pub address: Address,
     /// Its end of the link at its modem.
     pub host: LinkHost<VehicleLink<OpaqueSource>>,
@@ -78,18 +74,17 @@ pub struct Vehicle {
 }
 
 /// The ends and the channel between them.
-pub struct Water {
-    /// The time.
+pub struct LinkBench {
     pub now: Instant,
     /// The surface's end of the link at its modem.
     pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     /// The vehicles, in the order of their addresses.
-    pub vehicles: Vec<Vehicle>,
+    pub vehicles: Vec<BenchVehicle>,
     /// Where airtime and frames went.
     pub tally: Tally,
     /// Turns that were granted, and the time that they add up to.
     pub grants: (u64, Duration),
-    setting: Setting,
+    setting: LinkSetting,
     modem: ModemProfile,
     channel: Channel,
     /// When each end last took in a frame that was meant for it.
@@ -106,9 +101,9 @@ fn address(number: u8) -> Address {
     Address::vehicle(number).unwrap_or(Address::EVERYBODY)
 }
 
-impl Water {
+impl LinkBench {
     /// Ends that have not met, all chance drawn from `seed`.
-    pub fn new(setting: &Setting, seed: u64) -> Self {
+    pub fn new(setting: &LinkSetting, seed: u64) -> Self {
         let now = Instant::from_secs_f64(1000.0);
         let config = ChannelConfig {
             sound_speed_m_s: SOUND_SPEED_M_S,
@@ -118,14 +113,14 @@ impl Water {
         };
         let mut channel = Channel::new(config, seed);
         channel.place(SURFACE, Position::default());
-        let mut dice = Stream::new(seed, &[1]);
-        let mut draw = || (dice.uniform() * 2f64.powi(53)) as u64;
+        let mut rng = Stream::new(seed, &[1]);
+        let mut draw = || (rng.uniform() * 2f64.powi(53)) as u64;
         let mut vehicles = Vec::new();
         for number in 1..=setting.vehicles {
             let angle = f64::from(number) / f64::from(setting.vehicles) * std::f64::consts::TAU;
             let place = Position::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
             channel.place(NodeId(number), place);
-            vehicles.push(Vehicle::new(setting, address(number), draw(), now));
+            vehicles.push(BenchVehicle::new(setting, address(number), draw(), now));
         }
         Self {
             now,
@@ -140,13 +135,12 @@ impl Water {
         }
     }
 
-    /// What it is like.
-    pub fn setting(&self) -> &Setting {
+    /// The setting that it was made with.
+    pub fn setting(&self) -> &LinkSetting {
         &self.setting
     }
 
-    /// The only vehicle.
-    pub fn vehicle(&mut self) -> &mut Vehicle {
+    pub fn vehicle(&mut self) -> &mut BenchVehicle {
         &mut self.vehicles[0]
     }
 
@@ -174,7 +168,7 @@ impl Water {
     }
 }
 
-impl VirtualTime for Water {
+impl VirtualTime for LinkBench {
     fn now(&self) -> Instant {
         self.now
     }
@@ -211,7 +205,6 @@ impl VirtualTime for Water {
         }
     }
 
-    /// Lets every end say what it may say now.
     fn pump(&mut self) {
         while let Some(event) = self.surface.end_mut().poll_event() {
             if let SurfaceEvent::VehicleRestarted(_) = event {
@@ -244,9 +237,9 @@ fn poll_frame<E: LinkEnd>(host: &mut LinkHost<E>, now: Instant) -> Option<(Vec<u
     Some((bytes, kind))
 }
 
-impl Vehicle {
+impl BenchVehicle {
     /// A vehicle that has met nobody.
-    pub(super) fn new(setting: &Setting, address: Address, seed: u64, now: Instant) -> Self {
+    pub(super) fn new(setting: &LinkSetting, address: Address, seed: u64, now: Instant) -> Self {
         let config = VehicleConfig {
             address,
             mission: MissionId(7),
@@ -280,12 +273,12 @@ impl Vehicle {
 }
 
 /// The surface of a setting at its modem.
-pub(super) fn surface(setting: &Setting, seed: u64, now: Instant) -> LinkHost<SurfaceLink<OpaqueReplica>> {
+pub(super) fn surface(setting: &LinkSetting, seed: u64, now: Instant) -> LinkHost<SurfaceLink<OpaqueReplica>> {
     let link = SurfaceLink::new(surface_config(setting), seed, now);
     LinkHost::new(link, channel_station(setting.modem(), WINDOW, now))
 }
 
-fn surface_config(setting: &Setting) -> SurfaceConfig {
+fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
     let known = if setting.call_every.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),

@@ -1,8 +1,8 @@
-//! A second opinion on where a vehicle went: shares no code with the planners.
+//! An audit of a vehicle's track against a fence. It shares no code with the planners, so that it finds their errors.
 
 use scenecast_protocol::directive::{Fence, Polygon};
 
-/// Metres between two places that are looked at.
+/// Metres between two samples of a track.
 const GRAIN_M: f64 = 0.05;
 
 /// Stretches of a track, at most 5 cm each, that lie outside the fence or in a keep-out.
@@ -20,7 +20,6 @@ pub fn stretches_outside(track: &[(f64, f64)], fence: &Fence) -> usize {
     outside
 }
 
-/// Metres of a track.
 pub fn length_m(track: &[(f64, f64)]) -> f64 {
     track.windows(2).map(|leg| (leg[1].0 - leg[0].0).hypot(leg[1].1 - leg[0].1)).sum()
 }
