@@ -132,16 +132,17 @@ impl PowerCutTrial {
         self.ticks += 1;
         self.operate();
         self.surface.handle_timeout(self.now());
-        while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= Instant::ZERO + TICK * self.ticks) {
+        let now = self.now();
+        while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= now) {
             let Arrival { at_vehicle, bytes } = due.remove();
             match at_vehicle {
                 true => self.run_vehicle(Some(&bytes)),
-                false => self.surface.link_mut().handle_bytes(&bytes, self.now()),
+                false => self.surface.link_mut().handle_bytes(&bytes, now),
             }
         }
         self.run_vehicle(None);
         while self.surface.poll_event().is_some() {}
-        while let Some(bytes) = self.surface.poll_output(self.now()) {
+        while let Some(bytes) = self.surface.poll_output(now) {
             self.transmit(bytes, false);
         }
         let shown: BTreeSet<u8> =
