@@ -1,4 +1,4 @@
-//! How fast the two ends run on one core, without a channel: what one says the other hears when the airtime is over.
+//! Speed of the two ends on one core, without a channel: each frame is received when its airtime is over.
 //!
 //! `cargo bench -p scenecast-protocol --bench link`
 
@@ -36,7 +36,7 @@ fn saturated_hour(bencher: Bencher<'_, '_>, frame_bytes: usize) {
     bencher.with_inputs(|| Wire::new(frame_bytes)).bench_local_values(|mut wire| wire.run(Duration::from_secs(3600)));
 }
 
-/// A state of which there is always more to say, and that costs next to nothing.
+/// A state that always has content and takes almost no time.
 #[derive(Debug, Default)]
 struct Endless;
 
@@ -55,7 +55,7 @@ impl StateSource for Endless {
         20_000
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         false
     }
 
@@ -82,13 +82,13 @@ impl StateReplica for Endless {
     fn clear(&mut self) {}
 }
 
-/// Two ends with nothing but airtime between them.
+/// Two ends separated only by airtime.
 struct Wire {
     now: Instant,
     modem: ModemProfile,
     vehicle: VehicleLink<Endless>,
     surface: SurfaceLink<Endless>,
-    /// Frames on air by when they end and whether the surface sent them.
+    /// Frames on air by their end, and whether the surface sent them.
     on_air: BTreeMap<(Instant, bool), Vec<u8>>,
     frames: u64,
 }
@@ -124,7 +124,7 @@ impl Wire {
             shares,
             master: MasterConfig::default(),
             vehicles: vec![address],
-            call_every: None,
+            discovery_period: None,
             authenticity: None,
         };
         let mut vehicle = VehicleLink::with_source(vehicle, Endless, 1, SlotInboxState::default(), now);

@@ -1,67 +1,67 @@
-//! A representative image of a label on the wire.
+//! Exemplars on the wire: a small image that shows one label.
 
-use crate::directive::Request;
+use crate::directive::ExemplarRequest;
 
-/// Bytes before the image.
+/// Length of the header before the image, in bytes.
 pub const HEAD: usize = 4;
 /// Bytes of a VP8 key frame before its size: frame tag and start code.
 const TAG: usize = 3;
 const START_CODE: [u8; 3] = [0x9D, 0x01, 0x2A];
-/// Bytes of the frame that say nothing of a square image of known edge: start code and size.
+/// Bytes that every square image of a known edge has: start code and size.
 const CONSTANT: usize = 7;
 
-/// The edge of an image: 64 << `size` pixels.
+/// The edge of an image in pixels: 64 << `size`.
 pub fn edge_px(size: u8) -> u32 {
     64 << size.min(3)
 }
 
-/// Most bytes of an image of this size as it travels: 700 for the smallest, as much a pixel for larger ones.
-pub fn most_bytes(size: u8) -> usize {
+/// The most bytes of an image of this size: 700 for the smallest, and as many for each pixel of larger ones.
+pub fn max_bytes(size: u8) -> usize {
     (700 << (2 * size.min(2))) - HEAD
 }
 
-/// A representative image as an object on the link.
+/// An exemplar as an object on the link.
 ///
 /// ```text
 /// byte  field
 ///  0    label epoch
 ///  1    label, 1..=254
-///  2    serial number of the request it answers; 0: nobody asked
+///  2    serial number of the request that it answers; 0: it was not requested
 ///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 number of the picture, 0: there is none
 ///  4..  VP8 key frame without start code and size
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Exemplar {
-    /// Label epoch.
+    /// The epoch of the label ids.
     pub epoch: u8,
-    /// Label.
+    /// The label that it shows, 1..=254.
     pub label: u8,
-    /// Serial number of the request; 0: nobody asked.
+    /// Serial number of the request that it answers; 0 if it was not requested.
     pub serial: u8,
-    /// Size, 0..=3.
+    /// The edge is 64 << `size` pixels; 0..=3.
     pub size: u8,
-    /// Number of the picture among those of the label, 1..=63.
+    /// Its number among the exemplars of the label, 1..=63.
     pub picture: u8,
-    /// The image as it travels; empty if the vehicle has none that is asked for.
+    /// The image without its constant bytes; empty if the vehicle has none that matches the request.
     pub bytes: Vec<u8>,
 }
 
 impl Exemplar {
-    /// The object's bytes.
+    /// Encodes header and image for the sender of objects.
     pub fn encode(&self) -> Vec<u8> {
-        let what = self.size << 6 | self.picture & Request::MOST_PICTURE;
+        let what = self.size << 6 | self.picture & ExemplarRequest::MAX_PICTURE;
         [&[self.epoch, self.label, self.serial, what][..], &self.bytes].concat()
     }
 
-    /// Reads an object; `None` if it names no label, or a picture that is not there.
+    /// Decodes an object; `None` if it names no label, or a picture without bytes.
     pub fn decode(object: &[u8]) -> Option<Self> {
         let (&[epoch, label, serial, what], bytes) = object.split_first_chunk::<HEAD>()?;
-        let (size, picture) = (what >> 6, what & Request::MOST_PICTURE);
+        let (size, picture) = (what >> 6, what & ExemplarRequest::MAX_PICTURE);
         let is_sound = label != 0 && label != 255 && (picture == 0) == bytes.is_empty();
         is_sound.then(|| Self { epoch, label, serial, size, picture, bytes: bytes.to_vec() })
     }
 
-    /// The WebP file; `None` if there is no picture, or what came cannot be one. It is left to whoever shows it to decode it.
+    /// The WebP file; `None` if there is no picture, or if the bytes cannot be one. The pixels are not decoded here.
     pub fn webp(&self) -> Option<Vec<u8>> {
         unstrip(&self.bytes, edge_px(self.size) as u16)
     }
@@ -76,7 +76,7 @@ pub fn strip(file: &[u8]) -> Option<Vec<u8>> {
     rest.starts_with(&START_CODE).then(|| [&tag[..], rest.get(CONSTANT..).unwrap_or_default()].concat())
 }
 
-/// The WebP file of a square image of `edge` pixels; `None` if the bytes cannot be a key frame that is shown.
+/// The WebP file of a square image of `edge` pixels; `None` if the bytes cannot be a visible key frame.
 pub fn unstrip(bytes: &[u8], edge: u16) -> Option<Vec<u8>> {
     let (tag, rest) = bytes.split_first_chunk::<TAG>()?;
     let bits = u32::from_le_bytes([tag[0], tag[1], tag[2], 0]);
@@ -93,7 +93,9 @@ pub fn unstrip(bytes: &[u8], edge: u16) -> Option<Vec<u8>> {
     file.extend(b"WEBPVP8 ");
     file.extend(length.to_le_bytes());
     file.extend(&frame);
-    file.extend(&[0][..padding]);
+    if padding == 1 {
+        file.push(0);
+    }
     Some(file)
 }
 

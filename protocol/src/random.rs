@@ -1,6 +1,6 @@
-//! Numbers that look random, from a seed.
+//! A small generator of pseudorandom numbers.
 
-/// The next number of a splitmix64 sequence (S. Vigna, 2015).
+/// The next number of a SplitMix64 sequence (Steele, Lea and Flood 2014); `state` advances.
 pub(crate) fn next(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let mut z = *state;

@@ -1,4 +1,4 @@
-//! Time as the cores know it: an argument, never a clock.
+//! Time as an argument; the crate reads no clock.
 
 use std::ops::{Add, Sub};
 use std::time::Duration;
@@ -8,25 +8,25 @@ use std::time::Duration;
 pub struct Instant(u64);
 
 impl Instant {
-    /// The origin.
+    /// The origin of the host's clock.
     pub const ZERO: Self = Self(0);
 
-    /// `micros` microseconds after the origin.
+    /// The moment `micros` microseconds after the origin.
     pub const fn from_micros(micros: u64) -> Self {
         Self(micros)
     }
 
-    /// `seconds` seconds after the origin; negative or non-finite values read as the origin.
+    /// The moment `seconds` seconds after the origin; negative or non-finite values yield the origin.
     pub fn from_secs_f64(seconds: f64) -> Self {
         Self((seconds * 1e6).round() as u64)
     }
 
-    /// Microseconds since the origin.
+    /// The time since the origin in microseconds.
     pub const fn as_micros(self) -> u64 {
         self.0
     }
 
-    /// Seconds since the origin.
+    /// The time since the origin in seconds.
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / 1e6
     }
@@ -38,7 +38,7 @@ impl Instant {
 }
 
 impl From<Duration> for Instant {
-    /// Rounds up, so that what is due at the given time is due at the instant.
+    /// Rounds up, so that anything due at the given time is due at the instant.
     fn from(since_origin: Duration) -> Self {
         Self(since_origin.as_nanos().div_ceil(1000) as u64)
     }

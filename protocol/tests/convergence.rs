@@ -1,19 +1,19 @@
-//! The promises of the link, over seeds, on a virtual clock.
+//! Convergence of the two ends, over seeds, in virtual time.
 
 mod pair;
 
-use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
+use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
 use proptest::prelude::*;
-use scenecast_protocol::directive::{LifeLine, Slot, Utility};
+use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, PlaneKind, PlaneScale, PlaneSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Class, Extra, SpendOrder};
 use std::time::Duration;
 
-fn water() -> impl Strategy<Value = Water> {
+fn channel() -> impl Strategy<Value = LossyChannel> {
     (0.0..0.9f64, 0.0..0.2f64, 0.0..0.2f64, 0.0..0.2f64, 0.0..0.2f64, 30u64..2000).prop_map(
-        |(loss, duplication, reordering, corruption, talker, ms)| Water {
+        |(loss, duplication, reordering, corruption, talker, ms)| LossyChannel {
             loss,
             duplication,
             reordering,
@@ -48,7 +48,7 @@ fn setup() -> impl Strategy<Value = Setup> {
     )
 }
 
-fn assert_budget(pair: &Pair, budget_bps: u32) {
+fn assert_budget(pair: &LinkedEnds, budget_bps: u32) {
     for audit in &pair.audits {
         let limit = u64::from(budget_bps) * 10 + audit.largest_bits();
         assert!(audit.worst_window_bits() <= limit, "{} bits in a window, limit {limit}", audit.worst_window_bits());
@@ -59,17 +59,17 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
-    fn the_operators_map_becomes_the_vehicles_whatever_the_water_and_the_restarts(
+    fn the_maps_converge_over_any_channel_and_restarts(
         seed: u64,
-        water in water(),
+        channel in channel(),
         setup in setup(),
         restarts in proptest::collection::vec((0u8..6, 0u8..6), 6),
     ) {
         let budget = setup.budget_bps;
-        let mut pair = Pair::new(seed, setup, water);
+        let mut pair = LinkedEnds::new(seed, setup, channel);
         for (step, (what, outage)) in restarts.into_iter().enumerate() {
             let map = patchy(24, step as u64);
-            // Now and then one way is cut, or both.
+            // From time to time one direction is interrupted, or both.
             pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
             pair.vehicle.set_map(map.iter(), pair.now);
             pair.set_planes(24, step as u64);
@@ -88,10 +88,10 @@ proptest! {
     }
 
     #[test]
-    fn each_version_is_applied_at_most_once_and_the_last_one_is_in_force(
-        seed: u64, water in water(), setup in setup(), restarts in proptest::collection::vec(0u8..4, 8),
+    fn each_version_is_applied_once_and_the_last_stays(
+        seed: u64, channel in channel(), setup in setup(), restarts in proptest::collection::vec(0u8..4, 8),
     ) {
-        let mut pair = Pair::new(seed, setup, water);
+        let mut pair = LinkedEnds::new(seed, setup, channel);
         for (step, what) in restarts.into_iter().enumerate() {
             pair.surface.issue(auv(), utility(step as i8 + 1), pair.now).unwrap();
             pair.surface.issue(auv(), hold(step % 2 == 0), pair.now).unwrap();
@@ -100,8 +100,8 @@ proptest! {
                 pair.restart_vehicle(&patchy(2, 0));
             }
         }
-        let applied = |pair: &Pair| {
-            pair.surface.vehicle(auv()).unwrap().slots().all(|s| s.life == LifeLine::Applied)
+        let applied = |pair: &LinkedEnds| {
+            pair.surface.vehicle(auv()).unwrap().slots().all(|s| s.status == OrderStatus::Applied)
         };
         for _ in 0..1000 {
             pair.run(pair.now + Duration::from_secs(100), false);
@@ -118,7 +118,7 @@ proptest! {
     }
 }
 
-const CALM: Water = Water {
+const CALM: LossyChannel = LossyChannel {
     loss: 0.05,
     duplication: 0.0,
     reordering: 0.0,
@@ -131,7 +131,7 @@ const CALM: Water = Water {
 fn planes_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() {
     let sent = |planes: [u8; 2]| {
         let setup = Setup { planes: Some(planes), ..Setup::new(256, 4_000, Codec::Png) };
-        let mut pair = Pair::new(1, setup, Water { loss: 0.0, ..CALM });
+        let mut pair = LinkedEnds::new(1, setup, LossyChannel { loss: 0.0, ..CALM });
         for phase in 0..20 {
             pair.vehicle.set_map(speckled(120, phase), pair.now);
             pair.set_planes(120, phase);
@@ -143,21 +143,21 @@ fn planes_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() 
     };
     let [labels, confidence, depth] = sent([0, 0]);
     assert!(labels > 50_000 && confidence + depth < 100, "{labels} {confidence} {depth}");
-    // A half of what is sent is the map's share.
+    // Half of the sent bytes is the share of the map.
     let [labels, confidence, depth] = sent([20, 10]);
     let part = |bytes: u64| bytes as f64 / (labels + confidence + depth) as f64;
     assert!((0.08..0.13).contains(&part(confidence)), "{labels} {confidence} {depth}");
     assert!((0.03..0.08).contains(&part(depth)), "{labels} {confidence} {depth}");
 }
 
-fn sent(pair: &Pair, class: Class) -> u64 {
+fn sent(pair: &LinkedEnds, class: Class) -> u64 {
     pair.vehicle.stats().bytes_by_class.get(&class).copied().unwrap_or(0)
 }
 
 #[test]
 fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_not_name() {
     let setup = Setup { planes: Some([0, 0]), ..Setup::new(256, 4_000, Codec::Context) };
-    let mut pair = Pair::new(3, setup, Water { loss: 0.1, ..CALM });
+    let mut pair = LinkedEnds::new(3, setup, LossyChannel { loss: 0.1, ..CALM });
     pair.vehicle.set_spend(SpendOrder::new(&[Extra::Exemplars, Extra::Depth]).unwrap());
     pair.vehicle.set_map(speckled(20, 1), pair.now);
     pair.set_planes(100, 1);
@@ -165,7 +165,7 @@ fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_n
     for _ in 0..400 {
         pair.run(pair.now + Duration::from_secs(1), false);
         let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Depth));
-        // Ends of frames into which no part of the object fits, and what waits for its verdicts, are left over, too.
+        // Spare capacity includes ends of frames too short for a part of the object, and waits for verdicts.
         assert!(object >= 9_000 || depth <= object / 20, "{depth} bytes of depth after {object} of the object");
     }
     assert!(sent(&pair, Class::Depth) > 500, "then it is its turn");
@@ -175,7 +175,7 @@ fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_n
 
 #[test]
 fn curiosity_is_told_where_the_operator_asks_for_it_and_nowhere_else() {
-    let mut pair = Pair::new(4, Setup::new(256, 4_000, Codec::Context), Water { loss: 0.2, ..CALM });
+    let mut pair = LinkedEnds::new(4, Setup::new(256, 4_000, Codec::Context), LossyChannel { loss: 0.2, ..CALM });
     pair.vehicle.set_planes([(PlaneSource::new(PlaneScale::Curiosity, Codec::Context, Duration::ZERO), 0)]);
     pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
     let bits = (0..400).map(|i| (Cell::new(i % 20, i / 20), f64::from(i % 7) + f64::from(i / 80)));
@@ -193,7 +193,7 @@ fn curiosity_is_told_where_the_operator_asks_for_it_and_nowhere_else() {
 #[test]
 fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_agree_in_the_end() {
     let after_a_minute = |order: [Extra; 2]| {
-        let mut pair = Pair::new(5, Setup::new(256, 4_000, Codec::Context), Water { loss: 0.1, ..CALM });
+        let mut pair = LinkedEnds::new(5, Setup::new(256, 4_000, Codec::Context), LossyChannel { loss: 0.1, ..CALM });
         pair.vehicle.set_spend(SpendOrder::new(&order).unwrap());
         pair.vehicle.source_mut().set_coarse_limit(Some(500));
         pair.vehicle.set_map(speckled(200, 1), pair.now);
@@ -211,13 +211,13 @@ fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_a
 }
 
 #[test]
-fn a_new_epoch_takes_the_planes_away_before_the_first_new_label() {
+fn a_new_epoch_clears_the_planes_before_new_labels() {
     let setup = Setup { planes: Some([0, 0]), ..Setup::new(256, 10_000, Codec::Context) };
-    let mut pair = Pair::new(2, setup, Water { loss: 0.2, ..CALM });
+    let mut pair = LinkedEnds::new(2, setup, LossyChannel { loss: 0.2, ..CALM });
     pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
     pair.set_planes(20, 0);
     pair.run(pair.now + Duration::from_secs(200), true);
-    let level = |pair: &Pair, cell: Cell| {
+    let level = |pair: &LinkedEnds, cell: Cell| {
         let plane = pair.surface.vehicle(auv()).unwrap().plane(PlaneKind::Confidence);
         plane.map_or(0, |p| p.levels().shown().get(cell))
     };
@@ -234,9 +234,9 @@ fn a_new_epoch_takes_the_planes_away_before_the_first_new_label() {
 }
 
 #[test]
-fn an_end_that_was_not_heard_for_hours_is_heard_again() {
+fn contact_resumes_after_hours_of_silence() {
     for mute in [[true, false], [false, true], [true, true]] {
-        let mut pair = Pair::new(3, Setup::new(64, 10_000, Codec::Png), CALM);
+        let mut pair = LinkedEnds::new(3, Setup::new(64, 10_000, Codec::Png), CALM);
         pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
         pair.run(pair.now + Duration::from_secs(60), false);
         pair.mute = mute;
@@ -252,10 +252,10 @@ fn an_end_that_was_not_heard_for_hours_is_heard_again() {
 }
 
 #[test]
-fn what_was_held_back_is_asked_for_when_it_is_due() {
+fn held_changes_are_requested_when_due() {
     for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
         let setup = Setup { access, settle: Duration::from_secs(4), ..Setup::new(256, 10_000, Codec::Context) };
-        let mut pair = Pair::new(5, setup, Water { loss: 0.0, ..CALM });
+        let mut pair = LinkedEnds::new(5, setup, LossyChannel { loss: 0.0, ..CALM });
         let start = patchy(20, 0);
         pair.vehicle.set_map(start.iter(), pair.now);
         pair.run(pair.now + Duration::from_secs(60), false);
@@ -270,8 +270,8 @@ fn what_was_held_back_is_asked_for_when_it_is_due() {
 }
 
 #[test]
-fn a_large_directive_gets_through_while_many_losses_are_acknowledged() {
-    let mut pair = Pair::new(9, Setup::new(64, 10_000, Codec::Png), Water { loss: 0.45, ..CALM });
+fn a_large_directive_arrives_beside_large_acknowledgements() {
+    let mut pair = LinkedEnds::new(9, Setup::new(64, 10_000, Codec::Png), LossyChannel { loss: 0.45, ..CALM });
     pair.vehicle.set_map(speckled(120, 1), pair.now);
     pair.run(pair.now + Duration::from_secs(30), false);
     let weights = (1..=14).map(|label| (label, 50)).collect();
@@ -282,8 +282,8 @@ fn a_large_directive_gets_through_while_many_losses_are_acknowledged() {
 }
 
 #[test]
-fn a_directive_that_fits_no_frame_is_refused_where_it_is_issued() {
-    let mut pair = Pair::new(9, Setup::new(64, 10_000, Codec::Png), CALM);
+fn an_oversized_directive_is_refused_when_issued() {
+    let mut pair = LinkedEnds::new(9, Setup::new(64, 10_000, Codec::Png), CALM);
     let weights = (1..=100).map(|label| (label, 50)).collect();
     let utility = Slot::Utility(Utility { weights, ..Utility::default() });
     let refused = pair.surface.issue(auv(), utility, pair.now).unwrap_err().to_string();
@@ -301,8 +301,8 @@ fn speckled(side: i32, phase: u64) -> Vec<(Cell, u8)> {
 }
 
 #[test]
-fn a_clean_channel_is_mostly_spent_on_the_map() {
-    let water = Water {
+fn a_clean_channel_carries_mostly_the_map() {
+    let channel = LossyChannel {
         loss: 0.0,
         duplication: 0.0,
         reordering: 0.0,
@@ -310,7 +310,7 @@ fn a_clean_channel_is_mostly_spent_on_the_map() {
         talker: 0.0,
         propagation: Duration::from_millis(667),
     };
-    let mut pair = Pair::new(1, Setup::new(256, 10_000, Codec::Png), water);
+    let mut pair = LinkedEnds::new(1, Setup::new(256, 10_000, Codec::Png), channel);
     let start = pair.now;
     for phase in 0..30 {
         pair.vehicle.set_map(speckled(200, phase), pair.now);
@@ -321,13 +321,14 @@ fn a_clean_channel_is_mostly_spent_on_the_map() {
     assert!(efficiency > 0.7, "{efficiency}");
 }
 
-/// Found by the property test above: with no turns, nothing told the surface that its vehicle had gone.
+/// Found by the property test above: without turns, the surface did not notice that its vehicle had restarted.
 #[test]
-fn a_vehicle_that_restarts_twice_is_met_again_through_a_modem_that_takes_turns_by_itself() {
-    let water = Water { loss: 0.9, duplication: 0.03, talker: 0.11, propagation: Duration::from_millis(30), ..CALM };
+fn a_modem_owned_link_recovers_from_two_restarts() {
+    let channel =
+        LossyChannel { loss: 0.9, duplication: 0.03, talker: 0.11, propagation: Duration::from_millis(30), ..CALM };
     for seed in 0..30 {
         let setup = Setup { access: Access::ModemOwned { pool_frames: 8 }, ..Setup::new(32, 1000, Codec::Png) };
-        let mut pair = Pair::new(seed, setup, water.clone());
+        let mut pair = LinkedEnds::new(seed, setup, channel.clone());
         for _ in 0..3 {
             pair.run(pair.now + Duration::from_secs(20), false);
             pair.restart_vehicle(&patchy(2, 0));
@@ -337,10 +338,10 @@ fn a_vehicle_that_restarts_twice_is_met_again_through_a_modem_that_takes_turns_b
     }
 }
 
-/// Found by the property test above: the hello of a run that had ended came late, after that of the living one.
+/// Found by the property test above: the hello of an ended run came late, after that of the current one.
 #[test]
-fn a_late_hello_of_an_ended_run_does_not_keep_the_living_one_out() {
-    let water = Water {
+fn a_late_hello_does_not_block_the_current_run() {
+    let channel = LossyChannel {
         loss: 0.7785790619890249,
         duplication: 0.16584681244600216,
         reordering: 0.12036205488516465,
@@ -348,7 +349,7 @@ fn a_late_hello_of_an_ended_run_does_not_keep_the_living_one_out() {
         talker: 0.04104968855007638,
         propagation: Duration::from_millis(995),
     };
-    let mut pair = Pair::new(6_265_748_222_557_995_702, Setup::new(1000, 1000, Codec::Png), water);
+    let mut pair = LinkedEnds::new(6_265_748_222_557_995_702, Setup::new(1000, 1000, Codec::Png), channel);
     for (step, (what, mute)) in [
         (2, [false; 2]),
         (0, [false, true]),
@@ -375,13 +376,13 @@ fn a_late_hello_of_an_ended_run_does_not_keep_the_living_one_out() {
     assert!(pair.is_converged(), "{:?}", pair.vehicle.stats());
 }
 
-/// Found by the property test above: verdicts in three bytes fell behind what was lost, until numbers ran out.
+/// Found by the property test above: verdicts in three bytes fell behind the losses, until numbers ran out.
 #[test]
 fn verdicts_keep_up_with_losses_in_the_smallest_frames() {
-    let water = Water { loss: 0.896, talker: 0.056, propagation: Duration::from_millis(951), ..CALM };
+    let channel = LossyChannel { loss: 0.896, talker: 0.056, propagation: Duration::from_millis(951), ..CALM };
     for seed in 0..4 {
         let setup = Setup { access: Access::Polled, ..Setup::new(32, 1000, Codec::Png) };
-        let mut pair = Pair::new(seed, setup, water.clone());
+        let mut pair = LinkedEnds::new(seed, setup, channel.clone());
         pair.vehicle.set_map(patchy(24, 5).iter(), pair.now);
         pair.surface.issue(auv(), utility(5), pair.now).unwrap();
         pair.run(pair.now + Duration::from_secs(300_000), true);

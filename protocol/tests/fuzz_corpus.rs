@@ -1,4 +1,4 @@
-//! The fuzz targets without a fuzzer: every file of the corpora, and changes of them.
+//! The fuzz targets without a fuzzer: every file of the corpora, and mutations of them.
 
 #[path = "fuzz_corpus/seeds.rs"]
 mod seeds;
@@ -14,6 +14,7 @@ fn corpora() -> PathBuf {
 }
 
 /// Files of a corpus in the order of their names.
+#[allow(clippy::disallowed_methods, reason = "the corpus is files")]
 fn corpus(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let folder = fs::read_dir(corpora().join(name)).expect("corpus");
     let mut files: Vec<PathBuf> = folder.map(|entry| entry.expect("entry").path()).collect();
@@ -31,7 +32,7 @@ fn every_file_of_the_corpora_is_taken_or_refused() {
 }
 
 #[test]
-fn scripts_get_behind_the_seal_in_every_setup() {
+fn scripts_pass_the_seal_in_every_setup() {
     type Events = fn(&[u8]) -> usize;
     let ends: [(&str, Events); 2] =
         [("vehicle_link", targets::vehicle_events), ("surface_link", targets::surface_events)];
@@ -44,7 +45,8 @@ fn scripts_get_behind_the_seal_in_every_setup() {
 }
 
 #[test]
-#[ignore = "writes the corpora anew; files with other names stay"]
+#[ignore = "writes the corpora again; files with other names stay"]
+#[allow(clippy::disallowed_methods, reason = "the corpus is files")]
 fn write_the_corpora() {
     for (target, name, data) in seeds::all() {
         let folder = corpora().join(target);
@@ -63,11 +65,11 @@ fn a_long_storm_does_not_grow_an_end() {
     }
 }
 
-/// Runs a target on `count` changes of its corpus, the same each time.
+/// Runs a target on `count` mutations of its corpus, the same each time.
 fn vary(name: &str, target: Target, count: u64) {
     let files = corpus(name);
     for seed in 0..count {
-        let mut chance = Chance(seed ^ (name.len() as u64) << 32);
+        let mut chance = CorpusRng(seed ^ (name.len() as u64) << 32);
         let data = chance.varied(&files);
         let shown = data.clone();
         let outcome = std::panic::catch_unwind(move || target(&data));
@@ -95,11 +97,9 @@ fn changed_scripts_do_no_harm_to_a_vehicle() {
 fn changed_scripts_do_no_harm_to_a_surface() {
     vary("surface_link", targets::surface_link, 1000);
 }
+struct CorpusRng(u64);
 
-/// Chance from a seed.
-struct Chance(u64);
-
-impl Chance {
+impl CorpusRng {
     fn below(&mut self, limit: usize) -> usize {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) as usize % limit.max(1)

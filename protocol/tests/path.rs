@@ -1,15 +1,16 @@
-//! The planned path at the surface is the vehicle's, and no other one, on a virtual clock.
+//! The planned path at the surface is the vehicle's, in virtual time.
 
 mod pair;
 
-use pair::{Pair, Setup, Water, auv, patchy, utility};
+use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use proptest::prelude::*;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Class;
 use scenecast_protocol::wire::{PlannedPath, VehicleStatus};
 use std::time::Duration;
 
-const STILL: Water = Water {
+const STILL: LossyChannel = LossyChannel {
     loss: 0.0,
     duplication: 0.0,
     reordering: 0.0,
@@ -18,24 +19,25 @@ const STILL: Water = Water {
     propagation: Duration::from_millis(300),
 };
 
-/// A plan whose every place tells which one it is.
-fn plan(number: u32, places: usize) -> VehicleStatus {
+/// A plan whose every point has its number.
+fn plan(number: u32, points: usize) -> VehicleStatus {
     let x = f64::from(number);
-    let path = PlannedPath { places: (1..=places).map(|i| (x, i as f64)).collect(), goes_on: false };
-    VehicleStatus { labels: 3, waypoint: Some((x, 0.0)), path, ..VehicleStatus::default() }
+    let points = (1..=points).map(|i| MapPoint::new(x, i as f64)).collect();
+    let path = PlannedPath { points, continues: false };
+    VehicleStatus { labels: 3, waypoint: Some(MapPoint::new(x, 0.0)), path, ..VehicleStatus::default() }
 }
 
-fn told(pair: &Pair) -> Option<&VehicleStatus> {
+fn told(pair: &LinkedEnds) -> Option<&VehicleStatus> {
     pair.surface.vehicle(auv()).unwrap().status().map(|(status, _)| status)
 }
 
-/// Whether the surface has the waypoint and the path of the vehicle's plan, as far as a path is told.
-fn is_told(pair: &Pair) -> bool {
+/// Whether the surface has the waypoint and the path of the vehicle's plan, as far as a pose has it.
+fn is_told(pair: &LinkedEnds) -> bool {
     let plan = &pair.status;
     told(pair).is_some_and(|told| {
-        let n = told.path.places.len();
-        let is_whole = n == plan.path.places.len().min(PlannedPath::MOST);
-        is_whole && told.waypoint == plan.waypoint && told.path.places[..] == plan.path.places[..n]
+        let n = told.path.points.len();
+        let is_whole = n == plan.path.points.len().min(PlannedPath::MAX_POINTS);
+        is_whole && told.waypoint == plan.waypoint && told.path.points[..] == plan.path.points[..n]
     })
 }
 
@@ -43,14 +45,14 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
     #[test]
-    fn the_operators_path_becomes_the_vehicles_and_is_never_of_two_plans_nor_of_an_older_one(
+    fn the_shown_path_is_one_whole_plan_never_an_older(
         seed: u64,
         loss in 0.0..0.8f64,
         frame_bytes in prop_oneof![Just(96usize), Just(256), Just(1000)],
         steps in proptest::collection::vec((0u8..6, 0usize..10), 12),
     ) {
-        let water = Water { loss, duplication: 0.2, reordering: 0.2, corruption: 0.1, ..STILL };
-        let mut pair = Pair::new(seed, Setup::new(frame_bytes, 10_000, Codec::Context), water);
+        let channel = LossyChannel { loss, duplication: 0.2, reordering: 0.2, corruption: 0.1, ..STILL };
+        let mut pair = LinkedEnds::new(seed, Setup::new(frame_bytes, 10_000, Codec::Context), channel);
         let mut latest = 0;
         for (step, (what, places)) in steps.into_iter().enumerate() {
             let map = patchy(24, step as u64);
@@ -61,8 +63,8 @@ proptest! {
                     pair.vehicle.owe_pose(pair.now);
                 }
                 pair.run(pair.now + Duration::from_secs(1), false);
-                let Some((told, (x, _))) = told(&pair).and_then(|t| Some((t, t.waypoint?))) else { continue };
-                prop_assert!(told.path.places.iter().all(|p| p.0 == x), "{:?} of two plans", told.path);
+                let Some((told, x)) = told(&pair).and_then(|t| Some((t, t.waypoint?.x_m))) else { continue };
+                prop_assert!(told.path.points.iter().all(|p| p.x_m == x), "{:?} of two plans", told.path);
                 prop_assert!(x as u32 >= latest, "plan {} after {}", x, latest);
                 latest = x as u32;
             }
@@ -72,15 +74,15 @@ proptest! {
                 _ => {}
             }
         }
-        pair.water = STILL;
+        pair.channel = STILL;
         pair.run(pair.now + Duration::from_secs(60), false);
         prop_assert!(is_told(&pair), "{:?} is not {:?}", told(&pair).map(|t| &t.path), pair.status.path);
     }
 }
 
 #[test]
-fn a_path_that_an_order_has_overtaken_is_not_shown() {
-    let mut pair = Pair::new(3, Setup::new(256, 10_000, Codec::Context), STILL);
+fn a_path_from_before_an_applied_order_is_hidden() {
+    let mut pair = LinkedEnds::new(3, Setup::new(256, 10_000, Codec::Context), STILL);
     pair.status = plan(1, 5);
     pair.run(pair.now + Duration::from_secs(30), false);
     assert!(is_told(&pair));
@@ -101,19 +103,19 @@ fn a_path_that_an_order_has_overtaken_is_not_shown() {
 }
 
 #[test]
-fn a_path_takes_at_most_a_hundredth_of_the_budget_and_no_pose_comes_later_for_it() {
+fn a_path_takes_at_most_a_hundredth_of_the_budget() {
     for budget_bps in [100, 1000, 10_000] {
         let hour = |places: usize| {
-            let mut pair = Pair::new(9, Setup::new(256, budget_bps, Codec::Context), STILL);
+            let mut pair = LinkedEnds::new(9, Setup::new(256, budget_bps, Codec::Context), STILL);
             for minute in 0..60 {
                 // Differences of 25 bits.
                 pair.status = plan(minute, places);
-                let far = |(i, place): (usize, &mut (f64, f64))| place.0 = if i % 2 == 0 { 8e5 } else { -8e5 };
-                pair.status.path.places.iter_mut().enumerate().for_each(far);
+                let far = |(i, point): (usize, &mut MapPoint)| point.x_m = if i % 2 == 0 { 8e5 } else { -8e5 };
+                pair.status.path.points.iter_mut().enumerate().for_each(far);
                 pair.vehicle.set_map(patchy(60, minute.into()).iter(), pair.now);
                 pair.run(pair.now + Duration::from_secs(60), false);
             }
-            assert!(told(&pair).is_some_and(|t| t.path.goes_on == (places > PlannedPath::MOST)));
+            assert!(told(&pair).is_some_and(|t| t.path.continues == (places > PlannedPath::MAX_POINTS)));
             pair.vehicle.stats().bytes_by_class[&Class::Status] * 8
         };
         let (without, with) = (hour(0), hour(8));

@@ -1,8 +1,8 @@
-//! What the link promises besides convergence, over seeds, on a virtual clock.
+//! Further properties of the link, over seeds, in virtual time.
 
 mod pair;
 
-use pair::{Pair, Setup, Water, auv, hold, patchy, utility};
+use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::link::{DropReason, VehicleEvent};
 use scenecast_protocol::mac::Access;
@@ -12,7 +12,7 @@ use scenecast_protocol::wire::{Address, Envelope, MissionId, Seal};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-const ROUGH: Water = Water {
+const ROUGH: LossyChannel = LossyChannel {
     loss: 0.3,
     duplication: 0.2,
     reordering: 0.2,
@@ -21,7 +21,8 @@ const ROUGH: Water = Water {
     propagation: Duration::from_millis(500),
 };
 
-const STILL: Water = Water { loss: 0.0, duplication: 0.0, reordering: 0.0, corruption: 0.0, talker: 0.0, ..ROUGH };
+const STILL: LossyChannel =
+    LossyChannel { loss: 0.0, duplication: 0.0, reordering: 0.0, corruption: 0.0, talker: 0.0, ..ROUGH };
 
 /// Every cell has the label of the phase.
 fn flat(side: i32, phase: u8) -> LabelGrid {
@@ -31,15 +32,15 @@ fn flat(side: i32, phase: u8) -> LabelGrid {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Labels are the time: a cell that goes back would be a stale map shown as new.
+    /// Labels are the time: a cell that goes back would be an old map shown as new.
     #[test]
-    fn a_picture_never_goes_back(
+    fn the_shown_map_never_goes_back(
         seed: u64,
         access in prop_oneof![Just(Access::Shared), Just(Access::ModemOwned { pool_frames: 8 }), Just(Access::Polled)],
         restarts in proptest::collection::vec(0u8..8, 40),
     ) {
         let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
-        let mut pair = Pair::new(seed, setup, ROUGH);
+        let mut pair = LinkedEnds::new(seed, setup, ROUGH);
         let mut latest: BTreeMap<Cell, u8> = BTreeMap::new();
         for (phase, what) in restarts.into_iter().enumerate() {
             let phase = phase as u8 + 1;
@@ -65,7 +66,7 @@ proptest! {
 fn hours_without_an_answer_do_not_make_the_ends_grow() {
     for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
         for mute in [[true, false], [false, true], [true, true], [false, false]] {
-            let mut pair = Pair::new(5, Setup { access, ..Setup::new(64, 10_000, Codec::Png) }, ROUGH);
+            let mut pair = LinkedEnds::new(5, Setup { access, ..Setup::new(64, 10_000, Codec::Png) }, ROUGH);
             let mut sizes = Vec::new();
             for phase in 0..40u8 {
                 pair.vehicle.set_map(flat(20, phase + 1).iter(), pair.now);
@@ -82,24 +83,24 @@ fn hours_without_an_answer_do_not_make_the_ends_grow() {
 }
 
 #[test]
-fn nothing_of_another_mission_is_taken() {
+fn frames_of_another_mission_are_dropped() {
     for keyed in [false, true] {
         let setup = Setup::new(64, 10_000, Codec::Png);
         let setup = if keyed { setup.keyed(true, false) } else { setup };
-        let mut ours = Pair::new(1, setup.clone(), STILL);
-        let mut theirs = Pair::new(2, Setup { mission: MissionId(8), ..setup }, STILL);
+        let mut ours = LinkedEnds::new(1, setup.clone(), STILL);
+        let mut theirs = LinkedEnds::new(2, Setup { mission: MissionId(8), ..setup }, STILL);
         for phase in 0..60u8 {
             for pair in [&mut ours, &mut theirs] {
                 pair.vehicle.set_map(flat(9, phase + 1).iter(), pair.now);
                 pair.surface.issue(auv(), hold(phase % 2 == 0), pair.now).unwrap();
                 pair.run(pair.now + Duration::from_secs(20), false);
             }
-            let heard = ours.vehicle.stats().frames_heard;
+            let heard = ours.vehicle.stats().frames_received;
             for bytes in &theirs.overheard {
                 ours.vehicle.handle_frame(bytes, ours.now);
                 ours.surface.handle_frame(bytes, ours.now);
             }
-            assert_eq!(ours.vehicle.stats().frames_heard, heard, "a frame of another mission was taken");
+            assert_eq!(ours.vehicle.stats().frames_received, heard, "a frame of another mission was taken");
             assert_eq!(ours.vehicle.poll_event(), None);
         }
         assert!(ours.vehicle.stats().dropped[&DropReason::Checksum] > 1000);
@@ -107,45 +108,45 @@ fn nothing_of_another_mission_is_taken() {
 }
 
 /// A small generator, so that a million tries are cheap.
-struct Dice(u64);
+struct TestRng(u64);
 
-impl Dice {
+impl TestRng {
     fn below(&mut self, n: usize) -> usize {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         ((self.0 >> 33) as usize) % n
     }
 }
 
-/// What somebody without the key can do with a frame that was overheard.
-fn forge(frame: &[u8], dice: &mut Dice) -> Vec<u8> {
+/// A forgery that is possible without the key, made from an overheard frame.
+fn forge(frame: &[u8], rng: &mut TestRng) -> Vec<u8> {
     let mut bytes = frame.to_vec();
-    match dice.below(4) {
+    match rng.below(4) {
         0 => {}
         1 => {
-            let bit = dice.below(bytes.len() * 8);
+            let bit = rng.below(bytes.len() * 8);
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
         2 => {
-            for _ in 0..1 + dice.below(8) {
-                let at = dice.below(bytes.len());
-                bytes[at] = dice.below(256) as u8;
+            for _ in 0..1 + rng.below(8) {
+                let at = rng.below(bytes.len());
+                bytes[at] = rng.below(256) as u8;
             }
         }
-        // The tag is random, the rest as it was or a little changed.
+        // The tag is random, the rest unchanged or slightly changed.
         _ => {
             let n = bytes.len();
-            bytes.iter_mut().skip(n - 8).for_each(|b| *b = dice.below(256) as u8);
-            let at = dice.below(n - 8);
-            bytes[at] ^= 1 << dice.below(8);
+            bytes.iter_mut().skip(n - 8).for_each(|b| *b = rng.below(256) as u8);
+            let at = rng.below(n - 8);
+            bytes[at] ^= 1 << rng.below(8);
         }
     }
     bytes
 }
 
 #[test]
-fn a_forged_replayed_or_flipped_directive_is_never_applied_in_a_million_tries() {
+fn no_forged_replayed_or_flipped_directive_is_applied() {
     let mut recorded: Vec<Vec<u8>> = Vec::new();
-    let mut pair = Pair::new(11, Setup::new(64, 10_000, Codec::Png).keyed(false, false), STILL);
+    let mut pair = LinkedEnds::new(11, Setup::new(64, 10_000, Codec::Png).keyed(false, false), STILL);
     for run in 0..6 {
         for step in 0..10 {
             pair.surface.issue(auv(), utility(run * 10 + step), pair.now).unwrap();
@@ -161,31 +162,31 @@ fn a_forged_replayed_or_flipped_directive_is_never_applied_in_a_million_tries() 
     pair.run(pair.now + Duration::from_secs(120), false);
     let applied = pair.applied.len();
     assert!(applied >= 100 && recorded.len() > 200, "{applied} applied, {} recorded", recorded.len());
-    let mut dice = Dice(3);
+    let mut rng = TestRng(3);
     for _ in 0..1_000_000 {
-        let bytes = forge(&recorded[dice.below(recorded.len())], &mut dice);
+        let bytes = forge(&recorded[rng.below(recorded.len())], &mut rng);
         pair.vehicle.handle_frame(&bytes, pair.now);
         let event = pair.vehicle.poll_event();
         assert!(!matches!(event, Some(VehicleEvent::Slot { .. })), "{event:?} from {bytes:02x?}");
     }
-    // Forgeries have not broken anything either.
+    // The forgeries have not broken the link.
     pair.surface.issue(auv(), utility(99), pair.now).unwrap();
     pair.run(pair.now + Duration::from_secs(120), false);
     assert_eq!(pair.applied.last(), Some(&utility(99)));
 }
 
 #[test]
-fn a_vehicle_with_a_key_refuses_what_has_none_and_counts_it() {
+fn a_keyed_vehicle_refuses_and_counts_unkeyed_frames() {
     let plain = Setup::new(64, 10_000, Codec::Png);
-    let mut keyless = Pair::new(1, plain.clone(), STILL);
+    let mut keyless = LinkedEnds::new(1, plain.clone(), STILL);
     keyless.surface.issue(auv(), hold(true), keyless.now).unwrap();
     keyless.run(keyless.now + Duration::from_secs(60), false);
-    let mut keyed = Pair::new(2, plain.keyed(false, false), STILL);
+    let mut keyed = LinkedEnds::new(2, plain.keyed(false, false), STILL);
     for bytes in &keyless.overheard {
         keyed.vehicle.handle_frame(bytes, keyed.now);
     }
     assert!(keyed.vehicle.poll_event().is_none());
-    // Only the greeting can be told to be of this mission; what follows is sealed to a run that is not ours.
+    // Only hellos of another mission can be recognised; other frames are sealed to a run that is not ours.
     let to_vehicle = |bytes: &&Vec<u8>| {
         let envelope = Envelope::decode(bytes, |to| to == auv()).ok();
         envelope.is_some_and(|e| e.header.from == Address::SURFACE && e.open(&Seal::Crc(MissionId(7), 0)).is_some())
@@ -198,21 +199,21 @@ fn a_vehicle_with_a_key_refuses_what_has_none_and_counts_it() {
 }
 
 fn keyed_hello() -> Vec<u8> {
-    let mut keyed = Pair::new(2, Setup::new(64, 10_000, Codec::Png).keyed(false, false), STILL);
+    let mut keyed = LinkedEnds::new(2, Setup::new(64, 10_000, Codec::Png).keyed(false, false), STILL);
     keyed.run(keyed.now + Duration::from_secs(10), false);
     keyed.overheard.back().cloned().expect("a hello")
 }
 
 #[test]
-fn each_end_knows_the_clock_of_the_other_and_the_way_between_them() {
-    let mut pair = Pair::new(4, Setup::new(64, 10_000, Codec::Png), Water { loss: 0.2, ..STILL });
+fn each_end_measures_the_others_clock_and_distance() {
+    let mut pair = LinkedEnds::new(4, Setup::new(64, 10_000, Codec::Png), LossyChannel { loss: 0.2, ..STILL });
     pair.vehicle.set_map(flat(30, 1).iter(), pair.now);
     pair.run(pair.now + Duration::from_secs(120), false);
     let view = pair.surface.vehicle(auv()).unwrap();
     let round_trip = view.round_trip().unwrap().as_secs_f64();
     assert!((round_trip - 1.0).abs() < 0.01, "{round_trip} s");
     assert!((pair.vehicle.one_way().unwrap().as_secs_f64() - 0.5).abs() < 0.01);
-    // Both ends have one clock here: a moment of the other's is the same moment of one's own.
+    // Both ends share one clock here, so converted times must equal the original ones.
     let now = pair.now;
     for clock in [view.clock().unwrap(), pair.vehicle.surface_clock().unwrap()] {
         let shown = clock.to_theirs(now);
@@ -223,16 +224,17 @@ fn each_end_knows_the_clock_of_the_other_and_the_way_between_them() {
 }
 
 #[test]
-fn the_surface_knows_about_how_much_the_vehicle_has_still_to_send() {
-    let mut pair = Pair::new(5, Setup::new(256, 1000, Codec::Context), Water { loss: 0.2, ..STILL });
-    let told = |pair: &Pair| pair.surface.vehicle(auv()).and_then(|v| v.backlog()).map(|(b, _)| b.map_bytes as usize);
+fn the_surface_estimates_the_vehicles_backlog() {
+    let mut pair = LinkedEnds::new(5, Setup::new(256, 1000, Codec::Context), LossyChannel { loss: 0.2, ..STILL });
+    let told =
+        |pair: &LinkedEnds| pair.surface.vehicle(auv()).and_then(|v| v.backlog()).map(|(b, _)| b.map_bytes as usize);
     let mut compared = 0;
     for phase in 0..10 {
         pair.vehicle.set_map(patchy(200, phase).iter(), pair.now);
         pair.run(pair.now + Duration::from_secs(30), false);
-        let (told, is) = (told(&pair), pair.vehicle.source().told_backlog_bytes());
+        let (told, is) = (told(&pair), pair.vehicle.source().expected_backlog_bytes());
         if let Some(told) = told.filter(|_| phase > 2 && is > 300) {
-            // The vehicle goes on learning what its cells take, and does not count what is on its way.
+            // The vehicle's estimate changes with the cells that it sends, and excludes those in flight.
             assert!((is / 3..=is * 3).contains(&told), "{told} bytes are said to wait, and {is} do");
             compared += 1;
         }

@@ -1,17 +1,18 @@
 //! The bytes in `WIRE.md` are those that the code writes and reads.
 
+use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    Band, Budget, CellBand, Change, Constraints, Fence, Figure, Fix, Limits, Place, PlaneSet, PlannerKind, Polygon,
-    Reaction, RefusalReason, Request, Requests, SLOTS, Settings, Slot, SlotId, Utility, VersionedSlot,
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, Limits,
+    PlaneSet, PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState,
+    Utility, VersionedSlot,
 };
 use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
 use scenecast_protocol::map_codec;
 use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, Header, MissionId, ModeReason, Placement,
-    PlannedPath, Reader, Seal, SessionId, SlotReport, SlotState, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION,
-    unwrap_number,
+    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, ModeReason,
+    Placement, PlannedPath, Reader, Seal, SessionId, Stamp, VehicleMode, VehicleStatus, WIRE_VERSION, unwrap_number,
 };
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -29,7 +30,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02X}")).collect::<Vec<_>>().join(" ")
 }
 
-/// Bytes from pairs of digits; `None` if the text is anything else.
+/// Bytes from pairs of digits; `None` if the text has anything else.
 fn pairs(text: &str) -> Option<Vec<u8>> {
     text.split_whitespace().map(|p| u8::from_str_radix(p, 16).ok().filter(|_| p.len() == 2)).collect()
 }
@@ -40,7 +41,7 @@ fn section(from: &str, to: &str) -> &'static str {
     &rest[..rest.find(to).expect(to)]
 }
 
-/// The rows of a table: what stands in the first column, and what stands in backticks in the second.
+/// The rows of a table: the first column, and the part in backticks of the second.
 fn rows(section: &'static str) -> BTreeMap<&'static str, &'static str> {
     let row = |line: &'static str| {
         let (what, bytes) = line.strip_prefix("| ")?.strip_suffix("` |")?.rsplit_once(" | `")?;
@@ -65,7 +66,7 @@ fn frames(section: &'static str) -> BTreeMap<&'static str, Vec<u8>> {
     frames
 }
 
-/// Fails with every difference at once, so that a change of the wire is quickly written down.
+/// Fails with all differences at once, so that a change of the wire can be copied into the document.
 fn assert_same(found: BTreeMap<&str, Vec<u8>>, expected: Vec<(&str, Vec<u8>)>) {
     let mut problems: Vec<String> = expected
         .iter()
@@ -97,7 +98,7 @@ fn header(from: Address, number: u16) -> Header {
         stamp: None,
         nonce: None,
         ack: None,
-        hello: false,
+        kind: FrameKind::Numbered,
         keyed: false,
     }
 }
@@ -126,8 +127,7 @@ fn status() -> VehicleStatus {
         mode: VehicleMode::Hold,
         autopilot_silent: false,
         reason: ModeReason::Order,
-        x_m: 1.5,
-        y_m: -0.1,
+        position: MapPoint::new(1.5, -0.1),
         depth_m: 18.0,
         heading_deg: 90.0,
         sigma_m: 1.25,
@@ -146,9 +146,9 @@ fn status() -> VehicleStatus {
     }
 }
 
-/// A place in metres.
-fn place(x_m: i32, y_m: i32) -> Place {
-    Place { x_dm: 10 * x_m, y_dm: 10 * y_m }
+/// A point in whole metres.
+fn place(east_m: i32, north_m: i32) -> DecimetrePoint {
+    DecimetrePoint::new(10 * east_m, 10 * north_m)
 }
 
 /// The report and the pose of the vehicle's answer.
@@ -173,7 +173,7 @@ fn session(encrypt: bool) -> SessionKey {
     key().session(MISSION.0, 1, SURFACE_NONCE, VEHICLE_NONCE, encrypt)
 }
 
-/// A frame as the code writes it; what the code reads from it is the same again.
+/// Writes a frame and checks that it reads the same.
 fn frame(header: Header, size: usize, short: bool, seal: Seal<'_>, chunks: &[(ChunkKind, Vec<u8>)]) -> Vec<u8> {
     let mut builder = FrameBuilder::new(&Header { remaining: 0, ..header.clone() }, size);
     for (kind, payload) in chunks {
@@ -201,14 +201,14 @@ fn surface_hello(keyed: bool) -> Header {
         turn: Some(48),
         stamp: clock(50_000, None),
         nonce: keyed.then_some(SURFACE_NONCE),
-        hello: true,
+        kind: FrameKind::Hello,
         keyed,
         ..header(Address::SURFACE, 0)
     }
 }
 
 fn vehicle_hello(keyed: bool) -> Header {
-    Header { nonce: keyed.then_some(VEHICLE_NONCE), hello: true, keyed, ..header(auv(), 0) }
+    Header { nonce: keyed.then_some(VEHICLE_NONCE), kind: FrameKind::Hello, keyed, ..header(auv(), 0) }
 }
 
 fn call(keyed: bool) -> Header {
@@ -217,7 +217,7 @@ fn call(keyed: bool) -> Header {
         session: SessionId::from_random(CALL_SESSION),
         turn: Some(8),
         nonce: keyed.then_some(CALL_NONCE),
-        hello: true,
+        kind: FrameKind::Hello,
         keyed,
         ..header(Address::SURFACE, 0)
     }
@@ -242,7 +242,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let found = rows(section("### 11.1", "### 11.2"));
     let mut found: BTreeMap<&str, Vec<u8>> =
         found.into_iter().map(|(what, bytes)| (what, pairs(bytes).expect("digits"))).collect();
-    // What is inside of the map codec has a test there.
+    // Formats inside of the map codec have tests there.
     found.retain(|what, _| {
         !what.starts_with("head of a map chunk's payload") && !what.starts_with("the same, a payload")
     });
@@ -275,9 +275,10 @@ fn parts_of_a_frame_are_those_of_the_document() {
         assert_eq!(VersionedSlot::decode(&bytes), Ok(read));
         bytes
     };
-    let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], goes_on: bool| {
-        let path = PlannedPath { places: path.to_vec(), goes_on };
-        let bytes = VehicleStatus { waypoint, path, ..status() }.encode_pose(99);
+    let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], continues: bool| {
+        let point = |(x_m, y_m)| MapPoint { x_m, y_m };
+        let path = PlannedPath { points: path.iter().copied().map(point).collect(), continues };
+        let bytes = VehicleStatus { waypoint: waypoint.map(point), path, ..status() }.encode_pose(99);
         assert_eq!(VehicleStatus::default().read_pose(&bytes), Ok(()));
         bytes
     };
@@ -286,12 +287,12 @@ fn parts_of_a_frame_are_those_of_the_document() {
     let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), spend: SpendOrder::default() };
     let curious = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
     let curious = Budget { spend: curious.unwrap(), ..budget };
-    let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
-    let requests = Requests {
+    let fix = Fix { position: WorldPoint::new(-12.3, 400.0), sigma_m: 1.5, age_s: 0.82 };
+    let requests = ExemplarRequests {
         epoch: 1,
         wanted: vec![
-            Request { label: 3, serial: 2, size: 0, picture: 0 },
-            Request { label: 5, serial: 1, size: 1, picture: 9 },
+            ExemplarRequest { label: 3, serial: 2, size: 0, picture: 0 },
+            ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 },
         ],
     };
     let plane = |chunk: PlaneChunk<'_>| {
@@ -339,7 +340,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "stamp of a vehicle: clock 16 777 215 ms, frame 9 heard 258 ms before",
             stamp(auv(), heard(16_777_215, 9, 258), 6),
         ),
-        ("statement: horizon low ABC, nothing lost", statement(0xABC, vec![])),
+        ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
         ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),
         (
             "statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code with k = 2",
@@ -365,7 +366,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "the same with a path from there to (2.4, -3.4) and (-0.6, -3.4) m",
             pose(Some((1.0, -2.0)), &[(2.4, -3.4), (-0.6, -3.4)], false),
         ),
-        ("the same with a path of which nothing is told but that it goes on", pose(Some((1.0, -2.0)), &[], true)),
+        ("the same with an empty path that continues", pose(Some((1.0, -2.0)), &[], true)),
         (
             "the first pose with an autopilot that does not answer",
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
@@ -377,10 +378,13 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ),
         (
             "the same with a placement: version 2, 12.5 m east, -0.1 m north",
-            VehicleStatus { placement: Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 }), ..status() }
-                .encode_report(99, 0)
-                .unwrap()
-                .0,
+            VehicleStatus {
+                placement: Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) }),
+                ..status()
+            }
+            .encode_report(99, 0)
+            .unwrap()
+            .0,
         ),
         (
             "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",
@@ -438,7 +442,7 @@ fn frames_with_a_crc_are_those_of_the_document() {
         ..header(Address::SURFACE, 3)
     };
     let map = Header { base: 2, remaining: 1, ..header(auv(), 2) };
-    let nothing = Header { turn: Some(40), ..header(auv(), 2) };
+    let empty = Header { turn: Some(40), ..header(auv(), 2) };
     let expected = vec![
         ("hello of the surface", frame(surface_hello(false), 64, true, crc(0), &[])),
         ("hello of the vehicle", frame(vehicle_hello(false), 64, true, crc(SURFACE_SESSION), &[])),
@@ -449,7 +453,7 @@ fn frames_with_a_crc_are_those_of_the_document() {
             "map frame in the middle of a turn",
             frame(map, 48, false, crc(SURFACE_SESSION), &[(ChunkKind::Map, map_payload())]),
         ),
-        ("frame that says nothing", frame(nothing, 64, true, crc(SURFACE_SESSION), &[])),
+        ("frame without content", frame(empty, 64, true, crc(SURFACE_SESSION), &[])),
         ("call", frame(call(false), 64, true, crc(0), &[])),
         ("here", frame(here(false), 64, true, crc(CALL_SESSION), &[])),
     ];
@@ -504,6 +508,6 @@ fn golden_values_of_the_keys_are_those_of_the_document() {
 }
 
 #[test]
-fn the_document_is_of_the_version_that_the_code_speaks() {
+fn the_document_has_the_wire_version_of_the_code() {
     assert!(DOCUMENT.starts_with(&format!("# The wire of scenecast, version {WIRE_VERSION}\n")));
 }

@@ -1,11 +1,11 @@
-//! Scores on real imagery: our defaults and the baselines over a folder of images with `*_label.png` beside them.
+//! Scores on real imagery: the defaults and the baselines over a folder of images with annotations in `*_label.png`.
 //!
 //! `cargo bench -p scene-model --bench imagery -- DIR [SEEDS]`; `scenecast scene score` is the same with more options.
 #![allow(missing_docs)]
 
 use std::path::{Path, PathBuf};
 
-use scene_model::score::{MeanScore, Method, Scene, Trial};
+use scenecast_scoring::{AnnotatedScene, MeanScore, Method, Trial};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
@@ -22,10 +22,10 @@ fn main() {
     for path in &images {
         let image = image::open(path).unwrap().to_rgb8();
         let classes = image::open(classes_of(path)).unwrap().to_luma8();
-        let scene = Scene::new(trial, &image, &classes, &[255]).unwrap();
+        let scene = AnnotatedScene::new(trial, &image, &classes, &[255]).unwrap();
         print!("{:12}", path.file_stem().unwrap_or_default().to_string_lossy());
         for (scores, method) in all.iter_mut().zip(Method::ALL) {
-            let score = scene.grade(method).unwrap();
+            let score = scene.mean_score(method).unwrap();
             print!("  {:.3} / {:.3}", score.mutual_information_nats, score.excess_nats);
             scores.push(score);
         }

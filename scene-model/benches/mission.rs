@@ -1,4 +1,4 @@
-//! CPU time of a 20-minute mission: 600 frames of 640 x 480 over a procedural reef, extraction included.
+//! The CPU time of a mission of 20 minutes: 600 frames of 640 x 480 pixels over a procedural reef, extraction included.
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub)]
 
 mod cpu;
@@ -6,12 +6,12 @@ mod cpu;
 use std::collections::BTreeMap;
 
 use cpu::cpu_seconds;
-use scene_model::generate::{Reef, reef};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{SceneConfig, SceneModel};
-use scene_model::tuning::mutual_information_nats;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::{Reef, reef};
 
 fn main() {
     let mut parts = [0.0; 5];
@@ -63,13 +63,13 @@ fn main() {
         book.labels().count()
     );
     println!("{:.1} of the cells already shown change their label a frame", changes as f64 / 600.0);
-    let before = truth_told(&reef, &model);
+    let before = truth_mi(&reef, &model);
     model.sweep(30);
-    println!("MI with the truth {before:.3} nats at the end, {:.3} after 30 more sweeps", truth_told(&reef, &model));
+    println!("MI with the truth {before:.3} nats at the end, {:.3} after 30 more sweeps", truth_mi(&reef, &model));
 }
 
-/// Mutual information of the map with the class at each cell's centre, nats.
-fn truth_told(reef: &Reef, model: &SceneModel) -> f64 {
+/// The mutual information of the map with the class at each cell's centre, nats.
+fn truth_mi(reef: &Reef, model: &SceneModel) -> f64 {
     // The first frame's centre is the origin of the world.
     let pairs = model.label_map().into_iter().filter_map(|cell| {
         let (u, v) = (320 + cell.x * 25 + 12, 240 - cell.y * 25 - 12);

@@ -1,8 +1,8 @@
-//! Words resampled a second on the synthetic workload: each kernel beside a plain re-implementation, in one run.
+//! The speed of each kernel on the synthetic workload, next to a plain implementation in the same run.
 //!
-//! `cargo bench -p scene-model --bench sampler`; with `-- avx2` or the like only some. After divan's table (wall time)
-//! come the figures in words per CPU-second of the sampling thread (Linux; elsewhere wall time), and how many times
-//! the plain algorithm that is.
+//! `cargo bench -p scene-model --bench sampler`; `-- avx2` selects a kernel. Divan's table has wall times. The
+//! table below it has words per CPU-second of the sampling thread (on Linux; elsewhere of wall time), and the
+//! ratio to the plain algorithm.
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub, dead_code)]
 
 mod cpu;
@@ -15,7 +15,7 @@ use std::sync::{Mutex, OnceLock};
 use cpu::cpu_seconds;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use plain::Plain;
+use plain::PlainSampler;
 use scene_model::topics::{Kernel, SceneConfig, SceneModel};
 use workload::Workload;
 
@@ -23,20 +23,20 @@ const SWEEPS: u32 = 30;
 const LABELS: [u32; 4] = [8, 16, 32, 100];
 const PLAIN: &str = "plain";
 
-/// Words and CPU seconds by method and K.
+/// Resampled words and CPU seconds, by method and K.
 type Spent = BTreeMap<(&'static str, u32), (u64, f64)>;
 static SPENT: Mutex<Spent> = Mutex::new(BTreeMap::new());
 
 fn main() {
     divan::main();
-    print_cpu_figures();
+    print_cpu_rates();
 }
 
-/// The published algorithm: f64, a division a label, a cumulative distribution a word; one sweep.
+/// One sweep of the published algorithm: f64, one division for each label, one cumulative distribution for each word.
 #[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
 fn plain_algorithm(bencher: Bencher<'_, '_>, labels: u32) {
     let work = work();
-    let inputs = bencher.counter(words(1)).with_inputs(|| Plain::new(work, labels as usize));
+    let inputs = bencher.counter(words(1)).with_inputs(|| PlainSampler::new(work, labels as usize));
     inputs.bench_local_values(|mut plain| spend(PLAIN, labels, || plain.sweep()));
 }
 
@@ -55,13 +55,13 @@ fn avx512(bencher: Bencher<'_, '_>, labels: u32) {
     sampler(bencher, Kernel::Avx512, labels, 1);
 }
 
-/// The widest kernel with two threads: wall time alone tells.
+/// The widest kernel with two threads: only divan's wall time is meaningful.
 #[divan::bench(args = LABELS, sample_count = 3, sample_size = 1)]
 fn two_threads(bencher: Bencher<'_, '_>, labels: u32) {
     sampler(bencher, Kernel::detect(), labels, 2);
 }
 
-/// 30 sweeps of a new model, births on.
+/// 30 sweeps of a new model, with births.
 fn sampler(bencher: Bencher<'_, '_>, kernel: Kernel, labels: u32, threads: usize) {
     if !kernel.is_available() {
         return;
@@ -92,7 +92,7 @@ fn spend(method: &'static str, labels: u32, mut work: impl FnMut() -> u64) -> u6
     words
 }
 
-fn print_cpu_figures() {
+fn print_cpu_rates() {
     let spent = SPENT.lock().unwrap();
     let rate = |method, labels| spent.get(&(method, labels)).map(|(words, seconds)| *words as f64 / seconds / 1e6);
     println!("\nM words per CPU-second (times the plain algorithm), births on");

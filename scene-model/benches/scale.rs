@@ -1,4 +1,4 @@
-//! Memory and time at scale: 10 k cells with 1 M words at K = 100, then 1 M cells with 50 M words at K = 16.
+//! Memory and time of large models: 10 k cells with 1 M words at K = 100, then 1 M cells with 50 M words at K = 16.
 #![allow(clippy::disallowed_methods, missing_docs, unreachable_pub, dead_code)]
 
 mod workload;
@@ -16,7 +16,7 @@ fn main() {
         model.insert(f64::from(row), &strip(row, 100, 100));
     }
     model.sweep(10);
-    model.label_map();
+    let _ = model.label_map();
     println!("10 k cells, 1 M words, K 100: {:.0} MB", resident_mb() - before);
     drop(model);
 
@@ -36,14 +36,14 @@ fn main() {
     );
 }
 
-/// One row of cells of eight kinds of ground.
+/// The words of one row of cells, with eight kinds of ground.
 fn strip(row: u32, columns: u32, words_per_cell: u32) -> Vec<Observation> {
-    let mut chance = workload::Chance(u64::from(row) * 7919 + 1);
+    let mut rng = workload::XorShiftRng(u64::from(row) * 7919 + 1);
     let mut seen = Vec::with_capacity((columns * words_per_cell) as usize);
     for column in 0..columns {
         let ground = (row / 20 * 3 + column / 30 * 5) % 8;
         for _ in 0..words_per_cell {
-            let word = ground * 125 + (chance.unit() * chance.unit() * 250.0) as u32;
+            let word = ground * 125 + (rng.unit() * rng.unit() * 250.0) as u32;
             let (x, y) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
             seen.push(Observation { word: word % 1000, x, y, z: 0.0 });
         }
@@ -51,7 +51,7 @@ fn strip(row: u32, columns: u32, words_per_cell: u32) -> Vec<Observation> {
     seen
 }
 
-/// Memory of this process that is in RAM, MB (Linux; elsewhere nothing).
+/// The resident memory of this process in MB (on Linux; elsewhere NaN).
 fn resident_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));

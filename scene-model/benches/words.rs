@@ -1,12 +1,12 @@
-//! Words from frames of 640 x 480 pixels, frames a second on one core.
+//! Word extraction from frames of 640 x 480 pixels: frames a second on one core.
 //!
 //! `cargo bench -p scene-model --bench words`
 #![allow(missing_docs)]
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use scene_model::generate::reef;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_worlds::reef;
 
 const NONE: WordConfig = WordConfig { colour: 0, context: 0, spread: 0, texture: 0, binary: 0, warm_up_frames: 1 };
 
@@ -14,7 +14,7 @@ fn main() {
     divan::main();
 }
 
-/// All vocabularies in the default ratio.
+/// All kinds of words in the default ratio.
 #[divan::bench]
 fn all(bencher: Bencher<'_, '_>) {
     frames(bencher, WordConfig { warm_up_frames: 1, ..WordConfig::default() });

@@ -1,35 +1,48 @@
-//! What is kept in files: a magic, a version, a length and a CRC around the content.
+//! The envelope of stored files: a magic, a version, a length and a CRC around the content.
 //!
 //! ```text
 //!  0        8         12         20                     20 + n    24 + n
 //!  | magic  | version | length n | content              | CRC-32  |
 //! ```
-//! All numbers are little-endian; the CRC (ISO HDLC) covers everything before it.
+//!
+//! All numbers are little-endian. The CRC (CRC-32/ISO-HDLC) covers all bytes before it.
 
 const HEADER: usize = 20;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// One kind of kept bytes.
+/// One kind of stored file.
+///
+/// ```
+/// use scene_model::envelope::{Envelope, EnvelopeError};
+///
+/// const SURVEY: Envelope = Envelope { magic: *b"MYSURVEY", version: 1 };
+///
+/// let mut bytes = SURVEY.seal(b"content");
+/// assert_eq!(SURVEY.open(&bytes), Ok(&b"content"[..]));
+/// bytes[22] ^= 1;
+/// assert_eq!(SURVEY.open(&bytes), Err(EnvelopeError::Damaged));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Envelope {
-    /// How its bytes begin.
+    /// The first eight bytes of the file.
     pub magic: [u8; 8],
-    /// The version that is written, and the only one that is read.
+    /// The version to write, and the only one that is accepted.
     pub version: u32,
 }
 
-/// Why bytes are not of a kind, or not whole.
+/// The bytes are of another kind, of another version, or damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EnvelopeError {
-    /// They begin otherwise.
+    /// The bytes begin with another magic.
     #[error("a file of another kind")]
     Foreign,
-    /// Right kind, other version.
+    /// The magic is right, but the version differs.
     #[error("version {found}, this program reads version {wanted}")]
     Version {
-        /// Version of the bytes.
+        /// The version of the bytes.
         found: u32,
-        /// Version that is read.
+        /// The version that is accepted.
         wanted: u32,
     },
     /// The length or the checksum is wrong.
@@ -38,7 +51,8 @@ pub enum EnvelopeError {
 }
 
 impl Envelope {
-    /// Closes content.
+    /// Returns the content in its envelope.
+    #[must_use]
     pub fn seal(&self, content: &[u8]) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(HEADER + content.len() + 4);
         bytes.extend(self.magic);
@@ -49,7 +63,7 @@ impl Envelope {
         bytes
     }
 
-    /// The content of bytes that [`Envelope::seal`] closed.
+    /// Returns the content of bytes that [`Envelope::seal`] returned.
     pub fn open<'a>(&self, bytes: &'a [u8]) -> Result<&'a [u8], EnvelopeError> {
         let rest = bytes.strip_prefix(&self.magic).ok_or(EnvelopeError::Foreign)?;
         let (version, rest) = rest.split_first_chunk::<4>().ok_or(EnvelopeError::Damaged)?;
@@ -73,7 +87,7 @@ mod tests {
     const KIND: Envelope = Envelope { magic: *b"SCNTESTS", version: 3 };
 
     #[test]
-    fn content_comes_back_and_everything_else_is_refused_by_name() {
+    fn only_intact_bytes_of_the_right_kind_are_opened() {
         let bytes = KIND.seal(b"content");
         assert_eq!(KIND.open(&bytes), Ok(&b"content"[..]));
         assert_eq!(KIND.open(b"PNG"), Err(EnvelopeError::Foreign));

@@ -1,4 +1,4 @@
-//! The image patches that show best what a label means, in a bounded store.
+//! Exemplars: the image patches that best show the meaning of a topic, in a store of bounded size.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,46 +8,65 @@ use serde::{Deserialize, Serialize};
 
 use crate::topics::TopicId;
 
-/// A patch of a camera frame that represents a topic.
+/// A patch of a camera frame that shows a topic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Exemplar {
-    /// Square patch of the store's edge length.
+pub struct ExemplarPatch {
+    /// The pixels: a square of the store's edge.
     #[serde(with = "pixels")]
     pub patch: Arc<RgbImage>,
-    /// How well it represents the topic, higher is better (the daemon offers the cell's confidence).
+    /// How well the patch shows the topic; higher is better. A natural score is the cell's confidence.
     pub score: f32,
-    /// When it was seen, seconds.
+    /// The time of the frame, seconds.
     pub t_s: f64,
-    /// Where it was seen: east and north, metres.
+    /// The position on the ground: metres to the east and to the north.
     pub place: (f64, f64),
 }
 
-/// Keeps the best few patches of each topic.
+/// The best few patches of each topic.
+///
+/// ```
+/// use image::RgbImage;
+/// use scene_model::exemplars::ExemplarStore;
+/// use scene_model::topics::TopicId;
+///
+/// let mut store = ExemplarStore::new(2, 32);
+/// for (score, east) in [(0.5, 0.0), (0.9, 4.0), (0.7, 8.0)] {
+///     store.offer(TopicId(3), RgbImage::new(64, 64), score, 12.5, (east, 0.0));
+/// }
+/// let scores: Vec<f32> = store.all(TopicId(3)).iter().map(|exemplar| exemplar.score).collect();
+/// assert_eq!(scores, [0.9, 0.7]);
+/// assert_eq!(store.best(TopicId(3)).map(|exemplar| exemplar.patch.dimensions()), Some((32, 32)));
+/// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ExemplarStore {
     per_label: usize,
     edge_px: u32,
     apart_m: f64,
-    topics: BTreeMap<TopicId, Vec<Exemplar>>,
+    topics: BTreeMap<TopicId, Vec<ExemplarPatch>>,
 }
 
-/// Topics whose patches are kept; when there are more, the topic with the lowest best score goes.
+/// The maximum number of topics. Beyond it, the topic whose best score is lowest is dropped.
 const MAX_TOPICS: usize = 256;
 
 impl ExemplarStore {
-    /// A store of at most `per_label` patches of `edge_px` x `edge_px` pixels for each of at most 256 topics.
+    /// Returns an empty store for at most 256 topics with at most `per_label` patches of
+    /// `edge_px` x `edge_px` pixels each.
+    #[must_use]
     pub fn new(per_label: usize, edge_px: u32) -> Self {
         Self { per_label: per_label.max(1), edge_px: edge_px.max(1), apart_m: 0.5, topics: BTreeMap::new() }
     }
 
-    /// Keeps patches of one topic at least so far apart, metres (default 0.5), so that they are no views of one thing.
+    /// Sets the minimum distance between two patches of a topic in metres (0.5 by default), so
+    /// that they show different objects.
+    #[must_use]
     pub fn with_distance(self, apart_m: f64) -> Self {
         Self { apart_m, ..self }
     }
 
-    /// Offers a patch; it is scaled to the store's size and kept if its score is high enough.
+    /// Offers a patch, which is kept at the store's size if its score is high enough.
     ///
-    /// A score that is no number and a patch without pixels are ignored.
+    /// `t_s` is the time of the frame in seconds, `place` its position in metres to the east and to the north. A NaN
+    /// score and a patch without pixels are ignored.
     pub fn offer(&mut self, topic: TopicId, patch: RgbImage, score: f32, t_s: f64, place: (f64, f64)) {
         if score.is_nan() || patch.width() == 0 || patch.height() == 0 || !self.would_keep(topic, score) {
             return;
@@ -60,24 +79,27 @@ impl ExemplarStore {
         };
         let apart = self.apart_m;
         let kept = self.topics.entry(topic).or_default();
-        let near = |other: &Exemplar| (other.place.0 - place.0).hypot(other.place.1 - place.1) < apart;
+        let near = |other: &ExemplarPatch| (other.place.0 - place.0).hypot(other.place.1 - place.1) < apart;
         if kept.iter().any(|other| near(other) && other.score >= score) {
             return;
         }
         kept.retain(|other| !near(other));
         let rank = kept.partition_point(|other| other.score >= score);
-        kept.insert(rank, Exemplar { patch: Arc::new(patch), score, t_s, place });
+        kept.insert(rank, ExemplarPatch { patch: Arc::new(patch), score, t_s, place });
         kept.truncate(self.per_label);
-        self.drop_the_weakest_topic();
+        self.drop_lowest_topic();
     }
 
-    /// Whether a patch of this score would be kept now; lets the caller skip the cropping.
+    /// Whether a patch with this score could be kept now, so that the caller can avoid cropping it in vain.
+    #[must_use]
     pub fn would_keep(&self, topic: TopicId, score: f32) -> bool {
         let kept = self.topics.get(&topic).map_or(&[][..], Vec::as_slice);
         kept.len() < self.per_label || kept.last().is_some_and(|worst| score > worst.score)
     }
 
-    /// Gives every patch the score that `score` has for its topic and place now, and drops it where there is none.
+    /// Replaces the score of every patch by `score(topic, place)`, and drops the patches for which it is `None` or NaN.
+    ///
+    /// Call it after refinement, since patches may then lie in cells of another topic.
     pub fn review(&mut self, score: impl Fn(TopicId, (f64, f64)) -> Option<f32>) {
         for (&topic, kept) in &mut self.topics {
             kept.retain_mut(|exemplar| match score(topic, exemplar.place).filter(|score| !score.is_nan()) {
@@ -92,21 +114,23 @@ impl ExemplarStore {
         self.topics.retain(|_, kept| !kept.is_empty());
     }
 
-    /// The best patch of a topic.
-    pub fn best(&self, topic: TopicId) -> Option<&Exemplar> {
+    /// Returns the patch of a topic with the highest score.
+    #[must_use]
+    pub fn best(&self, topic: TopicId) -> Option<&ExemplarPatch> {
         self.topics.get(&topic)?.first()
     }
 
-    /// All kept patches of a topic, best first.
-    pub fn all(&self, topic: TopicId) -> &[Exemplar] {
+    /// Returns all patches of a topic, best first.
+    #[must_use]
+    pub fn all(&self, topic: TopicId) -> &[ExemplarPatch] {
         self.topics.get(&topic).map_or(&[], Vec::as_slice)
     }
 
-    fn drop_the_weakest_topic(&mut self) {
+    fn drop_lowest_topic(&mut self) {
         if self.topics.len() <= MAX_TOPICS {
             return;
         }
-        let best = |kept: &[Exemplar]| kept.first().map_or(f32::NEG_INFINITY, |exemplar| exemplar.score);
+        let best = |kept: &[ExemplarPatch]| kept.first().map_or(f32::NEG_INFINITY, |exemplar| exemplar.score);
         let weakest = self.topics.iter().min_by(|a, b| best(a.1).total_cmp(&best(b.1)));
         if let Some(topic) = weakest.map(|entry| *entry.0) {
             self.topics.remove(&topic);
@@ -114,7 +138,7 @@ impl ExemplarStore {
     }
 }
 
-/// An image as width, height and bytes.
+/// The serialised form of an image: width, height and bytes.
 mod pixels {
     use std::sync::Arc;
 
@@ -143,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_views_of_one_place_the_better_is_kept() {
+    fn better_of_two_views_of_one_place_is_kept() {
         let mut store = ExemplarStore::new(4, 8);
         for (score, east) in [(0.5, 0.0), (0.4, 0.1), (0.3, 9.0), (0.8, 0.2)] {
             store.offer(TopicId(1), RgbImage::new(8, 8), score, 1.0, (east, 0.0));
@@ -153,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn the_best_patches_are_kept_in_the_stores_size() {
+    fn best_patches_are_kept_at_the_size_of_the_store() {
         let mut store = ExemplarStore::new(2, 16);
         for score in [0.3, 0.9, 0.1, 0.5, f32::NAN] {
             offer(&mut store, 4, score);
@@ -165,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_store_comes_back_from_its_bytes() {
+    fn store_survives_serialisation() {
         let mut store = ExemplarStore::new(2, 4);
         offer(&mut store, 4, 0.5);
         let mut bytes = postcard::to_allocvec(&store).unwrap();
@@ -179,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn the_number_of_topics_is_bounded() {
+    fn number_of_topics_is_bounded() {
         let mut store = ExemplarStore::new(1, 2);
         for topic in 0..400 {
             offer(&mut store, topic, if topic == 3 { 0.01 } else { 0.5 });

@@ -1,4 +1,4 @@
-//! Published label ids: what a number on the map means never changes within an epoch.
+//! Published labels: numbers from 1 to 254 whose meaning never changes within an epoch.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,24 @@ use crate::topics::{FlatCell, TopicId};
 
 const DEFAULT_MIN_CELLS: u32 = 3;
 
-/// One cell of the map as it goes out.
+/// One cell of the published map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PublishedCell {
-    /// Cell index east.
+    /// Cell index east, as [`FlatCell::x`].
     pub x: i32,
-    /// Cell index north.
+    /// Cell index north, as [`FlatCell::y`].
     pub y: i32,
-    /// Published label, 1 to 254.
+    /// The published label, 1 to 254.
     pub label: u8,
-    /// As [`FlatCell::confidence`]; 0 where the label is not the cell's own topic (see [`LabelBook::publish`]).
+    /// As [`FlatCell::confidence`]; 0 if the label does not stand for the
+    /// cell's own topic (see [`LabelBook::publish`]).
     pub confidence: f32,
-    /// As [`FlatCell::perplexity`].
+    /// The perplexity of the cell's words, as [`FlatCell::perplexity`].
     pub perplexity: f32,
 }
 
-/// Number of cells of each published label.
+/// Returns the number of cells of each label.
+#[must_use]
 pub fn label_areas(cells: &[PublishedCell]) -> BTreeMap<u8, u32> {
     let mut areas = BTreeMap::new();
     for cell in cells {
@@ -32,75 +34,98 @@ pub fn label_areas(cells: &[PublishedCell]) -> BTreeMap<u8, u32> {
     areas
 }
 
-/// Which published id stands for which topic.
+/// The topics that the published labels of an epoch stand for.
+///
+/// ```
+/// use scene_model::publish::LabelBook;
+/// use scene_model::topics::{FlatCell, TopicId};
+///
+/// let cell = |x| FlatCell { x, y: 0, z: 0, topic: TopicId(17), words: 60, confidence: 0.9, perplexity: 20.0 };
+/// let map: Vec<FlatCell> = (0..4).map(cell).collect();
+///
+/// let mut book = LabelBook::new(0);
+/// // A topic gets its label when it has held three cells in two maps in a row.
+/// assert!(book.publish(&map).is_empty());
+/// let published = book.publish(&map);
+/// assert_eq!((published.len(), published[0].label), (4, 1));
+/// assert_eq!(book.topic_of(1), Some(TopicId(17)));
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabelBook {
     epoch: u8,
     min_cells: u32,
-    /// The topic of id 1, 2, ...; nothing where an earlier run may have given the id to a topic that is not known here.
+    /// The topic of label 1, 2 and so on. `None` if an earlier run may have given the label to a
+    /// topic that is unknown here.
     topics: Vec<Option<TopicId>>,
     ids: BTreeMap<TopicId, u8>,
-    /// Topics that held enough cells in the last call.
+    /// The topics that held enough cells in the last call.
     held: Vec<TopicId>,
-    /// Topic shown by each cell in the last call, by (y, x).
+    /// The topic that each cell showed after the last call, sorted by (y, x).
     shown: Vec<(i32, i32, TopicId)>,
 }
 
 impl LabelBook {
-    /// Ids that an epoch can give: 255 is left for "does not count" in annotations, 0 is "unexplored".
+    /// The number of labels in an epoch. 0 stands for an unexplored cell, and 255 for "ignore" in annotations.
     pub const CAPACITY: usize = 254;
 
-    /// An empty book.
+    /// Returns a book without labels.
+    #[must_use]
     pub fn new(epoch: u8) -> Self {
         let (topics, held, shown) = (Vec::new(), Vec::new(), Vec::new());
         Self { epoch, min_cells: DEFAULT_MIN_CELLS, topics, ids: BTreeMap::new(), held, shown }
     }
 
-    /// Sets how many cells a topic must hold in two consecutive calls to be given an id (default 3, at least 1).
+    /// Sets the number of cells that a topic must hold in two consecutive calls to get a label: 3
+    /// by default, at least 1.
+    #[must_use]
     pub fn with_min_cells(self, min_cells: u32) -> Self {
         Self { min_cells: min_cells.max(1), ..self }
     }
 
-    /// Number of times that the ids were started afresh, modulo 256, from the first epoch on.
+    /// Returns the current epoch. It grows by 1, modulo 256, whenever the labels are numbered again from 1.
+    #[must_use]
     pub fn epoch(&self) -> u8 {
         self.epoch
     }
 
-    /// The topic that an id stands for in this epoch.
+    /// Returns the topic that a label stands for in this epoch.
+    #[must_use]
     pub fn topic_of(&self, label: u8) -> Option<TopicId> {
         self.topics.get(usize::from(label).checked_sub(1)?).copied().flatten()
     }
 
-    /// The id of a topic in this epoch.
+    /// Returns the label of a topic in this epoch.
+    #[must_use]
     pub fn label_of(&self, topic: TopicId) -> Option<u8> {
         self.ids.get(&topic).copied()
     }
 
-    /// All ids given in this epoch, in the order in which they were given.
+    /// Returns all labels of this epoch, in the order in which they were given.
     pub fn labels(&self) -> impl Iterator<Item = u8> {
         1..=self.topics.len() as u8
     }
 
-    /// Goes on in the same epoch after a restart: ids up to `told` may have been published by then, and those that this
-    /// book has no topic for are never given again.
-    pub fn resume(&mut self, told: u8) {
-        let told = usize::from(told).min(Self::CAPACITY);
-        self.topics.resize(self.topics.len().max(told), None);
+    /// Continues the same epoch after a restart. Labels up to `published` may have been published before it; those
+    /// whose topic this book does not know are never given again.
+    pub fn resume(&mut self, published: u8) {
+        let published = usize::from(published).min(Self::CAPACITY);
+        self.topics.resize(self.topics.len().max(published), None);
     }
 
-    /// Starts the ids afresh in another epoch; what was held counts on.
+    /// Begins another epoch, whose labels are numbered from 1. Topics that held enough cells in the last
+    /// [`Self::publish`] can get their labels in the next one.
     pub fn begin_epoch(&mut self, epoch: u8) {
         self.epoch = epoch;
         self.topics.clear();
         self.ids.clear();
     }
 
-    /// Turns a flattened map (sorted by (y, x)) into published labels, sorted alike.
+    /// Returns the published form of a label map, both sorted by `(y, x)`.
     ///
-    /// An id is given when a topic has held at least `min_cells` cells in two consecutive calls, so that short-lived
-    /// births use up none. Until then its cells keep the label that they showed before, else take the label that most
-    /// of their four neighbours have, else are left out (still unexplored to the outside). When ids run out a new
-    /// epoch starts and everything is numbered afresh.
+    /// A topic gets a label after it has held at least `min_cells` cells in two consecutive calls, so that short-lived
+    /// topics use up no labels. Until then its cells keep the label that they showed before; otherwise they take the
+    /// label that most of their four neighbours have; otherwise they are left out, hence unexplored to the operator.
+    /// When no label is left, a new epoch begins.
     pub fn publish(&mut self, cells: &[FlatCell]) -> Vec<PublishedCell> {
         self.give_ids(cells);
         let known: Vec<Option<TopicId>> = self.known_topics(cells);
@@ -114,7 +139,8 @@ impl LabelBook {
         self.published(cells)
     }
 
-    /// What the last call of [`Self::publish`] made of the same map: a restored book goes on showing it.
+    /// Returns the result of the last [`Self::publish`] for the same map; a restored book continues with it.
+    #[must_use]
     pub fn published(&self, cells: &[FlatCell]) -> Vec<PublishedCell> {
         let mut cells = cells.iter();
         let publish = |&(y, x, topic): &(i32, i32, TopicId)| {
@@ -148,7 +174,7 @@ impl LabelBook {
         }
     }
 
-    /// For each cell its own topic, else the one it showed before, if that has an id.
+    /// For each cell, its own topic if that has a label, otherwise the topic that it showed before.
     fn known_topics(&self, cells: &[FlatCell]) -> Vec<Option<TopicId>> {
         let mut before = self.shown.iter().peekable();
         let mut known = Vec::with_capacity(cells.len());
@@ -162,7 +188,7 @@ impl LabelBook {
         known
     }
 
-    /// The topic that most of the four neighbours have; ties to the oldest.
+    /// The topic of most of the four neighbours, ties to the oldest topic.
     fn around(&self, cells: &[FlatCell], known: &[Option<TopicId>], index: usize) -> Option<TopicId> {
         let FlatCell { x, y, .. } = cells[index];
         let places = [(y - 1, x), (y, x - 1), (y, x + 1), (y + 1, x)];
@@ -195,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn an_id_is_given_at_the_second_sight_and_then_stays() {
+    fn label_is_given_in_the_second_map_and_then_kept() {
         let mut book = LabelBook::new(0);
         assert!(book.publish(&row(&[7, 7, 7])).is_empty());
         assert_eq!(labels(&book.publish(&row(&[7, 7, 7, 7]))), [1, 1, 1, 1]);
@@ -207,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn short_lived_topics_use_up_no_ids() {
+    fn short_lived_topics_use_up_no_labels() {
         let mut book = LabelBook::new(0);
         book.publish(&row(&[0; 9]));
         book.publish(&row(&[0; 9]));
@@ -220,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_cell_of_an_unpublished_topic_takes_its_neighbours_label() {
+    fn unpublished_topic_takes_the_label_of_its_neighbours() {
         let mut book = LabelBook::new(0);
         book.publish(&row(&[0; 4]));
         book.publish(&row(&[0; 4]));
@@ -230,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_restart_no_id_that_may_have_been_told_gets_another_meaning() {
+    fn published_ids_keep_their_meaning_after_a_restart() {
         let mut book = LabelBook::new(4);
         book.publish(&row(&[7, 7, 7]));
         book.publish(&row(&[7, 7, 7]));
@@ -239,13 +265,17 @@ mod tests {
         assert_eq!(labels(&book.publish(&row(&[7, 7, 7, 9, 9, 9]))), [1, 1, 1, 4, 4, 4]);
         assert_eq!((book.topic_of(1), book.topic_of(2), book.epoch()), (Some(TopicId(7)), None, 4));
         book.resume(2);
-        assert_eq!(book.labels().count(), 4, "nothing is taken back");
+        assert_eq!(book.labels().count(), 4, "labels are never withdrawn");
         book.begin_epoch(5);
-        assert_eq!(labels(&book.publish(&row(&[9, 9, 9, 7, 7, 7]))), [2, 2, 2, 1, 1, 1], "at once: both were held");
+        assert_eq!(
+            labels(&book.publish(&row(&[9, 9, 9, 7, 7, 7]))),
+            [2, 2, 2, 1, 1, 1],
+            "at once: both topics held enough cells before"
+        );
     }
 
     #[test]
-    fn when_ids_run_out_a_new_epoch_numbers_what_is_there() {
+    fn new_epoch_begins_when_labels_run_out() {
         let mut book = LabelBook::new(255).with_min_cells(1);
         for topic in 0..LabelBook::CAPACITY as u32 {
             book.publish(&row(&[topic]));

@@ -1,30 +1,52 @@
-//! A vocabulary as bytes: measures learnt from a set of images before a mission, frozen.
+//! A vocabulary file: the [`Measures`] that features become words by, as bytes.
+//!
+//! Measures that were learnt from images of a similar site before the mission give words the same meaning in every
+//! mission.
+//!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use scene_model::vocabulary;
+//! use scene_model::words::{WordConfig, WordExtractor};
+//!
+//! let site = RgbImage::from_fn(120, 90, |x, y| Rgb([(x * 2) as u8, (y * 2) as u8, 90]));
+//! let mut extractor = WordExtractor::new(&WordConfig::default());
+//! extractor.learn_tones(&site);
+//! extractor.learn_statistics(&site, 30.0);
+//! extractor.freeze();
+//! let file = vocabulary::save(&extractor.measures());
+//!
+//! let mut on_board = WordExtractor::from_measures(vocabulary::load(&file)?);
+//! assert_eq!(on_board.extract(&site, 30.0), extractor.extract(&site, 30.0));
+//! # Ok::<(), vocabulary::VocabularyError>(())
+//! ```
 
 use crate::envelope::{Envelope, EnvelopeError};
 use crate::words::Measures;
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNVOCAB", version: 1 };
-/// Most words of one kind in a cell.
-const MOST_PER_CELL: u32 = 1024;
+/// The maximum number of words of one kind in a cell.
+const MAX_WORDS_PER_CELL: u32 = 1024;
 
-/// Why bytes are no vocabulary to measure words against.
+/// The bytes are not a vocabulary that this version can use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VocabularyError {
-    /// Not a vocabulary, of another version, or damaged.
-    #[error("not a vocabulary to go by: {0}")]
+    /// The bytes are not a vocabulary, are of another version, or are damaged.
+    #[error("not a usable vocabulary: {0}")]
     Envelope(#[from] EnvelopeError),
-    /// The checksum is right but the content cannot be.
+    /// The checksum is right, but the content contradicts itself or this version; the text names where.
     #[error("the vocabulary's content is inconsistent: {0}")]
     Inconsistent(&'static str),
 }
 
-/// The vocabulary as bytes, for [`load`].
+/// Returns the measures as bytes, for [`load`].
+#[must_use]
 pub fn save(measures: &Measures) -> Vec<u8> {
     let content = (measures.config().vocabulary_size(), measures);
     ENVELOPE.seal(&postcard::to_allocvec(&content).unwrap_or_default())
 }
 
-/// The measures that [`save`] kept; words mean in every run what they meant in training.
+/// Returns the measures of bytes that [`save`] returned. Other content is refused and never panics.
 pub fn load(bytes: &[u8]) -> Result<Measures, VocabularyError> {
     let content = ENVELOPE.open(bytes)?;
     let (size, measures): (u32, Measures) =
@@ -34,7 +56,7 @@ pub fn load(bytes: &[u8]) -> Result<Measures, VocabularyError> {
         return Err(VocabularyError::Inconsistent("this program has another number of words"));
     }
     let kinds = [config.colour, config.context, config.spread, config.texture, config.binary];
-    if kinds.iter().any(|&words| words > MOST_PER_CELL) {
+    if kinds.iter().any(|&words| words > MAX_WORDS_PER_CELL) {
         return Err(VocabularyError::Inconsistent("more than 1024 words of a kind in a cell"));
     }
     Ok(measures)
@@ -51,18 +73,22 @@ mod tests {
     }
 
     fn trained() -> Measures {
-        WordExtractor::train(&WordConfig::default(), || std::iter::once((image(), 20.0)))
+        let mut extractor = WordExtractor::new(&WordConfig::default());
+        extractor.learn_tones(&image());
+        extractor.learn_statistics(&image(), 20.0);
+        extractor.freeze();
+        extractor.measures()
     }
 
     #[test]
-    fn a_vocabulary_gives_the_same_words_after_it_was_kept() {
+    fn loaded_vocabulary_gives_the_same_words() {
         let loaded = load(&save(&trained())).unwrap();
         let words = |measures| WordExtractor::from_measures(measures).extract(&image(), 20.0);
         assert_eq!(words(loaded), words(trained()));
     }
 
     #[test]
-    fn what_is_no_vocabulary_is_refused() {
+    fn other_bytes_are_refused() {
         assert_eq!(load(b"hello").unwrap_err(), EnvelopeError::Foreign.into());
         let greedy = WordConfig { colour: 5000, ..WordConfig::default() };
         let measures = WordExtractor::new(&greedy).measures();
@@ -70,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn content_under_a_right_checksum_never_panics() {
+    fn content_with_a_right_checksum_never_panics() {
         let sealed = save(&trained());
         let content = ENVELOPE.open(&sealed).unwrap();
         for at in 0..content.len() {

@@ -1,11 +1,11 @@
-//! What the scene model promises, from outside.
+//! The behaviour of the public interface over procedural reefs and hand-made words.
 
-use scene_model::generate::{Reef, reef};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, SceneConfig, SceneModel};
-use scene_model::tuning::mutual_information_nats;
 use scene_model::words::{WordConfig, WordExtractor};
+use scenecast_scoring::mutual_information_nats;
+use scenecast_worlds::{Reef, reef};
 
 const CELL_PX: f32 = 25.0;
 
@@ -23,7 +23,7 @@ fn learn_reef(reef: &Reef, config: SceneConfig) -> SceneModel {
     model
 }
 
-/// Mutual information of the map with the truth at the cell centres, the map displaced by whole cells around a torus.
+/// The mutual information of the truth at the cell centres with the map, which is shifted by whole cells on a torus.
 fn score(reef: &Reef, map: &[FlatCell], shift: (i32, i32)) -> f64 {
     let left = map.iter().map(|cell| cell.x).min().unwrap();
     let bottom = map.iter().map(|cell| cell.y).min().unwrap();
@@ -38,7 +38,7 @@ fn score(reef: &Reef, map: &[FlatCell], shift: (i32, i32)) -> f64 {
 }
 
 #[test]
-fn a_reef_with_known_truth_is_recovered_well_above_the_spatial_null() {
+fn reef_is_recovered_well_above_the_spatial_null() {
     let reef = reef(4, 1000, 800, 100, 6);
     let map = learn_reef(&reef, config(1)).label_map();
     let found = score(&reef, &map, (0, 0));
@@ -48,7 +48,7 @@ fn a_reef_with_known_truth_is_recovered_well_above_the_spatial_null() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_labels_and_another_seed_others() {
+fn labels_depend_on_the_seed_alone() {
     let reef = reef(9, 500, 400, 60, 5);
     let map = |seed| learn_reef(&reef, config(seed)).label_map();
     assert_eq!(map(1), map(1));
@@ -76,7 +76,7 @@ fn bad_words_are_counted_and_skipped() {
 }
 
 #[test]
-fn an_empty_model_has_an_empty_map() {
+fn empty_model_has_an_empty_map() {
     let mut model = SceneModel::new(config(1)).unwrap();
     assert_eq!((model.refine(1000), model.sweep(3), model.cells(), model.labels()), (0, 0, 0, 0));
     assert!(model.label_map().is_empty());
@@ -84,7 +84,7 @@ fn an_empty_model_has_an_empty_map() {
 }
 
 #[test]
-fn a_world_may_lie_on_both_sides_of_the_origin() {
+fn world_may_lie_on_both_sides_of_the_origin() {
     let mut model = SceneModel::new(config(1)).unwrap();
     let at = |x, y| Observation { word: 1, x, y, z: -30.0 };
     model.insert(0.0, &[at(-0.1, -0.1), at(0.1, -0.1), at(-1e6, 1e6)]);
@@ -93,7 +93,7 @@ fn a_world_may_lie_on_both_sides_of_the_origin() {
 }
 
 #[test]
-fn where_cells_stack_the_label_with_most_words_wins() {
+fn label_with_most_words_of_a_column_is_shown() {
     let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 1.0, ..config(1) };
     let mut model = SceneModel::new(config).unwrap();
     let at = |word, z| Observation { word, x: 0.5, y: 0.5, z };
@@ -107,7 +107,7 @@ fn where_cells_stack_the_label_with_most_words_wins() {
 }
 
 #[test]
-fn labels_are_never_renamed_while_a_mission_streams_in() {
+fn labels_keep_their_meaning_during_a_mission() {
     let reef = reef(2, 900, 700, 80, 6);
     let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
     let mut extractor = WordExtractor::new(&WordConfig::default());
@@ -132,7 +132,7 @@ fn labels_are_never_renamed_while_a_mission_streams_in() {
 }
 
 #[test]
-fn the_edge_of_the_seen_predicts_what_comes_next() {
+fn cells_beside_the_map_expect_its_topics() {
     let mut model = SceneModel::new(SceneConfig { cell_m: [1.0; 3], vocabulary: 4, ..config(1) }).unwrap();
     model.insert(0.0, &vec![Observation { word: 2, x: 0.5, y: 0.5, z: 0.0 }; 50]);
     model.sweep(5);
@@ -145,12 +145,12 @@ fn the_edge_of_the_seen_predicts_what_comes_next() {
 }
 
 #[test]
-fn stacked_cells_have_labels_of_their_own_and_the_map_keeps_the_height_of_the_one_that_shows() {
+fn stacked_cells_have_labels_and_heights_of_their_own() {
     let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 1.0, ..config(1) };
     let mut model = SceneModel::new(config).unwrap();
     let at = |word, x, z| Observation { word, x, y: -7.5, z };
     for _ in 0..2 {
-        // The second time these are words for cells that were seen before.
+        // In the second pass the cells exist already.
         model.insert(0.0, &[vec![at(0, 0.5, 9.0); 40], vec![at(3, 0.5, -2.0); 30], vec![at(3, 5.5, 1.0); 30]].concat());
         model.sweep(30);
     }

@@ -1,37 +1,38 @@
-//! The emulators say what the transcripts of known clients say. `transcripts/README.md` is the format.
+//! The emulators reply as in the transcripts of known clients. `transcripts/README.md` describes the format.
 
-use sim_channel::modem::Basin;
-use sim_channel::modem::Emulator;
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
-use sim_channel::{Channel, ChannelConfig, Duration, NodeId, Position};
+use sim_channel::modem::{Basin, Emulator};
+use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Time that an answer which is not acoustic may take.
-const ANSWER: Duration = Duration::from_millis(250);
+/// Longest time of a reply that is not acoustic.
+const REPLY_TIMEOUT: Duration = Duration::from_millis(250);
 
 struct Replay {
     basin: Basin,
-    /// What was told to each host and not yet compared.
-    told: BTreeMap<u8, Vec<u8>>,
+    /// Bytes that each host has received and that are not yet compared.
+    received: BTreeMap<u8, Vec<u8>>,
     micromodems: bool,
-    place: String,
+    /// File and line number, for failures.
+    location: String,
 }
 
 impl Replay {
     fn new() -> Self {
         let basin = Basin::new(Channel::new(ChannelConfig::default(), 1));
-        Self { basin, told: BTreeMap::new(), micromodems: false, place: String::new() }
+        Self { basin, received: BTreeMap::new(), micromodems: false, location: String::new() }
     }
 
+    #[allow(clippy::disallowed_methods, reason = "transcripts are files")]
     fn run(mut self, path: &Path) {
         let text = std::fs::read_to_string(path).expect("transcript");
         for (number, line) in (1..).zip(text.lines().map(str::trim_end)) {
-            self.place = format!("{}:{number}", path.display());
+            self.location = format!("{}:{number}", path.display());
             self.step(line);
         }
-        self.pass(ANSWER);
+        self.pass(REPLY_TIMEOUT);
         self.expect_nothing(1);
     }
 
@@ -41,17 +42,17 @@ impl Replay {
             ("" | "#", _) => {}
             ("modem", words) => self.add(words),
             ("wait", seconds) => self.pass(Duration::from_secs_f64(seconds.parse().expect("seconds"))),
-            ("drop", _) => self.told.entry(node).or_default().clear(),
+            ("drop", _) => self.received.entry(node).or_default().clear(),
             (">", text) => {
                 if node == 1 {
                     self.expect_nothing(1);
                 }
                 self.write(node, &bytes(text));
-                self.pass(ANSWER);
+                self.pass(REPLY_TIMEOUT);
             }
             ("<", text) => self.expect(node, text),
             ("?", text) => drop(self.take(node, text)),
-            _ => panic!("{}: no line of a transcript: {line}", self.place),
+            _ => panic!("{}: no line of a transcript: {line}", self.location),
         }
     }
 
@@ -69,14 +70,14 @@ impl Replay {
                 ..MicromodemConfig::new(number("address"))
             }))
         };
-        let node = NodeId(self.told.len() as u8 + 1);
+        let node = NodeId(self.received.len() as u8 + 1);
         let x_m = keys.get("at").map_or(0.0, |metres| metres.parse().expect("metres"));
-        self.basin.channel().place(node, Position::new(x_m, 0.0, 0.0));
+        self.basin.channel().place(node, NodePosition::new(x_m, 0.0, 0.0));
         self.basin.add(node, modem);
-        self.told.insert(node.0, Vec::new());
+        self.received.insert(node.0, Vec::new());
     }
 
-    /// Writes byte by byte, as a slow line may.
+    /// Writes in small pieces, as a slow line may.
     fn write(&mut self, node: u8, bytes: &[u8]) {
         let whole = self.sentence(bytes);
         for piece in whole.chunks(3) {
@@ -102,48 +103,48 @@ impl Replay {
     }
 
     fn collect(&mut self) {
-        for (node, told) in &mut self.told {
-            told.extend(self.basin.poll_host_bytes(NodeId(*node)));
+        for (node, received) in &mut self.received {
+            received.extend(self.basin.poll_host_bytes(NodeId(*node)));
         }
     }
 
     fn expect(&mut self, node: u8, text: &str) {
         if self.take(node, text).is_none() {
-            let told = self.told[&node].escape_ascii().to_string();
-            panic!("{}: host {node} was told\n  {told}\ninstead of\n  {text}", self.place);
+            let received = self.received[&node].escape_ascii().to_string();
+            panic!("{}: host {node} received\n  {received}\ninstead of\n  {text}", self.location);
         }
     }
 
     fn expect_nothing(&mut self, node: u8) {
-        let told = &self.told[&node];
-        assert!(told.is_empty(), "{}: host {node} was told more: {}", self.place, told.escape_ascii());
+        let received = &self.received[&node];
+        assert!(received.is_empty(), "{}: host {node} received more: {}", self.location, received.escape_ascii());
     }
 
-    /// Takes what a pattern matches off the front of what was told.
+    /// Removes the bytes that a pattern matches from the front of the received bytes.
     fn take(&mut self, node: u8, text: &str) -> Option<()> {
-        let told = self.told.get_mut(&node)?;
+        let received = self.received.get_mut(&node)?;
         let length = if self.micromodems {
-            let end = told.iter().position(|byte| *byte == b'\n')? + 1;
-            let body = told.get(..end)?.strip_suffix(b"\r\n")?;
+            let end = received.iter().position(|byte| *byte == b'\n')? + 1;
+            let body = received.get(..end)?.strip_suffix(b"\r\n")?;
             let (body, sum) = body.split_at(body.len().checked_sub(3)?);
             let xor = body.iter().skip(1).fold(0, |sum, byte| sum ^ byte);
             (sum == format!("*{xor:02X}").as_bytes() && matched(body, text) == Some(body.len())).then_some(end)?
         } else {
-            matched(told, text)?
+            matched(received, text)?
         };
-        told.drain(..length);
+        received.drain(..length);
         Some(())
     }
 }
 
-/// How many bytes at the front a pattern matches, as few as possible.
-fn matched(told: &[u8], pattern: &str) -> Option<usize> {
+/// Number of bytes at the front that a pattern matches, as few as possible.
+fn matched(received: &[u8], pattern: &str) -> Option<usize> {
     let Some(open) = pattern.find('{') else {
         let literal = bytes(pattern);
-        return told.starts_with(&literal).then_some(literal.len());
+        return received.starts_with(&literal).then_some(literal.len());
     };
     let literal = bytes(&pattern[..open]);
-    let rest = told.strip_prefix(literal.as_slice())?;
+    let rest = received.strip_prefix(literal.as_slice())?;
     let (kind, after) = pattern[open + 1..].split_once('}').expect("wildcard");
     let lengths = (0..=rest.len()).filter(|length| fits(&rest[..*length], kind));
     let found = if after.is_empty() {
@@ -165,7 +166,7 @@ fn fits(bytes: &[u8], kind: &str) -> bool {
     }
 }
 
-/// The bytes that a text stands for.
+/// The bytes of a text with escapes.
 fn bytes(text: &str) -> Vec<u8> {
     let mut out = Vec::new();
     let mut rest = text.bytes();
@@ -186,7 +187,7 @@ fn bytes(text: &str) -> Vec<u8> {
 }
 
 #[test]
-fn the_emulators_say_what_the_transcripts_say() {
+fn emulators_match_the_transcripts() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("transcripts");
     let mut files: Vec<PathBuf> =
         std::fs::read_dir(folder).expect("folder").map(|entry| entry.expect("entry").path()).collect();
@@ -197,7 +198,7 @@ fn the_emulators_say_what_the_transcripts_say() {
 }
 
 #[test]
-fn a_transcript_that_differs_is_noticed() {
+fn transcript_mismatch_is_detected() {
     for wrong in ["< NET\\r\\n", "< AT\\r\\n< more"] {
         let failed = std::panic::catch_unwind(|| {
             let mut replay = Replay::new();

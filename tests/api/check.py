@@ -1,7 +1,7 @@
 """Holds a running surface against its own OpenAPI document: python check.py URL
 
-Validates the document, asks every operation, validates each answer against its schema, and the figures as Prometheus
-reads them.
+Validates the document, calls every operation, validates each response against its schema, and parses the metrics as
+Prometheus does.
 """
 
 import json
@@ -17,11 +17,11 @@ import prometheus_client.parser
 URL = sys.argv[1].rstrip("/")
 ORDERS = {
     "set_utility": {"weights": {}, "exploration": 0.1},
-    "ask_exemplar": None,
+    "request_exemplar": None,
     "set_constraints": {"hold": False},
     "set_fence": {"fence": [[-500, -500], [500, -500], [500, 500], [-500, 500]], "keep_outs": [], "return_point": [0, 0]},
     "set_limits": {"depth_m": [0, 500], "on_silence": "hold"},
-    "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "planes": "depth", "alpha": 0},
+    "set_settings": {"planner": "greedy", "gamma": 1e-5, "cells": "coarse-to-fine", "layers": "depth", "alpha": 0},
     "set_budget": {"budget_bps": 9000, "shares": {"directive": 10, "status": 5, "fix": 5, "map": 50, "exemplar": 20}},
 }
 
@@ -75,7 +75,7 @@ def events(document, content, state_only):
     wanted = dict(content["x-events"])
     if state_only:
         wanted.pop("map")
-    with OPENER.open(URL + "/api/v1/events", timeout=20) as stream:
+    with OPENER.open(URL + "/api/v2/events", timeout=20) as stream:
         name = None
         for _ in range(1000):
             line = stream.readline().decode().rstrip("\n")
@@ -92,11 +92,11 @@ def events(document, content, state_only):
 
 def check(document, path, method, operation, state):
     vehicle = state["vehicles"][0]
-    asked = path.replace("{id}", str(vehicle["id"]))
+    requested = path.replace("{id}", str(vehicle["id"]))
     if "{file}" in path:
-        here = [l["id"] for l in vehicle["labels"] if l["exemplar"]["state"] == "here"]
-        expect(here, "no image is here to ask for")
-        asked = asked.replace("{file}", f"{here[0]}.webp")
+        received = [l["id"] for l in vehicle["labels"] if l["exemplar"]["state"] == "received"]
+        expect(received, "the surface has no image to read")
+        requested = requested.replace("{file}", f"{received[0]}.webp")
     name = operation["operationId"]
     good = next(status for status in operation["responses"] if status != "default")
     content = operation["responses"][good].get("content", {})
@@ -110,19 +110,19 @@ def check(document, path, method, operation, state):
         schema = operation["requestBody"]["content"]["application/json"]["schema"]
         validate(document, schema, order, f"the example of {name}")
         body = json.dumps(order).encode()
-    status, got, answer = ask(method, asked, body, headers)
-    expect(str(status) == good, f"{method} {asked}: {status} instead of {good}: {answer[:200]}")
+    status, got, answer = ask(method, requested, body, headers)
+    expect(str(status) == good, f"{method} {requested}: {status} instead of {good}: {answer[:200]}")
     if content:
         kind, described = next(iter(content.items()))
-        expect(got["content-type"] == kind, f"{asked} is {got['content-type']} instead of {kind}")
+        expect(got["content-type"] == kind, f"{requested} is {got['content-type']} instead of {kind}")
         if "schema" in described:
-            validate(document, described["schema"], json.loads(answer), asked)
+            validate(document, described["schema"], json.loads(answer), requested)
     if "{id}" in path:
         refused, _, why = ask(method, path.replace("{id}", "13").replace("{file}", "1.webp"), body, headers)
         expect(refused == 404, f"{method} {path} of no vehicle: {refused}")
-        validate(document, {"$ref": "#/components/schemas/Refusal"}, json.loads(why), f"the refusal of {path}")
+        validate(document, {"$ref": "#/components/schemas/ErrorBody"}, json.loads(why), f"the refusal of {path}")
     other = "POST" if "post" not in document["paths"][path] else "DELETE"
-    expect(ask(other, asked, b"{}")[0] == 405, f"{other} {asked} is not documented, yet taken")
+    expect(ask(other, requested, b"{}")[0] == 405, f"{other} {requested} is not documented but accepted")
 
 
 def check_metrics():
@@ -134,7 +134,7 @@ def check_metrics():
         for sample in f.samples:
             expect((f.type == "counter") == sample.name.endswith("_total"), f"{sample.name} is a {f.type}")
     classes = {s.labels["class"] for s in figures["scenecast_link_bits"].samples}
-    expect(classes == set(json.loads(ask("GET", "/api/v1/state")[2])["link"]["up"]["bytes_by_class"]), f"classes {classes}")
+    expect(classes == set(json.loads(ask("GET", "/api/v2/state")[2])["link"]["up"]["bytes_by_class"]), f"classes {classes}")
     expect(any(s.value for s in figures["scenecast_link_bits"].samples), "no bit was counted")
 
 
@@ -142,9 +142,9 @@ def main():
     document = json.loads(ask("GET", "/api/openapi.json")[2])
     openapi_spec_validator.validate(document)
     document["components"]["schemas"] = strict(document["components"]["schemas"])
-    state = json.loads(ask("GET", "/api/v1/state")[2])
+    state = json.loads(ask("GET", "/api/v2/state")[2])
     every = [(method, path, o) for path, methods in document["paths"].items() for method, o in methods.items()]
-    # An order for a further image takes the one that is here away: readings first.
+    # A request for a further image changes the state of the exemplar, so readings come first.
     for method, path, operation in sorted(every, key=lambda one: one[0]):
         check(document, path, method.upper(), operation, state)
     check_metrics()

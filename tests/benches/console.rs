@@ -71,7 +71,7 @@ fn share_of_a_core(process: &Process) -> f64 {
 
 /// Listens until `ends` and fetches each map as the page does; how late each was, seconds.
 fn console(port: u16, ends: Instant) -> Vec<f64> {
-    let mut events = BufReader::new(request(port, "/api/v1/events"));
+    let mut events = BufReader::new(request(port, "/api/v2/events"));
     // The mission's clock against ours: no state comes before it was made, so the quickest one tells best.
     let (origin, mut clock) = (Instant::now(), f64::INFINITY);
     let (mut updated, mut late, mut first) = (0.0, Vec::new(), true);
@@ -83,7 +83,7 @@ fn console(port: u16, ends: Instant) -> Vec<f64> {
             updated = state["vehicles"][0]["map"]["updated_s"].as_f64().unwrap_or(0.0);
         } else if line.starts_with("event: map") {
             let mut map = Vec::new();
-            request(port, "/api/v1/vehicles/1/map").read_to_end(&mut map).unwrap();
+            request(port, "/api/v2/vehicles/1/map").read_to_end(&mut map).unwrap();
             // The map that was there before the console has no arrival to be late from.
             if !std::mem::take(&mut first) {
                 late.push(origin.elapsed().as_secs_f64() - clock - updated);

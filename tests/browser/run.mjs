@@ -1,9 +1,10 @@
-// Runs every user story of the operator's page in headless Chromium.
+// Runs every user story of the operator's page in headless Chromium. Each story runs once.
 //
 //   node run.mjs                          against the mock
-//   node run.mjs --url http://HOST:PORT   against a running daemon: stories that need no mock
-//   ... --token-file FILE                 against one with a token: how to get in
-//   --only A,B   only stories whose name holds A or B      --require   a missing browser is a failure
+//   node run.mjs --url http://HOST:PORT   against a running daemon: the stories that need no mock
+//   ... --token-file FILE                 against one with a token: to log in
+//   ... --runs N                          each story N times, to find unstable ones
+//   --only A,B   only stories whose name contains A or B      --require   a missing browser is a failure
 
 import { existsSync, readFileSync } from "node:fs";
 import { LAUNCH } from "./browser.mjs";
@@ -15,9 +16,6 @@ const option = (name) => {
   return at > 0 ? process.argv[at + 1] : null;
 };
 
-/** Stories of a run that may be told once more: a browser on a busy machine may stall for a moment, a defect fails again. */
-const SECOND_TRIES = 2;
-
 const STORIES = ["entrance", "map", "labels", "vehicle", "constraints", "model", "link", "truth", "export", "cloud", "access", "cost"];
 
 async function stories() {
@@ -26,8 +24,8 @@ async function stories() {
   return modules.flatMap((m) => m.default).filter((s) => !only || only.some((part) => s.name.includes(part)));
 }
 
-/** What a story needs that is not here; null if it can be told. */
-function lacking(story, { mocked, token }) {
+/** The environment that a story requires and this run lacks, or null. */
+function missing(story, { mocked, token }) {
   if (story.scenario && !mocked) return "the mock";
   if (story.unmocked && mocked) return "a running daemon";
   return Boolean(story.locked) === Boolean(token) ? null : story.locked ? "a daemon with a token" : "a daemon without a token";
@@ -44,26 +42,19 @@ async function main() {
   const browser = await chromium.launch(LAUNCH);
   const scene = { url: url ?? mock.url, mocked: mock !== null, token: option("token-file") && readFileSync(option("token-file"), "utf8").trim() };
   const counts = { ok: 0, failed: 0, skipped: 0 };
-  let again = 0;
-  for (const story of await stories()) {
-    let outcome = await run(story, browser, scene);
-    if (outcome === "failed" && again < SECOND_TRIES) {
-      again += 1;
-      console.log("AGAIN");
-      outcome = await run(story, browser, scene);
-    }
-    counts[outcome] += 1;
+  for (let i = 0; i < Number(option("runs") ?? 1); i += 1) {
+    for (const story of await stories()) counts[await run(story, browser, scene)] += 1;
   }
   await browser.close();
   await mock?.close();
-  console.log(`${counts.ok} passed, ${counts.failed} failed, ${counts.skipped} skipped, ${again} told again`);
+  console.log(`${counts.ok} passed, ${counts.failed} failed, ${counts.skipped} skipped`);
   return counts.failed > 0 ? 1 : 0;
 }
 
 async function run(story, browser, scene) {
-  const lacks = lacking(story, scene);
-  if (lacks) {
-    console.log(`skip  ${story.name} (needs ${lacks})`);
+  const needed = missing(story, scene);
+  if (needed) {
+    console.log(`skip  ${story.name} (needs ${needed})`);
     return "skipped";
   }
   const start = performance.now();

@@ -1,8 +1,8 @@
 // Takes the screenshots of the operator's page: every state, theme and size, and the ones for the README.
 //
 //   node shots.mjs [--out DIR] [--only TEXT]           from the mock, into out/console-shots
-//   node shots.mjs --url http://127.0.0.1:8460 --out DIR   what a running daemon shows now
-//   ... --operate                                          after weights, pictures and a fence were sent to it
+//   node shots.mjs --url http://127.0.0.1:8460 --out DIR   from a running daemon
+//   ... --operate                                          after sending it weights, requests of images and a fence
 //
 // docs/page.png is daemon-light-wide.png of `scenecast demo --speed 6` after ten minutes of mission, with --operate.
 
@@ -24,31 +24,31 @@ const given = option("url", null);
 
 const tab = (name) => (page) => page.getByRole("tab", { name }).click();
 
-/** name -> {scenario, sizes, steps}: what is done before the picture is taken. */
+/** name -> {scenario, sizes, steps}: `steps` prepare the page. */
 const SCENES = {
   empty: { scenario: "empty" },
   rich: { scenario: "rich", steps: working },
   silent: { scenario: "silent" },
   refused: { scenario: "refused" },
-  lost: { scenario: "rich", steps: (page, steer) => steer({ down: true }).then(() => page.waitForTimeout(1500)) },
+  lost: { scenario: "rich", steps: (page, steer) => steer({ down: true }).then(() => page.locator("body[data-feed=lost]").waitFor()) },
   vehicle: { scenario: "refused", sizes: ["phone"], steps: tab("Vehicle") },
   link: { scenario: "rich", sizes: ["phone"], steps: tab("Link") },
   constraints: { scenario: "rich", steps: constrained },
   model: { scenario: "rich", steps: tuned },
-  coarse: { scenario: "empty", steps: (page, steer) => steer({ coarse: true, loss: 0, advance: 100 }).then(() => page.waitForTimeout(500)) },
+  coarse: { scenario: "empty", steps: (page, steer) => steer({ coarse: true, loss: 0, advance: 100 }).then(() => page.locator("#legend").waitFor()) },
   two: { scenario: "two", sizes: ["wide"] },
   age: { scenario: "rich", sizes: ["wide"], steps: (page) => page.selectOption("#layer", "age") },
   curiosity: { scenario: "rich", sizes: ["wide"], steps: curious },
   cloud: { scenario: "rich", sizes: ["wide"], steps: cloud },
 };
 
-/** Weights sent and under way, one more being set, two pictures asked for, the pointer on the map. */
+/** Weights in force and on the way, a further draft, two requested images, the pointer on the map. */
 async function working(page, steer) {
   const weigh = (n, w) => page.getByRole("slider", { name: `Weight of Label ${n}` }).fill(w);
   const wide = page.viewportSize().width > 1100;
-  await page.getByRole("button", { name: "Show me: a picture of Label 2" }).click();
+  await page.getByRole("button", { name: "Request: an image of Label 2" }).click();
   await steer({ advance: 90, loss: 0.02 });
-  await page.getByRole("button", { name: "Show me: a picture of Label 4" }).click();
+  await page.getByRole("button", { name: "Request: an image of Label 4" }).click();
   await weigh(2, "0.7");
   await weigh(5, "-0.4");
   await page.locator("#send-weights").click();
@@ -56,7 +56,7 @@ async function working(page, steer) {
   if (wide) await page.mouse.move(820, 380);
 }
 
-/** A fence in force, a keep-out being drawn wrongly, a band upside down. */
+/** A fence in force, a faulty draft of a keep-out, a faulty band. */
 async function constrained(page, steer) {
   const [x, y] = [[0.03, 0.97], [0.1, 0.9]];
   const draw = async (tool, places) => {
@@ -75,11 +75,11 @@ async function constrained(page, steer) {
   await page.getByLabel("Depth, m, highest").fill("5");
 }
 
-/** Settings in force, one more that no vehicle takes, and what fits a budget. */
+/** Settings in force, a faulty one, and a fit to a budget. */
 async function tuned(page, steer) {
   await page.getByRole("tab", { name: "Model" }).click();
   await page.locator("#set-gamma").fill("1e-5");
-  await page.locator("#set-planes").selectOption("depth");
+  await page.locator("#set-layers").selectOption("depth");
   await page.locator("#send-settings").click();
   await steer({ advance: 40, loss: 0 });
   await page.locator("#fit-bps").fill("1000");
@@ -87,25 +87,25 @@ async function tuned(page, steer) {
   await page.locator("#set-beta").fill("5000");
 }
 
-/** The layer that the operator asked for, and the level under the pointer. */
+/** A layer that the operator requested, and the level under the pointer. */
 async function curious(page, steer) {
   await page.getByRole("checkbox", { name: "curiosity" }).check();
-  await steer({ planes: true, advance: 14 });
+  await steer({ layers: true, advance: 14 });
   await page.locator("#layer option[value=curiosity]").waitFor({ state: "attached" });
   await page.selectOption("#layer", "curiosity");
   await page.mouse.move(820, 380);
 }
 
 async function cloud(page, steer) {
-  await steer({ planes: true, advance: 14 });
-  await page.waitForTimeout(500);
+  await steer({ layers: true, advance: 14 });
+  await page.locator("#layer option[value=depth]").waitFor({ state: "attached" });
   await page.getByRole("button", { name: "3-D" }).click();
 }
 
-/** Steers the first vehicle of a demo as an operator would, and waits until it has all. */
+/** Gives the first vehicle of a demo the orders of an operator, and waits until the images have arrived. */
 async function operate(url) {
-  const post = (path, body) => fetch(`${url}/api/v1${path}`, { method: "POST", headers: { "content-type": "application/json", "x-scenecast": "1" }, body: JSON.stringify(body) });
-  const first = async () => (await (await fetch(`${url}/api/v1/state`)).json()).vehicles[0];
+  const post = (path, body) => fetch(`${url}/api/v2${path}`, { method: "POST", headers: { "content-type": "application/json", "x-scenecast": "1" }, body: JSON.stringify(body) });
+  const first = async () => (await (await fetch(`${url}/api/v2/state`)).json()).vehicles[0];
   const v = await first();
   const m = v.map;
   const [west, south, east, north] = [m.x0, m.y0, m.x0 + m.width, m.y0 + m.height].map((cells, i) => cells * m.cell_m + (i < 2 ? -2 : 2));
@@ -113,22 +113,28 @@ async function operate(url) {
   const keepOut = [[x, north - 6], [x + 4, north - 7], [x + 2, north - 10]];
   await post(`/vehicles/${v.id}/fence`, { fence: [[west, south], [east, south], [east, north], [west, north]], keep_outs: [keepOut], return_point: [west + 2, south + 1] });
   await post(`/vehicles/${v.id}/utility`, { weights: { 3: 0.8, 5: -0.3 }, exploration: 0.2, curiosity: 0.1 });
-  const asked = v.labels.slice(0, 3).map((l) => l.id);
-  for (const label of asked) {
+  for (const { id: label } of v.labels.slice(0, 3)) {
     await post(`/vehicles/${v.id}/exemplars`, { label });
-    const here = async () => (await first()).labels.find((l) => l.id === label).exemplar.state === "here";
-    for (let i = 0; i < 60 && !(await here()); i += 1) await new Promise((resolve) => setTimeout(resolve, 500));
+    const received = async () => (await first()).labels.find((l) => l.id === label).exemplar.state === "received";
+    for (let i = 0; i < 60 && !(await received()); i += 1) await new Promise((resolve) => setTimeout(resolve, 500));
   }
 }
+
+/** Resolves after all images have loaded and two frames were painted. */
+const settled = (page) => page.evaluate(async () => {
+  await Promise.all([...document.images].filter((i) => !i.complete).map((i) => new Promise((done) => (i.onload = i.onerror = done))));
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+});
 
 async function shoot(browser, url, { name, size, theme, steps, steer }) {
   const context = await browser.newContext({ viewport: SIZES[size], hasTouch: size === "phone" });
   const page = await context.newPage();
   await page.addInitScript((t) => localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
   await page.goto(url);
-  await page.waitForTimeout(900);
+  await page.locator("body[data-feed=open]").waitFor();
+  await page.waitForFunction(() => import("/js/store.js").then(({ store }) => !store.vehicle || store.maps.has(store.selectedId)));
   await steps?.(page, steer);
-  await page.waitForTimeout(700);
+  await settled(page);
   await page.screenshot({ path: join(out, `${name}-${theme}-${size}.png`) });
   await context.close();
 }

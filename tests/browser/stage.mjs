@@ -1,18 +1,25 @@
-// What a story works with: a fresh page, the API, the mock's levers, patient checks.
+// The tools of a story: a new page, the API, control of the mock, and checks that wait for a condition.
 
 import assert from "node:assert/strict";
 
 export const WIDE = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
+export const API = "/api/v2";
 
-/** How long a step may take on a loaded machine; what passes does not wait for it. */
-const PATIENCE_MS = 30000;
+/** The limit of each wait. A condition that holds is noticed at once, so a slow machine does not fail a story. */
+const TIMEOUT_MS = 30000;
+const POLL_MS = 60;
+/** Time of a page whose clock is stopped: any fixed date. */
+const START_MS = Date.UTC(2026, 0, 1);
+
+/** The colours of CSS custom properties and pixels as [r, g, b]; a source text, since it runs in the page. */
+const IN_PAGE = `const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).match(/[0-9a-f]{2}/gi).map((x) => parseInt(x, 16));`;
 
 export class Stage {
-  /** What a story has measured, for people. */
+  /** Measurements of a story, for the log. */
   figures = [];
 
-  /** A new context with the page open and its first state shown. */
+  /** Opens the page in a new context; unless the story is bare, waits for the first state and map. */
   async open(browser, { url, mocked, token }, story) {
     Object.assign(this, { url, mocked, token, browser });
     this.errors = [];
@@ -21,14 +28,26 @@ export class Stage {
     const size = story.size ?? WIDE;
     this.context = await browser.newContext({ viewport: size, hasTouch: size === PHONE, acceptDownloads: true });
     this.page = await this.context.newPage();
-    this.page.setDefaultTimeout(PATIENCE_MS);
+    this.page.setDefaultTimeout(TIMEOUT_MS);
     this.page.on("pageerror", (error) => this.errors.push(`page: ${error.stack}`));
     this.page.on("console", (m) => m.type() === "error" && this.errors.push(`console: ${m.text()} ${m.location().url}`));
     this.page.on("request", (r) => r.method() === "POST" && this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() }));
     const theme = story.theme ?? "light";
     await this.page.addInitScript((t) => localStorage.getItem("scenecast.theme") ?? localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
+    if (story.stopped) await this.stopClock();
     await this.page.goto(url);
     if (!story.bare) await this.ready();
+  }
+
+  /** From here on the page's clock stands still: its timers and frames run only in `tick`. */
+  async stopClock() {
+    await this.page.clock.install({ time: START_MS });
+    await this.page.clock.pauseAt(START_MS + 1000);
+  }
+
+  /** Advances the stopped clock of the page. */
+  tick(ms) {
+    return this.page.clock.runFor(ms);
   }
 
   async ready() {
@@ -41,25 +60,28 @@ export class Stage {
     return this.page.evaluate(`(async () => {
       const names = ["store", "map/chart", "map/frames", "book", "map/layers"];
       const modules = await Promise.all(names.map((m) => import("/js/" + m + ".js")));
-      return (${fn})(Object.assign({}, ...modules), ${JSON.stringify(argument)});
+      ${IN_PAGE}
+      return (${fn})(Object.assign({ ink }, ...modules), ${JSON.stringify(argument)});
     })()`);
   }
 
-  /** Measures until `good`, at most five times, since others may use the machine; all that was measured, the last one first. */
-  async best(good, measure) {
-    const seen = [];
-    for (let i = 0; i < 5 && !(seen.length > 0 && good(seen[0])); i += 1) seen.unshift(await measure());
-    return seen;
+  /** Milliseconds of CPU time that the browser has spent on pages, including drawing and the network. Unlike time on a clock, it
+   *  does not depend on other programs. The resolution is 10 ms. */
+  async cpuMs() {
+    this.devtools ??= await this.browser.newBrowserCDPSession();
+    const { processInfo } = await this.devtools.send("SystemInfo.getProcessInfo");
+    // The main process mostly serves the test.
+    return 1000 * processInfo.filter((p) => p.type !== "browser").reduce((sum, p) => sum + p.cpuTime, 0);
   }
 
   async get(path) {
-    const answer = await fetch(`${this.url}/api/v1${path}`);
-    assert.equal(answer.status, 200, path);
-    return answer.json();
+    const response = await fetch(`${this.url}${API}${path}`);
+    assert.equal(response.status, 200, path);
+    return response.json();
   }
 
   post(path, body) {
-    return fetch(`${this.url}/api/v1${path}`, {
+    return fetch(`${this.url}${API}${path}`, {
       method: "POST", body: JSON.stringify(body), headers: { "x-scenecast": "1", "content-type": "application/json" },
     });
   }
@@ -70,13 +92,14 @@ export class Stage {
   }
 
   async steer(order) {
-    const answer = await fetch(`${this.url}/mock`, { method: "POST", body: JSON.stringify(order) });
-    assert.equal(answer.status, 200);
-    return answer.json();
+    const response = await fetch(`${this.url}/mock`, { method: "POST", body: JSON.stringify(order) });
+    assert.equal(response.status, 200);
+    return response.json();
   }
 
-  /** Polls until `check` gives something true; mission time runs on meanwhile in the mock if `advance`. */
-  async until(what, check, { ms = PATIENCE_MS, advance = 0 } = {}) {
+  /** Waits until `check` gives a true value, and returns it. Each time it does not, the mock's mission advances by `advance` seconds and
+   *  a stopped clock of the page by `tick` milliseconds. */
+  async until(condition, check, { ms = TIMEOUT_MS, advance = 0, tick = 0 } = {}) {
     const end = performance.now() + ms;
     let last = null;
     while (performance.now() < end) {
@@ -87,17 +110,23 @@ export class Stage {
         last = error;
       }
       if (advance && this.mocked) await this.steer({ advance });
-      await new Promise((resolve) => setTimeout(resolve, 60));
+      if (tick) await this.tick(tick);
+      await new Promise((resolve) => setTimeout(resolve, POLL_MS));
     }
-    throw new Error(`waited ${ms} ms for ${what}; last saw ${last}`);
+    throw new Error(`waited ${ms} ms for ${condition}; the last value was ${last}`);
   }
 
   shows(selector, pattern, options) {
-    const seen = async () => {
+    const matches = async () => {
       const text = await this.page.locator(selector).first().innerText();
       return pattern.test(text.replaceAll("\u202f", " ")) && text;
     };
-    return this.until(`${selector} to show ${pattern}`, seen, options);
+    return this.until(`${selector} to show ${pattern}`, matches, options);
+  }
+
+  /** Waits until an element is visible, or hidden. */
+  visible(selector, wanted = true, options) {
+    return this.until(`${selector} to be ${wanted ? "visible" : "hidden"}`, async () => (await this.page.locator(selector).first().isVisible()) === wanted, options);
   }
 
   button(name) {

@@ -1,9 +1,8 @@
-"""Opens exported maps with the readers that others use, and compares them cell by cell with the map that the API told.
+"""Opens exported maps with common readers, and compares them cell by cell with the map of the API.
 
     python check.py DIR
 
-DIR has state.json and map.json as the API told them, and of each MAKER (ctl, page) MAKER.png with MAKER.pgw and
-MAKER.png.aux.xml, MAKER.geojson, MAKER.ply, MAKER.csv.
+DIR has state.json and map.json from the API, and map.png with map.pgw and map.png.aux.xml, map.geojson, map.ply and map.csv.
 """
 
 import base64
@@ -24,7 +23,7 @@ CENTIMETRE = 0.01
 
 
 def tangent_plane(origin, lon, lat):
-    """Metres east and north on the plane that touches WGS 84 at the origin: another way than the one that is checked."""
+    """Metres east and north on the plane that touches WGS 84 at the origin: a computation independent of the checked one."""
 
     def ecef(lon, lat):
         lon, lat = math.radians(lon), math.radians(lat)
@@ -39,93 +38,92 @@ def tangent_plane(origin, lon, lat):
     return float(d @ east), float(d @ north)
 
 
-class Told:
-    """The map as the API told it, where it lies in the world."""
+class ApiMap:
+    """The map of the API in the world frame."""
 
     def __init__(self, directory):
         state = json.loads((directory / "state.json").read_text())
-        told = json.loads((directory / "map.json").read_text())
+        body = json.loads((directory / "map.json").read_text())
         self.origin = state["mission"]["origin"]
-        self.cell = told["cell_m"]
-        shape = (told["height"], told["width"])
-        self.labels = np.frombuffer(base64.b64decode(told["labels"]), np.uint8).reshape(shape)
+        self.cell = body["cell_m"]
+        shape = (body["height"], body["width"])
+        self.labels = np.frombuffer(base64.b64decode(body["labels"]), np.uint8).reshape(shape)
         moved = state["vehicles"][0]["map"]["placement"] or {"east_m": 0, "north_m": 0}
-        self.west, self.south = told["x0"] * self.cell + moved["east_m"], told["y0"] * self.cell + moved["north_m"]
+        self.west, self.south = body["x0"] * self.cell + moved["east_m"], body["y0"] * self.cell + moved["north_m"]
         rows, columns = np.nonzero(self.labels)
         self.x = self.west + (columns + 0.5) * self.cell
         self.y = self.south + (rows + 0.5) * self.cell
         self.label = self.labels[rows, columns]
-        assert len(self.label) > 100, "the map has too few cells to tell right from wrong"
+        assert len(self.label) > 100, "the map has too few cells for this check"
 
 
-def close(a, b, what, most=CENTIMETRE):
-    worst = float(np.max(np.abs(np.asarray(a) - np.asarray(b))))
-    assert worst <= most, f"{what}: {worst} off, {most} allowed"
+def close(a, b, name, tolerance=CENTIMETRE):
+    error = float(np.max(np.abs(np.asarray(a) - np.asarray(b))))
+    assert error <= tolerance, f"{name}: error {error}, {tolerance} allowed"
 
 
-def check_png(path, told):
+def check_png(path, api):
     with rasterio.open(path) as image:
         a = image.transform
         assert (a.b, a.d) == (0, 0), "rotated"
-        rows, columns = rasterio.transform.rowcol(a, told.x, told.y)
-        assert (image.read(1)[np.array(rows), np.array(columns)] == told.label).all(), "labels"
-        height = told.labels.shape[0]
-        close(image.bounds, [told.west, told.south, told.west + told.labels.shape[1] * told.cell, told.south + height * told.cell], "bounds")
-        if told.origin is None:
-            assert image.crs is None or not (image.crs.is_geographic or image.crs.is_projected), "a place on the Earth that nobody knows"
+        rows, columns = rasterio.transform.rowcol(a, api.x, api.y)
+        assert (image.read(1)[np.array(rows), np.array(columns)] == api.label).all(), "labels"
+        height = api.labels.shape[0]
+        close(image.bounds, [api.west, api.south, api.west + api.labels.shape[1] * api.cell, api.south + height * api.cell], "bounds")
+        if api.origin is None:
+            assert image.crs is None or not (image.crs.is_geographic or image.crs.is_projected), "coordinates of an unknown place"
             return
-        corners = [(0.0, 0.0), (3000.0, 2000.0), (-3000.0, 1000.0), *zip(told.x[:50], told.y[:50])]
+        corners = [(0.0, 0.0), (3000.0, 2000.0), (-3000.0, 1000.0), *zip(api.x[:50], api.y[:50])]
         lon, lat = rasterio.warp.transform(image.crs, "EPSG:4326", *zip(*corners))
-        close([tangent_plane(told.origin, *at) for at in zip(lon, lat)], corners, "projection")
+        close([tangent_plane(api.origin, *at) for at in zip(lon, lat)], corners, "projection")
 
 
-def check_geojson(path, told):
+def check_geojson(path, api):
     document = json.loads(path.read_text())
     regions = {f["properties"]["label"]: shapely.geometry.shape(f["geometry"]) for f in document["features"]}
-    assert set(regions) == set(told.label.tolist()), "labels"
-    if told.origin is None:
-        place = list(zip(told.x, told.y))
+    assert set(regions) == set(api.label.tolist()), "labels"
+    if api.origin is None:
+        place = list(zip(api.x, api.y))
     else:
-        crs = rasterio.crs.CRS.from_dict(proj="tmerc", lat_0=told.origin["lat_deg"], lon_0=told.origin["lon_deg"], k=1, datum="WGS84")
-        place = list(zip(*rasterio.warp.transform(crs, "EPSG:4326", told.x, told.y)))
+        crs = rasterio.crs.CRS.from_dict(proj="tmerc", lat_0=api.origin["lat_deg"], lon_0=api.origin["lon_deg"], k=1, datum="WGS84")
+        place = list(zip(*rasterio.warp.transform(crs, "EPSG:4326", api.x, api.y)))
         first = next(iter(regions.values())).geoms[0].exterior.coords[0]
-        x, y = tangent_plane(told.origin, *first)
-        corner = [(x - told.west) / told.cell, (y - told.south) / told.cell]
-        close(corner, np.round(corner), "corners of cells", CENTIMETRE / told.cell)
+        x, y = tangent_plane(api.origin, *first)
+        corner = [(x - api.west) / api.cell, (y - api.south) / api.cell]
+        close(corner, np.round(corner), "corners of cells", CENTIMETRE / api.cell)
     for label, region in regions.items():
         assert region.is_valid, f"label {label}: {shapely.is_valid_reason(region)}"
         inside = shapely.contains_xy(region, *zip(*place))
-        assert (inside == (told.label == label)).all(), f"label {label}: its region has other cells"
+        assert (inside == (api.label == label)).all(), f"label {label}: its region has other cells"
 
 
-def check_ply(path, told):
+def check_ply(path, api):
     vertices = plyfile.PlyData.read(str(path))["vertex"]
-    order, wanted = np.lexsort((vertices["x"], vertices["y"])), np.lexsort((told.x, told.y))
-    close(vertices["x"][order], told.x[wanted], "x")
-    close(vertices["y"][order], told.y[wanted], "y")
-    assert (vertices["label"][order] == told.label[wanted]).all(), "labels"
+    order, wanted = np.lexsort((vertices["x"], vertices["y"])), np.lexsort((api.x, api.y))
+    close(vertices["x"][order], api.x[wanted], "x")
+    close(vertices["y"][order], api.y[wanted], "y")
+    assert (vertices["label"][order] == api.label[wanted]).all(), "labels"
     assert np.isfinite(vertices["z"]).all() and {"red", "green", "blue"} <= {p.name for p in vertices.properties}
 
 
-def check_csv(path, told):
+def check_csv(path, api):
     with path.open(newline="") as file:
         lines = list(csv.DictReader(file))
-    close([float(line["east_m"]) for line in lines], told.x, "east")
-    close([float(line["north_m"]) for line in lines], told.y, "north")
-    assert [int(line["label"]) for line in lines] == told.label.tolist(), "labels"
+    close([float(line["east_m"]) for line in lines], api.x, "east")
+    close([float(line["north_m"]) for line in lines], api.y, "north")
+    assert [int(line["label"]) for line in lines] == api.label.tolist(), "labels"
 
 
 def main():
     directory = Path(sys.argv[1])
-    told = Told(directory)
-    for maker in ("ctl", "page"):
-        for extension, check in {"png": check_png, "geojson": check_geojson, "ply": check_ply, "csv": check_csv}.items():
-            path = directory / f"{maker}.{extension}"
-            try:
-                check(path, told)
-            except AssertionError as e:
-                sys.exit(f"{path}: {e}")
-    print(f"{len(told.label)} cells are where they belong in the files of both makers")
+    api = ApiMap(directory)
+    for extension, check in {"png": check_png, "geojson": check_geojson, "ply": check_ply, "csv": check_csv}.items():
+        path = directory / f"map.{extension}"
+        try:
+            check(path, api)
+        except AssertionError as e:
+            sys.exit(f"{path}: {e}")
+    print(f"{len(api.label)} cells are in the right place in each file")
 
 
 main()

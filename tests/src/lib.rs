@@ -1,5 +1,6 @@
 //! Harness of the whole-system tests.
 
+pub mod pages;
 mod recorded;
 
 pub use recorded::recorded;
@@ -203,6 +204,6 @@ pub fn run_script(program: &str, script: &str, arguments: &[&str]) {
 
 /// The state that a surface on `port` tells, once it does.
 pub fn state(port: u16) -> Option<serde_json::Value> {
-    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    let (status, body) = http(port, "GET", "/api/v2/state", "", "")?;
     (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
 }

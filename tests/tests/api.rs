@@ -1,4 +1,4 @@
-//! The API as programs use it: its document, its files, `scenecast ctl`.
+//! The API as used by programs: its document, its files, `scenecast ctl`.
 
 use scenecast_tests::{Process, assert_refused, free_port, http, python, run, run_script, scratch, state, wait_until};
 use serde_json::Value;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(90);
 
-fn said(output: &Output) -> String {
+fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
 }
 
@@ -32,44 +32,44 @@ fn ctl(port: u16, arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn settings_are_fitted_to_a_budget_sent_and_told_as_in_force() {
+fn settings_are_fitted_to_a_budget_and_sent() {
     let port = free_port();
     let _demo = demo(port, &["--duration", "3000"]);
     let refused = ctl(port, &["settings", "--alpha", "5000"]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(said(&refused).contains("alpha 5000: it takes 0.000000001 to 1000"), "{}", said(&refused));
-    let sent = ctl(port, &["settings", "--gamma", "1e-5", "--planes", "none", "--wait", "80"]);
-    assert_eq!(sent.status.code(), Some(0), "{}", said(&sent));
-    let told = ctl(port, &["settings", "--json"]);
-    let told: Value = serde_json::from_slice(&told.stdout).unwrap();
-    assert_eq!((&told["in_force"]["gamma"], &told["in_force"]["planes"]), (&1e-5.into(), &"none".into()));
-    assert_eq!((&told["asked"]["gamma"], &told["asked"]["alpha"]), (&1e-5.into(), &Value::Null));
+    assert!(text(&refused).contains("alpha 5000: it takes 0.000000001 to 1000"), "{}", text(&refused));
+    let sent = ctl(port, &["settings", "--gamma", "1e-5", "--layers", "none", "--wait", "80"]);
+    assert_eq!(sent.status.code(), Some(0), "{}", text(&sent));
+    let shown = ctl(port, &["settings", "--json"]);
+    let shown: Value = serde_json::from_slice(&shown.stdout).unwrap();
+    assert_eq!((&shown["in_force"]["gamma"], &shown["in_force"]["layers"]), (&1e-5.into(), &"none".into()));
+    assert_eq!((&shown["requested"]["gamma"], &shown["requested"]["alpha"]), (&1e-5.into(), &Value::Null));
 
     let nothing = ctl(port, &["settings", "--fit", "1"]);
     assert_eq!(nothing.status.code(), Some(1));
-    assert!(said(&nothing).contains("no setting fits 1 bit/s: the leanest needs"), "{}", said(&nothing));
+    assert!(text(&nothing).contains("no setting fits 1 bit/s: the lowest rate is"), "{}", text(&nothing));
     let fit = |more: &[&str]| {
         let output = ctl(port, &[&["settings", "--fit"], more, &["--dry-run", "--json"]].concat());
-        assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
         let order: Value = serde_json::from_slice(&output.stdout).unwrap();
         (order, String::from_utf8_lossy(&output.stderr).into_owned())
     };
     let (whole, words) = fit(&["100000"]);
-    assert!(words.contains("nothing is given up") && whole["cells"].is_string(), "{words}: {whole}");
+    assert!(words.contains("no trade-off") && whole["cells"].is_string(), "{words}: {whole}");
     let (named, _) = fit(&["--alpha", "0.3"]);
-    assert_eq!(named["alpha"], 0.3, "what is named goes before what fits");
-    let bad = http(port, "GET", "/api/v1/vehicles/1/fit?bits_per_s=x", "", "").unwrap();
+    assert_eq!(named["alpha"], 0.3, "a given setting precedes a fitted one");
+    let bad = http(port, "GET", "/api/v2/vehicles/1/fit?bits_per_s=x", "", "").unwrap();
     assert_eq!(bad.0, 422);
 }
 
 #[test]
-fn orders_are_followed_until_they_are_applied_and_a_refusal_is_told() {
+fn orders_are_followed_until_applied_or_refused() {
     let port = free_port();
     let _demo = demo(port, &["--duration", "3000"]);
     let label = labels(port)[0];
     let weight = format!("{label}=-0.75");
     let sent = ctl(port, &["utility", "set", &weight, "--exploration", "0.25", "--wait", "60", "--json"]);
-    assert_eq!(sent.status.code(), Some(0), "{}", said(&sent));
+    assert_eq!(sent.status.code(), Some(0), "{}", text(&sent));
     let outcome: Value = serde_json::from_slice(&sent.stdout).unwrap();
     assert_eq!((&outcome[0]["state"], &outcome[0]["slot"]), (&"applied".into(), &"utility".into()));
     let kept = ctl(port, &["utility", "--json"]);
@@ -77,7 +77,7 @@ fn orders_are_followed_until_they_are_applied_and_a_refusal_is_told() {
     assert_eq!((&kept["weights"][label.to_string()], &kept["exploration"]), (&(-0.75).into(), &0.25.into()));
 
     let budget = ctl(port, &["budget", "set", "8000", "--shares", "map=40,exemplar=30", "--wait", "60"]);
-    assert_eq!(budget.status.code(), Some(0), "{}", said(&budget));
+    assert_eq!(budget.status.code(), Some(0), "{}", text(&budget));
     let link = &state(port).unwrap()["link"];
     assert_eq!(
         (&link["budget_bps"], &link["shares"]["map"], &link["shares"]["status"]),
@@ -85,33 +85,33 @@ fn orders_are_followed_until_they_are_applied_and_a_refusal_is_told() {
     );
 
     let image = scratch("ctl-image").join("label.webp");
-    let here = ctl(port, &["exemplar", &label.to_string(), "--out", image.to_str().unwrap(), "--wait", "80"]);
-    assert_eq!(here.status.code(), Some(0), "{}", said(&here));
+    let saved = ctl(port, &["exemplar", &label.to_string(), "--out", image.to_str().unwrap(), "--wait", "80"]);
+    assert_eq!(saved.status.code(), Some(0), "{}", text(&saved));
     assert!(std::fs::read(&image).unwrap().starts_with(b"RIFF"));
 
     let refused = ctl(port, &["utility", "set", "250=1"]);
-    assert_eq!(refused.status.code(), Some(1), "{}", said(&refused));
-    assert!(said(&refused).contains("label 250 is not on the map"), "{}", said(&refused));
+    assert_eq!(refused.status.code(), Some(1), "{}", text(&refused));
+    assert!(text(&refused).contains("label 250 is not on the map"), "{}", text(&refused));
     let shares = ctl(port, &["budget", "set", "8000", "--shares", "map=90"]);
-    assert!(shares.status.code() == Some(1) && said(&shares).contains("100 or less"), "{}", said(&shares));
+    assert!(shares.status.code() == Some(1) && text(&shares).contains("100 or less"), "{}", text(&shares));
 
-    let status = said(&ctl(port, &["status"]));
+    let status = text(&ctl(port, &["status"]));
     for word in ["mission rehearsal", "vehicle 1 auv-1", "utility", "version 1 applied", "ago", "8000 bit/s"] {
         assert!(status.contains(word), "{word} is missing in {status}");
     }
-    assert!(said(&ctl(port, &["labels"])).contains("-0.75"));
+    assert!(text(&ctl(port, &["labels"])).contains("-0.75"));
     if let Some(python) = python() {
         run_script(&python, "tests/api/check.py", &[&format!("http://127.0.0.1:{port}")]);
     }
 }
 
 #[test]
-fn wrong_usage_is_told_from_a_surface_that_does_not_answer() {
+fn wrong_usage_differs_from_a_surface_without_an_answer() {
     let url = format!("http://127.0.0.1:{}", free_port());
     let absent = run(&["ctl", "status", "--url", &url]);
-    assert_eq!(absent.status.code(), Some(1), "{}", said(&absent));
-    assert!(said(&absent).contains(&url) && said(&absent).contains("scenecast asv or demo"), "{}", said(&absent));
-    assert_eq!(said(&absent).trim().lines().count(), 1);
+    assert_eq!(absent.status.code(), Some(1), "{}", text(&absent));
+    assert!(text(&absent).contains(&url) && text(&absent).contains("scenecast asv or demo"), "{}", text(&absent));
+    assert_eq!(text(&absent).trim().lines().count(), 1);
     assert_refused(&["ctl", "status", "--url", "ftp://nowhere"], &["--url ftp://nowhere", "http://HOST:PORT"]);
     assert_refused(&["ctl", "utility", "set", "3=2"], &["3=2", "-1 to 1"]);
     assert_refused(&["ctl", "utility", "set", "0=1"], &["0=1", "1 to 254"]);
@@ -124,19 +124,17 @@ fn wrong_usage_is_told_from_a_surface_that_does_not_answer() {
 }
 
 #[test]
-fn a_vehicle_is_fenced_limited_held_and_sent_on_from_a_shell() {
+fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     let (port, dir) = (free_port(), scratch("ctl-constraints"));
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "8", "--duration", "3000"]);
-    wait_until("the vehicle tells where it is", LIMIT, || {
-        state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null())
-    });
+    wait_until("the first status", LIMIT, || state(port).is_some_and(|s| !s["vehicles"][0]["status"].is_null()));
     let file = |name: &str, text: &str| {
         std::fs::write(dir.join(name), text).unwrap();
         dir.join(name).display().to_string()
     };
     let applied = |arguments: &[&str]| {
         let sent = ctl(port, &[arguments, &["--wait", "80"]].concat());
-        assert_eq!(sent.status.code(), Some(0), "{arguments:?}: {}", said(&sent));
+        assert_eq!(sent.status.code(), Some(0), "{arguments:?}: {}", text(&sent));
     };
     let keep_out = r#"{"type": "Feature", "properties": {"role": "keep_out"},
         "geometry": {"type": "Polygon", "coordinates": [[[70, 70], [75, 70], [75, 75], [70, 70]]]}}"#;
@@ -148,11 +146,11 @@ fn a_vehicle_is_fenced_limited_held_and_sent_on_from_a_shell() {
     let vehicle = || state(port).unwrap()["vehicles"][0].clone();
     let order = &vehicle()["fence_in_force"]["order"];
     assert_eq!((&order["return_point"][0], &order["keep_outs"][0][2][1]), (&(-5.0).into(), &75.0.into()));
-    assert!(said(&ctl(port, &["fence"])).contains("return point E -5.0 N 2.5"));
+    assert!(text(&ctl(port, &["fence"])).contains("return point E -5.0 N 2.5"));
 
     applied(&["limits", "set", "--depth", "0..60", "--on-silence", "hold"]);
     applied(&["limits", "set", "--silence", "900", "--keep"]);
-    let limits = said(&ctl(port, &["limits"]));
+    let limits = text(&ctl(port, &["limits"]));
     assert!(limits.contains("0.0 to 60.0 m") && limits.contains("15 min"), "{limits}");
 
     applied(&["hold"]);
@@ -160,11 +158,11 @@ fn a_vehicle_is_fenced_limited_held_and_sent_on_from_a_shell() {
     applied(&["resume"]);
     wait_until("it surveys", LIMIT, || vehicle()["status"]["mode"] == "survey");
 
-    // What the vehicle refuses, what it would never be sent, and what is no fence.
+    // A fence that the vehicle refuses, fences that the surface refuses, and files that are not a fence.
     let elsewhere = fence.replace("-80", "300").replace("80", "400");
     let refused = ctl(port, &["fence", "set", &file("elsewhere.geojson", &elsewhere), "--wait", "80"]);
-    assert!(refused.status.code() == Some(1) && said(&refused).contains("refused"), "{}", said(&refused));
-    assert!(said(&ctl(port, &["fence"])).contains("in force: version 2"));
+    assert!(refused.status.code() == Some(1) && text(&refused).contains("refused"), "{}", text(&refused));
+    assert!(text(&ctl(port, &["fence"])).contains("in force: version 2"));
     let url = format!("http://127.0.0.1:{port}");
     let crossed = fence.replace("[80, 80], [-80, 80]", "[-80, 80], [80, 80]");
     let crossed = file("crossed.geojson", &crossed);
@@ -179,7 +177,7 @@ fn a_vehicle_is_fenced_limited_held_and_sent_on_from_a_shell() {
 }
 
 #[test]
-fn others_on_the_network_need_a_token() {
+fn other_machines_need_a_token() {
     let dir = scratch("token");
     let file = dir.join("console.token");
     let file = file.to_str().unwrap();
@@ -199,13 +197,13 @@ fn others_on_the_network_need_a_token() {
     arguments.extend(["--set", &with]);
     let _surface = Process::start(&arguments);
     wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
-    let asked = |path: &str, headers: &str| http(port, "GET", path, headers, "").unwrap().0;
-    for path in ["/api/v1/state", "/api/v1/events", "/metrics", "/api/openapi.json", "/js/main.js", "/index.html"] {
-        assert_eq!(asked(path, ""), 401, "{path}");
+    let status = |path: &str, headers: &str| http(port, "GET", path, headers, "").unwrap().0;
+    for path in ["/api/v2/state", "/api/v2/events", "/metrics", "/api/openapi.json", "/js/main.js", "/index.html"] {
+        assert_eq!(status(path, ""), 401, "{path}");
     }
-    assert_eq!(asked("/", ""), 303);
-    assert_eq!(asked("/api/v1/state", &format!("Authorization: Bearer {token}\r\n")), 200);
-    assert_eq!(asked("/api/v1/state", &format!("Authorization: Bearer {token}0\r\n")), 401);
+    assert_eq!(status("/", ""), 303);
+    assert_eq!(status("/api/v2/state", &format!("Authorization: Bearer {token}\r\n")), 200);
+    assert_eq!(status("/api/v2/state", &format!("Authorization: Bearer {token}0\r\n")), 401);
     let form = |token: &str, more: &str| {
         let headers = format!("Content-Type: application/x-www-form-urlencoded\r\n{more}");
         scenecast_tests::http_whole(port, "POST", "/login", &headers, &format!("token={token}")).unwrap()
@@ -217,14 +215,14 @@ fn others_on_the_network_need_a_token() {
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
     assert!(!cookie.contains(&token), "the cookie is not the token");
     let session = cookie.split(';').next().unwrap();
-    assert_eq!(asked("/", &format!("Cookie: {session}\r\n")), 200);
+    assert_eq!(status("/", &format!("Cookie: {session}\r\n")), 200);
     let url = format!("http://127.0.0.1:{port}");
     assert_eq!(run(&["ctl", "status", "--url", &url, "--token-file", file]).status.code(), Some(0));
     let without = run(&["ctl", "status", "--url", &url]);
-    assert!(without.status.code() == Some(1) && said(&without).contains("--token-file"), "{}", said(&without));
+    assert!(without.status.code() == Some(1) && text(&without).contains("--token-file"), "{}", text(&without));
 }
 
-/// Exports everything of a mission that is over, and has it read by others.
+/// Exports the map of an ended mission in all formats, and opens the files with other programs.
 fn assert_exports_open(name: &str, origin: &[&str]) {
     let Some(python) = python() else { return };
     let (dir, port) = (scratch(name), free_port());
@@ -241,25 +239,22 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
     // A late fix may move the map between two files.
     wait_until("all files with the map in one place", LIMIT, || {
         let before = placement();
-        for file in ["map.json", "ctl.png", "ctl.geojson", "ctl.ply", "ctl.csv"] {
+        for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv"] {
             let made = ctl(port, &["map", "--out", &path(file)]);
-            assert_eq!(made.status.code(), Some(0), "{file}: {}", said(&made));
+            assert_eq!(made.status.code(), Some(0), "{file}: {}", text(&made));
         }
         std::fs::write(path("state.json"), state(port).unwrap().to_string()).unwrap();
         placement() == before
     });
-    // The page paints its PNG on a canvas, one pixel a cell like this one; its place is in the files beside it.
-    std::fs::copy(path("ctl.png"), path("page.png")).unwrap();
-    run_script("node", "tests/exports/page.mjs", &[&path("")]);
     run_script(&python, "tests/exports/check.py", &[&path("")]);
 }
 
 #[test]
-fn exports_of_a_mission_on_the_earth_open_in_the_right_place() {
+fn exports_with_an_origin_open_in_the_right_place() {
     assert_exports_open("exports-earth", &["--set", "mission.origin_deg=[60.17, -10.25]"]);
 }
 
 #[test]
-fn exports_of_a_mission_that_is_nowhere_open_in_metres() {
+fn exports_without_an_origin_open_in_metres() {
     assert_exports_open("exports-metres", &[]);
 }

@@ -1,25 +1,122 @@
-//! The crates depend on each other as ARCHITECTURE.md says.
+//! The crates depend on each other as the block `arrows` of ARCHITECTURE.md draws it, and on nothing that a sans-IO crate must not have.
 
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 
-#[test]
-fn the_leaf_crates_know_nothing_of_each_other_and_of_tokio() {
+/// Crates that would give a core a clock, a socket, a disk or a runtime.
+const IO_CRATES: [&str; 8] =
+    ["axum", "hyper", "nix", "serialport", "scenecast-files", "tokio", "tokio-serial", "tracing-subscriber"];
+
+/// Crates that do no IO.
+const SANS_IO: [&str; 11] = [
+    "scenecast-core",
+    "scenecast-drivers",
+    "scenecast-host",
+    "scenecast-motion",
+    "scenecast-protocol",
+    "scenecast-scoring",
+    "scenecast-surface",
+    "scenecast-vehicle",
+    "scenecast-worlds",
+    "scene-model",
+    "sim-channel",
+];
+
+/// Crates that no vehicle carries.
+const ASHORE: [&str; 9] = [
+    "scenecast-console",
+    "scenecast-modem-sim",
+    "scenecast-motion",
+    "scenecast-rehearsal",
+    "scenecast-scoring",
+    "scenecast-tests",
+    "scenecast-tools",
+    "scenecast-worlds",
+    "sim-channel",
+];
+
+type Arrows = BTreeMap<String, BTreeSet<String>>;
+
+fn metadata(arguments: &[&str]) -> Value {
     let mut cargo = std::process::Command::new(env!("CARGO"));
-    let output =
-        cargo.args(["metadata", "--format-version", "1", "--no-deps"]).current_dir(scenecast_tests::workspace());
-    let metadata: Value = serde_json::from_slice(&output.output().unwrap().stdout).unwrap();
-    let mut arrows: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for package in metadata["packages"].as_array().unwrap() {
-        let normal = package["dependencies"].as_array().unwrap().iter().filter(|d| d["kind"] != "dev");
-        let names = normal.map(|d| d["name"].as_str().unwrap().to_owned()).collect();
-        arrows.insert(package["name"].as_str().unwrap().to_owned(), names);
+    cargo.args(["metadata", "--format-version", "1", "--locked"]).args(arguments);
+    let output = cargo.current_dir(scenecast_tests::workspace()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap().to_owned()
+}
+
+/// The normal dependencies of each crate of the workspace, by name.
+fn dependencies() -> Arrows {
+    let metadata = metadata(&["--no-deps"]);
+    let packages = metadata["packages"].as_array().unwrap().iter();
+    let names = |p: &Value| {
+        let normal = p["dependencies"].as_array().unwrap().iter().filter(|d| d["kind"] != "dev");
+        normal.map(|d| text(&d["name"])).collect()
+    };
+    packages.map(|p| (text(&p["name"]), names(p))).collect()
+}
+
+/// The arrows between crates of ours.
+fn ours(all: &Arrows) -> Arrows {
+    let is_ours = |name: &&String| all.contains_key(*name);
+    all.iter().map(|(name, to)| (name.clone(), to.iter().filter(is_ours).cloned().collect())).collect()
+}
+
+/// The lines `crate -> crate crate` of the block `arrows` of ARCHITECTURE.md.
+fn drawn() -> Arrows {
+    let page = std::fs::read_to_string(scenecast_tests::workspace().join("ARCHITECTURE.md")).unwrap();
+    let (_, rest) = page.split_once("```arrows\n").expect("ARCHITECTURE.md has a block `arrows`");
+    let (block, _) = rest.split_once("```").unwrap();
+    let line = |line: &str| {
+        let (from, to) = line.split_once("->").unwrap_or_else(|| panic!("no arrow in `{line}`"));
+        (from.trim().to_owned(), to.split_whitespace().map(str::to_owned).collect())
+    };
+    block.lines().filter(|l| !l.trim().is_empty()).map(line).collect()
+}
+
+#[test]
+fn crates_depend_on_each_other_as_architecture_draws() {
+    let (drawn, built) = (drawn(), ours(&dependencies()));
+    for (name, to) in &built {
+        let page = drawn.get(name).unwrap_or_else(|| panic!("ARCHITECTURE.md does not draw {name}"));
+        assert_eq!(to, page, "arrows of {name}: left as in its Cargo.toml, right as in ARCHITECTURE.md");
     }
-    let ours = ["scenecast", "scenecast-protocol", "scene-model", "sim-channel", "scenecast-tests"];
-    for leaf in ["scenecast-protocol", "scene-model", "sim-channel"] {
-        let banned: BTreeSet<&str> = ours.into_iter().chain(["tokio", "serialport", "tokio-serial", "axum"]).collect();
-        let found: Vec<_> = arrows[leaf].iter().filter(|d| banned.contains(d.as_str())).collect();
-        assert!(found.is_empty(), "{leaf} depends on {found:?}");
+    let unknown: Vec<_> = drawn.keys().filter(|name| !built.contains_key(*name)).collect();
+    assert!(unknown.is_empty(), "ARCHITECTURE.md draws crates that do not exist: {unknown:?}");
+}
+
+#[test]
+fn sans_io_crates_depend_on_no_io_crate() {
+    let all = dependencies();
+    for name in SANS_IO {
+        let found: Vec<_> = all[name].iter().filter(|d| IO_CRATES.contains(&d.as_str())).collect();
+        assert!(found.is_empty(), "{name} depends on {found:?}");
+        let folder = ["", "daemon/"].map(|above| format!("{above}{}", name.trim_start_matches("scenecast-")));
+        let guard =
+            folder.iter().map(|f| scenecast_tests::workspace().join(f).join("clippy.toml")).find(|f| f.exists());
+        let guard = std::fs::read_to_string(guard.unwrap_or_else(|| panic!("{name} has no clippy.toml"))).unwrap();
+        for banned in ["Instant::now", "SystemTime::now", "thread::sleep", "HashMap", "fs::", "net::"] {
+            assert!(guard.contains(banned), "clippy.toml of {name} does not ban {banned}");
+        }
     }
-    assert!(!arrows["scenecast"].contains("scenecast-tests"));
+}
+
+#[test]
+fn the_vehicle_build_carries_no_page_simulator_or_tools() {
+    let tree = std::process::Command::new(env!("CARGO"))
+        .args(["tree", "-p", "scenecast", "--no-default-features", "--features", "vehicle", "--edges", "normal"])
+        .args(["--prefix", "none", "--locked", "--offline"])
+        .current_dir(scenecast_tests::workspace())
+        .output()
+        .unwrap();
+    assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+    let tree = String::from_utf8(tree.stdout).unwrap();
+    let crates: BTreeSet<&str> = tree.lines().filter_map(|l| l.split_whitespace().next()).collect();
+    assert!(crates.contains("scenecast-vehicle"), "{tree}");
+    let found: Vec<_> = ASHORE.into_iter().chain(["axum", "hyper"]).filter(|name| crates.contains(name)).collect();
+    assert!(found.is_empty(), "the vehicle build carries {found:?}");
 }

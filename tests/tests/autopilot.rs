@@ -157,7 +157,7 @@ fn ardusub_is_armed_guided_to_a_waypoint_and_told_where_it_is() {
 }
 
 #[test]
-fn a_vehicle_flies_its_survey_on_ardusub_and_says_so_when_it_goes_silent() {
+fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
     let Some(python) = python() else { return };
     let dir = scratch("ardusub");
     let [modem, page, mavlink] = [(); 3].map(|()| free_port());
@@ -188,7 +188,7 @@ fn a_vehicle_flies_its_survey_on_ardusub_and_says_so_when_it_goes_silent() {
     let _auv = Process::start(&["auv", "--config", &auv]);
     let mut peer = Peer::start(&python, mavlink, 3.0);
     let status = || {
-        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        let (_, body) = http(page, "GET", "/api/v2/state", "", "")?;
         Some(serde_json::from_slice::<Value>(&body).ok()?["vehicles"][0]["status"].clone())
     };
     let limit = Duration::from_secs(90);

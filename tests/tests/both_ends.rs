@@ -9,7 +9,7 @@ const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
 const LIMIT: Duration = Duration::from_secs(60);
 
 fn state(port: u16) -> Option<Value> {
-    let (status, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    let (status, body) = http(port, "GET", "/api/v2/state", "", "")?;
     (status == 200).then(|| serde_json::from_slice(&body).ok()).flatten()
 }
 
@@ -54,9 +54,9 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
              \"exemplar\": 30}}}}"
         )
     };
-    let (status, said) = http(page, "POST", "/api/v1/budget", ORDER, &order(60)).unwrap();
+    let (status, said) = http(page, "POST", "/api/v2/budget", ORDER, &order(60)).unwrap();
     assert_eq!((status, String::from_utf8_lossy(&said).contains("110 percent")), (422, true));
-    assert_eq!(http(page, "POST", "/api/v1/budget", ORDER, &order(40)).unwrap().0, 202);
+    assert_eq!(http(page, "POST", "/api/v2/budget", ORDER, &order(40)).unwrap().0, 202);
     wait_until("the surface's word is in force", LIMIT, || budget() == Some(6000));
     let now = state(page).unwrap();
     assert_eq!((now["link"]["budget_bps"].as_u64(), now["link"]["shares"]["map"].as_u64()), (Some(6000), Some(40)));
@@ -67,13 +67,13 @@ fn budget_and_shares_change_from_either_end_under_a_key() {
     wait_until("the vehicle's own word is in force", LIMIT, || budget() == Some(2000));
     std::fs::write(&file, "[link]\nbudget_bps = 1\n").unwrap();
     vehicle.hang_up();
-    let heard = || state(page)?["vehicles"][0]["heard_s"].as_f64();
+    let heard = || state(page)?["vehicles"][0]["last_received_s"].as_f64();
     let before = heard().unwrap();
     wait_until("the vehicle goes on with what it had", LIMIT, || heard().is_some_and(|at| at > before + 30.0));
     assert_eq!(budget(), Some(2000));
     let vehicle = &state(page).unwrap()["vehicles"][0];
     assert_eq!(vehicle["status"]["refused_frames"], 0);
-    assert!(vehicle["link"]["round_trip_s"].is_number() && vehicle["link"]["clock_ahead_s"].is_number(), "{vehicle}");
+    assert!(vehicle["link"]["round_trip_s"].is_number() && vehicle["link"]["clock_offset_s"].is_number(), "{vehicle}");
 }
 
 #[test]
@@ -83,5 +83,5 @@ fn an_end_with_another_key_is_not_heard() {
     wait_until("two minutes of the mission pass", LIMIT, || {
         state(page).is_some_and(|s| s["now_s"].as_f64() > Some(120.0))
     });
-    assert!(state(page).unwrap()["vehicles"][0]["heard_s"].is_null());
+    assert!(state(page).unwrap()["vehicles"][0]["last_received_s"].is_null());
 }

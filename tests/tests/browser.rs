@@ -1,17 +1,18 @@
 //! The operator's page in headless Chromium: the stories of `tests/browser`, against the mock and against real processes.
 
 use scenecast_tests::{Process, free_port, http, run, scratch, state, wait_until, workspace};
+use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);
-/// The stories measure: one browser at a time.
+/// One browser at a time, since the stories measure CPU time.
 static BROWSER: Mutex<()> = Mutex::new(());
 
-/// What is missing here to run a browser; a failure where nothing may be skipped.
+/// Whether this machine cannot run the stories; in CI that is a failure.
 fn is_skipped() -> bool {
     let chromium = std::env::var("CHROMIUM").unwrap_or_else(|_| "/usr/bin/chromium".to_owned());
     let packages = workspace().join("tests/browser/node_modules/playwright-core");
@@ -21,35 +22,35 @@ fn is_skipped() -> bool {
         () if !packages.exists() => "no packages: run npm ci in tests/browser".to_owned(),
         () => return false,
     };
-    let said = format!("SKIPPED: stories of the page in a browser: {missing}\n");
-    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{said}");
-    // Straight to the terminal: the test's own output is not shown while it passes.
-    let _ = std::io::stderr().write_all(said.as_bytes());
+    let line = format!("SKIPPED: stories of the page in a browser: {missing}\n");
+    assert!(std::env::var_os("CI").is_none_or(|ci| ci != "true"), "{line}");
+    // The harness hides the captured output of a test that passes.
+    let _ = std::io::stderr().write_all(line.as_bytes());
     true
 }
 
-/// Tells the stories that fit; fails with those that did not hold, else says how many held.
-fn assert_stories_hold(arguments: &[&str]) {
+/// Runs the stories for the given target. Prints their number and measurements, or fails with their output.
+fn assert_stories_pass(arguments: &[&str]) {
     let _one = BROWSER.lock().unwrap_or_else(|e| e.into_inner());
     let script = workspace().join("tests/browser/run.mjs");
     let output = Command::new("node").arg(script).arg("--require").args(arguments).output().expect("node runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{said}");
-    let counts = said.lines().last().unwrap_or_default();
-    assert!(!counts.starts_with("0 passed"), "no story was told: {said}");
-    let measured = said.lines().filter(|l| l.contains("figures: ")).map(|l| format!("{l}\n"));
+    let log = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{log}");
+    let counts = log.lines().last().unwrap_or_default();
+    assert!(!counts.starts_with("0 passed"), "no story ran: {log}");
+    let measured = log.lines().filter(|l| l.contains("figures: ")).map(|l| format!("{l}\n"));
     let _ = std::io::stderr().write_all(format!("{}{counts}\n", measured.collect::<String>()).as_bytes());
 }
 
 #[test]
-fn every_story_holds_against_the_mock() {
+fn every_story_passes_against_the_mock() {
     if !is_skipped() {
-        assert_stories_hold(&[]);
+        assert_stories_pass(&[]);
     }
 }
 
 #[test]
-fn every_story_that_needs_no_mock_holds_against_a_demo() {
+fn every_story_without_mock_passes_against_a_demo() {
     if is_skipped() {
         return;
     }
@@ -58,11 +59,11 @@ fn every_story_that_needs_no_mock_holds_against_a_demo() {
     wait_until("labels on the map", LIMIT, || {
         state(port).is_some_and(|s| s["vehicles"][0]["labels"].as_array().is_some_and(|l| l.len() > 3))
     });
-    assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}")]);
+    assert_stories_pass(&["--url", &format!("http://127.0.0.1:{port}")]);
 }
 
 #[test]
-fn a_surface_with_a_token_asks_the_browser_for_it() {
+fn a_surface_with_a_token_shows_the_login() {
     if is_skipped() {
         return;
     }
@@ -81,5 +82,58 @@ fn a_surface_with_a_token_asks_the_browser_for_it() {
     arguments.extend(sets.iter().flat_map(|s| ["--set", s]));
     let _surface = Process::start(&arguments);
     wait_until("the form is served", LIMIT, || http(port, "GET", "/login", "", "").is_some_and(|(s, _)| s == 200));
-    assert_stories_hold(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
+    assert_stories_pass(&["--url", &format!("http://127.0.0.1:{port}"), "--token-file", &token]);
+}
+
+/// The modules of the page with the modules that each imports.
+fn page_modules() -> BTreeMap<PathBuf, Vec<PathBuf>> {
+    let root = workspace().join("daemon/console/page/js");
+    let mut modules = BTreeMap::new();
+    let mut folders = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("the page's folder").flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).expect("a module is text");
+            let imported = text.lines().filter(|line| line.starts_with("import "));
+            let names = imported.filter_map(|line| line.rsplit('"').nth(1));
+            let names = names.map(|name| folder.join(name).canonicalize().expect("an imported module exists"));
+            modules.insert(path.canonicalize().expect("it was listed"), names.collect());
+        }
+    }
+    modules
+}
+
+/// Removes all nodes that lead to no circle; the others are left.
+fn circles<T: Ord + Clone>(mut graph: BTreeMap<T, Vec<T>>) -> Vec<T> {
+    loop {
+        let before = graph.len();
+        let nodes: std::collections::BTreeSet<T> = graph.keys().cloned().collect();
+        graph.retain(|_, imported| imported.iter().any(|name| nodes.contains(name)));
+        if graph.len() == before {
+            return graph.into_keys().collect();
+        }
+    }
+}
+
+#[test]
+fn modules_and_folders_of_the_page_form_no_circle() {
+    let modules = page_modules();
+    assert!(modules.len() > 40, "only {} modules", modules.len());
+    assert_eq!(circles(modules.clone()), Vec::<PathBuf>::new());
+    let root = workspace().join("daemon/console/page/js").canonicalize().expect("the page's folder");
+    // A module directly below js/ stands for itself.
+    let room = |path: &Path| match path.parent() {
+        Some(folder) if folder != root => folder.to_owned(),
+        _ => path.to_owned(),
+    };
+    let mut folders: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
+    for (module, imported) in &modules {
+        let others = imported.iter().map(|path| room(path)).filter(|other| *other != room(module));
+        folders.entry(room(module)).or_default().extend(others);
+    }
+    assert_eq!(circles(folders), Vec::<PathBuf>::new());
 }

@@ -4,7 +4,7 @@ use scenecast_tests::{assert_refused, run, scratch};
 use std::path::Path;
 
 #[test]
-fn wrong_input_is_answered_with_one_line_that_says_what_is_allowed() {
+fn wrong_input_gets_one_line_with_the_rule() {
     let dir = scratch("wrong-input");
     let out = dir.join("out");
     let out = out.to_str().unwrap();
@@ -65,7 +65,7 @@ fn a_port_in_use_is_named() {
 }
 
 #[test]
-fn the_same_arguments_give_the_same_report_byte_for_byte_but_for_the_wall_clock() {
+fn the_same_arguments_give_the_same_report() {
     let dir = scratch("repeat");
     let report = |name: &str| {
         let out = dir.join(name);
@@ -102,6 +102,7 @@ fn every_command_has_help_with_an_example() {
         &["bench", "fidelity"],
         &["bench", "link"],
         &["config"],
+        &["config", "migrate"],
         &["key", "new"],
         &["key", "show"],
         &["key", "token"],
@@ -142,6 +143,34 @@ fn a_key_is_made_once_and_shown() {
 }
 
 #[test]
+fn an_old_configuration_is_migrated_and_then_accepted() {
+    let file = scratch("migrate").join("auv.toml");
+    let path = file.to_str().unwrap();
+    let old = "[link]\n# ours\nspend = [\"depth\"]\nshares = [10, 5, 5, 60, 20]\n";
+    std::fs::write(&file, old).unwrap();
+    assert_refused(&["auv", "--config", path], &["auv.toml:3", "link.spend", "link.background", "migrate"]);
+    let migrated = run(&["config", "migrate", path]);
+    assert!(migrated.status.success());
+    assert!(String::from_utf8_lossy(&migrated.stdout).contains("line 3: link.spend -> link.background"));
+    let shares = "shares = { directive = 10, status = 5, fix = 5, map = 60, exemplar = 20 }";
+    let new = format!("[link]\n# ours\nbackground = [\"depth\"]\n{shares}\n");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), new);
+    scenecast_config::load(Some(&file), &[]).unwrap();
+    assert!(String::from_utf8_lossy(&run(&["config", "migrate", path]).stdout).contains("up to date"));
+    std::fs::write(&file, "[link]\nspend = []\nbackground = []\n").unwrap();
+    assert_refused(&["config", "migrate", path], &["auv.toml:2", "link.spend", "link.background"]);
+    assert_refused(&["config", "migrate", "nowhere.toml"], &["nowhere.toml"]);
+}
+
+#[test]
+fn a_misspelt_option_is_answered_with_the_nearest_one() {
+    assert_refused(&["sim", "--sede", "3", "--out", "x"], &["--sede", "--seed"]);
+    assert_refused(&["simm"], &["simm", "sim"]);
+    assert_refused(&["ctl", "settings", "--planes", "none"], &["--planes", "--layers"]);
+    assert_refused(&["ctl", "budget", "set", "--spend", "none"], &["--spend", "--background"]);
+}
+
+#[test]
 fn the_configuration_files_that_ship_are_accepted() {
     let root = scenecast_tests::workspace().join("config");
     let files = [
@@ -168,7 +197,7 @@ fn two_grounds(dir: &Path, name: &str) -> (String, String) {
 }
 
 #[test]
-fn a_folder_of_annotated_images_is_scored_and_wrong_ones_are_named() {
+fn annotated_images_are_scored_and_wrong_ones_named() {
     let dir = scratch("score");
     let folder = dir.to_str().unwrap();
     assert_refused(&["scene", "score", "--dir", folder], &["no NAME_label.png"]);

@@ -79,7 +79,7 @@ fn end(dir: &Path, role: &str, modem: &str, file: &str, sets: &[&str]) -> Logged
 
 /// The state of the vehicle as the page has it.
 fn vehicle_of(port: u16) -> Option<Value> {
-    let (_, body) = http(port, "GET", "/api/v1/state", "", "")?;
+    let (_, body) = http(port, "GET", "/api/v2/state", "", "")?;
     let state: Value = serde_json::from_slice(&body).ok()?;
     state["vehicles"].get(0).cloned()
 }
@@ -107,8 +107,8 @@ fn assert_survey_arrives(name: &str, modem: &str, sets: &[&str]) {
     let camera = format!("[camera]\nsource = \"frames:{}\"\n", recording.display());
     let surface = end(&dir, "asv", "ship", &page, sets);
     let vehicle = end(&dir, "auv", "auv", &camera, sets);
-    wait_until("the vehicle is heard", PATIENCE, || vehicle_of(port).is_some_and(|v| v["heard_s"].is_number()));
-    let order = ("/api/v1/vehicles/1/utility", r#"{"weights": {}, "exploration": 0.5, "curiosity": 0.1}"#);
+    wait_until("the vehicle is heard", PATIENCE, || vehicle_of(port).is_some_and(|v| v["last_received_s"].is_number()));
+    let order = ("/api/v2/vehicles/1/utility", r#"{"weights": {}, "exploration": 0.5, "curiosity": 0.1}"#);
     let (status, _) =
         http(port, "POST", order.0, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", order.1).unwrap();
     assert_eq!(status, 202);

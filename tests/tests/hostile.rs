@@ -67,20 +67,20 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
     assert_unmoved(&demo, port, "ten thousand slow heads", || {
         for _ in 0..25 {
             let held: Vec<_> =
-                (0..400).filter_map(|_| connect(port, "GET /api/v1/state HTTP/1.1\r\nX-Slow: ")).collect();
+                (0..400).filter_map(|_| connect(port, "GET /api/v2/state HTTP/1.1\r\nX-Slow: ")).collect();
             assert!(held.len() > 200, "the surface takes connections");
         }
     });
     assert_unmoved(&demo, port, "readers that do not read", || {
-        let ask = format!("GET /api/v1/events HTTP/1.1\r\n{host}\r\n");
+        let ask = format!("GET /api/v2/events HTTP/1.1\r\n{host}\r\n");
         let deaf: Vec<_> = (0..100).filter_map(|_| connect(port, &ask)).collect();
         std::thread::sleep(Duration::from_secs(3));
-        assert_eq!(http(port, "GET", "/api/v1/events", "", "").unwrap().0, 503, "there are only so many streams");
+        assert_eq!(http(port, "GET", "/api/v2/events", "", "").unwrap().0, 503, "there are only so many streams");
         drop(deaf);
     });
     assert_unmoved(&demo, port, "a thousand bodies that do not come", || {
         let head =
-            format!("POST /api/v1/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
+            format!("POST /api/v2/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
         for _ in 0..3 {
             let ask = format!("{head}Content-Length: 100\r\n\r\n{{");
             let held: Vec<_> = (0..350).filter_map(|_| connect(port, &ask)).collect();
@@ -91,7 +91,7 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
     assert_unmoved(&demo, port, "bodies without end", || {
         for length in ["Content-Length: 99999999999", "Transfer-Encoding: chunked"] {
             let head =
-                format!("POST /api/v1/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
+                format!("POST /api/v2/budget HTTP/1.1\r\n{host}X-Scenecast: 1\r\nContent-Type: application/json\r\n");
             let mut stream = connect(port, &format!("{head}{length}\r\n\r\n")).unwrap();
             let chunk = format!("10000\r\n{}\r\n", "1".repeat(0x10000));
             let written = (0..2000).map_while(|_| stream.write_all(chunk.as_bytes()).ok()).count();
@@ -111,12 +111,12 @@ fn no_client_stalls_the_link_or_fills_the_memory() {
         std::thread::scope(|scope| {
             for i in 0..60 {
                 let file = ["map", "map.png", "map.geojson", "map.ply"][i % 4];
-                scope.spawn(move || http(port, "GET", &format!("/api/v1/vehicles/1/{file}"), "", ""));
+                scope.spawn(move || http(port, "GET", &format!("/api/v2/vehicles/1/{file}"), "", ""));
             }
         });
     });
     wait_until("a reader is served again", Duration::from_secs(30), || {
-        let ask = format!("GET /api/v1/events HTTP/1.1\r\n{host}\r\n");
+        let ask = format!("GET /api/v2/events HTTP/1.1\r\n{host}\r\n");
         let mut first = [0; 12];
         connect(port, &ask).is_some_and(|mut s| s.read_exact(&mut first).is_ok() && first.ends_with(b"200"))
     });

@@ -65,7 +65,7 @@ fn the_replica_is_equal_soon_after_the_last_change() {
 fn no_map_of_fourteen_vehicles_grows_old() {
     let fleet = &table().fleet;
     assert_eq!(fleet.vehicles, 14);
-    assert!(fleet.oldest_shares <= 3.0, "older than 3 fair shares: {fleet:?}");
+    assert!(fleet.max_age_shares <= 3.0, "older than 3 fair shares: {fleet:?}");
 }
 
 #[test]

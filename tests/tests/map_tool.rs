@@ -1,14 +1,14 @@
 //! `scenecast map` as its user meets it.
 
 use scenecast_protocol::map_codec::Plane;
-use scenecast_protocol::map_codec::procedural::{Chance, Flips, Scene, Survey};
 use scenecast_tests::{assert_refused, run, scratch};
+use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The first maps of a small survey as `1.png`, `2.png`, ...
 fn series(dir: &Path, steps: usize) -> Vec<Plane> {
-    let scene = Scene::Colonies.draw(&mut Chance::new(3), 60, 40, 6);
+    let scene = MapScene::Colonies.draw(&mut MapRng::new(3), 60, 40, 6);
     let mut survey = Survey::new(1, scene, Flips { border: 20_000, anywhere: 0, settling: 0 }, steps);
     let maps = (1..=steps).map(|step| {
         survey.advance();
@@ -77,7 +77,7 @@ fn a_series_is_measured_in_the_order_of_its_numbers() {
 }
 
 #[test]
-fn bad_maps_and_chunk_files_are_refused_in_one_line_and_leave_no_file() {
+fn bad_maps_and_chunk_files_are_refused_in_one_line() {
     let dir = scratch("map-refused");
     series(&dir, 2);
     let (map, rgb, high, small) = (dir.join("2.png"), dir.join("rgb.png"), dir.join("high.png"), dir.join("small.png"));

@@ -34,7 +34,7 @@ fn assert_sound(figures: &Value) {
     for end in ["up", "down"] {
         let limit = link["budget_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
         let largest = link[end]["largest_transmission_bits"].as_f64().unwrap();
-        let worst = link[end]["worst_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
+        let worst = link[end]["max_window_bps"].as_f64().unwrap() * link["budget_window_s"].as_f64().unwrap();
         assert!(worst <= limit + largest, "{end}: {worst} bits in a window");
     }
 }
@@ -43,7 +43,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 18, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_operators_map_equals_the_vehicles_once_the_channel_has_drained(
+    fn the_maps_are_equal_once_the_channel_has_drained(
         seed in 0u64..1000,
         loss in prop_oneof![Just("0"), Just("0.1"), Just("0.3")],
         frame in prop_oneof![Just("64"), Just("256"), Just("1000")],
@@ -73,13 +73,13 @@ fn whole_missions_pass_with_either_codec() {
 
 #[test]
 fn planes_arrive_and_labels_do_not_wait_for_them() {
-    let without = fly(&["map.planes=[]"], 8);
-    assert_eq!(without["map"]["planes"], serde_json::json!({}));
-    for sets in [&["map.plane_shares=[0, 0, 0]"], &["map.plane_shares=[10, 5, 0]"]] {
+    let without = fly(&["map.layers=[]"], 8);
+    assert_eq!(without["map"]["layers"], serde_json::json!({}));
+    for sets in [&["map.layer_shares={}"], &["map.layer_shares={ confidence = 10, depth = 5 }"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
         for plane in ["confidence", "depth"] {
-            let plane = &with["map"]["planes"][plane];
+            let plane = &with["map"]["layers"][plane];
             assert_eq!(plane["agreement_final"], 1.0, "{plane}");
             assert!(plane["agreement_mean"].as_f64().unwrap() > 0.8, "{plane}");
             assert_eq!(plane["cells"], with["survey"]["explored_cells"]);
@@ -90,16 +90,17 @@ fn planes_arrive_and_labels_do_not_wait_for_them() {
 }
 
 #[test]
-fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_differs() {
+fn curiosity_is_sent_only_with_a_share_or_as_background() {
     let without = fly(&[], 8);
-    assert_eq!(without.to_string(), fly(&[r#"map.planes=["confidence", "depth"]"#], 8).to_string());
-    assert_eq!(without["map"]["planes"]["curiosity"], Value::Null);
-    for sets in
-        [r#"link.spend=["finer", "depth", "exemplars", "confidence", "curiosity"]"#, "map.plane_shares=[0, 0, 10]"]
-    {
+    assert_eq!(without.to_string(), fly(&[r#"map.layers=["confidence", "depth"]"#], 8).to_string());
+    assert_eq!(without["map"]["layers"]["curiosity"], Value::Null);
+    for sets in [
+        r#"link.background=["finer", "depth", "exemplars", "confidence", "curiosity"]"#,
+        "map.layer_shares.curiosity=10",
+    ] {
         let with = fly(&[sets], 8);
         assert_sound(&with);
-        let plane = &with["map"]["planes"]["curiosity"];
+        let plane = &with["map"]["layers"]["curiosity"];
         assert_eq!((&plane["agreement_final"], &plane["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
         assert!(mean(&with) > mean(&without) - 0.02, "{} with curiosity, {} without", mean(&with), mean(&without));
@@ -108,7 +109,7 @@ fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_dif
 
 #[test]
 fn levels_of_curiosity_tell_the_cells_of_a_reef_apart() {
-    let config = config(&[r#"link.spend=["curiosity"]"#]);
+    let config = config(&[r#"link.background=["curiosity"]"#]);
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 8, record: None }).unwrap();
     mission.advance(Instant::from_secs_f64(119.0)).unwrap();
     let vehicle = mission.vehicle();
@@ -127,7 +128,7 @@ fn the_same_seed_gives_the_same_report() {
 }
 
 #[test]
-fn directives_images_and_fixes_reach_the_vehicle_and_what_it_answers_comes_back() {
+fn directives_images_and_fixes_make_the_round_trip() {
     let figures = fly(&["survey.duration_s=400"], 4);
     assert_sound(&figures);
     assert_eq!(figures["directives"]["issued"], figures["directives"]["applied"], "{figures}");
@@ -148,7 +149,7 @@ fn the_map_codes_far_smaller_than_whole_pngs() {
 /// How far the vehicle is from where it believes to be in the second half of 400 s, metres, on the mean of each 10 s.
 fn position_error(sets: &[&str]) -> f64 {
     let mut config = config(sets);
-    config.operator.script = "none".into();
+    config.operator.script = scenecast_config::OperatorScript::None;
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 11, record: None }).unwrap();
     let errors = (20..40).map(|tens| {
         mission.advance(Instant::from_secs_f64(10.0 * f64::from(tens))).unwrap();

@@ -131,7 +131,7 @@ fn hosts_at_a_device_and_at_a_tcp_port_hear_each_other() {
 }
 
 #[test]
-fn a_device_is_unplugged_comes_back_and_its_link_goes_with_the_command() {
+fn an_unplugged_device_returns_and_links_end_with_the_run() {
     let mut emulation = Emulation::start("modem-sim-unplug");
     emulation.line();
     emulation.line();

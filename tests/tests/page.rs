@@ -12,7 +12,7 @@ fn slot(state: &Value, name: &str) -> Option<String> {
 const ORDER: &str = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
 
 #[test]
-fn an_operator_sees_the_map_sends_weights_and_gets_an_image() {
+fn an_operator_sends_weights_and_receives_an_image() {
     let port = free_port();
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
     let limit = Duration::from_secs(60);
@@ -21,40 +21,53 @@ fn an_operator_sees_the_map_sends_weights_and_gets_an_image() {
     });
     let label = state(port).unwrap()["vehicles"][0]["labels"][0]["id"].as_u64().unwrap();
     let weights = format!("{{\"weights\": {{\"{label}\": 0.8}}, \"exploration\": 0.2}}");
-    assert_eq!(http(port, "POST", "/api/v1/vehicles/1/utility", ORDER, &weights).unwrap().0, 202);
+    assert_eq!(http(port, "POST", "/api/v2/vehicles/1/utility", ORDER, &weights).unwrap().0, 202);
     wait_until("the weights are applied", limit, || {
         slot(&state(port).unwrap(), "utility").as_deref() == Some("applied")
     });
     let order = format!("{{\"label\": {label}}}");
-    assert_eq!(http(port, "POST", "/api/v1/vehicles/1/exemplars", ORDER, &order).unwrap().0, 202);
-    wait_until("the image is here", limit, || {
-        state(port).unwrap()["vehicles"][0]["labels"][0]["exemplar"]["state"] == "here"
+    assert_eq!(http(port, "POST", "/api/v2/vehicles/1/exemplars", ORDER, &order).unwrap().0, 202);
+    wait_until("the image has arrived", limit, || {
+        state(port).unwrap()["vehicles"][0]["labels"][0]["exemplar"]["state"] == "received"
     });
-    let (status, webp) = http(port, "GET", &format!("/api/v1/vehicles/1/exemplars/{label}.webp"), "", "").unwrap();
+    let (status, webp) = http(port, "GET", &format!("/api/v2/vehicles/1/exemplars/{label}.webp"), "", "").unwrap();
     assert!(status == 200 && webp.starts_with(b"RIFF"));
     let (status, page) = http(port, "GET", "/", "", "").unwrap();
     assert!(status == 200 && String::from_utf8_lossy(&page).contains("<title>"));
 }
 
 #[test]
-fn wrong_orders_and_strangers_are_refused() {
+fn wrong_orders_and_other_sites_are_refused() {
     let port = free_port();
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--duration", "600"]);
     wait_until("the page answers", Duration::from_secs(30), || state(port).is_some());
     let refused = |path: &str, headers: &str, body: &str| http(port, "POST", path, headers, body).unwrap();
-    let (status, said) = refused("/api/v1/vehicles/1/utility", ORDER, "{\"weights\": {\"9\": 0.5}}");
+    let (status, body) = refused("/api/v2/vehicles/1/utility", ORDER, "{\"weights\": {\"9\": 0.5}}");
     assert_eq!(status, 422);
-    assert!(String::from_utf8_lossy(&said).contains("label 9"), "{}", String::from_utf8_lossy(&said));
-    assert_eq!(refused("/api/v1/budget", ORDER, "{\"budget_bps\": 1}").0, 422);
-    assert_eq!(refused("/api/v1/budget", "Content-Type: application/json\r\n", "{\"budget_bps\": 1000}").0, 403);
-    let stranger = format!("{ORDER}Origin: http://elsewhere.example\r\n");
-    assert_eq!(refused("/api/v1/budget", &stranger, "{\"budget_bps\": 1000}").0, 403);
-    assert_eq!(http(port, "GET", "/api/v1/vehicles/7/map", "", "").unwrap().0, 404);
-    assert_eq!(refused("/api/v1/budget", ORDER, &"x".repeat(100_000)).0, 413);
+    assert!(String::from_utf8_lossy(&body).contains("label 9"), "{}", String::from_utf8_lossy(&body));
+    assert_eq!(refused("/api/v2/budget", ORDER, "{\"budget_bps\": 1}").0, 422);
+    assert_eq!(refused("/api/v2/budget", "Content-Type: application/json\r\n", "{\"budget_bps\": 1000}").0, 403);
+    let other_site = format!("{ORDER}Origin: http://elsewhere.example\r\n");
+    assert_eq!(refused("/api/v2/budget", &other_site, "{\"budget_bps\": 1000}").0, 403);
+    assert_eq!(http(port, "GET", "/api/v2/vehicles/7/map", "", "").unwrap().0, 404);
+    assert_eq!(refused("/api/v2/budget", ORDER, &"x".repeat(100_000)).0, 413);
 }
 
 #[test]
-fn the_page_is_small_and_what_a_browser_has_is_not_sent_again() {
+fn version_1_of_the_api_is_gone_and_names_version_2() {
+    let port = free_port();
+    let _demo = Process::start(&["demo", "--port", &port.to_string(), "--duration", "600"]);
+    wait_until("the page answers", Duration::from_secs(30), || state(port).is_some());
+    for (method, path) in [("GET", "vehicles/1/map"), ("GET", "state"), ("POST", "vehicles/1/utility")] {
+        let (status, body) = http(port, method, &format!("/api/v1/{path}"), ORDER, "{}").unwrap();
+        let body: Value = serde_json::from_slice(&body).unwrap();
+        assert_eq!(status, 410, "{path}");
+        assert!(body["error"].as_str().unwrap().contains(&format!("/api/v2/{path}")), "{body}");
+    }
+}
+
+#[test]
+fn the_page_is_small_and_cached() {
     let port = free_port();
     let _demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
     wait_until("the page answers", Duration::from_secs(60), || state(port).is_some());
@@ -69,7 +82,7 @@ fn the_page_is_small_and_what_a_browser_has_is_not_sent_again() {
         bytes += packed.len();
     }
     assert!((10_000..400_000).contains(&bytes), "{bytes} bytes");
-    for path in ["/", "/js/main.js", "/api/v1/vehicles/1/map.pgw"] {
+    for path in ["/", "/js/main.js", "/api/v2/vehicles/1/map.pgw"] {
         let answer = http_whole(port, "GET", path, "", "").unwrap();
         let tag = answer.lines().find_map(|l| l.strip_prefix("etag: ")).expect("a tag");
         let (status, _) = http(port, "GET", path, &format!("If-None-Match: {tag}\r\n"), "").unwrap();
@@ -78,7 +91,7 @@ fn the_page_is_small_and_what_a_browser_has_is_not_sent_again() {
 }
 
 #[test]
-fn a_demo_that_is_too_fast_for_the_machine_still_answers_and_ends_when_interrupted() {
+fn a_demo_too_fast_for_the_machine_still_answers() {
     let port = free_port();
     let mut demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "1000", "--duration", "1000000"]);
     wait_until("labels on the map", Duration::from_secs(60), || {
@@ -86,7 +99,7 @@ fn a_demo_that_is_too_fast_for_the_machine_still_answers_and_ends_when_interrupt
     });
     for exploration in [0.1, 0.2, 0.3] {
         let weights = format!("{{\"weights\": {{}}, \"exploration\": {exploration}}}");
-        assert_eq!(http(port, "POST", "/api/v1/vehicles/1/utility", ORDER, &weights).expect("an answer").0, 202);
+        assert_eq!(http(port, "POST", "/api/v2/vehicles/1/utility", ORDER, &weights).expect("an answer").0, 202);
     }
     assert_eq!(demo.interrupt(Duration::from_secs(10)), Some(0));
 }

@@ -23,7 +23,7 @@ fn surface(name: &str, gps: &str) -> (Process, impl Fn() -> Value + use<>) {
     std::fs::write(&file, text).unwrap();
     let process = Process::start(&["asv", "--config", file.to_str().unwrap()]);
     let state = move || {
-        let Some((_, body)) = http(page, "GET", "/api/v1/state", "", "") else { return Value::Null };
+        let Some((_, body)) = http(page, "GET", "/api/v2/state", "", "") else { return Value::Null };
         serde_json::from_slice(&body).unwrap_or_default()
     };
     (process, state)
@@ -51,7 +51,7 @@ fn report(second: u32) -> String {
 }
 
 #[test]
-fn gpsd_that_goes_away_is_asked_again_and_what_is_old_is_not_shown_as_good() {
+fn gpsd_is_reconnected_and_old_positions_are_not_good() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let (_process, state) = surface("gpsd", &format!("gpsd:{}", listener.local_addr().unwrap()));
     let mut stream = watched(&listener);
@@ -62,21 +62,21 @@ fn gpsd_that_goes_away_is_asked_again_and_what_is_old_is_not_shown_as_good() {
     };
     wait_until("a good position", LIMIT, || {
         feed(&mut stream);
-        state()["position"]["is_good"] == true
+        state()["position"]["is_valid"] == true
     });
     let now = state();
     assert!((now["mission"]["origin"]["lat_deg"].as_f64().unwrap() - 29.5).abs() < 1e-9, "{now}");
     drop(stream);
-    wait_until("the position is old", LIMIT, || state()["position"]["is_good"] == false);
+    wait_until("the position is old", LIMIT, || state()["position"]["is_valid"] == false);
     let mut again = watched(&listener);
     wait_until("it is good again", LIMIT, || {
         feed(&mut again);
-        state()["position"]["is_good"] == true
+        state()["position"]["is_valid"] == true
     });
 }
 
 #[test]
-fn a_receiver_that_talks_nonsense_is_counted_and_the_surface_goes_on() {
+fn nonsense_of_a_receiver_is_counted() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let (_process, state) = surface("nmea", &format!("tcp:{}", listener.local_addr().unwrap()));
     let (mut stream, _) = listener.accept().unwrap();
@@ -87,9 +87,9 @@ fn a_receiver_that_talks_nonsense_is_counted_and_the_surface_goes_on() {
     stream.write_all(nmea::line("GPGGA,120000.00,nan,N,inf,E,1,09,1.0,0.0,M,0.0,M,,").as_bytes()).unwrap();
     stream.write_all(nmea::line("GPGGA,120000.00,,,,,0,00,99.9,,,,,,").as_bytes()).unwrap();
     stream.write_all(good.as_bytes()).unwrap();
-    wait_until("a good position after the nonsense", LIMIT, || state()["position"]["is_good"] == true);
-    let refused = state()["position"]["refused"].clone();
-    let expected = serde_json::json!({ "checksum": 1, "overlong": 1, "unreadable": 2, "no_position": 1 });
+    wait_until("a good position after the nonsense", LIMIT, || state()["position"]["is_valid"] == true);
+    let refused = state()["position"]["rejected"].clone();
+    let expected = serde_json::json!({ "checksum": 1, "too_long": 1, "malformed": 2, "no_position": 1 });
     assert_eq!(refused, expected);
 }
 

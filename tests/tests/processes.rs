@@ -30,7 +30,7 @@ fn assert_map_arrives(name: &str, vehicle_link: &[String], surface_link: &[Strin
     wait_until("the operator's map equals the one of the rehearsal", Duration::from_secs(120), || {
         std::fs::read(&map).is_ok_and(|png| png == *expected)
     });
-    let (status, page) = http(port, "GET", "/api/v1/vehicles/1/map.png", "", "").unwrap();
+    let (status, page) = http(port, "GET", "/api/v2/vehicles/1/map.png", "", "").unwrap();
     assert_eq!((status, page), (200, expected.clone()), "the page has the same map");
 }
 
@@ -72,7 +72,7 @@ fn null_modem() -> (String, String, [TTYPort; 2]) {
 }
 
 #[test]
-fn a_map_arrives_over_serial_devices_and_equals_the_one_of_the_rehearsal() {
+fn a_map_over_serial_devices_equals_the_rehearsals() {
     let (a, b, _held) = null_modem();
     let link = |device: String| {
         vec!["modem.kind=transparent".to_owned(), format!("modem.device={device}"), "modem.baud=115200".to_owned()]
@@ -116,7 +116,7 @@ fn a_vehicle_that_is_killed_and_comes_back_is_heard_again() {
 }
 
 #[test]
-fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_labels() {
+fn a_killed_vehicle_resumes_from_its_checkpoint() {
     let (recording, expected) = recorded();
     let dir = scratch("checkpoint");
     let (port, page) = (free_port(), free_port());
@@ -144,7 +144,7 @@ fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_la
     }
     let arrived = || std::fs::read(dir.join("asv/operator-map-1.png")).is_ok_and(|png| png == *expected);
     let epoch = || {
-        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        let (_, body) = http(page, "GET", "/api/v2/state", "", "")?;
         let state: serde_json::Value = serde_json::from_slice(&body).ok()?;
         state["vehicles"][0]["map"]["epoch"].as_u64()
     };
@@ -160,7 +160,7 @@ fn a_vehicle_killed_again_and_again_goes_on_from_its_checkpoint_with_the_same_la
 }
 
 #[test]
-fn settings_from_the_surface_outlive_the_vehicle_and_do_not_cost_its_checkpoint() {
+fn settings_survive_a_restart_of_the_vehicle() {
     let (recording, _) = recorded();
     let dir = scratch("settings");
     let (port, page) = (free_port(), free_port());
@@ -177,7 +177,7 @@ fn settings_from_the_surface_outlive_the_vehicle_and_do_not_cost_its_checkpoint(
     let surface = file("asv.toml", [state("asv"), link("listen"), console].concat());
     let _surface = Process::start(&["asv", "--config", &surface]);
     let told = || {
-        let (_, body) = http(page, "GET", "/api/v1/state", "", "")?;
+        let (_, body) = http(page, "GET", "/api/v2/state", "", "")?;
         let state: serde_json::Value = serde_json::from_slice(&body).ok()?;
         Some(state["vehicles"][0].clone())
     };
@@ -189,7 +189,7 @@ fn settings_from_the_surface_outlive_the_vehicle_and_do_not_cost_its_checkpoint(
     });
     let headers = "Content-Type: application/json\r\nX-Scenecast: 1\r\n";
     let order = r#"{"gamma": 0.2, "alpha": 0.5}"#;
-    assert_eq!(http(page, "POST", "/api/v1/vehicles/1/settings", headers, order).unwrap().0, 202);
+    assert_eq!(http(page, "POST", "/api/v2/vehicles/1/settings", headers, order).unwrap().0, 202);
     wait_until("settings in force", Duration::from_secs(60), || {
         told().is_some_and(|v| v["settings"]["in_force"]["gamma"] == 0.2)
     });

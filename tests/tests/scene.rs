@@ -81,7 +81,7 @@ fn two_classes(dir: &Path) -> (String, String) {
 }
 
 #[test]
-fn words_are_labelled_as_their_classes_whatever_the_number_of_threads() {
+fn labels_follow_the_classes_at_any_number_of_threads() {
     let dir = scratch("scene-words");
     let (words, classes) = two_classes(&dir);
     let out = |name: &str| dir.join(name);
@@ -110,7 +110,7 @@ fn words_are_labelled_as_their_classes_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn the_map_is_indexed_by_label_with_y_up_and_shows_the_fuller_of_stacked_cells() {
+fn the_map_has_y_up_and_shows_the_fuller_of_stacked_cells() {
     let dir = scratch("scene-stacked");
     let line = |x: f64, y: f64, z: f64, word: u32, times: usize| {
         format!("0,{x},{y},{z}{}\n", format!(",{word}").repeat(times))
@@ -138,7 +138,7 @@ fn the_map_is_indexed_by_label_with_y_up_and_shows_the_fuller_of_stacked_cells()
 }
 
 #[test]
-fn a_wrong_words_file_is_refused_with_its_line_and_leaves_nothing() {
+fn a_wrong_words_file_is_refused_with_its_line() {
     let dir = scratch("scene-wrong");
     let out = dir.join("out");
     for (name, content, said) in [
@@ -171,14 +171,14 @@ fn a_wrong_words_file_is_refused_with_its_line_and_leaves_nothing() {
 }
 
 fn reef(dir: &Path) -> String {
-    let reef = scene_model::generate::reef(3, 400, 300, 60, 5);
+    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5);
     reef.image.save(dir.join("reef.png")).unwrap();
     image::GrayImage::from_raw(400, 300, reef.truth).unwrap().save(dir.join("classes.png")).unwrap();
     path(dir.join("reef.png"))
 }
 
 #[test]
-fn a_mosaic_is_labelled_and_scored_and_what_does_not_fit_it_is_refused() {
+fn a_mosaic_is_scored_and_unfit_annotations_are_refused() {
     let dir = scratch("scene-mosaic");
     let (mosaic, classes) = (reef(&dir), path(dir.join("classes.png")));
     let out = dir.join("out");
@@ -207,7 +207,7 @@ fn a_mosaic_is_labelled_and_scored_and_what_does_not_fit_it_is_refused() {
 fn tum(dir: &Path) -> PathBuf {
     let dir = dir.join("tum");
     std::fs::create_dir_all(dir.join("rgb")).unwrap();
-    let reef = scene_model::generate::reef(3, 400, 300, 60, 5).image;
+    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5).image;
     let (mut rgb, mut depth, mut truth) = ("# color images\n".to_owned(), String::new(), String::new());
     for i in 0..6u32 {
         let time = 100.0 + f64::from(i) * 0.5;
@@ -228,7 +228,7 @@ fn tum(dir: &Path) -> PathBuf {
 }
 
 #[test]
-fn a_tum_sequence_is_put_where_depth_and_pose_say_and_what_is_missing_is_counted() {
+fn a_tum_sequence_is_projected_and_gaps_are_counted() {
     let dir = scratch("scene-tum");
     let source = tum(&dir);
     let out = dir.join("out");
@@ -259,7 +259,7 @@ fn a_tum_sequence_is_put_where_depth_and_pose_say_and_what_is_missing_is_counted
 #[test]
 fn frames_with_poses_are_labelled_and_bad_ones_are_counted() {
     let dir = scratch("scene-frames");
-    let reef = scene_model::generate::reef(3, 400, 300, 60, 5).image;
+    let reef = scenecast_worlds::reef(3, 400, 300, 60, 5).image;
     let mut poses = "t_s,file,x_m,y_m,depth_m,heading_deg\n".to_owned();
     for i in 0..5u32 {
         image::imageops::crop_imm(&reef, i * 40, 0, 160, 120).to_image().save(dir.join(format!("{i}.png"))).unwrap();

@@ -1,52 +1,43 @@
-//! Settings of the scene model that fit a budget, as the API tells them.
+//! Settings of the scene model that fit a budget.
 
-use super::answer::Ask;
-use super::server::{Shared, VehicleId, refusal};
-use axum::extract::{Query, State};
-use axum::http::StatusCode;
-use axum::response::Response;
 use scenecast_core::tuning_table::{self, Row};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{SettingsOrder, Surface};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
-/// Most bits a second that may be asked about.
-const MOST_BPS: f64 = 1e7;
-
-/// The setting that tells most of those whose stream fits, and what it gives up. Figures come from the surface's tuning table:
-/// they hold for a sea floor and a survey like those that it was measured with.
+/// The most informative settings whose stream fits a budget, and the trade-off. The figures come from the tuning table of the
+/// surface; they hold for a sea floor and a survey similar to those of its measurements.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
-    /// Bits a second that the stream of the map may take.
+    /// The budget of the stream of the map, bit/s.
     pub bits_per_s: f64,
-    /// The setting with the highest mutual information that fits; null if none does.
-    pub chosen: Option<Fitted>,
-    /// The setting with the highest mutual information.
-    pub best: Fitted,
-    /// The setting with the smallest stream.
-    pub leanest: Fitted,
-    /// What is given up against the best, or that none fits: one line for people.
-    pub given_up: String,
+    /// The settings with the highest mutual information within the budget; null if none fit.
+    pub chosen: Option<FittedSettings>,
+    /// The settings with the highest mutual information.
+    pub best: FittedSettings,
+    /// The settings with the lowest rate.
+    pub lowest_rate: FittedSettings,
+    /// The loss in comparison with the best settings, or that no settings fit: one line for people.
+    pub trade_off: String,
 }
 
-/// A setting with what it reaches.
+/// Settings with the figures that they reach.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Fitted {
-    /// As an order; what it leaves null does not matter to the map's stream.
+pub struct FittedSettings {
+    /// The settings as an order. A null member has no influence on the stream of the map.
     pub settings: SettingsOrder,
-    /// Of labels and annotated classes, nats.
+    /// Mutual information of labels and annotated classes, nats.
     pub mutual_information_nats: f64,
-    /// What the best setting tells more, nats.
+    /// The difference from the best settings, nats.
     pub lost_nats: f64,
-    /// Different labels on the map.
+    /// The number of different labels on the map.
     pub labels: usize,
-    /// Bits a second of the map's stream.
+    /// The rate of the stream of the map, bit/s.
     pub stream_bps: f64,
 }
 
-impl Fitted {
+impl FittedSettings {
     fn new(fit: &tuning_table::Fit, row: &Row) -> Self {
         let (s, m) = (&row.setting, &row.measurement);
         Self {
@@ -55,7 +46,7 @@ impl Fitted {
                 alpha: Some(s.alpha),
                 beta: Some(s.beta),
                 gamma: Some(s.gamma),
-                // 0 would ask for what is configured.
+                // 0 would mean as configured.
                 refine_words_per_s: Some(s.refine_words_per_s.max(1.0)),
                 frames_per_s: Some(s.frames_per_s),
                 ..SettingsOrder::default()
@@ -68,32 +59,15 @@ impl Fitted {
     }
 }
 
-/// What fits so many bits a second, or the map's share of a vehicle's budget.
-pub(super) fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, String> {
+/// Settings that fit a budget in bit/s, by default the share of the map in the vehicle's budget.
+pub(crate) fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, String> {
     let bits_per_s = bits_per_s.unwrap_or_else(|| surface.map_bits_per_s(vehicle));
     let fit = surface.fit(cell_m, bits_per_s).map_err(|e| e.to_string())?;
     Ok(Fit {
         bits_per_s,
-        chosen: fit.chosen.as_ref().map(|row| Fitted::new(&fit, row)),
-        best: Fitted::new(&fit, &fit.best),
-        leanest: Fitted::new(&fit, &fit.leanest),
-        given_up: fit.said(),
+        chosen: fit.chosen.as_ref().map(|row| FittedSettings::new(&fit, row)),
+        best: FittedSettings::new(&fit, &fit.best),
+        lowest_rate: FittedSettings::new(&fit, &fit.lowest_rate),
+        trade_off: fit.trade_off(),
     })
-}
-
-/// Serves it.
-pub(super) async fn read(
-    State(shared): State<Shared>,
-    VehicleId(id): VehicleId,
-    Query(query): Query<BTreeMap<String, String>>,
-) -> Response {
-    let asked = query.get("bits_per_s").map(|text| (text, text.parse().ok().filter(|b| (1.0..=MOST_BPS).contains(b))));
-    match asked {
-        Some((text, None)) => {
-            let why = format!("bits_per_s {text:?}: it takes 1 to {MOST_BPS}");
-            refusal(StatusCode::UNPROCESSABLE_ENTITY, &why)
-        }
-        Some((_, bits_per_s)) => shared.ask(Ask::Fit(id, bits_per_s)).await,
-        None => shared.ask(Ask::Fit(id, None)).await,
-    }
 }

@@ -1,34 +1,24 @@
-//! The operator's page and its HTTP API.
+//! The operator's page, its HTTP API, and the client of that API.
 //!
-//! The host's loop owns the [`Surface`](scenecast_surface::Surface). It pushes a [`Snapshot`] whenever something has changed, and
-//! answers the [`Ask`]s of browsers between two steps, so no client can hold the link up.
+//! The host owns the [`Surface`](scenecast_surface::Surface). It publishes a [`Snapshot`] after each change and calls
+//! [`handle_request`] for waiting requests between two steps. So no client can delay the link.
+//!
+//! The modules form no circle: the types of the API ([`state`], [`orders`], [`fit`]) are at the bottom; `snapshot` and `request`
+//! fill them from the surface; `http` serves them; [`client`] reads them.
 
-mod answer;
-mod assets;
-mod base64;
-mod body;
 pub mod client;
-mod compress;
-mod connections;
-mod events;
 mod export;
 pub mod fit;
-mod guard;
+mod http;
+mod layers;
 mod link_meter;
-mod maps;
-mod metrics;
-mod openapi;
-mod operations;
 pub mod orders;
-mod place;
-mod planes;
-mod server;
+mod request;
 mod snapshot;
 pub mod state;
-mod token;
 
-pub use answer::{Ask, Reply, answer};
-pub use export::{Cells, Plane};
+pub use export::{CellLayer, MapCells};
+pub use http::{Console, ConsoleListener, PendingRequest, bind, start};
 pub use link_meter::LinkMeter;
-pub use server::{Console, Entrance, Request, bind, start};
+pub use request::{Reply, SurfaceRequest, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, snapshot};

@@ -1,10 +1,10 @@
-//! What the API takes: the bodies of orders.
+//! The bodies of orders.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Weights of labels on the map; labels that are not named weigh 0.
+/// Weights of labels on the map. A label that is not listed gets the weight 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UtilityOrder {
@@ -12,82 +12,81 @@ pub struct UtilityOrder {
     #[schemars(extend("propertyNames" = { "pattern": "^[1-9][0-9]{0,2}$" }))]
     #[schemars(extend("additionalProperties" = { "type": "number", "minimum": -1, "maximum": 1 }))]
     pub weights: BTreeMap<String, f64>,
-    /// -1 to 1 for unseen cells.
+    /// The weight of unexplored cells, -1 to 1.
     #[serde(default)]
     #[schemars(range(min = -1.0, max = 1.0))]
     pub exploration: f64,
-    /// -1 to 1 for cells that the scene model explains badly.
+    /// The weight of cells that the scene model explains badly, -1 to 1.
     #[serde(default)]
     #[schemars(range(min = -1.0, max = 1.0))]
     pub curiosity: f64,
 }
 
-/// Asks for an image of a label, in place of what was asked of the label before, or takes that back.
+/// Requests an image of a label in place of an earlier request for that label, or cancels the request.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExemplarOrder {
     /// A label on the map.
     #[schemars(range(min = 1, max = 254))]
     pub label: u8,
-    /// What of it.
+    /// The request, or its cancellation.
     #[serde(default)]
-    pub what: ExemplarWish,
-    /// For `larger`: which picture; left out: the newest.
+    pub action: ExemplarAction,
+    /// For `larger`: the number of the image; by default the latest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 63))]
-    pub picture: Option<u8>,
+    pub image: Option<u8>,
 }
 
-/// Which image of a label is wanted.
+/// A request for an image of a label.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum ExemplarWish {
-    /// The best one that is not here: 64 x 64 pixels, at most 700 bytes.
+pub enum ExemplarAction {
+    /// The best image that the surface does not have: 64 x 64 pixels, at most 700 bytes.
     #[default]
     Another,
-    /// One that is here with twice its edge: 128 x 128 pixels, at most 2800 bytes.
+    /// A received image with twice its width: 128 x 128 pixels, at most 2800 bytes.
     Larger,
-    /// None: what was asked for is not sent to its end.
+    /// Cancels the request: the vehicle stops sending the image.
     Cancel,
 }
 
-/// Tells the vehicle to stay, to abort, or with both false to go on, also after a breach.
+/// Orders the vehicle to hold or to abort. With both false it resumes its survey, also after a breach.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstraintsOrder {
-    /// Whether it stays.
+    /// Whether it holds its position.
     pub hold: bool,
-    /// Whether it aborts; goes before `hold`.
+    /// Whether it aborts; this has precedence over `hold`.
     #[serde(default)]
     pub abort: bool,
 }
 
-/// Budget of the surface, at once, and of each vehicle, by the directive.
+/// The budget of the surface, which changes at once, and of each vehicle, which receives it in the directive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BudgetOrder {
     /// Bits on air a second.
     #[schemars(range(min = 10, max = 10_000_000))]
     pub budget_bps: u32,
-    /// Least shares; left out: those of the surface.
+    /// Minimum shares; by default those of the surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shares: Option<SharesOrder>,
-    /// What bits that nobody else needs are spent on, in this order: different ones of finer (the cells between those of a
-    /// coarse map), depth, confidence and curiosity (planes without a share), exemplars (images of new labels that nobody
-    /// asked for). What is not named gets none, but for finer cells, which then go before all others. Left out: as it was
-    /// sent last.
+    /// The background streams that use spare capacity, in this order and without repetition: finer (the cells between coarse
+    /// ones), depth, confidence and curiosity (layers without a share), exemplars (images of new labels that nobody requested).
+    /// A stream that is not listed is not sent, except finer cells, which then precede all others. By default as last sent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub spend: Option<Vec<String>>,
+    pub background: Option<Vec<String>>,
 }
 
-/// Least shares in percent while each class has something to send; together at most 100.
+/// Minimum shares in percent while each class has data to send; their sum is at most 100.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SharesOrder {
-    /// Orders but for fixes.
+    /// Orders, except position fixes.
     #[schemars(range(max = 100))]
     pub directive: u8,
-    /// Statuses.
+    /// Reports of the vehicle.
     #[schemars(range(max = 100))]
     pub status: u8,
     /// Position fixes.

@@ -3,13 +3,9 @@
 /// Limits of the survey, metres from the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Area {
-    /// West limit.
     pub west: f64,
-    /// South limit.
     pub south: f64,
-    /// East limit.
     pub east: f64,
-    /// North limit.
     pub north: f64,
 }
 
@@ -25,7 +21,6 @@ impl Area {
         }
     }
 
-    /// The same area elsewhere.
     pub fn moved(&self, east_m: f64, north_m: f64) -> Self {
         Self {
             west: self.west + east_m,

@@ -1,4 +1,4 @@
-//! What a link has counted and measured, for people and programs.
+//! Counters of dropped frames, by the name of the reason.
 
 use scenecast_protocol::link::{DropReason, LinkStats};
 use std::collections::BTreeMap;
@@ -18,9 +18,9 @@ fn name(reason: DropReason) -> &'static str {
         DropReason::OldSession => "old_session",
         DropReason::Duplicate => "duplicate",
         DropReason::Late => "late",
-        DropReason::NoBase => "no_base",
-        DropReason::Stranger => "stranger",
+        DropReason::NoBase => "base_missing",
+        DropReason::UnknownSender => "unknown_sender",
         DropReason::Unauthenticated => "unauthenticated",
-        DropReason::Keyed => "keyed",
+        DropReason::Keyed => "key_missing",
     }
 }

@@ -5,9 +5,7 @@ use std::f64::consts::PI;
 /// Latitude and longitude on the WGS-84 ellipsoid, at its surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LatLon {
-    /// Degrees north, -90..=90.
     pub lat_deg: f64,
-    /// Degrees east, -180..=180.
     pub lon_deg: f64,
 }
 
@@ -32,13 +30,10 @@ pub struct TangentPlane {
 
 /// Semi-major axis, metres (NIMA TR8350.2).
 const A: f64 = 6_378_137.0;
-/// Flattening.
 const F: f64 = 1.0 / 298.257_223_563;
-/// First eccentricity squared.
 const E2: f64 = F * (2.0 - F);
 
 impl TangentPlane {
-    /// The plane at `origin`.
     pub fn new(origin: LatLon) -> Self {
         Self { origin, ecef: to_ecef(origin) }
     }

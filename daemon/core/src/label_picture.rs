@@ -3,23 +3,21 @@
 use crate::palette::colour;
 use scenecast_protocol::map::{Cell, LabelGrid, Rect};
 
-/// Most cells of a map that is drawn or told as a rectangle: a few frames can claim two cells at the ends of the world.
-pub const MOST_CELLS: u64 = 1 << 23;
+/// Most cells of a map that is sent as a rectangle: a few frames can claim two cells at the ends of the world.
+pub const MAX_CELLS: u64 = 1 << 23;
 
 /// Why a map is not drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// It spans too much.
-    #[error("the map spans {0} x {1} cells: at most {MOST_CELLS} are drawn")]
+    #[error("the map spans {0} x {1} cells: at most {MAX_CELLS} are drawn")]
     TooLarge(u32, u32),
-    /// The encoder has failed.
     #[error(transparent)]
     Png(#[from] png::EncodingError),
 }
 
 /// The map within `bounds` as an indexed PNG, north up; pixel value = label.
 pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, PictureError> {
-    if bounds.area() > MOST_CELLS {
+    if bounds.area() > MAX_CELLS {
         return Err(PictureError::TooLarge(bounds.width, bounds.height));
     }
     let highest = grid.iter().map(|(_, l)| l).max().unwrap_or(0);
@@ -55,7 +53,7 @@ pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, PictureE
     Ok(bytes)
 }
 
-/// The whole map as an indexed PNG; one black pixel if nothing is explored.
+/// The whole map as an indexed PNG; one black pixel if no cell is explored.
 pub fn encode(grid: &LabelGrid) -> Result<Vec<u8>, PictureError> {
     encode_within(grid, grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 }))
 }
@@ -75,11 +73,8 @@ pub fn read_whole(object: &[u8]) -> Option<LabelGrid> {
 
 /// The raw indices of an image, row by row from the top.
 pub struct Indices {
-    /// One index a pixel.
     pub pixels: Vec<u8>,
-    /// Columns.
     pub width: u32,
-    /// Rows.
     pub height: u32,
 }
 

@@ -7,25 +7,22 @@
 
 use crate::geodesy::LatLon;
 
-/// What a sentence says, in units of this program.
+/// The content of a sentence, in the units of this program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sentence {
     /// GGA, and RMC where there is no GGA: a position.
     Position {
-        /// Where.
         place: LatLon,
         /// Time of day of the measurement, seconds of UTC.
         utc_s: Option<f64>,
-        /// Horizontal dilution of precision.
         hdop: Option<f64>,
         /// Whether the solution has corrections: differential, real-time kinematic.
         is_corrected: bool,
     },
-    /// The receiver says that it has no position.
+    /// The receiver reports that it has no position.
     NoPosition,
     /// RMC, VTG: the way over ground.
     Motion {
-        /// Metres a second.
         speed_m_s: f64,
         /// Clockwise from true north, radians; `None` while standing.
         course_rad: Option<f64>,
@@ -42,7 +39,6 @@ pub enum NmeaError {
     /// Not text, no `$`, no `*`.
     #[error("no sentence")]
     NoSentence,
-    /// The checksum is another.
     #[error("wrong checksum")]
     Checksum,
     /// A field cannot be read, or is out of its range.
@@ -51,11 +47,10 @@ pub enum NmeaError {
 }
 
 /// Longest line that is taken: the standard allows 82 with its ends, receivers of many digits go beyond.
-pub const LONGEST_LINE: usize = 120;
+pub const MAX_LINE: usize = 120;
 
 const KNOT_M_S: f64 = 1852.0 / 3600.0;
 
-/// XOR of all bytes.
 pub fn checksum(body: &[u8]) -> u8 {
     body.iter().fold(0, |sum, b| sum ^ b)
 }
@@ -76,7 +71,7 @@ pub fn fields(line: &[u8]) -> Result<Vec<&str>, NmeaError> {
     Ok(body.split(',').collect())
 }
 
-/// What a line says; nothing for a sentence that is of no use here.
+/// Parses a line; `None` for a sentence that is not used here.
 pub fn parse(line: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
     let all = fields(line)?;
     let f = |i: usize| all.get(i).copied().unwrap_or("");
@@ -124,7 +119,7 @@ fn motion(speed_m_s: Option<f64>, course_deg: Option<f64>) -> Result<Option<Sent
     is_sound.then_some(Some(motion)).ok_or(NmeaError::Field)
 }
 
-/// A finite number; nothing if the field is empty.
+/// A finite number; `None` if the field is empty.
 fn number(field: &str) -> Result<Option<f64>, NmeaError> {
     if field.is_empty() {
         return Ok(None);

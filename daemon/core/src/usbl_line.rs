@@ -3,12 +3,10 @@
 /// Address of a modem in the water, as its make counts them.
 pub type ModemAddress = u8;
 
-/// What an ultra-short baseline told of another modem.
+/// The position of another modem as a USBL head measured it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsblLine {
-    /// The other modem.
     pub remote: ModemAddress,
-    /// Slant range, metres.
     pub range_m: Option<f64>,
     /// Clockwise from north, rad, -pi..=pi, and above the horizontal, rad; `None` if only the range is good.
     pub direction_rad: Option<(f64, f64)>,

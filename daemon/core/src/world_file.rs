@@ -1,6 +1,7 @@
 //! A map in the world: the file that geographic information systems look for beside a picture.
 
 use crate::geodesy::TangentPlane;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::wire::Placement;
 
@@ -10,10 +11,10 @@ use scenecast_protocol::wire::Placement;
 /// pixel.
 pub fn world_file(plane: &TangentPlane, placement: Option<Placement>, bounds: Rect, cell_m: f64) -> String {
     let world = |column: f64, row: f64| {
-        let at =
-            ((f64::from(bounds.x) + column) * cell_m, (f64::from(bounds.y) + f64::from(bounds.height) - row) * cell_m);
-        let (x, y) = placement.map_or(at, |p| p.to_world(at));
-        plane.to_place(x, y)
+        let x_m = (f64::from(bounds.x) + column) * cell_m;
+        let y_m = (f64::from(bounds.y) + f64::from(bounds.height) - row) * cell_m;
+        let (east, north) = Placement::map_to_world(placement, MapPoint { x_m, y_m }).xy();
+        plane.to_place(east, north)
     };
     let (width, height) = (f64::from(bounds.width), f64::from(bounds.height));
     let (corner, right, down) = (world(0.5, 0.5), world(0.5 + width, 0.5), world(0.5, 0.5 + height));
@@ -32,12 +33,13 @@ pub fn world_file(plane: &TangentPlane, placement: Option<Placement>, bounds: Re
 mod tests {
     use super::*;
     use crate::geodesy::LatLon;
+    use scenecast_protocol::coordinates::WorldPoint;
 
     #[test]
     fn a_pixel_of_the_picture_lies_where_its_cell_does() {
         let plane = TangentPlane::new(LatLon::new(29.5, 34.92).unwrap());
         let bounds = Rect { x: -10, y: 20, width: 100, height: 60 };
-        let placement = Placement { version: 1, east_m: 3.0, north_m: -2.0 };
+        let placement = Placement { version: 1, origin: WorldPoint::new(3.0, -2.0) };
         let text = world_file(&plane, Some(placement), bounds, 0.5);
         let v: Vec<f64> = text.lines().map(|l| l.parse().unwrap()).collect();
         // Column 40, row 10 from the north is cell (30, 69).

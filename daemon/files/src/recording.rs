@@ -9,13 +9,10 @@ use std::path::{Path, PathBuf};
 /// A camera frame of a recorded mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedFrame {
-    /// Mission time, seconds.
     pub t_s: f64,
-    /// The image's file.
     pub file: PathBuf,
     /// Where the camera believed to be: metres east and north.
     pub x_m: f64,
-    /// Metres north.
     pub y_m: f64,
     /// Depth below the surface, metres.
     pub depth_m: f64,
@@ -26,7 +23,6 @@ pub struct RecordedFrame {
 }
 
 impl RecordedFrame {
-    /// Reads the image.
     pub fn image(&self) -> Result<RgbImage, UserError> {
         Ok(crate::read_image(&self.file)?.to_rgb8())
     }
@@ -76,12 +72,6 @@ impl Recording {
         Ok(Self { frames })
     }
 
-    /// The folder of a `frames:DIR` source.
-    pub fn folder(source: &str) -> Result<&Path, UserError> {
-        let dir = source.strip_prefix("frames:").filter(|d| !d.is_empty());
-        dir.map(Path::new).ok_or_else(|| UserError::Input(format!("camera.source = {source:?}: it takes frames:DIR")))
-    }
-
     /// Limits of the places in the recording.
     pub fn area(&self) -> Area {
         let nowhere = Area { west: f64::MAX, south: f64::MAX, east: f64::MIN, north: f64::MIN };
@@ -127,7 +117,6 @@ fn of_mosaic(dir: &Path, line: &str, metres_per_pixel: f64) -> Option<RecordedFr
     Some(RecordedFrame { t_s, file: dir.join(file), x_m, y_m, depth_m: 0.0, heading_rad: yaw_deg.to_radians(), scale })
 }
 
-/// Seconds of `hhmmss`.
 fn time_of_day(text: &str) -> Option<f64> {
     let number: u32 = text.parse().ok().filter(|_| text.len() == 6)?;
     let (hours, minutes, seconds) = (number / 10_000, number / 100 % 100, number % 100);
@@ -190,7 +179,6 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes `poses.csv`.
     pub fn finish(&self) -> Result<(), UserError> {
         crate::write_whole(&self.dir.join("poses.csv"), self.poses.as_bytes())
     }
@@ -209,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn places_in_a_mosaic_become_metres_with_north_up_and_time_goes_on_over_midnight() {
+    fn mosaic_positions_become_metres_and_time_passes_midnight() {
         let text = "file,time_utc_hms,x_px,y_px,yaw_deg,scale\na.tif,235950,10,20,90,0.9\nb.tif,000010,-4,8,0,1\n";
         let frames = open("mosaic", "poses_estimated.csv", text).unwrap().frames;
         let first = &frames[0];

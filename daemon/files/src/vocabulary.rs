@@ -6,13 +6,13 @@ use std::io::Read;
 use std::path::Path;
 
 /// Most bytes of a vocabulary; one takes some kilobytes.
-const MOST_BYTES: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 
 /// Reads a vocabulary that `scenecast vocabulary train` wrote.
 pub fn read_vocabulary(path: &Path) -> Result<Measures, UserError> {
     let file = std::fs::File::open(path).map_err(|e| UserError::file(path, e))?;
     let mut bytes = Vec::new();
-    file.take(MOST_BYTES).read_to_end(&mut bytes).map_err(|e| UserError::file(path, e))?;
+    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(|e| UserError::file(path, e))?;
     let advice = "make one with scenecast vocabulary train";
     scene_model::vocabulary::load(&bytes).map_err(|e| UserError::file(path, format!("{e}; {advice}")))
 }
@@ -21,6 +21,6 @@ pub fn read_vocabulary(path: &Path) -> Result<Measures, UserError> {
 ///
 /// # Errors
 /// As [`read_vocabulary`].
-pub fn configured_vocabulary(file: &str) -> Result<Option<Measures>, UserError> {
-    (!file.is_empty()).then(|| read_vocabulary(Path::new(file))).transpose()
+pub fn configured_vocabulary(file: Option<&Path>) -> Result<Option<Measures>, UserError> {
+    file.map(read_vocabulary).transpose()
 }

@@ -19,7 +19,7 @@ pub enum FrameEvent {
     Sent {
         bytes: usize,
         /// Its kind, as the link names it.
-        kind: &'static str,
+        kind: scenecast_protocol::link::TransmitKind,
     },
     /// The modem refused the frame that was handed over last. The link repairs it like a lost one.
     NotSent(Refusal),

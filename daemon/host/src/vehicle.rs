@@ -2,10 +2,11 @@
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
-use scene_model::exemplars::Exemplar;
+use scene_model::exemplars::ExemplarPatch;
 use scenecast_core::TangentPlane;
 use scenecast_drivers::autopilot::{Autopilot, Goal};
 use scenecast_drivers::modem::Station;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle, VehicleOutput};
@@ -21,7 +22,7 @@ pub enum VehicleHostEvent {
     /// event and no frame; where it fails, end the run.
     Persist,
     /// The vehicle goes there, metres east and north in the map's frame.
-    Waypoint(f64, f64),
+    Waypoint(MapPoint),
     /// The vehicle stays where it is.
     Hold,
     Surface,
@@ -73,10 +74,10 @@ impl VehiclePilot {
         }
         vehicle.set_autopilot_silent(autopilot.health(now).is_silent());
         let navigator = vehicle.navigator();
-        let (x, y) = navigator.position();
-        let (world_x, world_y) = navigator.world();
-        let goal = vehicle.waypoint().map(|(to_x, to_y)| {
-            let (east_m, north_m) = (to_x - x, to_y - y);
+        let (x, y) = navigator.position().xy();
+        let (world_x, world_y) = navigator.world().xy();
+        let goal = vehicle.waypoint().map(|to| {
+            let (east_m, north_m) = (to.x_m - x, to.y_m - y);
             let place = self.plane.map(|plane| plane.to_place(world_x + east_m, world_y + north_m));
             Goal { east_m, north_m, depth_m: Some(self.depth_m), place }
         });
@@ -190,7 +191,7 @@ impl VehicleHost {
             return recorded;
         }
         let navigator = self.vehicle().navigator();
-        let (x_m, y_m) = navigator.position();
+        let (x_m, y_m) = navigator.position().xy();
         CameraPose { x_m, y_m, heading_rad: navigator.heading_rad(), depth_m: navigator.depth_m() }
     }
 
@@ -204,7 +205,7 @@ impl VehicleHost {
         &mut self,
         pose: Option<CameraPose>,
         update: &MapUpdate,
-        exemplars: BTreeMap<u8, Vec<Exemplar>>,
+        exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
         now: Instant,
     ) {
         if let Some(pose) = pose {
@@ -228,7 +229,7 @@ impl VehicleHost {
     }
 
     /// The mapper has the best exemplars of each label, the best first.
-    pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<Exemplar>>) {
+    pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<ExemplarPatch>>) {
         self.link.end_mut().handle_exemplars(exemplars);
     }
 
@@ -299,7 +300,7 @@ impl From<VehicleOutput> for VehicleHostEvent {
     fn from(output: VehicleOutput) -> Self {
         match output {
             VehicleOutput::Persist => Self::Persist,
-            VehicleOutput::Waypoint(x, y) => Self::Waypoint(x, y),
+            VehicleOutput::Waypoint(at) => Self::Waypoint(at),
             VehicleOutput::Hold => Self::Hold,
             VehicleOutput::Surface => Self::Surface,
             VehicleOutput::Tune(settings) => Self::Tune(settings),

@@ -25,10 +25,9 @@ use std::time::{Duration, Instant};
 use tank::Tank;
 use tokio::sync::mpsc;
 
-/// What the command was told.
+/// The options of the command.
 #[derive(Debug)]
 pub struct Options {
-    /// The scenario's file.
     pub scenario: PathBuf,
     /// Folder for symbolic links to devices.
     pub link_dir: Option<PathBuf>,

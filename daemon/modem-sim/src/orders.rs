@@ -1,18 +1,15 @@
 //! Lines on the standard input: faults and places on demand.
 
 use super::scenario::Trouble;
-use sim_channel::Position;
+use sim_channel::NodePosition;
 use std::io::BufRead;
 use tokio::sync::mpsc;
 
-/// What somebody asks for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// `fault NAME WHAT [NUMBER]`
     Fault(String, Trouble),
     /// `move NAME EAST NORTH DOWN`
-    Move(String, Position),
-    /// `quit`
+    Move(String, NodePosition),
     Quit,
 }
 
@@ -63,7 +60,7 @@ fn parse(line: &str) -> Result<Option<Order>, String> {
             let numbers: Option<Vec<f64>> =
                 place.iter().map(|n| n.parse().ok().filter(|n: &f64| n.abs() <= 1e6)).collect();
             match numbers.as_deref() {
-                Some([x, y, z]) => Ok(Some(Order::Move((*name).to_owned(), Position::new(*x, *y, *z)))),
+                Some([x, y, z]) => Ok(Some(Order::Move((*name).to_owned(), NodePosition::new(*x, *y, *z)))),
                 _ => Err(format!("move {}: it takes three numbers from -1000000 to 1000000 m", place.join(" "))),
             }
         }
@@ -84,7 +81,7 @@ mod tests {
         assert_eq!(parse("fault auv freeze 60"), Ok(Some(Order::Fault("auv".into(), freeze))));
         assert_eq!(parse("fault auv freeze"), Ok(Some(Order::Fault("auv".into(), freeze))));
         assert_eq!(parse("fault a reboot"), Ok(Some(Order::Fault("a".into(), Trouble::Reboot))));
-        assert_eq!(parse("move a 1 -2 3.5"), Ok(Some(Order::Move("a".into(), Position::new(1.0, -2.0, 3.5)))));
+        assert_eq!(parse("move a 1 -2 3.5"), Ok(Some(Order::Move("a".into(), NodePosition::new(1.0, -2.0, 3.5)))));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The basin with its modems, their ports, and what goes wrong when.
+//! The test basin with its modems, their ports, and the schedule of faults.
 
 use super::host::{FromHost, Line, Speed};
 use super::links::Links;
@@ -6,8 +6,8 @@ use super::orders::Order;
 use super::scenario::{Modem, Place, Scenario, Trouble, node};
 use super::{Pace, tcp};
 use scenecast_core::UserError;
-use sim_channel::modem::{Basin, Fault, Host};
-use sim_channel::{Channel, NodeId, Talker};
+use sim_channel::modem::{Basin, Fault, HostId};
+use sim_channel::{Channel, Interferer, NodeId};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::net::SocketAddr;
@@ -17,7 +17,7 @@ use tokio::sync::mpsc;
 
 /// Noise on a line comes in pieces, so that a line without pacing has it for as long.
 const NOISE_PIECE: Duration = Duration::from_millis(100);
-/// Bytes of noise in a piece: what 19200 baud carry.
+/// Bytes of noise in a piece, as 19200 baud carry.
 const NOISE_BYTES: u16 = 192;
 
 /// Everything that is emulated, and the ways to it.
@@ -37,9 +37,9 @@ pub struct Tank {
 /// The hosts at one modem.
 #[derive(Default)]
 struct Port {
-    /// The serial line, or what accepts TCP clients; `None` while it is unplugged.
+    /// The serial line or the TCP listener; `None` while it is unplugged.
     door: Option<Line>,
-    clients: BTreeMap<u32, (Host, Line)>,
+    clients: BTreeMap<u32, (HostId, Line)>,
     last_client: u32,
     /// The address that a TCP port had first, so that it comes back at the same.
     bound: Option<SocketAddr>,
@@ -65,11 +65,17 @@ impl Tank {
         let unix_s = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
         for (index, modem) in modems.iter().enumerate() {
             basin.add(node(index), modem.make.emulator(unix_s));
-            basin.channel().follow(node(index), modem.track.clone(), Duration::ZERO);
+            basin.channel().follow_track(node(index), modem.track.clone(), Duration::ZERO);
         }
         for (index, stranger) in (modems.len()..).zip(&strangers) {
             basin.channel().place(node(index), stranger.position);
-            basin.add_talker(Talker::new(node(index), stranger.bytes, stranger.airtime, stranger.mean_gap, seed));
+            basin.add_interferer(Interferer::new(
+                node(index),
+                stranger.bytes,
+                stranger.airtime,
+                stranger.mean_gap,
+                seed,
+            ));
         }
         for (from, to, loss) in losses {
             basin.channel().set_link_loss(from, to, loss);
@@ -86,13 +92,12 @@ impl Tank {
         Ok(tank)
     }
 
-    /// When something is due.
     pub fn poll_timeout(&self) -> Option<Duration> {
         let planned = self.plan.keys().next().map(|(at, _)| *at);
         [planned, self.basin.poll_timeout()].into_iter().flatten().min()
     }
 
-    /// Does everything that is due, and tells the hosts.
+    /// Runs everything that is due, and sends the output to the hosts.
     pub fn advance(&mut self, now: Duration) -> Result<(), UserError> {
         while let Some(entry) = self.plan.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((at, _), act) = entry.remove_entry();
@@ -110,7 +115,7 @@ impl Tank {
 
     fn tell_hosts(&mut self) {
         for (index, port) in self.ports.iter().enumerate() {
-            let first = self.basin.poll_bytes_for(node(index), Host::FIRST);
+            let first = self.basin.poll_bytes_for(node(index), HostId::FIRST);
             if let (Some(door), Place::Pty, false) = (&port.door, self.modems[index].place, first.is_empty()) {
                 door.tell(first);
             }
@@ -123,13 +128,12 @@ impl Tank {
         }
     }
 
-    /// Something from a port.
     pub fn handle_host(&mut self, from: FromHost, now: Duration) {
         match from {
             FromHost::Bytes { modem, line, bytes } => {
                 let client = self.ports[modem].clients.get(&line).map(|(host, _)| *host);
-                if let Some(host) = client.or((line == 0).then_some(Host::FIRST)) {
-                    self.basin.handle_bytes_of(node(modem), host, &bytes, now);
+                if let Some(host) = client.or((line == 0).then_some(HostId::FIRST)) {
+                    self.basin.handle_bytes_from(node(modem), host, &bytes, now);
                 }
             }
             FromHost::Joined { modem, stream } => {
@@ -138,7 +142,7 @@ impl Tank {
                     return;
                 }
                 let host = self.basin.attach(node(modem));
-                if host == Host::FIRST {
+                if host == HostId::FIRST {
                     tracing::warn!("{}: too many clients at once, one is turned away", self.modems[modem].name);
                     return;
                 }

@@ -1,7 +1,7 @@
 //! The true motion of a simulated vehicle, and the odometry of its drifting sensors.
 
 use scenecast_core::wrap_rad;
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 
 /// The measured displacement of a step, in error by the drift.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,7 +21,6 @@ pub struct Motion {
     pub y_m: f64,
     /// True heading clockwise from north, radians.
     pub heading_rad: f64,
-    /// Length of the true path so far, metres.
     pub distance_m: f64,
     speed_m_s: f64,
     scale_error: f64,
@@ -35,7 +34,7 @@ pub struct Motion {
     /// Where it believes to be, for a vehicle that reckons by itself.
     estimated: (f64, f64),
     rising: bool,
-    rng: Stream,
+    rng: RandomStream,
 }
 
 /// Speed up and down, metres a second: that of a small vehicle.
@@ -44,7 +43,7 @@ const VERTICAL_M_S: f64 = 0.3;
 impl Motion {
     /// At rest at a place; `drift` is the error of dead reckoning a metre of way.
     pub fn new(x_m: f64, y_m: f64, speed_m_s: f64, drift: f64, seed: u64) -> Self {
-        let mut rng = Stream::new(seed, &[1]);
+        let mut rng = RandomStream::new(seed, &[1]);
         let scale_error = drift * rng.normal();
         let heading_error_rad = drift * rng.normal();
         Self {

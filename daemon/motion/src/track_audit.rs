@@ -30,7 +30,9 @@ fn is_forbidden(p: (f64, f64), fence: &Fence) -> bool {
 
 /// How often an outline goes round a place, by the sum of the angles under which its edges are seen.
 fn winding(outline: &Polygon, (x, y): (f64, f64)) -> i32 {
-    let angle = |place: &scenecast_protocol::directive::Place| (place.metres().1 - y).atan2(place.metres().0 - x);
+    let angle = |place: &scenecast_protocol::coordinates::DecimetrePoint| {
+        (place.to_world().north_m - y).atan2(place.to_world().east_m - x)
+    };
     let turns = outline.0.iter().zip(outline.0.iter().cycle().skip(1)).map(|(a, b)| {
         let turn = angle(b) - angle(a);
         turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round()
@@ -41,12 +43,12 @@ fn winding(outline: &Polygon, (x, y): (f64, f64)) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::directive::Place;
+    use scenecast_protocol::coordinates::DecimetrePoint;
 
     #[test]
     fn what_lies_outside_or_in_a_keep_out_is_seen() {
         let square = |x: i32, side: i32| {
-            let place = |x_dm, y_dm| Place { x_dm: 10 * x_dm, y_dm: 10 * y_dm };
+            let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
             Polygon(vec![place(x, x), place(x + side, x), place(x + side, x + side), place(x, x + side)])
         };
         let fence = Fence { fence: Some(square(0, 20)), keep_outs: vec![square(8, 4)], return_point: None };

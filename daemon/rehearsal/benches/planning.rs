@@ -1,7 +1,8 @@
 //! `cargo bench -p scenecast --bench planning`: time of one plan on a map of 200 x 200 cells, half of it seen.
 
 use scenecast_core::Area;
-use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
+use scenecast_protocol::coordinates::DecimetrePoint;
+use scenecast_protocol::directive::{Fence, PlannerKind, Polygon, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_vehicle::{Footprint, Steering};
 
@@ -24,7 +25,7 @@ fn steering(kind: PlannerKind, sight_cells: f64) -> (Steering, LabelGrid, Utilit
     let sight = sight_cells * CELL_M;
     let area = Area { west: 0.0, south: 0.0, east: side, north: side };
     let mut steering = Steering::new(area, Footprint { across: sight, along: sight }, CELL_M, kind, 0.5);
-    let place = |x_dm, y_dm| Place { x_dm, y_dm };
+    let place = |x, y| DecimetrePoint::new(x, y);
     let fence = Polygon(vec![place(0, 0), place(480, 20), place(500, 480), place(30, 500)]);
     let keep_out = Polygon(vec![place(200, 200), place(260, 210), place(240, 280)]);
     steering.set_fence(&Fence { fence: Some(fence), keep_outs: vec![keep_out], return_point: None });

@@ -50,7 +50,7 @@ fn setting(sets: &[&str], loss: f64) -> ModemSetting {
 
 fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
     let mut config = config.clone();
-    config.modem.device = "emulated".into();
+    config.modem.device = Some("emulated".into());
     let profile = scenecast_drivers::modem::modem_of_process(&config, end).unwrap();
     modem::driver(&config, end, profile).unwrap()
 }
@@ -109,7 +109,7 @@ fn what_does_not_fit_is_refused_to_the_caller() {
 }
 
 #[test]
-fn addresses_out_of_reach_are_refused() {
+fn unreachable_addresses_are_refused() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
         let mut driver = driver(&config(sets), Address::SURFACE);
         for bad in [0, 10, 200] {
@@ -120,7 +120,7 @@ fn addresses_out_of_reach_are_refused() {
 }
 
 #[test]
-fn a_modem_with_a_wrong_address_is_refused() {
+fn a_modem_with_another_address_is_refused_and_stays_silent() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
         let mut bench = ModemBench::new(&setting(sets, 0.0), 5).unwrap();
         bench.inject(0, Fault::WrongAddress(7));

@@ -9,7 +9,7 @@ use scenecast_vehicle::Durable;
 use std::time::Duration;
 
 #[test]
-fn a_discovered_vehicle_gets_a_record_and_a_status() {
+fn a_vehicle_that_answers_a_discovery_call_gets_a_record() {
     let load = |sets: &[&str]| {
         scenecast_config::load(None, &sets.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()).unwrap()
     };
@@ -18,7 +18,7 @@ fn a_discovered_vehicle_gets_a_record_and_a_status() {
     let far = load(&["vehicle.address=3"]);
     let vehicle = scenecast_vehicle::assemble(&far, None, modem, area, Durable::default(), 7, Instant::ZERO).unwrap();
     let surface = scenecast_surface::assemble(
-        &load(&["link.call_every_s=60"]),
+        &load(&["link.discovery_period_s=60"]),
         None,
         TuningTable::shipped(),
         modem,
@@ -54,7 +54,7 @@ fn a_discovered_vehicle_gets_a_record_and_a_status() {
     let surface = surface.surface();
     assert_eq!(surface.desk(third).unwrap().name, "vehicle 3");
     assert!(surface.view(third).unwrap().status().is_some());
-    assert!(surface.view(Address::vehicle(1).unwrap()).unwrap().heard().is_none());
+    assert!(surface.view(Address::vehicle(1).unwrap()).unwrap().last_received().is_none());
 }
 
 #[test]

@@ -54,11 +54,11 @@ impl FramesLog {
     pub fn handle_fate(&mut self, arrival: &Arrival) {
         let Some(sent) = self.open.remove(&arrival.transmission) else { return };
         let fate = match &arrival.outcome {
-            sim_channel::Outcome::Lost { reason, .. } => {
+            sim_channel::ReceptionOutcome::Lost { reason, .. } => {
                 self.lost[usize::from(sent.direction == "down")] += 1;
                 format!("lost {reason:?}").to_lowercase()
             }
-            sim_channel::Outcome::Delivered { .. } => "ok".to_owned(),
+            sim_channel::ReceptionOutcome::Delivered { .. } => "ok".to_owned(),
         };
         sent.write(&fate, &mut self.text);
     }

@@ -1,7 +1,7 @@
 //! GPS receiver and compass of a rehearsed surface vehicle: their NMEA sentences.
 
 use scenecast_core::{LatLon, TangentPlane, nmea};
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 
 /// Standard deviation of the compass, degrees.
 const COMPASS_SIGMA_DEG: f64 = 0.5;
@@ -22,14 +22,14 @@ pub(super) struct Receiver {
 pub(super) struct Instruments {
     receiver: Receiver,
     plane: TangentPlane,
-    rng: Stream,
+    rng: RandomStream,
     slow_error: (f64, f64),
 }
 
 impl Instruments {
     pub(super) fn new(receiver: Receiver, seed: u64) -> Self {
         let plane = TangentPlane::new(receiver.origin);
-        Self { receiver, plane, rng: Stream::new(seed, &[9]), slow_error: (0.0, 0.0) }
+        Self { receiver, plane, rng: RandomStream::new(seed, &[9]), slow_error: (0.0, 0.0) }
     }
 
     /// Position and heading as NMEA 0183, once a second; `astray` is by how much the receiver is led astray.

@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn agreement_and_delay_follow_a_cell() {
+    fn agreement_and_delay_follow_a_cell_until_it_agrees() {
         let at = |s: f64| Instant::from_secs_f64(s);
         let (mut vehicle, mut operator) = (LabelGrid::default(), LabelGrid::default());
         let mut meter = Meter::default();

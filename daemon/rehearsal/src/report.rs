@@ -1,12 +1,12 @@
 //! The figures of a mission.
 
 use super::mission::Mission;
-use scene_model::tuning::mutual_information_nats;
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::schedule::Class;
-use scenecast_protocol::wire::SlotState;
+use scenecast_scoring::mutual_information_nats;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -86,7 +86,7 @@ fn map(m: &Mission) -> Value {
         "width": bounds.map_or(0, |b| b.width),
         "height": bounds.map_or(0, |b| b.height),
         "cell_m": m.cell_m(),
-        "codec": m.config.map.codec,
+        "codec": m.config.map.codec.to_string(),
         "versions": m.vehicle().map_version(),
         "updates_sent": stats.chunks_sent,
         "flips_suppressed": m.vehicle().flips_suppressed(),
@@ -95,7 +95,7 @@ fn map(m: &Mission) -> Value {
         "agreement_final": round(m.meters.labels.agreement()),
         "agreement_mean": round(m.meters.labels.agreement_mean_of_survey()),
         "age_s": summary(m.meters.labels.delays(m.now()).summary()),
-        "planes": m.vehicle().planes().map(|p| plane(m, p)).collect::<BTreeMap<_, _>>(),
+        "layers": m.vehicle().planes().map(|p| plane(m, p)).collect::<BTreeMap<_, _>>(),
     })
 }
 
@@ -136,7 +136,7 @@ fn link(m: &Mission) -> Value {
         let (loss, goodput) = (&heard_by.loss_in, &heard_by.goodput_in);
         json!({
             "sent_bps": round(audit.total_bits() as f64 / seconds),
-            "worst_window_bps": round(audit.worst_window_bps()),
+            "max_window_bps": round(audit.worst_window_bps()),
             "largest_transmission_bits": audit.largest_bits(),
             "frames_sent": m.frames().sent[i],
             "frames_lost": m.frames().lost[i],
@@ -151,7 +151,7 @@ fn link(m: &Mission) -> Value {
         "budget_window_s": m.config.link.budget_window_s,
         "frame_bytes": m.modem().frame_bytes,
         "sent_bps": round((up_audit.total_bits() + down_audit.total_bits()) as f64 / seconds),
-        "worst_window_bps": round(worst),
+        "max_window_bps": round(worst),
         "frames_sent": m.frames().sent.iter().sum::<u64>(),
         "frames_lost": m.frames().lost.iter().sum::<u64>(),
         "goodput_bps": round(goodput),
@@ -190,7 +190,7 @@ fn exemplars(m: &Mission) -> Value {
     json!({
         "requested": delivered + pages().filter(|page| page.asked.is_some()).count(),
         "delivered": delivered,
-        "unasked": pictures().filter(|p| !p.asked).count(),
+        "unrequested": pictures().filter(|p| !p.asked).count(),
         "bytes": pictures().map(|p| p.sent_bytes).sum::<usize>(),
     })
 }
@@ -198,7 +198,7 @@ fn exemplars(m: &Mission) -> Value {
 fn survey(m: &Mission) -> Value {
     json!({
         "distance_m": round(m.motion.distance_m),
-        "planner": m.config.survey.planner,
+        "planner": m.config.survey.planner.name(),
         "waypoints": m.logbook.legs.len(),
         "waypoints_outside_fence": m.legs_outside_fence(),
         "explored_cells": m.vehicle().map().explored(),

@@ -5,7 +5,7 @@ use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, Sentenc
 use scenecast_drivers::modem::s2c::{LineParser, S2c, S2cConfig, S2cMode};
 use scenecast_drivers::modem::{Class, Destination, Driver};
 use scenecast_protocol::time::Instant;
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 use std::time::Duration;
 
 /// Lines of an ordinary run; the long one is `SCENECAST_STORM_LINES=10000000`.
@@ -36,7 +36,7 @@ const SEEDS: [&[u8]; 22] = [
     b"$CACST,6,0,20250606230123.348554,06,32767,45,0102,0123,07,00,00,00,00,1,001,000,0,3,1,0,150*00\r\n",
 ];
 
-struct LineRng(Stream);
+struct LineRng(RandomStream);
 
 impl LineRng {
     fn below(&mut self, n: usize) -> usize {
@@ -115,7 +115,7 @@ fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
 
 #[test]
 fn any_lines_are_survived_by_drivers() {
-    let mut rng = LineRng(Stream::new(1, &[1]));
+    let mut rng = LineRng(RandomStream::new(1, &[1]));
     let mut drivers = drivers();
     let mut now = Instant::from_secs_f64(1.0);
     drivers.iter_mut().for_each(|d| d.handle_open(now));
@@ -130,7 +130,7 @@ fn any_lines_are_survived_by_drivers() {
 
 #[test]
 fn any_lines_are_survived_by_parsers_in_bounded_memory() {
-    let mut rng = LineRng(Stream::new(2, &[1]));
+    let mut rng = LineRng(RandomStream::new(2, &[1]));
     let (mut plain, mut wrapped, mut sentences) =
         (LineParser::default(), LineParser::default(), SentenceParser::default());
     wrapped.set_ties(true);

@@ -21,12 +21,12 @@ const IGNORE: u8 = 255;
 impl World {
     /// A procedural reef of about 26 x 18 m drawn from the scene model's own generative process.
     pub fn procedural(seed: u64, metres_per_pixel: f64) -> Self {
-        let reef = scene_model::generate::reef(seed, 2600, 1800, 25, 8);
+        let reef = scenecast_worlds::reef(seed, 2600, 1800, 25, 8);
         Self { image: reef.image, metres_per_pixel, classes: Some(reef.truth) }
     }
 
     /// A reef that was drawn before.
-    pub(crate) fn from_reef(reef: &scene_model::generate::Reef, metres_per_pixel: f64) -> Self {
+    pub(crate) fn from_reef(reef: &scenecast_worlds::Reef, metres_per_pixel: f64) -> Self {
         Self { image: reef.image.clone(), metres_per_pixel, classes: Some(reef.truth.clone()) }
     }
 
@@ -113,7 +113,7 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn north_is_at_the_top_and_turns_with_the_heading() {
+    fn the_camera_has_north_at_the_top_and_turns_with_the_heading() {
         let image = RgbImage::from_fn(200, 200, |x, y| Rgb([x as u8, y as u8, 0]));
         let world = World { image, metres_per_pixel: 0.1, classes: None };
         let north = world.view(10.0, 10.0, 0.0, 64, 64);

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_checkpoint_of_this_mission_continues_the_epoch() {
+    fn only_a_checkpoint_of_the_same_mission_continues_the_epoch() {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk).unwrap();
         let last = Durable { epoch: 4, labels: 7, ..durable };

@@ -191,7 +191,7 @@ fn a_label_keeps_its_meaning_wherever_the_power_is_cut() {
 }
 
 #[test]
-fn the_epoch_continues_only_with_a_checkpoint() {
+fn labels_continue_with_a_checkpoint_and_begin_again_without() {
     let mut trial = LabelTrial::new(5);
     trial.run().unwrap();
     trial.run().unwrap();

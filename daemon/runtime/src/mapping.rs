@@ -3,7 +3,7 @@
 use super::checkpoint::CheckpointFile;
 use super::clock::Clock;
 use super::journal::Folder;
-use scene_model::exemplars::Exemplar;
+use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
@@ -34,7 +34,7 @@ pub(super) struct Mapped {
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
-    pub(super) exemplars: BTreeMap<u8, Vec<Exemplar>>,
+    pub(super) exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
 }
 
 pub(super) struct MapperThread {

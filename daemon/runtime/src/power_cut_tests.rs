@@ -8,7 +8,8 @@ use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_host::{SurfaceHost, VehicleHost, VehicleHostEvent, channel_station};
-use scenecast_protocol::directive::{Fix, LifeLine, SlotId};
+use scenecast_protocol::coordinates::WorldPoint;
+use scenecast_protocol::directive::{Fix, OrderStatus, SlotId};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
@@ -125,7 +126,7 @@ impl PowerCutTrial {
 
     fn is_settled(&self) -> bool {
         let mut slots = self.surface.surface().view(self.auv()).unwrap().slots();
-        slots.all(|s| matches!(s.life, LifeLine::Applied | LifeLine::Refused(_)))
+        slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
     }
 
     fn tick(&mut self) {
@@ -137,7 +138,10 @@ impl PowerCutTrial {
             let Arrival { at_vehicle, bytes } = due.remove();
             match at_vehicle {
                 true => self.run_vehicle(Some(&bytes)),
-                false => self.surface.link_mut().handle_bytes(&bytes, now),
+                false => {
+                    let now = self.now();
+                    self.surface.link_mut().handle_bytes(&bytes, now);
+                }
             }
         }
         self.run_vehicle(None);
@@ -158,7 +162,11 @@ impl PowerCutTrial {
                 surface.set_hold(auv, true, now).unwrap();
                 surface.set_budget(5000, None, None, now).unwrap();
             }
-            60 => drop(surface.send_fix(auv, Fix { x_m: 1.0, y_m: 1.0, sigma_m: 1.0, age_s: 0.1 }, now).unwrap()),
+            60 => drop(
+                surface
+                    .send_fix(auv, Fix { position: WorldPoint::new(1.0, 1.0), sigma_m: 1.0, age_s: 0.1 }, now)
+                    .unwrap(),
+            ),
             90 => drop(surface.set_hold(auv, false, now).unwrap()),
             120 => drop(surface.set_utility(auv, &BTreeMap::new(), (0.5, 0.0), now).unwrap()),
             150 => surface.set_budget(9000, None, None, now).unwrap(),
@@ -285,7 +293,7 @@ fn start(config: &Config, disk: &Disk, rng: &mut DiskRng, cuts: &mut Vec<usize>,
 }
 
 #[test]
-fn a_power_cut_at_any_step_is_survived() {
+fn a_power_cut_applies_nothing_twice_and_keeps_label_meanings() {
     let mut whole = PowerCutTrial::new(1, 0, Vec::new());
     whole.run();
     assert_eq!(whole.acted.len(), 6, "every version comes through");
@@ -301,7 +309,7 @@ fn a_power_cut_at_any_step_is_survived() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
     #[test]
-    fn power_cuts_and_losses_apply_no_slot_twice(
+    fn power_cuts_and_losses_apply_nothing_twice(
         seed: u64, loss in 0usize..40, cuts in proptest::collection::vec(0usize..80, 1..8),
     ) {
         PowerCutTrial::new(seed, loss, cuts).run();
@@ -309,7 +317,7 @@ proptest! {
 }
 
 #[test]
-fn the_next_run_after_a_disk_failure_catches_up() {
+fn a_failing_disk_ends_the_run_and_the_next_run_catches_up() {
     for (seed, failing) in (0..50).flat_map(|seed| [(seed, DiskStep::Sync), (seed, DiskStep::Append)]) {
         let mut trial = PowerCutTrial::new(seed, 0, Vec::new());
         while trial.ticks < 29 {

@@ -9,7 +9,9 @@ use super::refusals::{Refusals, warn_without_key};
 use super::stop::Stop;
 use crate::port::FromPort;
 use scenecast_config::Config;
-use scenecast_console::{Ask, Console, LinkMeter, MissionFacts, Reply, Request, answer, bind, snapshot, start};
+use scenecast_console::{
+    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request, snapshot, start,
+};
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_core::world_file;
@@ -29,14 +31,14 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
-        let entrance = match config.console.listen.as_str() {
-            "" => None,
-            address => {
+        let listener = match &config.console.listen {
+            None => None,
+            Some(address) => {
                 let token = scenecast_config::load_token(&config)?;
-                Some(bind(address, "console.listen", token, &config.console.host).await?)
+                Some(bind(address.as_str(), "console.listen", token, &config.console.host).await?)
             }
         };
-        let dir = PathBuf::from(&config.runtime.state_dir);
+        let dir = config.runtime.state_dir.clone();
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
@@ -50,22 +52,22 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             super::random_bits(),
             clock.now(),
         )?;
-        if let Some(relay) = relay(&config)? {
+        if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
         }
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
-        let console = entrance.map(|entrance| {
-            println!("the operator's page is at http://{} (end with Ctrl-C)", config.console.listen);
-            start(entrance)
+        let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
+            println!("the operator's page is at http://{address} (end with Ctrl-C)");
+            start(listener)
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = ModemPort::open(&config, clock.now()).await?;
-        let instruments = Instruments::open(&config)?;
+        let instruments = Instruments::open(&config);
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
-        let ports = Ports { modem, instruments, pilot: PilotPort::open(&config, autopilot.is_some())? };
+        let ports = Ports { modem, instruments, pilot: PilotPort::open(&config, autopilot.is_some()) };
         let vehicle = scenecast_config::vehicle_address(&config)?;
         let p = &config.position;
         let follow = p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m));
@@ -118,7 +120,7 @@ impl SurfaceShell {
                     self.ports.instruments.handle(report, &mut self.host, self.clock.now());
                 }
                 report = self.ports.pilot.next() => self.handle_pilot(report),
-                (ask, reply) = next_request(&mut self.console) => self.answer(ask, reply),
+                (request, reply) = next_request(&mut self.console) => self.handle_request(request, reply),
             }
             self.host.handle_timeout(self.clock.now());
         }
@@ -133,9 +135,9 @@ impl SurfaceShell {
         }
     }
 
-    fn answer(&mut self, ask: Ask, reply: oneshot::Sender<Reply>) {
+    fn handle_request(&mut self, request: SurfaceRequest, reply: oneshot::Sender<Reply>) {
         // A browser that has gone away needs no answer.
-        let _ = reply.send(answer(self.host.surface_mut(), ask, self.facts.cell_m, self.clock.now()));
+        let _ = reply.send(handle_request(self.host.surface_mut(), request, self.facts.cell_m, self.clock.now()));
     }
 
     fn publish(&mut self) {
@@ -191,7 +193,7 @@ impl SurfaceShell {
             SurfaceOutput::ExemplarHere(vehicle, label) => {
                 tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
             }
-            SurfaceOutput::SlotSettled(..) | SurfaceOutput::Changed(_) => {}
+            SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
         Ok(())
     }
@@ -202,7 +204,7 @@ impl SurfaceShell {
         match *event {
             FrameEvent::Sent { bytes, .. } => self.meter.sent(bits_on_air(bytes), now),
             FrameEvent::Received { bytes } => {
-                self.meter.heard(bits_on_air(bytes), now);
+                self.meter.received(bits_on_air(bytes), now);
                 let surface = self.host.surface();
                 let views = surface.vehicles().filter_map(|(a, _)| surface.view(a));
                 views.for_each(|v| self.refusals.note(v.stats()));
@@ -231,7 +233,7 @@ impl SurfaceShell {
     }
 }
 
-async fn next_request(console: &mut Option<Console>) -> Request {
+async fn next_request(console: &mut Option<Console>) -> PendingRequest {
     let request = match console {
         Some(console) => console.requests.recv().await,
         None => None,

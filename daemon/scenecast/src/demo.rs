@@ -1,6 +1,6 @@
 //! A rehearsal at the pace of the world, with the operator's page.
 
-use scenecast_console::{Console, LinkMeter, MissionFacts, answer, bind, snapshot, start};
+use scenecast_console::{Console, LinkMeter, MissionFacts, bind, handle_request, snapshot, start};
 use scenecast_core::UserError;
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::Mission;
@@ -90,10 +90,10 @@ impl Demo {
 
     fn serve(&mut self, console: &mut Console, mut changed: bool) {
         let now = self.mission.now();
-        while let Ok((ask, reply)) = console.requests.try_recv() {
+        while let Ok((request, reply)) = console.requests.try_recv() {
             let cell_m = self.facts.cell_m;
             // A browser that has gone away needs no answer.
-            let _ = reply.send(answer(self.mission.surface_mut(), ask, cell_m, now));
+            let _ = reply.send(handle_request(self.mission.surface_mut(), request, cell_m, now));
             changed = true;
         }
         let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH);
@@ -109,7 +109,7 @@ impl Demo {
         let now = self.mission.now();
         let totals = [self.mission.received_bits(), self.mission.audits()[1].total_bits()];
         if totals[0] > self.counted[0] {
-            self.meter.heard(totals[0] - self.counted[0], now);
+            self.meter.received(totals[0] - self.counted[0], now);
         }
         if totals[1] > self.counted[1] {
             self.meter.sent(totals[1] - self.counted[1], now);

@@ -1,6 +1,6 @@
 //! Images of a vehicle's labels: those that are here, and those that are asked for.
 
-use scenecast_protocol::directive::{Request, Requests};
+use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::time::Instant;
@@ -32,10 +32,8 @@ pub enum AskState {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
     /// What the vehicle is asked.
-    pub request: Request,
-    /// How far it is.
+    pub request: ExemplarRequest,
     pub state: AskState,
-    /// When that last changed.
     pub changed: Instant,
 }
 
@@ -46,11 +44,9 @@ pub struct Picture {
     pub number: u8,
     /// Its size: an edge of 64 << `size` pixels.
     pub size: u8,
-    /// The file.
     pub webp: Vec<u8>,
     /// Bytes of it that came over the water.
     pub sent_bytes: usize,
-    /// When it came.
     pub came: Instant,
     /// Whether somebody had asked for it.
     pub asked: bool,
@@ -74,13 +70,13 @@ pub struct Album {
 
 impl Album {
     /// Requests at a time: as many as a vehicle takes.
-    const MOST_ASKED: usize = 8;
+    const MAX_ASKED: usize = 8;
     /// Images that are kept of a label.
-    const MOST_OF_LABEL: usize = 8;
+    const MAX_OF_LABEL: usize = 8;
     /// Bytes that are kept; the oldest images go.
-    const MOST_BYTES: usize = 1 << 20;
+    const MAX_BYTES: usize = 1 << 20;
     /// The largest size that is asked for.
-    pub const LARGEST: u8 = 1;
+    pub const MAX_SIZE: u8 = 1;
 
     /// What there is of a label.
     pub fn page(&self, label: u8) -> Option<&Page> {
@@ -95,17 +91,17 @@ impl Album {
     /// Asks for an image of a label in place of what was asked of it before. The error is one line for the operator.
     pub fn ask(&mut self, label: u8, wish: Wish, now: Instant) -> Result<(), String> {
         let others = self.pages.iter().filter(|(l, p)| **l != label && p.is_open()).count();
-        if others >= Self::MOST_ASKED {
+        if others >= Self::MAX_ASKED {
             return Err(format!("{others} images are on their way: wait for one, or cancel one"));
         }
-        let mut request = Request { label, ..Request::default() };
+        let mut request = ExemplarRequest { label, ..ExemplarRequest::default() };
         let page = self.pages.get(&label);
         if let Wish::Larger(number) = wish {
             let picture = page.and_then(|p| p.picture(number)).ok_or_else(|| match number {
                 Some(number) => format!("picture {number} of label {label} is not here"),
                 None => format!("no image of label {label} is here yet: ask for one first"),
             })?;
-            if picture.size >= Self::LARGEST {
+            if picture.size >= Self::MAX_SIZE {
                 let edge = edge_px(picture.size);
                 return Err(format!(
                     "picture {} of label {label} is as large as they come: {edge} pixels",
@@ -128,9 +124,9 @@ impl Album {
     }
 
     /// Requests that are not met yet.
-    pub fn wanted(&self, epoch: u8) -> Requests {
+    pub fn wanted(&self, epoch: u8) -> ExemplarRequests {
         let open = self.pages.values().filter(|page| page.is_open());
-        Requests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
+        ExemplarRequests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
     }
 
     /// The vehicle refused what is asked for.
@@ -165,7 +161,7 @@ impl Album {
         let sent_bytes = exemplar.encode().len();
         page.pictures.retain(|p| p.number != number);
         page.pictures.push(Picture { number, size, webp, sent_bytes, came: now, asked });
-        if page.pictures.len() > Self::MOST_OF_LABEL {
+        if page.pictures.len() > Self::MAX_OF_LABEL {
             page.pictures.remove(0);
         }
         self.make_room();
@@ -175,7 +171,7 @@ impl Album {
     fn make_room(&mut self) {
         let bytes =
             |pages: &BTreeMap<u8, Page>| pages.values().flat_map(|p| &p.pictures).map(|p| p.webp.len()).sum::<usize>();
-        while bytes(&self.pages) > Self::MOST_BYTES {
+        while bytes(&self.pages) > Self::MAX_BYTES {
             let with_some = self.pages.values_mut().filter(|page| !page.pictures.is_empty());
             let Some(page) = with_some.min_by_key(|page| page.pictures.first().map(|p| p.came)) else { return };
             page.pictures.remove(0);
@@ -208,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_is_met_by_its_own_answer_and_a_larger_one_takes_the_place_of_the_smaller() {
+    fn a_request_takes_its_own_reply_and_a_larger_image_replaces() {
         let mut album = Album::default();
         assert_eq!(
             album.ask(5, Wish::Larger(None), NOW).unwrap_err(),
@@ -217,14 +213,14 @@ mod tests {
         album.ask(5, Wish::Another, NOW).unwrap();
         assert_eq!(
             album.wanted(3),
-            Requests { epoch: 3, wanted: vec![Request { label: 5, serial: 1, size: 0, picture: 0 }] }
+            ExemplarRequests { epoch: 3, wanted: vec![ExemplarRequest { label: 5, serial: 1, size: 0, picture: 0 }] }
         );
         album.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
         assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
         assert!(album.handle_exemplar(&come(5, 1, 0, 9), NOW));
         assert!(album.wanted(3).wanted.is_empty());
         album.ask(5, Wish::Larger(None), NOW).unwrap();
-        assert_eq!(album.wanted(3).wanted, [Request { label: 5, serial: 2, size: 1, picture: 9 }]);
+        assert_eq!(album.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
         assert!(album.handle_exemplar(&come(5, 2, 1, 9), NOW));
         let sizes: Vec<(u8, u8)> = album.page(5).unwrap().pictures.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
@@ -234,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cancelled_or_refused_is_wanted_no_more_and_what_is_here_stays() {
+    fn cancelled_and_refused_requests_end_and_images_stay() {
         let mut album = Album::default();
         assert!(album.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
         assert!(!album.page(5).unwrap().pictures[0].asked);
@@ -278,8 +274,8 @@ mod tests {
             }
         }
         let kept: Vec<&Picture> = album.pages().flat_map(|(_, page)| &page.pictures).collect();
-        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= Album::MOST_BYTES);
+        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= Album::MAX_BYTES);
         assert!(kept.len() > 60 && kept.iter().all(|p| p.number > 15), "the newest are kept");
-        assert!(album.pages().all(|(_, page)| page.pictures.len() <= Album::MOST_OF_LABEL));
+        assert!(album.pages().all(|(_, page)| page.pictures.len() <= Album::MAX_OF_LABEL));
     }
 }

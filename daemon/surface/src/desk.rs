@@ -4,7 +4,7 @@ use super::album::Album;
 use super::pauses::Pauses;
 use super::settings::SettingsDesk;
 use scenecast_core::UsblLine;
-use scenecast_protocol::directive::{Fence, Limits, Requests, SlotId, Utility};
+use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
@@ -14,7 +14,6 @@ use std::collections::VecDeque;
 /// The operator's papers about one vehicle.
 #[derive(Debug)]
 pub struct Desk {
-    /// Name for people.
     pub name: String,
     /// The utility that was sent last.
     pub utility: Utility,
@@ -28,11 +27,9 @@ pub struct Desk {
     pub limits_in_force: Option<(u16, Limits)>,
     /// The settings that were asked for, and those in force.
     pub settings: SettingsDesk,
-    /// Images of labels.
     pub album: Album,
     /// Where the vehicle said it was: time, east, north.
     pub track: VecDeque<(Instant, f64, f64)>,
-    /// Epoch of the labels.
     pub epoch: u8,
     /// The last whole map, where the vehicle sends those.
     pub whole: Option<LabelGrid>,
@@ -48,7 +45,6 @@ impl Desk {
     /// Places of the track that are kept.
     const TRACK: usize = 500;
 
-    /// An empty desk.
     pub fn new(name: String) -> Self {
         Self {
             name,
@@ -75,7 +71,7 @@ impl Desk {
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
             self.album = Album::default();
         }
-        self.track.push_back((now, status.x_m, status.y_m));
+        self.track.push_back((now, status.position.x_m, status.position.y_m));
         if self.track.len() > Self::TRACK {
             self.track.pop_front();
         }
@@ -102,7 +98,7 @@ impl Desk {
     }
 
     /// Images that are asked for and not here.
-    pub fn wanted(&self) -> Requests {
+    pub fn wanted(&self) -> ExemplarRequests {
         self.album.wanted(self.epoch)
     }
 }

@@ -1,6 +1,7 @@
 //! What the operator types, as slots of the directive. Every refusal is one line that says what is allowed.
 
-use scenecast_protocol::directive::{Band, Fence, Limits, Place, Polygon, Reaction};
+use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
+use scenecast_protocol::directive::{Band, Fence, Limits, Polygon, Reaction};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -51,7 +52,7 @@ pub struct LimitsOrder {
 
 impl From<&Fence> for FenceOrder {
     fn from(fence: &Fence) -> Self {
-        let vertex = |p: &Place| [p.metres().0, p.metres().1];
+        let vertex = |p: &DecimetrePoint| [p.to_world().east_m, p.to_world().north_m];
         let outline = |p: &Polygon| p.0.iter().map(vertex).collect();
         Self {
             fence: fence.fence.as_ref().map(outline),
@@ -97,8 +98,8 @@ impl LimitsOrder {
         let limits = Limits {
             depth: self.depth_m.map(|b| band("depth_m", b)).transpose()?,
             altitude: self.altitude_m.map(|b| band("altitude_m", b)).transpose()?,
-            distance_m: self.distance_m.map(|v| whole("distance_m", v, Limits::MOST)).transpose()?,
-            time_s: self.time_s.map(|v| whole("time_s", v, Limits::MOST)).transpose()?,
+            distance_m: self.distance_m.map(|v| whole("distance_m", v, Limits::MAX)).transpose()?,
+            time_s: self.time_s.map(|v| whole("time_s", v, Limits::MAX)).transpose()?,
             silence_s: self.silence_s.map(|v| whole("silence_s", v, u16::MAX.into())).transpose()?.map(|s| s as u16),
             on_silence: reaction("on_silence", self.on_silence.as_deref())?,
             on_breach: reaction("on_breach", self.on_breach.as_deref())?,
@@ -113,9 +114,9 @@ fn outline(what: &str, vertices: &[[f64; 2]]) -> Result<Polygon, String> {
     vertices.iter().map(|&v| place(what, v)).collect::<Result<_, _>>().map(Polygon)
 }
 
-fn place(what: &str, [x, y]: [f64; 2]) -> Result<Place, String> {
+fn place(what: &str, [x, y]: [f64; 2]) -> Result<DecimetrePoint, String> {
     let far = format!("{what}: [{x}, {y}] is no place within 838 km of the origin");
-    Place::from_metres(x, y).ok_or(far)
+    DecimetrePoint::nearest(WorldPoint::new(x, y)).ok_or(far)
 }
 
 fn band(what: &str, [low, high]: [f64; 2]) -> Result<Band, String> {
@@ -181,8 +182,8 @@ mod tests {
         let sent =
             fence(r#"{"fence": [[0,0],[9.04,0],[9,9]], "keep_outs": [[[4,1],[5,1],[5,2]]], "return_point": [8,1]}"#);
         let sent = sent.unwrap();
-        assert_eq!(sent.fence.unwrap().0[1], Place { x_dm: 90, y_dm: 0 });
-        assert_eq!((sent.keep_outs.len(), sent.return_point), (1, Some(Place { x_dm: 80, y_dm: 10 })));
+        assert_eq!(sent.fence.unwrap().0[1], DecimetrePoint::new(90, 0));
+        assert_eq!((sent.keep_outs.len(), sent.return_point), (1, Some(DecimetrePoint::new(80, 10))));
         assert_eq!(fence("{}"), Ok(Fence::default()), "lifts the fence");
         let sent = limits(r#"{"depth_m": [5, 40], "silence_s": 600, "on_silence": "return"}"#).unwrap();
         assert_eq!(sent.depth, Some(Band { low_dm: 50, high_dm: 400 }));

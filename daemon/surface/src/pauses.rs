@@ -16,7 +16,6 @@ impl Pauses {
     /// A pause up to this length is as usual as it is long.
     const SHORT: Duration = Duration::from_secs(60);
 
-    /// A frame was heard.
     pub fn hear(&mut self, now: Instant) {
         let Some(last) = self.heard.replace(now) else { return };
         let pause = now.since(last);
@@ -55,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn no_pause_between_turns_looks_like_silence_however_many_frames_a_turn_has() {
+    fn no_pause_between_turns_counts_as_silence() {
         for (frames, frame_ms, pause_s) in [(2, 200, 10), (60, 200, 10), (3, 5000, 120), (20, 6000, 240)] {
             let most = worst(frames, Duration::from_millis(frame_ms), Duration::from_secs(pause_s));
             assert!(most < 2.0, "{frames} frames, then {pause_s} s: {most} times what was expected");

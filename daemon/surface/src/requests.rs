@@ -2,7 +2,7 @@
 
 use super::album::{Album, Wish};
 use super::{Desk, Surface};
-use scenecast_protocol::directive::{LifeLine, Slot, SlotId, SlotProgress};
+use scenecast_protocol::directive::{OrderStatus, Slot, SlotId, SlotProgress};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 
@@ -44,7 +44,7 @@ impl Surface {
     }
 
     pub(super) fn handle_settled(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
-        let refused = |s: &SlotProgress| s.id == slot && matches!(s.life, LifeLine::Refused(_));
+        let refused = |s: &SlotProgress| s.id == slot && matches!(s.status, OrderStatus::Refused(_));
         let is_refused = self.link.vehicle(vehicle).is_some_and(|v| v.slots().any(refused));
         if let Some(desk) = self.desks.get_mut(&vehicle).filter(|_| slot == SlotId::Requests && is_refused) {
             desk.album.handle_refusal(now);

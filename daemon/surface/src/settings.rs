@@ -1,6 +1,6 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, LifeLine, PlaneSet, PlannerKind, Settings};
+use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlaneSet, PlannerKind, Settings};
 use scenecast_protocol::map::PlaneKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -15,8 +15,8 @@ pub struct SettingsOrder {
     /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
     /// first where there is much to say. The cells of its model stay.
     pub cells: Option<String>,
-    /// Planes that it tells beside the labels: none, or different ones of confidence, depth, curiosity with commas between.
-    pub planes: Option<String>,
+    /// The layers that it sends in addition to the labels: none, or different ones of confidence, depth, curiosity, separated by commas.
+    pub layers: Option<String>,
     /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
     pub alpha: Option<f64>,
     /// Prior weight of each word in a label, 1e-9 to 1e3.
@@ -48,8 +48,8 @@ impl SettingsOrder {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
             planes: choice(
-                "planes",
-                &self.planes,
+                "layers",
+                &self.layers,
                 plane_set,
                 "none, or different ones of confidence, depth, curiosity",
             )?,
@@ -104,7 +104,7 @@ impl From<&Settings> for SettingsOrder {
         Self {
             planner: told(settings.planner, String::new(), |p| text(p.name())),
             cells: told(settings.cells, String::new(), |c| text(c.name())),
-            planes: told(settings.planes, String::new(), plane_names),
+            layers: told(settings.planes, String::new(), plane_names),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -136,20 +136,20 @@ impl SettingsDesk {
     }
 
     /// What is to go out for an order: what was asked for before it included, but for what the vehicle has refused.
-    pub(super) fn next_order(&self, order: &Settings, last: Option<LifeLine>) -> Settings {
-        let base = if matches!(last, Some(LifeLine::Refused(_))) { &self.in_force } else { &self.asked };
+    pub(super) fn next_order(&self, order: &Settings, last: Option<OrderStatus>) -> Settings {
+        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.asked };
         base.then(order)
     }
 
     /// That has gone out, after an order that had come as far as `last`.
-    pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<LifeLine>) {
-        self.is_unsure |= matches!(last, Some(LifeLine::OnAir | LifeLine::Heard));
+    pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<OrderStatus>) {
+        self.is_unsure |= matches!(last, Some(OrderStatus::OnAir | OrderStatus::Received));
         self.asked = settings;
     }
 
     /// The vehicle has decided about the last order.
-    pub(super) fn handle_settled(&mut self, life: LifeLine) {
-        if life == LifeLine::Applied {
+    pub(super) fn handle_settled(&mut self, life: OrderStatus) {
+        if life == OrderStatus::Applied {
             (self.in_force, self.is_unsure) = (self.asked, false);
         }
     }
@@ -182,7 +182,7 @@ mod tests {
             "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
         );
         for planes in ["perplexity", "depth,depth", "depth,", "none,depth"] {
-            let said = refused(&format!(r#"{{"planes": "{planes}"}}"#));
+            let said = refused(&format!(r#"{{"layers": "{planes}"}}"#));
             assert!(said.contains("none, or different ones of confidence, depth, curiosity"), "{said}");
         }
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
@@ -191,24 +191,24 @@ mod tests {
 
     #[test]
     fn an_order_is_told_as_it_was_typed() {
-        let typed = r#"{"planner":"","cells":"coarse","planes":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
+        let typed = r#"{"planner":"","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
         assert_eq!(SettingsOrder::from(&order.read().unwrap()), order);
-        let planes = |names: &str| read(&format!(r#"{{"planes": "{names}"}}"#)).unwrap();
-        let told = |names: &str| SettingsOrder::from(&planes(names)).planes.unwrap();
+        let planes = |names: &str| read(&format!(r#"{{"layers": "{names}"}}"#)).unwrap();
+        let told = |names: &str| SettingsOrder::from(&planes(names)).layers.unwrap();
         assert_eq!(["none", "curiosity, depth"].map(told), ["none", "depth,curiosity"]);
         assert_eq!(read("{}").unwrap(), Settings::default());
     }
 
     #[test]
     fn what_is_allowed_is_what_the_configuration_allows() {
-        use scenecast_config::{Allowed, KEYS};
+        use scenecast_config::Key;
         let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
         for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().figures()) {
-            let key = KEYS.iter().find(|k| k.name == name).unwrap();
+            let key = Key::find(name).unwrap();
             // 0 words a second is a configuration's way to have no refinement.
             let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };
-            assert_eq!(key.allowed, Allowed::Range(low, *range.end()), "{name}");
+            assert_eq!(key.rule.range, (low, *range.end()), "{name}");
         }
     }
 
@@ -222,17 +222,17 @@ mod tests {
         };
         send(&mut desk, r#"{"alpha": 0.5}"#, None);
         assert_eq!(desk.in_force(), Some(&Settings::default()));
-        send(&mut desk, r#"{"gamma": 0.1}"#, Some(LifeLine::Queued));
-        desk.handle_settled(LifeLine::Applied);
+        send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
+        desk.handle_settled(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"planes": "confidence,depth"}"#, Some(LifeLine::Applied));
-        send(&mut desk, r#"{"beta": 1}"#, Some(LifeLine::Heard));
+        send(&mut desk, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
+        send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
         assert_eq!(desk.in_force(), None, "the vehicle may follow the planes already");
-        let refused = LifeLine::Refused(RefusalReason::OutOfRange);
+        let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
         desk.handle_settled(refused);
         send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
         assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        desk.handle_settled(LifeLine::Applied);
+        desk.handle_settled(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(desk.asked()));
     }
 }

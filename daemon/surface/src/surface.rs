@@ -7,13 +7,13 @@ use super::settings::SettingsOrder;
 use scenecast_core::UsblLine;
 use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
-use scenecast_protocol::directive::{Budget, Constraints, Fix, LifeLine, Slot, SlotId, Utility};
+use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::schedule::{Shares, SpendOrder};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::wire::{Address, Placement};
 use std::collections::{BTreeMap, VecDeque};
 
 /// What the surface tells its host.
@@ -26,12 +26,11 @@ pub enum SurfaceOutput {
     /// An image of a label is here.
     ExemplarHere(Address, u8),
     /// A slot is in force or was refused.
-    SlotSettled(Address, SlotId),
+    SlotDecided(Address, SlotId),
     /// Anything else that the operator's page shows.
     Changed(Address),
 }
 
-/// The surface.
 pub struct Surface {
     pub(super) link: SurfaceLink,
     pub(super) desks: BTreeMap<Address, Desk>,
@@ -61,7 +60,6 @@ impl Surface {
         format!("vehicle {}", vehicle.number())
     }
 
-    /// The vehicles.
     pub fn vehicles(&self) -> impl Iterator<Item = (Address, &Desk)> {
         self.desks.iter().map(|(&a, d)| (a, d))
     }
@@ -100,7 +98,7 @@ impl Surface {
 
     /// Frames that no known vehicle has sent, or that could not be read.
     pub fn strangers(&self) -> u64 {
-        self.link.strangers()
+        self.link.unknown_senders()
     }
 
     /// An earlier run may have sent until `now`: the budget counts as spent.
@@ -195,8 +193,8 @@ impl Surface {
     }
 
     /// How far the last order of a slot has come.
-    fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<LifeLine> {
-        self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.life)
+    fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
+        self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
     /// What the vehicles spend left-over bits on, as it was configured or sent last.
@@ -236,12 +234,10 @@ impl Surface {
         Ok(())
     }
 
-    /// Sends a position fix.
     pub fn send_fix(&mut self, vehicle: Address, fix: Fix, now: Instant) -> Result<u16, String> {
         self.issue(vehicle, Slot::Fix(fix), now)
     }
 
-    /// Gives it a GPS.
     pub fn set_relay(&mut self, relay: Relay) {
         self.relay = Some(relay);
     }
@@ -256,7 +252,6 @@ impl Surface {
         self.relay.as_mut().map_or(b"", |relay| relay.handle_gps_open())
     }
 
-    /// Bytes of the GPS.
     pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
         self.relay.iter_mut().for_each(|relay| relay.handle_gps(bytes, now));
     }
@@ -279,8 +274,7 @@ impl Surface {
     pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
         let view = self.link.vehicle(vehicle)?;
         let (status, _) = view.status()?;
-        let at = (status.x_m, status.y_m);
-        Some(status.placement.map_or(at, |p| p.to_world(at)))
+        Some(Placement::map_to_world(status.placement, status.position).xy())
     }
 
     pub(super) fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, String> {
@@ -298,7 +292,6 @@ impl Surface {
         Some(cells)
     }
 
-    /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
         while let Some(event) = self.link.poll_event() {
@@ -307,7 +300,7 @@ impl Surface {
             }
         }
         let link = &self.link;
-        let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.heard()) == Some(now);
+        let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
         self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.hear(now));
     }
 
@@ -322,18 +315,18 @@ impl Surface {
                 self.ask_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
-            SurfaceEvent::SlotSettled(vehicle, slot) => {
+            SurfaceEvent::SlotDecided(vehicle, slot) => {
                 let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
-                let (life, version) = (settled.life, settled.version);
+                let (life, version) = (settled.status, settled.version);
                 let desk = self.desks.get_mut(&vehicle)?;
                 if slot == SlotId::Settings {
                     desk.settings.handle_settled(life);
                 }
-                if life == LifeLine::Applied {
+                if life == OrderStatus::Applied {
                     desk.handle_applied(slot, version);
                 }
                 self.handle_settled(vehicle, slot, now);
-                Some(SurfaceOutput::SlotSettled(vehicle, slot))
+                Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;

@@ -1,9 +1,9 @@
 //! From a configuration to a vehicle.
 
 use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
-use scenecast_config::{Config, background, cell_m, vehicle_address};
+use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
-use scenecast_protocol::directive::{PlaneSet, PlannerKind, Reaction};
+use scenecast_protocol::directive::PlaneSet;
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
@@ -29,15 +29,15 @@ pub fn assemble(
         modem,
         budget_bps: durable.budget_bps.unwrap_or(config.link.budget_bps),
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),
-        shares: Shares(durable.shares.unwrap_or(config.link.shares)),
+        shares: durable.shares.map_or(config.link.shares, Shares),
         status_period: Duration::from_secs_f64(config.link.status_period_s),
         authenticity,
     };
-    let codec = config.map.codec.parse().unwrap_or_default();
+    let codec = config.map.codec;
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     link.set_planes(planes(config, codec));
-    link.source_mut().set_settle_time(Duration::from_secs_f64(config.map.settle_s));
-    let planner = PlannerKind::from_name(&config.survey.planner).unwrap_or(PlannerKind::Horizon);
+    link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
+    let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
@@ -46,16 +46,15 @@ pub fn assemble(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
-    link.set_spend(durable.spend.and_then(SpendOrder::from_code).unwrap_or_else(|| background(config)));
+    link.set_spend(durable.spend.and_then(SpendOrder::from_code).unwrap_or(config.link.background));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, told_planes(config));
-    if config.map.stream == "whole-png" {
+    vehicle.configure_telling(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, told_planes(config));
+    if config.map.stream == MapStream::WholePng {
         vehicle.send_whole_png();
     }
     Ok(vehicle)
 }
 
-/// What the camera sees.
 fn footprint(config: &Config) -> Footprint {
     let mpp = config.camera.metres_per_pixel;
     Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }
@@ -64,11 +63,10 @@ fn footprint(config: &Config) -> Footprint {
 /// What the vehicle does of its own accord.
 fn habits(config: &Config) -> Habits {
     let survey = &config.survey;
-    let reaction = |name: &str| Reaction::from_name(name).unwrap_or(Reaction::Return);
     Habits {
-        on_silence: reaction(&survey.on_silence),
-        on_breach: reaction(&survey.on_breach),
-        on_abort: reaction(&survey.on_abort),
+        on_silence: survey.on_silence,
+        on_breach: survey.on_breach,
+        on_abort: survey.on_abort,
         silence_s: if survey.max_silence_s > 0.0 { survey.max_silence_s } else { f64::INFINITY },
         speed_m_s: survey.speed_m_s,
         altitude_m: survey.altitude_m,
@@ -77,19 +75,20 @@ fn habits(config: &Config) -> Habits {
 
 /// The planes of the map that are told.
 fn told_planes(config: &Config) -> PlaneSet {
-    PlaneSet::of(|kind| config.map.planes.iter().any(|name| name == kind.name()))
+    PlaneSet::of(|kind| config.map.layers.iter().any(|layer| layer.as_str() == kind.name()))
 }
 
 /// Every plane that the operator could ask for, and its part of the map's share in percent.
 fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u8)> {
     let map = &config.map;
-    let settle = Duration::from_secs_f64(map.settle_s);
+    let settle = Duration::from_secs_f64(map.debounce_s);
     let scale = |kind| match kind {
         PlaneKind::Confidence => PlaneScale::Confidence,
         PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),
         PlaneKind::Curiosity => PlaneScale::Curiosity,
     };
-    let planes = PlaneKind::ALL.into_iter().zip(map.plane_shares);
-    let possible = planes.filter(|_| map.stream == "delta");
+    let share = |kind: PlaneKind| LayerName::new(kind.name()).and_then(|layer| map.layer_shares.get(&layer).copied());
+    let planes = PlaneKind::ALL.into_iter().map(move |kind| (kind, share(kind).unwrap_or(0)));
+    let possible = planes.filter(|_| map.stream == MapStream::Delta);
     possible.map(move |(kind, share)| (PlaneSource::new(scale(kind), codec, settle), share))
 }

@@ -33,7 +33,6 @@ pub enum NoCheckpoint {
     Config(#[from] UserError),
 }
 
-/// What is kept.
 #[derive(Serialize, Deserialize)]
 struct Kept<M, B, W, E, R> {
     lineage: u64,
@@ -47,9 +46,7 @@ struct Kept<M, B, W, E, R> {
 
 /// A mapper that goes on where a checkpoint left it, and the mission that it belongs to.
 pub struct Restored {
-    /// The mapper.
     pub mapper: Mapper,
-    /// As [`super::Durable::lineage`].
     pub lineage: u64,
 }
 
@@ -82,7 +79,7 @@ impl Mapper {
         if *model.config() != configured || words != configured_words.config() {
             return Err(NoCheckpoint::OtherParameters);
         }
-        if !config.scene.vocabulary.is_empty() && !is_same(&kept.words, &configured_words) {
+        if config.scene.vocabulary.is_some() && !is_same(&kept.words, &configured_words) {
             return Err(NoCheckpoint::OtherParameters);
         }
         let mut mapper = fresh;
@@ -138,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn other_priors_do_not_cost_the_checkpoint_and_those_in_force_go_on() {
+    fn a_checkpoint_survives_other_priors() {
         let figure = |value: f64| Change::To(Figure::new(value).unwrap());
         let settings = Settings { gamma: figure(0.2), alpha: figure(0.5), ..Settings::default() };
         let mut whole = Mapper::new(&config(&[]), None, 3, 1).unwrap();

@@ -7,11 +7,9 @@ use scenecast_protocol::wire::ModeReason;
 /// What the vehicle does where the operator's limits say nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Habits {
-    /// On silence.
     pub on_silence: Reaction,
     /// Outside the fence or a band.
     pub on_breach: Reaction,
-    /// On an abort.
     pub on_abort: Reaction,
     /// Seconds of silence that are allowed; infinite: any.
     pub silence_s: f64,
@@ -41,13 +39,10 @@ pub type Stop = (Reaction, ModeReason);
 #[derive(Debug)]
 pub struct Guard {
     habits: Habits,
-    /// Limits in force.
     pub limits: Limits,
-    /// Order in force.
     pub order: Constraints,
     /// Metres gone since the limits are in force.
     pub used_m: f64,
-    /// Seconds since then.
     pub used_s: f64,
     /// A breach, until the operator's next order or fence; silence that made the vehicle come up.
     pub latched: ModeReason,
@@ -65,7 +60,6 @@ impl Guard {
         Self { habits, limits, order, used_m: 0.0, used_s: 0.0, latched, heard: now, now }
     }
 
-    /// The time is `now`.
     pub fn handle_time(&mut self, now: Instant) {
         self.used_s += now.since(self.now).as_secs_f64();
         self.now = now;
@@ -169,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_makes_the_vehicle_do_as_it_is_set_until_somebody_is_heard() {
+    fn silence_triggers_the_policy_until_the_surface_is_received() {
         let mut guard = Guard::new(Habits::default(), at(0.0));
         guard.set_limits(Limits { silence_s: Some(60), on_silence: Some(Reaction::Hold), ..Limits::default() });
         guard.handle_time(at(60.0));
@@ -181,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_that_came_up_in_silence_stays_up_until_it_is_ordered_on() {
+    fn a_vehicle_surfaced_by_silence_waits_for_an_order() {
         let mut guard =
             Guard::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
         guard.handle_time(at(61.0));

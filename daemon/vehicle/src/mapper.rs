@@ -3,13 +3,12 @@
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
 use image::RgbImage;
-use scene_model::exemplars::{Exemplar, ExemplarStore};
+use scene_model::exemplars::{ExemplarPatch, ExemplarStore};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{Measures, WordConfig, WordExtractor};
-use scenecast_config::Config;
-use scenecast_config::cell_m;
+use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Figure, Settings};
 use scenecast_protocol::map::{Cell, PlaneKind};
@@ -29,7 +28,6 @@ pub struct MapUpdate {
     pub cells: Vec<(Cell, u8)>,
     /// How sure the model is of these labels, 0 to 1, depths of the sea floor there, metres, and mean surprise of a word, bits.
     pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
-    /// Labels given so far.
     pub labels: u8,
     /// How badly the model explains each cell.
     pub perplexity: Vec<(Cell, f32)>,
@@ -70,10 +68,10 @@ impl Mapper {
         let extractor =
             vocabulary.map_or_else(|| WordExtractor::new(&WordConfig::default()), WordExtractor::from_measures);
         let cell_m = cell_m(config);
-        let birth = match config.scene.birth.as_str() {
-            "collapsed" => Birth::Collapsed,
-            "rost" => Birth::Rost,
-            _ => Birth::Literal,
+        let birth = match config.scene.birth {
+            BirthRule::Literal => Birth::Literal,
+            BirthRule::Collapsed => Birth::Collapsed,
+            BirthRule::Rost => Birth::Rost,
         };
         let scene = SceneConfig {
             cell_m: [cell_m, cell_m, 1e4],
@@ -197,12 +195,12 @@ impl Mapper {
     }
 
     /// The images that represent a label best so far, the best first.
-    pub fn exemplars(&self, label: u8) -> &[Exemplar] {
+    pub fn exemplars(&self, label: u8) -> &[ExemplarPatch] {
         self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
     }
 
     /// The images of all labels that have some.
-    pub fn gallery(&self) -> BTreeMap<u8, Vec<Exemplar>> {
+    pub fn gallery(&self) -> BTreeMap<u8, Vec<ExemplarPatch>> {
         let labels = self.book.labels();
         let images = labels.map(|label| (label, self.exemplars(label).to_vec()));
         images.filter(|(_, images)| !images.is_empty()).collect()
@@ -213,12 +211,10 @@ impl Mapper {
         self.book.epoch()
     }
 
-    /// Cells with words.
     pub fn cells(&self) -> usize {
         self.model.cells()
     }
 
-    /// Words held.
     pub fn words(&self) -> u64 {
         self.model.words()
     }

@@ -6,6 +6,7 @@ mod odometer;
 use super::vehicle::LastPlace;
 use filter::Filter;
 use odometer::Odometer;
+use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 
@@ -17,8 +18,7 @@ use scenecast_protocol::wire::Placement;
 /// now on straight, so that the placement needs to move ever less.
 #[derive(Debug)]
 pub struct Navigator {
-    /// East and north in the map's frame, metres.
-    at: (f64, f64),
+    at: MapPoint,
     heading_rad: f64,
     depth_m: f64,
     filter: Filter,
@@ -34,7 +34,6 @@ pub struct Navigator {
 /// What became of a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FixVerdict {
-    /// It corrects the estimate.
     Used,
     /// It is of a time that the vehicle does not remember.
     TooOld,
@@ -63,12 +62,12 @@ impl Navigator {
     /// How far it may have drifted while it was off, metres.
     const RESUMED_SIGMA_M: f64 = 50.0;
     /// Farther from the origin is no mission, metres.
-    const FARTHEST_M: f64 = 800_000.0;
+    const MAX_DISTANCE_M: f64 = 800_000.0;
 
     /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of way.
     pub fn new(x_m: f64, y_m: f64, depth_m: f64, drift: f64) -> Self {
         Self {
-            at: (x_m, y_m),
+            at: MapPoint { x_m, y_m },
             heading_rad: 0.0,
             depth_m,
             filter: Filter::new((x_m, y_m), drift),
@@ -82,10 +81,10 @@ impl Navigator {
 
     /// On a map of an earlier run, about where that was at its last fix; the first fix moves the vehicle, not the map.
     pub fn resume(last: LastPlace, depth_m: f64, drift: f64) -> Self {
-        let (x, y) = last.at();
-        let mut navigator = Self::new(x, y, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
-        let (world_x, world_y) = last.placement().map_or((x, y), |p| p.to_world((x, y)));
-        navigator.filter.shift(world_x - x, world_y - y);
+        let at = last.at();
+        let mut navigator = Self::new(at.x_m, at.y_m, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
+        let world = Placement::map_to_world(last.placement(), at);
+        navigator.filter.shift(world.east_m - at.x_m, world.north_m - at.y_m);
         (navigator.placement, navigator.is_lost) = (last.placement(), true);
         navigator
     }
@@ -96,14 +95,15 @@ impl Navigator {
         self
     }
 
-    /// East and north in the map's frame, metres.
-    pub fn position(&self) -> (f64, f64) {
+    /// The position in the map frame.
+    pub fn position(&self) -> MapPoint {
         self.at
     }
 
-    /// East and north of the mission's origin in the world, metres: the best estimate there is.
-    pub fn world(&self) -> (f64, f64) {
-        self.filter.position()
+    /// The best estimate of the position in the world frame.
+    pub fn world(&self) -> WorldPoint {
+        let (east_m, north_m) = self.filter.position();
+        WorldPoint { east_m, north_m }
     }
 
     /// Where the map's frame lies in the world, as it was told last; `None`: no fix has moved it.
@@ -111,14 +111,14 @@ impl Navigator {
         self.placement
     }
 
-    /// A place of the map's frame in the world, as the map lies now.
-    pub fn to_world(&self, at: (f64, f64)) -> (f64, f64) {
-        self.placement.map_or(at, |p| p.to_world(at))
+    /// Converts a point of the map frame into the world frame, by the current placement.
+    pub fn to_world(&self, at: MapPoint) -> WorldPoint {
+        Placement::map_to_world(self.placement, at)
     }
 
-    /// A place of the world in the map's frame.
-    pub fn to_map(&self, at: (f64, f64)) -> (f64, f64) {
-        self.placement.map_or(at, |p| p.to_map(at))
+    /// Converts a point of the world frame into the map frame, by the current placement.
+    pub fn to_map(&self, at: WorldPoint) -> MapPoint {
+        Placement::world_to_map(self.placement, at)
     }
 
     /// Heading clockwise from north, radians.
@@ -148,7 +148,7 @@ impl Navigator {
         }
         (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
         let (x, y) = self.filter.handle_way(dx_m, dy_m);
-        self.at = (self.at.0 + x, self.at.1 + y);
+        self.at = MapPoint { x_m: self.at.x_m + x, y_m: self.at.y_m + y };
         self.odometer.handle_way(dx_m, dy_m, now, Self::MEMORY_S);
     }
 
@@ -161,15 +161,16 @@ impl Navigator {
     /// The position in the map's frame is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.is_lost = false;
-        let (dx, dy) = (x_m - self.at.0, y_m - self.at.1);
-        (self.at, self.heading_rad, self.depth_m) = ((x_m, y_m), heading_rad, depth_m);
+        let (dx, dy) = (x_m - self.at.x_m, y_m - self.at.y_m);
+        (self.at, self.heading_rad, self.depth_m) = (MapPoint { x_m, y_m }, heading_rad, depth_m);
         self.filter.shift(dx, dy);
         self.odometer.handle_way(dx, dy, now, Self::MEMORY_S);
     }
 
     /// A fix of where in the world the vehicle was at `taken`.
-    pub fn handle_fix(&mut self, x_m: f64, y_m: f64, sigma_m: f64, taken: Instant, now: Instant) -> FixVerdict {
-        let is_place = x_m.abs() <= Self::FARTHEST_M && y_m.abs() <= Self::FARTHEST_M;
+    pub fn handle_fix(&mut self, at: WorldPoint, sigma_m: f64, taken: Instant, now: Instant) -> FixVerdict {
+        let (x_m, y_m) = at.xy();
+        let is_place = x_m.abs() <= Self::MAX_DISTANCE_M && y_m.abs() <= Self::MAX_DISTANCE_M;
         if !is_place || !sigma_m.is_finite() || sigma_m < 0.0 {
             return FixVerdict::Absurd;
         }
@@ -184,8 +185,7 @@ impl Navigator {
         self.filter.correct(&since, (x_m, y_m), sigma);
         self.last_fix = Some(now);
         if std::mem::take(&mut self.is_lost) {
-            let world = self.filter.position();
-            self.at = self.to_map(world);
+            self.at = self.to_map(self.world());
         }
         self.place();
         FixVerdict::Used
@@ -204,11 +204,11 @@ impl Navigator {
     }
 
     fn place(&mut self) {
-        let (x, y) = self.filter.position();
-        let (east, north) = (x - self.at.0, y - self.at.1);
-        let (was_east, was_north) = self.placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        if (east - was_east).hypot(north - was_north) >= Self::WORTH_TELLING_M {
-            self.placement = Some(Placement::moved_to(self.placement, east, north));
+        let world = self.world();
+        let origin = WorldPoint { east_m: world.east_m - self.at.x_m, north_m: world.north_m - self.at.y_m };
+        let before = self.placement.map_or(WorldPoint::default(), |p| p.origin);
+        if before.distance_m(origin) >= Self::WORTH_TELLING_M {
+            self.placement = Some(Placement::moved_to(self.placement, origin));
         }
     }
 }
@@ -236,34 +236,34 @@ mod tests {
         let mut nav = under_way();
         assert!(nav.sigma_m() > 0.5);
         // At 30 s it believed to be at 30 m, but was at 33 m: now it is near 66 m if the log is to blame, 63 m if not.
-        assert_eq!(nav.handle_fix(33.0, 0.0, 0.1, at(30.0), at(60.0)), FixVerdict::Used);
-        assert!((63.0..67.0).contains(&nav.world().0), "{:?}", nav.world());
-        assert_eq!(nav.handle_fix(0.0, 0.0, 0.1, at(30.0), at(600.0)), FixVerdict::TooOld);
+        assert_eq!(nav.handle_fix(WorldPoint::new(33.0, 0.0), 0.1, at(30.0), at(60.0)), FixVerdict::Used);
+        assert!((63.0..67.0).contains(&nav.world().east_m), "{:?}", nav.world());
+        assert_eq!(nav.handle_fix(WorldPoint::new(0.0, 0.0), 0.1, at(30.0), at(600.0)), FixVerdict::TooOld);
     }
 
     #[test]
     fn a_fix_between_two_steps_counts_where_the_vehicle_was_then() {
         let mut nav = under_way();
-        nav.handle_fix(30.5, 0.0, 0.1, at(30.5), at(60.0));
-        assert!((nav.world().0 - 60.0).abs() < 0.05, "{:?}", nav.world());
+        nav.handle_fix(WorldPoint::new(30.5, 0.0), 0.1, at(30.5), at(60.0));
+        assert!((nav.world().east_m - 60.0).abs() < 0.05, "{:?}", nav.world());
     }
 
     #[test]
-    fn a_fix_moves_the_placement_and_neither_the_vehicle_nor_its_map() {
+    fn a_fix_moves_the_placement_but_not_the_map() {
         let mut nav = under_way();
-        assert_eq!((nav.position(), nav.placement()), ((60.0, 0.0), None));
-        nav.handle_fix(60.0, 3.0, 0.1, at(60.0), at(60.0));
-        assert_eq!(nav.position(), (60.0, 0.0), "no jump in the map's frame");
+        assert_eq!((nav.position(), nav.placement()), (MapPoint::new(60.0, 0.0), None));
+        nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
+        assert_eq!(nav.position(), MapPoint::new(60.0, 0.0), "no jump in the map's frame");
         let first = nav.placement().unwrap();
         assert_eq!(first.version, 1);
-        let (x, y) = first.to_world(nav.position());
+        let (x, y) = first.to_world(nav.position()).xy();
         assert!((x - 60.0).abs() < 0.3 && (y - 3.0).abs() < 0.3, "{x} {y}");
-        nav.handle_fix(60.0, 3.0, 0.1, at(60.0), at(60.0));
+        nav.handle_fix(WorldPoint::new(60.0, 3.0), 0.1, at(60.0), at(60.0));
         assert_eq!(nav.placement().unwrap().version, 1, "a move that is not worth telling");
     }
 
     #[test]
-    fn fixes_tell_what_is_wrong_with_the_sensors_and_the_way_becomes_straight() {
+    fn fixes_calibrate_the_sensors_and_straighten_the_track() {
         // A compass that is off by two degrees, on a way of 1 km to the east.
         let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.03);
         let (sin, cos) = 2f64.to_radians().sin_cos();
@@ -271,9 +271,9 @@ mod tests {
         for s in 1..=1000 {
             nav.handle_odometry(cos, sin, 0.0, 18.0, at(f64::from(s)));
             if s % 10 == 0 && s <= 800 {
-                nav.handle_fix(f64::from(s), 0.0, 2.0, at(f64::from(s)), at(f64::from(s) + 1.0));
+                nav.handle_fix(WorldPoint::new(f64::from(s), 0.0), 2.0, at(f64::from(s)), at(f64::from(s) + 1.0));
             }
-            error.push((nav.world().0 - f64::from(s)).hypot(nav.world().1));
+            error.push((nav.world().east_m - f64::from(s)).hypot(nav.world().north_m));
         }
         let without = 200.0 * 2.0 * (1f64.to_radians()).sin();
         assert!(error[999] < 0.4 * without, "{} m after 200 m without a fix; {without} m uncorrected", error[999]);
@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn absurd_fixes_and_outliers_change_nothing() {
         let mut nav = under_way();
-        nav.handle_fix(60.0, 0.0, 1.0, at(60.0), at(60.0));
+        nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.world();
         for (x, y, sigma, verdict) in [
             (f64::NAN, 0.0, 1.0, FixVerdict::Absurd),
@@ -292,36 +292,41 @@ mod tests {
             (60.0, 90.0, 1.0, FixVerdict::Outlier),
             (-40.0, 0.0, 1.0, FixVerdict::Outlier),
         ] {
-            assert_eq!(nav.handle_fix(x, y, sigma, at(60.0), at(61.0)), verdict, "{x} {y} {sigma}");
+            assert_eq!(nav.handle_fix(WorldPoint::new(x, y), sigma, at(60.0), at(61.0)), verdict, "{x} {y} {sigma}");
         }
         assert_eq!(nav.world(), before);
     }
 
     #[test]
-    fn a_way_that_nobody_measured_makes_the_place_uncertain_until_a_fix() {
+    fn unmeasured_motion_is_uncertain_until_a_fix() {
         let mut nav = under_way();
-        nav.handle_fix(60.0, 0.0, 1.0, at(60.0), at(60.0));
+        nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.sigma_m();
         nav.handle_unseen_way(30.0);
         assert!((20.0..25.0).contains(&nav.sigma_m()), "{} m, {before} m before", nav.sigma_m());
-        assert_eq!(nav.handle_fix(60.0, 25.0, 1.0, at(61.0), at(61.0)), FixVerdict::Used, "no outlier any more");
+        assert_eq!(
+            nav.handle_fix(WorldPoint::new(60.0, 25.0), 1.0, at(61.0), at(61.0)),
+            FixVerdict::Used,
+            "no outlier any more"
+        );
         assert!(nav.sigma_m() < 2.0);
     }
 
     #[test]
     fn fixes_that_agree_with_each_other_are_believed_in_the_end() {
         let mut nav = under_way();
-        let verdicts: Vec<_> =
-            (0..6).map(|i| nav.handle_fix(60.0, 200.0, 1.0, at(60.0), at(61.0 + f64::from(i)))).collect();
+        let verdicts: Vec<_> = (0..6)
+            .map(|i| nav.handle_fix(WorldPoint::new(60.0, 200.0), 1.0, at(60.0), at(61.0 + f64::from(i))))
+            .collect();
         assert_eq!(verdicts[..4], [FixVerdict::Outlier, FixVerdict::Outlier, FixVerdict::Outlier, FixVerdict::Used]);
-        assert!((nav.world().1 - 200.0).abs() < 2.0, "{:?}", nav.world());
+        assert!((nav.world().north_m - 200.0).abs() < 2.0, "{:?}", nav.world());
     }
 
     #[test]
     fn a_vehicle_that_never_moved_takes_fixes_of_its_memory() {
         let mut nav = Navigator::new(0.0, 0.0, 5.0, 0.01).with_start_sigma(10.0);
-        assert_eq!(nav.handle_fix(8.0, -3.0, 1.0, at(4.0), at(5.0)), FixVerdict::Used);
-        assert!((nav.world().0 - 8.0).abs() < 0.3, "{:?}", nav.world());
+        assert_eq!(nav.handle_fix(WorldPoint::new(8.0, -3.0), 1.0, at(4.0), at(5.0)), FixVerdict::Used);
+        assert!((nav.world().east_m - 8.0).abs() < 0.3, "{:?}", nav.world());
     }
 
     proptest! {
@@ -333,9 +338,9 @@ mod tests {
             for (i, (a, b, sigma, place, age)) in steps.into_iter().enumerate() {
                 let now = at(200.0 + i as f64);
                 nav.handle_odometry(a % 3.0, b % 3.0, 0.0, 5.0, now);
-                nav.handle_fix(a, b, sigma, now, now);
-                nav.handle_fix(place, -place, sigma % 10.0, at((200.0 + i as f64 - age).max(0.0)), now);
-                prop_assert!(nav.world().0.is_finite() && nav.world().1.is_finite() && nav.sigma_m().is_finite());
+                nav.handle_fix(WorldPoint::new(a, b), sigma, now, now);
+                nav.handle_fix(WorldPoint::new(place, -place), sigma % 10.0, at((200.0 + i as f64 - age).max(0.0)), now);
+                prop_assert!(nav.world().east_m.is_finite() && nav.world().north_m.is_finite() && nav.sigma_m().is_finite());
             }
         }
     }

@@ -11,7 +11,7 @@ pub(super) const PATCH_PX: u32 = 128;
 /// Pixels from one place in a frame that is looked at to the next.
 const STEP_PX: u32 = 64;
 /// Least score of a patch that goes on representing its label.
-const LEAST_SCORE: f32 = 0.3;
+const MIN_SCORE: f32 = 0.3;
 
 /// The map by which patches are judged.
 pub(super) struct Judge<'a> {
@@ -45,7 +45,7 @@ impl Judge<'_> {
     pub(super) fn review(&self, store: &mut ExemplarStore) {
         store.review(|topic, place| {
             let (now, score) = self.score(place)?;
-            (now == topic && score >= LEAST_SCORE).then_some(score)
+            (now == topic && score >= MIN_SCORE).then_some(score)
         });
     }
 
@@ -61,7 +61,7 @@ impl Judge<'_> {
             let middle = (left as f32 + edge as f32 / 2.0, top as f32 + edge as f32 / 2.0);
             let centre = [Word { id: 0, u: middle.0, v: middle.1 }];
             let Some(place) = camera.project(width, height, pose, &centre).first().map(|o| (o.x, o.y)) else { return };
-            let Some((topic, score)) = self.score(place).filter(|s| s.1 >= LEAST_SCORE) else { continue };
+            let Some((topic, score)) = self.score(place).filter(|s| s.1 >= MIN_SCORE) else { continue };
             if store.would_keep(topic, score) {
                 let patch = image::imageops::crop_imm(frame, left, top, edge, edge).to_image();
                 store.offer(topic, patch, score, t_s, place);
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_patch_whose_place_has_another_label_by_now_represents_it_no_more() {
+    fn a_relabelled_patch_is_no_exemplar_of_its_old_label() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
         judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);

@@ -1,10 +1,15 @@
 //! Where to go next.
 
 mod ahead;
+mod choice;
+mod grounds;
 
-use super::planning::{
-    Bounds, Knowledge, Lattice, Node, Planner, Point, Question, Ways, Window, Worth, distance, planner,
-};
+pub use ahead::PathAhead;
+
+use choice::PlannerChoice;
+use grounds::Grounds;
+
+use super::planning::{Bounds, Knowledge, Node, Point, Question, Window, Worth, distance};
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -13,9 +18,7 @@ use std::collections::VecDeque;
 /// What the camera sees, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
-    /// Across the heading.
     pub across: f64,
-    /// Along the heading.
     pub along: f64,
 }
 
@@ -29,7 +32,6 @@ impl Footprint {
 /// What the vehicle is to do next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
-    /// Go there, straight.
     Go(Point),
     /// What is left of distance or time is the way home.
     UsedUp,
@@ -45,21 +47,9 @@ pub enum Course {
 /// cells are of the map's frame.
 #[derive(Debug)]
 pub struct Steering {
-    area: Area,
-    footprint: Footprint,
-    clearance_m: f64,
-    configured: PlannerKind,
-    chosen: Option<PlannerKind>,
-    planner: Box<dyn Planner>,
-    running: PlannerKind,
-    bounds: Bounds,
-    home: Point,
-    return_point: Option<Point>,
-    lattice: Lattice,
+    grounds: Grounds,
+    choice: PlannerChoice,
     window: Window,
-    ways_home: Option<Ways>,
-    /// Metres from the end of those ways to the return point itself.
-    home_leg_m: f64,
     known: Knowledge,
     /// East and north of the map's frame in the world, metres.
     placed: Point,
@@ -68,8 +58,6 @@ pub struct Steering {
     planned_for: u64,
 }
 
-/// Steps between two places of the lattice, in reaches of the camera: looks overlap by a tenth.
-const STEP: f64 = 0.9;
 /// Steps to one waypoint while the way may change with the map: with two, `horizon` collects 2 % less, for each step shows
 /// something new.
 const STEPS_AHEAD: usize = 1;
@@ -77,53 +65,38 @@ const STEPS_AHEAD: usize = 1;
 impl Steering {
     /// Steers within `area`; cells have edges of `cell_m` metres. The vehicle stays `clearance_m` clear of every outline.
     pub fn new(area: Area, footprint: Footprint, cell_m: f64, configured: PlannerKind, clearance_m: f64) -> Self {
-        let bounds = Bounds::default();
-        let lattice = Lattice::new(area.shrunk(footprint.reach()), &[], STEP * footprint.reach(), &bounds);
-        let home = lattice.place(0);
         let mut steering = Self {
-            area,
-            footprint,
-            clearance_m,
-            configured,
-            chosen: None,
-            planner: planner(PlannerKind::Lawnmower),
-            running: PlannerKind::Lawnmower,
-            bounds,
-            home,
-            return_point: None,
-            lattice,
+            grounds: Grounds::new(area, footprint.reach(), clearance_m),
+            choice: PlannerChoice::new(configured),
             window: Window::new(area, cell_m),
-            ways_home: None,
-            home_leg_m: 0.0,
             known: Knowledge::default(),
             placed: (0.0, 0.0),
             plan: VecDeque::new(),
             planned_for: 0,
         };
-        steering.lay_out();
+        steering.choice.planner_mut().handle_change();
         steering
     }
 
     /// Where the survey begins, metres.
     pub fn start(&self) -> Point {
-        self.lattice.place(0)
+        self.grounds.lattice().place(0)
     }
 
     /// Where the vehicle goes on its return.
     pub fn home(&self) -> Point {
-        self.return_point.unwrap_or(self.home)
+        self.grounds.home()
     }
 
-    /// The bounds in force.
     pub fn bounds(&self) -> &Bounds {
-        &self.bounds
+        self.grounds.bounds()
     }
 
     /// A fix has moved the map to there in the world: ways are planned anew, from where the vehicle now believes to be.
     pub fn set_placement(&mut self, east_m: f64, north_m: f64) {
         if self.placed != (east_m, north_m) {
             self.placed = (east_m, north_m);
-            self.window = Window::new(self.area.moved(-east_m, -north_m), self.window.cell_m);
+            self.window = Window::new(self.grounds.area().moved(-east_m, -north_m), self.window.cell_m);
             self.plan.clear();
         }
     }
@@ -135,14 +108,14 @@ impl Steering {
 
     /// Puts a fence that was checked in force.
     pub fn set_fence(&mut self, fence: &Fence) {
-        self.bounds = Bounds::new(fence, self.clearance_m);
-        self.return_point = fence.return_point.map(|p| p.metres());
-        self.lay_out();
+        self.grounds.set_fence(fence);
+        self.choice.planner_mut().handle_change();
+        self.plan.clear();
     }
 
     /// The operator's choice of a planner; `None`: as configured.
     pub fn set_planner(&mut self, chosen: Option<PlannerKind>) {
-        self.chosen = chosen;
+        self.choice.choose(chosen);
         self.plan.clear();
     }
 
@@ -151,20 +124,9 @@ impl Steering {
         self.plan.clear();
     }
 
-    fn lay_out(&mut self) {
-        let reach = self.footprint.reach();
-        let inner = self.area.shrunk(reach);
-        self.lattice = Lattice::new(inner, &[self.home()], STEP * reach, &self.bounds);
-        let end = self.lattice.entry(self.home(), &self.bounds);
-        self.ways_home = end.map(|n| self.lattice.ways(n));
-        self.home_leg_m = end.map_or(0.0, |n| distance(self.home(), self.lattice.place(n)));
-        self.planner.handle_change();
-        self.plan.clear();
-    }
-
     /// The camera saw the sea floor around `at`, of the map's frame.
     pub fn handle_view(&mut self, at: Point) {
-        let reach = self.footprint.reach();
+        let reach = self.grounds.reach_m();
         // Cells whose middle was in sight.
         let cells = |middle: f64| {
             let edge = |metres: f64| metres / self.window.cell_m - 0.5;
@@ -182,16 +144,18 @@ impl Steering {
 
     /// The next waypoint from `from`, of which version `version` of the map is known, with `left_m` metres to go in all.
     pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
-        self.follow_choice(utility.is_some());
-        let left_m = left_m - self.home_leg_m;
-        let Some(at) = self.lattice.entry(from, &self.bounds) else { return Course::NoWay };
-        let approach = distance(from, self.lattice.place(at));
-        let adapts = self.running != PlannerKind::Lawnmower;
+        if self.choice.follow(utility.is_some()) {
+            self.plan.clear();
+        }
+        let left_m = left_m - self.grounds.last_leg_m();
+        let Some(at) = self.grounds.entry(from) else { return Course::NoWay };
+        let approach = distance(from, self.grounds.lattice().place(at));
+        let adapts = self.choice.adapts();
         let changed = adapts && self.planned_for != map.1;
         if self.plan.front() == Some(&at) {
             self.plan.pop_front();
         }
-        let is_next = |n: &Node| self.lattice.around(at).any(|(to, _)| to == *n);
+        let is_next = |n: &Node| self.grounds.lattice().around(at).any(|(to, _)| to == *n);
         let follows = self.plan.front().is_some_and(is_next);
         if changed || !follows || !self.can_go(at, &self.plan, left_m - approach) {
             self.planned_for = map.1;
@@ -200,26 +164,19 @@ impl Steering {
         self.waypoint(from, at, if adapts { STEPS_AHEAD } else { usize::MAX }, left_m)
     }
 
-    fn follow_choice(&mut self, has_utility: bool) {
-        let wanted = if has_utility { self.chosen.unwrap_or(self.configured) } else { PlannerKind::Lawnmower };
-        if wanted != self.running {
-            (self.planner, self.running) = (planner(wanted), wanted);
-            self.plan.clear();
-        }
-    }
-
     fn ask(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
-        let Some(home) = &self.ways_home else { return Vec::new() };
+        let Some(home) = self.grounds.return_paths() else { return Vec::new() };
         let none = Utility::default();
-        let worth = Worth::new(&self.lattice, (&self.window, self.placed), map, &self.known, utility.unwrap_or(&none));
-        let question = Question { lattice: &self.lattice, worth: &worth, from, home, left_m };
-        self.planner.plan(&question)
+        let worth =
+            Worth::new(self.grounds.lattice(), (&self.window, self.placed), map, &self.known, utility.unwrap_or(&none));
+        let question = Question { lattice: self.grounds.lattice(), worth: &worth, from, home, left_m };
+        self.choice.planner_mut().plan(&question)
     }
 
     /// Whether the first place of a plan still leaves the way home.
     fn can_go(&self, from: Node, plan: &VecDeque<Node>, left_m: f64) -> bool {
-        let Some(home) = &self.ways_home else { return false };
-        let first = plan.front().and_then(|&to| self.lattice.around(from).find(|(n, _)| *n == to));
+        let Some(home) = self.grounds.return_paths() else { return false };
+        let first = plan.front().and_then(|&to| self.grounds.lattice().around(from).find(|(n, _)| *n == to));
         first.is_some_and(|(n, step)| !left_m.is_finite() || step + home.metres[n] <= left_m)
     }
 
@@ -228,8 +185,10 @@ impl Steering {
         let Some(&first) = self.plan.front() else {
             return if left_m.is_finite() { Course::UsedUp } else { Course::There };
         };
-        let entry = self.lattice.place(at);
-        if distance(from, entry) > self.lattice.step_m() || !self.bounds.allows_leg(from, self.lattice.place(first)) {
+        let entry = self.grounds.lattice().place(at);
+        if distance(from, entry) > self.grounds.lattice().step_m()
+            || !self.grounds.bounds().allows_leg(from, self.grounds.lattice().place(first))
+        {
             return Course::Go(entry);
         }
         let step = first as isize - at as isize;
@@ -237,11 +196,11 @@ impl Steering {
         let mut count = 0;
         while let Some(&next) = self.plan.front() {
             let is_straight = next as isize - ahead as isize == step;
-            let far = (self.lattice.place(next), from);
-            if count >= most || !is_straight || (count > 0 && !self.bounds.allows_leg(far.1, far.0)) {
+            let far = (self.grounds.lattice().place(next), from);
+            if count >= most || !is_straight || (count > 0 && !self.grounds.bounds().allows_leg(far.1, far.0)) {
                 break;
             }
-            if count > 0 && !self.leaves_way_home(next, distance(far.0, far.1), left_m) {
+            if count > 0 && !self.grounds.leaves_return(next, distance(far.0, far.1), left_m) {
                 break;
             }
             ahead = next;
@@ -250,17 +209,7 @@ impl Steering {
         }
         // It is popped when it is reached, so that the rest of the plan follows it.
         self.plan.push_front(ahead);
-        Course::Go(self.lattice.place(ahead))
-    }
-
-    fn leaves_way_home(&self, node: Node, gone_m: f64, left_m: f64) -> bool {
-        !left_m.is_finite() || self.ways_home.as_ref().is_some_and(|w| gone_m + w.metres[node] <= left_m)
-    }
-
-    /// Where a way home enters the lattice and where it leaves it, and the places after the first.
-    fn way_home(&self, from: Point) -> Option<(Node, Node, Vec<Node>)> {
-        let (at, end) = (self.lattice.entry(from, &self.bounds)?, self.lattice.entry(self.home(), &self.bounds)?);
-        Some((at, end, self.lattice.ways(at).to(end)))
+        Course::Go(self.grounds.lattice().place(ahead))
     }
 
     /// The next waypoint on the way home.
@@ -270,30 +219,28 @@ impl Steering {
         if distance(from, home) <= self.arrival_m() {
             return Course::There;
         }
-        let Some((at, end, way)) = self.way_home(from) else { return Course::NoWay };
+        let Some((at, end, way)) = self.grounds.return_path(from) else { return Course::NoWay };
         if at != end && way.is_empty() {
             return Course::NoWay;
         }
-        let entry = self.lattice.place(at);
-        match way.first().map(|&n| self.lattice.place(n)) {
+        let entry = self.grounds.lattice().place(at);
+        match way.first().map(|&n| self.grounds.lattice().place(n)) {
             None if distance(from, entry) > self.arrival_m() => Course::Go(entry),
-            None if self.bounds.allows_exit(home, entry) => Course::Go(home),
+            None if self.grounds.bounds().allows_exit(home, entry) => Course::Go(home),
             None => Course::There,
-            Some(next) if self.bounds.allows_leg(from, next) => Course::Go(next),
+            Some(next) if self.grounds.bounds().allows_leg(from, next) => Course::Go(next),
             Some(_) => Course::Go(entry),
         }
     }
 
-    /// Metres of the way home from a place, infinite if there is none.
+    /// Metres of the return path from a place, infinite if there is none.
     pub fn way_home_m(&self, from: Point) -> f64 {
-        let Some(at) = self.lattice.entry(from, &self.bounds) else { return f64::INFINITY };
-        let along = self.ways_home.as_ref().map_or(f64::INFINITY, |w| w.metres[at]);
-        distance(from, self.lattice.place(at)) + along + self.home_leg_m
+        self.grounds.return_path_m(from)
     }
 
     /// Metres from a waypoint at which it counts as reached.
     pub fn arrival_m(&self) -> f64 {
-        0.5f64.min(self.clearance_m.max(0.1) / 2.0)
+        self.grounds.arrival_m()
     }
 }
 

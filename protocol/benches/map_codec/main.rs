@@ -1,6 +1,7 @@
 //! Bytes and CPU time of map chunks on survey series, stills and a large map, against the best PNG.
 //!
-//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli takes nearly all of the time.
+//! `cargo bench -p scenecast-protocol --bench map_codec [-- [quick] [no-png] [real | procedural | large]]`; zopfli
+//! takes nearly all of the time.
 #![allow(clippy::disallowed_methods)]
 
 mod large;
@@ -9,8 +10,8 @@ mod zopfli_bytes;
 
 use cpu_time::ThreadTime;
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::map_codec::procedural::{Chance, Flips, Scene, Survey};
 use scenecast_protocol::map_codec::{Codec, Plane, decode, encode_all};
+use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use std::time::Duration;
 use zopfli_bytes::zopfli_bytes;
 
@@ -96,8 +97,8 @@ fn procedural(seeds: u64) {
     for (name, flips) in regimes() {
         let mut totals = Totals::default();
         for seed in 0..seeds {
-            let mut chance = Chance::new(900 + seed);
-            let scene = Scene::ALL[seed as usize % 4].draw(&mut chance, SIDE, SIDE, 8);
+            let mut rng = MapRng::new(900 + seed);
+            let scene = MapScene::ALL[seed as usize % 4].draw(&mut rng, SIDE, SIDE, 8);
             totals.add(&series(&survey(seed, scene, flips)));
         }
         totals.print(name);
@@ -105,10 +106,10 @@ fn procedural(seeds: u64) {
     }
     all.print("all");
     println!("stills from nothing, {SIDE} x {SIDE}");
-    for (i, scene) in Scene::ALL.into_iter().enumerate() {
+    for (i, scene) in MapScene::ALL.into_iter().enumerate() {
         let mut totals = Totals::default();
         for seed in 0..seeds {
-            let plane = scene.draw(&mut Chance::new(700 + i as u64 * 10 + seed), SIDE, SIDE, 8);
+            let plane = scene.draw(&mut MapRng::new(700 + i as u64 * 10 + seed), SIDE, SIDE, 8);
             totals.add(&series(&[Plane::uniform(SIDE, SIDE, 0), plane]));
         }
         totals.print(&format!("{scene:?}"));

@@ -1,13 +1,13 @@
-//! Crops of the shared real maps; skipped, loudly, where they are absent.
+//! Crops of the shared real maps; skipped with a message where they are absent.
 
 use scenecast_protocol::map_codec::Plane;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Where the shared material lies, seen from this package.
+/// The folder of the shared material.
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
 
-/// A map of the shared data, one cell in `step` each way, pixel value + `shift` = label.
+/// A map of the shared data, one cell in `step` in each direction; pixel value + `shift` is the label.
 pub(crate) fn map(name: &str, step: usize, shift: u8) -> Option<Plane> {
     let path = Path::new(DATA).join(name);
     let Ok(file) = std::fs::read(&path) else {
@@ -29,7 +29,7 @@ fn grey(file: &[u8]) -> Plane {
     Plane { width: info.width as usize, height: info.height as usize, labels }
 }
 
-/// Square crops of `side` cells, side by side, that hold at least `least` kinds of label.
+/// Square crops of `side` cells, side by side, that hold at least `least` different labels.
 pub(crate) fn crops(map: &Plane, side: usize, least: usize) -> Vec<Plane> {
     let corners = (0..map.height / side).flat_map(|row| (0..map.width / side).map(move |column| (column, row)));
     let crop = |(column, row): (usize, usize)| crop(map, column * side, row * side, side);

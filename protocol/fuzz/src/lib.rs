@@ -1,3 +1,3 @@
-//! Fuzz targets of scenecast-protocol: `targets` says what must hold, `src/bin` runs it under libFuzzer.
+//! Fuzz targets of scenecast-protocol: `targets` states the properties, `src/bin` runs them under libFuzzer.
 
 pub mod targets;

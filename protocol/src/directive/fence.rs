@@ -1,10 +1,11 @@
-//! Where the vehicle may be.
+//! The fence: where the vehicle may be.
 
-use super::polygon::{Place, Polygon, PolygonFault};
-use super::steps::{minus, plus, put_pair, take_pair, take_width, width_of};
-use crate::map_codec::bits::{BitReader, BitWriter};
+use super::polygon::{Polygon, PolygonFault};
+use crate::bytes::{BitReader, BitWriter, DecimetreStep, take_width, width_of};
+use crate::coordinates::DecimetrePoint;
 
-/// The outline that the vehicle stays in, those that it stays out of, and the place that it returns to.
+/// The outline that the vehicle stays in, the keep-outs that it stays out of, and the return point; all in the world
+/// frame.
 ///
 /// Bits follow each other, the most significant first; the last byte is filled with zeros.
 ///
@@ -22,41 +23,41 @@ use crate::map_codec::bits::{BitReader, BitWriter};
 /// * anchor: x, y of the first vertex, or of the return point if there is no outline: decimetres, two's complement,
 ///   within 838 860.7 m; left out if there is neither.
 /// * n: vertices, 3 to 34. w: bits of a difference, 1 to 25, two's complement, decimetres.
-/// * dx, dy: from the vertex before; a later outline's first vertex from the anchor. The very first vertex is the anchor
-///   and is left out.
+/// * dx, dy: from the previous vertex; a later outline's first vertex from the anchor. The very first vertex is the
+///   anchor and is left out.
 /// * return point: from the anchor, in a width of its own, written before it in 5 bits; left out if it is the anchor.
 ///
 /// Source: surface. Eight vertices with edges of up to 800 m and a return point take at most 37 bytes, which fit a
 /// frame of 64 bytes under a key; without one, edges may have 6 km.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Fence {
-    /// The vehicle stays inside.
+    /// The outline that the vehicle stays inside.
     pub fence: Option<Polygon>,
-    /// The vehicle stays outside of each.
+    /// Outlines that the vehicle stays outside of, at most [`Self::MAX_KEEP_OUTS`].
     pub keep_outs: Vec<Polygon>,
-    /// Where it goes on its return; `None`: where its run began.
-    pub return_point: Option<Place>,
+    /// The goal of a return; `None` is the point where the vehicle's run began.
+    pub return_point: Option<DecimetrePoint>,
 }
 
-/// What is wrong with a fence.
+/// Why a fence is refused. Keep-outs are counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FenceFault {
-    /// The fence is no polygon.
+    /// The fence is not a valid polygon.
     #[error("fence: {0}")]
     Fence(PolygonFault),
-    /// A keep-out, counted from 1, is no polygon.
+    /// A keep-out is not a valid polygon.
     #[error("keep_outs: outline {0}: {1}")]
     KeepOut(usize, PolygonFault),
-    /// More than fit the count.
+    /// There are more keep-outs than the layout can count.
     #[error("keep_outs: {0} outlines: it takes 15 or fewer")]
     TooMany(usize),
-    /// A keep-out, counted from 1, covers the whole fence.
+    /// A keep-out covers the whole fence.
     #[error("keep_outs: outline {0} covers the whole fence: nothing is left")]
     NothingLeft(usize),
-    /// The vehicle could never get there.
+    /// The return point is outside the fence.
     #[error("return_point lies outside the fence")]
     ReturnOutside,
-    /// The vehicle could never get there; the keep-out counts from 1.
+    /// The return point is inside a keep-out.
     #[error("return_point lies in keep-out {0}")]
     ReturnKeptOut(usize),
     /// The return point is too far from the origin.
@@ -65,15 +66,15 @@ pub enum FenceFault {
 }
 
 impl Fence {
-    /// Most keep-outs.
-    pub const MOST_KEEP_OUTS: usize = 15;
+    /// The most keep-outs that the layout can count.
+    pub const MAX_KEEP_OUTS: usize = 15;
 
-    /// Whether a vehicle could obey it.
+    /// Checks whether a vehicle could obey the fence.
     pub fn check(&self) -> Result<(), FenceFault> {
         if let Some(fence) = &self.fence {
             fence.check().map_err(FenceFault::Fence)?;
         }
-        if self.keep_outs.len() > Self::MOST_KEEP_OUTS {
+        if self.keep_outs.len() > Self::MAX_KEEP_OUTS {
             return Err(FenceFault::TooMany(self.keep_outs.len()));
         }
         for (i, keep_out) in (1..).zip(&self.keep_outs) {
@@ -84,7 +85,7 @@ impl Fence {
             }
         }
         let Some(home) = self.return_point else { return Ok(()) };
-        if Place::from_metres(home.metres().0, home.metres().1).is_none() {
+        if DecimetrePoint::nearest(home.to_world()).is_none() {
             return Err(FenceFault::ReturnTooFar);
         }
         if self.fence.as_ref().is_some_and(|f| !f.contains(home)) {
@@ -96,40 +97,40 @@ impl Fence {
         }
     }
 
-    /// Whether the vehicle may be at a place.
-    pub fn allows(&self, place: Place) -> bool {
+    /// Whether the vehicle may be at a point.
+    pub fn allows(&self, place: DecimetrePoint) -> bool {
         self.fence.as_ref().is_none_or(|f| f.contains(place)) && !self.keep_outs.iter().any(|k| k.contains(place))
     }
 
-    /// Every outline, the fence first.
+    /// Every outline; the fence comes first.
     pub fn outlines(&self) -> impl Iterator<Item = &Polygon> {
         self.fence.iter().chain(&self.keep_outs)
     }
 
-    /// The payload. What [`Self::check`] does not allow is cut to what the layout can say.
+    /// Encodes the payload. A fence that [`Self::check`] refuses is cut to what the layout can state.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bits = BitWriter::default();
-        let keep_outs = self.keep_outs.len().min(Self::MOST_KEEP_OUTS);
+        let keep_outs = self.keep_outs.len().min(Self::MAX_KEEP_OUTS);
         bits.bit(self.fence.is_some());
         bits.put(keep_outs as u64, 4);
         bits.bit(self.return_point.is_some());
         let outlines = || self.fence.iter().chain(self.keep_outs.iter().take(keep_outs));
         let first = outlines().next().and_then(|o| o.0.first()).copied();
         let Some(anchor) = first.or(self.return_point) else { return bits.into_bytes() };
-        put_pair(&mut bits, anchor, 24);
+        step_to(anchor).put(&mut bits, 24);
         for (i, outline) in outlines().enumerate() {
             put_outline(&mut bits, outline, anchor, i == 0);
         }
         if let Some(home) = self.return_point.filter(|_| first.is_some()) {
-            let step = minus(home, anchor);
+            let step = step_to(home).since(step_to(anchor));
             let width = width_of([step]);
             bits.put(u64::from(width), 5);
-            put_pair(&mut bits, step, width);
+            step.put(&mut bits, width);
         }
         bits.into_bytes()
     }
 
-    /// Reads a payload; `None` if it is none. What it says is still to be checked.
+    /// Decodes a payload; `None` if it has another layout. [`Self::check`] must still be called.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut bits = BitReader::new(bytes);
         let has_fence = bits.bit()?;
@@ -138,17 +139,17 @@ impl Fence {
         let mut read = Self::default();
         let outlines = u64::from(has_fence) + keep_outs;
         if outlines > 0 || has_return {
-            let anchor = take_pair(&mut bits, 24)?;
+            let anchor = DecimetreStep::take(&mut bits, 24)?;
             for i in 0..outlines {
                 let outline = take_outline(&mut bits, anchor, i == 0)?;
                 if has_fence && i == 0 { read.fence = Some(outline) } else { read.keep_outs.push(outline) }
             }
             read.return_point = match (has_return, outlines) {
                 (false, _) => None,
-                (true, 0) => Some(anchor),
+                (true, 0) => Some(point_at(anchor)),
                 (true, _) => {
                     let width = take_width(&mut bits)?;
-                    Some(plus(anchor, take_pair(&mut bits, width)?))
+                    Some(point_at(anchor.plus(DecimetreStep::take(&mut bits, width)?)))
                 }
             };
         }
@@ -156,18 +157,18 @@ impl Fence {
     }
 }
 
-fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: Place, is_first: bool) {
-    let vertices = outline.0.get(..Polygon::MOST_VERTICES).unwrap_or(&outline.0);
+fn put_outline(bits: &mut BitWriter, outline: &Polygon, anchor: DecimetrePoint, is_first: bool) {
+    let vertices = outline.0.get(..Polygon::MAX_VERTICES).unwrap_or(&outline.0);
     let before = std::iter::once(anchor).chain(vertices.iter().copied());
-    let steps: Vec<Place> =
-        vertices.iter().zip(before).map(|(&v, b)| minus(v, b)).skip(usize::from(is_first)).collect();
+    let steps = vertices.iter().zip(before).map(|(&v, b)| step_to(v).since(step_to(b)));
+    let steps: Vec<DecimetreStep> = steps.skip(usize::from(is_first)).collect();
     let width = width_of(steps.iter().copied());
     bits.put((vertices.len() as u64).saturating_sub(3), 5);
     bits.put(u64::from(width), 5);
-    steps.into_iter().for_each(|step| put_pair(bits, step, width));
+    steps.into_iter().for_each(|step| step.put(bits, width));
 }
 
-fn take_outline(bits: &mut BitReader<'_>, anchor: Place, is_first: bool) -> Option<Polygon> {
+fn take_outline(bits: &mut BitReader<'_>, anchor: DecimetreStep, is_first: bool) -> Option<Polygon> {
     let n = bits.take(5)? + 3;
     let width = take_width(bits)?;
     let mut vertices = Vec::with_capacity(n as usize);
@@ -176,9 +177,18 @@ fn take_outline(bits: &mut BitReader<'_>, anchor: Place, is_first: bool) -> Opti
     }
     while (vertices.len() as u64) < n {
         let before = vertices.last().copied().unwrap_or(anchor);
-        vertices.push(plus(before, take_pair(bits, width)?));
+        vertices.push(before.plus(DecimetreStep::take(bits, width)?));
     }
-    Some(Polygon(vertices))
+    Some(Polygon(vertices.into_iter().map(point_at).collect()))
+}
+
+/// The step from the origin to a point.
+fn step_to(point: DecimetrePoint) -> DecimetreStep {
+    DecimetreStep { x_dm: point.east_dm, y_dm: point.north_dm }
+}
+
+fn point_at(step: DecimetreStep) -> DecimetrePoint {
+    DecimetrePoint { east_dm: step.x_dm, north_dm: step.y_dm }
 }
 
 #[cfg(test)]
@@ -187,7 +197,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn polygon(vertices: &[(i32, i32)]) -> Polygon {
-        Polygon(vertices.iter().map(|&(x_dm, y_dm)| Place { x_dm, y_dm }).collect())
+        Polygon(vertices.iter().map(|&(x, y)| DecimetrePoint::new(x, y)).collect())
     }
 
     fn square(x: i32, y: i32, side: i32) -> Polygon {
@@ -199,7 +209,7 @@ mod tests {
         let fence = Fence {
             fence: Some(square(-100, 50, 400)),
             keep_outs: vec![polygon(&[(0, 100), (50, 100), (0, 180)])],
-            return_point: Some(Place { x_dm: -90, y_dm: 60 }),
+            return_point: Some(DecimetrePoint::new(-90, 60)),
         };
         assert_eq!(fence.check(), Ok(()));
         let bytes = fence.to_bytes();
@@ -210,29 +220,29 @@ mod tests {
         assert_eq!(bytes, golden, "{bytes:02X?}");
         assert_eq!(Fence::from_bytes(&bytes), Some(fence));
         assert_eq!(Fence::default().to_bytes(), [0]);
-        let home = Fence { return_point: Some(Place { x_dm: 1, y_dm: -1 }), ..Fence::default() };
+        let home = Fence { return_point: Some(DecimetrePoint::new(1, -1)), ..Fence::default() };
         assert_eq!(home.to_bytes(), [0x04, 0, 0, 0x07, 0xFF, 0xFF, 0xFC]);
         assert_eq!(Fence::from_bytes(&home.to_bytes()), Some(home));
     }
 
     #[test]
-    fn eight_vertices_and_a_return_point_fit_a_frame_of_64_bytes_under_a_key() {
+    fn eight_vertices_and_a_return_point_fit_a_keyed_frame() {
         let r = 8_000.0f64;
         let octagon = (0..8).map(|i| f64::from(i) * std::f64::consts::FRAC_PI_4);
         let vertices =
-            octagon.map(|a| Place { x_dm: (r * a.cos()) as i32 - 8_000_000, y_dm: (r * a.sin()) as i32 + 7_000_000 });
+            octagon.map(|a| DecimetrePoint::new((r * a.cos()) as i32 - 8_000_000, (r * a.sin()) as i32 + 7_000_000));
         let fence = Polygon(vertices.collect());
-        let return_point = Some(Place { x_dm: -8_000_000, y_dm: 7_000_000 });
+        let return_point = Some(DecimetrePoint::new(-8_000_000, 7_000_000));
         let fence = Fence { fence: Some(fence), keep_outs: Vec::new(), return_point };
         assert_eq!(fence.check(), Ok(()));
-        // Five bytes of the slot's head, 13 of the frame's, 8 of a tag.
+        // Five bytes of the slot's head, 13 of the frame's header, 8 of a tag.
         assert!(fence.to_bytes().len() <= 64 - 13 - 8 - 5, "{} bytes", fence.to_bytes().len());
     }
 
     #[test]
-    fn a_fence_that_no_vehicle_could_obey_is_refused_by_what_is_wrong() {
+    fn a_fence_that_no_vehicle_can_obey_is_refused() {
         let fence = |f: Polygon, k: &[Polygon], home: Option<(i32, i32)>| {
-            let return_point = home.map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+            let return_point = home.map(|(x, y)| DecimetrePoint::new(x, y));
             Fence { fence: Some(f), keep_outs: k.to_vec(), return_point }.check()
         };
         let field = square(0, 0, 100);
@@ -265,7 +275,7 @@ mod tests {
         ) {
             let mut outlines: Vec<Polygon> = outlines.iter().map(|o| polygon(o)).collect();
             let fence = if has_fence { outlines.pop() } else { None };
-            let return_point = home.map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+            let return_point = home.map(|(x, y)| DecimetrePoint::new(x, y));
             let fence = Fence { fence, keep_outs: outlines, return_point };
             prop_assert_eq!(Fence::from_bytes(&fence.to_bytes()), Some(fence));
         }

@@ -1,10 +1,10 @@
 //! Numbers of three decimal digits in two bytes.
 
 use super::Change;
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 use std::fmt;
 
-/// A positive number of three decimal digits, so that what is typed is what is in force.
+/// A positive number of three decimal digits. A decimal that an operator types comes into force exactly as typed.
 ///
 /// ```text
 /// bit 15: 0; bits 14-10: e; bits 9-0: m, 100..=999. The value is m x 10^(e - 14); all bits 0: as configured.
@@ -17,16 +17,16 @@ pub struct Figure {
 
 impl Figure {
     const OFFSET: i32 = 14;
-    const MOST_EXPONENT: i32 = 31;
+    const MAX_EXPONENT: i32 = 31;
 
-    /// The number nearest to `value`; none for what is not positive or lies off the scale of 1e-12 to 9.99e19.
+    /// The nearest number to `value`; `None` unless it is positive and within 1e-12 to 9.99e19.
     pub fn new(value: f64) -> Option<Self> {
         if !(value.is_finite() && value > 0.0) {
             return None;
         }
         let mut exponent = value.log10().floor() as i32 - 2;
         let mut digits = (value * power(-exponent)).round();
-        // The logarithm, or the digits, may have been rounded over a power of ten.
+        // Rounding of the logarithm or of the digits may cross a power of ten.
         while digits >= 1000.0 {
             exponent += 1;
             digits = (value * power(-exponent)).round();
@@ -36,14 +36,14 @@ impl Figure {
             digits = (value * power(-exponent)).round();
         }
         let exponent = exponent + Self::OFFSET;
-        let fits = (0..=Self::MOST_EXPONENT).contains(&exponent) && (100.0..1000.0).contains(&digits);
+        let fits = (0..=Self::MAX_EXPONENT).contains(&exponent) && (100.0..1000.0).contains(&digits);
         fits.then_some(Self { digits: digits as u16, exponent: exponent as u8 })
     }
 
-    /// The number.
+    /// The number as a float, rounded once.
     pub fn value(self) -> f64 {
         let exponent = i32::from(self.exponent) - Self::OFFSET;
-        // Digits and powers up to 10^17 are exact, so one rounding gives what the decimal numeral would.
+        // Digits and powers up to 10^17 are exact, so a single rounding gives the same float as the decimal numeral.
         if exponent < 0 { f64::from(self.digits) / power(-exponent) } else { f64::from(self.digits) * power(exponent) }
     }
 
@@ -84,7 +84,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn what_is_typed_with_three_digits_is_what_is_in_force() {
+    fn three_typed_digits_come_into_force_exactly() {
         for text in ["0.01", "1e-12", "0.0005", "5e-5", "0.123", "999", "1000", "30", "50000", "1e8", "9.99e19", "0.3"]
         {
             let value: f64 = text.parse().unwrap();

@@ -1,8 +1,9 @@
 //! A position fix.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated, decimetres, put24};
+use crate::coordinates::WorldPoint;
 
-/// Where the vehicle was, as GPS and USBL saw it from the surface.
+/// A measured position of the vehicle in the world frame, from GPS and USBL at the surface.
 ///
 /// ```text
 /// byte  field
@@ -15,30 +16,25 @@ use crate::wire::{Reader, Truncated};
 /// The age is written at the moment of transmission, so the clocks of the two ends need not agree.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Fix {
-    /// East of the origin, metres.
-    pub x_m: f64,
-    /// North of the origin, metres.
-    pub y_m: f64,
-    /// Standard deviation, metres.
+    /// The measured position, in steps of a decimetre.
+    pub position: WorldPoint,
+    /// Standard deviation in metres, in steps of 0.25 m.
     pub sigma_m: f64,
-    /// Age at transmission, seconds.
+    /// Age at transmission in seconds.
     pub age_s: f64,
 }
 
 impl Fix {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        for metres in [self.x_m, self.y_m] {
-            let dm = (metres * 10.0).round().clamp(-8_388_608.0, 8_388_607.0) as i32;
-            out.extend_from_slice(dm.to_be_bytes().get(1..).unwrap_or_default());
-        }
+        put24(out, decimetres(self.position.east_m) as u32);
+        put24(out, decimetres(self.position.north_m) as u32);
         out.push((self.sigma_m * 4.0).round().clamp(0.0, 255.0) as u8);
         out.extend_from_slice(&((self.age_s * 100.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
         Ok(Self {
-            x_m: f64::from(r.i24()?) / 10.0,
-            y_m: f64::from(r.i24()?) / 10.0,
+            position: WorldPoint { east_m: f64::from(r.i24()?) / 10.0, north_m: f64::from(r.i24()?) / 10.0 },
             sigma_m: f64::from(r.u8()?) / 4.0,
             age_s: f64::from(r.u16()?) / 100.0,
         })
@@ -51,7 +47,7 @@ mod tests {
 
     #[test]
     fn a_fix_takes_nine_bytes_and_comes_back() {
-        let fix = Fix { x_m: -12.3, y_m: 400.0, sigma_m: 1.5, age_s: 0.82 };
+        let fix = Fix { position: WorldPoint::new(-12.3, 400.0), sigma_m: 1.5, age_s: 0.82 };
         let mut bytes = Vec::new();
         fix.encode(&mut bytes);
         assert_eq!(bytes, [0xFF, 0xFF, 0x85, 0, 0x0F, 0xA0, 6, 0, 82]);

@@ -1,23 +1,23 @@
-//! How deep, how far, how long, and what to do when something is amiss.
+//! Limits of depth, altitude, distance and time, and the reactions to a breach.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
-/// What the vehicle does of its own accord.
+/// A reaction of the vehicle's failsafe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reaction {
-    /// Stays where it is.
+    /// The vehicle stays at its position.
     Hold,
-    /// Goes to the return point and stays there.
+    /// The vehicle goes to the return point and stays there.
     Return,
-    /// Comes up.
+    /// The vehicle rises to the water surface.
     Surface,
 }
 
 impl Reaction {
-    /// Every reaction, in wire order from 1.
+    /// Every reaction; the number on the wire is the index plus 1.
     pub const ALL: [Self; 3] = [Self::Hold, Self::Return, Self::Surface];
 
-    /// Name in files and in the API.
+    /// The name in files and in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Hold => "hold",
@@ -26,7 +26,7 @@ impl Reaction {
         }
     }
 
-    /// The reaction of that name.
+    /// The reaction with that name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|r| r.name() == name)
     }
@@ -40,23 +40,23 @@ impl Reaction {
     }
 }
 
-/// Lowest and highest value, decimetres.
+/// A range of depth or altitude, in decimetres.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Band {
-    /// Lowest.
+    /// The lowest allowed value in decimetres.
     pub low_dm: u16,
-    /// Highest.
+    /// The highest allowed value in decimetres.
     pub high_dm: u16,
 }
 
 impl Band {
-    /// Whether a value in metres lies inside.
+    /// Whether a value in metres lies inside, bounds included.
     pub fn contains(self, metres: f64) -> bool {
         (f64::from(self.low_dm)..=f64::from(self.high_dm)).contains(&(metres * 10.0))
     }
 }
 
-/// Limits of depth, altitude, way and time, and what the vehicle does when one is broken.
+/// Limits of depth, altitude, distance and time, and the vehicle's reactions when one is broken.
 ///
 /// ```text
 /// byte  bits  field
@@ -66,48 +66,48 @@ impl Band {
 ///  1    2     reserved, 0
 ///  4          [depth: lowest, highest, decimetres below the surface, 0..6553.5 m]
 ///  4          [altitude: lowest, highest, decimetres above the sea floor]
-///  3          [distance: metres of way over ground, 1..16 777 215, the way back included]
-///  3          [time: seconds, 1..16 777 215, the way back included]
+///  3          [distance: metres travelled over ground, 1..16 777 215, the return path included]
+///  3          [time: seconds, 1..16 777 215, the return path included]
 ///  2          [silence: seconds without a frame of the surface, 1..65 535]
 /// ```
 ///
-/// Source: surface. Distance and time count from when the vehicle puts the limits in force.
+/// Source: surface. Distance and time count from the moment when the vehicle puts the limits in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Limits {
-    /// Depths that are allowed.
+    /// Allowed depths below the water surface.
     pub depth: Option<Band>,
-    /// Altitudes that are allowed.
+    /// Allowed altitudes above the sea floor.
     pub altitude: Option<Band>,
-    /// Metres that the vehicle may go.
+    /// Distance over ground in metres, the return path included.
     pub distance_m: Option<u32>,
-    /// Seconds that the survey may take.
+    /// Duration of the survey in seconds, the return path included.
     pub time_s: Option<u32>,
-    /// Seconds that the surface may be silent.
+    /// Seconds without a frame of the surface.
     pub silence_s: Option<u16>,
-    /// What to do then; `None`: as configured on the vehicle.
+    /// The reaction to silence; `None` keeps the vehicle's configured one.
     pub on_silence: Option<Reaction>,
-    /// What to do outside the fence, in a keep-out or outside a band.
+    /// The reaction outside the fence, in a keep-out or outside a band; `None` keeps the configured one.
     pub on_breach: Option<Reaction>,
-    /// What to do on an abort.
+    /// The reaction to an abort; `None` keeps the configured one.
     pub on_abort: Option<Reaction>,
 }
 
-/// What is wrong with limits.
+/// Why limits are refused; the name of the limit comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LimitsFault {
-    /// The lowest is not below the highest.
+    /// The lowest value is not below the highest.
     #[error("{0}: the lowest value must be below the highest")]
     EmptyBand(&'static str),
-    /// A limit of nothing, or one that the layout cannot say.
+    /// A limit of 0, or one that the layout cannot state.
     #[error("{0}: it takes 1 to {1}")]
     OutOfRange(&'static str, u32),
 }
 
 impl Limits {
-    /// Most metres of way, and most seconds.
-    pub const MOST: u32 = 0xFF_FFFF;
+    /// The largest distance in metres, and the longest time in seconds.
+    pub const MAX: u32 = 0xFF_FFFF;
 
-    /// Whether a vehicle could obey them.
+    /// Checks whether a vehicle could obey the limits.
     pub fn check(&self) -> Result<(), LimitsFault> {
         for (name, band) in [("depth_m", self.depth), ("altitude_m", self.altitude)] {
             if band.is_some_and(|b| b.low_dm >= b.high_dm) {
@@ -115,8 +115,8 @@ impl Limits {
             }
         }
         for (name, limit, most) in [
-            ("distance_m", self.distance_m, Self::MOST),
-            ("time_s", self.time_s, Self::MOST),
+            ("distance_m", self.distance_m, Self::MAX),
+            ("time_s", self.time_s, Self::MAX),
             ("silence_s", self.silence_s.map(u32::from), u32::from(u16::MAX)),
         ] {
             if limit.is_some_and(|l| !(1..=most).contains(&l)) {
@@ -126,7 +126,7 @@ impl Limits {
         Ok(())
     }
 
-    /// The payload.
+    /// Encodes the payload of the slot.
     pub fn to_bytes(&self) -> Vec<u8> {
         let given = [
             self.depth.is_some(),
@@ -143,13 +143,13 @@ impl Limits {
             out.extend_from_slice(&edge.to_be_bytes());
         }
         for limit in [self.distance_m, self.time_s].into_iter().flatten() {
-            out.extend_from_slice(limit.min(Self::MOST).to_be_bytes().get(1..).unwrap_or_default());
+            out.extend_from_slice(limit.min(Self::MAX).to_be_bytes().get(1..).unwrap_or_default());
         }
         out.extend(self.silence_s.into_iter().flat_map(u16::to_be_bytes));
         out
     }
 
-    /// Reads a payload; `None` if it is none. What it says is still to be checked.
+    /// Decodes a payload; `None` if it has another layout. [`Self::check`] must still be called.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut r = Reader::new(bytes);
         let read = Self::read(&mut r).ok().flatten()?;

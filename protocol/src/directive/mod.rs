@@ -1,5 +1,6 @@
-//! What the surface tells a vehicle: independent versioned slots.
+//! The directive: the operator's orders to a vehicle, as independent versioned slots.
 
+mod decision;
 mod fence;
 mod figure;
 mod fix;
@@ -8,50 +9,50 @@ mod outbox;
 mod polygon;
 mod requests;
 mod settings;
-pub(crate) mod steps;
 mod tuning;
 mod utility;
 
+pub use decision::{SlotReport, SlotState};
 pub use fence::{Fence, FenceFault};
 pub use figure::Figure;
 pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
-pub use outbox::{LifeLine, PendingSlot, SlotOutbox, SlotProgress};
-pub use polygon::{Place, Polygon, PolygonFault};
-pub use requests::{Request, Requests};
+pub use outbox::{OrderStatus, PendingSlot, SlotOutbox, SlotProgress};
+pub use polygon::{Polygon, PolygonFault};
+pub use requests::{ExemplarRequest, ExemplarRequests};
 pub use settings::{Budget, Constraints, PlannerKind};
 pub use tuning::{CellBand, Change, PlaneSet, Settings, SettingsFault};
 pub use utility::Utility;
 
+use crate::bytes::{Reader, Truncated};
 use crate::schedule::Class;
-use crate::wire::{Reader, Truncated};
 
-/// Number of slots.
+/// The number of slots of the directive.
 pub const SLOTS: usize = 8;
 
 /// A slot of the directive; a newer version supersedes the older one of the same slot only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SlotId {
-    /// What each label is worth.
+    /// The weight of each label.
     Utility,
-    /// Orders that never wait for anything longer: hold and abort.
+    /// Orders that take effect at once: hold and abort.
     Constraints,
     /// How the vehicle builds its map.
     Settings,
-    /// Bits the vehicle may put on air.
+    /// The vehicle's bit budget and its shares.
     Budget,
-    /// Representative images asked for.
+    /// Exemplars that the operator requests.
     Requests,
-    /// Where the vehicle is, seen from the surface.
+    /// The vehicle's position, measured from the surface.
     Fix,
-    /// How deep, how far and how long the vehicle may go, and what it does when something is amiss.
+    /// Limits of depth, altitude, distance and time, and the reactions to a breach.
     Limits,
-    /// Where the vehicle may be.
+    /// The outline of the survey area, and keep-outs.
     Fence,
 }
 
 impl SlotId {
-    /// Every slot, in wire order.
+    /// Every slot, in the order of the numbers on the wire.
     pub const ALL: [Self; SLOTS] = [
         Self::Utility,
         Self::Constraints,
@@ -63,22 +64,22 @@ impl SlotId {
         Self::Fence,
     ];
 
-    /// Place in [`Self::ALL`] and number on the wire.
+    /// The index in [`Self::ALL`], which is the number on the wire.
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// What its bits count as.
+    /// The class that its bytes count as.
     pub fn class(self) -> Class {
         if self == Self::Fix { Class::Fix } else { Class::Directive }
     }
 
-    /// Whether a vehicle that applies it chooses its way afresh.
+    /// Whether a vehicle that applies it plans its path again.
     pub fn steers(self) -> bool {
         matches!(self, Self::Utility | Self::Constraints | Self::Settings | Self::Limits | Self::Fence)
     }
 
-    /// Name for people.
+    /// The name for people and in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Utility => "utility",
@@ -96,21 +97,21 @@ impl SlotId {
 /// Why a vehicle refuses a slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum RefusalReason {
-    /// The bytes make no sense.
+    /// The payload has another layout.
     Malformed,
-    /// It speaks of labels of another epoch.
+    /// It refers to labels of another epoch.
     OtherEpoch,
     /// It names a label that the map does not have.
     UnknownLabel,
-    /// A value lies outside what the vehicle accepts.
+    /// A value lies outside the range that the vehicle accepts.
     OutOfRange,
     /// It contradicts itself or a constraint in force.
     Contradiction,
     /// It came too late to be of use.
     TooOld,
-    /// The vehicle is outside of what it allows.
+    /// The vehicle is outside of the area or band that it allows.
     Outside,
-    /// The vehicle cannot do it.
+    /// The vehicle is not able to obey it.
     Unable,
 }
 
@@ -134,7 +135,7 @@ impl RefusalReason {
         Self::ALL.into_iter().find(|r| r.code() == code)
     }
 
-    /// One sentence for the operator.
+    /// An explanation for the operator, one clause.
     pub fn explain(self) -> &'static str {
         match self {
             Self::Malformed => "the vehicle could not read it",
@@ -152,26 +153,26 @@ impl RefusalReason {
 /// The payload of a slot.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slot {
-    /// See [`Utility`].
+    /// Weights of labels, exploration and curiosity.
     Utility(Utility),
-    /// See [`Constraints`].
+    /// Orders to hold or to abort.
     Constraints(Constraints),
-    /// See [`Settings`].
+    /// Settings of mapping and planning.
     Settings(Settings),
-    /// See [`Budget`].
+    /// Bit budget, shares and background streams.
     Budget(Budget),
-    /// See [`Requests`].
-    Requests(Requests),
-    /// See [`Fix`].
+    /// The exemplars that the operator requests.
+    Requests(ExemplarRequests),
+    /// A position that the surface has measured.
     Fix(Fix),
-    /// See [`Limits`].
+    /// Limits, and reactions to their breach.
     Limits(Limits),
-    /// See [`Fence`].
+    /// Fence, keep-outs and return point.
     Fence(Fence),
 }
 
 impl Slot {
-    /// Which slot this is the content of.
+    /// The slot that this payload belongs to.
     pub fn id(&self) -> SlotId {
         match self {
             Self::Utility(_) => SlotId::Utility,
@@ -204,7 +205,7 @@ impl Slot {
             SlotId::Constraints => Self::Constraints(Constraints::decode(r)?),
             SlotId::Settings => Self::Settings(Settings::decode(r)?),
             SlotId::Budget => Self::Budget(Budget::decode(r)?),
-            SlotId::Requests => Self::Requests(Requests::decode(r)?),
+            SlotId::Requests => Self::Requests(ExemplarRequests::decode(r)?),
             SlotId::Fix => Self::Fix(Fix::decode(r)?),
             SlotId::Limits => Self::Limits(Limits::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
             SlotId::Fence => Self::Fence(Fence::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?),
@@ -212,7 +213,7 @@ impl Slot {
     }
 }
 
-/// A slot as it travels.
+/// A version of a slot on the wire.
 ///
 /// ```text
 ///  0                   1                   2                   3
@@ -224,18 +225,18 @@ impl Slot {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct VersionedSlot {
-    /// Which slot.
+    /// The slot, also where the payload is unreadable.
     pub id: SlotId,
-    /// Random number of the run of the surface that counts the versions.
+    /// The random number of the surface's run that counts the versions.
     pub series: u16,
-    /// Version in the series; wraps.
+    /// The version within the series; wraps.
     pub version: u16,
-    /// What it says; `None` if the payload could not be read.
+    /// The payload; `None` if it is unreadable.
     pub content: Option<Slot>,
 }
 
 impl VersionedSlot {
-    /// The bytes of `slot` at `version` of `series`.
+    /// Encodes `slot` at `version` of `series`.
     pub fn encode(series: u16, version: u16, slot: &Slot) -> Vec<u8> {
         let mut out = vec![(slot.id() as u8) << 5];
         out.extend_from_slice(&series.to_be_bytes());
@@ -244,7 +245,7 @@ impl VersionedSlot {
         out
     }
 
-    /// Reads a slot; an unreadable payload still yields its id and version, so that it can be refused by name.
+    /// Decodes a slot. An unreadable payload still yields its id and version, so that it can be refused by name.
     pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
@@ -286,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn every_setting_at_once_leaves_room_in_a_frame_of_48_bytes() {
+    fn all_settings_at_once_fit_a_frame_of_48_bytes() {
         let figure = Change::To(Figure::new(0.01).unwrap());
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),

@@ -1,55 +1,54 @@
-//! The surface's side of the slots: what to send, and what became of it.
+//! The surface's side of the directive: which slots to send, and how far each has come.
 
-use super::{RefusalReason, SLOTS, Slot, SlotId, VersionedSlot};
+use super::{RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
 use crate::time::Instant;
-use crate::wire::{SlotState, VehicleStatus};
 
-/// How far a version of a slot has come.
+/// How far an order has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LifeLine {
-    /// Waits for its first transmission.
+pub enum OrderStatus {
+    /// It waits for its first transmission.
     Queued,
-    /// Was transmitted, nothing heard of it yet.
+    /// It was transmitted and is not acknowledged yet.
     OnAir,
-    /// The vehicle has it, its decision is not known yet.
-    Heard,
-    /// In force at the vehicle.
+    /// The vehicle has received it; its decision is not known yet.
+    Received,
+    /// It is in force at the vehicle.
     Applied,
-    /// The vehicle refused it and keeps what it had.
+    /// The vehicle refused it, and the previous version stays in force.
     Refused(RefusalReason),
 }
 
-/// The newest version of a slot and how far it has come.
+/// The latest version of a slot, and how far it has come.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SlotProgress {
-    /// Which slot.
+    /// The slot that was issued.
     pub id: SlotId,
-    /// Version in this session of the surface.
+    /// The version in this run of the surface, from 1; wraps.
     pub version: u16,
-    /// Content.
+    /// The payload of this version.
     pub slot: Slot,
     /// How far it has come.
-    pub life: LifeLine,
-    /// When it was issued.
+    pub status: OrderStatus,
+    /// When the operator issued it.
     pub issued: Instant,
-    /// When `life` last changed.
+    /// When the status last changed.
     pub changed: Instant,
     /// When it was last put into a frame.
     pub sent: Option<Instant>,
 }
 
-/// A slot that waits to be heard, as it would go into a frame now.
+/// A slot that waits for transmission, encoded as of now.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PendingSlot {
-    /// Which slot.
+    /// The slot that the chunk belongs to.
     pub id: SlotId,
-    /// Its version.
+    /// The version within the series of this run.
     pub version: u16,
-    /// The chunk.
+    /// The encoded payload of the chunk.
     pub bytes: Vec<u8>,
 }
 
-/// The directive of one vehicle as the surface keeps it.
+/// The directive of one vehicle at the surface.
 #[derive(Debug)]
 pub struct SlotOutbox {
     series: u16,
@@ -57,36 +56,43 @@ pub struct SlotOutbox {
 }
 
 impl SlotOutbox {
-    /// An empty directive whose versions count in `series`, a random number drawn at each start of the surface.
+    /// An empty directive; `series` must be drawn at random at each start of the surface.
     pub fn new(series: u16) -> Self {
         Self { series, slots: Default::default() }
     }
 
-    /// Issues a new version of a slot, which supersedes the older one; returns its version.
+    /// Issues a new version of a slot, which supersedes the older one; returns the version.
     pub fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
         let id = slot.id();
         let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
         let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
-        *entry =
-            Some(SlotProgress { id, version, slot, life: LifeLine::Queued, issued: now, changed: now, sent: None });
+        *entry = Some(SlotProgress {
+            id,
+            version,
+            slot,
+            status: OrderStatus::Queued,
+            issued: now,
+            changed: now,
+            sent: None,
+        });
         version
     }
 
-    /// Every slot that was ever issued.
+    /// The latest version of every slot that was issued.
     pub fn progress(&self) -> impl Iterator<Item = &SlotProgress> {
         self.slots.iter().flatten()
     }
 
-    /// Whether something waits to be heard by the vehicle.
+    /// Whether a version waits that the vehicle is not known to have received.
     pub fn has_backlog(&self) -> bool {
-        self.progress().any(|s| matches!(s.life, LifeLine::Queued | LifeLine::OnAir))
+        self.progress().any(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
     }
 
-    /// The slots that the vehicle is not known to have heard, commands before fixes, as they would go out at `now`; without
-    /// those that went out after `again_before`.
+    /// The slots that the vehicle is not known to have received, commands before fixes, encoded as of `now`;
+    /// without those sent after `again_before`.
     pub fn pending(&self, now: Instant, again_before: Instant) -> Vec<PendingSlot> {
         self.progress()
-            .filter(|s| matches!(s.life, LifeLine::Queued | LifeLine::OnAir))
+            .filter(|s| matches!(s.status, OrderStatus::Queued | OrderStatus::OnAir))
             .filter(|s| s.sent.is_none_or(|at| at <= again_before))
             .map(|s| PendingSlot {
                 id: s.id,
@@ -96,53 +102,54 @@ impl SlotOutbox {
             .collect()
     }
 
-    /// The chunk of a version as it would go out at `now`, if it has not been superseded.
+    /// The chunk of a version as of `now`, unless the version is superseded.
     pub fn encode(&self, id: SlotId, version: u16, now: Instant) -> Option<Vec<u8>> {
         let slot = self.progress().find(|s| s.id == id && s.version == version)?;
         Some(VersionedSlot::encode(self.series, version, &dated(slot, now)))
     }
 
-    /// A frame with this version of the slot was written.
+    /// Notes that a frame with this version was written.
     pub fn mark_on_air(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.advance(id, version, LifeLine::OnAir, now, |life| life == LifeLine::Queued);
+        self.advance(id, version, OrderStatus::OnAir, now, |status| status == OrderStatus::Queued);
         if let Some(slot) = self.slots.get_mut(id.index()).and_then(Option::as_mut) {
             slot.sent = Some(now);
         }
     }
 
-    /// The vehicle acknowledged a frame with this version.
-    pub fn mark_heard(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.advance(id, version, LifeLine::Heard, now, |life| matches!(life, LifeLine::Queued | LifeLine::OnAir));
+    /// Notes that the vehicle acknowledged a frame with this version.
+    pub fn mark_received(&mut self, id: SlotId, version: u16, now: Instant) {
+        self.advance(id, version, OrderStatus::Received, now, |life| {
+            matches!(life, OrderStatus::Queued | OrderStatus::OnAir)
+        });
     }
 
-    /// The vehicle reported its decisions; returns the slots whose fate is newly known.
-    pub fn handle_report(&mut self, status: &VehicleStatus, now: Instant) -> Vec<SlotId> {
+    /// Takes the decisions in the vehicle's report; returns the slots that are newly applied or refused.
+    pub fn handle_report(&mut self, reports: &[SlotReport; SLOTS], now: Instant) -> Vec<SlotId> {
         let mut settled = Vec::new();
-        for id in SlotId::ALL {
-            let report = status.slot(id);
+        for (id, report) in SlotId::ALL.into_iter().zip(reports) {
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
-            let life = match report.state {
+            let status = match report.state {
                 SlotState::Unknown => {
-                    let forgotten = |l| matches!(l, LifeLine::Heard | LifeLine::Applied);
-                    self.advance(id, slot.version, LifeLine::Queued, now, forgotten);
+                    let forgotten = |l| matches!(l, OrderStatus::Received | OrderStatus::Applied);
+                    self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
                     continue;
                 }
                 _ if slot.version as u8 != report.version_low => continue,
-                SlotState::Applied => LifeLine::Applied,
-                SlotState::Refused(reason) => LifeLine::Refused(reason),
+                SlotState::Applied => OrderStatus::Applied,
+                SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
-            if self.advance(id, slot.version, life, now, |l| l == LifeLine::Heard) {
+            if self.advance(id, slot.version, status, now, |l| l == OrderStatus::Received) {
                 settled.push(id);
             }
         }
         settled
     }
 
-    /// The vehicle restarted: what it was not known to have in force goes out again.
+    /// Queues again each order that a restarted vehicle is not known to have in force.
     pub fn handle_peer_restart(&mut self, now: Instant) {
         for slot in self.slots.iter_mut().flatten() {
-            if matches!(slot.life, LifeLine::OnAir | LifeLine::Heard) {
-                (slot.life, slot.changed, slot.sent) = (LifeLine::Queued, now, None);
+            if matches!(slot.status, OrderStatus::OnAir | OrderStatus::Received) {
+                (slot.status, slot.changed, slot.sent) = (OrderStatus::Queued, now, None);
             }
         }
     }
@@ -151,13 +158,13 @@ impl SlotOutbox {
         &mut self,
         id: SlotId,
         version: u16,
-        to: LifeLine,
+        to: OrderStatus,
         now: Instant,
-        from: impl Fn(LifeLine) -> bool,
+        from: impl Fn(OrderStatus) -> bool,
     ) -> bool {
         match self.slots.get_mut(id.index()) {
-            Some(Some(s)) if s.version == version && from(s.life) => {
-                (s.life, s.changed) = (to, now);
+            Some(Some(s)) if s.version == version && from(s.status) => {
+                (s.status, s.changed) = (to, now);
                 true
             }
             _ => false,
@@ -165,7 +172,7 @@ impl SlotOutbox {
     }
 }
 
-/// A fix is as old as it is when it leaves.
+/// Brings the age of a fix up to date.
 fn dated(progress: &SlotProgress, now: Instant) -> Slot {
     match progress.slot {
         Slot::Fix(fix) => Slot::Fix(super::Fix { age_s: fix.age_s + now.since(progress.issued).as_secs_f64(), ..fix }),

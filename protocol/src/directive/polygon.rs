@@ -1,51 +1,21 @@
-//! Polygons in whole decimetres: every predicate is exact.
+//! Polygons in whole decimetres, on which every predicate is exact.
 
-/// A place on the horizontal plane, decimetres from the origin, each coordinate within [`Place::REACH_DM`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Place {
-    /// East.
-    pub x_dm: i32,
-    /// North.
-    pub y_dm: i32,
-}
+use crate::coordinates::DecimetrePoint;
 
-impl Place {
-    /// Largest coordinate that fits the wire, either sign.
-    pub const REACH_DM: i32 = 8_388_607;
-
-    /// The nearest place to one in metres; `None` if that is not on the plane that the wire can say.
-    pub fn from_metres(x_m: f64, y_m: f64) -> Option<Self> {
-        let dm = |m: f64| {
-            let dm = (m * 10.0).round();
-            (dm.abs() <= f64::from(Self::REACH_DM)).then_some(dm as i32)
-        };
-        Some(Self { x_dm: dm(x_m)?, y_dm: dm(y_m)? })
-    }
-
-    /// East and north of the origin, metres.
-    pub fn metres(self) -> (f64, f64) {
-        (f64::from(self.x_dm) / 10.0, f64::from(self.y_dm) / 10.0)
-    }
-
-    fn is_in_reach(self) -> bool {
-        self.x_dm.unsigned_abs().max(self.y_dm.unsigned_abs()) <= Self::REACH_DM.unsigned_abs()
-    }
-}
-
-/// A polygon, the last vertex joined to the first; either sense of rotation.
+/// A polygon, the last vertex joined to the first; it may turn either way.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Polygon(pub Vec<Place>);
+pub struct Polygon(pub Vec<DecimetrePoint>);
 
-/// Why vertices make no polygon. Vertices and edges count from 1; edge n begins at vertex n.
+/// Why a polygon is not valid. Vertices and edges count from 1; edge n begins at vertex n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PolygonFault {
-    /// No area can lie between so few.
-    #[error("{0} vertices: it takes 3 to {most}", most = Polygon::MOST_VERTICES)]
+    /// Fewer than 3 or more than [`Polygon::MAX_VERTICES`] vertices.
+    #[error("{0} vertices: it takes 3 to {most}", most = Polygon::MAX_VERTICES)]
     Vertices(usize),
-    /// A vertex is too far from the origin.
+    /// A vertex is beyond the range of the wire.
     #[error("vertex {0} lies more than 838 km from the origin")]
     TooFar(usize),
-    /// Two neighbouring vertices are the same.
+    /// Two neighbouring vertices are equal.
     #[error("vertex {0} is at the same place as the one before it")]
     Repeated(usize),
     /// All vertices lie on one line.
@@ -57,19 +27,19 @@ pub enum PolygonFault {
 }
 
 impl Polygon {
-    /// Most vertices.
-    pub const MOST_VERTICES: usize = 34;
+    /// The most vertices that the layout can count.
+    pub const MAX_VERTICES: usize = 34;
 
-    /// Whether this is a simple polygon that the wire can say.
+    /// Checks whether this is a simple polygon within the range of the wire.
     pub fn check(&self) -> Result<(), PolygonFault> {
         let n = self.0.len();
-        if !(3..=Self::MOST_VERTICES).contains(&n) {
+        if !(3..=Self::MAX_VERTICES).contains(&n) {
             return Err(PolygonFault::Vertices(n));
         }
-        if let Some(far) = self.0.iter().position(|p| !p.is_in_reach()) {
+        if let Some(far) = self.0.iter().position(|p| !p.is_in_range()) {
             return Err(PolygonFault::TooFar(far + 1));
         }
-        let edges: Vec<(Place, Place)> = self.edges().collect();
+        let edges: Vec<(DecimetrePoint, DecimetrePoint)> = self.edges().collect();
         if let Some(same) = edges.iter().position(|(a, b)| a == b) {
             return Err(PolygonFault::Repeated((same + 1) % n + 1));
         }
@@ -92,20 +62,20 @@ impl Polygon {
         Ok(())
     }
 
-    /// Edges, the closing one last.
-    pub fn edges(&self) -> impl Iterator<Item = (Place, Place)> + '_ {
+    /// All edges; the closing one comes last.
+    pub fn edges(&self) -> impl Iterator<Item = (DecimetrePoint, DecimetrePoint)> + '_ {
         self.0.iter().copied().zip(self.0.iter().copied().cycle().skip(1))
     }
 
-    /// Whether a place lies inside or on the edge.
-    pub fn contains(&self, p: Place) -> bool {
+    /// Whether a point lies inside or on an edge.
+    pub fn contains(&self, p: DecimetrePoint) -> bool {
         let mut inside = false;
         for (a, b) in self.edges() {
             if cross(a, b, p) == 0 && is_between(a, b, p) {
                 return true;
             }
-            if (a.y_dm > p.y_dm) != (b.y_dm > p.y_dm) {
-                inside ^= (cross(a, b, p) > 0) == (b.y_dm > a.y_dm);
+            if (a.north_dm > p.north_dm) != (b.north_dm > p.north_dm) {
+                inside ^= (cross(a, b, p) > 0) == (b.north_dm > a.north_dm);
             }
         }
         inside
@@ -118,25 +88,25 @@ impl Polygon {
 }
 
 /// Twice the area of the triangle, positive if it turns left.
-fn cross(a: Place, b: Place, c: Place) -> i64 {
+fn cross(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> i64 {
     let d = |p: i32, q: i32| i64::from(p) - i64::from(q);
-    d(b.x_dm, a.x_dm) * d(c.y_dm, a.y_dm) - d(b.y_dm, a.y_dm) * d(c.x_dm, a.x_dm)
+    d(b.east_dm, a.east_dm) * d(c.north_dm, a.north_dm) - d(b.north_dm, a.north_dm) * d(c.east_dm, a.east_dm)
 }
 
-/// Whether `p` lies in the box of `a` and `b`.
-fn is_between(a: Place, b: Place, p: Place) -> bool {
-    (a.x_dm.min(b.x_dm)..=a.x_dm.max(b.x_dm)).contains(&p.x_dm)
-        && (a.y_dm.min(b.y_dm)..=a.y_dm.max(b.y_dm)).contains(&p.y_dm)
+/// Whether `p` lies in the bounding box of `a` and `b`.
+fn is_between(a: DecimetrePoint, b: DecimetrePoint, p: DecimetrePoint) -> bool {
+    (a.east_dm.min(b.east_dm)..=a.east_dm.max(b.east_dm)).contains(&p.east_dm)
+        && (a.north_dm.min(b.north_dm)..=a.north_dm.max(b.north_dm)).contains(&p.north_dm)
 }
 
-/// Whether the way from `a` over `b` to `c` turns round on itself.
-fn folds_back(a: Place, b: Place, c: Place) -> bool {
+/// Whether the path from `a` over `b` to `c` reverses its direction at `b`.
+fn folds_back(a: DecimetrePoint, b: DecimetrePoint, c: DecimetrePoint) -> bool {
     cross(a, b, c) == 0 && (is_between(a, b, c) || is_between(b, c, a))
 }
 
-fn segments_meet((a, b): (Place, Place), (c, d): (Place, Place)) -> bool {
+fn segments_meet((a, b): (DecimetrePoint, DecimetrePoint), (c, d): (DecimetrePoint, DecimetrePoint)) -> bool {
     let (s, t) = (cross(a, b, c).signum() * cross(a, b, d).signum(), cross(c, d, a).signum() * cross(c, d, b).signum());
-    let touches = |p: Place, q: Place, r: Place| cross(p, q, r) == 0 && is_between(p, q, r);
+    let touches = |p: DecimetrePoint, q: DecimetrePoint, r: DecimetrePoint| cross(p, q, r) == 0 && is_between(p, q, r);
     (s < 0 && t < 0) || touches(a, b, c) || touches(a, b, d) || touches(c, d, a) || touches(c, d, b)
 }
 
@@ -145,7 +115,7 @@ mod tests {
     use super::*;
 
     fn polygon(vertices: &[(i32, i32)]) -> Polygon {
-        Polygon(vertices.iter().map(|&(x_dm, y_dm)| Place { x_dm, y_dm }).collect())
+        Polygon(vertices.iter().map(|&(x, y)| DecimetrePoint::new(x, y)).collect())
     }
 
     #[test]
@@ -154,12 +124,12 @@ mod tests {
         assert_eq!(polygon(&[(0, 10), (10, 10), (10, 0), (0, 0)]).check(), Ok(()));
         assert_eq!(polygon(&[(0, 0), (40, 0), (40, 40), (20, 10), (0, 40)]).check(), Ok(()), "not convex");
         assert_eq!(polygon(&[(0, 0), (5, 0), (10, 0), (10, 10)]).check(), Ok(()), "a vertex on a straight edge");
-        let far = Place::REACH_DM;
+        let far = DecimetrePoint::MAX_DM;
         assert_eq!(polygon(&[(-far, -far), (far, -far), (far, far), (-far, far)]).check(), Ok(()));
     }
 
     #[test]
-    fn what_is_no_polygon_is_refused_by_what_is_wrong() {
+    fn invalid_polygons_are_refused_with_the_fault() {
         use PolygonFault::*;
         assert_eq!(polygon(&[(0, 0), (10, 0)]).check(), Err(Vertices(2)));
         assert_eq!(polygon(&[]).check(), Err(Vertices(0)));
@@ -174,10 +144,10 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_inside_on_the_edge_or_outside() {
+    fn a_point_is_inside_on_the_edge_or_outside() {
         let u = polygon(&[(0, 0), (30, 0), (30, 30), (20, 30), (20, 10), (10, 10), (10, 30), (0, 30)]);
         assert_eq!(u.check(), Ok(()));
-        for (x_dm, y_dm, inside) in [
+        for (x, y, inside) in [
             (5, 20, true),
             (15, 20, false),
             (25, 20, true),
@@ -187,7 +157,7 @@ mod tests {
             (31, 5, false),
             (-1, 30, false),
         ] {
-            assert_eq!(u.contains(Place { x_dm, y_dm }), inside, "{x_dm}, {y_dm}");
+            assert_eq!(u.contains(DecimetrePoint::new(x, y)), inside, "{x}, {y}");
         }
     }
 }

@@ -1,49 +1,50 @@
-//! The images that the operator wants.
+//! Requests for exemplars.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
-/// A request for an image of a label.
+/// A request for an exemplar of a label.
 ///
 /// ```text
 /// byte 0: label, 1..=254
 /// byte 1: serial number of the request, 1..=255; a label's next request has another one
-/// byte 2: bits 7-6 size: an edge of 64 << size pixels; bits 5-0 picture: 0 the best one that the surface has not, or the
-///         number of one that it has
+/// byte 2: bits 7-6 size: an edge of 64 << size pixels; bits 5-0 picture: 0 the best one that the surface does not have, or
+///         the number of one that it has
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Request {
-    /// Label.
+pub struct ExemplarRequest {
+    /// The label that the exemplar should show, 1..=254.
     pub label: u8,
-    /// Serial number of the request.
+    /// Serial number of the request, 1..=255.
     pub serial: u8,
-    /// Largest edge, 64 << `size` pixels; 0..=3.
+    /// The largest edge is 64 << `size` pixels; 0..=3.
     pub size: u8,
-    /// Which picture; 0: the best one that the surface has not; at most [`Request::MOST_PICTURE`].
+    /// The number of the exemplar, at most [`ExemplarRequest::MAX_PICTURE`]; 0 is the best one that
+    /// the surface does not have.
     pub picture: u8,
 }
 
-impl Request {
-    /// The highest number of a picture.
-    pub const MOST_PICTURE: u8 = 63;
+impl ExemplarRequest {
+    /// The highest number of an exemplar.
+    pub const MAX_PICTURE: u8 = 63;
 }
 
-/// The images that the operator still wants; what is not named any more is not sent to its end.
+/// The exemplars that the operator still requests. The vehicle stops sending the others.
 ///
 /// ```text
 /// byte 0: label epoch; then each request, 3 bytes
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Requests {
-    /// Epoch of the label ids.
+pub struct ExemplarRequests {
+    /// The epoch of the label ids.
     pub epoch: u8,
-    /// What is wanted.
-    pub wanted: Vec<Request>,
+    /// The requests, in the order in which they are served.
+    pub wanted: Vec<ExemplarRequest>,
 }
 
-impl Requests {
+impl ExemplarRequests {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.push(self.epoch);
-        let bytes = |r: &Request| [r.label, r.serial, r.size << 6 | r.picture & Request::MOST_PICTURE];
+        let bytes = |r: &ExemplarRequest| [r.label, r.serial, r.size << 6 | r.picture & ExemplarRequest::MAX_PICTURE];
         out.extend(self.wanted.iter().flat_map(bytes));
     }
 
@@ -51,7 +52,12 @@ impl Requests {
         let mut requests = Self { epoch: r.u8()?, wanted: Vec::new() };
         while !r.rest().is_empty() {
             let (label, serial, what) = (r.u8()?, r.u8()?, r.u8()?);
-            requests.wanted.push(Request { label, serial, size: what >> 6, picture: what & Request::MOST_PICTURE });
+            requests.wanted.push(ExemplarRequest {
+                label,
+                serial,
+                size: what >> 6,
+                picture: what & ExemplarRequest::MAX_PICTURE,
+            });
         }
         Ok(requests)
     }
@@ -63,13 +69,13 @@ mod tests {
 
     #[test]
     fn golden_bytes_of_requests() {
-        let first = Request { label: 3, serial: 2, ..Request::default() };
-        let larger = Request { label: 5, serial: 1, size: 1, picture: 9 };
-        let requests = Requests { epoch: 1, wanted: vec![first, larger] };
+        let first = ExemplarRequest { label: 3, serial: 2, ..ExemplarRequest::default() };
+        let larger = ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 };
+        let requests = ExemplarRequests { epoch: 1, wanted: vec![first, larger] };
         let mut bytes = Vec::new();
         requests.encode(&mut bytes);
         assert_eq!(bytes, [1, 3, 2, 0x00, 5, 1, 0x49]);
-        assert_eq!(Requests::decode(&mut Reader::new(&bytes)), Ok(requests));
-        assert!(Requests::decode(&mut Reader::new(&bytes[..3])).is_err(), "half a request");
+        assert_eq!(ExemplarRequests::decode(&mut Reader::new(&bytes)), Ok(requests));
+        assert!(ExemplarRequests::decode(&mut Reader::new(&bytes[..3])).is_err(), "half a request");
     }
 }

@@ -1,7 +1,7 @@
 //! Short slots that set how a vehicle behaves.
 
+use crate::bytes::{Reader, Truncated};
 use crate::schedule::{Shares, SpendOrder};
-use crate::wire::{Reader, Truncated};
 
 /// Orders that never wait for anything longer.
 ///

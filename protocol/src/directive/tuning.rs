@@ -1,8 +1,8 @@
 //! How a vehicle builds its map, how finely it tells it, and how it chooses its way.
 
 use super::{Figure, PlannerKind};
+use crate::bytes::{Reader, Truncated};
 use crate::map::PlaneKind;
-use crate::wire::{Reader, Truncated};
 use std::ops::RangeInclusive;
 
 /// What an order says of one setting.

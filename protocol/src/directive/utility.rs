@@ -1,9 +1,9 @@
-//! The operator's utility function.
+//! The operator's utility.
 
-use crate::wire::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 use std::collections::BTreeMap;
 
-/// What seeing one more cell of each label is worth to the operator.
+/// The operator's weights: the value of one more look at a cell of each label.
 ///
 /// ```text
 /// byte  field
@@ -14,18 +14,18 @@ use std::collections::BTreeMap;
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Utility {
-    /// Epoch of the label ids.
+    /// The epoch of the label ids.
     pub epoch: u8,
-    /// Weight of unseen cells, hundredths.
+    /// Weight of unexplored cells in hundredths, -100..=100.
     pub exploration: i8,
-    /// Weight of perplexity, hundredths.
+    /// Weight of perplexity in hundredths, -100..=100.
     pub curiosity: i8,
-    /// Weight by label, hundredths.
+    /// Weights by label in hundredths, -100..=100; a missing label has weight 0.
     pub weights: BTreeMap<u8, i8>,
 }
 
 impl Utility {
-    /// Weight of a label in -1..=1.
+    /// The weight of a label in -1..=1.
     pub fn weight(&self, label: u8) -> f64 {
         self.weights.get(&label).map_or(0.0, |&w| f64::from(w) / 100.0)
     }

@@ -1,9 +1,9 @@
-//! What the link measures of the water, from recent frames.
+//! Estimates of the channel's quality, from recent frames.
 
 use crate::time::Instant;
 use std::time::Duration;
 
-/// Recent share of frames that were lost.
+/// The recent share of lost frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
     share: f64,
@@ -17,12 +17,11 @@ impl Default for Loss {
 }
 
 impl Loss {
-    /// Frames over which the share is smoothed.
     const MEMORY: u32 = 64;
-    /// What is assumed of a link of which nothing is known, as if so many frames had been seen.
+    /// The loss that is assumed before the first frame.
     const PRIOR: f64 = 0.1;
 
-    /// Counts a frame.
+    /// Counts a frame as lost or received.
     pub fn count(&mut self, lost: bool) {
         self.frames = (self.frames + 1).min(Self::MEMORY);
         self.share += (f64::from(u8::from(lost)) - self.share) / f64::from(self.frames);
@@ -33,21 +32,21 @@ impl Loss {
         self.share
     }
 
-    /// The share to plan with: what is assumed of an unknown link gives way to what is measured.
+    /// The share to plan with: the assumed loss gives way to the measured one as frames are counted.
     pub fn expected(&self) -> f64 {
         const WEIGHT: f64 = 8.0;
         let n = f64::from(self.frames);
         (self.share * n + Self::PRIOR * WEIGHT) / (n + WEIGHT)
     }
 
-    /// Times that something must be sent so that all copies are lost with at most probability `risk`; at most `most`.
+    /// The number of copies to send so that all of them are lost with at most probability `risk`; at most `most`.
     pub fn copies(&self, risk: f64, most: u32) -> u32 {
         let loss = self.expected().clamp(1e-6, 0.99);
         ((risk.ln() / loss.ln()).ceil() as u32).clamp(1, most)
     }
 }
 
-/// Recent rate of useful bits.
+/// The recent rate of useful bits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Goodput {
     bits: f64,
@@ -55,16 +54,16 @@ pub struct Goodput {
 }
 
 impl Goodput {
-    /// Time over which the rate is smoothed.
+    /// Time constant of the smoothing.
     const MEMORY: Duration = Duration::from_secs(60);
 
-    /// Counts bytes.
+    /// Counts useful bytes that went through at `now`.
     pub fn count(&mut self, bytes: usize, now: Instant) {
         self.bits = self.left(now) + bytes as f64 * 8.0;
         self.counted = self.counted.max(now);
     }
 
-    /// Bits a second.
+    /// The smoothed rate in bit/s; it decays while no bytes are counted.
     pub fn bits_per_s(&self, now: Instant) -> f64 {
         self.left(now) / Self::MEMORY.as_secs_f64()
     }

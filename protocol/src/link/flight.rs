@@ -1,10 +1,10 @@
-//! Frames sent whose fate is not known.
+//! Sent frames whose fate is not known yet.
 
 use super::FrameNumber;
 use crate::wire::{AckStatement, MAX_WINDOW};
 use std::collections::BTreeMap;
 
-/// Numbers the frames toward one peer and remembers what each carried until the peer has judged it.
+/// Numbers the frames toward one peer, and keeps the content of each until the peer has reported its fate.
 #[derive(Debug)]
 pub struct Flight<T> {
     next: FrameNumber,
@@ -19,19 +19,19 @@ impl<T> Default for Flight<T> {
 }
 
 impl<T> Flight<T> {
-    /// Number of the next frame.
+    /// The number of the next frame; the first is 1.
     pub fn next_number(&self) -> FrameNumber {
         self.next
     }
 
-    /// Distance of the next frame to the last one whose fate is known.
+    /// The next frame's number minus the horizon, as the header's `base` field states it.
     pub fn base_distance(&self) -> u16 {
         (self.next - self.horizon).min(MAX_WINDOW) as u16
     }
 
-    /// Whether no further frame can be told from an old one before the peer has answered.
+    /// Whether the peer must answer first, because a further number could be mistaken for an old one.
     pub fn is_full(&self) -> bool {
-        // A turn that has begun is finished.
+        // A turn that has begun is completed.
         const TURN: u64 = 64;
         self.next - self.horizon >= MAX_WINDOW - TURN
     }
@@ -41,13 +41,14 @@ impl<T> Flight<T> {
         self.horizon
     }
 
-    /// The next frame was written and carries `content`.
+    /// Numbers the next frame, which carries `content`.
     pub fn push(&mut self, content: T) {
         self.frames.insert(self.next, content);
         self.next += 1;
     }
 
-    /// The peer's verdict; returns what newly judged frames carried, in the order of their numbers, and whether it arrived.
+    /// Takes the peer's verdict. Returns the content of newly judged frames in the order of their
+    /// numbers, and whether each arrived.
     pub fn handle_statement(&mut self, statement: &AckStatement) -> Vec<(T, bool)> {
         let ahead = u64::from(statement.horizon_low.wrapping_sub(self.horizon as u16) & 0xFFF);
         let horizon = self.horizon + ahead;

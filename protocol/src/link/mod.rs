@@ -1,11 +1,11 @@
-//! Two ends that agree, whatever the water does to the frames between them.
+//! Two ends that agree on their shared state, whatever frames the channel loses, delays, repeats or damages.
 //!
-//! [`VehicleLink`] and [`SurfaceLink`] are the ends. What they share, the state of a pair of ends, is in [`Pair`], split by
-//! concern: who speaks with whom (`meeting`, `run`), [`Flight`] (frames of unknown fate), [`Window`] (frames heard).
+//! [`VehicleLink`] and [`SurfaceLink`] are the ends. [`LinkPair`] is the state that either keeps toward one peer: the
+//! handshake and its runs, [`Flight`] (sent frames of unknown fate) and [`LinkWindow`] (received frames).
 
 mod estimate;
 mod flight;
-mod meeting;
+mod handshake;
 mod pair;
 mod run;
 mod slots;
@@ -16,33 +16,66 @@ mod window;
 
 pub use estimate::{Goodput, Loss};
 pub use flight::Flight;
-pub use pair::{Inbound, Pair};
+pub use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
 pub use surface::{Cycle, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
 pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
-pub use window::{Refusal, Window};
+pub use window::{LinkWindow, WindowRefusal};
 
-/// A frame to put on air.
+use crate::schedule::Class;
+
+/// A frame that the host must transmit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Transmit {
-    /// Receiver.
+    /// The receiver; a modem that addresses frames itself needs it.
     pub to: crate::wire::Address,
-    /// The frame.
+    /// The bytes of the frame, at most the modem's frame size.
     pub bytes: Vec<u8>,
-    /// What the frame mostly carries.
-    pub kind: &'static str,
+    /// The main purpose of the frame.
+    pub kind: TransmitKind,
 }
 
-/// Why the link asks to be woken.
+/// The main purpose of a transmission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TransmitKind {
+    /// The surface looks for unknown vehicles.
+    DiscoveryCall,
+    /// Opens a handshake, answers one, or answers a discovery call.
+    Hello,
+    /// Grants a turn and carries no slot.
+    Grant,
+    /// Only acknowledges received frames, without any chunk.
+    Acknowledgement,
+    /// The unchanged copy of an earlier frame.
+    Repeat,
+    /// Carries chunks, the most bytes of them of this class.
+    Content(Class),
+}
+
+impl TransmitKind {
+    /// The name in reports and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DiscoveryCall => "call",
+            Self::Hello => "hello",
+            Self::Grant => "grant",
+            Self::Acknowledgement => "ack",
+            Self::Repeat => "again",
+            Self::Content(class) => class.name(),
+        }
+    }
+}
+
+/// The reason for a wakeup.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wakeup {
-    /// Its granted turn begins.
+    /// The turn begins that the surface has granted.
     Turn,
     /// The surface may grant the next turn.
     Grant,
 }
 
-/// The frame number after which a peer that lost its state starts counting what it hears.
+/// An unbounded frame number; the header carries its low 16 bits.
 type FrameNumber = u64;

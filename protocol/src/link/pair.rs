@@ -1,133 +1,133 @@
-//! The state of one pair of ends.
+//! The state of one end toward one peer.
 
-use super::meeting::{Greeting, Meeting};
+use super::handshake::{Handshake, HandshakeOutcome};
 use super::run::{Authenticity, Identity};
-use super::{DropReason, FrameNumber, LinkStats, Refusal, Window};
+use super::{DropReason, FrameNumber, LinkStats, LinkWindow, WindowRefusal};
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
-use crate::wire::{Address, Chunks, Envelope, Frame, FrameBuilder, Header, MissionId, Seal, Stamp};
+use crate::wire::{Address, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, MissionId, Seal, Stamp};
 
-/// What a verified frame tells.
+/// The content of a verified frame.
 #[derive(Debug)]
 pub struct Inbound<'a, T> {
-    /// Whether the peer has restarted: all it had acknowledged is void. To be handled before everything else.
+    /// Whether the peer has begun a new run, so that it holds none of our state. To be handled before all else.
     pub restarted: bool,
-    /// What own frames carried that are newly judged, and whether they arrived; in the order sent.
+    /// The content of own frames that are newly judged, in the order sent, and whether each arrived.
     pub fates: Vec<(T, bool)>,
-    /// Its number, if it was taken.
+    /// The frame's number, if it was accepted.
     pub number: Option<FrameNumber>,
-    /// Whether no later frame was heard before it.
+    /// Whether no frame with a higher number came in before.
     pub is_latest: bool,
     /// The sender bases its map chunks on every frame up to here.
     pub base: FrameNumber,
-    /// Whether it was not taken because it builds on what we never acknowledged.
+    /// Whether it was rejected because it builds on frames that we never acknowledged.
     pub lacks_base: bool,
     frame: Frame<'a>,
 }
 
 impl<'a, T> Inbound<'a, T> {
-    /// A frame that tells no more than its header.
+    /// A frame of which only the header counts.
     fn empty(restarted: bool, frame: Frame<'a>) -> Self {
         Self { restarted, fates: Vec::new(), number: None, is_latest: true, base: 0, lacks_base: false, frame }
     }
 
-    /// Its header.
+    /// The header of the frame.
     pub fn header(&self) -> &Header {
         &self.frame.header
     }
 
-    /// What it carries; nothing if it was not taken.
+    /// The chunks of the frame; none if it was not accepted.
     pub fn chunks(&self) -> Chunks<'_> {
         if self.number.is_some() { self.frame.chunks() } else { Chunks::default() }
     }
 }
 
-/// Runs, flight, window and counters toward one peer; `T` is what a frame carried.
+/// Handshake, flight, window and counters toward one peer. `T` is the content of a sent frame.
 #[derive(Debug)]
-pub struct Pair<T> {
+pub struct LinkPair<T> {
     mission: MissionId,
     us: Address,
     peer: Address,
     authenticity: Option<Authenticity>,
-    meeting: Meeting<T>,
-    /// At the vehicle: the last frame that gave a turn wants our hello for an answer.
+    handshake: Handshake<T>,
+    /// At the vehicle: the surface's last frame with a turn is to be answered with a hello.
     owes_hello: bool,
-    /// Frames in a row that some other run of the peer seems to have sent.
+    /// Consecutive frames that seem to come from another run of the peer.
     strays: u32,
-    /// Counters.
+    /// Counters and estimates of this link.
     pub stats: LinkStats,
 }
 
-impl<T> Pair<T> {
-    /// Strays after which the peer is taken to mean another run of ours or its.
+impl<T> LinkPair<T> {
+    /// Strays after which the two ends are taken to have lost each other's runs.
     const STRAYS: u32 = 3;
 
-    /// A pair that has not met; `seed` is random for each start of the program.
+    /// A pair without contact; `seed` must be random for each start of the program.
     pub fn new(mission: MissionId, us: Address, peer: Address, authenticity: Option<Authenticity>, seed: u64) -> Self {
-        let (meeting, stats) = (Meeting::new(seed), LinkStats::default());
-        Self { mission, us, peer, authenticity, meeting, owes_hello: false, strays: 0, stats }
+        let (handshake, stats) = (Handshake::new(seed), LinkStats::default());
+        Self { mission, us, peer, authenticity, handshake, owes_hello: false, strays: 0, stats }
     }
 
-    /// The other end.
+    /// The address of the other end.
     pub fn peer(&self) -> Address {
         self.peer
     }
 
-    /// Whether there is a run of the peer to speak with.
+    /// Whether there is a current run of the peer.
     pub fn is_met(&self) -> bool {
-        self.meeting.run().is_some() && !self.meeting.is_leaving()
+        self.handshake.run().is_some() && !self.handshake.is_leaving()
     }
 
-    /// Whether there is anybody to speak to: a run of the peer, or a hello of one.
-    pub fn has_heard(&self) -> bool {
-        self.meeting.run().is_some() || self.meeting.offered().is_some()
+    /// Whether there is a run of the peer, or a hello of one.
+    pub fn has_contact(&self) -> bool {
+        self.handshake.run().is_some() || self.handshake.offered().is_some()
     }
 
-    /// Whether a numbered frame has shown that the peer means this run.
+    /// Whether a numbered frame has shown that the peer uses the current run.
     pub fn is_proven(&self) -> bool {
-        self.meeting.run().is_some_and(|r| r.window.highest() > 0)
+        self.handshake.run().is_some_and(|r| r.window.highest() > 0)
     }
 
     /// Whether frames of unknown fate fill the window.
     pub fn is_full(&self) -> bool {
-        self.meeting.run().is_some_and(|r| r.flight.is_full())
+        self.handshake.run().is_some_and(|r| r.flight.is_full())
     }
 
-    /// Frames of unknown fate.
+    /// The number of frames of unknown fate.
     pub fn outstanding(&self) -> u64 {
-        self.meeting.run().map_or(0, |r| r.flight.next_number() - 1 - r.flight.horizon())
+        self.handshake.run().map_or(0, |r| r.flight.next_number() - 1 - r.flight.horizon())
     }
 
-    /// The last frame whose fate is known.
+    /// The last frame whose fate is known, 0 before the first.
     pub fn horizon(&self) -> FrameNumber {
-        self.meeting.run().map_or(0, |r| r.flight.horizon())
+        self.handshake.run().map_or(0, |r| r.flight.horizon())
     }
 
-    /// Number of the next frame; the peer sees its low bits.
+    /// The number of the next frame, 0 without a run.
     pub fn next_number(&self) -> FrameNumber {
-        self.meeting.run().map_or(0, |r| r.flight.next_number())
+        self.handshake.run().map_or(0, |r| r.flight.next_number())
     }
 
-    /// The window of heard frames, if there is one.
-    pub fn window_mut(&mut self) -> Option<&mut Window> {
-        self.meeting.run_mut().map(|r| &mut r.window)
+    /// The window of received frames, if there is a run.
+    pub fn window_mut(&mut self) -> Option<&mut LinkWindow> {
+        self.handshake.run_mut().map(|r| &mut r.window)
     }
 
-    /// Whether the peer seems to speak with another run than we do.
+    /// Whether the peer seems to use other runs than this end does.
     pub fn has_lost_touch(&self) -> bool {
         self.strays >= Self::STRAYS
     }
 
-    /// Frames heard that wait for our statement.
+    /// Received frames that no acknowledgement statement of ours covers yet.
     pub fn unstated(&self) -> u64 {
-        self.meeting.run().map_or(0, |r| r.window.unstated())
+        self.handshake.run().map_or(0, |r| r.window.unstated())
     }
 
-    /// Bytes of the statement that the next frame would carry.
+    /// Bytes of the acknowledgement statement on all received frames.
     pub fn statement_bytes(&self) -> usize {
-        self.meeting.run().map_or(0, |r| r.window.statement_bytes())
+        self.handshake.run().map_or(0, |r| r.window.statement_bytes())
     }
 
-    /// Bytes that a frame of ours ends in, and of the nonce of a hello.
+    /// Bytes of the seal of our frames, and of the nonce of a hello.
     pub fn seal_bytes(&self) -> usize {
         match (self.is_keyed(self.direction_out()), self.is_met()) {
             (true, true) => TAG_BYTES,
@@ -136,7 +136,7 @@ impl<T> Pair<T> {
         }
     }
 
-    /// Bytes that a full frame of ours ends in.
+    /// Bytes of the seal of a full frame of ours.
     pub fn full_seal_bytes(&self, frame_bytes: usize) -> usize {
         Seal::bytes(self.is_keyed(self.direction_out()), frame_bytes)
     }
@@ -153,11 +153,11 @@ impl<T> Pair<T> {
         self.authenticity.as_ref().is_some_and(|a| a.all || matches!(direction, Direction::Down))
     }
 
-    /// Reads a frame of this peer; what is dropped is counted.
+    /// Opens a frame of this peer. The error is the reason for which it was dropped and counted.
     pub fn handle_frame<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
-        let result = match envelope.header.hello {
-            true => self.read_hello(envelope),
-            false => self.read_numbered(envelope),
+        let result = match envelope.header.kind {
+            FrameKind::Hello => self.read_hello(envelope),
+            FrameKind::Numbered => self.read_numbered(envelope),
         };
         if let Err(reason) = &result {
             self.stats.drop(*reason);
@@ -167,7 +167,7 @@ impl<T> Pair<T> {
 
     fn read_hello<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
         let header = &envelope.header;
-        let own = if self.us == Address::SURFACE { Some(self.meeting.own()) } else { None };
+        let own = if self.us == Address::SURFACE { Some(self.handshake.own()) } else { None };
         let (session, nonce) = own.map_or((0, 0), |o| (o.session.get(), o.nonce));
         let frame = match &self.authenticity {
             Some(a) => envelope.open(&Seal::Hello(&a.key, self.mission, session, nonce)),
@@ -176,16 +176,16 @@ impl<T> Pair<T> {
         let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
         let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
         let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
-        let greeting = match own {
-            Some(_) => self.meeting.handle_answer(peer, key),
-            None => self.meeting.handle_call(peer, key),
+        let outcome = match own {
+            Some(_) => self.handshake.handle_answer(peer, key),
+            None => self.handshake.handle_call(peer, key),
         };
-        if greeting == Greeting::Retired {
-            // A late hello can make the living run look ended; what the vehicle goes on to say tells.
+        if outcome == HandshakeOutcome::Retired {
+            // A late hello can make the current run look ended; the vehicle's next frames decide.
             self.strays += u32::from(own.is_some());
             return Err(DropReason::OldSession);
         }
-        let is_new = greeting == Greeting::New;
+        let is_new = outcome == HandshakeOutcome::New;
         self.owes_hello = is_new && own.is_none();
         let restarted = is_new && own.is_some();
         self.stats.peer_restarts += u64::from(restarted);
@@ -196,12 +196,12 @@ impl<T> Pair<T> {
     fn read_numbered<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
         let (mission, direction) = (self.mission, self.direction_in());
         let keyed = self.is_keyed(direction);
-        let offered = self.meeting.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let offered = self.handshake.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
         let restarted = offered.is_some();
-        let known = || self.meeting.run().and_then(|r| r.open(envelope, mission, direction, keyed));
+        let known = || self.handshake.run().and_then(|r| r.open(envelope, mission, direction, keyed));
         let Some(frame) = offered.or_else(known) else {
-            let reason = self.refuse(envelope, self.meeting.own().session.get());
-            let stray = self.meeting.run().is_some_and(|r| r.peer.session != envelope.header.session);
+            let reason = self.refuse(envelope, self.handshake.own().session.get());
+            let stray = self.handshake.run().is_some_and(|r| r.peer.session != envelope.header.session);
             self.strays += u32::from(stray && (reason == DropReason::OldSession || keyed));
             return Err(reason);
         };
@@ -210,10 +210,10 @@ impl<T> Pair<T> {
         }
         self.strays = 0;
         if restarted {
-            self.meeting.accept_offered();
+            self.handshake.accept_offered();
             self.stats.peer_restarts += 1;
         }
-        self.owes_hello = self.meeting.is_leaving();
+        self.owes_hello = self.handshake.is_leaving();
         if self.owes_hello {
             return Ok(Inbound::empty(restarted, frame));
         }
@@ -222,12 +222,12 @@ impl<T> Pair<T> {
 
     fn take<'a>(&mut self, frame: Frame<'a>, restarted: bool) -> Result<Inbound<'a, T>, DropReason> {
         let header = &frame.header;
-        let Some(run) = self.meeting.run_mut() else { return Err(DropReason::Stranger) };
+        let Some(run) = self.handshake.run_mut() else { return Err(DropReason::UnknownSender) };
         let fates = header.ack.as_ref().map_or_else(Vec::new, |ack| run.flight.handle_statement(ack));
         for (_, delivered) in &fates {
             self.stats.judge(*delivered);
         }
-        // A frame that is not taken has still told us the fate of ours, so that goes up with the refusal.
+        // A rejected frame has still reported fates of ours, so these are returned with it.
         let before = run.window.highest();
         let mut lacks_base = false;
         let number = match run.window.accept(header.number, header.base) {
@@ -237,7 +237,7 @@ impl<T> Pair<T> {
             }
             Err(refusal) if fates.is_empty() && !restarted => return Err(refusal.into()),
             Err(refusal) => {
-                lacks_base = refusal == Refusal::NoBase;
+                lacks_base = refusal == WindowRefusal::NoBase;
                 self.stats.drop(refusal.into());
                 None
             }
@@ -246,38 +246,40 @@ impl<T> Pair<T> {
         Ok(Inbound { restarted, fates, number, is_latest, base: run.window.base(), lacks_base, frame })
     }
 
-    /// Why a frame that does not open is not ours, as far as it can be told.
+    /// The most likely reason why a frame does not open.
     fn refuse(&mut self, envelope: &Envelope<'_>, session: u16) -> DropReason {
-        let expected =
-            if envelope.header.hello { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
+        let kind = envelope.header.kind;
+        let expected = if kind.is_hello() { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
         let plain = || envelope.open(&Seal::Crc(self.mission, session)).is_some();
         match (expected, envelope.header.keyed) {
             (false, true) => DropReason::Keyed,
             (true, false) if plain() => DropReason::Unauthenticated,
-            (false, false) if !envelope.header.hello && plain() => DropReason::OldSession,
+            (false, false) if !kind.is_hello() && plain() => DropReason::OldSession,
             _ => DropReason::Checksum,
         }
     }
 
-    /// Whether the next frame is a hello: the peer is to be told of our run.
+    /// Whether the next frame must be a hello.
     pub fn must_greet(&self) -> bool {
-        self.owes_hello || self.meeting.run().is_none()
+        self.owes_hello || self.handshake.run().is_none()
     }
 
-    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement; a hello if `hello` is asked for or nobody was met.
+    /// Starts the next frame, with at most `ack_room` bytes of acknowledgement. It becomes a hello if `kind` demands it
+    /// or the handshake is not complete.
     pub fn begin_frame(
         &mut self,
         size: usize,
         ack_room: usize,
         turn: Option<u8>,
         stamp: Option<Stamp>,
-        hello: bool,
+        kind: FrameKind,
     ) -> FrameBuilder {
-        let hello = hello || self.must_greet();
-        let own = self.meeting.offered().filter(|_| hello).map_or(self.meeting.own(), |r| r.own);
+        let kind = FrameKind::hello_if(kind.is_hello() || self.must_greet());
+        let hello = kind.is_hello();
+        let own = self.handshake.offered().filter(|_| hello).map_or(self.handshake.own(), |r| r.own);
         let direction = self.direction_out();
         let keyed = if hello { self.authenticity.is_some() } else { self.is_keyed(direction) };
-        let run = self.meeting.run_mut().filter(|_| !hello);
+        let run = self.handshake.run_mut().filter(|_| !hello);
         let (number, base) = run.as_ref().map_or((0, 1), |r| (r.flight.next_number() as u16, r.flight.base_distance()));
         let header = Header {
             from: self.us,
@@ -290,18 +292,18 @@ impl<T> Pair<T> {
             stamp,
             nonce: (hello && keyed).then_some(own.nonce),
             ack: run.and_then(|r| r.window.statement(ack_room)),
-            hello,
+            kind,
             keyed,
         };
         FrameBuilder::new(&header, size)
     }
 
-    /// Closes a frame and remembers what it carries.
-    pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, hello: bool, short: bool) -> Vec<u8> {
+    /// Closes a frame and keeps its content until its fate is known.
+    pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, kind: FrameKind, short: bool) -> Vec<u8> {
         self.stats.frames_sent += 1;
         let direction = self.direction_out();
-        if hello || self.must_greet() {
-            let to = self.meeting.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
+        if kind.is_hello() || self.must_greet() {
+            let to = self.handshake.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
             let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
             return match &self.authenticity {
                 Some(a) => builder.finish(&Seal::Hello(&a.key, self.mission, session, nonce), short),
@@ -309,7 +311,7 @@ impl<T> Pair<T> {
             };
         }
         let (mission, keyed) = (self.mission, self.is_keyed(direction));
-        let Some(run) = self.meeting.run_mut() else { return Vec::new() };
+        let Some(run) = self.handshake.run_mut() else { return Vec::new() };
         let number = run.flight.next_number();
         run.flight.push(carried);
         match run.key.as_ref().filter(|_| keyed) {
@@ -318,21 +320,21 @@ impl<T> Pair<T> {
         }
     }
 
-    /// Begins a new run of ours toward the peer, because what the two ends hold does not agree.
+    /// Begins a new run toward the peer, because the states of the two ends do not agree.
     pub fn renew(&mut self) {
         self.stats.resyncs += 1;
         self.strays = 0;
         if self.us == Address::SURFACE {
-            self.meeting.renew_surface();
+            self.handshake.renew_surface();
         } else {
             let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
-            self.meeting.renew_vehicle(key);
-            self.owes_hello = self.meeting.is_leaving();
+            self.handshake.renew_vehicle(key);
+            self.owes_hello = self.handshake.is_leaving();
         }
     }
 }
 
-/// The key of a run of ours with a run of the peer.
+/// Derives the key of a run of ours with a run of the peer.
 fn session_key(
     authenticity: Option<Authenticity>,
     mission: MissionId,
@@ -347,12 +349,12 @@ fn session_key(
     }
 }
 
-impl From<Refusal> for DropReason {
-    fn from(refusal: Refusal) -> Self {
+impl From<WindowRefusal> for DropReason {
+    fn from(refusal: WindowRefusal) -> Self {
         match refusal {
-            Refusal::Duplicate => Self::Duplicate,
-            Refusal::Late => Self::Late,
-            Refusal::NoBase => Self::NoBase,
+            WindowRefusal::Duplicate => Self::Duplicate,
+            WindowRefusal::Late => Self::Late,
+            WindowRefusal::NoBase => Self::NoBase,
         }
     }
 }
@@ -363,9 +365,9 @@ mod tests {
     use crate::seal::MissionKey;
     use std::sync::Arc;
 
-    fn carry(from: &mut Pair<u64>, to: &mut Pair<u64>, content: u64, hello: bool) -> Vec<(u64, bool)> {
-        let builder = from.begin_frame(64, 20, Some(4), None, hello);
-        let bytes = from.finish_frame(builder, content, hello, true);
+    fn carry(from: &mut LinkPair<u64>, to: &mut LinkPair<u64>, content: u64, kind: FrameKind) -> Vec<(u64, bool)> {
+        let builder = from.begin_frame(64, 20, Some(4), None, kind);
+        let bytes = from.finish_frame(builder, content, kind, true);
         let us = to.us;
         let envelope = Envelope::decode(&bytes, |a| a == us).unwrap();
         let inbound = to.handle_frame(&envelope).unwrap();
@@ -373,20 +375,20 @@ mod tests {
     }
 
     #[test]
-    fn tags_verify_across_every_turn_of_the_frame_counter() {
+    fn tags_verify_across_every_wrap_of_the_frame_counter() {
         let key = Arc::new(MissionKey::from_bytes([9; 16]));
         let authenticity = Some(Authenticity { key, all: true, encrypt: true });
         let auv = Address::vehicle(3).unwrap();
-        let mut surface = Pair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), 1);
-        let mut vehicle = Pair::new(MissionId(1), auv, Address::SURFACE, authenticity, 2);
-        carry(&mut surface, &mut vehicle, 0, true);
-        carry(&mut vehicle, &mut surface, 0, true);
-        carry(&mut surface, &mut vehicle, 0, false);
+        let mut surface = LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), 1);
+        let mut vehicle = LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, 2);
+        carry(&mut surface, &mut vehicle, 0, FrameKind::Hello);
+        carry(&mut vehicle, &mut surface, 0, FrameKind::Hello);
+        carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered);
         let mut delivered = 0;
         for i in 0..140_000 {
-            carry(&mut vehicle, &mut surface, i, false);
+            carry(&mut vehicle, &mut surface, i, FrameKind::Numbered);
             if i % 500 == 0 {
-                for (content, held) in carry(&mut surface, &mut vehicle, 0, false) {
+                for (content, held) in carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered) {
                     assert!(held && content == delivered);
                     delivered += 1;
                 }

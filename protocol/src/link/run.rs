@@ -1,46 +1,46 @@
-//! One run of ours with one run of the peer.
+//! A run of this end with a run of the peer.
 
-use super::{Flight, Window};
+use super::{Flight, LinkWindow};
 use crate::seal::{Direction, MissionKey, SessionKey};
 use crate::wire::{Envelope, Frame, MissionId, Seal, SessionId, unwrap_number};
 use std::sync::Arc;
 
-/// How frames are made authentic.
+/// The key and the scope of authentication.
 #[derive(Debug, Clone)]
 pub struct Authenticity {
-    /// The key that both ends share.
+    /// The mission key, which both ends share.
     pub key: Arc<MissionKey>,
-    /// Whether frames of the vehicle are authentic too, not only those of the surface.
+    /// Whether frames of the vehicle are authenticated too, and not only those of the surface.
     pub all: bool,
-    /// Whether what authentic frames carry is encrypted.
+    /// Whether the content of authenticated frames is encrypted.
     pub encrypt: bool,
 }
 
-/// Names a run of an end: the session on the wire, and a number that no other run has.
+/// The identity of a run of one end: the session on the wire, and a nonce that no other run has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Identity {
-    /// Session on the wire.
+    /// The session number in the frame header.
     pub session: SessionId,
-    /// Random number of the run; 0 where there is no key.
+    /// The random number that the hello carries; 0 without a key.
     pub nonce: u64,
 }
 
-/// The state between two runs: numbers begin at 1, nothing is known of either side.
+/// The state of a pair of runs; frame numbers begin at 1.
 #[derive(Debug)]
-pub(super) struct Run<T> {
+pub(super) struct LinkRun<T> {
     pub(super) own: Identity,
     pub(super) peer: Identity,
     pub(super) key: Option<SessionKey>,
     pub(super) flight: Flight<T>,
-    pub(super) window: Window,
+    pub(super) window: LinkWindow,
 }
 
-impl<T> Run<T> {
+impl<T> LinkRun<T> {
     pub(super) fn new(own: Identity, peer: Identity, key: Option<SessionKey>) -> Self {
-        Self { own, peer, key, flight: Flight::default(), window: Window::default() }
+        Self { own, peer, key, flight: Flight::default(), window: LinkWindow::default() }
     }
 
-    /// The frame, if the peer's run sealed it to ours; `keyed` says whether it must have a tag.
+    /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.
     pub(super) fn open<'a>(
         &self,
         envelope: &Envelope<'a>,

@@ -1,24 +1,23 @@
-//! The vehicle's side of the directive: each version of each slot is decided about once.
+//! The vehicle's side of the directive: it decides about each version of each slot once.
 
-use crate::directive::{SLOTS, SlotId, VersionedSlot};
-use crate::wire::{SlotReport, SlotState};
+use crate::directive::{SLOTS, SlotId, SlotReport, SlotState, VersionedSlot};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// What must survive a restart of the vehicle so that nothing is applied twice.
+/// The state that must survive a restart of the vehicle, so that no order is applied twice.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SlotInboxState {
-    /// The series of versions that is being followed.
+    /// The series of the surface's current run.
     pub series: Option<u16>,
-    /// Series that have ended.
+    /// Series of ended runs, oldest first.
     pub retired: VecDeque<u16>,
-    /// Latest version seen, by slot.
+    /// The latest version received, by slot.
     pub versions: [Option<u16>; SLOTS],
-    /// What was decided about it, as in the status, by slot.
+    /// The decision about that version in the code of the report, by slot.
     pub decisions: [u8; SLOTS],
 }
 
-/// Filters the slots that arrive, and reports what was decided.
+/// Filters the slots that come in, and keeps the decisions for the report.
 #[derive(Debug, Default)]
 pub struct SlotInbox {
     state: SlotInboxState,
@@ -26,10 +25,10 @@ pub struct SlotInbox {
 }
 
 impl SlotInbox {
-    /// Ended series to remember.
+    /// Ended series that are remembered.
     const MEMORY: usize = 16;
 
-    /// An inbox that continues from what survived.
+    /// An inbox that continues from the state that survived.
     pub fn restore(state: SlotInboxState) -> Self {
         let mut reports = [SlotReport::default(); SLOTS];
         for (report, (version, code)) in reports.iter_mut().zip(state.versions.into_iter().zip(state.decisions)) {
@@ -40,17 +39,17 @@ impl SlotInbox {
         Self { state, reports }
     }
 
-    /// What must survive.
+    /// The state that must survive a restart.
     pub fn state(&self) -> &SlotInboxState {
         &self.state
     }
 
-    /// Decisions, for the status.
+    /// The decisions, as the status reports them.
     pub fn reports(&self) -> [SlotReport; SLOTS] {
         self.reports
     }
 
-    /// Whether a version that arrived is news; if so it is from now on counted as seen.
+    /// Whether a version is new; if so, it counts as received from now on.
     pub fn admit(&mut self, slot: &VersionedSlot) -> bool {
         if self.state.retired.contains(&slot.series) {
             return false;
@@ -66,7 +65,7 @@ impl SlotInbox {
         newer
     }
 
-    /// The host has decided about the latest version of a slot.
+    /// Keeps the host's decision about the latest version of a slot.
     pub fn decide(&mut self, id: SlotId, state: SlotState) {
         let i = id.index();
         if let Some(&Some(version)) = self.state.versions.get(i)

@@ -1,25 +1,25 @@
-//! Frames heard.
+//! The window of received frames.
 
 use super::FrameNumber;
 use crate::wire::{AckStatement, MAX_WINDOW, unwrap_number};
 use std::collections::BTreeSet;
 
-/// Why a verified frame is not taken.
+/// Why the window rejects a verified frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
-    /// It was taken before.
+pub enum WindowRefusal {
+    /// The frame was accepted before.
     Duplicate,
-    /// It comes after it was declared lost, or refers to a base that is gone.
+    /// The frame comes after it was declared lost, or refers to a base that is gone.
     Late,
-    /// It claims a base that we never acknowledged.
+    /// The frame claims a base that we never acknowledged.
     NoBase,
 }
 
-/// What was heard of one run of a peer.
+/// The received frames of one run of the peer.
 ///
-/// Invariants: `base <= closed <= highest`; a frame up to `closed` that is not in `held` never will be.
+/// Invariants: `base <= closed <= highest`; a frame up to `closed` that is not in `held` is never accepted.
 #[derive(Debug, Default)]
-pub struct Window {
+pub struct LinkWindow {
     base: FrameNumber,
     closed: FrameNumber,
     highest: FrameNumber,
@@ -27,34 +27,34 @@ pub struct Window {
     unpersisted: BTreeSet<FrameNumber>,
 }
 
-impl Window {
+impl LinkWindow {
     /// The last frame whose fate the sender is known to know.
     pub fn base(&self) -> FrameNumber {
         self.base
     }
 
-    /// Highest frame number heard.
+    /// The highest frame number received, 0 before the first.
     pub fn highest(&self) -> FrameNumber {
         self.highest
     }
 
-    /// Frames heard that no statement has spoken of yet, and those that were lost between them.
+    /// Frame numbers after the last statement, up to the highest one received.
     pub fn unstated(&self) -> u64 {
         self.highest - self.closed
     }
 
-    /// Takes a frame, or says why not.
-    pub fn accept(&mut self, number_low: u16, base_distance: u16) -> Result<FrameNumber, Refusal> {
+    /// Accepts a frame and returns its number, or the reason for which it is rejected.
+    pub fn accept(&mut self, number_low: u16, base_distance: u16) -> Result<FrameNumber, WindowRefusal> {
         let number = unwrap_number(number_low, self.highest);
-        let base = number.checked_sub(u64::from(base_distance)).ok_or(Refusal::Late)?;
+        let base = number.checked_sub(u64::from(base_distance)).ok_or(WindowRefusal::Late)?;
         if self.held.contains(&number) {
-            return Err(Refusal::Duplicate);
+            return Err(WindowRefusal::Duplicate);
         }
         if number <= self.closed || base < self.base {
-            return Err(Refusal::Late);
+            return Err(WindowRefusal::Late);
         }
         if base > self.closed || number - self.base > 2 * MAX_WINDOW {
-            return Err(Refusal::NoBase);
+            return Err(WindowRefusal::NoBase);
         }
         self.base = base;
         self.held = self.held.split_off(&(base + 1));
@@ -63,19 +63,19 @@ impl Window {
         Ok(number)
     }
 
-    /// Frame `number` may not be acknowledged before the host has made its content durable.
+    /// Bars frame `number` from acknowledgement until the host has made its content durable.
     pub fn hold_back(&mut self, number: FrameNumber) {
         self.unpersisted.insert(number);
     }
 
-    /// Everything taken so far is durable.
+    /// Lifts the bar from every frame received so far.
     pub fn handle_persisted(&mut self) {
         self.unpersisted.clear();
     }
 
-    /// The verdict on what was heard, in at most `room` bytes; `None` if the sender knows everything already.
+    /// The verdict on the received frames in at most `room` bytes; `None` if the sender knows all of it.
     ///
-    /// What the verdict calls lost is closed: it will not be taken later.
+    /// A frame that the verdict declares lost is not accepted later.
     pub fn statement(&mut self, room: usize) -> Option<AckStatement> {
         let mut horizon = self.utmost();
         loop {
@@ -88,7 +88,7 @@ impl Window {
         }
     }
 
-    /// Bytes that a statement on all that was heard takes.
+    /// Bytes of a statement on all received frames.
     pub fn statement_bytes(&self) -> usize {
         let mut bytes = Vec::new();
         if let Some(statement) = self.verdict(self.utmost()) {
@@ -118,24 +118,24 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Both ends agree for ever on what was delivered up to the sender's horizon.
+        /// Both ends agree forever on the fate of each frame up to the sender's horizon.
         #[test]
         fn sender_and_receiver_agree_on_every_fate(
             events in proptest::collection::vec((0u8..10, 0usize..40, 3usize..20), 1..400),
         ) {
             let mut flight = Flight::<u64>::default();
-            let mut window = Window::default();
-            let mut water: Vec<(u64, u16)> = Vec::new();
+            let mut window = LinkWindow::default();
+            let mut channel: Vec<(u64, u16)> = Vec::new();
             let mut taken = BTreeSet::new();
             let mut fates = Vec::new();
             for (what, pick, room) in events {
                 match what {
                     0..5 if !flight.is_full() => {
-                        water.push((flight.next_number(), flight.base_distance()));
+                        channel.push((flight.next_number(), flight.base_distance()));
                         flight.push(flight.next_number());
                     }
-                    5..8 if !water.is_empty() => {
-                        let (number, distance) = water.remove(pick % water.len());
+                    5..8 if !channel.is_empty() => {
+                        let (number, distance) = channel.remove(pick % channel.len());
                         if window.accept(number as u16, distance).is_ok() {
                             prop_assert!(taken.insert(number), "frame {} taken twice", number);
                         }
@@ -155,8 +155,8 @@ mod tests {
     }
 
     #[test]
-    fn both_ends_agree_across_every_turn_of_the_counters() {
-        let (mut flight, mut window) = (Flight::<u64>::default(), Window::default());
+    fn both_ends_agree_across_every_wrap_of_the_counters() {
+        let (mut flight, mut window) = (Flight::<u64>::default(), LinkWindow::default());
         let mut judged = 0;
         for i in 0..200_000u64 {
             let (number, distance) = (flight.next_number(), flight.base_distance());
@@ -178,8 +178,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_durable_is_not_acknowledged() {
-        let mut w = Window::default();
+    fn undurable_frames_are_not_acknowledged() {
+        let mut w = LinkWindow::default();
         let first = w.accept(1, 1).unwrap();
         w.hold_back(first);
         assert_eq!(w.statement(10), None);

@@ -1,29 +1,28 @@
-//! The peer's clock, seen from ours.
+//! The peer's clock relative to ours.
 
 use crate::time::Instant;
 use crate::wire::Stamp;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How far the peer's clock is ahead of ours, known within half of the asymmetry of the two ways.
+/// The offset of the peer's clock. The error is at most half the difference between the two propagation times.
 ///
-/// A frame that was late, or was sent again as it was, makes the peer's clock look slow; so the greatest of the last few
-/// measurements counts.
+/// A frame that was late, or is a copy of an earlier one, makes the peer's clock look slow. Therefore the greatest of
+/// the last few measurements counts.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ClockMap {
-    /// Peer's clock minus ours, microseconds; the peer's comes round after 4 h 39 min.
+    /// The peer's clock minus ours in microseconds; the peer's clock wraps every 4 h 39 min.
     measured_us: VecDeque<i64>,
     at: Instant,
 }
 
 impl ClockMap {
-    /// Measurements that are kept.
     const KEPT: usize = 4;
 
-    /// Takes a stamp of a transmission that began `ago` before `now`.
+    /// Takes the clock reading in a frame whose transmission began `ago` before `now`.
     pub fn measure(&mut self, clock_ms: u32, ago: Duration, now: Instant) {
         let began = (now - ago).as_micros() as i64;
-        // Counted near what is known, so that a clock that has come round is not taken for a slow one.
+        // Unwrapped near the known offset, so that a wrapped clock is not taken for a slow one.
         let near = began + self.measured_us.back().copied().unwrap_or_default();
         self.measured_us.push_back(Stamp::unwrap_clock(clock_ms, near) - began);
         if self.measured_us.len() > Self::KEPT {
@@ -36,18 +35,18 @@ impl ClockMap {
         self.measured_us.iter().max().copied().unwrap_or_default()
     }
 
-    /// When it was measured last.
+    /// When the offset was last measured.
     pub fn measured_at(&self) -> Instant {
         self.at
     }
 
-    /// Our time, nearest to `now`, when the peer's clock showed `clock_ms`.
+    /// Our time, nearest to `now`, at which the peer's clock showed `clock_ms`.
     pub fn to_ours(&self, clock_ms: u32, now: Instant) -> Instant {
         let theirs = Stamp::unwrap_clock(clock_ms, now.as_micros() as i64 + self.ahead_us());
         Instant::from_micros((theirs - self.ahead_us()).max(0) as u64)
     }
 
-    /// What the peer's clock shows at `at`, milliseconds, low 24 bits.
+    /// The reading of the peer's clock at `at`: milliseconds, low 24 bits.
     pub fn to_theirs(&self, at: Instant) -> u32 {
         Stamp::clock(Instant::from_micros((at.as_micros() as i64 + self.ahead_us()).rem_euclid(1000 << 24) as u64))
     }
@@ -58,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_moment_comes_back_through_the_peers_clock() {
+    fn times_convert_to_the_peers_clock_and_back() {
         let now = Instant::from_secs_f64(90_000.5);
         let mut map = ClockMap::default();
         map.measure(1_000, Duration::from_millis(500), now);

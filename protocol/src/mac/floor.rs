@@ -1,40 +1,40 @@
-//! Whether an end may speak now.
+//! Whether the vehicle may transmit now.
 
 use super::{Access, Grant, ModemProfile};
 use crate::time::Instant;
 
-/// A vehicle's right to speak, and what it has in its modem.
+/// A vehicle's right to transmit, and the number of its frames in the modem.
 #[derive(Debug, Clone, Default)]
 pub struct Floor {
     grant: Option<Grant>,
-    /// Frames that the modem has asked for and not got.
+    /// Frames that the modem has requested and not received yet.
     polled: u32,
-    /// Frames handed to the modem that have not left it.
+    /// Frames handed to the modem that are not on air yet.
     in_modem: u32,
 }
 
 impl Floor {
-    /// The surface grants a turn, or takes it back.
+    /// The surface grants a turn, or withdraws it with `None`.
     pub fn handle_grant(&mut self, grant: Option<Grant>) {
         self.grant = grant;
     }
 
-    /// The modem asks for `frames` frames now.
+    /// The modem requests `frames` frames now.
     pub fn handle_poll(&mut self, frames: u32) {
         self.polled = frames;
     }
 
-    /// Frames handed to the modem that have not left it.
+    /// Frames handed to the modem that are not on air yet.
     pub fn in_modem(&self) -> u32 {
         self.in_modem
     }
 
-    /// A frame has left the modem.
+    /// The oldest frame in the modem has been transmitted.
     pub fn handle_sent(&mut self) {
         self.in_modem = self.in_modem.saturating_sub(1);
     }
 
-    /// Frames that may be handed to the modem now, one by one.
+    /// How many frames may be handed to the modem now, one after the other.
     pub fn frames(&self, profile: &ModemProfile, now: Instant) -> u32 {
         match profile.access {
             Access::Shared if self.in_modem > 0 => 0,
@@ -44,12 +44,12 @@ impl Floor {
         }
     }
 
-    /// Whether a turn is open in which nothing can be said any more: too little of it is left.
+    /// Whether a turn is open that is too short for any further frame.
     pub fn is_over(&self, profile: &ModemProfile, now: Instant) -> bool {
         self.in_modem == 0 && self.grant.is_some_and(|g| now >= g.begins) && self.frames(profile, now) == 0
     }
 
-    /// A frame was handed to the modem; after the `last` one the turn is over.
+    /// A frame was handed to the modem; the turn ends after the `last` one.
     pub fn spend(&mut self, last: bool) {
         self.in_modem += 1;
         self.polled = if last { 0 } else { self.polled.saturating_sub(1) };
@@ -58,12 +58,12 @@ impl Floor {
         }
     }
 
-    /// Nothing more is said in this turn.
+    /// Ends the turn before its time.
     pub fn give_up(&mut self) {
         (self.grant, self.polled) = (None, 0);
     }
 
-    /// When a granted turn begins, unless a frame is in the modem.
+    /// When a granted turn begins; `None` while a frame is in the modem.
     pub fn next_wakeup(&self) -> Option<Instant> {
         self.grant.filter(|_| self.in_modem == 0).map(|g| g.begins)
     }

@@ -1,4 +1,4 @@
-//! The surface's side of the turns.
+//! The surface's side of medium access.
 
 use super::{Access, ModemProfile, quarter_seconds};
 use crate::time::Instant;
@@ -8,11 +8,11 @@ use std::time::Duration;
 /// How the surface grants turns to one vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MasterConfig {
-    /// Longest one-way propagation delay to expect before a round trip was measured.
+    /// Longest one-way propagation time to expect before the first measurement.
     pub max_propagation: Duration,
-    /// Longest turn to grant.
+    /// The longest turn to grant.
     pub max_turn: Duration,
-    /// Longest pause between turns while nothing is to be said.
+    /// The longest pause between turns while neither end has content.
     pub max_idle: Duration,
 }
 
@@ -26,43 +26,49 @@ impl Default for MasterConfig {
     }
 }
 
-/// What the medium is doing, as far as the surface knows.
+/// The state of the medium, as far as the surface knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum State {
-    /// Nobody speaks; the next grant goes out at the given time, with news from `ready` on.
-    Idle { ready: Instant, next: Instant },
-    /// The surface is on air.
+enum MediumState {
+    /// Nobody transmits. The next grant goes out at `next`, or from `ready` on if there is new content.
+    Idle {
+        ready: Instant,
+        next: Instant,
+    },
     Speaking,
-    /// The vehicle has the turn, and nothing was heard yet.
-    Granted { granted: Instant, until: Instant },
-    /// The vehicle is speaking.
-    Listening { until: Instant },
+    /// The vehicle has the turn, and no frame of it came in yet.
+    Granted {
+        granted: Instant,
+        until: Instant,
+    },
+    Listening {
+        until: Instant,
+    },
 }
 
-/// Grants turns to one vehicle and recovers lost grants.
+/// Grants turns to one vehicle and recovers from lost grants.
 #[derive(Debug)]
 pub struct Master {
     config: MasterConfig,
-    state: State,
-    /// Recent measurements of the two-way propagation; the least of them counts, for every error makes it look longer.
+    state: MediumState,
+    /// Recent measurements of the two-way propagation time. The least one counts, because every
+    /// error makes it look longer.
     round_trips: VecDeque<Duration>,
     unanswered: u32,
     granted_airtime: Duration,
-    /// When the last turn was granted, and whether the vehicle had so much to say that it took most of it.
+    /// When the last turn was granted.
     granted: Option<Instant>,
     is_saturated: bool,
     begun: Option<Instant>,
 }
 
 impl Master {
-    /// Measurements of the round trip that are kept.
     const ROUND_TRIPS: usize = 4;
 
     /// A master that may grant its first turn at `now`.
     pub fn new(config: MasterConfig, now: Instant) -> Self {
         Self {
             config,
-            state: State::Idle { ready: now, next: now },
+            state: MediumState::Idle { ready: now, next: now },
             round_trips: VecDeque::new(),
             unanswered: 0,
             granted_airtime: Duration::ZERO,
@@ -72,97 +78,99 @@ impl Master {
         }
     }
 
-    /// Two-way propagation; `None` before the first measurement.
+    /// Two-way propagation time; `None` before the first measurement.
     pub fn round_trip(&self) -> Option<Duration> {
         self.round_trips.iter().min().copied()
     }
 
-    /// Grants in a row that were not answered.
+    /// The number of consecutive grants without an answer.
     pub fn unanswered(&self) -> u32 {
         self.unanswered
     }
 
-    /// When the last turn began.
+    /// When the surface's last turn toward this vehicle began.
     pub fn begun(&self) -> Option<Instant> {
         self.begun
     }
 
-    /// Whether the medium is taken by a turn of this vehicle or a grant to it.
+    /// Whether a turn of this vehicle, or a grant to it, occupies the medium.
     pub fn is_engaged(&self) -> bool {
-        !matches!(self.state, State::Idle { .. })
+        !matches!(self.state, MediumState::Idle { .. })
     }
 
-    /// Whether the surface may begin its turn at `now`; `news` ends an idle pause.
+    /// Whether the surface may begin its turn at `now`; `news` (a waiting slot) ends an idle pause.
     pub fn may_speak(&self, news: bool, now: Instant) -> bool {
         match self.state {
-            State::Idle { ready, next } => now >= next || (news && now >= ready),
-            State::Speaking => false,
-            State::Granted { until, .. } | State::Listening { until } => now >= until,
+            MediumState::Idle { ready, next } => now >= next || (news && now >= ready),
+            MediumState::Speaking => false,
+            MediumState::Granted { until, .. } | MediumState::Listening { until } => now >= until,
         }
     }
 
-    /// When [`Self::may_speak`] next turns true by itself; `news` as there.
+    /// When [`Self::may_speak`] next becomes true by itself; `news` has the same meaning.
     pub fn next_wakeup(&self, news: bool) -> Option<Instant> {
         match self.state {
-            State::Idle { ready, next } => Some(if news { ready.min(next) } else { next }),
-            State::Speaking => None,
-            State::Granted { until, .. } | State::Listening { until } => Some(until),
+            MediumState::Idle { ready, next } => Some(if news { ready.min(next) } else { next }),
+            MediumState::Speaking => None,
+            MediumState::Granted { until, .. } | MediumState::Listening { until } => Some(until),
         }
     }
 
-    /// When a vehicle that does not answer is tried again although others wait: ever more seldom.
+    /// The earliest retry of a vehicle that does not answer, while others wait. The interval doubles with each
+    /// grant, up to 128 s.
     pub fn retry_at(&self) -> Instant {
         let Some(begun) = self.begun.filter(|_| self.unanswered >= 3) else { return Instant::ZERO };
         begun + Duration::from_secs(1 << (self.unanswered - 1).min(7))
     }
 
-    /// The vehicle is there after all: it is spoken with as soon as possible.
+    /// Contacts the vehicle as soon as possible, because it has answered a discovery call.
     pub fn hurry(&mut self, now: Instant) {
         self.unanswered = self.unanswered.min(2);
-        if let State::Idle { next, .. } = &mut self.state {
+        if let MediumState::Idle { next, .. } = &mut self.state {
             *next = (*next).min(now);
         }
     }
 
-    /// The turn to grant where `vehicles` share the medium: long against what changing hands costs, in quarter seconds.
+    /// The length of the next turn in quarter seconds: long compared to the cost of a handover, shorter where
+    /// several vehicles share the medium.
     pub fn grant(&self, profile: &ModemProfile, vehicles: usize) -> u8 {
         let cost = self.round_trip().unwrap_or(self.config.max_propagation * 2) + profile.turn_around * 2;
         let least = profile.frame_airtime() + Duration::from_secs(1);
-        // With several, each waits for all the others: shorter turns cost some capacity and save much waiting.
+        // With several vehicles, each waits for all others: shorter turns cost some capacity and save much waiting.
         let most = self.config.max_turn.div_f64((vehicles.max(1) as f64).sqrt()).max(cost * 2);
         quarter_seconds((cost * 16).min(most).max(least), 255)
     }
 
-    /// The surface begins its turn. A turn that begins while an answer was due counts as unanswered.
+    /// The surface begins its turn. If an answer was due, the grant before counts as unanswered.
     pub fn begin(&mut self, grant_quarters: u8, now: Instant) {
         self.begun = Some(now);
-        if matches!(self.state, State::Granted { .. }) {
+        if matches!(self.state, MediumState::Granted { .. }) {
             self.unanswered += 1;
         }
         self.granted_airtime = Duration::from_millis(250) * u32::from(grant_quarters);
-        self.state = State::Speaking;
+        self.state = MediumState::Speaking;
     }
 
-    /// Something was said outside of turns.
+    /// The surface transmits outside of a turn.
     pub fn note_begun(&mut self, now: Instant) {
         self.begun = Some(now);
     }
 
-    /// The last frame of the surface's turn has left the modem; of the answer, up to `losable` frames may be lost in a row.
+    /// The last frame of the surface's turn is on air. Up to `losable` consecutive frames of the answer may be lost.
     pub fn handle_turn_sent(&mut self, profile: &ModemProfile, losable: u32, now: Instant) {
         let flight =
             self.round_trip().map_or(self.config.max_propagation * 2, |rtt| rtt + rtt / 4 + Duration::from_millis(200));
-        // A vehicle farther away than it was thought to be must not be talked over for ever; a modem that polls waits itself.
+        // A vehicle farther away than assumed must get the chance to answer; a modem that polls waits by itself.
         let doubts = if profile.access == Access::Polled { 0 } else { self.unanswered.saturating_sub(4).min(10) };
         let patience = Duration::from_secs(1) * doubts;
         let frames = if self.is_saturated { losable + 1 } else { 1 };
         let answer = (profile.frame_airtime() * frames).min(self.granted_airtime.max(profile.frame_airtime()));
         let until = now + patience + flight + profile.turn_around * 2 + answer;
         self.granted = Some(now);
-        self.state = State::Granted { granted: now, until };
+        self.state = MediumState::Granted { granted: now, until };
     }
 
-    /// A measurement of the two-way propagation.
+    /// Takes a measurement of the two-way propagation time.
     pub fn handle_round_trip(&mut self, measured: Duration) {
         if measured <= self.config.max_propagation * 8 {
             self.round_trips.push_back(measured);
@@ -172,10 +180,10 @@ impl Master {
         }
     }
 
-    /// A frame of the vehicle was heard, after which it says `remaining` more will follow; `wish` is its turn byte.
+    /// A frame of the vehicle came in that announces `remaining` further frames; `wish` is its turn byte.
     ///
-    /// Only for a frame that proves that the vehicle has heard the grant: one that was late under way or came twice tells
-    /// nothing about the turn.
+    /// The caller must make sure that the vehicle has received the grant: a late frame or a copy of an earlier one does
+    /// not show the state of the turn.
     pub fn handle_answer(
         &mut self,
         bytes: usize,
@@ -184,10 +192,10 @@ impl Master {
         profile: &ModemProfile,
         now: Instant,
     ) {
-        if let State::Granted { granted, .. } = self.state
+        if let MediumState::Granted { granted, .. } = self.state
             && self.round_trips.is_empty()
         {
-            // Until a stamp tells, what the whole answer took is the most that it can be.
+            // Before the first stamp, the time of the whole answer is an upper bound.
             let both_ways = now.since(granted).saturating_sub(profile.airtime(bytes) + profile.turn_around);
             self.handle_round_trip(both_ways);
         }
@@ -198,19 +206,19 @@ impl Master {
         if remaining > 0 {
             let margin = profile.turn_around + profile.frame_airtime() / 2;
             let until = now + rest.min(self.granted_airtime) + margin;
-            self.state = State::Listening { until };
+            self.state = MediumState::Listening { until };
             return;
         }
         let pause = wish.map_or(Duration::ZERO, |quarters| Duration::from_millis(250) * u32::from(quarters));
         let ready = now + profile.turn_around;
-        self.state = State::Idle { ready, next: ready + pause.min(self.config.max_idle) };
+        self.state = MediumState::Idle { ready, next: ready + pause.min(self.config.max_idle) };
     }
 
-    /// Nothing may be sent before `at` (the budget does not allow it): wait until then.
+    /// Waits until `at`, because the budget allows no transmission before.
     pub fn postpone(&mut self, at: Instant) {
-        if let State::Granted { .. } = self.state {
+        if let MediumState::Granted { .. } = self.state {
             self.unanswered += 1;
         }
-        self.state = State::Idle { ready: at, next: at };
+        self.state = MediumState::Idle { ready: at, next: at };
     }
 }

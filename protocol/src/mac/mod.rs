@@ -1,7 +1,7 @@
-//! Medium access: who may speak, and for how long.
+//! Medium access: who may transmit, and for how long.
 //!
-//! No clock is shared; every wait comes from measured ranges and known airtimes. What the modem does by itself decides how
-//! turns are made: [`Access`].
+//! The ends share no clock; every wait follows from measured propagation times and known airtimes. [`Access`] describes
+//! how a modem divides the medium by itself.
 
 mod clock_map;
 mod floor;
@@ -15,54 +15,55 @@ pub use master::{Master, MasterConfig};
 
 use std::time::Duration;
 
-/// How the ends share the medium; the modem's driver chooses.
+/// How the ends share the medium; the modem's driver selects it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Access {
-    /// The surface grants turns, a vehicle speaks only in one. Also right for a full-duplex link.
+    /// The surface grants turns, and a vehicle transmits only in its turn. A full-duplex link works this way too.
     #[default]
     Shared,
-    /// The modem does half duplex, and repeats, by itself; each end speaks as long as the modem's pool takes frames.
+    /// The modem does half duplex and repetition by itself; each end transmits as long as
+    /// the modem's pool takes frames.
     ModemOwned {
-        /// Frames that may be in the modem at a time: a turn's worth, so that what waits there does not grow old.
+        /// Frames in the modem at a time: about a turn's worth, so that queued frames do not become outdated.
         pool_frames: u32,
     },
-    /// The modem asks for the frames of a cycle that the surface's modem has begun.
+    /// The modem requests the frames of a cycle that the surface's modem has begun.
     Polled,
 }
 
-/// What the link must know of the modem.
+/// The properties of a modem that the link depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModemProfile {
-    /// Bytes of a full frame.
+    /// The size of a full frame in bytes.
     pub frame_bytes: usize,
-    /// Bits a second on air.
+    /// The bit rate on air in bit/s.
     pub bit_rate_bps: f64,
     /// Bits on air that each transmission costs besides its bytes (preamble, header of the modem).
     pub overhead_bits: u64,
-    /// Time from the end of a reception or transmission to the beginning of one's own.
+    /// Time from the end of a reception or transmission to the beginning of an own transmission.
     pub turn_around: Duration,
-    /// How the ends share the medium.
+    /// How the ends share the medium through this modem.
     pub access: Access,
 }
 
 impl ModemProfile {
-    /// Bits on air of a transmission of `bytes`; the frames of a cycle are on air as whole ones, however full they are.
+    /// Bits on air of a transmission of `bytes`. In a polled cycle every frame occupies the airtime of a full one.
     pub fn bits_on_air(&self, bytes: usize) -> u64 {
         let bytes = if self.access == Access::Polled { bytes.max(self.frame_bytes) } else { bytes };
         bytes as u64 * 8 + self.overhead_bits
     }
 
-    /// Time on air of a transmission of `bytes`.
+    /// The airtime of a transmission of `bytes`.
     pub fn airtime(&self, bytes: usize) -> Duration {
         self.time_of(self.bits_on_air(bytes))
     }
 
-    /// Time that `bits` take on air.
+    /// The airtime of `bits`, at least 1 bit/s assumed.
     pub fn time_of(&self, bits: u64) -> Duration {
         Duration::from_secs_f64(bits as f64 / self.bit_rate_bps.max(1.0))
     }
 
-    /// Time on air of a full frame.
+    /// The airtime of a full frame.
     pub fn frame_airtime(&self) -> Duration {
         self.airtime(self.frame_bytes)
     }

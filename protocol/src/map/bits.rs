@@ -1,9 +1,9 @@
 //! A set of cells of one tile.
 
-use super::grid::TILE_CELLS;
+use crate::grid::TILE_CELLS;
 use crate::map_codec::Stride;
 
-/// Cells of a tile by their places in it, a bit each.
+/// Cells of a tile by index, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct TileSet([u64; TILE_CELLS / 64]);
 
@@ -12,7 +12,7 @@ impl TileSet {
         self.word(cell).is_some_and(|word| word >> (cell % 64) & 1 == 1)
     }
 
-    /// Puts a cell in or takes it out.
+    /// Adds a cell or removes it.
     pub(super) fn set(&mut self, cell: u8, inside: bool) {
         if let Some(word) = self.0.get_mut(usize::from(cell / 64)) {
             *word = *word & !(1 << (cell % 64)) | u64::from(inside) << (cell % 64);
@@ -27,7 +27,7 @@ impl TileSet {
         self.0 == [0; TILE_CELLS / 64]
     }
 
-    /// The cells of `self` that are in neither of the others.
+    /// The cells of `self` that are in neither of the other sets.
     pub(super) fn without(&self, one: &Self, other: &Self) -> Self {
         let mut left = *self;
         for ((word, one), other) in left.0.iter_mut().zip(one.0).zip(other.0) {
@@ -36,7 +36,7 @@ impl TileSet {
         left
     }
 
-    /// The cells that are on a lattice: its rows, four to a word, begin with a tile's.
+    /// The cells on a lattice. Four rows of a tile share a word, and the rows of the lattice begin with the tile's.
     pub(super) fn on(&self, stride: Stride) -> Self {
         let mask = match stride {
             Stride::One => u64::MAX,
@@ -45,7 +45,6 @@ impl TileSet {
         Self(self.0.map(|word| word & mask))
     }
 
-    /// The cells in ascending order.
     pub(super) fn iter(&self) -> impl Iterator<Item = u8> + use<> {
         [0u8, 64, 128, 192].into_iter().zip(self.0).flat_map(|(first, word)| {
             let mut left = word;
@@ -69,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_put_in_is_listed_in_order_until_taken_out() {
+    fn cells_are_listed_in_order_until_removed() {
         let mut set = TileSet::default();
         for cell in [255, 0, 64, 63, 7] {
             set.set(cell, true);

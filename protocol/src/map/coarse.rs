@@ -1,15 +1,15 @@
-//! Coarse first: which cells go out before the others when there is too much to say.
+//! Coarse first: which cells go out before the others when the backlog is large.
 
 use super::dirty::Counts;
 use crate::map_codec::Stride;
 
-/// What a cell of a large backlog is expected to cost, bits: nearly all of its cells are new.
+/// The expected cost of a cell of a large backlog in bits; nearly all of these cells are new.
 const BITS_PER_CELL: usize = 2;
 
-/// Decides between a picture of the whole and a picture of a part.
+/// Decides between an overview of the whole map and a detailed part of it.
 #[derive(Debug, Default)]
 pub(super) struct Coarse {
-    /// More than so many bytes of backlog go out coarse to fine, if that is wanted; 0: whatever waits does.
+    /// A larger backlog in bytes goes out coarse to fine; 0 means always, `None` never.
     after_bytes: Option<usize>,
 }
 
@@ -18,7 +18,7 @@ impl Coarse {
         self.after_bytes = after_bytes;
     }
 
-    /// Whether there is too much to say, and every cell of the coarse lattice is said or on its way.
+    /// Whether the backlog is large while every cell of the coarse lattice is sent or in flight.
     pub(super) fn is_refining(&self, counts: &Counts) -> bool {
         self.is_too_much(counts) && counts.waiting_coarse == 0
     }
@@ -27,7 +27,7 @@ impl Coarse {
         self.after_bytes.is_some_and(|most| counts.waiting * BITS_PER_CELL > most.saturating_mul(8))
     }
 
-    /// The lattice that the next chunk is to be of: the coarse one while it has a cell waiting and there is too much to say.
+    /// The lattice of the next chunk: the coarse one while the backlog is large and one of its cells waits.
     pub(super) fn stride(&self, counts: &Counts) -> Stride {
         if self.is_too_much(counts) && counts.waiting_coarse > 0 { Stride::Four } else { Stride::One }
     }

@@ -1,24 +1,24 @@
-//! A fingerprint of a map that is cheap to keep up.
+//! A fingerprint of a map that is updated cell by cell.
 
 use super::Cell;
 
-/// Sixteen-bit fingerprint of a set of labelled cells, independent of the order in which they were set.
+/// A 16-bit fingerprint of a set of labelled cells; it does not depend on the order in which they were set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MapDigest(u64);
 
 impl MapDigest {
-    /// Follows a cell from label `old` to label `new`.
+    /// Updates the fingerprint for a cell whose label changes from `old` to `new`.
     pub fn change(&mut self, cell: Cell, old: u8, new: u8) {
         self.0 ^= term(cell, old) ^ term(cell, new);
     }
 
-    /// The fingerprint.
+    /// The low 16 bits of the sum over all cells.
     pub fn value(self) -> u16 {
         (self.0 ^ self.0 >> 16 ^ self.0 >> 32 ^ self.0 >> 48) as u16
     }
 }
 
-/// Mixing function of splitmix64 over cell and label; 0 for an unexplored cell.
+/// The mixing function of SplitMix64 over cell and label; 0 for an unexplored cell.
 fn term(cell: Cell, label: u8) -> u64 {
     if label == 0 {
         return 0;

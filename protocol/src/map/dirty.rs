@@ -1,14 +1,14 @@
-//! The index of what differs between what the surface is known to hold and what it ought to hold.
+//! The index of cells that differ from the state that the surface is known to hold.
 
 use super::bits::TileSet;
-use super::grid::{TILE_CELLS, TileKey, TileLabels};
 use super::value::{Interest, Value, cost};
 use super::{Cell, LabelGrid, UNEXPLORED};
+use crate::grid::{TILE_CELLS, TileKey, TileLabels};
 use crate::map_codec::Stride;
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
-/// Moments are kept in sixteenths of a second.
+/// A time in sixteenths of a second.
 type Tick = u32;
 
 fn tick(at: Instant) -> Tick {
@@ -33,13 +33,13 @@ struct Times {
 #[derive(Debug, Clone)]
 struct Tile {
     differing: TileSet,
-    /// Cells whose label has not stood long enough.
+    /// Cells whose label is not stable yet.
     held: TileSet,
     /// Cells in frames of unknown fate.
     flying: TileSet,
-    /// No held cell is due earlier.
+    /// A lower bound of the times at which held cells become due.
     due: Tick,
-    /// Of the waiting cells; `None` when it has to be summed up anew.
+    /// The value of the waiting cells; `None` if it must be summed again.
     value: Option<Value>,
     times: Box<Times>,
 }
@@ -101,12 +101,12 @@ impl Tile {
     }
 }
 
-/// How many cells differ, how many of these wait to be sent or are held back, and how many are on their way.
+/// Numbers of cells that differ, of these waiting or held back, and of cells in flight.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Counts {
     pub(super) differing: usize,
     pub(super) waiting: usize,
-    /// Of the waiting cells those on the coarse lattice.
+    /// Waiting cells on the coarse lattice.
     pub(super) waiting_coarse: usize,
     pub(super) held: usize,
     pub(super) flying: usize,
@@ -122,31 +122,31 @@ impl Counts {
     }
 }
 
-/// How a new label of a cell is to be treated.
+/// A change of a cell's target label.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Change {
-    /// Whether the new label differs from what the surface is known to hold.
+pub(super) struct CellChange {
+    /// Whether the new label differs from the one that the surface is known to hold.
     pub(super) differs: bool,
     /// Whether the surface is known to hold any label.
     pub(super) known: bool,
-    /// The new label has to stand until then.
+    /// The new label must be stable until then.
     pub(super) due: Instant,
-    /// The longest time that a difference is held back.
+    /// The longest time for which a difference is held back.
     pub(super) longest: std::time::Duration,
 }
 
-/// Cells that differ or are on their way, by tile.
+/// Cells that differ or are in flight, by tile.
 ///
 /// Memory is nine bytes a cell in tiles that hold one.
 #[derive(Debug)]
 pub(super) struct Dirty {
     tiles: BTreeMap<TileKey, Tile>,
     counts: Counts,
-    /// No held cell is due earlier.
+    /// A lower bound of the times at which held cells become due.
     due: Tick,
-    /// The lattice whose cells the tiles' values are of.
+    /// The lattice on which the tiles' values are computed.
     stride: Stride,
-    /// Cells looked at so far to choose what to send.
+    /// The number of cells inspected so far in choosing what to send.
     looked_at: u64,
 }
 
@@ -166,7 +166,7 @@ impl Dirty {
         self.looked_at
     }
 
-    /// Everything differs and nothing is on its way.
+    /// Marks every cell of the target as different and none as in flight.
     pub(super) fn reset(&mut self, target: &LabelGrid, now: Instant) {
         (self.tiles, self.counts, self.due) = (BTreeMap::new(), Counts::default(), Tick::MAX);
         for (key, labels) in target.tiles().filter(|(_, labels)| labels.iter().any(|&l| l != UNEXPLORED)) {
@@ -178,8 +178,8 @@ impl Dirty {
         }
     }
 
-    /// The target of a cell has changed; says how many changes will never be sent because of that.
-    pub(super) fn change(&mut self, cell: Cell, change: Change, now: Instant) -> u64 {
+    /// Handles a change of a cell's target. Returns how many changes will never be sent because of it.
+    pub(super) fn change(&mut self, cell: Cell, change: CellChange, now: Instant) -> u64 {
         self.update(cell, |tile, place| {
             let overtaken = tile.held.contains(place) && !tile.flying.contains(place);
             let began = if tile.differing.contains(place) { moment(tile.since(place)) } else { now };
@@ -190,7 +190,7 @@ impl Dirty {
         })
     }
 
-    /// The label of a cell is certain: nothing is to be waited for.
+    /// Ends the hold of a cell, because its label is certain.
     pub(super) fn settle(&mut self, cell: Cell) {
         if self.tiles.contains_key(&cell.tile()) {
             self.update(cell, |tile, place| {
@@ -200,12 +200,12 @@ impl Dirty {
         }
     }
 
-    /// A cell is on its way.
+    /// Notes that a cell is in flight.
     pub(super) fn depart(&mut self, cell: Cell) {
         self.update(cell, |tile, place| tile.flying.set(place, true));
     }
 
-    /// A cell is no longer on its way; `known` says whether the surface holds any label.
+    /// Notes that a cell is no longer in flight; `known` is whether the surface holds any label of it.
     pub(super) fn arrive(&mut self, cell: Cell, delivered: bool, differs: bool, known: bool, now: Instant) {
         self.update(cell, |tile, place| {
             tile.flying.set(place, false);
@@ -214,7 +214,7 @@ impl Dirty {
         });
     }
 
-    /// Lets go what has been held back long enough; says whether anything was.
+    /// Releases the cells that are due; returns whether there are any.
     pub(super) fn release(&mut self, now: Instant) -> bool {
         if moment(self.due) > now {
             return false;
@@ -235,17 +235,17 @@ impl Dirty {
         self.counts.waiting > waiting
     }
 
-    /// No cell that is held back is due earlier.
+    /// A lower bound of the times at which held cells become due.
     pub(super) fn next_due(&self) -> Option<Instant> {
         (self.counts.held > 0).then(|| moment(self.due))
     }
 
-    /// Worth has changed.
+    /// Discards all values, because the interest has changed.
     pub(super) fn revalue(&mut self) {
         self.tiles.values_mut().for_each(|tile| tile.value = None);
     }
 
-    /// The waiting cell of a lattice to start from: the most valuable one of the tile that is worth most a bit.
+    /// The waiting cell of a lattice to start from: the most valuable one of the tile with the most value a bit.
     pub(super) fn best(
         &mut self,
         stride: Stride,
@@ -268,9 +268,9 @@ impl Dirty {
                     *tile.value.insert(value)
                 }
             };
-            let worth = value.per_bit(now_s);
-            if worth > best.map_or(0.0, |(most, _)| most) {
-                best = Some((worth, key));
+            let value = value.per_bit(now_s);
+            if value > best.map_or(0.0, |(most, _)| most) {
+                best = Some((value, key));
             }
         }
         let (_, key) = best?;
@@ -279,14 +279,14 @@ impl Dirty {
         let (old, new) = (acked.tile(key), target.tile(key));
         let value = |place: u8| {
             let i = usize::from(place);
-            interest.worth(old[i], new[i]) * (1.0 + now_s - moment(tile.since(place)).as_secs_f64())
+            interest.value(old[i], new[i]) * (1.0 + now_s - moment(tile.since(place)).as_secs_f64())
         };
         let first = tile.waiting().on(stride).iter().map(|place| (value(place), place));
         let (_, place) = first.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
         Some(Cell::at(key, place))
     }
 
-    /// Asks whether cells wait to be sent; quick for cells that follow each other along a row.
+    /// A test whether cells wait; it is fast for cells that follow each other along a row.
     pub(super) fn waiting(&self) -> impl Fn(Cell) -> bool + '_ {
         let last = std::cell::Cell::new(None::<(TileKey, TileSet)>);
         move |cell| {
@@ -298,7 +298,7 @@ impl Dirty {
         }
     }
 
-    /// Changes what is known of a cell, and keeps counts, values and the list of tiles in step.
+    /// Changes the state of a cell, and keeps counts, values and the list of tiles consistent.
     fn update<R>(&mut self, cell: Cell, change: impl FnOnce(&mut Tile, u8) -> R) -> R {
         let tile = self.tiles.entry(cell.tile()).or_default();
         let before = tile.counts();
@@ -320,7 +320,7 @@ impl Tile {
         for place in self.waiting().on(stride).iter() {
             let i = usize::from(place);
             let since = moment(self.since(place)).as_secs_f64();
-            value.add(interest.worth(acked[i], target[i]), cost(acked[i]), since);
+            value.add(interest.value(acked[i], target[i]), cost(acked[i]), since);
         }
         value
     }

@@ -81,10 +81,11 @@ pub struct PlaneSource {
 }
 
 impl PlaneSource {
-    /// A plane of which nothing is known; a level of a cell that the surface knows has to stand for `settle` to be sent.
+    /// A plane of which nothing is known; a level of a cell that the surface knows has to stand for `settle` to be
+    /// sent.
     pub fn new(scale: PlaneScale, codec: Codec, settle: Duration) -> Self {
         let mut levels = MapSource::new(codec);
-        levels.set_settle_time(settle);
+        levels.set_debounce(settle);
         Self { scale, levels }
     }
 
@@ -165,8 +166,8 @@ impl StateSource for PlaneSource {
         self.levels.is_quiet()
     }
 
-    fn is_settled(&self) -> bool {
-        self.levels.is_settled()
+    fn is_converged(&self) -> bool {
+        self.levels.is_converged()
     }
 
     fn digest(&self) -> u16 {

@@ -1,16 +1,17 @@
-//! The surface's side of the map: the picture, and the bases that the next chunks may refer to.
+//! The surface's side of the map: the map to show, and the bases of the next chunks.
 
 use super::{Cell, LabelGrid, MAX_LABEL, MapDigest, StateReplica, UNEXPLORED};
 use crate::map_codec;
 use crate::time::Instant;
 use std::collections::BTreeMap;
 
-/// Most cells that a replica has heard of, and most changes that wait for the base: a few bytes can claim a whole patch.
-const MOST_CELLS: usize = 1 << 23;
+/// The most cells that a replica knows, and the most changes that wait for the base: a few bytes
+/// can claim a whole patch.
+const MAX_CELLS: usize = 1 << 23;
 
-/// What the replica knows of a cell besides its label.
+/// The replica's knowledge of a cell besides its label.
 #[derive(Debug, Clone, Copy)]
-struct Heard {
+struct CellRecord {
     number: u64,
     at: Instant,
 }
@@ -23,22 +24,21 @@ pub struct Replica {
     base: LabelGrid,
     base_digest: MapDigest,
     log: BTreeMap<u64, Vec<(Cell, u8)>>,
-    /// Changes in `log`.
     logged: usize,
     shown: LabelGrid,
-    heard: BTreeMap<Cell, Heard>,
+    heard: BTreeMap<Cell, CellRecord>,
     version: u64,
     updated: Option<Instant>,
 }
 
 impl Replica {
-    /// The map to show.
+    /// The map to show; it holds exactly the cells that were sent.
     pub fn shown(&self) -> &LabelGrid {
         &self.shown
     }
 
-    /// What to paint at a cell: its label, or else that of the cell that stands for the block of 4 x 4 cells around
-    /// it, and how many cells a side that label stands for. Only what was sent is in [`Self::shown`].
+    /// The label to paint at a cell, and the side of the square that it stands for, in cells. A cell without a label
+    /// shows that of the coarse cell for its block of 4 x 4 cells. [`Self::shown`] has only the cells that were sent.
     pub fn painted(&self, cell: Cell) -> Option<(u8, i32)> {
         [1, 4].into_iter().find_map(|n| {
             let corner = Cell::new(cell.x.div_euclid(n) * n, cell.y.div_euclid(n) * n);
@@ -47,22 +47,22 @@ impl Replica {
         })
     }
 
-    /// When [`Self::shown`] was last confirmed or changed by the vehicle.
+    /// When a chunk last changed or confirmed a cell of [`Self::shown`].
     pub fn updated(&self) -> Option<Instant> {
         self.updated
     }
 
-    /// When a cell was last heard of.
+    /// When a chunk last covered a cell.
     pub fn heard(&self, cell: Cell) -> Option<Instant> {
         self.heard.get(&cell).map(|h| h.at)
     }
 }
 
 impl Replica {
-    /// Applies a chunk of frame `number` unless it makes no sense here or has a label above `most`.
+    /// Applies a chunk of frame `number`, unless it makes no sense here or has a label above `most`.
     pub(super) fn apply_up_to(&mut self, most: u8, number: u64, chunk: &[u8], now: Instant) -> bool {
         let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
-        let is_large = self.heard.len().max(self.logged) + changes.len() > MOST_CELLS;
+        let is_large = self.heard.len().max(self.logged) + changes.len() > MAX_CELLS;
         if is_large || changes.iter().any(|&(_, label)| label > most) {
             return false;
         }
@@ -70,7 +70,7 @@ impl Replica {
         let mut changed = false;
         for &(cell, label) in &changes {
             if self.heard.get(&cell).is_none_or(|h| h.number <= number) {
-                self.heard.insert(cell, Heard { number, at: now });
+                self.heard.insert(cell, CellRecord { number, at: now });
                 changed |= self.shown.set(cell, label) != label;
             }
         }
@@ -114,13 +114,13 @@ mod tests {
     use crate::map_codec::{Codec, encode};
 
     #[test]
-    fn chunks_that_claim_more_cells_than_a_map_has_are_refused() {
+    fn chunks_that_claim_too_many_cells_are_refused() {
         let target: LabelGrid = (0..100).map(|i| (Cell::new(i % 10, i / 10), 7)).collect();
         let chunk = encode(Codec::Png, &LabelGrid::default(), &target, Cell::new(5, 5), 200, &|_| true).unwrap();
-        let mut replica = Replica { logged: MOST_CELLS - 150, ..Replica::default() };
+        let mut replica = Replica { logged: MAX_CELLS - 150, ..Replica::default() };
         assert!(replica.apply(1, &chunk.bytes, Instant::ZERO));
         assert!(!replica.apply(2, &chunk.bytes, Instant::ZERO));
         replica.advance_base(1);
-        assert_eq!((replica.logged, replica.base.explored()), (MOST_CELLS - 150, 100));
+        assert_eq!((replica.logged, replica.base.explored()), (MAX_CELLS - 150, 100));
     }
 }

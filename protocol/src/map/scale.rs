@@ -47,8 +47,8 @@ pub enum PlaneScale {
         /// Steps from the surface to where level 1 begins.
         first: u16,
     },
-    /// Level 1 to 16: level n is from `n - 1` to `n` bits of mean surprise of a word, the binary logarithm of the perplexity;
-    /// level 16 is more, too.
+    /// Level 1 to 16: level n is from `n - 1` to `n` bits of mean surprise of a word, the binary logarithm of the
+    /// perplexity; level 16 is more, too.
     Curiosity,
 }
 

@@ -1,27 +1,27 @@
-//! The vehicle's side of the map: what the surface is known to hold, what it ought to hold, what is on its way.
+//! The vehicle's side of the map: the map itself, the surface's known copy, and the cells in flight.
 
 use super::coarse::Coarse;
-use super::dirty::{Change, Dirty};
-use super::settle::Settling;
+use super::debounce::Debounce;
+use super::dirty::{CellChange, Dirty};
 use super::value::Interest;
-use super::{Cell, LabelGrid, MOST_CONFIDENT, MapDigest, StateSource, UNEXPLORED};
+use super::{Cell, LabelGrid, MAX_CONFIDENCE, MapDigest, StateSource, UNEXPLORED};
 use crate::map_codec::{self, Codec, Stride};
 use crate::time::Instant;
 use std::time::Duration;
 
-/// The map to be replicated.
+/// A map to be replicated.
 ///
-/// Invariant: a cell is dirty exactly if its target label differs from what the surface is known to hold. A dirty cell
-/// is on its way, held back until its label has stood for a while, or waiting.
+/// Invariant: a cell is dirty exactly if its target label differs from the one that the surface is known to hold. A
+/// dirty cell is in flight, held back until its label is stable, or waiting.
 #[derive(Debug)]
 pub struct MapSource {
     codec: Codec,
     interest: Interest,
-    settling: Settling,
+    debounce: Debounce,
     coarse: Coarse,
-    /// Learned size of the stream, bytes a changed cell; the last lone cells count much.
+    /// A running estimate of bytes for each changed cell; the newest chunks weigh most.
     bytes_per_cell: f64,
-    /// Bytes of the last chunks and cells that they changed, the newest counting most.
+    /// Bytes of recent chunks and the cells that they changed, exponentially weighted.
     spent: (f64, f64),
     target: LabelGrid,
     acked: LabelGrid,
@@ -33,12 +33,12 @@ pub struct MapSource {
 }
 
 impl MapSource {
-    /// An empty map that goes out by `codec`; nothing is held back.
+    /// An empty map that is sent with `codec`, without debouncing.
     pub fn new(codec: Codec) -> Self {
         Self {
             codec,
             interest: Interest::default(),
-            settling: Settling::default(),
+            debounce: Debounce::default(),
             coarse: Coarse::default(),
             bytes_per_cell: 1.0,
             spent: (32.0, 32.0),
@@ -51,42 +51,43 @@ impl MapSource {
         }
     }
 
-    /// What each label is worth to the operator, 0..=1; what differs from his picture goes out in that order.
+    /// Sets the operator's interest in each label, 0..=1, which decides the order of changes.
     pub fn set_interest(&mut self, weight: impl Fn(u8) -> f64) {
         self.interest = Interest::new(weight);
         self.dirty.revalue();
     }
 
-    /// How long a new label of a cell that the surface knows has to stand before it is sent: `calm` if the cell has not
-    /// flipped of late, up to eight times that if it has. A difference is held back for sixteen times that at most. Zero:
-    /// everything is sent at once.
-    pub fn set_settle_time(&mut self, calm: Duration) {
-        self.settling.set_wait(calm);
+    /// Sets how long a new label of a cell that the surface knows must be stable before it is sent: `calm` for a cell
+    /// that has not flipped recently, up to eight times that for one that has. A difference is held back for at most
+    /// sixteen times `calm`. Zero sends everything at once.
+    pub fn set_debounce(&mut self, calm: Duration) {
+        self.debounce.set_wait(calm);
     }
 
-    /// A backlog of about more than so many bytes goes out coarse to fine: every fourth cell in both directions first, then
-    /// all. 0: always; `None`: never.
+    /// A backlog of more than about this many bytes goes out coarse to fine: first every fourth cell in both
+    /// directions, then all. 0 means always, `None` never.
     pub fn set_coarse_limit(&mut self, after_bytes: Option<usize>) {
         self.coarse.set_limit(after_bytes);
     }
 
-    /// Changes that never had to be sent, for they were taken back or overtaken while they were held back.
+    /// Changes that were never sent, because they were reverted or superseded while they were held back.
     pub fn flips_suppressed(&self) -> u64 {
         self.flips_suppressed
     }
 
-    /// Makes every cell unexplored: labels mean something else from now on.
+    /// Makes every cell unexplored, because labels change their meaning.
     pub fn clear(&mut self, now: Instant) {
         let labelled: Vec<Cell> = self.target.iter().map(|(cell, _)| cell).collect();
         self.set(labelled.into_iter().map(|cell| (cell, UNEXPLORED)), now);
     }
 
-    /// Sets the labels that the surface ought to hold; returns how many changed. A change makes a new version.
+    /// Sets labels of cells; returns how many changed. Each call with a change makes a new version.
     pub fn set(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
         self.set_confident(cells.into_iter().map(|(cell, label)| (cell, label, 0)), now)
     }
 
-    /// The same with how sure the model is of each label, 0 to [`MOST_CONFIDENT`]; what is certain is not held back.
+    /// As [`Self::set`], with the model's confidence in each label, 0 to [`MAX_CONFIDENCE`]; certain
+    /// labels are not held back.
     pub fn set_confident(&mut self, cells: impl IntoIterator<Item = (Cell, u8, u8)>, now: Instant) -> usize {
         let mut changed = 0;
         for (cell, label, confidence) in cells {
@@ -94,7 +95,7 @@ impl MapSource {
             if old != label {
                 changed += 1;
                 self.note_change(cell, (old, label), confidence, now);
-            } else if confidence >= MOST_CONFIDENT {
+            } else if confidence >= MAX_CONFIDENCE {
                 self.dirty.settle(cell);
             }
         }
@@ -104,13 +105,13 @@ impl MapSource {
 
     fn note_change(&mut self, cell: Cell, (old, label): (u8, u8), confidence: u8, now: Instant) {
         let seen = old != UNEXPLORED && label != UNEXPLORED;
-        let wait = if seen { self.settling.flip(cell, confidence, now) } else { Duration::ZERO };
+        let wait = if seen { self.debounce.flip(cell, confidence, now) } else { Duration::ZERO };
         let acked = self.acked.get(cell);
-        let change = Change {
+        let change = CellChange {
             differs: label != acked,
             known: acked != UNEXPLORED,
             due: now + wait,
-            longest: self.settling.longest(),
+            longest: self.debounce.longest(),
         };
         self.flips_suppressed += self.dirty.change(cell, change, now);
     }
@@ -125,7 +126,7 @@ impl MapSource {
         &self.acked
     }
 
-    /// Versions so far.
+    /// The number of versions so far.
     pub fn version(&self) -> u64 {
         self.version
     }
@@ -183,7 +184,7 @@ impl StateSource for MapSource {
         self.coarse.is_refining(&self.dirty.counts())
     }
 
-    fn told_backlog_bytes(&self) -> usize {
+    fn expected_backlog_bytes(&self) -> usize {
         let (bytes, cells) = self.spent;
         (self.dirty.counts().waiting as f64 * bytes / cells.max(1.0)).ceil() as usize
     }
@@ -193,7 +194,7 @@ impl StateSource for MapSource {
         counts.waiting == 0 && counts.flying == 0
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         let counts = self.dirty.counts();
         counts.differing == 0 && counts.flying == 0
     }

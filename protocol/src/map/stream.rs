@@ -1,71 +1,72 @@
-//! What the link asks of a state that it replicates; the label map is one.
+//! The interface between the link and a state that it replicates, such as the label map.
 
 use crate::time::Instant;
 use std::fmt::Debug;
 
-/// The sending side of a replicated state: knows what the peer is known to hold and what it ought to hold.
+/// The sending side of a replicated state: it knows the current state and the one that the peer is known to hold.
 pub trait StateSource: Debug {
-    /// What one chunk changes at the peer.
+    /// The content of a chunk, by which its fate is reported.
     type Carried: Debug;
 
-    /// The most useful chunk of at most `room` bytes, if anything is left to say; from then on it is on its way.
+    /// The most useful chunk of at most `room` bytes, if any content waits; it counts as in flight from then on.
     fn next_chunk(&mut self, room: usize, now: Instant) -> Option<(Vec<u8>, Self::Carried)>;
 
-    /// The fate of a chunk is known. Fates must be told in the order of frame numbers.
+    /// Takes the fate of a chunk. Fates come in the order of frame numbers.
     fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant);
 
-    /// The peer has lost all that it held.
+    /// The peer holds none of the state any more.
     fn handle_peer_restart(&mut self, now: Instant);
 
-    /// Time has passed: changes that were held back may be due. Says whether any was.
+    /// Releases changes that were held back and are due at `_now`; returns whether there are any.
     fn handle_timeout(&mut self, _now: Instant) -> bool {
         false
     }
 
-    /// When changes that are held back become due, or a little earlier; `None` if none is held back.
+    /// When changes that are held back become due, or a little earlier; `None` if there are none.
     fn next_due(&self) -> Option<Instant> {
         None
     }
 
-    /// About how many bytes wait for their first or next transmission, without what is held back.
+    /// The approximate number of bytes that wait for transmission, without those held back; rather
+    /// too many than too few.
     fn backlog_bytes(&self) -> usize;
 
-    /// Whether what waits only refines a coarse picture of the whole that has been said, and there is much of it.
+    /// Whether the waiting content is large and only refines an overview that is already sent.
     fn is_refining(&self) -> bool {
         false
     }
 
-    /// The same for people: a turn would rather be too long than too short, a person is told what is likely.
-    fn told_backlog_bytes(&self) -> usize {
+    /// The likely number of bytes that wait for transmission, as people should see it.
+    fn expected_backlog_bytes(&self) -> usize {
         self.backlog_bytes()
     }
 
-    /// Whether nothing waits or is on its way, though something may be held back.
+    /// Whether no content waits or is in flight; some may be held back.
     fn is_quiet(&self) -> bool {
-        self.is_settled()
+        self.is_converged()
     }
 
-    /// Whether the peer is known to hold everything.
-    fn is_settled(&self) -> bool;
+    /// Whether the peer is known to hold the whole state.
+    fn is_converged(&self) -> bool;
 
-    /// Fingerprint of what the peer is known to hold.
+    /// A fingerprint of the state that the peer is known to hold.
     fn digest(&self) -> u16;
 }
 
 /// The receiving side of a replicated state.
 pub trait StateReplica: Debug + Default {
-    /// Applies a chunk of frame `number`; frames may come in any order. `false` if it makes no sense here.
+    /// Applies a chunk of frame `number`; frames may come in any order. Returns `false` if it makes no sense here.
     fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool;
 
-    /// The sender now bases its chunks on every frame up to `horizon`.
+    /// The sender bases its chunks on every frame up to `horizon` from now on.
     fn advance_base(&mut self, horizon: u64);
 
-    /// Fingerprint of what the sender knows us to hold.
+    /// A fingerprint of the state that the sender knows us to hold.
     fn base_digest(&self) -> u16;
 
-    /// Counts changes of what is shown.
+    /// Counts changes of the visible state.
     fn version(&self) -> u64;
 
-    /// Forgets everything: the sender began afresh.
+    /// Empties the state, because the sender has begun a new run.
     fn clear(&mut self);
 }

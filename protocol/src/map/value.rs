@@ -1,19 +1,20 @@
-//! What it is worth to tell the operator of a change, and what that costs.
+//! The value of a change to the operator, and its cost in bits.
 
 use super::UNEXPLORED;
 
-/// Worth of a change of labels without any interest: with it nothing starves, for worth is multiplied by age.
+/// The value of a change between labels without interest. It is positive so that age, which multiplies
+/// it, lets no cell starve.
 const FLOOR: f64 = 0.2;
-/// Worth of correcting a label against showing one where nothing was shown.
+/// The value of correcting a label, relative to that of showing a new cell.
 const CORRECTION: f64 = 0.5;
-/// Bits of a frame and a chunk that each tile has to bear.
+/// Bits of frame and chunk headers for each tile.
 const HEAD_BITS: f64 = 48.0;
-/// What a newly seen cell costs, bits.
+/// Cost of a new cell in bits.
 const NEW_BITS: f64 = 2.0;
-/// What a flipped cell costs, bits.
+/// Cost of a flipped cell in bits.
 const FLIP_BITS: f64 = 9.0;
 
-/// What each label is worth to the operator, 0..=1.
+/// The operator's interest in each label, 0..=1.
 #[derive(Debug)]
 pub(super) struct Interest([f64; 256]);
 
@@ -29,39 +30,39 @@ impl Interest {
         Self([(); 256].map(|()| labels.next().map_or(0.0, |label| weight(label).abs().min(1.0))))
     }
 
-    /// Worth of telling the operator that a cell has changed.
-    pub(super) fn worth(&self, old: u8, new: u8) -> f64 {
+    /// The value of a change of a cell from `old` to `new`.
+    pub(super) fn value(&self, old: u8, new: u8) -> f64 {
         let of = |label: u8| self.0.get(usize::from(label)).copied().unwrap_or_default();
         let wrong = if old == UNEXPLORED { 1.0 } else { CORRECTION };
         wrong * (FLOOR + of(old).max(of(new)))
     }
 }
 
-/// About what it takes to tell a change, bits.
+/// The approximate cost of a change in bits.
 pub(super) fn cost(old: u8) -> f64 {
     if old == UNEXPLORED { NEW_BITS } else { FLIP_BITS }
 }
 
-/// The value of a group of changes, as a function of time: each is worth more the older it is.
+/// The value of a group of changes as a function of time; each gains value with its age.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Value {
-    worth: f64,
-    /// Sum of worth times the moment of the change in seconds.
-    worth_since: f64,
+    value: f64,
+    /// Sum of the values times the times of the changes in seconds.
+    value_since: f64,
     bits: f64,
 }
 
 impl Value {
-    /// Takes in a change with its worth, its cost, and since when there is something to tell, in seconds.
-    pub(super) fn add(&mut self, worth: f64, bits: f64, since_s: f64) {
-        self.worth += worth;
-        self.worth_since += worth * since_s;
+    /// Adds a change with its value, its cost, and its time in seconds.
+    pub(super) fn add(&mut self, value: f64, bits: f64, since_s: f64) {
+        self.value += value;
+        self.value_since += value * since_s;
         self.bits += bits;
     }
 
-    /// Worth times age, a bit, at `now_s` seconds.
+    /// Value times age for each bit, at `now_s` seconds.
     pub(super) fn per_bit(&self, now_s: f64) -> f64 {
-        (self.worth * (1.0 + now_s) - self.worth_since) / (HEAD_BITS + self.bits)
+        (self.value * (1.0 + now_s) - self.value_since) / (HEAD_BITS + self.bits)
     }
 }
 
@@ -70,11 +71,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn new_cells_come_before_lonely_flips_and_age_comes_before_both() {
+    fn age_outranks_new_cells_and_these_isolated_flips() {
         let interest = Interest::new(|label| if label == 7 { 0.8 } else { 0.0 });
         let value = |old: u8, new: u8, since_s: f64| {
             let mut value = Value::default();
-            (0..20).for_each(|_| value.add(interest.worth(old, new), cost(old), since_s));
+            (0..20).for_each(|_| value.add(interest.value(old, new), cost(old), since_s));
             value.per_bit(100.0)
         };
         assert!(value(0, 1, 90.0) > 3.0 * value(2, 1, 90.0));

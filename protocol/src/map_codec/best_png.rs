@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn the_dirty_box_counts_where_it_is_smaller_and_no_change_is_no_file() {
+    fn the_smaller_of_box_and_delta_counts() {
         let before = Plane::uniform(40, 40, 1);
         let mut after = before.clone();
         assert_eq!(after.smallest_delta_png(&before, &mut stored), 0);

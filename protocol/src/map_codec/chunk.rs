@@ -1,26 +1,26 @@
-//! Writing the best chunk for the room that is left, and reading any chunk.
+//! Encoding of the best chunk for a given room, and decoding of any chunk.
 
-use super::bits::BitReader;
 use super::grow::Growth;
-use super::header::{Body, Header, base_check};
+use super::header::{Body, ChunkHeader, base_check};
 use super::lattice::{Lattice, Stride};
 use super::window::Patch;
 use super::{Codec, context, png};
-use crate::map::{Cell, LabelGrid, Rect};
+use crate::bytes::BitReader;
+use crate::grid::{Cell, LabelGrid, Rect};
 
-/// One encoded change of the map.
+/// An encoded change of the map.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MapChunk {
-    /// Everything that [`decode`] needs besides the base.
+    /// The bytes that [`decode`] needs besides the base.
     pub bytes: Vec<u8>,
-    /// Changed cells with their new labels (0 = becomes unexplored), exactly as [`decode`] returns them.
+    /// The changed cells with their new labels (0 makes a cell unexplored), exactly as [`decode`] returns them.
     pub changes: Vec<(Cell, u8)>,
 }
 
-/// Why a chunk was refused.
+/// Why a chunk is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
-    /// The bytes end inside the head.
+    /// The bytes end inside the header.
     #[error("map chunk ends early")]
     Truncated,
     /// The patch is larger than allowed or leaves the 32-bit grid.
@@ -29,19 +29,19 @@ pub enum DecodeError {
     /// The chunk was coded against another base, or has a byte too many or too few.
     #[error("map chunk was coded against another base")]
     BaseMismatch,
-    /// The body is not one that the encoder writes.
+    /// The encoder never writes such a body.
     #[error("map chunk is corrupt")]
     Corrupt,
-    /// The body needs a coder that is not known here.
+    /// The body needs an unknown coder.
     #[error("map chunk uses an unknown codec")]
     UnknownCodec,
 }
 
-/// Best chunk of at most `room` bytes around `seed`.
+/// The best chunk of at most `room` bytes around `seed`.
 ///
-/// Grows a compact patch around `seed` for as long as it fits and fills the room. `wanted` says which cells that
-/// differ between `base` and `target` may be sent now; the others stay untouched. `None` if `seed` does not differ or
-/// is not wanted, or if not even one cell fits.
+/// Grows a compact patch around `seed` as long as it fits. `wanted` selects the cells that may be sent now among those
+/// that differ between `base` and `target`; the others stay untouched. `None` if `seed` does not differ or is not
+/// wanted, or if not even one cell fits.
 pub fn encode(
     codec: Codec,
     base: &LabelGrid,
@@ -53,7 +53,7 @@ pub fn encode(
     encode_every(Stride::One, codec, base, target, seed, room, wanted)
 }
 
-/// As [`encode`], of cells on the lattice of `stride` alone; `None` if `seed` is not on it.
+/// As [`encode`], for cells on the lattice of `stride` alone; `None` if `seed` is not on it.
 pub fn encode_every(
     stride: Stride,
     codec: Codec,
@@ -82,12 +82,12 @@ fn best_chunk(codec: Codec, base: Lattice<'_>, growth: &Growth, room: usize) -> 
     }
 }
 
-/// The changes in a chunk: cells with their new labels (0 = becomes unexplored), row by row.
+/// The changes in a chunk: cells with their new labels (0 makes a cell unexplored), row by row.
 ///
 /// Never panics, whatever the bytes; allocates for at most [`MAX_PATCH_CELLS`](super::MAX_PATCH_CELLS) cells.
 pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeError> {
     let mut bits = BitReader::new(bytes);
-    let header = Header::read(&mut bits).ok_or(DecodeError::Truncated)?;
+    let header = ChunkHeader::read(&mut bits).ok_or(DecodeError::Truncated)?;
     if !header.geometry_is_sound() {
         return Err(DecodeError::BadGeometry);
     }
@@ -103,12 +103,12 @@ pub fn decode(base: &LabelGrid, bytes: &[u8]) -> Result<Vec<(Cell, u8)>, DecodeE
     .map(|patch| patch.changes().into_iter().map(|(cell, label)| (header.stride.on_map(cell), label)).collect())
 }
 
-/// Head of a chunk for `rect`.
-pub(super) fn header_for(base: Lattice<'_>, body: Body, rect: Rect) -> Header {
-    Header { body, stride: base.stride(), patch: rect, check: base_check(base, rect) }
+/// The header of a chunk for `rect`.
+pub(super) fn header_for(base: Lattice<'_>, body: Body, rect: Rect) -> ChunkHeader {
+    ChunkHeader { body, stride: base.stride(), patch: rect, check: base_check(base, rect) }
 }
 
-/// The chunk that says `patch` in `bytes`.
+/// The chunk with the content `patch` and these bytes.
 pub(super) fn chunk(patch: &Patch, bytes: Vec<u8>) -> MapChunk {
     MapChunk { bytes, changes: patch.changes() }
 }

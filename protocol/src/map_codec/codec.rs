@@ -1,12 +1,12 @@
-//! Which coder writes a chunk.
+//! The choice of the coder.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// How chunks are written; every decoder reads all of them.
+/// How chunks are encoded; every decoder reads all of them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Codec {
-    /// The smaller of the two for each chunk.
+    /// For each chunk, the smaller result of the two.
     #[default]
     Auto,
     /// An indexed PNG of the changed part without its constant bytes.

@@ -1,10 +1,10 @@
 //! A file of chunks that turn one map into another.
 
 use super::{Codec, DecodeError, Plane, decode, encode_all};
-use crate::map::Rect;
+use crate::grid::Rect;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// Chunks of one change, in order, and the size of the map they are for.
+/// The chunks of one change, in order, and the size of the map that they apply to.
 ///
 /// ```text
 ///      +--------+------------+-----------+------------+----------+-----------+------------------+---------+
@@ -16,58 +16,58 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// sum: CRC-32 of everything before. A map has 1 to 2^26 cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChunkFile {
-    /// Columns of the map.
+    /// Width of the map in cells.
     pub width: u32,
-    /// Rows of the map.
+    /// Height of the map in cells.
     pub height: u32,
-    /// Fingerprint of the base's labels.
+    /// CRC-32 of the base's labels.
     pub base: u32,
-    /// The bytes of each chunk.
+    /// The bytes of each chunk, in the order of application.
     pub chunks: Vec<Vec<u8>>,
 }
 
 /// Why a file of chunks cannot be made or used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ChunkFileError {
-    /// The first bytes are others.
+    /// It does not begin with the magic.
     #[error("not a file of map chunks")]
     NotChunks,
-    /// Written by another version.
+    /// It was written by another version.
     #[error("file version {0}; this program reads version {VERSION}")]
     Version(u8),
-    /// The file ends early or goes on after the last chunk.
+    /// It ends early or has bytes after the last chunk.
     #[error("the file of map chunks is cut off or has bytes after its end")]
     Length,
-    /// The bytes do not give the sum at the end.
+    /// The checksum at the end does not match.
     #[error("the file of map chunks is damaged: its sum is wrong")]
     Damaged,
     /// The map has no cell, or more than 2^26.
-    #[error("a map of {0} x {1} cells; 1 to {MOST_CELLS} cells are allowed")]
+    #[error("a map of {0} x {1} cells; 1 to {MAX_CELLS} cells are allowed")]
     CellCount(u32, u32),
-    /// The base is another one than the encoder's.
+    /// The base is not the encoder's.
     #[error("the chunks need the base map that they were made with")]
     OtherBase,
     /// Base and target, or base and file, differ in size.
     #[error("the base map is {base_width} x {base_height}, the other {width} x {height}")]
     Size {
-        /// Columns of the base.
+        /// Width of the base in cells.
         base_width: usize,
-        /// Rows of the base.
+        /// Height of the base in cells.
         base_height: usize,
-        /// Columns of the other.
+        /// Width of the other map in cells.
         width: usize,
-        /// Rows of the other.
+        /// Height of the other map in cells.
         height: usize,
     },
-    /// No cell fits the room.
+    /// Not even one cell fits into the room.
     #[error("a chunk of {0} bytes holds no cell")]
     Room(usize),
-    /// A chunk is refused.
+    /// A chunk does not decode against the base.
     #[error("chunk {index}: {error}")]
     Chunk {
-        /// Which, from 0.
+        /// Index of the chunk, from 0.
         index: usize,
-        /// Why.
+        /// The reason of the refusal.
         error: DecodeError,
     },
     /// A chunk changes cells outside the map.
@@ -78,11 +78,11 @@ pub enum ChunkFileError {
 const MAGIC: [u8; 4] = *b"SCMC";
 const VERSION: u8 = 1;
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
-/// Cells of the largest map that a file may be for.
-const MOST_CELLS: u64 = 1 << 26;
+/// Cells of the largest map that a file may describe.
+const MAX_CELLS: u64 = 1 << 26;
 
 impl ChunkFile {
-    /// The chunks of at most `room` bytes that turn `base` into `target`, and how many cells they change.
+    /// The chunks of at most `room` bytes that turn `base` into `target`, and the number of cells that they change.
     pub fn encode(codec: Codec, base: &Plane, target: &Plane, room: usize) -> Result<(Self, usize), ChunkFileError> {
         same_size(base, target.width, target.height)?;
         let size = allowed_size(target.width as u32, target.height as u32)?;
@@ -93,7 +93,7 @@ impl ChunkFile {
         Ok((Self { width: size.0, height: size.1, base: CRC.checksum(&base.labels), chunks }, changed))
     }
 
-    /// The map that `base` becomes; without a base, the one that nothing becomes.
+    /// Applies the chunks to `base`; without one, to an unexplored map.
     pub fn apply(&self, base: Option<&Plane>) -> Result<Plane, ChunkFileError> {
         let (width, height) = (self.width as usize, self.height as usize);
         if let Some(base) = base {
@@ -119,7 +119,7 @@ impl ChunkFile {
         Ok(Plane::from_grid(&map, width, height))
     }
 
-    /// The file.
+    /// Encodes the file with its checksum at the end.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::from(MAGIC);
         out.push(VERSION);
@@ -134,7 +134,7 @@ impl ChunkFile {
         out
     }
 
-    /// Reads a file.
+    /// Decodes a file; its chunks are not decoded yet.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ChunkFileError> {
         let (magic, rest) = bytes.split_first_chunk::<4>().ok_or(ChunkFileError::NotChunks)?;
         if *magic != MAGIC {
@@ -144,7 +144,7 @@ impl ChunkFile {
         if version != VERSION {
             return Err(ChunkFileError::Version(version));
         }
-        let mut reader = Reader(rest);
+        let mut reader = FileReader(rest);
         let (width, height) = allowed_size(reader.number()?, reader.number()?)?;
         let (base, count) = (reader.number()?, reader.number()?);
         let chunks = (0..count).map(|_| reader.chunk()).collect::<Result<_, _>>()?;
@@ -161,9 +161,9 @@ impl ChunkFile {
     }
 }
 
-struct Reader<'a>(&'a [u8]);
+struct FileReader<'a>(&'a [u8]);
 
-impl Reader<'_> {
+impl FileReader<'_> {
     fn number(&mut self) -> Result<u32, ChunkFileError> {
         let (number, rest) = self.0.split_first_chunk().ok_or(ChunkFileError::Length)?;
         self.0 = rest;
@@ -181,7 +181,7 @@ impl Reader<'_> {
 
 fn allowed_size(width: u32, height: u32) -> Result<(u32, u32), ChunkFileError> {
     let cells = u64::from(width) * u64::from(height);
-    if (1..=MOST_CELLS).contains(&cells) { Ok((width, height)) } else { Err(ChunkFileError::CellCount(width, height)) }
+    if (1..=MAX_CELLS).contains(&cells) { Ok((width, height)) } else { Err(ChunkFileError::CellCount(width, height)) }
 }
 
 fn same_size(base: &Plane, width: usize, height: usize) -> Result<(), ChunkFileError> {
@@ -190,55 +190,5 @@ fn same_size(base: &Plane, width: usize, height: usize) -> Result<(), ChunkFileE
         Ok(())
     } else {
         Err(ChunkFileError::Size { base_width, base_height, width, height })
-    }
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, clippy::indexing_slicing)]
-mod tests {
-    use super::*;
-    use crate::map_codec::procedural::{Chance, Scene, sampler_noise};
-
-    fn maps() -> (Plane, Plane) {
-        let mut chance = Chance::new(3);
-        let before = Scene::Colonies.draw(&mut chance, 60, 40, 6);
-        let mut after = before.clone();
-        sampler_noise(&mut chance, &mut after, 50_000, 10_000);
-        (before, after)
-    }
-
-    #[test]
-    fn a_file_turns_the_base_into_the_target_whatever_the_codec() {
-        let (before, after) = maps();
-        for codec in [Codec::Auto, Codec::Png, Codec::Context] {
-            let (file, changed) = ChunkFile::encode(codec, &before, &after, 64).unwrap();
-            assert!(changed > 0 && file.chunks.len() > 1);
-            let file = ChunkFile::from_bytes(&file.to_bytes()).unwrap();
-            assert_eq!(file.apply(Some(&before)).unwrap(), after);
-            let (still, _) = ChunkFile::encode(codec, &Plane::uniform(60, 40, 0), &after, 200).unwrap();
-            assert_eq!(still.apply(None).unwrap(), after);
-        }
-    }
-
-    #[test]
-    fn files_cut_off_or_for_another_base_are_refused() {
-        let (before, after) = maps();
-        let bytes = ChunkFile::encode(Codec::Auto, &before, &after, 100).unwrap().0.to_bytes();
-        for length in 0..bytes.len() {
-            assert!(ChunkFile::from_bytes(bytes.get(..length).unwrap()).is_err());
-        }
-        let longer: Vec<u8> = bytes.iter().copied().chain([0]).collect();
-        assert_eq!(ChunkFile::from_bytes(&longer), Err(ChunkFileError::Length));
-        let file = ChunkFile::from_bytes(&bytes).unwrap();
-        assert!(matches!(file.apply(Some(&Plane::uniform(9, 9, 1))), Err(ChunkFileError::Size { .. })));
-        assert_eq!(file.apply(Some(&Plane::uniform(60, 40, 1))), Err(ChunkFileError::OtherBase));
-        assert_eq!(file.apply(None), Err(ChunkFileError::OtherBase));
-        for i in 0..bytes.len() * 8 {
-            let mut damaged = bytes.clone();
-            damaged[i / 8] ^= 1 << (i % 8);
-            assert!(ChunkFile::from_bytes(&damaged).is_err(), "bit {i}");
-        }
-        let tiny = ChunkFile::encode(Codec::Auto, &before, &after, 3);
-        assert_eq!(tiny, Err(ChunkFileError::Room(3)));
     }
 }

@@ -1,9 +1,9 @@
 //! Chunks whose bytes must not change.
 
 use super::{Codec, decode, encode};
-use crate::map::{Cell, LabelGrid};
+use crate::grid::{Cell, LabelGrid};
 
-/// Blocks of labels around the origin, and the same with a patch of new labels and a few lone flips.
+/// Blocks of labels around the origin, and the same with a patch of new labels and a few isolated flips.
 fn change() -> (LabelGrid, LabelGrid) {
     let label = |x: i32, y: i32| ((x.rem_euclid(40) / 8) * 3 + y.rem_euclid(33) / 11) as u8;
     let cells = (-40..40).flat_map(|y| (-40..40).map(move |x| Cell::new(x, y)));
@@ -22,7 +22,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// What the bytes say about the change, read back.
+/// Decodes golden bytes and compares the changes.
 fn reads_back(codec: Codec, golden: &str) {
     let (base, target) = change();
     let chunk = encode(codec, &base, &target, Cell::new(0, 4), 100, &|_| true).expect("fits");
@@ -33,7 +33,7 @@ fn reads_back(codec: Codec, golden: &str) {
 
 #[test]
 fn png_chunks_with_golden_bytes_still_read() {
-    // Not compared with what is written today: that depends on the deflate library.
+    // The bytes are not compared, because they depend on the deflate library.
     reads_back(Codec::Png, PNG);
 }
 

@@ -1,20 +1,20 @@
-//! Growing a compact patch around a cell: nested rectangles, each a little larger than the one before.
+//! Growth of a compact patch around a cell: nested rectangles, each a little larger than the one before.
 
-use super::window::{Area, Window};
+use super::window::{Area, GrowthWindow};
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
-use crate::map::Cell;
+use crate::grid::Cell;
 use crate::map_codec::lattice::Lattice;
 
-/// Nested areas around the middle of `window`, smallest first; each holds more changes than the one before.
+/// Nested areas around the centre of `window`, smallest first; each holds more changes than the one before.
 #[derive(Debug)]
 pub(super) struct Growth {
-    pub(super) window: Window,
+    pub(super) window: GrowthWindow,
     pub(super) areas: Vec<Area>,
 }
 
-/// What a lonely change costs at least, bits.
+/// The least cost of an isolated change in bits.
 const LONELY_BITS: usize = 4;
-/// What a change with another one beside it costs at least, unless it goes on like all its neighbours, bits.
+/// The least cost of a change beside another one in bits, unless it continues all its neighbours.
 const EDGE_BITS: usize = 1;
 /// The first window reaches this many cells from the seed.
 const FIRST_REACH: usize = 48;
@@ -22,13 +22,13 @@ const FIRST_REACH: usize = 48;
 const LAST_REACH: usize = 384;
 
 impl Growth {
-    /// The cell it grew around.
+    /// The cell at the centre.
     pub(super) fn seed(&self) -> Cell {
         let middle = (self.window.side / 2) as i64;
         Cell::new((self.window.x + middle) as i32, (self.window.y + middle) as i32)
     }
 
-    /// Grows around `seed` until the changes surely need more than `room` bytes; `None` if `seed` is not to be sent.
+    /// Grows around `seed` until the changes certainly need more than `room` bytes; `None` if `seed` is not to be sent.
     pub(super) fn around(
         base: Lattice<'_>,
         target: Lattice<'_>,
@@ -38,7 +38,7 @@ impl Growth {
     ) -> Option<Self> {
         let mut reach = FIRST_REACH;
         loop {
-            let window = Window::around(base, target, seed, reach, wanted);
+            let window = GrowthWindow::around(base, target, seed, reach, wanted);
             if !window.is_wanted(reach, reach) {
                 return None;
             }
@@ -51,8 +51,8 @@ impl Growth {
     }
 }
 
-/// The bounds of the changes in ever larger squares, and whether they are more than the room or a patch can hold.
-fn grow(window: &Window, room_bits: usize) -> (Vec<Area>, bool) {
+/// The bounds of the changes in ever larger squares, and whether they exceed the room or the largest patch.
+fn grow(window: &GrowthWindow, room_bits: usize) -> (Vec<Area>, bool) {
     let middle = window.side / 2;
     let mut area = Area { left: middle, right: middle + 1, bottom: middle, top: middle + 1 };
     let mut areas = vec![area];
@@ -79,7 +79,7 @@ fn grow(window: &Window, room_bits: usize) -> (Vec<Area>, bool) {
     (areas, false)
 }
 
-/// Cells farther than `inner` and at most `outer` from the middle, as (column, row).
+/// Cells farther than `inner` and at most `outer` from the centre, as (column, row).
 fn ring(middle: usize, inner: usize, outer: usize) -> impl Iterator<Item = (usize, usize)> {
     (middle - outer..=middle + outer).flat_map(move |row| {
         let whole = row.abs_diff(middle) > inner;
@@ -89,7 +89,7 @@ fn ring(middle: usize, inner: usize, outer: usize) -> impl Iterator<Item = (usiz
     })
 }
 
-fn least_bits(window: &Window, column: usize, row: usize) -> usize {
+fn least_bits(window: &GrowthWindow, column: usize, row: usize) -> usize {
     let label = window.outcome(column, row);
     let same = |c: usize, r: usize| window.is_wanted(c, r) && window.outcome(c, r) == label;
     match (same(column - 1, row), same(column, row - 1)) {

@@ -1,19 +1,19 @@
-//! The head of a chunk: coder, place and size of the patch, check of the base.
+//! The header of a chunk: coder, position and size of the patch, check of the base.
 
-use super::bits::{BitReader, BitWriter};
 use super::{MAX_PATCH_CELLS, MAX_PATCH_SIDE};
-use crate::map::Rect;
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::Rect;
 use crate::map_codec::lattice::{Lattice, Stride};
 use crc::{CRC_8_AUTOSAR, Crc};
 
-/// Which coder wrote the body.
+/// The coder of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Body {
     Png,
     Context,
 }
 
-/// Head of every chunk; most significant bit first, followed directly by the body.
+/// The header of every chunk, most significant bit first, followed directly by the body.
 ///
 /// ```text
 ///  bits  1      1        3            n + n         2           m + m              8
@@ -28,7 +28,7 @@ pub(super) enum Body {
 /// * check: CRC-8 over the base in the patch and [`CHECK_MARGIN`] cells around it, xor the low byte of the length
 ///   of the chunk; so a byte too many or too few is refused too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct ChunkHeader {
     pub(super) body: Body,
     pub(super) stride: Stride,
     pub(super) patch: Rect,
@@ -40,8 +40,7 @@ const SIDE_BITS: [u32; 4] = [4, 6, 7, 10];
 /// Cells around the patch that the check covers too.
 pub(super) const CHECK_MARGIN: usize = 16;
 
-impl Header {
-    /// The longest head in bytes.
+impl ChunkHeader {
     #[cfg(test)]
     const MAX_BYTES: usize = 13;
 
@@ -65,17 +64,15 @@ impl Header {
         chunk.iter_mut().skip(at / 8).zip(length).for_each(|(byte, length)| *byte ^= length);
     }
 
-    /// Class and bits of a coordinate.
     fn place_size(&self) -> (u64, u32) {
         smallest(&PLACE_BITS, |n| fits(self.patch.x, n) && fits(self.patch.y, n))
     }
 
-    /// Class and bits of a side.
     fn side_size(&self) -> (u64, u32) {
         smallest(&SIDE_BITS, |m| ((self.patch.width - 1) | (self.patch.height - 1)) >> m == 0)
     }
 
-    /// Reads the head; `None` if the bits end early.
+    /// Reads the header; `None` if the bits end early.
     pub(super) fn read(bits: &mut BitReader<'_>) -> Option<Self> {
         let body = if bits.bit()? { Body::Context } else { Body::Png };
         let stride = if bits.bit()? { Stride::Four } else { Stride::One };
@@ -101,7 +98,7 @@ impl Header {
     }
 }
 
-/// Check over the base that a chunk for `patch` is coded against.
+/// The check over the base against which a chunk for `patch` is coded.
 pub(super) fn base_check(base: Lattice<'_>, patch: Rect) -> u8 {
     const CRC: Crc<u8> = Crc::<u8>::new(&CRC_8_AUTOSAR);
     let margin = CHECK_MARGIN as i64;
@@ -109,7 +106,7 @@ pub(super) fn base_check(base: Lattice<'_>, patch: Rect) -> u8 {
     CRC.checksum(&base.copy_area(i64::from(patch.x) - margin, i64::from(patch.y) - margin, width, height))
 }
 
-/// The first size that holds, or the last, with its place in the list.
+/// The index and value of the first size that suffices, or of the last one.
 fn smallest(sizes: &[u32], holds: impl Fn(u32) -> bool) -> (u64, u32) {
     let mut classes = (0..).zip(sizes.iter().copied());
     let last = classes.clone().last().unwrap_or_default();
@@ -129,16 +126,16 @@ fn signed(value: u64, bits: u32) -> i32 {
 mod tests {
     use super::*;
 
-    fn bytes_of(header: Header) -> Vec<u8> {
+    fn bytes_of(header: ChunkHeader) -> Vec<u8> {
         let mut out = BitWriter::default();
         header.write(&mut out);
         out.into_bytes()
     }
 
     #[test]
-    fn a_typical_head_keeps_its_golden_bytes() {
+    fn a_typical_header_keeps_its_golden_bytes() {
         let patch = Rect { x: 200, y: -3, width: 40, height: 24 };
-        let header = Header { body: Body::Context, stride: Stride::One, patch, check: 0xA5 };
+        let header = ChunkHeader { body: Body::Context, stride: Stride::One, patch, check: 0xA5 };
         // 1 | 0 | 010 | 011001000 | 111111101 | 01 | 100111 | 010111 | 10100101 | 000
         assert_eq!(bytes_of(header), [0x93, 0x23, 0xFA, 0xCE, 0xBD, 0x28]);
         // Six bytes: xor 00000110 into the check.
@@ -148,14 +145,14 @@ mod tests {
     }
 
     #[test]
-    fn heads_of_any_size_read_back() {
+    fn headers_of_any_size_read_back() {
         for (x, y) in [(0, 0), (127, -128), (128, 0), (-1024, 1023), (-1025, 9), (40_000, -1), (i32::MAX, i32::MIN)] {
             for (width, height) in [(1, 1), (16, 16), (17, 3), (64, 65), (1024, 64)] {
                 for stride in [Stride::One, Stride::Four] {
-                    let header = Header { body: Body::Png, stride, patch: Rect { x, y, width, height }, check: 7 };
+                    let header = ChunkHeader { body: Body::Png, stride, patch: Rect { x, y, width, height }, check: 7 };
                     let bytes = bytes_of(header);
-                    assert!(bytes.len() <= Header::MAX_BYTES);
-                    assert_eq!(Header::read(&mut BitReader::new(&bytes)), Some(header));
+                    assert!(bytes.len() <= ChunkHeader::MAX_BYTES);
+                    assert_eq!(ChunkHeader::read(&mut BitReader::new(&bytes)), Some(header));
                 }
             }
         }

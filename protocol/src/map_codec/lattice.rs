@@ -1,26 +1,27 @@
-//! A map seen through every so many cells of it.
+//! Sublattices of a map.
 
-use crate::map::{Cell, LabelGrid};
+use crate::grid::{Cell, LabelGrid};
 
-/// Every n-th cell of a map, n = 1 or 4, numbered without gaps: cell (x, y) of the lattice is (n x, n y) of the map.
+/// Every n-th cell of a map, n = 1 or 4, numbered without gaps: cell (x, y) of the lattice is cell (n x,
+/// n y) of the map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lattice<'a> {
     grid: &'a LabelGrid,
     stride: Stride,
 }
 
-/// How far apart the cells of a lattice are.
+/// The distance between the cells of a lattice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stride {
-    /// Every cell.
+    /// A lattice of all cells.
     #[default]
     One,
-    /// Every fourth cell in both directions.
+    /// A lattice of every fourth cell in both directions.
     Four,
 }
 
 impl Stride {
-    /// The distance in cells.
+    /// The distance in cells of the map.
     pub const fn cells(self) -> i32 {
         match self {
             Self::One => 1,
@@ -28,12 +29,12 @@ impl Stride {
         }
     }
 
-    /// The cell of the map that a cell of the lattice is.
+    /// The cell of the map at a cell of the lattice.
     pub(super) fn on_map(self, cell: Cell) -> Cell {
         Cell::new(cell.x.wrapping_mul(self.cells()), cell.y.wrapping_mul(self.cells()))
     }
 
-    /// The cell of the lattice that a cell of the map is, if it is on it.
+    /// The cell of the lattice at a cell of the map, if it is on the lattice.
     pub fn on_lattice(self, cell: Cell) -> Option<Cell> {
         let n = self.cells();
         (cell.x % n == 0 && cell.y % n == 0).then(|| Cell::new(cell.x / n, cell.y / n))
@@ -45,7 +46,6 @@ impl<'a> Lattice<'a> {
         Self { grid, stride }
     }
 
-    /// Every cell of the map.
     pub(super) fn whole(grid: &'a LabelGrid) -> Self {
         Self::new(grid, Stride::One)
     }

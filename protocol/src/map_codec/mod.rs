@@ -1,10 +1,9 @@
-//! Label-map coding: a change of the map against a base both ends hold, small enough for the room in a frame.
+//! Label-map coding: changes of the map against a base that both ends hold, in chunks that fit into a frame.
 //!
-//! A chunk covers one compact patch. It says the new label of the cells it changes and leaves every other cell of
-//! the patch as it is; it decodes alone, given the base. See [`encode`] and [`decode`].
+//! A chunk covers one compact patch. It has the new labels of the cells that change, and leaves every other cell of the
+//! patch as it is. It decodes alone, given the base. See [`encode`] and [`decode`].
 
 mod best_png;
-pub(crate) mod bits;
 mod chunk;
 mod codec;
 #[allow(clippy::indexing_slicing)] // Tables whose sizes the layouts of its contexts give.
@@ -20,8 +19,6 @@ mod plane;
 mod plane_png;
 mod png;
 #[allow(clippy::indexing_slicing)]
-pub mod procedural;
-#[allow(clippy::indexing_slicing)]
 mod series;
 #[cfg(test)]
 mod tests;
@@ -30,7 +27,7 @@ mod window;
 
 pub use chunk::{DecodeError, MapChunk, decode, encode, encode_every};
 pub use codec::Codec;
-pub use context::{PRIOR_SCENES, train_prior};
+pub use context::training;
 pub use file::{ChunkFile, ChunkFileError};
 pub use lattice::Stride;
 pub use plane::Plane;
@@ -38,7 +35,7 @@ pub use plane_png::MapPngError;
 pub use png::restored_png;
 pub use series::encode_all;
 
-/// Most cells a patch may have; bounds what decoding a chunk allocates.
+/// The most cells of a patch; bounds the allocation in decoding a chunk.
 pub const MAX_PATCH_CELLS: usize = 1 << 16;
-/// Most cells along one side of a patch.
+/// The most cells along one side of a patch.
 pub const MAX_PATCH_SIDE: usize = 1 << 10;

@@ -1,6 +1,6 @@
 //! A dense map of labels.
 
-use crate::map::{Cell, LabelGrid};
+use crate::grid::{Cell, LabelGrid};
 
 /// Labels of a `width` x `height` map, row by row; 0 = unexplored.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -58,25 +58,5 @@ impl Plane {
     /// Sets the label in `column` of `row`.
     pub fn set(&mut self, column: usize, row: usize, label: u8) {
         self.labels[row * self.width + column] = label;
-    }
-
-    /// Labels of the up to eight cells around place `i`.
-    pub fn around(&self, i: usize) -> impl Iterator<Item = u8> + '_ {
-        let (column, row) = (i % self.width, i / self.width);
-        let columns = column.saturating_sub(1)..(column + 2).min(self.width);
-        (row.saturating_sub(1)..(row + 2).min(self.height))
-            .flat_map(move |r| columns.clone().map(move |c| (c, r)))
-            .filter(move |&place| place != (column, row))
-            .map(|(c, r)| self.get(c, r))
-    }
-
-    /// Whether the cell at place `i` touches one with another label, other than unexplored, along a side.
-    pub fn on_border(&self, i: usize) -> bool {
-        let (column, row) = (i % self.width, i / self.width);
-        let other = |label: u8| label != 0 && label != self.labels[i];
-        (column > 0 && other(self.labels[i - 1]))
-            || (column + 1 < self.width && other(self.labels[i + 1]))
-            || (row > 0 && other(self.labels[i - self.width]))
-            || (row + 1 < self.height && other(self.labels[i + self.width]))
     }
 }

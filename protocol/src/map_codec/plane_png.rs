@@ -1,7 +1,7 @@
 //! Maps as indexed PNG files.
 
 use super::Plane;
-use crate::map::MAX_LABEL;
+use crate::grid::MAX_LABEL;
 use std::io::Cursor;
 
 /// Why a file is not taken as a map.

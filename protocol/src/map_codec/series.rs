@@ -3,13 +3,13 @@
 use super::lattice::Lattice;
 use super::window::Patch;
 use super::{Codec, MAX_PATCH_CELLS, MAX_PATCH_SIDE, MapChunk, context, encode, png};
-use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
+use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Chunks of at most `room` bytes that together turn `base` into `target`; each decodes alone against `base`.
 ///
-/// Looks at both maps as a whole and, unless the codec is `png`, tiles the change with patches that do not overlap:
-/// fewer bytes than [`encode`] one after another. `None` if `room` is too small for a single cell.
+/// The encoder considers both maps as a whole and, unless the codec is `png`, tiles the change with patches that do not
+/// overlap. This takes fewer bytes than repeated calls of [`encode`]. `None` if `room` is too small for a single cell.
 pub fn encode_all(codec: Codec, base: &LabelGrid, target: &LabelGrid, room: usize) -> Option<Vec<MapChunk>> {
     let cells = base.iter().chain(target.iter()).map(|(cell, _)| cell);
     let differs = |cell| base.get(cell) != target.get(cell) && target.get(cell) <= MAX_LABEL;
@@ -50,7 +50,7 @@ fn one_after_another(
     Some(chunks)
 }
 
-/// Edge of the blocks that [`regions`] puts together, as bits; changes farther apart are not worth one patch.
+/// Logarithm of the edge of the blocks that [`regions`] joins; changes farther apart do not share a patch.
 const BLOCK_BITS: u32 = 8;
 
 /// The changes in groups of adjoining blocks.
@@ -77,7 +77,7 @@ fn regions(dirty: &BTreeSet<(i32, i32)>) -> Vec<BTreeSet<(i32, i32)>> {
     regions
 }
 
-/// A guess at the bits of all changes, from how each goes on from its western and southern neighbours.
+/// An estimate of the bits of all changes, from how each continues its western and southern neighbours.
 fn likely_bits(target: &LabelGrid, dirty: &BTreeSet<(i32, i32)>) -> usize {
     let bits = |&(y, x): &(i32, i32)| {
         let label = target.get(Cell::new(x, y));
@@ -103,7 +103,7 @@ fn strips(bounds: Rect, bits: usize, room_bits: usize) -> Vec<Rect> {
     (0..count).map(strip).collect()
 }
 
-/// Chunks for the changes `left` in the strip, from south to north, each as full as it gets.
+/// Chunks for the changes `left` in the strip, from south to north, each as full as possible.
 fn strip_chunks(
     base: &LabelGrid,
     target: &LabelGrid,
@@ -129,49 +129,7 @@ fn strip_chunks(
 
 #[cfg(test)]
 mod tests {
-    use super::super::procedural::{Chance, Flips, Scene, Survey};
-    use super::super::{Plane, decode};
     use super::*;
-
-    /// Maps of a small survey, one a step.
-    fn survey(scene: Scene) -> Vec<Plane> {
-        let scene = scene.draw(&mut Chance::new(42), 96, 96, 8);
-        let mut survey = Survey::new(7, scene, Flips { border: 10_000, anywhere: 2000, settling: 0 }, 12);
-        let mut maps = vec![survey.map().clone()];
-        for _ in 0..12 {
-            survey.advance();
-            maps.push(survey.map().clone());
-        }
-        maps
-    }
-
-    fn bytes(codec: Codec, maps: &[Plane], room: usize) -> usize {
-        let mut bytes = 0;
-        for pair in maps.windows(2) {
-            let (base, target) = (pair[0].to_grid(), pair[1].to_grid());
-            let mut replica = base.clone();
-            for chunk in encode_all(codec, &base, &target, room).expect("room for a cell") {
-                assert!(chunk.bytes.len() <= room);
-                bytes += chunk.bytes.len();
-                for (cell, label) in decode(&base, &chunk.bytes).expect("own chunk") {
-                    assert_eq!(replica.set(cell, label), base.get(cell), "a cell was sent twice");
-                }
-            }
-            assert_eq!(replica, target);
-        }
-        bytes
-    }
-
-    #[test]
-    fn a_survey_arrives_whole_in_far_fewer_bytes_than_png_chunks_take() {
-        for scene in Scene::ALL {
-            let maps = survey(scene);
-            for (room, most) in [(64, 60), (256, 60), (1000, 60)] {
-                let (context, png) = (bytes(Codec::Auto, &maps, room), bytes(Codec::Png, &maps, room));
-                assert!(context * 100 <= png * most, "{scene:?}, {room} bytes: {context} against {png}");
-            }
-        }
-    }
 
     #[test]
     fn changes_far_apart_and_wider_than_a_patch_are_tiled() {

@@ -1,17 +1,17 @@
-//! What every chunk promises, whichever coder wrote it.
+//! Properties of every chunk, whichever coder wrote it.
 
-use super::bits::BitWriter;
 use super::chunk::header_for;
 use super::header::Body;
 use super::lattice::Lattice;
 use super::{Codec, DecodeError, MapChunk, decode, encode, restored_png};
-use crate::map::{Cell, LabelGrid, MAX_LABEL, Rect};
+use crate::bytes::BitWriter;
+use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
 const CODECS: [Codec; 3] = [Codec::Auto, Codec::Png, Codec::Context];
 
-/// A patchy grid: blobs of labels on a square, somewhere on the map.
+/// A patchy grid: blobs of labels on a square at any position.
 fn grid(labels: u8, density: u8) -> impl Strategy<Value = Vec<(i32, i32, u8)>> {
     let blob = (0..40i32, 0..40i32, 1..9i32, 1..9i32, 0..=labels);
     let cell = (0..40i32, 0..40i32, 0..=labels);
@@ -73,7 +73,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
 
     #[test]
-    fn chunks_say_only_wanted_changes_and_say_them_exactly(
+    fn chunks_have_exactly_the_wanted_changes(
         (base, target, dirty) in change(), room in 5..1000usize, pick: prop::sample::Index, salt in 0..4i32,
     ) {
         prop_assume!(!dirty.is_empty());
@@ -116,7 +116,7 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_bodies_behind_a_right_head_are_read_or_refused_without_panic(
+    fn any_body_after_a_valid_header_never_panics(
         (base, _, _) in change(), context: bool, x in -30..30i32, y in -30..30i32,
         width in 1..60u32, height in 1..60u32, body in prop::collection::vec(any::<u8>(), 0..120),
     ) {
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn the_png_of_a_chunk_is_a_valid_file_of_its_changes((base, target, dirty) in change(), room in 24..900usize) {
+    fn the_png_of_a_chunk_shows_its_changes((base, target, dirty) in change(), room in 24..900usize) {
         prop_assume!(!dirty.is_empty());
         let chunk = encode(Codec::Png, &base, &target, dirty[0], room, &|_| true).expect("one cell fits");
         let file = restored_png(&chunk.bytes).expect("own chunk");
@@ -206,7 +206,7 @@ fn a_wrong_base_is_nearly_always_refused() {
 }
 
 #[test]
-fn a_seed_that_is_not_to_be_sent_gives_no_chunk() {
+fn an_unwanted_seed_yields_no_chunk() {
     let target: LabelGrid = [(Cell::new(3, 3), 4), (Cell::new(9, 9), 5)].into_iter().collect();
     let base = LabelGrid::default();
     assert_eq!(encode(Codec::Auto, &base, &target, Cell::new(4, 4), 100, &|_| true), None);

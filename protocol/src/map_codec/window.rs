@@ -1,12 +1,12 @@
-//! Dense copies of a part of the two maps.
+//! Dense copies of a part of base and target.
 
-use crate::map::{Cell, MAX_LABEL, Rect};
+use crate::grid::{Cell, MAX_LABEL, Rect};
 use crate::map_codec::lattice::Lattice;
 
 /// The base and the wanted changes in a square of cells.
 #[derive(Debug)]
-pub(super) struct Window {
-    /// South-west corner; may lie off the 32-bit grid, where nothing is wanted.
+pub(super) struct GrowthWindow {
+    /// South-west corner; it may lie off the 32-bit grid, where no cell is wanted.
     pub(super) x: i64,
     pub(super) y: i64,
     pub(super) side: usize,
@@ -16,7 +16,7 @@ pub(super) struct Window {
     wanted: Vec<bool>,
 }
 
-impl Window {
+impl GrowthWindow {
     /// The `2 * reach` square around `seed`.
     pub(super) fn around(
         base: Lattice<'_>,
@@ -46,7 +46,7 @@ impl Window {
         self.wanted[row * self.side + column]
     }
 
-    /// The label the cell is to get, which is the one it has unless it is wanted.
+    /// The new label of the cell, or its label in the base if the cell is not wanted.
     pub(super) fn outcome(&self, column: usize, row: usize) -> u8 {
         let i = row * self.side + column;
         if self.wanted[i] { self.target[i] } else { self.base[i] }
@@ -89,7 +89,7 @@ impl Area {
         self.top - self.bottom
     }
 
-    /// Stretches to hold the cell.
+    /// Grows to include the cell.
     pub(super) fn include(&mut self, column: usize, row: usize) {
         (self.left, self.right) = (self.left.min(column), self.right.max(column + 1));
         (self.bottom, self.top) = (self.bottom.min(row), self.top.max(row + 1));
@@ -100,7 +100,7 @@ impl Area {
     }
 }
 
-/// What a chunk says: the base of its patch and what shall become of it, row by row; equal cells stay untouched.
+/// The content of a chunk: base and outcome of its patch, row by row; equal cells stay untouched.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Patch {
     pub(super) rect: Rect,
@@ -109,12 +109,11 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Every change in `rect`.
     pub(super) fn between(base: Lattice<'_>, target: Lattice<'_>, rect: Rect) -> Self {
         let (width, height) = (rect.width as usize, rect.height as usize);
         let copy = |grid: Lattice<'_>| grid.copy_area(i64::from(rect.x), i64::from(rect.y), width, height);
         let (base, mut outcome) = (copy(base), copy(target));
-        // 255 is no label: such a cell stays as it is.
+        // 255 is not a label: such a cell stays as it is.
         outcome.iter_mut().zip(&base).filter(|(new, _)| **new > MAX_LABEL).for_each(|(new, &old)| *new = old);
         Self { rect, base, outcome }
     }
@@ -130,7 +129,7 @@ impl Patch {
         Some(patch)
     }
 
-    /// The rows that hold the first `count` cells, the cells after those unchanged.
+    /// The rows that hold the first `count` cells, with later cells unchanged.
     pub(super) fn first_cells(&self, count: usize) -> Self {
         let width = self.rect.width as usize;
         let height = count.div_ceil(width);
@@ -163,7 +162,7 @@ impl Patch {
         Self { rect: self.rect, base: self.base.clone(), outcome: outcome.collect() }
     }
 
-    /// The patch cut down to the cells that change; `None` if none does.
+    /// The patch cut down to its changes; `None` if it has none.
     pub(super) fn trimmed(&self) -> Option<Self> {
         let rect = Rect::around(self.changes().into_iter().map(|(cell, _)| cell))?;
         let pick = |cells: &[u8]| {

@@ -1,19 +1,19 @@
-//! The erasure code of one block: any K of its symbols give back the K source symbols.
+//! The erasure code of one block: any K of its symbols yield the K source symbols.
 //!
 //! Systematic, maximum distance separable: I. S. Reed, G. Solomon, "Polynomial codes over certain finite fields", 1960.
-//! Repair symbols are the rows of a Cauchy matrix, each square part of which has an inverse that can be written down:
+//! Repair symbols are the rows of a Cauchy matrix; each square submatrix has an inverse in closed form:
 //! J. Blömer et al., "An XOR-based erasure-resilient coding scheme", ICSI TR-95-048, 1995.
 
 use super::gf256::{add_multiple, inverse, product};
 
-/// Most symbols of a block, source and repair together.
+/// The most symbols of a block, source and repair together.
 pub(super) const MAX_BLOCK: usize = 255;
 
-/// A symbol of a block with its place among the source symbols or among the repair symbols.
+/// A symbol of a block with its index among the source symbols or among the repair symbols.
 pub(super) type Placed<T> = (u8, T);
 
-/// The share of a source symbol in a repair symbol: 1 / (x + y) with x = 255 - `repair` and y = `source`, which differ
-/// in a block of at most [`MAX_BLOCK`] symbols.
+/// The coefficient of a source symbol in a repair symbol: 1 / (x + y) with x = 255 - `repair` and y = `source`, which
+/// differ in a block of at most [`MAX_BLOCK`] symbols.
 fn share(repair: u8, source: u8) -> u8 {
     inverse((255 - repair) ^ source)
 }
@@ -25,7 +25,8 @@ pub(super) fn add_repair<'a>(to: &mut [u8], repair: u8, sources: impl Iterator<I
     }
 }
 
-/// The source symbols at the places `missing`, in that order, from as many repair symbols and all `known` source symbols.
+/// The source symbols with the indices `missing`, in that order, from as many repair symbols
+/// and all `known` source symbols.
 pub(super) fn recover<'a>(
     missing: &[u8],
     mut repairs: Vec<Placed<Vec<u8>>>,
@@ -47,8 +48,8 @@ pub(super) fn recover<'a>(
     missing.iter().zip(&of_columns).map(solve).collect()
 }
 
-/// For each of `these` its distances to all `others`, multiplied, over those to the rest of `these`: the inverse of the
-/// Cauchy matrix 1 / (x + y) has the elements u(x) v(y) / (x + y) of such factors.
+/// For each of `these`, the product of its distances to all `others`, divided by those to the rest of `these`. The
+/// inverse of the Cauchy matrix 1 / (x + y) has the elements u(x) v(y) / (x + y) of such factors.
 fn factors(these: &[u8], others: &[u8]) -> Vec<u8> {
     let times = |a, b| product(a, b);
     let factor = |&this: &u8| {
@@ -75,7 +76,7 @@ mod tests {
         symbol
     }
 
-    /// Whether the block comes back from these of its symbols, source symbols counted first.
+    /// Whether the block is recovered from these of its symbols, source symbols counted first.
     fn comes_back(sources: &[Vec<u8>], held: &[usize]) -> bool {
         let k = sources.len();
         let missing: Vec<u8> = (0..k).filter(|i| !held.contains(i)).map(|i| i as u8).collect();

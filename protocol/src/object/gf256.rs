@@ -1,12 +1,12 @@
-//! The field of 256 elements in which the erasure code reckons.
+//! The field of 256 elements in which the erasure code calculates.
 
 /// x^8 + x^4 + x^3 + x^2 + 1, in which x generates every element but 0.
 const POLYNOMIAL: u16 = 0x11D;
 
-/// Powers of x, twice over, and their exponents.
+/// Two periods of the powers of x, and the exponents of all elements.
 const POWERS: ([u8; 510], [u8; 256]) = powers();
 
-/// All products; a row is all multiples of one factor.
+/// All products; a row holds all multiples of one factor.
 static PRODUCTS: [[u8; 256]; 256] = products();
 
 const fn powers() -> ([u8; 510], [u8; 256]) {
@@ -49,12 +49,12 @@ pub(super) fn product(a: u8, b: u8) -> u8 {
     multiples(a)[usize::from(b)]
 }
 
-/// The element whose product with `a` is 1; that of 0 is taken to be 1.
+/// The element whose product with `a` is 1; for 0 the result is 1.
 pub(super) fn inverse(a: u8) -> u8 {
     POWERS.0[255 - usize::from(POWERS.1[usize::from(a)])]
 }
 
-/// Adds `factor` times `from` to `to`, element by element, as far as both reach.
+/// Adds `factor` times `from` to `to`, element by element; the shorter slice decides the length.
 pub(super) fn add_multiple(to: &mut [u8], factor: u8, from: &[u8]) {
     let multiple = multiples(factor);
     for (t, &f) in to.iter_mut().zip(from) {

@@ -1,4 +1,4 @@
-//! How an object is cut into symbols and blocks.
+//! The division of an object into symbols and blocks.
 
 use super::MAX_OBJECT;
 use super::code::MAX_BLOCK;
@@ -6,29 +6,27 @@ use crc::{CRC_32_ISCSI, Crc};
 
 static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
-/// Number of source symbols and bytes of a symbol.
+/// The number and the size of the source symbols.
 ///
 /// The source symbols in order are the object, 0 to 63 bytes of 0, a byte that counts them, and a CRC-32/ISCSI of all
-/// that. Symbols are dealt out to the blocks in turn, like cards: a lost run of them then takes the same from each
-/// block, and many blocks do as well as one large one would.
+/// that. Symbols are dealt to the blocks in turn, like cards: a lost run of symbols then takes the same number from
+/// each block, and many blocks are as good as one large one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
-    /// 1..=2048.
     sources: u16,
-    /// 1..=64 bytes.
     symbol: u8,
 }
 
-/// Where a symbol belongs: its block, and its place among the source or the repair symbols of the block.
+/// The position of a symbol: its block, and its index among the block's source or repair symbols.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
+pub(super) enum SymbolPlace {
     /// A piece of the object.
     Source(usize, u8),
     /// A combination of all source symbols of its block.
     Repair(usize, u8),
 }
 
-impl Place {
+impl SymbolPlace {
     pub(super) fn block(self) -> usize {
         match self {
             Self::Source(block, _) | Self::Repair(block, _) => block,
@@ -39,14 +37,12 @@ impl Place {
 impl Layout {
     /// Bytes after the object: the count of padding, and the CRC.
     pub(super) const TRAILER: usize = 5;
-    /// Most source symbols.
     pub(super) const MAX_SOURCES: usize = 2048;
-    /// Most bytes of a symbol.
     pub(super) const MAX_SYMBOL: usize = 64;
-    /// Most source symbols of a block; at least as many repair symbols less one are left.
+    /// The most source symbols of a block; this leaves at least as many repair symbols less one.
     const MAX_BLOCK_SOURCES: usize = 128;
 
-    /// A layout; `None` if it is that of no object of 1..=[`MAX_OBJECT`] bytes.
+    /// A layout; `None` if no object of 1..=[`MAX_OBJECT`] bytes has it.
     pub(super) fn new(sources: usize, symbol: usize) -> Option<Self> {
         let sound = (1..=Self::MAX_SOURCES).contains(&sources)
             && (1..=Self::MAX_SYMBOL).contains(&symbol)
@@ -57,8 +53,8 @@ impl Layout {
 
     /// The layout for an object of `len` bytes in parts with `room` bytes of data; `None` if the room is too small.
     ///
-    /// Some 6 to 16 symbols a part, so that little is lost where a later frame has less room; of these sizes the one
-    /// that needs the fewest parts.
+    /// A part gets about 6 to 16 symbols, so that little is lost where a later frame has less room; of these sizes, the
+    /// one that needs the fewest parts is chosen.
     pub(super) fn choose(len: usize, room: usize) -> Option<Self> {
         let total = len + Self::TRAILER;
         let part = room.min(total);
@@ -72,27 +68,25 @@ impl Layout {
         Self::new(total.div_ceil(symbol), symbol)
     }
 
-    /// Source symbols, 1..=2048.
+    /// The number of source symbols, 1..=2048.
     pub fn sources(self) -> usize {
         usize::from(self.sources)
     }
 
-    /// Bytes of a symbol, 1..=64.
+    /// The size of a symbol in bytes, 1..=64.
     pub fn symbol(self) -> usize {
         usize::from(self.symbol)
     }
 
-    /// Bytes of all source symbols.
+    /// The total size of the source symbols in bytes.
     pub(super) fn bytes(self) -> usize {
         self.sources() * self.symbol()
     }
 
-    /// Blocks, 1..=16.
     pub(super) fn blocks(self) -> usize {
         self.sources().div_ceil(Self::MAX_BLOCK_SOURCES)
     }
 
-    /// Source symbols of a block.
     pub(super) fn block_sources(self, block: usize) -> usize {
         (self.sources() + self.blocks() - 1 - block) / self.blocks()
     }
@@ -101,42 +95,41 @@ impl Layout {
         MAX_BLOCK - self.block_sources(0)
     }
 
-    /// Symbols, source and repair, 255..=4080.
+    /// The number of symbols, source and repair, 255..=4080.
     pub fn symbols(self) -> usize {
         self.sources() + self.blocks() * self.block_repairs()
     }
 
-    /// Symbols of a block, source and repair.
     pub(super) fn block_symbols(self, block: usize) -> usize {
         self.block_sources(block) + self.block_repairs()
     }
 
-    /// Where a symbol belongs; source symbols are counted first.
-    pub(super) fn place(self, symbol: usize) -> Place {
+    /// The position of a symbol; source symbols are numbered first.
+    pub(super) fn place(self, symbol: usize) -> SymbolPlace {
         let blocks = self.blocks();
         match symbol.checked_sub(self.sources()) {
-            None => Place::Source(symbol % blocks, (symbol / blocks) as u8),
-            Some(repair) => Place::Repair(repair % blocks, (repair / blocks) as u8),
+            None => SymbolPlace::Source(symbol % blocks, (symbol / blocks) as u8),
+            Some(repair) => SymbolPlace::Repair(repair % blocks, (repair / blocks) as u8),
         }
     }
 
-    /// The source symbols of a block within the bytes of all, each with its place in the block.
+    /// The source symbols of a block in the bytes of all, each with its index in the block.
     pub(super) fn sources_of(self, block: usize, bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> + Clone {
         let mine = bytes.chunks_exact(self.symbol()).skip(block).step_by(self.blocks());
         mine.enumerate().map(|(place, symbol)| (place as u8, symbol))
     }
 
-    /// Bytes that an object with this layout has at least.
+    /// The least length of an object with this layout.
     pub(super) fn least_len(self) -> usize {
         (self.bytes() + 1).saturating_sub(Self::TRAILER + self.symbol()).max(1)
     }
 
-    /// Bytes that an object with this layout has at most.
+    /// The greatest length of an object with this layout.
     pub(super) fn most_len(self) -> usize {
         (self.bytes() - Self::TRAILER).min(MAX_OBJECT)
     }
 
-    /// Makes the bytes of all source symbols of an object.
+    /// Appends padding and CRC, so that the object has the bytes of all source symbols.
     pub(super) fn seal(self, object: &mut Vec<u8>) {
         let padding = self.bytes() - Self::TRAILER - object.len();
         object.resize(object.len() + padding, 0);
@@ -145,7 +138,7 @@ impl Layout {
         object.extend_from_slice(&crc.to_be_bytes());
     }
 
-    /// The object in the bytes of all source symbols; `None` if they are not of one object.
+    /// The object in the bytes of all source symbols; `None` if the CRC does not match.
     pub(super) fn open(self, mut bytes: Vec<u8>) -> Option<Vec<u8>> {
         let crc = bytes.split_off(bytes.len().checked_sub(4)?);
         if crc != CRC32.checksum(&bytes).to_be_bytes() {
@@ -201,8 +194,8 @@ mod tests {
             let mut seen = vec![0; layout.blocks()];
             for place in (0..layout.symbols()).map(|i| layout.place(i)) {
                 let at = match place {
-                    Place::Source(block, place) => (block, usize::from(place)),
-                    Place::Repair(block, place) => (block, layout.block_sources(block) + usize::from(place)),
+                    SymbolPlace::Source(block, place) => (block, usize::from(place)),
+                    SymbolPlace::Repair(block, place) => (block, layout.block_sources(block) + usize::from(place)),
                 };
                 prop_assert_eq!(seen[at.0], at.1);
                 seen[at.0] += 1;

@@ -1,5 +1,7 @@
-//! Objects larger than a frame: cut into small symbols, with repair symbols ahead where the link loses some, and
-//! repaired by what is missing.
+//! Objects larger than a frame, sent as the symbols of an erasure code.
+//!
+//! An object is cut into small symbols. Where the link loses frames, repair symbols are sent ahead; losses beyond them
+//! are repaired by the symbols that are missing.
 
 #[allow(clippy::indexing_slicing)] // Tables of 256 rows and columns, indexed by bytes.
 mod gf256;
@@ -21,5 +23,5 @@ pub use part::{ObjectId, Part, PartError};
 pub use receiver::{ObjectReceiver, Received};
 pub use sender::ObjectSender;
 
-/// Largest object in bytes.
+/// The largest object in bytes.
 pub const MAX_OBJECT: usize = 16 * 1024;

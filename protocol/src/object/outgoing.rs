@@ -1,13 +1,13 @@
-//! One object on its way to the peer.
+//! An object during its transmission.
 
 use super::code::add_repair;
-use super::layout::Place;
+use super::layout::SymbolPlace;
 use super::supply::Supply;
 use super::{Layout, ObjectId, Part};
 use std::collections::VecDeque;
 use std::ops::Range;
 
-/// Which symbols a part carried, and in which attempt at which object: its fate is told with it.
+/// The symbols of a part, by which its fate is reported.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SymbolRun {
     pub(super) serial: u64,
@@ -17,17 +17,17 @@ pub struct SymbolRun {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Symbol {
-    /// In the queue, or not sent yet.
+    /// It waits for its first or next transmission.
     Waiting,
     InFlight,
     Delivered,
-    /// Left out: its block did without.
+    /// It was left out because its block is complete without it.
     Skipped,
 }
 
-/// Symbols of a block by their state, and how many to have in flight.
+/// The symbols of a block by their state, and how many should be in flight.
 #[derive(Debug, Clone, Copy)]
-struct Block {
+struct OutgoingBlock {
     sources: usize,
     waiting: usize,
     in_flight: usize,
@@ -35,7 +35,7 @@ struct Block {
     target: usize,
 }
 
-impl Block {
+impl OutgoingBlock {
     fn wanted(&self) -> usize {
         self.target.saturating_sub(self.in_flight).min(self.waiting)
     }
@@ -45,49 +45,49 @@ impl Block {
     }
 }
 
-/// What is known of the symbols of an object since its layout is fixed.
+/// The state of all symbols, once the layout is fixed.
 #[derive(Debug)]
-struct Progress {
+struct SymbolProgress {
     layout: Layout,
     supply: Supply,
     symbols: Vec<Symbol>,
-    blocks: Vec<Block>,
-    /// Lost symbols, to be sent again before new ones.
+    blocks: Vec<OutgoingBlock>,
+    /// Lost symbols, which go out again before new ones.
     lost: VecDeque<Range<usize>>,
-    /// First symbol that was not sent yet.
+    /// The first symbol that was not sent yet.
     fresh: usize,
 }
 
 /// An object on its way to the peer.
 #[derive(Debug)]
-pub(super) struct Outgoing {
+pub(super) struct OutgoingObject {
     pub(super) serial: u64,
-    /// Whether it may go only where bits are left over.
+    /// Whether it may use only spare capacity.
     pub(super) is_extra: bool,
     attempt: u32,
-    /// The object; the bytes of all source symbols once the layout is fixed.
+    /// The object; once the layout is fixed, the bytes of all source symbols.
     bytes: Vec<u8>,
-    progress: Option<Progress>,
+    progress: Option<SymbolProgress>,
 }
 
-impl Outgoing {
+impl OutgoingObject {
     pub(super) fn new(serial: u64, bytes: Vec<u8>, is_extra: bool) -> Self {
         Self { serial, is_extra, attempt: 0, bytes, progress: None }
     }
 
-    /// Bytes of the symbols that wait to be sent.
+    /// Bytes of the symbols that wait for transmission.
     pub(super) fn backlog_bytes(&self) -> usize {
-        let wanted = |p: &Progress| p.blocks.iter().map(Block::wanted).sum::<usize>() * p.layout.symbol();
+        let wanted = |p: &SymbolProgress| p.blocks.iter().map(OutgoingBlock::wanted).sum::<usize>() * p.layout.symbol();
         self.progress.as_ref().map_or(self.bytes.len() + Layout::TRAILER, wanted)
     }
 
-    /// The next part of at most `room` bytes; a layout is fixed for parts of `usual` bytes.
+    /// The next part of at most `room` bytes. A layout is fixed for parts of `usual` bytes.
     pub(super) fn next_part(&mut self, room: usize, usual: usize, loss: f64) -> Option<(SymbolRun, Vec<u8>)> {
         let room = room.checked_sub(Part::HEADER)?;
         if self.progress.is_none() {
             let layout = Layout::choose(self.bytes.len(), usual.checked_sub(Part::HEADER)?)?;
             layout.seal(&mut self.bytes);
-            self.progress = Some(Progress::new(layout, usual, loss));
+            self.progress = Some(SymbolProgress::new(layout, usual, loss));
         }
         let progress = self.progress.as_mut()?;
         let layout = progress.layout;
@@ -102,11 +102,11 @@ impl Outgoing {
 
     fn write_symbol(&self, layout: Layout, symbol: usize, out: &mut Vec<u8>) {
         match layout.place(symbol) {
-            Place::Source(..) => {
+            SymbolPlace::Source(..) => {
                 let at = symbol * layout.symbol();
                 out.extend_from_slice(self.bytes.get(at..at + layout.symbol()).unwrap_or_default());
             }
-            Place::Repair(block, repair) => {
+            SymbolPlace::Repair(block, repair) => {
                 let at = out.len();
                 out.resize(at + layout.symbol(), 0);
                 let to = out.get_mut(at..).unwrap_or_default();
@@ -121,7 +121,7 @@ impl Outgoing {
         }
     }
 
-    /// Returns whether the object is complete at the peer.
+    /// Takes the fate of a part; returns whether the object is complete at the peer.
     pub(super) fn handle_fate(&mut self, run: &SymbolRun, delivered: bool) -> bool {
         let Some(progress) = self.of_attempt(run) else { return false };
         if delivered {
@@ -141,16 +141,16 @@ impl Outgoing {
         }
     }
 
-    /// The peer has lost what it had received.
+    /// Starts from the first symbol, because the peer has lost its copy.
     pub(super) fn handle_peer_restart(&mut self) {
         self.attempt += 1;
         if let Some(progress) = &mut self.progress {
             let supply = progress.supply;
-            *progress = Progress::with_supply(progress.layout, supply);
+            *progress = SymbolProgress::with_supply(progress.layout, supply);
         }
     }
 
-    fn of_attempt(&mut self, run: &SymbolRun) -> Option<&mut Progress> {
+    fn of_attempt(&mut self, run: &SymbolRun) -> Option<&mut SymbolProgress> {
         self.progress.as_mut().filter(|_| run.attempt == self.attempt)
     }
 }
@@ -159,13 +159,13 @@ fn supply_of(layout: Layout, usual: usize, loss: f64) -> Supply {
     Supply::new(loss, usual.saturating_sub(Part::HEADER) / layout.symbol(), layout.blocks())
 }
 
-impl Progress {
+impl SymbolProgress {
     fn new(layout: Layout, usual: usize, loss: f64) -> Self {
         Self::with_supply(layout, supply_of(layout, usual, loss))
     }
 
     fn with_supply(layout: Layout, supply: Supply) -> Self {
-        let block = |b| Block {
+        let block = |b| OutgoingBlock {
             sources: layout.block_sources(b),
             waiting: layout.block_symbols(b),
             in_flight: 0,
@@ -184,7 +184,7 @@ impl Progress {
         progress
     }
 
-    /// Decides how many symbols of each block are to be in flight.
+    /// Decides how many symbols of each block should be in flight.
     fn aim(&mut self) {
         for block in &mut self.blocks {
             block.target = self.supply.in_flight(block.missing());
@@ -208,8 +208,8 @@ impl Progress {
         (self.fresh < self.symbols.len()).then(|| self.wanted_run(self.fresh..self.symbols.len(), most))
     }
 
-    /// The first symbol of `range` that is to be sent. Those before it are given up: either they are not waiting, or
-    /// what is in flight is enough for their block, and comes back if it is lost.
+    /// The first symbol of `range` to send. Those before it are skipped: either they do not wait, or enough of their
+    /// block is in flight; they wait again if that is lost.
     fn skip_unwanted(&mut self, range: Range<usize>) -> usize {
         let end = range.end;
         for symbol in range {
@@ -224,9 +224,9 @@ impl Progress {
         end
     }
 
-    /// As much of `range` as is to be sent in one part; some symbols too many are sent where a header would cost more.
+    /// The part of `range` to send at once; a few unneeded symbols are sent where another header would cost more.
     fn wanted_run(&self, range: Range<usize>, most: usize) -> Range<usize> {
-        let mut wanted: Vec<usize> = self.blocks.iter().map(Block::wanted).collect();
+        let mut wanted: Vec<usize> = self.blocks.iter().map(OutgoingBlock::wanted).collect();
         let mut end = range.start;
         for symbol in range.clone().take(most) {
             if self.symbols.get(symbol) != Some(&Symbol::Waiting)

@@ -1,14 +1,14 @@
-//! What a chunk of an object carries.
+//! The chunks of an object.
 
 use super::Layout;
-use crate::wire::Reader;
+use crate::bytes::Reader;
 
-/// Names an object within the sender's session, 0..=2047; wraps.
+/// The name of an object within the sender's session, 0..=2047; wraps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectId(pub(super) u16);
 
 impl ObjectId {
-    /// As many objects have different names.
+    /// The number of different names.
     pub(super) const COUNT: u64 = 2048;
 
     pub(super) fn of(serial: u64) -> Self {
@@ -41,35 +41,35 @@ impl ObjectId {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part<'a> {
-    /// Which object.
+    /// The name of the object.
     pub id: ObjectId,
-    /// How it is cut.
+    /// The division of the object.
     pub layout: Layout,
-    /// Number of the first symbol.
+    /// The number of the first symbol.
     pub first: u16,
-    /// The symbols.
+    /// Whole symbols, one after the other.
     pub data: &'a [u8],
 }
 
-/// Why received bytes are no part of an object.
+/// Why received bytes are not a part of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PartError {
-    /// Shorter than a header.
+    /// They are shorter than a header.
     #[error("the part is too short")]
     Truncated,
-    /// No object is cut like this.
+    /// No object has this layout.
     #[error("no object has such symbols")]
     Layout,
-    /// No symbol, a piece of a symbol, or a symbol that does not exist.
+    /// There is no symbol, a part of a symbol, or a symbol that does not exist.
     #[error("the part holds no run of symbols")]
     Run,
 }
 
 impl<'a> Part<'a> {
-    /// Bytes before the symbols.
+    /// The length of the header in bytes.
     pub const HEADER: usize = 5;
 
-    /// The bytes of a header, to which the symbols are to be appended; `room` bytes are set aside.
+    /// The bytes of a header, with capacity for `room` bytes in all.
     pub(super) fn header(id: ObjectId, layout: Layout, first: usize, room: usize) -> Vec<u8> {
         let bits = u64::from(id.0) << 29
             | (layout.sources() as u64 - 1) << 18
@@ -80,14 +80,14 @@ impl<'a> Part<'a> {
         out
     }
 
-    /// The bytes on the wire.
+    /// Encodes the part as the payload of a chunk.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Self::header(self.id, self.layout, usize::from(self.first), Self::HEADER + self.data.len());
         out.extend_from_slice(self.data);
         out
     }
 
-    /// Reads a part; its symbols exist in an object of 1..=[`MAX_OBJECT`](super::MAX_OBJECT) bytes.
+    /// Decodes a part; its symbols exist in an object of 1..=[`MAX_OBJECT`](super::MAX_OBJECT) bytes.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, PartError> {
         let mut r = Reader::new(bytes);
         let header = r.take(Self::HEADER).map_err(|_| PartError::Truncated)?;

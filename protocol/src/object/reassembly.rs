@@ -1,32 +1,32 @@
-//! One object on its way from the peer.
+//! An object during its reception.
 
 use super::code::{Placed, recover};
-use super::layout::Place;
+use super::layout::SymbolPlace;
 use super::{Layout, Part};
 
-/// Symbols of a block that came in; repair symbols are kept only until the block is whole.
+/// The received symbols of a block; repair symbols are kept only until the block is complete.
 #[derive(Debug, Default)]
-struct Block {
+struct ReceivedBlock {
     sources: usize,
     repairs: Vec<Placed<Vec<u8>>>,
 }
 
-impl Block {
+impl ReceivedBlock {
     fn held(&self) -> usize {
         self.sources + self.repairs.len()
     }
 }
 
-/// An object on its way from the peer; holds at most each source symbol and as many repair symbols.
+/// An object on its way from the peer. It holds each source symbol at most once, and at most as many repair symbols.
 #[derive(Debug)]
 pub(super) struct Reassembly {
     pub(super) layout: Layout,
-    /// When it was last added to.
+    /// The receiver's counter when a part was last added.
     pub(super) touched: u64,
     bytes: Vec<u8>,
     /// Which source symbols are in `bytes`.
     have: Vec<bool>,
-    blocks: Vec<Block>,
+    blocks: Vec<ReceivedBlock>,
 }
 
 impl Reassembly {
@@ -36,22 +36,22 @@ impl Reassembly {
             touched: 0,
             bytes: vec![0; layout.bytes()],
             have: vec![false; layout.sources()],
-            blocks: (0..layout.blocks()).map(|_| Block::default()).collect(),
+            blocks: (0..layout.blocks()).map(|_| ReceivedBlock::default()).collect(),
         }
     }
 
-    /// Takes a part with this layout.
+    /// Adds a part with this layout.
     pub(super) fn add(&mut self, part: &Part<'_>) {
         for (symbol, data) in part.symbols() {
             let place = self.layout.place(symbol);
             let needed = self.layout.block_sources(place.block());
             let Some(block) = self.blocks.get_mut(place.block()).filter(|b| b.sources < needed) else { continue };
             match place {
-                Place::Source(..) => self.set_source(symbol, data),
-                Place::Repair(_, repair) if block.repairs.iter().all(|(r, _)| *r != repair) => {
+                SymbolPlace::Source(..) => self.set_source(symbol, data),
+                SymbolPlace::Repair(_, repair) if block.repairs.iter().all(|(r, _)| *r != repair) => {
                     block.repairs.push((repair, data.to_vec()));
                 }
-                Place::Repair(..) => {}
+                SymbolPlace::Repair(..) => {}
             }
             self.complete(place.block(), needed);
         }
@@ -68,7 +68,7 @@ impl Reassembly {
         block.sources += 1;
     }
 
-    /// Recovers what a block misses as soon as enough of its symbols are held.
+    /// Recovers the missing symbols of a block as soon as enough others are held.
     fn complete(&mut self, number: usize, needed: usize) {
         let blocks = self.blocks.len();
         let Some(block) = self.blocks.get_mut(number).filter(|b| b.held() >= needed) else { return };
@@ -90,19 +90,19 @@ impl Reassembly {
         self.blocks.iter().enumerate().all(|(b, block)| block.sources == self.layout.block_sources(b))
     }
 
-    /// Bytes held, in source and repair symbols, at most those of the object.
+    /// Bytes held in source and repair symbols, at most those of the object.
     pub(super) fn held(&self) -> usize {
-        let held: usize = self.blocks.iter().map(Block::held).sum();
+        let held: usize = self.blocks.iter().map(ReceivedBlock::held).sum();
         (held * self.layout.symbol()).min(self.layout.most_len())
     }
 
-    /// The first `n` bytes of the object, once they are held and are surely of the object.
+    /// The first `n` bytes, once they are held and certainly belong to the object.
     pub(super) fn head(&self, n: usize) -> Option<&[u8]> {
         let held = self.have.get(..n.div_ceil(self.layout.symbol()))?.iter().all(|&h| h);
         self.bytes.get(..n).filter(|_| held && n <= self.layout.least_len())
     }
 
-    /// The whole object; `None` if its check fails.
+    /// The whole object; `None` if its CRC does not match.
     pub(super) fn open(self) -> Option<Vec<u8>> {
         self.layout.open(self.bytes)
     }

@@ -4,34 +4,34 @@ use super::reassembly::Reassembly;
 use super::{Layout, ObjectId, Part};
 use std::collections::{BTreeMap, VecDeque};
 
-/// What a received part led to.
+/// The result of a received part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Received {
-    /// More is to come: bytes held and bytes of the whole object, counted in whole symbols.
+    /// More parts are needed: bytes held, and bytes of the whole object, counted in whole symbols.
     Progress(ObjectId, usize, usize),
-    /// The object is complete.
+    /// The part completes the object.
     Complete(ObjectId, Vec<u8>),
-    /// A late part of an object that is complete, or the last one of an object whose check failed.
+    /// The part adds no information: its object is complete, or its CRC did not match.
     Nothing,
 }
 
-/// Objects on their way from the peer, by serial number.
+/// The objects on their way from the peer, by serial number.
 #[derive(Debug, Default)]
 pub struct ObjectReceiver {
     objects: BTreeMap<u64, Reassembly>,
-    /// Objects that are complete or not wanted, of which parts may still come; oldest first.
+    /// Complete or cancelled objects of which parts may still come in; oldest first.
     done: VecDeque<(u64, Layout)>,
     newest: Option<u64>,
     clock: u64,
 }
 
 impl ObjectReceiver {
-    /// Most objects in reassembly at a time; a further one replaces the one that waited longest.
+    /// The most objects in reassembly; a further one replaces the one that waited longest.
     const MAX_OBJECTS: usize = 16;
-    /// Most objects that are remembered as done.
+    /// The most complete or cancelled objects that are remembered.
     const MAX_DONE: usize = 64;
 
-    /// Takes a part.
+    /// Handles a part and returns the state of its object.
     pub fn handle_part(&mut self, part: &Part<'_>) -> Received {
         let serial = self.serial(part.id);
         self.forget_old(serial);
@@ -58,12 +58,12 @@ impl ObjectReceiver {
         }
     }
 
-    /// The first `n` bytes of an unfinished object, once they are held.
+    /// The first `n` bytes of an incomplete object, once they are held.
     pub fn head(&self, id: ObjectId, n: usize) -> Option<&[u8]> {
         self.objects.get(&self.serial(id))?.head(n)
     }
 
-    /// Forgets an unfinished object and what may still come of it.
+    /// Discards an incomplete object and all parts that still come in of it.
     pub fn cancel(&mut self, id: ObjectId) {
         let serial = self.serial(id);
         if let Some(object) = self.objects.remove(&serial) {
@@ -71,7 +71,7 @@ impl ObjectReceiver {
         }
     }
 
-    /// Forgets everything: the peer begins anew.
+    /// Discards all objects, because the peer has begun a new run.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
@@ -80,7 +80,7 @@ impl ObjectReceiver {
         id.serial(self.newest.unwrap_or(ObjectId::COUNT))
     }
 
-    /// Forgets objects whose names may have been used again up to `serial`.
+    /// Discards objects whose names may have been used again up to `serial`.
     fn forget_old(&mut self, serial: u64) {
         let newest = self.newest.map_or(serial, |n| n.max(serial));
         if self.newest != Some(newest) {

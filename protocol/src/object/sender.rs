@@ -1,34 +1,34 @@
 //! The sending side of objects.
 
-use super::outgoing::{Outgoing, SymbolRun};
+use super::outgoing::{OutgoingObject, SymbolRun};
 use super::{MAX_OBJECT, ObjectId};
 use std::collections::VecDeque;
 
-/// Objects on their way to the peer, oldest first.
+/// The objects on their way to the peer, oldest first.
 #[derive(Debug, Default)]
 pub struct ObjectSender {
-    objects: VecDeque<Outgoing>,
+    objects: VecDeque<OutgoingObject>,
     next: u64,
-    /// Share of frames that the link loses.
+    /// Expected share of lost frames.
     loss: f64,
-    /// Bytes that a part usually can have.
+    /// Bytes that a part usually gets.
     usual_room: usize,
 }
 
 impl ObjectSender {
-    /// Most objects at a time; a further one replaces the oldest.
+    /// The most objects at a time; a further one replaces the oldest.
     const MAX_OBJECTS: usize = 16;
-    /// An object is replaced at the latest when so many later ones were pushed, so that its name stays unique.
+    /// An object is replaced at the latest when this many later ones were pushed, so that its name stays unique.
     const MAX_AGE: u64 = ObjectId::COUNT / 2 - 1;
-    /// The largest loss that is reckoned with.
+    /// The largest loss that the code is designed for.
     const MAX_LOSS: f64 = 0.95;
 
-    /// Takes an object to send; `None` if it is empty or larger than [`MAX_OBJECT`].
+    /// Queues an object; `None` if it is empty or larger than [`MAX_OBJECT`].
     pub fn push(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
         self.add(bytes, false)
     }
 
-    /// The same for an object that is only worth bits that are left over.
+    /// Queues an object that may use only spare capacity.
     pub fn push_extra(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
         self.add(bytes, true)
     }
@@ -39,20 +39,20 @@ impl ObjectSender {
         }
         let serial = self.next;
         self.next += 1;
-        let too_old = |o: &Outgoing| serial - o.serial > Self::MAX_AGE;
+        let too_old = |o: &OutgoingObject| serial - o.serial > Self::MAX_AGE;
         if self.objects.len() >= Self::MAX_OBJECTS || self.objects.front().is_some_and(too_old) {
             self.objects.pop_front();
         }
-        self.objects.push_back(Outgoing::new(serial, bytes, is_extra));
+        self.objects.push_back(OutgoingObject::new(serial, bytes, is_extra));
         Some(ObjectId::of(serial))
     }
 
-    /// Stops sending an object.
+    /// Stops sending an object; an unknown one is ignored.
     pub fn cancel(&mut self, id: ObjectId) {
         self.objects.retain(|o| ObjectId::of(o.serial) != id);
     }
 
-    /// Stops sending every object; names go on, as the peer remembers them.
+    /// Stops sending every object. Names are not used again, because the peer remembers them.
     pub fn cancel_all(&mut self) {
         self.objects.clear();
     }
@@ -62,27 +62,27 @@ impl ObjectSender {
         self.objects.is_empty()
     }
 
-    /// Whether the peer is known to have every object that is no extra.
+    /// Whether the peer is known to have every object that has a share.
     pub fn has_only_extra(&self) -> bool {
         self.objects.iter().all(|o| o.is_extra)
     }
 
-    /// Whether the peer is known to have every extra object.
+    /// Whether the peer is known to have every background object.
     pub fn has_no_extra(&self) -> bool {
         self.objects.iter().all(|o| !o.is_extra)
     }
 
-    /// Bytes that wait for their first or next transmission, repair symbols included, without extra objects.
+    /// Bytes that wait for transmission, repair symbols included, without background objects.
     pub fn backlog_bytes(&self) -> usize {
-        self.objects.iter().filter(|o| !o.is_extra).map(Outgoing::backlog_bytes).sum()
+        self.objects.iter().filter(|o| !o.is_extra).map(OutgoingObject::backlog_bytes).sum()
     }
 
-    /// The same of extra objects.
+    /// Bytes of background objects that wait for transmission.
     pub fn extra_backlog_bytes(&self) -> usize {
-        self.objects.iter().filter(|o| o.is_extra).map(Outgoing::backlog_bytes).sum()
+        self.objects.iter().filter(|o| o.is_extra).map(OutgoingObject::backlog_bytes).sum()
     }
 
-    /// Tells the share of frames that the link loses, 0..=0.95; repair symbols go ahead accordingly, none at 0.
+    /// Sets the expected share of lost frames, 0..=0.95; the number of repair symbols follows it, none at 0.
     pub fn set_loss(&mut self, loss: f64) {
         let loss = if loss.is_finite() { loss.clamp(0.0, Self::MAX_LOSS) } else { 0.0 };
         if loss != self.loss {
@@ -91,19 +91,19 @@ impl ObjectSender {
         }
     }
 
-    /// The next part of at most `room` bytes, header included, of an object that is no extra; the same again until it is
-    /// marked in flight.
+    /// The next part of at most `room` bytes, header included, of an object with a share. It stays the same until
+    /// it is marked in flight.
     pub fn next_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
         self.next_part_of(false, room)
     }
 
-    /// The same of an extra object.
+    /// The next part of a background object.
     pub fn next_extra_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
         self.next_part_of(true, room)
     }
 
     fn next_part_of(&mut self, is_extra: bool, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
-        // Rooms at the end of a frame are small: an object that begins there is still cut for whole frames.
+        // The room at the end of a frame is small; an object that begins there is still cut for whole frames.
         self.usual_room = room.max(self.usual_room - self.usual_room.div_ceil(128));
         let (usual, loss) = (self.usual_room, self.loss);
         let (run, part) = {
@@ -113,14 +113,14 @@ impl ObjectSender {
         Some((ObjectId::of(run.serial), run, part))
     }
 
-    /// A frame with this part was written.
+    /// Notes that a frame with this part was written.
     pub fn mark_in_flight(&mut self, _: ObjectId, run: &SymbolRun) {
         if let Some(object) = self.objects.iter_mut().find(|o| o.serial == run.serial) {
             object.mark_in_flight(run);
         }
     }
 
-    /// The fate of a frame with this part is known; returns whether the object is now complete at the peer.
+    /// Takes the fate of a frame with this part; returns whether its object is now complete at the peer.
     pub fn handle_fate(&mut self, _: ObjectId, run: &SymbolRun, delivered: bool) -> bool {
         let Some(at) = self.objects.iter().position(|o| o.serial == run.serial) else { return false };
         let complete = self.objects.get_mut(at).is_some_and(|o| o.handle_fate(run, delivered));
@@ -130,8 +130,8 @@ impl ObjectSender {
         complete
     }
 
-    /// The peer has lost what it had received.
+    /// Starts every object from the first symbol, because the peer has lost its copies.
     pub fn handle_peer_restart(&mut self) {
-        self.objects.iter_mut().for_each(Outgoing::handle_peer_restart);
+        self.objects.iter_mut().for_each(OutgoingObject::handle_peer_restart);
     }
 }

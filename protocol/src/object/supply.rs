@@ -1,32 +1,32 @@
 //! How many symbols to send so that enough of them arrive.
 
-/// Standard deviations of chance that are covered ahead, for one group of blocks that share their losses.
+/// Standard deviations that are covered ahead, for one group of blocks that share their losses.
 const MARGIN: f64 = 0.5;
 
 /// The rule by which symbols are sent ahead of their losses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Supply {
-    /// Share of symbols that arrive.
+    /// The share of symbols that arrive.
     arrive: f64,
     /// Symbols of a block that are lost together.
     run: f64,
-    /// Standard deviations of chance to cover.
+    /// Margin of the plan in standard deviations.
     margin: f64,
 }
 
 impl Supply {
-    /// A link that loses `loss` of its frames (0..=0.95), each with `run` symbols dealt out to `blocks` blocks.
+    /// For a link that loses `loss` of its frames (0..=0.95), each with `run` symbols dealt to `blocks` blocks.
     pub(super) fn new(loss: f64, run: usize, blocks: usize) -> Self {
-        // Blocks that no frame reaches together fail one by one: the more, the surer each has to be.
+        // Blocks that no frame covers together fail independently: the more of them, the larger the margin.
         let groups = blocks.div_ceil(run.max(1)).max(1);
         let margin = MARGIN * f64::from(usize::BITS - groups.leading_zeros());
         Self { arrive: 1.0 - loss, run: (run as f64 / blocks as f64).max(1.0), margin }
     }
 
-    /// Symbols of a block to have in flight when `missing` have to arrive.
+    /// The number of symbols of a block to have in flight when `missing` must arrive.
     ///
-    /// The mean number of arrivals, less the margin, is to be what is missing; beyond that only whole runs, as less
-    /// than a frame in addition changes little. Exactly what is missing where nothing is lost.
+    /// The mean number of arrivals less the margin equals the missing symbols. Beyond `missing`, only whole runs are
+    /// added, because less than a frame changes little. On a link without losses the result is `missing`.
     pub(super) fn in_flight(&self, missing: usize) -> usize {
         let lost = 1.0 - self.arrive;
         if lost <= 0.0 || missing == 0 {
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exactly_what_is_missing_is_sent_where_nothing_is_lost() {
+    fn a_lossless_link_sends_exactly_the_missing_symbols() {
         let supply = Supply::new(0.0, 11, 2);
         assert!((0..200).all(|n| supply.in_flight(n) == n));
     }

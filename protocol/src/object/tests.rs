@@ -4,10 +4,10 @@ use super::{MAX_OBJECT, ObjectId, ObjectReceiver, ObjectSender, Part, Received, 
 use proptest::prelude::*;
 use std::collections::VecDeque;
 
-/// A small generator of chance (Marsaglia's xorshift, 2003), so that a case is its seed.
-struct Chance(u64);
+/// A xorshift generator (Marsaglia 2003), so that a seed names a case.
+struct LossRng(u64);
 
-impl Chance {
+impl LossRng {
     fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
     }
@@ -34,25 +34,25 @@ struct Flying {
     bytes: Vec<u8>,
 }
 
-/// Both ends, and frames between them whose fates are told in order, some time later.
-struct Link {
+/// Both ends, and frames between them whose fates are reported in order, some time later.
+struct LossyLink {
     sender: ObjectSender,
     receiver: ObjectReceiver,
     flying: VecDeque<Flying>,
-    chance: Chance,
+    chance: LossRng,
     loss: f64,
     sent: usize,
     received: Vec<(ObjectId, Vec<u8>)>,
     delivered: Vec<ObjectId>,
 }
 
-impl Link {
+impl LossyLink {
     fn new(seed: u64, loss: f64) -> Self {
         Self {
             sender: ObjectSender::default(),
             receiver: ObjectReceiver::default(),
             flying: VecDeque::new(),
-            chance: Chance::new(seed),
+            chance: LossRng::new(seed),
             loss,
             sent: 0,
             received: vec![],
@@ -75,7 +75,7 @@ impl Link {
         }
     }
 
-    /// All frames under way arrive in some order, some twice, or are lost; then their fates are told in order.
+    /// All frames on their way arrive in some order, some twice, or are lost; then their fates are reported in order.
     fn settle(&mut self) {
         let fates: Vec<bool> = (0..self.flying.len()).map(|_| !self.chance.happens(self.loss)).collect();
         let mut arriving: Vec<usize> = (0..fates.len()).filter(|&i| fates[i]).collect();
@@ -111,7 +111,7 @@ proptest! {
         rooms in (14usize..60, 0usize..1000),
         window in 1usize..60,
     ) {
-        let mut link = Link::new(seed, loss);
+        let mut link = LossyLink::new(seed, loss);
         link.sender.set_loss(told);
         let objects: Vec<_> = lens.iter().map(|&len| link.chance.object(len)).collect();
         let ids: Vec<_> = objects.iter().map(|o| link.sender.push(o.clone()).unwrap()).collect();
@@ -148,7 +148,7 @@ proptest! {
 
     #[test]
     fn the_largest_object_arrives_over_the_smallest_frames(seed: u64, loss in 0.0..0.6f64) {
-        let mut link = Link::new(seed, loss);
+        let mut link = LossyLink::new(seed, loss);
         link.sender.set_loss(loss);
         let object = link.chance.object(MAX_OBJECT);
         link.sender.push(object.clone()).unwrap();
@@ -161,9 +161,9 @@ proptest! {
 }
 
 #[test]
-fn no_repair_symbol_is_sent_where_nothing_is_lost() {
+fn a_lossless_link_sends_no_repair_symbol() {
     for (len, room) in [(1, 14), (700, 14), (700, 49), (5000, 240), (MAX_OBJECT, 1000)] {
-        let mut link = Link::new(1, 0.0);
+        let mut link = LossyLink::new(1, 0.0);
         let object = link.chance.object(len);
         link.sender.push(object).unwrap();
         while link.send(room) {
@@ -176,9 +176,9 @@ fn no_repair_symbol_is_sent_where_nothing_is_lost() {
     }
 }
 
-/// What it takes to bring objects over, by the bytes that it takes where nothing is lost.
+/// The cost of bringing objects over, relative to the bytes on a lossless link.
 struct Cost {
-    /// Share of objects that are complete after one pass.
+    /// The share of objects that are complete after one pass.
     complete: f64,
     one_pass: f64,
     in_all: f64,
@@ -188,7 +188,7 @@ fn cost(len: usize, room: usize, loss: f64) -> Cost {
     const RUNS: u64 = 300;
     let (mut complete, mut one_pass, mut in_all, mut lossless) = (0, 0, 0, 0);
     for seed in 0..RUNS {
-        let mut link = Link::new(seed, loss);
+        let mut link = LossyLink::new(seed, loss);
         let object = link.chance.object(len);
         link.sender.push(object.clone()).unwrap();
         while link.send(room) {}
@@ -211,7 +211,7 @@ fn cost(len: usize, room: usize, loss: f64) -> Cost {
 }
 
 #[test]
-fn one_pass_is_enough_for_most_objects_at_the_loss_that_is_told() {
+fn one_pass_completes_most_objects_at_the_expected_loss() {
     for (len, room) in [(700, 49), (700, 113), (4000, 113), (4000, 240), (MAX_OBJECT, 240), (MAX_OBJECT, 1000)] {
         let Cost { complete, one_pass, in_all } = cost(len, room, 0.3);
         let case =
@@ -221,8 +221,8 @@ fn one_pass_is_enough_for_most_objects_at_the_loss_that_is_told() {
 }
 
 #[test]
-fn late_parts_of_a_complete_object_begin_nothing() {
-    let mut link = Link::new(3, 0.0);
+fn late_parts_of_a_complete_object_are_ignored() {
+    let mut link = LossyLink::new(3, 0.0);
     link.sender.set_loss(0.5);
     let object = link.chance.object(900);
     link.sender.push(object).unwrap();
@@ -237,12 +237,12 @@ fn late_parts_of_a_complete_object_begin_nothing() {
 
 #[test]
 fn a_name_that_is_used_again_is_another_object() {
-    let mut link = Link::new(4, 0.0);
+    let mut link = LossyLink::new(4, 0.0);
     for round in 0..5000 {
         let object = link.chance.object(40);
         let id = link.sender.push(object.clone()).unwrap();
         if round % 7 == 0 {
-            // Left unfinished at the receiver.
+            // Left incomplete at the receiver.
             link.send(30);
             link.settle();
             link.sender.cancel(id);
@@ -255,7 +255,7 @@ fn a_name_that_is_used_again_is_another_object() {
 }
 
 #[test]
-fn an_object_is_given_up_before_its_name_is_used_again() {
+fn an_object_is_dropped_before_its_name_is_reused() {
     let mut sender = ObjectSender::default();
     let first = sender.push(vec![1; 50]).unwrap();
     for later in 1..3000 {
@@ -268,7 +268,7 @@ fn an_object_is_given_up_before_its_name_is_used_again() {
 
 #[test]
 fn the_head_is_known_before_the_rest() {
-    let mut link = Link::new(5, 0.0);
+    let mut link = LossyLink::new(5, 0.0);
     let object = link.chance.object(700);
     let id = link.sender.push(object.clone()).unwrap();
     assert_eq!(link.receiver.head(id, 3), None);
@@ -279,8 +279,8 @@ fn the_head_is_known_before_the_rest() {
 }
 
 #[test]
-fn a_restart_of_the_peer_begins_anew_and_old_fates_count_nothing() {
-    let mut link = Link::new(6, 0.0);
+fn a_restart_of_the_peer_voids_earlier_fates() {
+    let mut link = LossyLink::new(6, 0.0);
     let object = link.chance.object(700);
     link.sender.push(object.clone()).unwrap();
     while link.send(49) {}
@@ -295,8 +295,8 @@ fn a_restart_of_the_peer_begins_anew_and_old_fates_count_nothing() {
 }
 
 #[test]
-fn what_is_cancelled_at_the_receiver_stays_away() {
-    let mut link = Link::new(7, 0.0);
+fn a_cancelled_object_is_not_received_again() {
+    let mut link = LossyLink::new(7, 0.0);
     let object = link.chance.object(700);
     let id = link.sender.push(object).unwrap();
     link.send(49);
@@ -318,7 +318,7 @@ fn a_further_object_replaces_the_oldest() {
 
 #[test]
 fn an_object_whose_check_fails_is_dropped() {
-    let mut link = Link::new(8, 0.0);
+    let mut link = LossyLink::new(8, 0.0);
     link.sender.push(vec![7; 300]).unwrap();
     while link.send(49) {}
     let mut outcomes = vec![];

@@ -1,10 +1,11 @@
-//! A witness of what went on air, independent of the budget that let it out.
+//! An independent check of the bits on air.
 
 use crate::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Counts bits on air at the modem's door and keeps the worst window.
+/// Counts bits on air where frames enter the modem, and keeps the largest sum of any window. It shares
+/// no code with the budget.
 #[derive(Debug, Clone)]
 pub struct Audit {
     window: Duration,
@@ -17,7 +18,7 @@ pub struct Audit {
 }
 
 impl Audit {
-    /// A witness over `window`.
+    /// An audit over windows of this length.
     pub fn new(window: Duration) -> Self {
         Self {
             window,
@@ -30,7 +31,7 @@ impl Audit {
         }
     }
 
-    /// A transmission of `bits` began at `now`.
+    /// Counts a transmission of `bits` that begins at `now`.
     pub fn record(&mut self, bits: u64, now: Instant) {
         while let Some(&(sent, old)) = self.recent.front()
             && now.since(sent) >= self.window
@@ -46,32 +47,32 @@ impl Audit {
         self.transmissions += 1;
     }
 
-    /// The window.
+    /// The length of the window.
     pub fn window(&self) -> Duration {
         self.window
     }
 
-    /// Most bits that began within any window.
+    /// The most bits that began within any window.
     pub fn worst_window_bits(&self) -> u64 {
         self.worst_bits
     }
 
-    /// [`Self::worst_window_bits`] a second of window.
+    /// [`Self::worst_window_bits`] divided by the window, in bit/s.
     pub fn worst_window_bps(&self) -> f64 {
         self.worst_bits as f64 / self.window.as_secs_f64()
     }
 
-    /// Bits so far.
+    /// Bits on air since the beginning.
     pub fn total_bits(&self) -> u64 {
         self.total_bits
     }
 
-    /// Bits of the largest transmission so far.
+    /// Bits on air of the largest transmission.
     pub fn largest_bits(&self) -> u64 {
         self.largest_bits
     }
 
-    /// Transmissions so far.
+    /// The number of transmissions since the beginning.
     pub fn transmissions(&self) -> u64 {
         self.transmissions
     }

@@ -4,18 +4,19 @@ use crate::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Lets whole modem transmissions out so that neither any window nor the long run exceeds the budget.
+/// Releases whole transmissions so that neither any window nor the long run exceeds the budget.
 ///
-/// Two conditions, both in bits on air:
-/// * the transmissions begun within the last window add up to less than `rate x window`, so that one more exceeds it by at
-///   most itself;
-/// * a token bucket as deep as `rate x window`, filled at `rate`, has the bits (or is full, for a transmission larger than
-///   the bucket, which then leaves a debt). This bounds the long-run mean where a transmission is large against a window.
+/// Two conditions must hold, both in bits on air:
+/// * The transmissions that began within the last window add up to less than `rate x window`, so that one more exceeds
+///   it by at most its own size.
+/// * A token bucket (RFC 2215) as deep as `rate x window`, filled at `rate`, has enough bits. A transmission larger
+///   than the bucket needs a full bucket and leaves a debt. This bounds the long-run mean where a transmission is large
+///   compared to a window.
 #[derive(Debug, Clone)]
 pub struct BitBudget {
     bits_per_s: u32,
     window: Duration,
-    /// Millionths of a bit, so that a rate times microseconds is exact; below zero is debt.
+    /// Bits in the bucket, in millionths, so that a rate times microseconds is exact; negative values are a debt.
     tokens: i128,
     filled: Instant,
     recent: VecDeque<(Instant, u64)>,
@@ -30,29 +31,29 @@ impl BitBudget {
         Self { bits_per_s, window, tokens, filled: now, recent: VecDeque::new(), recent_bits: 0 }
     }
 
-    /// A run that has just ended may have sent all that was allowed: nothing is left in this window.
+    /// Counts the whole window as used, because a run that has just ended may have sent all that was allowed.
     pub fn assume_spent(&mut self, now: Instant) {
         self.spend((self.capacity() / 1_000_000).max(0) as u64, now);
     }
 
-    /// Bits a second.
+    /// The rate of the budget in bit/s.
     pub fn bits_per_s(&self) -> u32 {
         self.bits_per_s
     }
 
-    /// The window.
+    /// The window over which the budget holds.
     pub fn window(&self) -> Duration {
         self.window
     }
 
-    /// Changes the rate from `now` on; what was sent stays counted.
+    /// Changes the rate from `now` on; earlier transmissions stay counted.
     pub fn set_rate(&mut self, bits_per_s: u32, now: Instant) {
         self.advance(now);
         self.bits_per_s = bits_per_s.max(1);
         self.tokens = self.tokens.min(self.capacity());
     }
 
-    /// When a transmission of `bits` may begin; `now` if it may at once.
+    /// The earliest time at which a transmission of `bits` may begin, not before `now`.
     pub fn earliest(&self, bits: u64, now: Instant) -> Instant {
         let mut at = now;
         let short = millionths(bits).min(self.capacity()) - self.tokens - self.gained(now);
@@ -72,13 +73,13 @@ impl BitBudget {
         at
     }
 
-    /// Whether less than half of what a window allows was sent in the last one.
+    /// Whether less than half of the window's bits were sent in the last window.
     pub fn is_plentiful(&self, now: Instant) -> bool {
         let recent: u64 = self.recent.iter().filter(|(at, _)| now.since(*at) < self.window).map(|(_, bits)| bits).sum();
         millionths(recent) * 2 < self.capacity()
     }
 
-    /// How many of `transmissions`, each with its bits and when it would begin, may go out one after the other.
+    /// How many of `transmissions`, each with its bits and its start, may go out one after the other.
     pub fn affordable(&self, transmissions: impl IntoIterator<Item = (u64, Instant)>) -> usize {
         let mut trial = self.clone();
         let allowed = transmissions.into_iter().take_while(|&(bits, at)| {
@@ -97,7 +98,7 @@ impl BitBudget {
         self.recent_bits += bits;
     }
 
-    /// The last `transmissions` were still in the modem until `now`: they count from then.
+    /// Moves the start of the last `transmissions` to `now`, because they were still in the modem until then.
     pub fn handle_delay(&mut self, transmissions: usize, now: Instant) {
         for (at, _) in self.recent.iter_mut().rev().take(transmissions) {
             *at = now;
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_full_budget_is_used_to_the_last_bit_over_a_long_run() {
+    fn the_whole_budget_is_used_over_a_long_run() {
         let mut budget = BitBudget::new(100, Duration::from_secs(10), Instant::ZERO);
         let (mut now, mut sent) = (Instant::ZERO, 0);
         while now < Instant::from_secs_f64(3600.0) {

@@ -1,4 +1,4 @@
-//! What is worth the next bits, and how many there may be.
+//! Which content goes out next, and how many bits it may take.
 
 mod audit;
 mod budget;

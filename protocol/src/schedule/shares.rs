@@ -69,8 +69,8 @@ impl From<PlaneKind> for Class {
     }
 }
 
-/// Least share of each of [`Class::SHARED`] in percent of the bytes that an end sends, while the class has something to send.
-/// They add up to 100 at most; what is left over goes to the class that comes first.
+/// Least share of each of [`Class::SHARED`] in percent of the bytes that an end sends, while the class has something to
+/// send. They add up to 100 at most; what is left over goes to the class that comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shares(pub [u8; 5]);
 
@@ -112,8 +112,8 @@ impl ClassShares {
         Self { shares, ..Self::default() }
     }
 
-    /// Gives planes of the map a part of its share, percent; together 100 at most. A plane without one takes what nobody
-    /// else needs.
+    /// Gives planes of the map a part of its share, percent; together 100 at most. A plane without one takes what
+    /// nobody else needs.
     pub fn set_planes(&mut self, planes: [u8; Class::PLANES.len()]) {
         self.planes = planes;
     }

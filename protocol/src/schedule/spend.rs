@@ -5,8 +5,8 @@ use super::Class;
 /// Something that is worth bits only when they are left over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extra {
-    /// The cells between those of the coarse map, while there is too much to say: in its place among the extras instead of
-    /// before all of them. Those of the labels that weigh most go first.
+    /// The cells between those of the coarse map, while there is too much to say: in its place among the extras instead
+    /// of before all of them. Those of the labels that weigh most go first.
     Finer,
     /// Depths of the sea floor, if they have no share.
     Depth,
@@ -45,8 +45,8 @@ impl Extra {
     }
 }
 
-/// Extras in the order in which they get what is left over. One that is not named gets nothing, except that finer cells then
-/// are cells like all others.
+/// Extras in the order in which they get what is left over. One that is not named gets nothing, except that finer cells
+/// then are cells like all others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SpendOrder([Option<Extra>; Extra::ALL.len()]);
 

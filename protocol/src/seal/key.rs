@@ -1,4 +1,4 @@
-//! The key of a mission, and what comes from it.
+//! The mission key and the keys derived from it.
 
 use super::prf::{Secret, ShortTagged, join, mac, prf};
 use super::{SessionKey, Tag};
@@ -6,12 +6,12 @@ use ascon_aead::aead::{AeadInOut, KeyInit};
 use std::fmt;
 use zeroize::Zeroizing;
 
-/// Nonces under the mission key: each is used once, with nothing associated, so what comes from one says nothing of another.
+/// Nonces under the mission key. Each is used once, with no associated data, so that the results are independent.
 const FINGERPRINT: &[u8; 16] = b"scenecast-print1";
 const HELLO: &[u8; 16] = b"scenecast-hello1";
 const SESSION: &[u8; 16] = b"scenecast-sessn1";
 
-/// The nonce of every hello tag: under the hello key nothing is ever encrypted, see `prf`.
+/// The nonce of every hello tag. The hello key encrypts no data; see `prf`.
 const HELLO_NONCE: &[u8; 16] = &[0; 16];
 
 /// The secret of a mission, 16 bytes that both ends hold; wiped from memory when dropped.
@@ -21,7 +21,7 @@ pub struct MissionKey {
 }
 
 impl MissionKey {
-    /// A key of 16 bytes; they must come from the operating system's random source.
+    /// A key of 16 bytes, which must come from the operating system's random source.
     pub fn from_bytes(bytes: [u8; 16]) -> Self {
         Self { bytes: Zeroizing::new(bytes) }
     }
@@ -30,20 +30,20 @@ impl MissionKey {
         &self.bytes
     }
 
-    /// 32 bits by which people see that both ends hold the same key; they do not give the key away.
+    /// 32 bits by which people check that both ends hold the same key; they do not reveal it.
     pub fn fingerprint(&self) -> u32 {
         let [a, b, c, d, ..] = *prf(&self.bytes, FINGERPRINT, &[]);
         u32::from_be_bytes([a, b, c, d])
     }
 
-    /// The tag of a frame that says hello, over `parts` and where each of them ends.
+    /// The tag of a hello frame, over `parts` and their lengths.
     ///
-    /// It proves a holder of the key, not the present: parts heard again verify again.
+    /// It proves that a holder of the key wrote them, at any time: replayed parts verify again.
     pub fn hello_tag(&self, parts: &[&[u8]]) -> Tag {
         mac(&self.hello_cipher(), HELLO_NONCE, &join(parts)).into()
     }
 
-    /// Whether `tag` is the one of `parts`; takes the same time for every wrong tag.
+    /// Whether `tag` is the tag of `parts`; takes the same time for every wrong tag.
     pub fn verify_hello(&self, parts: &[&[u8]], tag: &Tag) -> bool {
         let tag = (*tag).into();
         let nothing: &mut [u8] = &mut [];
@@ -54,10 +54,11 @@ impl MissionKey {
         ShortTagged::new(&(*prf(&self.bytes, HELLO, &[])).into())
     }
 
-    /// The key of one pair of runs: of the surface that drew `surface_nonce` and of `vehicle` that drew `vehicle_nonce`.
+    /// The key of a session: of the surface's run that drew `surface_nonce`, and the run of `vehicle` that drew
+    /// `vehicle_nonce`.
     ///
-    /// Each end draws its 64 bits at random when it starts. While one of the two is fresh the key is new, so neither
-    /// end accepts frames of an earlier run, and none is encrypted twice under the same nonce.
+    /// Each end draws its 64 bits at random when it starts. If one of the two is fresh, the key is new. Then neither
+    /// end accepts frames of an earlier run, and no frame is encrypted twice under the same nonce.
     pub fn session(
         &self,
         mission: u32,

@@ -1,7 +1,7 @@
-//! The cryptography of authentic frames: keys, tags, and nothing of the frames themselves.
+//! The cryptography of authentic frames: keys and tags.
 //!
-//! One primitive does all: Ascon-AEAD128 (NIST SP 800-232), as `prf.rs` says for sub-keys and tags and as the
-//! standard says for frames.
+//! All of it uses one primitive, Ascon-AEAD128 (NIST SP 800-232): for frames as the standard defines it, for sub-keys
+//! and tags as `prf.rs` explains.
 //!
 //! ```text
 //! mission key (16 secret bytes, the key file)
@@ -24,10 +24,10 @@ pub use key::MissionKey;
 pub use session::{Direction, SessionKey};
 pub use text::KeyError;
 
-/// What proves that a frame comes from a holder of the key: the first 8 bytes of the 16 of Ascon-AEAD128.
+/// The proof that a frame comes from a holder of the key: the first 8 of the 16 tag bytes of Ascon-AEAD128.
 ///
-/// A guess is right once in 2^64. A truncated tag is one of the options of SP 800-232.
+/// A guess succeeds with probability 2^-64. SP 800-232 permits truncated tags.
 pub type Tag = [u8; TAG_BYTES];
 
-/// Bytes of a [`Tag`].
+/// The length of a [`Tag`] in bytes.
 pub const TAG_BYTES: usize = 8;

@@ -7,20 +7,19 @@ use ascon_aead::aead::consts::{True, U4, U8, U16};
 use ascon_aead::aead::{AeadInOut, KeyInit, Tag};
 use zeroize::Zeroizing;
 
-/// Ascon-AEAD128 with 8-byte tags.
 pub(super) type ShortTagged = TruncatedAsconAead128<U8>;
 
-/// Sixteen secret bytes.
 pub(super) type Secret = Zeroizing<[u8; 16]>;
 
-/// A pseudo-random function of `nonce` and `data` under `key`: the whole tag of an empty plaintext with `data` associated.
+/// A pseudorandom function of `nonce` and `data` under `key`: the whole tag of an empty plaintext with `data`
+/// associated.
 ///
-/// Why that is sound, even when a nonce comes again with other data: a repeated nonce endangers Ascon through the
-/// key stream, which an empty plaintext never shows. What is left is a sponge that starts from a keyed permutation,
-/// absorbs 16 bytes at a time over 192 hidden bits, and ends in a permutation between two additions of the key, of which
-/// only the tag is seen: a pseudo-random function up to about 2^96 calls and 2^128 guesses of the key. Proofs with
-/// repeated nonces: Lefevre and Mennink, "Generic Security of the Ascon Mode: On the Power of Key Blinding", SAC 2024
-/// (eprint 2023/796) and "SoK: Security of the Ascon Modes" (eprint 2024/1969).
+/// It is sound even if a nonce is used again with other data. A repeated nonce endangers Ascon through the key stream,
+/// which an empty plaintext never reveals. The rest is a sponge that starts from a keyed permutation, absorbs 16 bytes
+/// at a time over 192 hidden bits, and ends in a permutation between two additions of the key, of which only the tag is
+/// revealed: a pseudorandom function up to about 2^96 calls and 2^128 guesses of the key. Proofs with repeated nonces:
+/// Lefevre and Mennink, "Generic Security of the Ascon Mode: On the Power of Key Blinding", SAC 2024 (eprint 2023/796)
+/// and "SoK: Security of the Ascon Modes" (eprint 2024/1969).
 pub(super) fn prf(key: &Secret, nonce: &[u8; 16], data: &[u8]) -> Secret {
     Zeroizing::new(mac::<U16>(&TruncatedAsconAead128::new(&(**key).into()), nonce, data).into())
 }
@@ -49,7 +48,7 @@ where
         .expect("the only error is a length of 2^64 bytes, which no slice has")
 }
 
-/// Parts as one string that tells where each ends: before each its length in 4 bytes, the most significant first.
+/// Joins parts so that their boundaries count too: each follows its length in 4 bytes, the most significant first.
 pub(super) fn join(parts: &[&[u8]]) -> Vec<u8> {
     let mut joined = Vec::with_capacity(parts.iter().map(|p| p.len() + 4).sum());
     for part in parts {
@@ -104,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn joined_parts_tell_where_each_ends() {
+    fn joined_parts_keep_their_boundaries() {
         assert_eq!(join(&[b"ab", b"", b"c"]), [0, 0, 0, 2, b'a', b'b', 0, 0, 0, 0, 0, 0, 0, 1, b'c']);
         assert_ne!(join(&[b"ab", b"c"]), join(&[b"a", b"bc"]));
     }

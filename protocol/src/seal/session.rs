@@ -1,11 +1,11 @@
-//! The key of one pair of runs: seals and opens frames.
+//! The key of a session, which seals and opens frames.
 
 use super::Tag;
 use super::prf::{Secret, ShortTagged, encrypt, join, mac};
 use ascon_aead::aead::{AeadInOut, KeyInit};
 use std::fmt;
 
-/// Which way a frame goes.
+/// The direction of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Direction {
     /// From the surface to the vehicle.
@@ -14,10 +14,10 @@ pub enum Direction {
     Up,
 }
 
-/// Seals and opens the frames of one pair of runs; wiped from memory when dropped.
+/// Seals and opens the frames of one session; wiped from memory when dropped.
 ///
-/// A frame is a head, which stays readable, and a body, which is encrypted in a session that encrypts. Both are
-/// authentic, and so are the direction and the number.
+/// A frame has a head, which stays readable, and a body, which an encrypting session encrypts. Both are authenticated,
+/// and so are the direction and the number.
 pub struct SessionKey {
     cipher: ShortTagged,
     encrypt: bool,
@@ -28,10 +28,10 @@ impl SessionKey {
         Self { cipher: ShortTagged::new(&(**key).into()), encrypt }
     }
 
-    /// The tag of a frame; in a session that encrypts, `body` is encrypted in place.
+    /// The tag of a frame. An encrypting session encrypts `body` in place.
     ///
-    /// `number` counts the frames of this direction without bounds and never comes again with other content: two
-    /// bodies encrypted under one number would tell their difference.
+    /// `number` counts the frames of this direction without wrapping, and must never be used again with other content:
+    /// two bodies encrypted under one number would reveal their difference.
     pub fn seal(&self, direction: Direction, number: u64, head: &[u8], body: &mut [u8]) -> Tag {
         let nonce = nonce(direction, number);
         let tag = if self.encrypt {
@@ -42,10 +42,10 @@ impl SessionKey {
         tag.into()
     }
 
-    /// Whether the frame is what was sealed; in a session that encrypts, `body` is then decrypted in place.
+    /// Whether the frame is as it was sealed. If so, an encrypting session decrypts `body` in place.
     ///
-    /// If it is not, an encrypted body is filled with zeros and one that is not encrypted is left as it was. A tag
-    /// whose length is not 8 bytes is a wrong one. Takes the same time for every wrong tag.
+    /// If not, an encrypted body is filled with zeros, and any other is left as it was. A tag of a length other than 8
+    /// bytes is wrong. Takes the same time for every wrong tag.
     pub fn open(&self, direction: Direction, number: u64, head: &[u8], body: &mut [u8], tag: &[u8]) -> bool {
         let Ok(tag) = Tag::try_from(tag) else {
             if self.encrypt {

@@ -1,4 +1,4 @@
-//! What the keys promise together.
+//! Properties of the keys together.
 
 use super::*;
 use proptest::collection::vec;
@@ -25,7 +25,7 @@ fn flip(bytes: &mut [u8], bit: usize) {
     bytes[bit / 8] ^= 1 << (bit % 8);
 }
 
-/// Values for another implementation to check itself; those here are confirmed by one in Python, written from the standard.
+/// Values for another implementation to check itself; one in Python, written from the standard, confirms them.
 #[test]
 fn golden_bytes() {
     let seal = |encrypt, direction| {
@@ -43,7 +43,7 @@ fn golden_bytes() {
 }
 
 #[test]
-fn nobody_sees_the_secret_in_what_is_printed_for_debugging() {
+fn debug_output_hides_the_secret() {
     let said = format!("{:?} {:?}", key(), session(true));
     assert_eq!(said, format!("MissionKey({:08x}) SessionKey {{ encrypt: true, .. }}", key().fingerprint()));
 }
@@ -66,7 +66,7 @@ fn every_input_of_a_session_changes_its_key() {
 }
 
 #[test]
-fn what_an_encrypted_session_sealed_no_plain_one_opens() {
+fn no_plain_session_opens_an_encrypted_frame() {
     let mut body = *b"body";
     let tag = session(true).seal(Direction::Up, 1, b"head", &mut body);
     assert!(!session(false).open(Direction::Up, 1, b"head", &mut body, &tag));
@@ -89,7 +89,7 @@ fn a_tag_of_another_length_is_a_wrong_one() {
     }
 }
 
-/// Of a million random forgeries none gets through, in either kind of session nor as a hello.
+/// Of a million random forgeries none succeeds, in either kind of session or as a hello.
 #[test]
 fn random_forgeries_are_refused() {
     let (sessions, key) = ([session(false), session(true)], key());
@@ -114,7 +114,7 @@ fn random_forgeries_are_refused() {
 
 proptest! {
     #[test]
-    fn what_was_sealed_opens(
+    fn a_sealed_frame_opens(
         encrypt: bool, direction in direction(), number: u64, head in vec(any::<u8>(), 0..40), body in vec(any::<u8>(), 0..300),
     ) {
         let mut sealed = body.clone();
@@ -138,7 +138,7 @@ proptest! {
         prop_assert!(!session(encrypt).open(Direction::Up, 1, head, body, &tag));
     }
 
-    /// Every bit, one after the other: of head, body, tag, number, direction, both nonces, mission and vehicle.
+    /// Flips every bit in turn: of head, body, tag, number, direction, both nonces, mission and vehicle.
     #[test]
     fn a_flipped_bit_is_refused(encrypt: bool, head in vec(any::<u8>(), 0..12), body in vec(any::<u8>(), 0..40), number: u64) {
         let mut sealed = body.clone();

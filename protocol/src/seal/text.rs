@@ -3,53 +3,52 @@
 use super::MissionKey;
 use zeroize::Zeroizing;
 
-/// Version of the format.
 const VERSION: &str = "1";
 
-/// Why a text is no key file.
+/// Why a text is not a key file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum KeyError {
-    /// No line but comments.
+    /// There are only comments and empty lines.
     #[error("there is no key in it: one line is expected, scenecast-key 1 KEY CHECK")]
     Missing,
-    /// A line that is neither a key nor a comment.
+    /// A line is neither a key nor a comment.
     #[error("line {line}: this is no key: expected is scenecast-key 1 KEY CHECK, or a comment after #")]
     NotAKey {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
     },
-    /// A version of the format that we do not read.
+    /// A key has another version of the format.
     #[error(
         "line {line}: this is a key of another version; this is version {VERSION}, written scenecast-key {VERSION}"
     )]
     Version {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
     },
-    /// A key or check of another length, or with other characters.
+    /// A key or its check has another length or other characters than hexadecimal digits.
     #[error("line {line}: expected are 32 hexadecimal digits of key and 8 of check")]
     Digits {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
     },
-    /// The check is that of another key.
+    /// The check belongs to another key.
     #[error("line {line}: the check does not fit the key: a digit is wrong; copy the file again")]
     Check {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
     },
-    /// A second key.
+    /// The file has a second key.
     #[error("line {line}: this is a second key; one is allowed")]
     Second {
-        /// Line, from 1.
+        /// Number of the line, from 1.
         line: usize,
     },
 }
 
 impl MissionKey {
-    /// The key in a text: one line `scenecast-key 1 KEY CHECK`, empty lines, and comment lines after `#`.
+    /// Parses a key file: one line `scenecast-key 1 KEY CHECK`, empty lines, and comments after `#`.
     ///
-    /// KEY is 32 hexadecimal digits, CHECK is 8, the key's fingerprint.
+    /// KEY has 32 hexadecimal digits. CHECK has 8, the key's fingerprint.
     pub fn parse(text: &str) -> Result<Self, KeyError> {
         let mut key = None;
         for (line, content) in text.trim_start_matches('\u{FEFF}').lines().enumerate() {
@@ -65,7 +64,7 @@ impl MissionKey {
         key.ok_or(KeyError::Missing)
     }
 
-    /// The text of a key file, one line; it holds the secret and is wiped from memory when dropped.
+    /// The text of a key file, one line. It holds the secret and is wiped from memory when dropped.
     pub fn to_text(&self) -> Zeroizing<String> {
         let key = u128::from_be_bytes(*self.bytes());
         Zeroizing::new(format!("scenecast-key {VERSION} {key:032x} {:08x}\n", self.fingerprint()))
@@ -93,7 +92,7 @@ fn parse_line(content: &str, line: usize) -> Result<MissionKey, KeyError> {
     Ok(key)
 }
 
-/// The number that exactly `digits` hexadecimal digits say.
+/// The value of exactly `digits` hexadecimal digits.
 fn hex(text: &str, digits: usize) -> Option<u128> {
     let plain = text.len() == digits && text.bytes().all(|b| b.is_ascii_hexdigit());
     plain.then(|| u128::from_str_radix(text, 16).ok()).flatten()
@@ -120,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn every_problem_names_its_line_and_what_is_allowed() {
+    fn every_error_names_its_line_and_the_allowed_form() {
         assert_eq!(error(""), Some(KeyError::Missing));
         assert_eq!(error("# a\n#b"), Some(KeyError::Missing));
         assert_eq!(error("\nhello"), Some(KeyError::NotAKey { line: 2 }));

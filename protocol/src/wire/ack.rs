@@ -1,14 +1,15 @@
-//! What a receiver says of the frames it heard.
+//! Acknowledgement statements: a receiver's verdict on the peer's frames.
 
-use super::cursor::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
-/// Most frames a sender may have outstanding, so that a 12-bit horizon names one of them without doubt.
+/// The most frames that a sender may have outstanding, so that a 12-bit horizon is unambiguous.
 pub const MAX_WINDOW: u64 = 2048;
 
 /// A final verdict on every frame up to a horizon.
 ///
-/// "Of the frames numbered up to `horizon` I hold all but `lost`." A receiver never takes a frame that it has declared
-/// lost, so both ends agree for ever on what was delivered up to a horizon: that is what map deltas are based on.
+/// It states: "Of the frames numbered up to `horizon` I hold all but `lost`." A receiver never accepts a frame that it
+/// has declared lost. So both ends agree forever on the fate of every frame up to a horizon, and map chunks can build
+/// on it.
 ///
 /// ```text
 ///  0                   1
@@ -19,7 +20,7 @@ pub const MAX_WINDOW: u64 = 2048;
 /// len      0..14: bytes of loss code; 15: len2 has the number (15..255)
 /// loss code, most significant bit first:
 ///   k  2 bits   0: bitmap; 1..3: Rice code with parameter k
-///   bitmap      bit i (from 0): 1 = frame horizon-i is lost; what is past the end is held
+///   bitmap      bit i (from 0): 1 = frame horizon-i is lost; frames past the end are held
 ///   Rice        for each lost frame downward from the horizon: frames held since the previous lost one, as quotient
 ///               (value >> k) in ones, a zero, then k bits; ones to the end of the bytes are padding
 /// ```
@@ -27,12 +28,12 @@ pub const MAX_WINDOW: u64 = 2048;
 pub struct AckStatement {
     /// Low 12 bits of the highest frame number judged.
     pub horizon_low: u16,
-    /// Distances below the horizon of the lost frames, ascending.
+    /// Distances of the lost frames below the horizon, ascending.
     pub lost: Vec<u16>,
 }
 
 impl AckStatement {
-    /// Appends the statement if it takes at most `room` bytes; says whether it did.
+    /// Appends the statement if it takes at most `room` bytes; returns whether it did.
     pub fn encode(&self, room: usize, out: &mut Vec<u8>) -> bool {
         let code = encode_losses(&self.lost);
         let long = code.len() >= 15;
@@ -48,7 +49,7 @@ impl AckStatement {
         true
     }
 
-    /// Reads a statement.
+    /// Decodes a statement; the rest stays in `reader`.
     pub fn decode(reader: &mut Reader<'_>) -> Result<Self, Truncated> {
         let word = reader.u16()?;
         let len = match word & 15 {
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tenth_lost_of_five_hundred_frames_takes_under_forty_bytes() {
+    fn fifty_losses_in_500_frames_take_under_40_bytes() {
         let lost: Vec<u16> = (0..50).map(|i| i * 10 + (i * 7 % 5)).collect();
         let mut bytes = Vec::new();
         assert!(AckStatement { horizon_low: 0, lost }.encode(40, &mut bytes));

@@ -1,8 +1,8 @@
-//! How much waits at the vehicle to be sent.
+//! The vehicle's backlog.
 
-use super::cursor::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated};
 
-/// Bytes that the vehicle has still to send, about.
+/// The approximate number of bytes that the vehicle still has to send.
 ///
 /// ```text
 /// byte  bits  field                 unit, range
@@ -12,14 +12,14 @@ use super::cursor::{Reader, Truncated};
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Backlog {
-    /// Of labels of the map.
+    /// Bytes of labels of the map.
     pub map_bytes: u32,
-    /// Of planes and images.
+    /// Bytes of planes and images.
     pub other_bytes: u32,
 }
 
 impl Backlog {
-    /// Bytes on the wire.
+    /// Length on the wire in bytes.
     pub const BYTES: usize = 2;
 
     pub(super) fn encode(self) -> [u8; Self::BYTES] {
@@ -31,7 +31,7 @@ impl Backlog {
     }
 }
 
-/// Four bits of value, rounded up, and how often it is doubled.
+/// A value of four bits, rounded up, and the number of doublings.
 fn code(bytes: u32) -> u8 {
     let shift = (0..16u32).find(|&shift| bytes.div_ceil(1 << shift) < 16);
     shift.map_or(u8::MAX, |shift| (bytes.div_ceil(1 << shift) << 4 | shift) as u8)
@@ -56,7 +56,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_backlog_comes_back_no_smaller_and_by_at_most_an_eighth_larger(bytes in 0u32..=491_520) {
+        fn a_backlog_is_rounded_up_by_at_most_an_eighth(bytes in 0u32..=491_520) {
             let back = value(code(bytes));
             prop_assert!(back >= bytes && back - bytes <= bytes / 8, "{bytes} became {back}");
         }

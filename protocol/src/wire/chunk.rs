@@ -1,22 +1,22 @@
-//! Chunks: what a frame carries.
+//! Chunks, the content of a frame.
 
-/// Most bytes that a chunk header takes.
+/// The longest header of a chunk in bytes.
 pub const MAX_CHUNK_HEADER: usize = 2;
 
-/// What a chunk is about.
+/// The kinds of chunks that a frame can carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChunkKind {
     /// A patch of the label map.
     Map,
-    /// Where the vehicle is and what it does.
+    /// Position, mode and path of the vehicle.
     Pose,
     /// One slot of the directive.
     Slot,
     /// A part of an object that is larger than a frame.
     Object,
-    /// What the vehicle says of its map and of the directive.
+    /// The vehicle's report on its map and on the directive.
     Report,
-    /// A patch of a plane of the map, or what the surface is known to hold of one.
+    /// A patch of a plane of the map, or a digest of the surface's copy of one.
     Plane,
 }
 
@@ -45,14 +45,14 @@ impl ChunkKind {
 /// +-----+---------+----------------+-----------+
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
-/// kind     0 nothing more in this frame, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 plane; 7 reserved: the frame is refused
+/// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 plane; 7 reserved: the frame is refused
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Chunk<'a> {
-    /// What it is about.
+    /// The kind, which names the format of the payload.
     pub kind: ChunkKind,
-    /// Its own bytes.
+    /// The payload, without the header.
     pub payload: &'a [u8],
 }
 
@@ -65,18 +65,18 @@ pub fn chunk_header_len(payload: usize, room: usize) -> usize {
     }
 }
 
-/// Most bytes of payload that a chunk can have.
-const LONGEST: usize = 27 + 1023;
+/// The longest payload of a chunk in bytes.
+const MAX_PAYLOAD: usize = 27 + 1023;
 
-/// Most bytes of payload that one chunk can have in `room` bytes; every smaller payload fits too.
+/// The longest payload of a single chunk in `room` bytes; every shorter payload fits too.
 pub fn room_for_payload(room: usize) -> usize {
     room.saturating_sub(1)
 }
 
-/// Appends a chunk to a frame body that can still take `room` bytes; says whether it fitted.
+/// Appends a chunk to a frame body that can still take `room` bytes; returns whether it fitted.
 pub(super) fn push_chunk(kind: ChunkKind, payload: &[u8], room: usize, out: &mut Vec<u8>) -> bool {
     let n = payload.len();
-    if n + chunk_header_len(n, room) > room || n > LONGEST {
+    if n + chunk_header_len(n, room) > room || n > MAX_PAYLOAD {
         return false;
     }
     let head = kind.code() << 5;
@@ -89,7 +89,7 @@ pub(super) fn push_chunk(kind: ChunkKind, payload: &[u8], room: usize, out: &mut
     true
 }
 
-/// The chunks of a received frame, in order; ends at the first that makes no sense.
+/// The chunks of a received frame, in order; ends at the first malformed one.
 #[derive(Debug, Clone, Default)]
 pub struct Chunks<'a> {
     body: &'a [u8],
@@ -142,7 +142,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_last_chunk_that_fills_the_frame_has_a_one_byte_header() {
+    fn a_last_chunk_filling_the_frame_has_a_short_header() {
         let mut out = Vec::new();
         assert!(push_chunk(ChunkKind::Map, &[7; 200], 201, &mut out));
         assert_eq!((out.len(), out[0]), (201, 0b001_11111));

@@ -1,9 +1,9 @@
-//! Frames: what one modem transmission carries, and what it ends in.
+//! Frames, the unit of transmission, and their seals.
 
 use super::WIRE_VERSION;
 use super::chunk::{ChunkKind, Chunks, push_chunk};
-use super::cursor::{Reader, Truncated};
 use super::header::{Address, Header, MissionId};
+use crate::bytes::{Reader, Truncated};
 use crate::seal::{Direction, MissionKey, SessionKey, TAG_BYTES, Tag};
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
 use std::borrow::Cow;
@@ -14,19 +14,19 @@ const LONG_FRAME: usize = 128;
 static CRC24: Crc<u32> = Crc::<u32>::new(&CRC_24_OPENPGP);
 static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
-/// Why received bytes are no frame for us.
+/// Why received bytes are not a frame for this end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
-    /// Too short, or the header runs out of the frame.
+    /// Too short, or the header exceeds the frame.
     #[error("the frame is too short")]
     Truncated,
-    /// A wire version that we do not speak.
+    /// The frame has another wire version.
     #[error("the frame has wire version {0}, this is version {WIRE_VERSION}")]
     Version(u8),
-    /// For somebody else.
+    /// The frame is addressed to another end.
     #[error("the frame is for another address")]
     NotForUs,
-    /// Corrupted, of another mission, or sealed to a session that is not ours.
+    /// Damaged, of another mission, or sealed to a session that is not ours.
     #[error("the checksum or tag does not match")]
     Checksum,
     /// A field has a value that no sender writes.
@@ -40,19 +40,19 @@ impl From<Truncated> for FrameError {
     }
 }
 
-/// What a frame ends in, and what that proves.
+/// The end of a frame, which proves its integrity or its authenticity.
 #[derive(Debug, Clone, Copy)]
 pub enum Seal<'a> {
     /// A CRC over the mission, the receiver's session (0 if it is not known) and the frame.
     Crc(MissionId, u16),
     /// The tag of a hello: mission, the receiver's session and nonce (0 if they are not known) and the frame.
     Hello(&'a MissionKey, MissionId, u16, u64),
-    /// The tag of a numbered frame; the number is unbounded.
+    /// The tag of a numbered frame; the number does not wrap.
     Session(&'a SessionKey, Direction, u64),
 }
 
 impl Seal<'_> {
-    /// Bytes that a frame of `len` bytes ends in.
+    /// Length of the seal of a frame of `len` bytes.
     pub fn bytes(keyed: bool, len: usize) -> usize {
         match (keyed, len < LONG_FRAME) {
             (true, _) => TAG_BYTES,
@@ -70,7 +70,7 @@ impl Seal<'_> {
         [mission, session, nonce, frame]
     }
 
-    /// Writes the end of a frame of `len` bytes in all, whose chunks begin at `body_at`.
+    /// Appends the seal of a frame of `len` bytes in all, whose chunks begin at `body_at`.
     fn close(&self, bytes: &mut Vec<u8>, body_at: usize, len: usize) {
         match *self {
             Self::Crc(mission, session) => {
@@ -91,7 +91,7 @@ impl Seal<'_> {
     }
 }
 
-/// The CRC at the end of a frame of `len` bytes that is made of `parts`.
+/// The CRC of a frame of `len` bytes that consists of `parts`.
 fn checksum(parts: &[&[u8]], len: usize, mission: MissionId, to_session: u16) -> u32 {
     let crc = if len < LONG_FRAME { &CRC24 } else { &CRC32 };
     let mut digest = crc.digest();
@@ -101,26 +101,26 @@ fn checksum(parts: &[&[u8]], len: usize, mission: MissionId, to_session: u16) ->
     digest.finalize()
 }
 
-/// A frame whose header could be read, and that nobody has verified yet.
+/// A frame whose header was read and which is not verified yet.
 #[derive(Debug, Clone)]
 pub struct Envelope<'a> {
-    /// What it claims.
+    /// The header, which may be forged.
     pub header: Header,
     head: &'a [u8],
     body: &'a [u8],
     end: &'a [u8],
 }
 
-/// A verified frame.
+/// A frame whose seal was verified.
 #[derive(Debug, Clone)]
 pub struct Frame<'a> {
-    /// Its header.
+    /// The header, verified together with the chunks.
     pub header: Header,
     body: Cow<'a, [u8]>,
 }
 
 impl<'a> Envelope<'a> {
-    /// Reads the header of a frame; `to_us` says which addresses are ours.
+    /// Reads the header of a frame; `to_us` selects our addresses.
     pub fn decode(bytes: &'a [u8], to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
         let keyed = bytes.first().is_some_and(|flags| flags & 1 != 0);
         let end = bytes.len().checked_sub(Seal::bytes(keyed, bytes.len())).ok_or(FrameError::Truncated)?;
@@ -132,7 +132,7 @@ impl<'a> Envelope<'a> {
         Ok(Self { header, head, body, end })
     }
 
-    /// Whether the frame was sealed so, and is what its sender wrote.
+    /// The frame, if this seal verifies it.
     pub fn open(&self, seal: &Seal<'_>) -> Option<Frame<'a>> {
         let mut body = Cow::Borrowed(self.body);
         let sound = match *seal {
@@ -158,7 +158,7 @@ impl<'a> Envelope<'a> {
 }
 
 impl Frame<'_> {
-    /// What the frame carries.
+    /// The chunks of the frame in order.
     pub fn chunks(&self) -> Chunks<'_> {
         Chunks::new(&self.body)
     }
@@ -175,7 +175,7 @@ pub struct FrameBuilder {
 }
 
 impl FrameBuilder {
-    /// Starts a frame of at most `size` bytes; the ack statement is written only if it fits.
+    /// Starts a frame of at most `size` bytes; the acknowledgement statement is written only if it fits.
     pub fn new(header: &Header, size: usize) -> Self {
         let mut bytes = Vec::with_capacity(size);
         let remaining_at = header.encode(&mut bytes);
@@ -191,7 +191,7 @@ impl FrameBuilder {
         builder
     }
 
-    /// Corrects what follows in this turn.
+    /// Sets the header's `remaining` byte.
     pub fn set_remaining(&mut self, remaining: u8) {
         if let Some(byte) = self.bytes.get_mut(self.remaining_at) {
             *byte = remaining;
@@ -203,12 +203,12 @@ impl FrameBuilder {
         self.size.saturating_sub(self.bytes.len() + Seal::bytes(self.keyed, self.size))
     }
 
-    /// Adds a chunk; says whether it fitted.
+    /// Adds a chunk; returns whether it fitted.
     pub fn push(&mut self, kind: ChunkKind, payload: &[u8]) -> bool {
         push_chunk(kind, payload, self.room(), &mut self.bytes)
     }
 
-    /// Bytes that the frame will have.
+    /// The length of the finished frame in bytes.
     pub fn len(&self, short: bool) -> usize {
         if !short {
             return self.size;
@@ -221,7 +221,7 @@ impl FrameBuilder {
         }
     }
 
-    /// Closes the frame; a full frame is padded to its size, a `short` one ends where its content ends.
+    /// Seals the frame. A `short` frame ends where its content ends; any other is padded to its size.
     pub fn finish(mut self, seal: &Seal<'_>, short: bool) -> Vec<u8> {
         let len = self.len(short);
         self.bytes.resize(len - Seal::bytes(self.keyed, len), 0);
@@ -232,7 +232,7 @@ impl FrameBuilder {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{AckStatement, SessionId, Stamp, room_for_payload};
+    use super::super::{AckStatement, FrameKind, SessionId, Stamp, room_for_payload};
     use super::*;
     use proptest::prelude::*;
     use std::time::Duration;
@@ -251,7 +251,7 @@ mod tests {
             stamp: None,
             nonce: None,
             ack: Some(AckStatement { horizon_low: 5, lost: vec![] }),
-            hello: false,
+            kind: FrameKind::Numbered,
             keyed: false,
         }
     }
@@ -292,7 +292,7 @@ mod tests {
             stamp: Some(stamp),
             nonce: Some(0x0102_0304_0506_0708),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed: true,
             ..header()
         };
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_of_64_bytes_spends_at_most_14_on_everything_but_payload() {
+    fn a_frame_of_64_bytes_has_50_bytes_of_payload() {
         let mut b = FrameBuilder::new(&header(), 64);
         let payload = vec![1; room_for_payload(b.room())];
         assert!(b.push(ChunkKind::Map, &payload));

@@ -1,20 +1,20 @@
 //! The header of a frame.
 
 use super::ack::AckStatement;
-use super::cursor::Reader;
 use super::frame::FrameError;
 use super::stamp::Stamp;
 use super::{MAX_WINDOW, WIRE_VERSION};
+use crate::bytes::Reader;
 use std::num::NonZeroU16;
 
-/// Who speaks or is spoken to: 0 the surface, 1..=14 vehicles, 15 everybody.
+/// The address of an end: 0 is the surface, 1..=14 are vehicles, 15 is everybody.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address(u8);
 
 impl Address {
-    /// The surface end.
+    /// The address of the surface end.
     pub const SURFACE: Self = Self(0);
-    /// Every vehicle that hears it; never a sender.
+    /// All vehicles; never a sender.
     pub const EVERYBODY: Self = Self(15);
 
     /// The vehicle with this number; `None` outside 1..=14.
@@ -27,29 +27,49 @@ impl Address {
         (1..=14).contains(&self.0)
     }
 
-    /// The number on the wire.
+    /// The number on the wire, 0..=15.
     pub fn number(self) -> u8 {
         self.0
     }
 }
 
-/// Keeps missions apart that share the water: it seeds every check, so a frame of another mission does not verify.
+/// Separates missions on one channel. It enters every seal, so a frame of another mission does not verify.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct MissionId(pub u32);
 
-/// Random number of one run of one end; 0 is never drawn.
+/// A random number of one run of one end; never 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SessionId(NonZeroU16);
 
 impl SessionId {
-    /// A session id from 16 random bits.
+    /// A session id from 16 random bits; 0 becomes 65 535.
     pub fn from_random(bits: u16) -> Self {
         Self(NonZeroU16::new(bits).unwrap_or(NonZeroU16::MAX))
     }
 
-    /// The number on the wire.
+    /// The number on the wire, never 0.
     pub fn get(self) -> u16 {
         self.0.get()
+    }
+}
+
+/// The two kinds of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// Names the session of the sender; it has neither an acknowledgement statement nor chunks, and its number is 0.
+    Hello,
+    /// Belongs to a session of both ends, in which it has a number.
+    Numbered,
+}
+
+impl FrameKind {
+    pub(crate) fn hello_if(is_hello: bool) -> Self {
+        if is_hello { Self::Hello } else { Self::Numbered }
+    }
+
+    /// Whether the frame is a hello.
+    pub fn is_hello(self) -> bool {
+        self == Self::Hello
     }
 }
 
@@ -69,7 +89,7 @@ impl SessionId {
 /// +-------------------------------+---------------+---------------+
 /// A          an ack statement is present
 /// T          a turn byte is present
-/// H          hello: the sender tells its session; such a frame has no ack statement and no chunks
+/// H          hello: the sender names its session; such a frame has no ack statement and no chunks
 /// S          a time stamp is present
 /// K          keyed: the frame ends in a tag of 8 bytes under the mission's key instead of a CRC; a hello then has a nonce
 /// number     of this frame in the pair of sessions, wraps; the first is 1. In a hello: 0
@@ -83,29 +103,29 @@ impl SessionId {
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// Sender.
+    /// The address of the sending end.
     pub from: Address,
-    /// Receiver.
+    /// The receiving end, or everybody.
     pub to: Address,
-    /// The sender's session.
+    /// The session of the sender's run.
     pub session: SessionId,
-    /// Low 16 bits of the frame's number.
+    /// Low 16 bits of the frame's number; 0 in a hello.
     pub number: u16,
-    /// `number` minus the sender's horizon.
+    /// `number` minus the sender's horizon, 1..=2048.
     pub base: u16,
-    /// What follows in this turn.
+    /// Bits or frames that follow in this turn, as above.
     pub remaining: u8,
-    /// The turn byte.
+    /// The turn byte, as above.
     pub turn: Option<u8>,
-    /// When the frame was sent.
+    /// The sender's clock at transmission.
     pub stamp: Option<Stamp>,
-    /// Random number of the sender's run; in a keyed hello.
+    /// The random number of the sender's run; only in a keyed hello.
     pub nonce: Option<u64>,
-    /// What the sender says of the frames it heard from the receiver.
+    /// The verdict on the receiver's frames.
     pub ack: Option<AckStatement>,
-    /// Whether the frame only tells the sender's session.
-    pub hello: bool,
-    /// Whether the frame ends in a tag.
+    /// Whether the frame opens a session or belongs to one.
+    pub kind: FrameKind,
+    /// Whether the frame ends in a tag instead of a CRC.
     pub keyed: bool,
 }
 
@@ -116,7 +136,7 @@ const STAMP: u8 = 0b10;
 const KEYED: u8 = 0b1;
 
 impl Header {
-    /// Reads the header of a frame that `to_us` says is ours; nothing is verified yet.
+    /// Reads the header of a frame if `to_us` selects its receiver; the frame is not verified yet.
     pub(super) fn decode(r: &mut Reader<'_>, to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
         let flags = r.u8()?;
         if flags >> 5 != WIRE_VERSION {
@@ -138,25 +158,25 @@ impl Header {
         }
         let remaining = r.u8()?;
         let has = |bit: u8| flags & bit != 0;
-        let (hello, keyed) = (has(HELLO), has(KEYED));
+        let (kind, keyed) = (FrameKind::hello_if(has(HELLO)), has(KEYED));
         let turn = has(TURN).then(|| r.u8()).transpose()?;
         let stamp = has(STAMP).then(|| Stamp::decode(from, r)).transpose()?;
-        let nonce = (hello && keyed).then(|| r.u64()).transpose()?;
+        let nonce = (kind.is_hello() && keyed).then(|| r.u64()).transpose()?;
         let ack = has(ACK).then(|| AckStatement::decode(r)).transpose()?;
-        Ok(Self { from, to, session, number, base, remaining, turn, stamp, nonce, ack, hello, keyed })
+        Ok(Self { from, to, session, number, base, remaining, turn, stamp, nonce, ack, kind, keyed })
     }
 
-    /// The first byte but for the bit of the ack statement.
+    /// The first byte without the bit of the acknowledgement statement.
     pub(super) fn flags(&self) -> u8 {
         let bit = |on: bool, bit: u8| if on { bit } else { 0 };
         WIRE_VERSION << 5
             | bit(self.turn.is_some(), TURN)
-            | bit(self.hello, HELLO)
+            | bit(self.kind.is_hello(), HELLO)
             | bit(self.stamp.is_some(), STAMP)
             | bit(self.keyed, KEYED)
     }
 
-    /// Appends everything up to the ack statement; returns where the count of what remains stands.
+    /// Appends everything up to the acknowledgement statement; returns the index of the `remaining` byte.
     pub(super) fn encode(&self, out: &mut Vec<u8>) -> usize {
         out.extend_from_slice(&[self.flags(), self.from.0 << 4 | self.to.0]);
         out.extend_from_slice(&self.session.get().to_be_bytes());
@@ -178,6 +198,6 @@ impl Header {
         remaining_at
     }
 
-    /// The bit that says that an ack statement is present.
+    /// The bit that marks an acknowledgement statement.
     pub(super) const ACK_FLAG: u8 = ACK;
 }

@@ -1,11 +1,10 @@
-//! Bits on the water: frames, their acknowledgements, their chunks.
+//! The wire format: frames, acknowledgement statements and chunks.
 //!
 //! Multi-byte integers are big-endian. Diagrams count bits from the most significant one of the first byte.
 
 mod ack;
 mod backlog;
 mod chunk;
-mod cursor;
 mod frame;
 mod header;
 mod number;
@@ -14,17 +13,17 @@ mod placement;
 mod stamp;
 mod status;
 
+pub use crate::bytes::{Reader, Truncated};
 pub use ack::{AckStatement, MAX_WINDOW};
 pub use backlog::Backlog;
 pub use chunk::{Chunk, ChunkKind, Chunks, MAX_CHUNK_HEADER, chunk_header_len, room_for_payload};
-pub use cursor::{Reader, Truncated};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
-pub use header::{Address, Header, MissionId, SessionId};
+pub use header::{Address, FrameKind, Header, MissionId, SessionId};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;
 pub use stamp::Stamp;
-pub use status::{ModeReason, SlotReport, SlotState, StatusError, VehicleMode, VehicleStatus};
+pub use status::{ModeReason, StatusError, VehicleMode, VehicleStatus};
 
-/// Version of the wire; a frame of another version is counted and dropped.
+/// The version of the wire format; a frame of another version is counted and dropped.
 pub const WIRE_VERSION: u8 = 2;

@@ -1,4 +1,4 @@
-//! Sixteen-bit frame numbers on the wire, unbounded ones inside.
+//! Frame numbers: 16 bits on the wire, unbounded inside.
 
 /// The unbounded number nearest to `near` whose low 16 bits are `low`.
 pub fn unwrap_number(low: u16, near: u64) -> u64 {
@@ -11,7 +11,7 @@ mod tests {
     use super::unwrap_number;
 
     #[test]
-    fn numbers_unwrap_across_the_turn_of_the_counter() {
+    fn numbers_unwrap_across_a_wrap_of_the_counter() {
         assert_eq!(unwrap_number(3, 65_530), 65_539);
         assert_eq!(unwrap_number(65_530, 65_540), 65_530);
         assert_eq!(unwrap_number(5, 5), 5);

@@ -1,86 +1,88 @@
-//! The way that the vehicle plans to go after its waypoint.
+//! The path that the vehicle plans after its waypoint.
 
-use super::status::decimetres;
-use crate::directive::Place;
-use crate::directive::steps::{minus, plus, put_pair, take_pair, take_width, width_of};
-use crate::map_codec::bits::{BitReader, BitWriter};
+use crate::bytes::{BitReader, BitWriter, DecimetreStep, decimetres, take_width, width_of};
+use crate::coordinates::MapPoint;
 
-/// Waypoints after the one in force, as planned when the pose was written.
+/// The waypoints after the current one, as planned when the pose was written; in the map frame.
 ///
 /// ```text
-///  bits     1       3     5          2w             0 to 7
-///       +---------+---+------+------------------+-------
-///       | goes on | n | w    | dx, dy, for each | zeros
-///       +---------+---+------+------------------+-------
+///  bits      1       3     5          2w             0 to 7
+///       +-----------+---+------+------------------+-------
+///       | continues | n | w    | dx, dy, for each | zeros
+///       +-----------+---+------+------------------+-------
 /// ```
-/// * goes on: the plan has more waypoints than are told. n: those that are, 0 to 7.
-/// * w: bits of a difference, 1 to 25, two's complement, decimetres, as few as do; left out if n is 0.
-/// * dx, dy: from the waypoint before, never both 0.
+/// * continues: the plan has more waypoints than these n, 0 to 7.
+/// * w: bits of a difference, 1 to 25, two's complement, decimetres, the fewest that hold all; left out if n is 0.
+/// * dx, dy: from the previous waypoint, never both 0.
 ///
-/// A path of which nothing is to be said takes no byte. Source: vehicle, at the end of a pose with a waypoint, in the map's
-/// frame as that is. Seven legs of up to 6.3 m take 14 bytes, of up to 819 m 26.
+/// An empty path that does not continue takes no byte. Source: vehicle, at the end of a pose with a waypoint. Seven
+/// legs of up to 6.3 m take 14 bytes, of up to 819 m 26.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlannedPath {
-    /// East and north, metres; the first is gone to from the waypoint in force.
-    pub places: Vec<(f64, f64)>,
+    /// The waypoints in their order, at most [`Self::MAX_POINTS`] on the wire.
+    pub points: Vec<MapPoint>,
     /// Whether the plan has more waypoints than these.
-    pub goes_on: bool,
+    pub continues: bool,
 }
 
 impl PlannedPath {
-    /// Most waypoints that are told after the one in force.
-    pub const MOST: usize = 7;
+    /// The most waypoints that a pose has after the current one.
+    pub const MAX_POINTS: usize = 7;
 
-    /// At most `room` bytes of it, after a waypoint: as many places as fit, and that it goes on if not all do.
-    pub(super) fn encode(&self, waypoint: (f64, f64), room: usize) -> Vec<u8> {
-        let mut before = place(waypoint);
+    /// Encodes as many waypoints as fit into `room` bytes.
+    pub(super) fn encode(&self, waypoint: MapPoint, room: usize) -> Vec<u8> {
+        let mut before = step_to(waypoint);
         let mut steps = Vec::new();
-        for next in self.places.iter().map(|&p| place(p)) {
-            let step = minus(next, before);
-            if step != Place::default() {
+        for next in self.points.iter().map(|&p| step_to(p)) {
+            let step = next.since(before);
+            if step != DecimetreStep::default() {
                 steps.push(step);
             }
             before = next;
         }
-        let told = (0..=steps.len().min(Self::MOST)).rev().find_map(|n| {
+        let told = (0..=steps.len().min(Self::MAX_POINTS)).rev().find_map(|n| {
             let (told, rest) = steps.split_at_checked(n)?;
-            Some(write(told, self.goes_on || !rest.is_empty())).filter(|bytes| bytes.len() <= room)
+            Some(write(told, self.continues || !rest.is_empty())).filter(|bytes| bytes.len() <= room)
         });
         told.unwrap_or_default()
     }
 
-    /// Reads what follows a waypoint; `None` if no vehicle writes that.
-    pub(super) fn decode(bytes: &[u8], waypoint: (f64, f64)) -> Option<Self> {
+    /// Decodes the bytes after a waypoint; `None` if no vehicle writes them.
+    pub(super) fn decode(bytes: &[u8], waypoint: MapPoint) -> Option<Self> {
         let mut bits = BitReader::new(bytes);
-        let goes_on = bits.bit()?;
+        let continues = bits.bit()?;
         let n = bits.take(3)?;
         let width = if n > 0 { take_width(&mut bits)? } else { 1 };
-        let mut read = Self { places: Vec::new(), goes_on };
-        let mut at = place(waypoint);
+        let mut read = Self { points: Vec::new(), continues };
+        let mut at = step_to(waypoint);
         for _ in 0..n {
-            at = plus(at, take_pair(&mut bits, width)?);
-            read.places.push(at.metres());
+            at = at.plus(DecimetreStep::take(&mut bits, width)?);
+            read.points.push(point_at(at));
         }
-        // There is one way to write a path.
+        // Each path has exactly one encoding.
         (read.encode(waypoint, usize::MAX) == bytes).then_some(read)
     }
 }
 
-fn place((x_m, y_m): (f64, f64)) -> Place {
-    Place { x_dm: decimetres(x_m), y_dm: decimetres(y_m) }
+fn step_to(point: MapPoint) -> DecimetreStep {
+    DecimetreStep { x_dm: decimetres(point.x_m), y_dm: decimetres(point.y_m) }
 }
 
-fn write(steps: &[Place], goes_on: bool) -> Vec<u8> {
-    if steps.is_empty() && !goes_on {
+fn point_at(step: DecimetreStep) -> MapPoint {
+    MapPoint { x_m: f64::from(step.x_dm) / 10.0, y_m: f64::from(step.y_dm) / 10.0 }
+}
+
+fn write(steps: &[DecimetreStep], continues: bool) -> Vec<u8> {
+    if steps.is_empty() && !continues {
         return Vec::new();
     }
     let mut bits = BitWriter::default();
-    bits.bit(goes_on);
+    bits.bit(continues);
     bits.put(steps.len() as u64, 3);
     if !steps.is_empty() {
         let width = width_of(steps.iter().copied());
         bits.put(u64::from(width), 5);
-        steps.iter().for_each(|&step| put_pair(&mut bits, step, width));
+        steps.iter().for_each(|&step| step.put(&mut bits, width));
     }
     bits.into_bytes()
 }
@@ -90,10 +92,10 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const FROM: (f64, f64) = (1.0, -2.0);
+    const FROM: MapPoint = MapPoint::new(1.0, -2.0);
 
-    fn path(places: &[(f64, f64)], goes_on: bool) -> PlannedPath {
-        PlannedPath { places: places.to_vec(), goes_on }
+    fn path(points: &[(f64, f64)], continues: bool) -> PlannedPath {
+        PlannedPath { points: points.iter().map(|&(x, y)| MapPoint::new(x, y)).collect(), continues }
     }
 
     #[test]
@@ -114,31 +116,31 @@ mod tests {
     }
 
     #[test]
-    fn what_no_vehicle_writes_is_refused() {
+    fn unusual_encodings_of_a_path_are_refused() {
         let wider_than_need_be = [0x23, 0x8E, 0xE5, 0x88, 0x00];
         let (nothing, standing_still, padded) = ([0x00], [0x10, 0x80], [0x23, 0x1D, 0x94, 0x40, 0x01]);
         let (zero_wide, cut, too_long) = ([0x10, 0x00], [0x23, 0x1D], [0x80, 0x00]);
         for bytes in [&wider_than_need_be[..], &nothing, &standing_still, &padded, &zero_wide, &cut, &too_long, &[]] {
             assert_eq!(PlannedPath::decode(bytes, FROM), None, "{bytes:02X?}");
         }
-        let far = (838_860.7, 0.0);
-        let east = path(&[(838_860.7, 5.0)], false).encode((838_860.0, 5.0), 99);
-        assert!(PlannedPath::decode(&east, (0.0, 0.0)).is_some());
+        let far = MapPoint::new(838_860.7, 0.0);
+        let east = path(&[(838_860.7, 5.0)], false).encode(MapPoint::new(838_860.0, 5.0), 99);
+        assert!(PlannedPath::decode(&east, MapPoint::default()).is_some());
         assert_eq!(PlannedPath::decode(&east, far), None, "beyond the reach of the wire");
     }
 
     proptest! {
         #[test]
-        fn as_much_as_fits_the_room_comes_back_and_the_rest_is_said_to_follow(
+        fn a_path_is_cut_to_the_room_and_marked(
             steps in proptest::collection::vec((-30_000i32..30_000, -300i32..300), 0..12),
-            goes_on: bool,
+            continues: bool,
             room in 0usize..60,
         ) {
-            let mut at = place(FROM);
-            let mut whole = path(&[], goes_on);
+            let mut at = step_to(FROM);
+            let mut whole = path(&[], continues);
             for (x_dm, y_dm) in steps.into_iter().filter(|&s| s != (0, 0)) {
-                at = plus(at, Place { x_dm, y_dm });
-                whole.places.push(at.metres());
+                at = at.plus(DecimetreStep { x_dm, y_dm });
+                whole.points.push(point_at(at));
             }
             let bytes = whole.encode(FROM, room);
             prop_assert!(bytes.len() <= room);
@@ -147,11 +149,11 @@ mod tests {
                 prop_assert!(room == 0 || whole == PlannedPath::default());
                 return Ok(());
             };
-            let told = read.places.len();
-            prop_assert!(told <= PlannedPath::MOST);
-            prop_assert_eq!(&read.places[..], &whole.places[..told]);
-            prop_assert_eq!(read.goes_on, goes_on || told < whole.places.len());
-            prop_assert!(room < 46 || told == whole.places.len().min(PlannedPath::MOST));
+            let told = read.points.len();
+            prop_assert!(told <= PlannedPath::MAX_POINTS);
+            prop_assert_eq!(&read.points[..], &whole.points[..told]);
+            prop_assert_eq!(read.continues, continues || told < whole.points.len());
+            prop_assert!(room < 46 || told == whole.points.len().min(PlannedPath::MAX_POINTS));
         }
 
         #[test]

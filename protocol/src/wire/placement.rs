@@ -1,8 +1,9 @@
-//! Where the vehicle's map lies in the world.
+//! The placement of the vehicle's map in the world.
 
-use super::cursor::{Reader, Truncated};
+use crate::bytes::{Reader, Truncated, decimetres, put24};
+use crate::coordinates::{MapPoint, WorldPoint};
 
-/// The map's frame seen from the world's: by how much the map must be moved to lie where it belongs.
+/// The shift from the map frame to the world frame.
 ///
 /// ```text
 /// byte  bits  field    unit, range
@@ -11,49 +12,58 @@ use super::cursor::{Reader, Truncated};
 ///  4-6  24    north    decimetres, signed
 /// ```
 ///
-/// Both frames have x east and y north. The map's is the vehicle's own reckoning, in which cells are never binned anew;
-/// the world's is the plane that touches the Earth at the mission's origin. Source: vehicle, at the end of a report.
+/// In both frames x points east and y north. The map frame is the vehicle's dead reckoning, in which no cell ever
+/// moves. The world frame is the tangent plane at the mission's origin. Source: vehicle, at the end of a report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Counts the moves.
+    /// Counts the moves, 1 to 255 and then from 1 again.
     pub version: u8,
-    /// Add to x of the map's frame, metres.
-    pub east_m: f64,
-    /// Add to y of the map's frame, metres.
-    pub north_m: f64,
+    /// The map frame's origin in the world frame.
+    pub origin: WorldPoint,
 }
 
 impl Placement {
-    /// Bytes on the wire.
+    /// Length on the wire in bytes.
     pub const BYTES: usize = 7;
 
-    /// A place of the map's frame in the world's.
-    pub fn to_world(&self, (x_m, y_m): (f64, f64)) -> (f64, f64) {
-        (x_m + self.east_m, y_m + self.north_m)
+    /// Converts a point of the map frame into the world frame.
+    pub fn to_world(&self, at: MapPoint) -> WorldPoint {
+        WorldPoint { east_m: at.x_m + self.origin.east_m, north_m: at.y_m + self.origin.north_m }
     }
 
-    /// A place of the world's frame in the map's.
-    pub fn to_map(&self, (x_m, y_m): (f64, f64)) -> (f64, f64) {
-        (x_m - self.east_m, y_m - self.north_m)
+    /// Converts a point of the world frame into the map frame.
+    pub fn to_map(&self, at: WorldPoint) -> MapPoint {
+        MapPoint { x_m: at.east_m - self.origin.east_m, y_m: at.north_m - self.origin.north_m }
     }
 
-    /// What the next move makes of it, in whole decimetres: both ends place the map at the same spot.
-    pub fn moved_to(before: Option<Self>, east_m: f64, north_m: f64) -> Self {
+    /// As [`Self::to_world`]. A map without a placement has not moved: the origins of both frames coincide.
+    pub fn map_to_world(placement: Option<Self>, at: MapPoint) -> WorldPoint {
+        placement.map_or(WorldPoint { east_m: at.x_m, north_m: at.y_m }, |p| p.to_world(at))
+    }
+
+    /// As [`Self::to_map`]. A map without a placement has not moved: the origins of both frames coincide.
+    pub fn world_to_map(placement: Option<Self>, at: WorldPoint) -> MapPoint {
+        placement.map_or(MapPoint { x_m: at.east_m, y_m: at.north_m }, |p| p.to_map(at))
+    }
+
+    /// The placement after the next move, rounded to whole decimetres, so that both ends use the same numbers.
+    pub fn moved_to(before: Option<Self>, origin: WorldPoint) -> Self {
         let version = before.map_or(0, |p| p.version).wrapping_add(1).max(1);
         let whole = |metres: f64| (metres * 10.0).round() / 10.0;
-        Self { version, east_m: whole(east_m), north_m: whole(north_m) }
+        Self { version, origin: WorldPoint { east_m: whole(origin.east_m), north_m: whole(origin.north_m) } }
     }
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.push(self.version.max(1));
-        super::status::put24(out, super::status::decimetres(self.east_m) as u32);
-        super::status::put24(out, super::status::decimetres(self.north_m) as u32);
+        put24(out, decimetres(self.origin.east_m) as u32);
+        put24(out, decimetres(self.origin.north_m) as u32);
     }
 
-    /// `None` is a version that no vehicle writes.
+    /// `None` stands for version 0, which no vehicle writes.
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Option<Self>, Truncated> {
         let version = r.u8()?;
-        let read = Self { version, east_m: f64::from(r.i24()?) / 10.0, north_m: f64::from(r.i24()?) / 10.0 };
+        let origin = WorldPoint { east_m: f64::from(r.i24()?) / 10.0, north_m: f64::from(r.i24()?) / 10.0 };
+        let read = Self { version, origin };
         Ok((version != 0).then_some(read))
     }
 }
@@ -64,18 +74,18 @@ mod tests {
 
     #[test]
     fn golden_bytes_of_a_placement() {
-        let placement = Placement { version: 3, east_m: 12.5, north_m: -0.1 };
+        let placement = Placement { version: 3, origin: WorldPoint::new(12.5, -0.1) };
         let mut bytes = Vec::new();
         placement.encode(&mut bytes);
         assert_eq!(bytes, [3, 0, 0, 125, 0xFF, 0xFF, 0xFF]);
         assert_eq!(Placement::decode(&mut Reader::new(&bytes)), Ok(Some(placement)));
-        assert_eq!(placement.to_map(placement.to_world((4.0, 5.0))), (4.0, 5.0));
+        assert_eq!(placement.to_map(placement.to_world(MapPoint::new(4.0, 5.0))), MapPoint::new(4.0, 5.0));
     }
 
     #[test]
-    fn versions_count_the_moves_and_leave_zero_out() {
-        let first = Placement::moved_to(None, 1.0, 2.0);
+    fn versions_count_the_moves_and_skip_zero() {
+        let first = Placement::moved_to(None, WorldPoint::new(1.0, 2.0));
         assert_eq!(first.version, 1);
-        assert_eq!(Placement::moved_to(Some(Placement { version: 255, ..first }), 0.0, 0.0).version, 1);
+        assert_eq!(Placement::moved_to(Some(Placement { version: 255, ..first }), WorldPoint::default()).version, 1);
     }
 }

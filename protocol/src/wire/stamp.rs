@@ -1,14 +1,14 @@
-//! Time stamps, so that each end can tell how far away the other is and what its clock says.
+//! Time stamps, from which each end estimates the propagation time and the other end's clock.
 
-use super::cursor::{Reader, Truncated};
 use super::header::Address;
+use crate::bytes::{Reader, Truncated};
 use crate::time::Instant;
 use std::time::Duration;
 
-/// Milliseconds of a clock since any origin, low 24 bits: they come round after 4 h 39 min.
+/// Bits of a clock reading in milliseconds; it wraps every 4 h 39 min.
 const CLOCK_BITS: u32 = 24;
 
-/// When a frame was sent, by the sender's clock.
+/// The time of a transmission by the sender's clock.
 ///
 /// ```text
 /// from the surface, 5 bytes
@@ -18,43 +18,43 @@ const CLOCK_BITS: u32 = 24;
 ///
 /// from a vehicle, 6 bytes
 ///  0-2  clock when the transmission of this frame began   milliseconds, low 24 bits
-///  3    number of the surface's frame that was heard last, low 8 bits
+///  3    number of the surface's last received frame, low 8 bits
 ///  4-5  from the end of its reception to the beginning of this frame   milliseconds, 65 535 = that or more
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// Of the surface.
+    /// A stamp in a frame of the surface.
     Surface {
-        /// Clock, milliseconds, low 24 bits.
+        /// Clock in milliseconds, low 24 bits.
         clock_ms: u32,
-        /// One-way propagation, if it is known.
+        /// One-way propagation time, once it was measured.
         one_way: Option<Duration>,
     },
-    /// Of a vehicle.
+    /// A stamp in a frame of a vehicle.
     Vehicle {
-        /// Clock, milliseconds, low 24 bits.
+        /// Clock in milliseconds, low 24 bits.
         clock_ms: u32,
-        /// Low 8 bits of the number of the surface's frame that was heard last.
+        /// Low 8 bits of the number of the surface's last received frame.
         heard: u8,
-        /// Time since the end of its reception.
+        /// Time since the end of that reception, at most [`Stamp::MAX_HELD`].
         held: Duration,
     },
 }
 
 impl Stamp {
-    /// Bytes of a surface's stamp.
+    /// Length of the surface's stamp in bytes.
     pub const SURFACE_BYTES: usize = 5;
-    /// What a vehicle says that has held a frame for so long or longer.
-    pub const LONGEST_HELD: Duration = Duration::from_millis(u16::MAX as u64);
-    /// Bytes of a vehicle's stamp.
+    /// The largest `held`, which stands for this time or a longer one.
+    pub const MAX_HELD: Duration = Duration::from_millis(u16::MAX as u64);
+    /// Length of a vehicle's stamp in bytes.
     pub const VEHICLE_BYTES: usize = 6;
 
-    /// What the clock shows on the wire at `now`.
+    /// The clock reading at `now`, as on the wire.
     pub fn clock(now: Instant) -> u32 {
         (now.as_micros() / 1000) as u32 & ((1 << CLOCK_BITS) - 1)
     }
 
-    /// The moment nearest to `near`, by the clock that wrote it, at which it showed `clock_ms`; in microseconds.
+    /// The time in microseconds by the clock that showed `clock_ms`, as near to `near_us` as possible.
     pub fn unwrap_clock(clock_ms: u32, near_us: i64) -> i64 {
         let turn = 1_000_i64 << CLOCK_BITS;
         let at = i64::from(clock_ms) * 1000;
@@ -62,7 +62,7 @@ impl Stamp {
         at + turns * turn
     }
 
-    /// Sender's clock, milliseconds, low 24 bits.
+    /// The sender's clock in milliseconds, low 24 bits.
     pub fn clock_ms(&self) -> u32 {
         match *self {
             Self::Surface { clock_ms, .. } | Self::Vehicle { clock_ms, .. } => clock_ms,

@@ -1,26 +1,27 @@
 //! The vehicle's status.
 
 use super::backlog::Backlog;
-use super::cursor::{Reader, Truncated};
 use super::path::PlannedPath;
 use super::placement::Placement;
-use crate::directive::{RefusalReason, SLOTS, SlotId};
+use crate::bytes::{Reader, Truncated, decimetres, put24};
+use crate::coordinates::MapPoint;
+use crate::directive::{SLOTS, SlotId, SlotReport, SlotState};
 
-/// What the vehicle is doing.
+/// The activity of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum VehicleMode {
-    /// Flying its survey.
+    /// The survey is in progress.
     #[default]
     Survey,
-    /// Staying where it is.
+    /// The vehicle stays at its position.
     Hold,
-    /// On its way to the return point.
+    /// The vehicle is on its return path.
     Return,
-    /// On its way up.
+    /// The vehicle rises to the water surface.
     Surface,
-    /// Stopped by an abort.
+    /// An abort has stopped the vehicle.
     Abort,
-    /// The survey is over.
+    /// The survey is complete, and the vehicle stays.
     Done,
 }
 
@@ -32,38 +33,38 @@ impl VehicleMode {
     }
 }
 
-/// Why the vehicle does what it does.
+/// The reason for the vehicle's mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ModeReason {
-    /// Nothing is amiss.
+    /// The survey's plan; there is no fault.
     #[default]
     Survey,
-    /// The operator ordered it.
+    /// An order of the operator.
     Order,
-    /// It is outside the fence or in a keep-out.
+    /// The vehicle is outside the fence or in a keep-out.
     Fence,
-    /// The distance that it may go is used up but for the way back.
+    /// The rest of the allowed distance is needed for the return path.
     Distance,
-    /// The time that it may take is used up but for the way back.
+    /// The rest of the allowed time is needed for the return path.
     Time,
     /// The surface was silent for longer than allowed.
     Silence,
-    /// It is outside the depth band or the altitude band.
+    /// The vehicle is outside the depth band or the altitude band.
     Band,
-    /// There is nowhere that it may go.
-    NoWay,
+    /// There is no allowed path to any goal.
+    NoPath,
 }
 
 impl ModeReason {
     const ALL: [Self; 8] =
-        [Self::Survey, Self::Order, Self::Fence, Self::Distance, Self::Time, Self::Silence, Self::Band, Self::NoWay];
+        [Self::Survey, Self::Order, Self::Fence, Self::Distance, Self::Time, Self::Silence, Self::Band, Self::NoPath];
 
-    /// The reason of a number on the wire; `None` for no reason and for what is no number of one.
+    /// The reason with this number on the wire; `None` for the survey and for unknown numbers.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(usize::from(code)).copied().filter(|r| *r != Self::Survey)
     }
 
-    /// Name for people; `None` if nothing is amiss.
+    /// The name for people; `None` for the survey.
     pub fn name(self) -> Option<&'static str> {
         match self {
             Self::Survey => None,
@@ -73,42 +74,21 @@ impl ModeReason {
             Self::Time => Some("time"),
             Self::Silence => Some("silence"),
             Self::Band => Some("depth or altitude"),
-            Self::NoWay => Some("no way"),
+            Self::NoPath => Some("no path"),
         }
     }
 }
 
-/// What became of a slot of the directive at the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SlotState {
-    /// Never received in this session of the surface.
-    #[default]
-    Unknown,
-    /// In force.
-    Applied,
-    /// Refused; the vehicle keeps what it had.
-    Refused(RefusalReason),
-}
-
-/// The latest version of a slot that the vehicle decided about, and how.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SlotReport {
-    /// Low 8 bits of the version.
-    pub version_low: u8,
-    /// The decision.
-    pub state: SlotState,
-}
-
-/// What the vehicle says of itself, in two chunks that each fit a small frame.
+/// The vehicle's status, in two chunks that each fit a small frame.
 ///
 /// ```text
 /// pose
 /// byte  bits  field                 unit, range
 ///  0    3     mode                  0 survey, 1 hold, 2 return, 3 surface, 4 abort, 5 done
 ///  0    1     a waypoint follows
-///  0    1     the autopilot does not answer: nobody carries out what the mode says
-///  0    3     why                   0 by the survey, 1 order, 2 fence, 3 distance, 4 time, 5 silence, 6 depth or
-///                                   altitude, 7 no way
+///  0    1     the autopilot does not answer, so the mode is not carried out
+///  0    3     reason                0 by the survey, 1 order, 2 fence, 3 distance, 4 time, 5 silence, 6 depth or
+///                                   altitude, 7 no path
 ///  1-3  24    x east                decimetres, signed, +-838 km
 ///  4-6  24    y north               decimetres, signed
 ///  7-8  16    depth                 decimetres below the surface, 0..6553.5 m
@@ -117,7 +97,7 @@ pub struct SlotReport {
 /// 11    8     age of the last fix   seconds, 254 = that or more, 255 = no fix yet
 /// 12-14 24    explored cells
 /// 15-20 48    [waypoint x, y]       decimetres, signed
-/// 21..        [what is planned after it, see `PlannedPath`]; only after a waypoint
+/// 21..        [planned path, see `PlannedPath`]; only after a waypoint
 ///
 /// report
 ///  0    8     label epoch
@@ -125,60 +105,59 @@ pub struct SlotReport {
 ///  2-3  16    digest of the map that the surface is known to hold (the base of this frame)
 ///  4-5  16    budget in force       bits a second: 12 bits of value, then 4 bits by how many it is shifted left
 ///  6    8     frames refused for want of authenticity, 255 = that or more
-///  7-8  16    what waits to be sent, see `Backlog`
-///  9    8     slots that are reported of, a bit each, the first slot in the highest bit
+///  7-8  16    backlog, see `Backlog`
+///  9    8     slots in this report, a bit each, the first slot in the highest bit
 /// 10..  8     version of each of them, low 8 bits
-/// then  4     what became of each of them: 1 applied, 2..9 refusal reason; the rest is refused; 4 bits 0 after an odd number
-/// 7 more      [where the map lies in the world, see `Placement`]; left out while it has not moved
+/// then  4     decision about each of them: 1 applied, 2..9 refusal reason; any other value is refused; after an odd number,
+///             4 bits 0
+/// 7 more      [placement of the map, see `Placement`]; left out while it has not moved
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
-    /// What it is doing.
+    /// The activity of the vehicle at present.
     pub mode: VehicleMode,
-    /// Whether its autopilot does not answer, so that nobody carries out what the mode says.
+    /// Whether the autopilot does not answer, so that the mode is not carried out.
     pub autopilot_silent: bool,
-    /// And why.
+    /// The reason for the mode.
     pub reason: ModeReason,
-    /// East of the origin, metres.
-    pub x_m: f64,
-    /// North of the origin, metres.
-    pub y_m: f64,
-    /// Depth below the surface, metres.
+    /// The estimated position in the map frame.
+    pub position: MapPoint,
+    /// Depth below the water surface in metres.
     pub depth_m: f64,
-    /// Heading clockwise from north, degrees in 0..360.
+    /// Heading clockwise from north in degrees, 0..360.
     pub heading_deg: f64,
-    /// Standard deviation of its position estimate, metres.
+    /// Standard deviation of the position estimate in metres.
     pub sigma_m: f64,
-    /// Seconds since the last position fix that it used; `None` if there was none.
+    /// Seconds since the last fix that was used; `None` before the first.
     pub fix_age_s: Option<f64>,
-    /// Where it is going, metres east and north.
-    pub waypoint: Option<(f64, f64)>,
-    /// Where it plans to go from there; told only with a waypoint.
+    /// The next goal of the vehicle, in the map frame.
+    pub waypoint: Option<MapPoint>,
+    /// The planned path after the waypoint; it is sent only with a waypoint.
     pub path: PlannedPath,
-    /// Explored cells on its map.
+    /// Number of explored cells on the map.
     pub explored_cells: u32,
-    /// Epoch of its label ids.
+    /// The epoch of the label ids.
     pub epoch: u8,
-    /// Labels on its map.
+    /// Number of labels on the map, 0..=254.
     pub labels: u8,
-    /// Digest of the map that it knows the surface to hold.
+    /// Digest of the map that the surface is known to hold.
     pub base_digest: u16,
-    /// Bits a second that it may send, with 12 bits of precision.
+    /// The bit budget in bit/s; the wire keeps its 12 leading bits.
     pub budget_bps: u32,
-    /// Frames that it refused because they were not authentic.
+    /// Frames refused because they were not authentic, at most 255.
     pub refused_frames: u8,
-    /// What it has still to send.
+    /// The content that still waits to be sent.
     pub backlog: Backlog,
     /// Decisions about the slots of the directive, by slot.
     pub slots: [SlotReport; SLOTS],
-    /// Where the map lies in the world; `None` while no fix has moved it.
+    /// The placement of the map; `None` while no fix has moved it.
     pub placement: Option<Placement>,
 }
 
-/// Why bytes are no status.
+/// Why bytes are not a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum StatusError {
-    /// Too short or too long.
+    /// They are too short or too long.
     #[error("the status has another length")]
     Length,
     /// A field has a value that no vehicle writes.
@@ -192,15 +171,11 @@ impl From<Truncated> for StatusError {
     }
 }
 
-pub(super) fn decimetres(metres: f64) -> i32 {
-    (metres * 10.0).round().clamp(-8_388_608.0, 8_388_607.0) as i32
+fn take_point(r: &mut Reader<'_>) -> Result<MapPoint, Truncated> {
+    Ok(MapPoint { x_m: f64::from(r.i24()?) / 10.0, y_m: f64::from(r.i24()?) / 10.0 })
 }
 
-pub(super) fn put24(out: &mut Vec<u8>, value: u32) {
-    out.extend_from_slice(value.to_be_bytes().get(1..).unwrap_or_default());
-}
-
-/// Bits a second as 12 bits of value and 4 bits of shift, rounded down.
+/// A rate in bit/s as 12 bits of value and 4 bits of shift, rounded down.
 fn code_rate(bits_per_s: u32) -> u16 {
     let shift = (32 - bits_per_s.leading_zeros()).saturating_sub(12).min(15);
     ((bits_per_s >> shift).min(0xFFF) << 4 | shift) as u16
@@ -211,38 +186,39 @@ fn decode_rate(code: u16) -> u32 {
 }
 
 impl VehicleStatus {
-    /// Bytes of a report without slots.
+    /// Length of a report without slots in bytes.
     const REPORT_HEAD: usize = 8 + Backlog::BYTES;
-    /// Bytes of a pose with a waypoint, without a path.
+    /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
 
-    /// The pose chunk; values out of range are clamped to it. The waypoint is left out if `room` is too small for it, and of
-    /// the path what does not fit.
+    /// Encodes the pose; values out of range are clamped. If `room` is too small, the waypoint or the end of
+    /// the path is left out.
     pub fn encode_pose(&self, room: usize) -> Vec<u8> {
         let waypoint = self.waypoint.filter(|_| room >= Self::POSE);
         let flags = u8::from(waypoint.is_some()) << 4 | u8::from(self.autopilot_silent) << 3;
         let mut out = vec![self.mode.code() << 5 | flags | self.reason as u8];
-        put24(&mut out, decimetres(self.x_m) as u32);
-        put24(&mut out, decimetres(self.y_m) as u32);
+        put24(&mut out, decimetres(self.position.x_m) as u32);
+        put24(&mut out, decimetres(self.position.y_m) as u32);
         out.extend_from_slice(&((self.depth_m * 10.0).round().clamp(0.0, 65_535.0) as u16).to_be_bytes());
         out.push(((self.heading_deg / 360.0 * 256.0).round() as i64 & 255) as u8);
         out.push((self.sigma_m * 4.0).round().clamp(0.0, 255.0) as u8);
         out.push(self.fix_age_s.map_or(255, |age| age.round().clamp(0.0, 254.0) as u8));
         put24(&mut out, self.explored_cells.min(0xFF_FFFF));
-        if let Some((x, y)) = waypoint {
-            put24(&mut out, decimetres(x) as u32);
-            put24(&mut out, decimetres(y) as u32);
-            out.extend(self.path.encode((x, y), room - Self::POSE));
+        if let Some(at) = waypoint {
+            put24(&mut out, decimetres(at.x_m) as u32);
+            put24(&mut out, decimetres(at.y_m) as u32);
+            out.extend(self.path.encode(at, room - Self::POSE));
         }
         out
     }
 
-    /// A report chunk of at most `room` bytes about the slots from `first` on and the placement, and the slot that the next
-    /// one has to begin with, 0 if all is said; `None` if not one slot fits that was decided about.
+    /// Encodes a report of at most `room` bytes on the decided slots from `first` on, and on the placement.
+    /// Also returns the slot with which the next report must begin, 0 if this one is complete. `None` means
+    /// that not even one slot fits.
     pub fn encode_report(&self, room: usize, first: usize) -> Option<(Vec<u8>, usize)> {
         let known = |&(_, s): &(usize, &SlotReport)| s.state != SlotState::Unknown;
         let decided: Vec<(usize, &SlotReport)> = self.slots.iter().enumerate().skip(first).filter(known).collect();
-        // A slot takes a byte and a half.
+        // A slot takes one and a half bytes.
         let fitting = room.saturating_sub(Self::REPORT_HEAD) * 2 / 3;
         let (told, left) = decided.split_at(fitting.min(decided.len()));
         if told.is_empty() && !left.is_empty() {
@@ -268,14 +244,13 @@ impl VehicleStatus {
         Some((out, next))
     }
 
-    /// Reads a pose; the rest stays as it is.
+    /// Decodes a pose into `self`; the fields of the report stay unchanged.
     pub fn read_pose(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
         let mode = VehicleMode::ALL.get(usize::from(head >> 5)).copied().ok_or(StatusError::BadField)?;
         let reason = ModeReason::ALL.get(usize::from(head & 7)).copied().ok_or(StatusError::BadField)?;
-        let metres = |dm: i32| f64::from(dm) / 10.0;
-        let mut read = Self { mode, reason, x_m: metres(r.i24()?), y_m: metres(r.i24()?), ..self.clone() };
+        let mut read = Self { mode, reason, position: take_point(&mut r)?, ..self.clone() };
         read.depth_m = f64::from(r.u16()?) / 10.0;
         read.heading_deg = f64::from(r.u8()?) / 256.0 * 360.0;
         read.sigma_m = f64::from(r.u8()?) / 4.0;
@@ -284,7 +259,7 @@ impl VehicleStatus {
         (read.waypoint, read.path) = (None, PlannedPath::default());
         read.autopilot_silent = head & 0b1000 != 0;
         if head & 0b1_0000 != 0 {
-            let waypoint = (metres(r.i24()?), metres(r.i24()?));
+            let waypoint = take_point(&mut r)?;
             read.waypoint = Some(waypoint);
             if !r.rest().is_empty() {
                 let path = r.take(r.rest().len())?;
@@ -298,7 +273,7 @@ impl VehicleStatus {
         Ok(())
     }
 
-    /// Reads a report; the rest stays as it is, and so do slots and the placement where it says nothing of them.
+    /// Decodes a report into `self`; other fields, and slots and placement that it does not have, stay unchanged.
     pub fn read_report(&mut self, bytes: &[u8]) -> Result<(), StatusError> {
         let mut r = Reader::new(bytes);
         let mut read = Self { epoch: r.u8()?, labels: r.u8()?, base_digest: r.u16()?, ..self.clone() };
@@ -327,28 +302,9 @@ impl VehicleStatus {
         Ok(())
     }
 
-    /// The report about one slot.
+    /// The decision about one slot.
     pub fn slot(&self, id: SlotId) -> SlotReport {
         self.slots.get(id.index()).copied().unwrap_or_default()
-    }
-}
-
-impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=9 a reason of refusal.
-    pub(crate) fn code(self) -> u8 {
-        match self {
-            Self::Unknown => 0,
-            Self::Applied => 1,
-            Self::Refused(reason) => reason.code(),
-        }
-    }
-
-    pub(crate) fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Unknown),
-            1 => Some(Self::Applied),
-            code => RefusalReason::from_code(code).map(Self::Refused),
-        }
     }
 }
 

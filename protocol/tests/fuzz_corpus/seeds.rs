@@ -1,7 +1,7 @@
-//! What the corpora begin with: what two ends say to each other, and chunks of three maps.
+//! The initial corpora: the traffic of two ends, and chunks of three maps.
 
 use super::targets::base;
-use super::targets::link::{End, Setup, Surface, planes};
+use super::targets::link::{FuzzEnd, Setup, Surface, planes};
 use super::targets::raw;
 use scenecast_protocol::map::{Cell, LabelGrid, MapSource};
 use scenecast_protocol::map_codec::{Codec, encode};
@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Corpus, name of the file, content.
 type Seed = (&'static str, String, Vec<u8>);
 
-/// Every file that is made, not found.
+/// Every file that is generated, not found by a fuzzer.
 pub fn all() -> Vec<Seed> {
     let mut seeds = [frames(), contents(), objects(), scripts(), golden(), map_chunks()].concat();
     seeds.iter_mut().for_each(|(_, _, data)| data.truncate(2000));
@@ -25,7 +25,7 @@ pub fn all() -> Vec<Seed> {
 const SETUPS: [(&str, u8); 6] =
     [("plain", 0), ("surface-keyed", 1), ("keyed", 2), ("encrypted", 3), ("pool", 8), ("polled", 12)];
 
-/// What both ends say over calm water: who, and the frame.
+/// The frames of both ends over a lossless channel, with their senders.
 fn traffic(setup: u8) -> Vec<(&'static str, Vec<u8>)> {
     let mut now = Instant::from_secs_f64(1000.0);
     let setup = Setup::new(setup);
@@ -44,7 +44,7 @@ fn traffic(setup: u8) -> Vec<(&'static str, Vec<u8>)> {
     said
 }
 
-fn turn(from: &mut impl End, to: &mut impl End, now: &mut Instant) -> Vec<Vec<u8>> {
+fn turn(from: &mut impl FuzzEnd, to: &mut impl FuzzEnd, now: &mut Instant) -> Vec<Vec<u8>> {
     *now = *now + Duration::from_millis(1500);
     from.poll(4, *now);
     let mut said = Vec::new();
@@ -137,7 +137,7 @@ fn chunks(body: &[u8]) -> Vec<(ChunkKind, Vec<u8>)> {
     frame.chunks().map(|c| (c.kind, c.payload.to_vec())).collect()
 }
 
-/// Scripts that say again what the true peer says, with what may happen in between.
+/// Scripts that repeat the frames of the true peer, with disturbances in between.
 fn scripts() -> Vec<Seed> {
     let mut seeds = Vec::new();
     for (name, setup) in SETUPS {
@@ -156,20 +156,20 @@ fn scripts() -> Vec<Seed> {
     seeds
 }
 
-/// A quarter second, the modem polls, the end speaks.
+/// A quarter second passes, the modem polls, the end transmits.
 const TURN: &[u8] = &[8, 5, 12, 4, 14, 30];
-/// The peer greets with a new run, hears the answer, and the host changes something.
+/// The peer sends a hello of a new run, receives the answer, and the host changes its state.
 const RESTART: &[u8] = &[5, 1, 7, 3, 20, 0, 1, 1, 14, 30, 13, 0, 9, 8, 20];
-/// Repeats, strays, noise, odd statements and numbers, a long silence.
+/// Repeats, strays, noise, unusual statements and numbers, a long silence.
 const STORM: &[u8] =
     &[7, 1, 6, 0, 1, 0, 2, 0x20, 0, 0, 3, 1, 2, 3, 2, 0x3B, 0, 2, 0x10, 1, 0, 9, 0, 1, 1, 0, 9, 7, 15, 0, 11, 0];
 
-/// A step with a frame that acknowledges everything, grants or wishes a turn, and carries `body`.
+/// A step with a frame that acknowledges all frames, grants or wishes a turn, and carries `body`.
 fn numbered(body: &[u8]) -> Vec<u8> {
     [&[1, 0x08, 40, 0, body.len() as u8], body].concat()
 }
 
-/// The same with the CRC of a mission without a key.
+/// As `numbered`, with the CRC of a mission without a key.
 fn forged(body: &[u8]) -> Vec<u8> {
     [&[6, 0x10, 40, 0, body.len() as u8], body].concat()
 }
@@ -179,7 +179,7 @@ fn body_of(bytes: &[u8]) -> Vec<u8> {
     bytes[raw::head(&envelope.header).len()..bytes.len() - Seal::bytes(false, bytes.len())].to_vec()
 }
 
-/// Bytes that the unit tests and the description of the wire name.
+/// Bytes in the unit tests and in the description of the wire.
 fn golden() -> Vec<Seed> {
     let losses = |lost: Vec<u16>| {
         let mut bytes = Vec::new();
@@ -247,7 +247,7 @@ fn map_chunks() -> Vec<Seed> {
     seeds
 }
 
-/// A base with a patch of new labels and a few lone flips.
+/// A base with a patch of new labels and a few isolated flips.
 fn change(choice: u8) -> (LabelGrid, LabelGrid) {
     let base = base(choice);
     let mut target = base.clone();

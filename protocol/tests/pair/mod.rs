@@ -1,9 +1,9 @@
-//! Two ends on a virtual clock with an unkind pipe between them.
+//! Two ends in virtual time with an unreliable channel between them.
 
-// Each test program uses a part of it.
+// Each test program uses a part of this module.
 #![allow(dead_code)]
 
-use scenecast_protocol::directive::{Constraints, Slot, Utility};
+use scenecast_protocol::directive::{Constraints, Slot, SlotState, Utility};
 use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
@@ -13,24 +13,24 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What the water does to frames.
+/// How the channel treats frames.
 #[derive(Debug, Clone)]
-pub(crate) struct Water {
+pub(crate) struct LossyChannel {
     pub(crate) loss: f64,
     pub(crate) duplication: f64,
     pub(crate) reordering: f64,
     pub(crate) corruption: f64,
-    /// Share of transmissions after which a stranger says something of its own, or repeats what it heard.
+    /// Share of transmissions after which a third party transmits noise or an overheard frame.
     pub(crate) talker: f64,
     pub(crate) propagation: Duration,
 }
 
-/// What the two ends have in common.
+/// The settings that both ends share.
 #[derive(Debug, Clone)]
 pub(crate) struct Setup {
     pub(crate) mission: MissionId,
@@ -39,7 +39,7 @@ pub(crate) struct Setup {
     pub(crate) codec: Codec,
     pub(crate) access: Access,
     pub(crate) authenticity: Option<Authenticity>,
-    /// How long a new label has to stand.
+    /// How long a new label must be stable.
     pub(crate) settle: Duration,
     /// The share of each plane in percent of the map's; `None`: no planes are sent.
     pub(crate) planes: Option<[u8; 2]>,
@@ -75,32 +75,32 @@ impl Setup {
     }
 }
 
-pub(crate) struct Pair {
+pub(crate) struct LinkedEnds {
     pub(crate) now: Instant,
-    /// Whether nothing of the surface (0) or of the vehicle (1) gets through.
+    /// Whether the frames of the surface (0) or of the vehicle (1) are all lost.
     pub(crate) mute: [bool; 2],
     pub(crate) vehicle: VehicleLink,
     pub(crate) surface: SurfaceLink,
-    pub(crate) water: Water,
+    pub(crate) channel: LossyChannel,
     pub(crate) audits: [Audit; 2],
-    /// Slots applied at the vehicle: series is constant a run of the surface, so versions must not repeat.
+    /// Slots applied at the vehicle. A run of the surface has one series, so versions must not repeat.
     pub(crate) applied: Vec<Slot>,
-    /// What the vehicle says of itself.
+    /// The status of the vehicle.
     pub(crate) status: VehicleStatus,
     setup: Setup,
     random: u64,
-    on_air: BTreeMap<(Instant, u64), Event>,
-    /// What waits in each modem, and whether it is sending.
+    on_air: BTreeMap<(Instant, u64), PairEvent>,
+    /// The frames in each modem, and whether it is transmitting.
     modems: [(VecDeque<Vec<u8>>, bool); 2],
     /// The last transmissions of both ends.
     pub(crate) overheard: VecDeque<Vec<u8>>,
     serial: u64,
     durable: SlotInboxState,
-    /// What the planes were last set to.
+    /// The last quantities of the planes.
     quantities: Vec<(PlaneKind, Vec<(Cell, f64)>)>,
 }
 
-enum Event {
+enum PairEvent {
     Sent { by_vehicle: bool },
     Arrives { at_vehicle: bool, bytes: Vec<u8> },
     Poll { of_vehicle: bool, frames: u32 },
@@ -110,8 +110,8 @@ pub(crate) fn auv() -> Address {
     Address::vehicle(1).unwrap()
 }
 
-impl Pair {
-    pub(crate) fn new(seed: u64, setup: Setup, water: Water) -> Self {
+impl LinkedEnds {
+    pub(crate) fn new(seed: u64, setup: Setup, channel: LossyChannel) -> Self {
         let now = Instant::from_secs_f64(1000.0);
         let window = Duration::from_secs(10);
         Self {
@@ -119,7 +119,7 @@ impl Pair {
             mute: [false; 2],
             vehicle: vehicle(&setup, seed ^ 0xA5A5, SlotInboxState::default(), now),
             surface: surface(&setup, seed, now),
-            water,
+            channel,
             audits: [Audit::new(window), Audit::new(window)],
             applied: Vec::new(),
             status: VehicleStatus { labels: 3, ..VehicleStatus::default() },
@@ -177,7 +177,7 @@ impl Pair {
 
     fn forget_modem(&mut self, of_vehicle: bool) {
         self.modems[usize::from(of_vehicle)] = (VecDeque::new(), false);
-        self.on_air.retain(|_, e| !matches!(e, Event::Sent { by_vehicle } if *by_vehicle == of_vehicle));
+        self.on_air.retain(|_, e| !matches!(e, PairEvent::Sent { by_vehicle } if *by_vehicle == of_vehicle));
     }
 
     pub(crate) fn shown(&self) -> &LabelGrid {
@@ -185,7 +185,7 @@ impl Pair {
     }
 
     pub(crate) fn is_converged(&self) -> bool {
-        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_settled()
+        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_converged()
     }
 
     fn planes_agree(&self) -> bool {
@@ -196,12 +196,12 @@ impl Pair {
         })
     }
 
-    /// How much the two ends hold, as the length of what they tell a debugger.
+    /// The length of the `Debug` output of both ends, as a measure of their memory.
     pub(crate) fn size(&self) -> usize {
         format!("{:?}{:?}", self.vehicle, self.surface).len()
     }
 
-    /// Runs until `until`, or until both maps agree if that is asked for.
+    /// Runs until `until`, or until both maps agree if `stop_when_converged`.
     pub(crate) fn run(&mut self, until: Instant, stop_when_converged: bool) {
         loop {
             self.pump();
@@ -211,7 +211,7 @@ impl Pair {
             let timers = [self.vehicle.poll_timeout(), self.surface.poll_timeout(self.now)];
             let timer = timers.into_iter().flatten().map(|(at, _)| at).filter(|&at| at > self.now).min();
             let event = self.on_air.first_key_value().map(|((at, _), _)| *at);
-            // A timer that has passed but led to no frame waits for the next event, or a while.
+            // A timer that has passed without a frame waits for the next event, or a while.
             let next = timer.into_iter().chain(event).min().unwrap_or(self.now + Duration::from_millis(200));
             if next > until {
                 self.now = until;
@@ -225,19 +225,19 @@ impl Pair {
         }
     }
 
-    fn handle(&mut self, event: Event) {
+    fn handle(&mut self, event: PairEvent) {
         match event {
-            Event::Sent { by_vehicle } => {
+            PairEvent::Sent { by_vehicle } => {
                 self.modems[usize::from(by_vehicle)].1 = false;
                 match by_vehicle {
                     true => self.vehicle.handle_transmit_outcome(self.now),
                     false => self.surface.handle_transmit_outcome(self.now),
                 }
             }
-            Event::Arrives { at_vehicle: true, bytes } => self.vehicle.handle_frame(&bytes, self.now),
-            Event::Arrives { at_vehicle: false, bytes } => self.surface.handle_frame(&bytes, self.now),
-            Event::Poll { of_vehicle: true, frames } => self.vehicle.handle_poll(frames),
-            Event::Poll { of_vehicle: false, frames } => self.surface.handle_poll(frames),
+            PairEvent::Arrives { at_vehicle: true, bytes } => self.vehicle.handle_frame(&bytes, self.now),
+            PairEvent::Arrives { at_vehicle: false, bytes } => self.surface.handle_frame(&bytes, self.now),
+            PairEvent::Poll { of_vehicle: true, frames } => self.vehicle.handle_poll(frames),
+            PairEvent::Poll { of_vehicle: false, frames } => self.surface.handle_poll(frames),
         }
     }
 
@@ -270,20 +270,20 @@ impl Pair {
         }
     }
 
-    /// The modem's own cycle: an initiation packet that may be lost, then the sender's host is asked for frames.
+    /// The modem's own cycle: an initiation packet that may be lost, then requests for the sender's frames.
     fn begin_cycle(&mut self) {
         if self.setup.access != Access::Polled {
             return;
         }
         let Some(cycle) = self.surface.poll_cycle(self.now) else { return };
         let of_vehicle = cycle.from == auv();
-        // Where bits get damaged, the surface's own modem does not begin either now and then.
-        let chance = if of_vehicle { self.water.loss } else { self.water.corruption / 2.0 };
+        // On a channel that damages bits, the surface's own modem sometimes fails to begin too.
+        let chance = if of_vehicle { self.channel.loss } else { self.channel.corruption / 2.0 };
         let heard = self.draw() >= chance && !(of_vehicle && self.mute[0]);
-        let way = if of_vehicle { self.water.propagation } else { Duration::ZERO };
+        let way = if of_vehicle { self.channel.propagation } else { Duration::ZERO };
         if heard {
             let at = self.now + way + Duration::from_millis(300);
-            self.schedule(at, Event::Poll { of_vehicle, frames: cycle.frames.min(8) });
+            self.schedule(at, PairEvent::Poll { of_vehicle, frames: cycle.frames.min(8) });
         }
     }
 
@@ -292,33 +292,33 @@ impl Pair {
         assert!(bytes.len() <= modem.frame_bytes);
         self.audits[usize::from(by_vehicle)].record(modem.bits_on_air(bytes.len()), self.now);
         let end = self.now + modem.airtime(bytes.len());
-        self.schedule(end, Event::Sent { by_vehicle });
-        let copies = 1 + u32::from(self.draw() < self.water.duplication);
+        self.schedule(end, PairEvent::Sent { by_vehicle });
+        let copies = 1 + u32::from(self.draw() < self.channel.duplication);
         for _ in 0..copies {
-            if self.draw() < self.water.loss || self.mute[usize::from(by_vehicle)] {
+            if self.draw() < self.channel.loss || self.mute[usize::from(by_vehicle)] {
                 continue;
             }
             let bytes = self.damaged(bytes.clone());
-            let late = if self.draw() < self.water.reordering { self.draw() * 20.0 } else { 0.0 };
-            let at = end + self.water.propagation + Duration::from_secs_f64(late);
-            self.schedule(at, Event::Arrives { at_vehicle: !by_vehicle, bytes });
+            let late = if self.draw() < self.channel.reordering { self.draw() * 20.0 } else { 0.0 };
+            let at = end + self.channel.propagation + Duration::from_secs_f64(late);
+            self.schedule(at, PairEvent::Arrives { at_vehicle: !by_vehicle, bytes });
         }
         self.overheard.push_front(bytes);
         self.overheard.truncate(400);
-        if self.draw() < self.water.talker {
+        if self.draw() < self.channel.talker {
             self.talk(end);
         }
     }
 
     fn damaged(&mut self, mut bytes: Vec<u8>) -> Vec<u8> {
-        if self.draw() < self.water.corruption {
+        if self.draw() < self.channel.corruption {
             let bit = (self.draw() * bytes.len() as f64 * 8.0) as usize;
             bytes[bit / 8] ^= 1 << (bit % 8);
         }
         bytes
     }
 
-    /// A third talker: noise, or something that it overheard a while ago, changed or not.
+    /// A third party transmits noise, or an overheard frame, changed or unchanged.
     fn talk(&mut self, at: Instant) {
         let pick = (self.draw() * self.overheard.len() as f64) as usize;
         let mut bytes = self.overheard[pick].clone();
@@ -331,10 +331,10 @@ impl Pair {
             _ => {}
         }
         let at_vehicle = self.draw() < 0.5;
-        self.schedule(at, Event::Arrives { at_vehicle, bytes });
+        self.schedule(at, PairEvent::Arrives { at_vehicle, bytes });
     }
 
-    fn schedule(&mut self, at: Instant, event: Event) {
+    fn schedule(&mut self, at: Instant, event: PairEvent) {
         self.serial += 1;
         self.on_air.insert((at, self.serial), event);
     }
@@ -352,7 +352,7 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
         authenticity: setup.authenticity.clone(),
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
-    link.source_mut().set_settle_time(setup.settle);
+    link.source_mut().set_debounce(setup.settle);
     let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
     let source = |scale| PlaneSource::new(scale, setup.codec, setup.settle);
     link.set_planes(setup.planes.into_iter().flat_map(|shares| scales.map(source).into_iter().zip(shares)));
@@ -368,7 +368,7 @@ fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
         shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: vec![auv()],
-        call_every: None,
+        discovery_period: None,
         authenticity: setup.authenticity.clone(),
     };
     SurfaceLink::new(config, seed, now)

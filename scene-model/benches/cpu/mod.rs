@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-/// Seconds of CPU time (Linux; elsewhere wall time since the first call).
+/// The CPU time so far in seconds (on Linux; elsewhere the wall time since the first call).
 pub fn cpu_seconds() -> f64 {
     thread_local!(static START: Instant = Instant::now());
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();

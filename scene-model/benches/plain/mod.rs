@@ -1,10 +1,10 @@
-//! The published algorithm, plainly: one word after another, 64-bit floats, a division a label, a cumulative
-//! distribution a word. What the sampler's speed is compared with, on the same machine in the same run.
+//! A plain implementation of the published algorithm, as a reference for the speed of the sampler: one word after
+//! another, 64-bit floats, one division for each label, one cumulative distribution for each word.
 
-use super::workload::{Chance, Workload};
+use super::workload::{Workload, XorShiftRng};
 
-/// Cells of a square world with a fixed number of labels, all in use from the start.
-pub struct Plain {
+/// A square world with a fixed number of labels, all of them in use from the start.
+pub struct PlainSampler {
     labels: usize,
     vocabulary: usize,
     words: Vec<Vec<(usize, usize)>>,
@@ -12,13 +12,13 @@ pub struct Plain {
     in_cell: Vec<Vec<f64>>,
     of_word: Vec<Vec<f64>>,
     of_label: Vec<f64>,
-    chance: Chance,
+    rng: XorShiftRng,
 }
 
 const ALPHA: f64 = 0.01;
 const BETA: f64 = 0.1;
 
-impl Plain {
+impl PlainSampler {
     pub fn new(work: &Workload, labels: usize) -> Self {
         let side = work.side as usize;
         let vocabulary = work.vocabulary as usize;
@@ -39,11 +39,11 @@ impl Plain {
             in_cell: vec![vec![0.0; labels]; side * side],
             of_word: vec![vec![0.0; labels]; vocabulary],
             of_label: vec![0.0; labels],
-            chance: Chance(99),
+            rng: XorShiftRng(99),
         };
         for seen in &work.observations {
             let cell = seen.y as usize * side + seen.x as usize;
-            let label = (plain.chance.unit() * labels as f64) as usize;
+            let label = (plain.rng.unit() * labels as f64) as usize;
             plain.words[cell].push((seen.word as usize, label));
             plain.count(cell, seen.word as usize, label, 1.0);
         }
@@ -56,7 +56,7 @@ impl Plain {
         self.of_label[label] += sign;
     }
 
-    /// Resamples every word once; returns how many.
+    /// Resamples every word once, and returns their number.
     pub fn sweep(&mut self) -> u64 {
         let mut done = 0;
         for cell in 0..self.words.len() {
@@ -85,7 +85,7 @@ impl Plain {
                 total
             })
             .collect();
-        let aim = self.chance.unit() * total;
+        let aim = self.rng.unit() * total;
         cumulative.partition_point(|&sum| sum <= aim).min(self.labels - 1)
     }
 }

@@ -1,5 +1,5 @@
-//! The synthetic workload of the speed and quality figures: 100 patches of 8 true
-//! labels (entropy about 2.0 nats), sparse word distributions.
+//! The synthetic workload of the speed and quality benches: 100 patches of 8 true labels (entropy about 2.0
+//! nats) with sparse word distributions.
 
 use scene_model::project::Observation;
 
@@ -15,13 +15,13 @@ pub struct Workload {
 const LABELS: usize = 8;
 const PATCHES: usize = 100;
 
-/// `side` x `side` cells of 1 m with about `words_per_cell` words each out of `vocabulary`.
+/// Returns `side` x `side` cells of 1 m with about `words_per_cell` words each, from a vocabulary of `vocabulary` words.
 pub fn workload(seed: u64, side: i32, words_per_cell: u32, vocabulary: u32) -> Workload {
-    let mut chance = Chance(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut rng = XorShiftRng(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let centres: Vec<[f64; 2]> =
-        (0..PATCHES).map(|_| [chance.unit() * f64::from(side), chance.unit() * f64::from(side)]).collect();
-    let labels: Vec<usize> = (0..PATCHES).map(|_| (chance.unit() * LABELS as f64) as usize).collect();
-    let tables: Vec<Vec<f64>> = (0..LABELS).map(|_| word_table(vocabulary, &mut chance)).collect();
+        (0..PATCHES).map(|_| [rng.unit() * f64::from(side), rng.unit() * f64::from(side)]).collect();
+    let labels: Vec<usize> = (0..PATCHES).map(|_| (rng.unit() * LABELS as f64) as usize).collect();
+    let tables: Vec<Vec<f64>> = (0..LABELS).map(|_| word_table(vocabulary, &mut rng)).collect();
     let (mut observations, mut truth) = (Vec::new(), Vec::new());
     for y in 0..side {
         for x in 0..side {
@@ -31,9 +31,9 @@ pub fn workload(seed: u64, side: i32, words_per_cell: u32, vocabulary: u32) -> W
             let label = labels[nearest.unwrap_or(0)];
             truth.push(label as u32);
             let spread = (f64::from(words_per_cell) * 0.2) as u32;
-            let count = words_per_cell - spread + (chance.unit() * f64::from(2 * spread + 1)) as u32;
+            let count = words_per_cell - spread + (rng.unit() * f64::from(2 * spread + 1)) as u32;
             for _ in 0..count {
-                let aim = chance.unit();
+                let aim = rng.unit();
                 let word = tables[label].partition_point(|&sum| sum <= aim) as u32;
                 observations.push(Observation { word: word.min(vocabulary - 1), x: px, y: py, z: 0.0 });
             }
@@ -42,13 +42,14 @@ pub fn workload(seed: u64, side: i32, words_per_cell: u32, vocabulary: u32) -> W
     Workload { side, vocabulary, observations, truth }
 }
 
-/// Cumulative word probabilities of one label: a tenth of the vocabulary, exponentially distributed, on a thin floor.
-fn word_table(vocabulary: u32, chance: &mut Chance) -> Vec<f64> {
-    let weight = |chance: &mut Chance| {
-        let mass = -(1.0 - chance.unit()).ln();
-        if chance.unit() < 0.1 { mass } else { 0.02 * mass }
+/// The cumulative word probabilities of one label: a tenth of the vocabulary has most
+/// of the mass, exponentially distributed.
+fn word_table(vocabulary: u32, rng: &mut XorShiftRng) -> Vec<f64> {
+    let weight = |rng: &mut XorShiftRng| {
+        let mass = -(1.0 - rng.unit()).ln();
+        if rng.unit() < 0.1 { mass } else { 0.02 * mass }
     };
-    let weights: Vec<f64> = (0..vocabulary).map(|_| weight(chance)).collect();
+    let weights: Vec<f64> = (0..vocabulary).map(|_| weight(rng)).collect();
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
     weights
@@ -60,10 +61,10 @@ fn word_table(vocabulary: u32, chance: &mut Chance) -> Vec<f64> {
         .collect()
 }
 
-/// Xorshift64*: the workload must not depend on the crate under test.
-pub struct Chance(pub u64);
+/// Xorshift64*, so that the workload does not depend on the crate under test.
+pub struct XorShiftRng(pub u64);
 
-impl Chance {
+impl XorShiftRng {
     pub fn unit(&mut self) -> f64 {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;

@@ -1,37 +1,51 @@
-//! The camera of a survey vehicle: straight down on flat ground.
+//! A camera that looks straight down on flat ground, as on most survey vehicles.
 
 use super::Observation;
 use crate::words::Word;
 
-/// Where the camera is: local ENU metres (x east, y north, z up) and heading.
+/// The position and the heading of a camera that looks down: metres in a local east-north-up frame, and radians.
 ///
-/// `yaw_rad` 0 points the top of the image north; positive turns counter-clockwise seen from above (the mathematical
-/// sense), so a compass heading h degrees is `-h.to_radians()`.
+/// At `yaw_rad` 0 the top of the image points north. Positive angles are counter-clockwise seen from above, so the
+/// compass heading h in degrees is `-h.to_radians()`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
-    /// East, metres.
+    /// Metres to the east of the origin.
     pub x: f64,
-    /// North, metres.
+    /// Metres to the north of the origin.
     pub y: f64,
-    /// Up, metres, of the camera itself.
+    /// Height of the camera itself above the origin, metres.
     pub z: f64,
-    /// Radians, counter-clockwise from north.
+    /// Angle of the top of the image, radians counter-clockwise from north.
     pub yaw_rad: f64,
 }
 
 /// A camera that looks straight down on flat ground at a known altitude.
+///
+/// ```
+/// use scene_model::project::{DownCamera, Pose};
+/// use scene_model::words::Word;
+///
+/// let camera = DownCamera { metres_per_pixel: 0.01, altitude_m: 3.0 };
+/// // 20 m deep, heading east: a compass heading of 90 degrees.
+/// let pose = Pose { x: 10.0, y: -4.0, z: -20.0, yaw_rad: -f64::to_radians(90.0) };
+/// // The middle of the upper edge of a frame of 640 x 480 pixels lies 2.4 m ahead.
+/// let seen = camera.project(640, 480, &pose, &[Word { id: 5, u: 320.0, v: 0.0 }]);
+/// assert!((seen[0].x - 12.4).abs() < 1e-9 && (seen[0].y + 4.0).abs() < 1e-9);
+/// assert_eq!(seen[0].z, -23.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DownCamera {
-    /// Ground size of one pixel, metres, at the present altitude.
+    /// The edge of a pixel on the ground at the current altitude, metres.
     pub metres_per_pixel: f64,
-    /// Height of the camera above the ground, metres.
+    /// The height of the camera above the ground, metres.
     pub altitude_m: f64,
 }
 
 impl DownCamera {
-    /// Puts the words of a frame of `width` x `height` pixels onto the ground below `pose`.
+    /// Returns the words of a frame of `width` x `height` pixels at their positions on the ground below `pose`.
     ///
     /// The centre of the frame lies below the camera; `v` grows towards the bottom of the image.
+    #[must_use]
     pub fn project(&self, width: u32, height: u32, pose: &Pose, words: &[Word]) -> Vec<Observation> {
         let (sin, cos) = pose.yaw_rad.sin_cos();
         let (centre_u, centre_v) = (f64::from(width) / 2.0, f64::from(height) / 2.0);

@@ -1,4 +1,4 @@
-//! From pixels to the world: where on the sea floor a visual word lies.
+//! From pixels to the world: the position of a visual word on the sea floor.
 
 mod down;
 mod pinhole;
@@ -6,15 +6,15 @@ mod pinhole;
 pub use down::{DownCamera, Pose};
 pub use pinhole::{CameraPose, DepthImage, PinholeCamera, Projected};
 
-/// A visual word in the world: local ENU metres.
+/// A visual word at a position in the world: metres in a local east-north-up frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Word id, below the vocabulary size.
+    /// The word's number, below the vocabulary size.
     pub word: u32,
-    /// East, metres.
+    /// Metres to the east of the origin.
     pub x: f64,
-    /// North, metres.
+    /// Metres to the north of the origin.
     pub y: f64,
-    /// Up, metres.
+    /// Metres above the origin; negative below it.
     pub z: f64,
 }

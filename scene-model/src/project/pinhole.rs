@@ -1,55 +1,71 @@
-//! Algorithm 1 of the paper: words of an RGB-D image, back-projected and turned into the world.
+//! A pinhole camera with depth: back-projects words into the world (Algorithm 1 of the paper).
 
 use super::Observation;
 use crate::words::Word;
 
-/// Intrinsics of a pinhole camera, pixels: x to the right, y down, z ahead.
+/// The intrinsics of a pinhole camera, pixels. Its axes are x to the right, y down, z ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PinholeCamera {
-    /// Focal length across.
+    /// Focal length along x, pixels.
     pub fx: f64,
-    /// Focal length down.
+    /// Focal length along y, pixels.
     pub fy: f64,
-    /// Column of the optical axis.
+    /// Column of the optical axis, pixels from the left edge.
     pub cx: f64,
-    /// Row of the optical axis.
+    /// Row of the optical axis, pixels from the top edge.
     pub cy: f64,
 }
 
-/// Camera-to-world transform: a unit quaternion and a position.
+/// The transform from the camera to the world: a quaternion and a position.
 ///
-/// A camera that looks straight down with the top of its image to the north has the quaternion (1, 0, 0, 0) in the
-/// order x, y, z, w: half a turn about east.
+/// A camera that looks straight down, with the top of its image to the north, has the quaternion (1, 0, 0, 0) in the
+/// order x, y, z, w: half a turn about the axis to the east.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraPose {
-    /// Position of the camera: local ENU, metres.
+    /// The position of the camera: metres to the east, to the north and up.
     pub position: [f64; 3],
-    /// Rotation as x, y, z, w (the order of the TUM RGB-D files); any length above 0 will do.
+    /// The rotation as x, y, z, w, the order of the TUM RGB-D files. It need not have unit length, but must not be 0.
     pub rotation: [f64; 4],
 }
 
-/// Distance along the optical axis of each pixel.
+/// The distance of each pixel along the optical axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage {
-    /// Pixels.
+    /// Columns, pixels; need not be those of the colour image.
     pub width: u32,
-    /// Pixels.
+    /// Rows, pixels; need not be those of the colour image.
     pub height: u32,
-    /// Metres, row by row from the top; 0, negative or not a number where there is no reading.
+    /// `width` x `height` distances in metres, row by row from the top; 0, negative or NaN without a reading.
     pub metres: Vec<f32>,
 }
 
-/// Words in the world, and how many had no depth.
+/// The words of a frame in the world, and the number of words without depth.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Projected {
-    /// Words with a position.
+    /// The words whose pixel has a depth, in their order in the frame.
     pub observations: Vec<Observation>,
-    /// Words without a depth reading under them, skipped.
+    /// The number of words whose pixel has no depth; they are skipped.
     pub without_depth: u64,
 }
 
 impl PinholeCamera {
-    /// Puts the words of a frame into the world by the depth under each; the depth image may have another size.
+    /// Returns the words of a frame of `size` (width, height) pixels at the positions that the depth image gives.
+    ///
+    /// ```
+    /// use scene_model::project::{CameraPose, DepthImage, PinholeCamera};
+    /// use scene_model::words::Word;
+    ///
+    /// let camera = PinholeCamera { fx: 100.0, fy: 100.0, cx: 50.0, cy: 40.0 };
+    /// let looking_down = CameraPose { position: [10.0, 20.0, -5.0], rotation: [1.0, 0.0, 0.0, 0.0] };
+    /// let depth = DepthImage { width: 2, height: 1, metres: vec![2.0, 0.0] };
+    /// let words = [Word { id: 3, u: 25.0, v: 40.0 }, Word { id: 4, u: 75.0, v: 40.0 }];
+    ///
+    /// let projected = camera.project((100, 80), &depth, &looking_down, &words);
+    /// assert_eq!((projected.observations[0].x, projected.observations[0].z), (9.5, -7.0));
+    /// assert_eq!(projected.without_depth, 1);
+    /// ```
+    #[must_use]
     pub fn project(&self, size: (u32, u32), depth: &DepthImage, pose: &CameraPose, words: &[Word]) -> Projected {
         let mut projected = Projected::default();
         for word in words {
@@ -61,7 +77,8 @@ impl PinholeCamera {
         projected
     }
 
-    /// Puts the words of a frame onto a plane at a constant distance along the optical axis, metres.
+    /// Returns the words of a frame on a plane at a constant distance of `metres` along the optical axis.
+    #[must_use]
     pub fn project_flat(&self, metres: f64, pose: &CameraPose, words: &[Word]) -> Vec<Observation> {
         words.iter().map(|word| self.place(word, metres, pose)).collect()
     }
@@ -69,14 +86,14 @@ impl PinholeCamera {
     fn place(&self, word: &Word, metres: f64, pose: &CameraPose) -> Observation {
         let right = (f64::from(word.u) - self.cx) / self.fx * metres;
         let down = (f64::from(word.v) - self.cy) / self.fy * metres;
-        let [x, y, z] = pose.to_world([right, down, metres]);
+        let [x, y, z] = pose.transform([right, down, metres]);
         Observation { word: word.id, x, y, z }
     }
 }
 
 impl CameraPose {
-    /// A point of the camera's frame in the world.
-    pub fn to_world(&self, point: [f64; 3]) -> [f64; 3] {
+    /// Transforms a point from the camera's axes to the world, metres.
+    fn transform(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z, w] = self.rotation;
         let scale = 2.0 / (x * x + y * y + z * z + w * w);
         let rows = [
@@ -91,7 +108,7 @@ impl CameraPose {
 }
 
 impl DepthImage {
-    /// The reading at a place given as shares of width and height.
+    /// The reading at a position given as shares of width and height.
     fn at(&self, across: f32, down: f32) -> Option<f64> {
         if !(0.0..1.0).contains(&across) || !(0.0..1.0).contains(&down) {
             return None;
@@ -115,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_looks_down_sees_the_ground_below_it() {
+    fn camera_looking_down_sees_the_ground_below() {
         let seen = CAMERA.project_flat(2.0, &DOWN, &[word(50.0, 40.0), word(100.0, 0.0)]);
         assert_eq!((seen[0].x, seen[0].y, seen[0].z), (10.0, 20.0, -7.0));
         assert_eq!((seen[1].x, seen[1].y, seen[1].z), (11.0, 20.8, -7.0));

@@ -1,10 +1,10 @@
-//! The cells of the world, by dense id: words with their labels, label counts, neighbours.
+//! The cells of the world: their words with labels, label counts and neighbours.
 
+use super::affinity::Affinity;
 use super::grid::{Coord, NONE, SpatialHash, colour_of, neighbours_of};
-use super::kinship::Kinship;
 use super::labels::{LANES, Lanes, UNLABELLED, label_of, pack, word_of};
 
-/// All cells seen so far, in the order of their first observation.
+/// All observed cells. Their ids are consecutive in the order of their first observation.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     blocks: usize,
@@ -13,12 +13,12 @@ pub(crate) struct Cells {
     words: Vec<Vec<u32>>,
     counts: Vec<u16>,
     neighbours: Vec<[u32; 6]>,
-    kinship: Kinship,
+    affinity: Affinity,
     total: u64,
 }
 
 impl Cells {
-    /// Room for `blocks` x 16 label slots in each cell; `colour_levels` as in the configuration.
+    /// No cells yet; each will have `blocks` x 16 label slots. `colour_levels` is as in the configuration.
     pub(crate) fn new(blocks: usize, colour_levels: u32) -> Self {
         Self {
             blocks,
@@ -27,7 +27,7 @@ impl Cells {
             words: Vec::new(),
             counts: Vec::new(),
             neighbours: Vec::new(),
-            kinship: Kinship::new(colour_levels),
+            affinity: Affinity::new(colour_levels),
             total: 0,
         }
     }
@@ -36,7 +36,6 @@ impl Cells {
         self.coords.len()
     }
 
-    /// Words in all cells.
     pub(crate) fn total(&self) -> u64 {
         self.total
     }
@@ -49,7 +48,7 @@ impl Cells {
         colour_of(self.coords[cell as usize])
     }
 
-    /// Words of a cell, packed with their labels.
+    /// The words of a cell, each packed with its label.
     pub(crate) fn words(&self, cell: u32) -> &[u32] {
         &self.words[cell as usize]
     }
@@ -62,7 +61,7 @@ impl Cells {
         self.blocks * LANES
     }
 
-    /// Label counts of a cell, one per slot.
+    /// The label counts of a cell, one for each slot.
     pub(crate) fn counts(&self, cell: u32) -> &[u16] {
         let width = self.width();
         &self.counts[cell as usize * width..][..width]
@@ -77,7 +76,7 @@ impl Cells {
         &self.neighbours[cell as usize]
     }
 
-    /// The cell at `coord`, made and linked to its neighbours if it is new.
+    /// The id of the cell at `coord`. A new cell is linked with its neighbours.
     pub(crate) fn find_or_add(&mut self, coord: Coord) -> u32 {
         if let Some(cell) = self.hash.get(coord) {
             return cell;
@@ -95,22 +94,22 @@ impl Cells {
         self.words.push(Vec::new());
         self.counts.resize(self.counts.len() + self.width(), 0);
         self.neighbours.push(neighbours);
-        self.kinship.add_cell();
+        self.affinity.add_cell();
         cell
     }
 
-    /// Makes a cell of a checkpoint with its labelled words.
+    /// Adds a cell of a checkpoint with its labelled words.
     pub(crate) fn restore(&mut self, coord: Coord, words: &[u32]) {
         let cell = self.find_or_add(coord);
         self.total += words.len() as u64;
         self.words[cell as usize] = words.to_vec();
-        words.iter().for_each(|&packed| self.kinship.see(cell, word_of(packed)));
-        self.kinship.relink(cell, &self.neighbours[cell as usize]);
+        words.iter().for_each(|&packed| self.affinity.add_word(cell, word_of(packed)));
+        self.affinity.update_cell(cell, &self.neighbours[cell as usize]);
         let counts = self.counts_mut(cell);
         words.iter().for_each(|&packed| counts[label_of(packed) as usize] += 1);
     }
 
-    /// Label counts around a place, whether it has a cell or not: of its cell and the six next to it.
+    /// The sums of the label counts of `coord` and its six neighbours, of those that exist.
     pub(crate) fn counts_around(&self, coord: Coord) -> Vec<u32> {
         let mut sums = vec![0; self.width()];
         for there in std::iter::once(coord).chain(neighbours_of(coord)) {
@@ -124,24 +123,25 @@ impl Cells {
     /// Adds a word without a label.
     pub(crate) fn push(&mut self, cell: u32, word: u32) {
         self.words[cell as usize].push(pack(word, UNLABELLED));
-        self.kinship.see(cell, word);
+        self.affinity.add_word(cell, word);
         self.total += 1;
     }
 
-    /// Weighs the neighbours anew of cells that got words.
-    pub(crate) fn weigh(&mut self, changed: impl Iterator<Item = u32>) {
+    /// Updates the appearance affinity after the cells in `changed` got words.
+    pub(crate) fn update_affinity(&mut self, changed: impl Iterator<Item = u32>) {
         for cell in changed {
-            self.kinship.relink(cell, &self.neighbours[cell as usize]);
+            self.affinity.update_cell(cell, &self.neighbours[cell as usize]);
         }
-        self.kinship.settle();
+        self.affinity.update_weights();
     }
 
-    /// Label counts of a cell's neighbours, weighed, into `around`, with its own into `near` (one number per slot).
+    /// Writes the label counts of a cell's neighbours, weighted by affinity, into `around`, and these
+    /// plus its own into `near`.
     pub(crate) fn gather(&self, cell: u32, near: &mut [Lanes], around: &mut [Lanes]) {
         around.fill(Lanes([0.0; LANES]));
         for (direction, &other) in self.neighbours(cell).iter().enumerate() {
             if other != NONE {
-                add_counts(around, self.counts(other), self.kinship.weight(cell, direction));
+                add_counts(around, self.counts(other), self.affinity.weight(cell, direction));
             }
         }
         near.copy_from_slice(around);
@@ -162,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbours_are_linked_both_ways_in_any_order() {
+    fn neighbours_are_linked_in_both_directions() {
         let mut cells = Cells::new(1, 0);
         let middle = cells.find_or_add([0, 0, 0]);
         let north = cells.find_or_add([0, 1, 0]);

@@ -2,43 +2,60 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Which reading of the weight of a new label is used.
+/// The weight of a new label: three readings of `gamma`.
+///
+/// V is the size of the vocabulary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Birth {
-    /// gamma, as the words of the paper say.
+    /// `gamma` itself, as in the text of the paper.
     #[default]
     Literal,
-    /// gamma / V, the exact collapsed likelihood of a word under a new label.
+    /// `gamma / V`, the exact collapsed likelihood of a word under a new label.
     Collapsed,
-    /// alpha * gamma / V, as the published ROST code has it.
+    /// `alpha * gamma / V`, as in the published ROST code.
     Rost,
 }
 
-/// Parameters of a [`SceneModel`](super::SceneModel).
+/// The parameters of a [`SceneModel`](super::SceneModel).
+///
+/// ```
+/// use scene_model::topics::SceneConfig;
+///
+/// let config = SceneConfig { cell_m: [0.5, 0.5, 1e4], max_labels: 32, seed: 7, ..SceneConfig::for_images() };
+/// config.check()?;
+///
+/// let error = SceneConfig { beta: 0.0, ..config }.check().unwrap_err();
+/// assert_eq!(error.to_string(), "beta = 0: allowed is 1e-12 to 1e9");
+/// # Ok::<(), scene_model::topics::ConfigError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneConfig {
-    /// Edges of a cell in x, y, z: metres, above 0. The default height makes the world flat.
+    /// Edges of a cell in x, y and z, metres: 1e-12 to 1e9. The default height of 10 km makes the world flat.
     pub cell_m: [f64; 3],
-    /// Prior count of each label in each cell: above 0.
+    /// Prior count of each label in each cell: 1e-12 to 1e9.
     pub alpha: f64,
-    /// Prior count of each word under each label: above 0.
+    /// Prior count of each word under each label: 1e-12 to 1e9.
     pub beta: f64,
-    /// Weight of a new label, read as `birth` says: 0 (no births after the first) or above.
+    /// Weight of a new label in the reading of `birth`: 0 to 1e9. With 0 the first label stays the only one.
     pub gamma: f64,
-    /// Reading of `gamma`.
+    /// How `gamma` becomes the weight of a new label.
     pub birth: Birth,
-    /// Most labels at one time: 1 to 1024.
+    /// The maximum number of labels at one time (K): 1 to 1024. The table of V x K counts may hold at most 2^28.
     pub max_labels: u32,
-    /// Number of different words: 1 to 2^20.
+    /// The number of different words (V): 1 to 2^20.
     pub vocabulary: u32,
-    /// Words below the cube of this are points of a lattice of colours, and neighbours that look alike count more, as
-    /// [`crate::words::COLOUR_LEVELS`] says of the words of images; 0: all neighbours count alike, as in the paper.
+    /// Levels of the colour lattice behind the first words, for the appearance affinity: 0 to 64, its cube at most
+    /// `vocabulary`.
+    ///
+    /// Word ids below the cube of this number are colours, (L x levels + a) x levels + b, and neighbours of a similar
+    /// colour weigh more. It is 8 for the words of a [`WordExtractor`](crate::words::WordExtractor). With 0 all
+    /// neighbours weigh the same, as in the paper.
     pub colour_levels: u32,
-    /// Words kept in one cell, later ones are skipped: 1 to 65535.
+    /// The maximum number of words in one cell, 1 to 65535; [`insert`](super::SceneModel::insert) skips later ones.
     pub max_words_per_cell: u32,
-    /// Seed of every random choice.
+    /// The seed of every random draw.
     pub seed: u64,
 }
 
@@ -59,15 +76,16 @@ impl Default for SceneConfig {
     }
 }
 
-/// A parameter out of its range.
+/// A parameter is out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 #[error("{key} = {value}: allowed is {allowed}")]
 pub struct ConfigError {
-    /// Name of the parameter.
+    /// The name of the field of [`SceneConfig`].
     pub key: &'static str,
-    /// What it was set to.
+    /// The refused value, as text.
     pub value: String,
-    /// What it may be.
+    /// The allowed range, as text.
     pub allowed: &'static str,
 }
 
@@ -76,12 +94,13 @@ pub(crate) const MAX_VOCABULARY: u32 = 1 << 20;
 const MAX_TABLE: u64 = 1 << 28;
 
 impl SceneConfig {
-    /// The defaults for words of images, in which neighbours that look alike count more.
+    /// The defaults for the words of a [`WordExtractor`](crate::words::WordExtractor): with appearance affinity.
+    #[must_use]
     pub fn for_images() -> Self {
         Self { colour_levels: crate::words::COLOUR_LEVELS, ..Self::default() }
     }
 
-    /// Says which parameter is out of range, if any.
+    /// Checks all ranges; the error names the first parameter that is out of its range.
     pub fn check(&self) -> Result<(), ConfigError> {
         for edge in self.cell_m {
             positive("cell_m", edge)?;
@@ -103,7 +122,7 @@ impl SceneConfig {
         within("max_words_per_cell", self.max_words_per_cell, 65_535, "1 to 65535")
     }
 
-    /// Weight of a new label for any word.
+    /// The weight of a new label in the configured reading.
     pub(crate) fn birth_weight(&self) -> f64 {
         match self.birth {
             Birth::Literal => self.gamma,
@@ -117,8 +136,8 @@ fn positive(key: &'static str, value: f64) -> Result<(), ConfigError> {
     if (1e-12..=1e9).contains(&value) { Ok(()) } else { Err(refuse(key, value, "1e-12 to 1e9")) }
 }
 
-fn within(key: &'static str, value: u32, most: u32, allowed: &'static str) -> Result<(), ConfigError> {
-    if (1..=most).contains(&value) { Ok(()) } else { Err(refuse(key, value, allowed)) }
+fn within(key: &'static str, value: u32, max: u32, allowed: &'static str) -> Result<(), ConfigError> {
+    if (1..=max).contains(&value) { Ok(()) } else { Err(refuse(key, value, allowed)) }
 }
 
 fn refuse(key: &'static str, value: impl ToString, allowed: &'static str) -> ConfigError {
@@ -130,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_out_of_range_is_named_with_its_range() {
+    fn error_names_the_parameter_and_its_range() {
         let config = SceneConfig { beta: f64::NAN, ..SceneConfig::default() };
         assert_eq!(config.check().unwrap_err().to_string(), "beta = NaN: allowed is 1e-12 to 1e9");
         let config = SceneConfig { max_labels: 0, ..SceneConfig::default() };
@@ -138,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn the_default_is_in_range() {
+    fn defaults_are_in_range() {
         SceneConfig::default().check().unwrap();
     }
 }

@@ -1,53 +1,56 @@
-//! What a cell shows on the map: mode of the MAP labels of its words, confidence, perplexity.
+//! The label, confidence and perplexity of one cell.
 
 use super::cells::Cells;
-use super::kernel::{Ballot, Kernel};
+use super::kernel::{Kernel, LabelVotes};
 use super::labels::{LANES, Labels, Lanes, TopicId, UNLABELLED};
 
-/// The map's view of one cell.
+/// The evaluation of one cell for the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CellView {
     pub(crate) topic: TopicId,
-    /// Words whose MAP label is the cell's.
-    pub(crate) votes: u32,
+    /// The number of words whose MAP label is the topic's.
+    pub(crate) agreeing: u32,
     pub(crate) words: u32,
-    /// Sum over words of -ln p(w), nats.
+    /// The sum of -ln p(w) over the words, nats.
     pub(crate) surprise: f64,
 }
 
-/// Evaluates cells one after another with the same working memory.
+/// Evaluates cells one after another with the same buffers.
 pub(crate) struct Evaluator<'a> {
     labels: &'a Labels,
     near: Vec<Lanes>,
     share: Vec<Lanes>,
-    votes: Vec<u32>,
-    active: f64,
+    tally: Vec<u32>,
+    /// The number of topics in use.
+    topics: f64,
 }
 
 impl<'a> Evaluator<'a> {
     pub(crate) fn new(labels: &'a Labels) -> Self {
         let zero = vec![Lanes([0.0; LANES]); labels.blocks];
-        let votes = vec![0; labels.blocks * LANES];
-        Self { labels, near: zero.clone(), share: zero, votes, active: labels.active() as f64 }
+        let tally = vec![0; labels.blocks * LANES];
+        Self { labels, near: zero.clone(), share: zero, tally, topics: labels.in_use() as f64 }
     }
 
-    /// MAP label per word is the arg max over labels in use with the word's own label taken out; ties to the lowest
-    /// slot there and to the oldest topic in the mode.
+    /// Evaluates one cell. Its topic is the mode of the MAP labels of its words, ties to the oldest topic.
+    ///
+    /// The MAP label of a word is the label in use with the largest weight, the word's own label removed,
+    /// ties to the lowest slot.
     pub(crate) fn view(&mut self, kernel: Kernel, cells: &Cells, cell: u32) -> CellView {
         cells.gather(cell, &mut self.near, &mut self.share);
         self.prepare();
-        self.votes.fill(0);
+        self.tally.fill(0);
         let words = cells.words(cell);
-        let ballot = Ballot { labels: self.labels, near: &self.near, share: &self.share };
-        let ln_likelihood = kernel.vote(&ballot, words, &mut self.votes);
+        let votes = LabelVotes { labels: self.labels, near: &self.near, share: &self.share };
+        let ln_likelihood = kernel.map_labels(&votes, words, &mut self.tally);
         let near: f64 = self.near.iter().flat_map(|lanes| lanes.0).map(f64::from).sum();
-        let mass = near + self.active * f64::from(self.labels.alpha());
-        let (topic, votes) = self.mode();
+        let mass = near + self.topics * f64::from(self.labels.alpha());
+        let (topic, agreeing) = self.mode();
         let words = words.len() as u32;
-        CellView { topic, votes, words, surprise: f64::from(words) * mass.ln() - ln_likelihood }
+        CellView { topic, agreeing, words, surprise: f64::from(words) * mass.ln() - ln_likelihood }
     }
 
-    /// (n_k + alpha) / (n_k. + V beta) of labels in use, 0 of others.
+    /// Computes (n_k + alpha) / (n_k. + V beta) of the labels in use; 0 for other slots.
     fn prepare(&mut self) {
         let labels = self.labels;
         let birth = labels.birth_slot().unwrap_or(UNLABELLED) as usize;
@@ -64,7 +67,7 @@ impl<'a> Evaluator<'a> {
 
     fn mode(&self) -> (TopicId, u32) {
         let mut winner = (TopicId(u32::MAX), 0);
-        for (slot, &votes) in self.votes.iter().enumerate().filter(|entry| *entry.1 > 0) {
+        for (slot, &votes) in self.tally.iter().enumerate().filter(|entry| *entry.1 > 0) {
             let topic = self.labels.topic(slot as u32).unwrap_or(TopicId(u32::MAX));
             if votes > winner.1 || (votes == winner.1 && topic < winner.0) {
                 winner = (topic, votes);

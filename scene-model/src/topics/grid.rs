@@ -1,17 +1,28 @@
-//! Which cell a position falls in, and a spatial hash from cell coordinates to dense ids.
+//! From positions to cell coordinates, and a spatial hash from these to cell ids.
 
 use crate::random::mix;
 
-/// Absent cell or neighbour.
+/// The id of an absent cell or neighbour.
 pub(crate) const NONE: u32 = u32::MAX;
 
 /// Cell coordinates in x, y, z.
 pub(crate) type Coord = [i32; 3];
 
-/// The cell of a position, or nothing where it is no number or out of reach (2^30 cells from the origin).
+/// Returns the cell coordinates of a position, both `position` and the cell's `edges` in metres.
 ///
-/// Cells lie on the origin's corner in x and y; in z the origin is in the middle of its cell, so that a flat bottom
-/// near z = 0 does not flicker between two layers.
+/// `None` if a coordinate is not finite, or 2^30 or more cells away from the origin. In x and y the origin is the
+/// corner of cell 0; in z it is the middle of cell 0, so that a flat bottom near z = 0 does not fall into two cells in
+/// turn.
+///
+/// ```
+/// use scene_model::topics::{centre_of, coord_of};
+///
+/// let edges = [0.5, 0.5, 2.0];
+/// assert_eq!(coord_of([-0.1, 0.6, -0.9], edges), Some([-1, 1, 0]));
+/// assert_eq!(centre_of([-1, 1, 0], edges), [-0.25, 0.75, 0.0]);
+/// assert_eq!(coord_of([f64::NAN, 0.0, 0.0], edges), None);
+/// ```
+#[must_use]
 pub fn coord_of(position: [f64; 3], edges: [f64; 3]) -> Option<[i32; 3]> {
     const REACH: f64 = (1 << 30) as f64;
     let mut coord = [0; 3];
@@ -26,12 +37,13 @@ pub fn coord_of(position: [f64; 3], edges: [f64; 3]) -> Option<[i32; 3]> {
     Some(coord)
 }
 
-/// The middle of a cell, metres.
+/// Returns the centre of a cell in metres; the inverse of [`coord_of`].
+#[must_use]
 pub fn centre_of(coord: [i32; 3], edges: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| (f64::from(coord[axis]) + if axis == 2 { 0.0 } else { 0.5 }) * edges[axis])
 }
 
-/// The six Von Neumann neighbours; opposite directions differ in the last bit.
+/// The six Von Neumann neighbours. The indices of opposite directions differ in the last bit.
 pub(crate) fn neighbours_of([x, y, z]: Coord) -> [Coord; 6] {
     [[x - 1, y, z], [x + 1, y, z], [x, y - 1, z], [x, y + 1, z], [x, y, z - 1], [x, y, z + 1]]
 }
@@ -41,7 +53,7 @@ pub(crate) fn colour_of([x, y, z]: Coord) -> usize {
     ((x ^ y ^ z) & 1) as usize
 }
 
-/// Open-addressing hash table from coordinates to dense ids, at most half full.
+/// An open-addressing hash table from coordinates to cell ids, at most half full.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SpatialHash {
     slots: Vec<(Coord, u32)>,
@@ -57,7 +69,7 @@ impl SpatialHash {
         (id != NONE).then_some(id)
     }
 
-    /// Adds a cell that is not there yet.
+    /// Adds a cell, which must be new.
     pub(crate) fn insert(&mut self, coord: Coord, id: u32) {
         if self.len * 2 >= self.slots.len() {
             self.grow();
@@ -76,7 +88,7 @@ impl SpatialHash {
         }
     }
 
-    /// Where `coord` is, or the free slot where it belongs.
+    /// The slot of `coord`, or the free slot to insert it in.
     fn slot(&self, coord: Coord) -> usize {
         let mask = self.slots.len() - 1;
         let mut slot = hash(coord) as usize & mask;
@@ -110,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_position_that_is_no_number_has_no_cell() {
+    fn a_position_out_of_range_has_no_cell() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
             assert_eq!(coord_of([0.0, bad, 0.0], [1.0; 3]), None);
         }

@@ -1,4 +1,4 @@
-//! The flattened map, kept up to date cell by cell.
+//! The label map, updated cell by cell and flattened to two dimensions.
 
 use super::cells::Cells;
 use super::evaluate::{CellView, Evaluator};
@@ -8,34 +8,35 @@ use super::labels::{Labels, TopicId};
 /// One cell of the map flattened to two dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlatCell {
-    /// Cell index east: the cell spans x * edge to (x + 1) * edge metres.
+    /// Cell index east: the cell spans `x * edge` to `(x + 1) * edge` metres.
     pub x: i32,
-    /// Cell index north.
+    /// Cell index north, as `x`.
     pub y: i32,
-    /// Cell index of the height that the label comes from: the topmost cell with that label.
+    /// Cell index up, of the topmost cell with this label; `z` = 0 lies around height 0.
     pub z: i32,
-    /// Label of the cell.
+    /// The topic that most words of the column belong to.
     pub topic: TopicId,
-    /// Words in the column.
+    /// The number of words in the column.
     pub words: u32,
-    /// Share of the column's words whose own MAP label is this one, 0 to 1.
+    /// The share of the column's words whose own MAP label is this topic, 0 to 1.
     pub confidence: f32,
-    /// exp(-mean ln p(w)) over the words of the column; in-sample.
+    /// exp(-mean ln p(w)) over the words of the column, at least about 1. In-sample: a measure
+    /// of surprise, not of quality.
     pub perplexity: f32,
 }
 
-/// Views of all cells, and which of them are out of date.
+/// The evaluations of all cells, and a list of those that are out of date.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MapCache {
     views: Vec<Option<CellView>>,
     stale: Vec<u32>,
     is_stale: Vec<bool>,
-    /// Cells by y, x, then from top to bottom.
+    /// Cell ids sorted by y, x, then from top to bottom.
     order: Vec<u32>,
 }
 
 impl MapCache {
-    pub(crate) fn touch(&mut self, cell: u32) {
+    pub(crate) fn mark_stale(&mut self, cell: u32) {
         let index = cell as usize;
         if index >= self.is_stale.len() {
             self.is_stale.resize(index + 1, false);
@@ -45,7 +46,7 @@ impl MapCache {
         }
     }
 
-    /// Evaluates what is out of date.
+    /// Evaluates the cells that are out of date.
     pub(crate) fn refresh(&mut self, kernel: Kernel, cells: &Cells, labels: &Labels) {
         self.views.resize(cells.len(), None);
         let mut evaluator = Evaluator::new(labels);
@@ -62,7 +63,7 @@ impl MapCache {
         }
     }
 
-    /// exp of the mean surprise over all words.
+    /// exp of the mean surprise over all words; 1 without words.
     pub(crate) fn perplexity(&self) -> f64 {
         let (mut surprise, mut words) = (0.0, 0u64);
         for view in self.views.iter().flatten() {
@@ -84,12 +85,12 @@ impl MapCache {
         map
     }
 
-    /// Every cell by itself, by y, x, then from top to bottom.
+    /// Each cell on its own, sorted by y, x, then from top to bottom.
     pub(crate) fn volume(&self, cells: &Cells) -> Vec<FlatCell> {
         self.order.iter().filter_map(|&cell| self.flatten_column(cells, &[cell])).collect()
     }
 
-    /// The label with most words in a column from top to bottom; ties to the upper cell.
+    /// The label with the most words in a column that is sorted from top to bottom; ties to the upper cell.
     fn flatten_column(&self, cells: &Cells, stack: &[u32]) -> Option<FlatCell> {
         let views = || stack.iter().filter_map(|&cell| self.views[cell as usize].map(|view| (cell, view)));
         let words_of = |topic| views().filter(|(_, v)| v.topic == topic).map(|(_, v)| v.words).sum::<u32>();
@@ -103,10 +104,10 @@ impl MapCache {
         let (cell, topic, _) = winner?;
         let [x, y, z] = cells.coord(cell);
         let words: u32 = views().map(|(_, view)| view.words).sum();
-        let votes: u32 = views().filter(|(_, view)| view.topic == topic).map(|(_, view)| view.votes).sum();
+        let agreeing: u32 = views().filter(|(_, view)| view.topic == topic).map(|(_, view)| view.agreeing).sum();
         let surprise: f64 = views().map(|(_, view)| view.surprise).sum();
         let each = 1.0 / f64::from(words.max(1));
-        let confidence = (f64::from(votes) * each) as f32;
+        let confidence = (f64::from(agreeing) * each) as f32;
         Some(FlatCell { x, y, z, topic, words, confidence, perplexity: (surprise * each).exp() as f32 })
     }
 }

@@ -1,21 +1,22 @@
-//! Label slots of the sampler: global counts, which slots are in use, whose topic each one is.
+//! The label slots of the sampler: global counts, and the topic of each slot.
 //!
-//! A slot is a column of the count tables and is used again; a [`TopicId`] is the serial number of a topic's birth and
-//! is not.
+//! A slot is a column of the count tables and is reused after its topic has died. A [`TopicId`] is the serial number of
+//! a topic's birth and is never reused.
 
 use serde::{Deserialize, Serialize};
 
-use super::kernel::Move;
+use super::config::SceneConfig;
+use super::label_changes::LabelChange;
 
-/// Label slots come in blocks of this many, whatever the width of the machine's vectors.
+/// The label slots of a block: the same number for every kernel, whatever the width of its vectors.
 pub(crate) const LANES: usize = 16;
 
-/// One block of per-slot numbers.
+/// One block of numbers, one for each slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub(crate) [f32; LANES]);
 
-/// One block of per-slot counts.
+/// One block of counts, one for each slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Counts(pub(crate) [i32; LANES]);
@@ -23,7 +24,7 @@ pub(crate) struct Counts(pub(crate) [i32; LANES]);
 const LABEL_BITS: u32 = 12;
 const LABEL_MASK: u32 = (1 << LABEL_BITS) - 1;
 
-/// Label of a word that has none yet; above every slot.
+/// The label of a word that has none yet; above every slot.
 pub(crate) const UNLABELLED: u32 = LABEL_MASK;
 
 #[inline(always)]
@@ -41,21 +42,21 @@ pub(crate) fn word_of(packed: u32) -> u32 {
     packed >> LABEL_BITS
 }
 
-/// Serial number of a topic's birth, never used twice by one model.
+/// The serial number of a topic's birth, from 0 on. One model never uses a number twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TopicId(pub u32);
 
-/// Global word and label counts with the vectors that the kernel reads.
+/// The global word and label counts, and the vectors that the kernels derive weights from.
 #[derive(Clone, Debug)]
 pub(crate) struct Labels {
     pub(crate) blocks: usize,
-    /// Occurrences of word w under each slot: rows of `blocks`.
+    /// n_kw: how often word w has each label, in rows of `blocks` for each word.
     pub(crate) rows: Vec<Counts>,
-    /// Prior weight in each cell: alpha of slots in use, the birth weight of the birth slot, 0 of others.
+    /// The prior weight of each slot in a cell: alpha if it is in use, the birth weight for the birth slot, else 0.
     pub(crate) prior: Vec<Lanes>,
     /// 1 / (n_k + V beta).
     pub(crate) rate: Vec<Lanes>,
-    /// What `rate` gains when one word is taken away.
+    /// The difference that removing one word makes to `rate`.
     pub(crate) rate_gain: Vec<Lanes>,
     pub(crate) beta: f32,
     alpha: f32,
@@ -69,7 +70,7 @@ pub(crate) struct Labels {
 }
 
 impl Labels {
-    pub(crate) fn new(config: &super::SceneConfig) -> Self {
+    pub(crate) fn new(config: &SceneConfig) -> Self {
         let max_labels = config.max_labels as usize;
         let blocks = max_labels.div_ceil(LANES);
         let mut labels = Self {
@@ -88,25 +89,25 @@ impl Labels {
             birth_slot: None,
             next_topic: 0,
         };
-        labels.settle();
+        labels.assign_topics();
         labels
     }
 
-    /// Other priors from now on; counts and topics stay.
-    pub(crate) fn set_priors(&mut self, config: &super::SceneConfig) {
+    /// Changes the priors; counts and topics stay.
+    pub(crate) fn set_priors(&mut self, config: &SceneConfig) {
         self.beta = config.beta as f32;
         self.alpha = config.alpha as f32;
         self.birth_weight = config.birth_weight() as f32;
         self.word_mass = f64::from(config.vocabulary) * config.beta;
-        self.settle();
+        self.assign_topics();
     }
 
-    /// Slots of a checkpoint; the counts are still to come.
-    pub(crate) fn restore(config: &super::SceneConfig, topics: &[Option<TopicId>], next_topic: u32) -> Self {
+    /// The slots of a checkpoint, with all counts 0; [`Self::count`] adds the words.
+    pub(crate) fn restore(config: &SceneConfig, topics: &[Option<TopicId>], next_topic: u32) -> Self {
         Self { topics: topics.to_vec(), next_topic, ..Self::new(config) }
     }
 
-    /// Counts labelled words.
+    /// Adds labelled words to the counts.
     pub(crate) fn count(&mut self, words: &[u32]) {
         for &packed in words {
             let slot = label_of(packed) as usize;
@@ -115,23 +116,22 @@ impl Labels {
         }
     }
 
-    /// Topic of each slot, and the serial number of the next birth.
+    /// The topic of each slot, and the serial number of the next birth.
     pub(crate) fn topics(&self) -> (&[Option<TopicId>], u32) {
         (&self.topics, self.next_topic)
     }
 
-    /// Slot that stands for a new label, if there is room for one.
+    /// The slot that stands for a new label, if one is free.
     pub(crate) fn birth_slot(&self) -> Option<u32> {
         self.birth_slot
     }
 
-    /// Prior count of each label in each cell.
     pub(crate) fn alpha(&self) -> f32 {
         self.alpha
     }
 
-    /// Topics in use.
-    pub(crate) fn active(&self) -> usize {
+    /// The number of topics with words.
+    pub(crate) fn in_use(&self) -> usize {
         self.topics.iter().flatten().count()
     }
 
@@ -139,13 +139,13 @@ impl Labels {
         self.topics.get(slot as usize).copied().flatten()
     }
 
-    /// Takes the label changes of a phase into the counts.
+    /// Applies the label changes of a phase to the counts.
     ///
-    /// Totals are gathered in four parts, or each change would wait for the one before it.
-    pub(crate) fn relabel(&mut self, moves: &[Move]) {
+    /// Totals are summed in four parts; otherwise each change would have to wait for the one before it.
+    pub(crate) fn relabel(&mut self, changes: &[LabelChange]) {
         let blocks = self.blocks;
         let mut gains = vec![[0i32; 4]; self.totals.len()];
-        for (index, change) in moves.iter().enumerate() {
+        for (index, change) in changes.iter().enumerate() {
             let (old, new) = (usize::from(change.old), usize::from(change.new));
             let row = &mut self.rows[change.word as usize * blocks..][..blocks];
             if old < gains.len() {
@@ -160,8 +160,9 @@ impl Labels {
         }
     }
 
-    /// Gives topics to slots that were born, retires empty ones, and refreshes what the kernel reads.
-    pub(crate) fn settle(&mut self) {
+    /// Gives topics to slots that got their first word, retires empty ones, chooses the birth slot
+    /// and updates the kernels' vectors.
+    pub(crate) fn assign_topics(&mut self) {
         for (topic, &total) in self.topics.iter_mut().zip(&self.totals) {
             match (total, *topic) {
                 (0, Some(_)) => *topic = None,
@@ -173,7 +174,7 @@ impl Labels {
             }
         }
         let free = self.topics.iter().position(Option::is_none).map(|slot| slot as u32);
-        let wanted = self.birth_weight > 0.0 || self.active() == 0;
+        let wanted = self.birth_weight > 0.0 || self.in_use() == 0;
         self.birth_slot = free.filter(|_| wanted);
         self.refresh();
     }

@@ -1,42 +1,42 @@
-//! Which cells are refined next.
+//! The order in which online refinement visits the cells.
 //!
-//! The mixed online schedule of arXiv 1509.03242: half of the draws go to the cells just seen, half to all cells with a
-//! probability that rises with recency, as Beta(2, 1) over the order of first sight.
+//! The mixed schedule of Girdhar and Dudek (arXiv 1509.03242): half of the draws go to the cells of the
+//! last observation, half to all cells, with a probability that rises with recency as Beta(2, 1) over
+//! the order of first observation.
 
 use super::cells::Cells;
-use crate::random::Stream;
+use crate::random::CounterRng;
 
-/// Words in a phase: a share of all words, so that a young model is not sampled against stale counts.
+/// A phase holds at most 1/32 of all words, so that a model with few words is not sampled against stale counts.
 const PHASE_SHARE: u64 = 32;
 const PHASE_WORDS: u64 = 32_768;
 
-/// Most words that a phase may hold.
+/// The maximum number of words in a phase, in a model of `total` words.
 pub(crate) fn phase_words(total: u64) -> u64 {
     (total / PHASE_SHARE).clamp(1, PHASE_WORDS)
 }
 
-/// Draws cells for online refinement, each at most once a round.
+/// Draws cells for online refinement, each at most once in a round.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Mixed {
+pub(crate) struct MixedSchedule {
     recent: Vec<u32>,
     drawn_in: Vec<u64>,
     round: u64,
 }
 
-impl Mixed {
-    /// Names the cells that were just observed.
-    pub(crate) fn just_seen(&mut self, cells: &[u32]) {
+impl MixedSchedule {
+    /// Replaces the cells of the last observation.
+    pub(crate) fn set_recent(&mut self, cells: &[u32]) {
         self.recent.clear();
         self.recent.extend_from_slice(cells);
     }
 
-    /// The cells that were just observed.
     pub(crate) fn recent(&self) -> &[u32] {
         &self.recent
     }
 
-    /// Cells with about `words` words, by checkerboard colour; at least one if there is any.
-    pub(crate) fn draw(&mut self, cells: &Cells, words: u64, chance: &mut Stream) -> [Vec<u32>; 2] {
+    /// Draws cells with about `words` words in total, at least one cell, split by checkerboard colour.
+    pub(crate) fn draw(&mut self, cells: &Cells, words: u64, rng: &mut CounterRng) -> [Vec<u32>; 2] {
         let mut round = [Vec::new(), Vec::new()];
         if cells.len() == 0 {
             return round;
@@ -46,7 +46,7 @@ impl Mixed {
         let mut drawn = 0;
         let mut repeats = 0;
         while drawn < words && repeats < 64 {
-            let cell = self.draw_one(cells.len(), chance);
+            let cell = self.draw_one(cells.len(), rng);
             if std::mem::replace(&mut self.drawn_in[cell as usize], self.round) == self.round {
                 repeats += 1;
                 continue;
@@ -57,11 +57,11 @@ impl Mixed {
         round
     }
 
-    fn draw_one(&self, cells: usize, chance: &mut Stream) -> u32 {
-        if !self.recent.is_empty() && chance.next_u64() & 1 == 0 {
-            return self.recent[chance.below(self.recent.len())];
+    fn draw_one(&self, cells: usize, rng: &mut CounterRng) -> u32 {
+        if !self.recent.is_empty() && rng.next_u64() & 1 == 0 {
+            return self.recent[rng.below(self.recent.len())];
         }
-        let rank = chance.unit().sqrt() * cells as f64;
+        let rank = rng.unit().sqrt() * cells as f64;
         (rank as usize).min(cells - 1) as u32
     }
 }

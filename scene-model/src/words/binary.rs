@@ -1,44 +1,45 @@
-//! Binary words: an oriented pattern of brightness comparisons (as ORB), nearest of random prototypes.
+//! Binary words: an oriented pattern of brightness comparisons, as in ORB (Rublee et al., ICCV 2011), quantised to
+//! the nearest of random prototypes.
 
-use super::Word;
+use super::grey_plane::GreyPlane;
 use super::grid::centres;
-use super::plane::Plane;
-use crate::random::Stream;
+use super::word::Word;
+use crate::random::CounterRng;
 
 const BITS: usize = 128;
 const SIDE: usize = 21;
-/// The pattern stays this far from the centre, pixels of half resolution.
+/// The maximum distance of a compared pixel from the centre, in pixels of half resolution.
 const RADIUS: f64 = 9.0;
-const TURNS: usize = 32;
+const ORIENTATIONS: usize = 32;
 const SEED: u64 = 0x0b5e_55ed;
 
-/// Number of binary words.
+/// The number of binary words.
 pub(crate) const SIZE: u32 = 64;
 
-/// Two places in a patch that are compared.
-type Pair = [u16; 2];
+/// The indices of two pixels of a patch that are compared.
+type PixelPair = [u16; 2];
 
-/// The pattern in each orientation, and the prototypes.
+/// The pattern in each orientation, and the prototypes of the words.
 #[derive(Clone, Debug)]
-pub(crate) struct Binary {
-    patterns: Vec<[Pair; BITS]>,
+pub(crate) struct BinaryWords {
+    patterns: Vec<[PixelPair; BITS]>,
     prototypes: Vec<u128>,
 }
 
-impl Default for Binary {
+impl Default for BinaryWords {
     fn default() -> Self {
-        let mut chance = Stream::new(SEED);
-        let places: Vec<[f64; 2]> = (0..2 * BITS).map(|_| place(&mut chance)).collect();
-        let patterns = (0..TURNS).map(|turn| turned(&places, turn)).collect();
-        let prototypes =
-            (0..SIZE).map(|_| u128::from(chance.next_u64()) << 64 | u128::from(chance.next_u64())).collect();
+        let mut rng = CounterRng::new(SEED);
+        let points: Vec<[f64; 2]> = (0..2 * BITS).map(|_| pattern_point(&mut rng)).collect();
+        let patterns = (0..ORIENTATIONS).map(|turn| rotated(&points, turn)).collect();
+        let prototypes = (0..SIZE).map(|_| u128::from(rng.next_u64()) << 64 | u128::from(rng.next_u64())).collect();
         Self { patterns, prototypes }
     }
 }
 
-impl Binary {
-    /// One word for each position of a grid of `spacing` pixels of the full frame, seen at half resolution.
-    pub(crate) fn extract(&self, half: &Plane, spacing: f32, first_id: u32, words: &mut Vec<Word>) {
+impl BinaryWords {
+    /// Appends one word for each position on a grid of `spacing` pixels of the full frame;
+    /// `half` has half the resolution.
+    pub(crate) fn extract(&self, half: &GreyPlane, spacing: f32, first_id: u32, words: &mut Vec<Word>) {
         let across = centres(half.width as u32, spacing / 2.0);
         let down = centres(half.height as u32, spacing / 2.0);
         for &v in &down {
@@ -65,7 +66,7 @@ impl Binary {
     }
 }
 
-/// Direction from the centre of a patch to its centre of brightness, in turns of 1 / 32.
+/// The direction from the centre of a patch to its centroid of brightness, in steps of 1/32 of a turn.
 fn orientation(patch: &[[f32; SIDE]; SIDE]) -> usize {
     let half = (SIDE / 2) as f32;
     let (mut right, mut down) = (0.0f32, 0.0f32);
@@ -75,27 +76,27 @@ fn orientation(patch: &[[f32; SIDE]; SIDE]) -> usize {
             down += (y as f32 - half) * value;
         }
     }
-    let turn = down.atan2(right) / std::f32::consts::TAU * TURNS as f32;
-    (turn.round() as i32).rem_euclid(TURNS as i32) as usize
+    let turn = down.atan2(right) / std::f32::consts::TAU * ORIENTATIONS as f32;
+    (turn.round() as i32).rem_euclid(ORIENTATIONS as i32) as usize
 }
 
-fn place(chance: &mut Stream) -> [f64; 2] {
+fn pattern_point(rng: &mut CounterRng) -> [f64; 2] {
     loop {
-        let place = [chance.normal() * RADIUS / 2.0, chance.normal() * RADIUS / 2.0];
-        if place[0].hypot(place[1]) <= RADIUS {
-            return place;
+        let point = [rng.normal() * RADIUS / 2.0, rng.normal() * RADIUS / 2.0];
+        if point[0].hypot(point[1]) <= RADIUS {
+            return point;
         }
     }
 }
 
-fn turned(places: &[[f64; 2]], turn: usize) -> [Pair; BITS] {
-    let (sin, cos) = (std::f64::consts::TAU * turn as f64 / TURNS as f64).sin_cos();
+fn rotated(points: &[[f64; 2]], turn: usize) -> [PixelPair; BITS] {
+    let (sin, cos) = (std::f64::consts::TAU * turn as f64 / ORIENTATIONS as f64).sin_cos();
     let half = (SIDE / 2) as f64;
     let index = |[x, y]: [f64; 2]| {
         let (right, down) = ((cos * x - sin * y + half).round(), (sin * x + cos * y + half).round());
         (down as usize * SIDE + right as usize) as u16
     };
-    std::array::from_fn(|bit| [index(places[2 * bit]), index(places[2 * bit + 1])])
+    std::array::from_fn(|bit| [index(points[2 * bit]), index(points[2 * bit + 1])])
 }
 
 #[cfg(test)]
@@ -108,8 +109,8 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_patch_keeps_its_code() {
-        let binary = Binary::default();
+    fn rotated_patch_keeps_its_code() {
+        let binary = BinaryWords::default();
         let straight = binary.code(&ramp(0.0));
         let turned = binary.code(&ramp(std::f32::consts::FRAC_PI_2));
         assert!((straight ^ turned).count_ones() <= 16);

@@ -2,26 +2,27 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::field::Field;
-use super::{Moments, Word};
+use super::colour_field::ColourField;
+use super::moments::Moments;
+use super::word::Word;
 
-/// The first words are points of a lattice of this many levels each of L, a and b: id = (L x levels + a) x levels + b.
-pub const LEVELS: u32 = 8;
-/// The lattice spans this many standard deviations either side of the mean.
+/// The levels of L, of a and of b on the lattice of colour words: the first 8 x 8 x 8 ids are (L x 8 + a) x 8 + b.
+pub(crate) const LEVELS: u32 = 8;
+/// The lattice spans this many standard deviations on either side of the mean.
 const REACH: f32 = 2.0;
 
-/// Number of colour words.
+/// The number of colour words.
 pub(crate) const SIZE: u32 = LEVELS * LEVELS * LEVELS;
 
-/// Mean and spread of L, a and b in the frames learnt from.
+/// The moments of L, a and b.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Colour {
+pub(crate) struct ColourWords {
     lab: [Moments; 3],
 }
 
-impl Colour {
-    /// One word for each point of the field: the lattice point of its colour.
-    pub(crate) fn extract(&mut self, field: &Field, learn: bool, first_id: u32, words: &mut Vec<Word>) {
+impl ColourWords {
+    /// Appends one word for each point of the field: the lattice point of its colour.
+    pub(crate) fn extract(&mut self, field: &ColourField, learn: bool, first_id: u32, words: &mut Vec<Word>) {
         if learn {
             Moments::learn(&mut self.lab, &field.lab);
         }
@@ -36,7 +37,7 @@ impl Colour {
     }
 }
 
-/// Level of a z-score on `levels` equal steps from -`reach` to `reach`, beyond that the outer ones.
+/// The level of a z-score on `levels` equal steps from `-reach` to `reach`; values beyond take the outer levels.
 pub(super) fn level(z: f32, reach: f32, levels: u32) -> u32 {
     let step = 2.0 * reach / levels as f32;
     ((z + reach) / step).clamp(0.0, levels as f32 - 1.0) as u32

@@ -1,36 +1,44 @@
-//! Context words: what the colours are like over a few cells around.
+//! Context and spread words: the mean and the deviation of the colours over a few cells.
 //!
-//! Fine colour words say what a point looks like, these say what it is part of; on real reefs they lift the map more
-//! than any finer vocabulary did (README).
+//! Colour words describe a point, context words its surroundings. On real reefs they improve the map more than any
+//! finer vocabulary did (measured: `docs/explanation/scene-model.md`).
 
 use serde::{Deserialize, Serialize};
 
 use super::colour::level;
-use super::field::Field;
+use super::colour_field::ColourField;
+use super::moments::Moments;
 use super::texture::sextile;
-use super::{Moments, Word};
+use super::word::Word;
 
 const COLOUR_LEVELS: u32 = 6;
 const CONTRAST_LEVELS: u32 = 4;
 const REACH: f32 = 2.0;
-/// Windows, in cells.
+/// Edges of the windows, in cells.
 const CONTEXT_CELLS: f32 = 3.0;
 const SPREAD_CELLS: f32 = 2.0;
 
-/// Number of context words.
+/// The number of context words: levels of L, a and b and of the contrast.
 pub(crate) const SIZE: u32 = COLOUR_LEVELS * COLOUR_LEVELS * COLOUR_LEVELS * CONTRAST_LEVELS;
-/// Number of spread words.
+/// The number of spread words: six levels each of L, a and b.
 pub(crate) const SPREAD_SIZE: u32 = 216;
 
-/// Mean L, a, b and the logarithm of the spread of L, around each point.
+/// The moments of the windows' mean L, a and b, and of the logarithm of the deviation of L.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Context {
+pub(crate) struct ContextWords {
     measures: [Moments; 4],
 }
 
-impl Context {
-    /// One word for each position of a grid of `spacing` pixels.
-    pub(crate) fn extract(&mut self, field: &Field, spacing: f32, learn: bool, first_id: u32, words: &mut Vec<Word>) {
+impl ContextWords {
+    /// Appends one word for each position on a grid of `spacing` pixels.
+    pub(crate) fn extract(
+        &mut self,
+        field: &ColourField,
+        spacing: f32,
+        learn: bool,
+        first_id: u32,
+        words: &mut Vec<Word>,
+    ) {
         let (means, spreads) = field.windows(CONTEXT_CELLS);
         let measure = |(mean, spread): (&[f32; 3], &[f32; 3])| [mean[0], mean[1], mean[2], (spread[0] + 1.0).ln()];
         let measures: Vec<[f32; 4]> = means.iter().zip(&spreads).map(measure).collect();
@@ -49,15 +57,22 @@ impl Context {
     }
 }
 
-/// Logarithms of the spreads of L, a and b, around each point.
+/// The moments of the logarithms of the windows' deviations of L, a and b.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Spread {
+pub(crate) struct SpreadWords {
     measures: [Moments; 3],
 }
 
-impl Spread {
-    /// One word for each position of a grid of `spacing` pixels.
-    pub(crate) fn extract(&mut self, field: &Field, spacing: f32, learn: bool, first_id: u32, words: &mut Vec<Word>) {
+impl SpreadWords {
+    /// Appends one word for each position on a grid of `spacing` pixels.
+    pub(crate) fn extract(
+        &mut self,
+        field: &ColourField,
+        spacing: f32,
+        learn: bool,
+        first_id: u32,
+        words: &mut Vec<Word>,
+    ) {
         let (_, spreads) = field.windows(SPREAD_CELLS);
         let measures: Vec<[f32; 3]> =
             spreads.into_iter().map(|spread| spread.map(|value| (value + 0.5).ln())).collect();

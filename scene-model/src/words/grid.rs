@@ -1,13 +1,13 @@
-//! Regular sample positions in a frame.
+//! Regular sample positions along an axis of a frame.
 
-/// Sample positions along one axis: the centres of equal parts of about `spacing` pixels.
+/// The centres of equal parts of about `spacing` pixels along an axis of `length` pixels.
 pub(crate) fn centres(length: u32, spacing: f32) -> Vec<f32> {
     let count = parts(length, spacing);
     let step = length as f32 / count as f32;
     (0..count).map(|i| (i as f32 + 0.5) * step).collect()
 }
 
-/// Bounds of the same parts: one more than there are parts, from 0 to `length`.
+/// The bounds of the same parts, from 0 to `length`: one more than there are parts.
 pub(crate) fn bounds(length: u32, spacing: f32) -> Vec<u32> {
     let count = parts(length, spacing);
     (0..=count).map(|i| (u64::from(i) * u64::from(length) / u64::from(count)) as u32).collect()

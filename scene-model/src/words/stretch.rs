@@ -1,18 +1,18 @@
-//! Tone stretch: the 1st to 99th percentile of each channel becomes 0 to 1.
+//! The tone stretch: maps the 1st to 99th percentile of each channel to 0 to 1.
 
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use super::plane::Plane;
+use super::grey_plane::GreyPlane;
 
 const LOW: f64 = 0.01;
 const HIGH: f64 = 0.99;
 
-/// Channel histograms of the frames learnt from, and the stretch that follows from them.
+/// The histograms of the channels, and the stretch that follows from them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Stretch {
     histograms: [Vec<u64>; 3],
-    /// Value at 0 and 1 / range, per channel.
+    /// The value that becomes 0, and 1 / range, of each channel.
     tones: [(f32, f32); 3],
 }
 
@@ -23,13 +23,13 @@ impl Default for Stretch {
 }
 
 impl Stretch {
-    /// Makes sure that what was read back has the right shape.
+    /// Repairs the shape of deserialised histograms.
     pub(crate) fn restored(mut self) -> Self {
         self.histograms.iter_mut().for_each(|histogram| histogram.resize(256, 0));
         self
     }
 
-    /// Takes a frame into the estimate.
+    /// Adds a frame to the histograms.
     pub(crate) fn learn(&mut self, frame: &RgbImage) {
         let [red, green, blue] = &mut self.histograms;
         for pixel in frame.as_raw().as_chunks::<3>().0 {
@@ -44,7 +44,7 @@ impl Stretch {
         }
     }
 
-    /// A stretched colour, each channel 0 to 1.
+    /// Stretches a colour with channels of 0 to 255 to channels of 0 to 1.
     pub(crate) fn apply(&self, rgb: [f32; 3]) -> [f32; 3] {
         let mut out = rgb;
         for (value, (low, gain)) in out.iter_mut().zip(self.tones) {
@@ -53,8 +53,8 @@ impl Stretch {
         out
     }
 
-    /// Stretched luminance, 0 to 1 (Rec. 601 weights).
-    pub(crate) fn grey(&self, frame: &RgbImage) -> Plane {
+    /// The stretched luma of a frame, 0 to 1, with the weights of Rec. 601.
+    pub(crate) fn grey(&self, frame: &RgbImage) -> GreyPlane {
         let table = |channel: usize, weight: f32| -> Vec<f32> {
             let (low, gain) = self.tones[channel];
             (0..256).map(|value| weight * ((value as f32 - low) * gain).clamp(0.0, 1.0)).collect()
@@ -62,7 +62,7 @@ impl Stretch {
         let (red, green, blue) = (table(0, 0.299), table(1, 0.587), table(2, 0.114));
         let pixels = frame.as_raw().as_chunks::<3>().0;
         let grey = pixels.iter().map(|p| red[p[0] as usize] + green[p[1] as usize] + blue[p[2] as usize]).collect();
-        Plane { width: frame.width() as usize, height: frame.height() as usize, grey }
+        GreyPlane { width: frame.width() as usize, height: frame.height() as usize, grey }
     }
 }
 

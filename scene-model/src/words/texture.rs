@@ -1,51 +1,52 @@
-//! Texture words: Gabor energy at three scales, each cut into six levels of equal share.
+//! Texture words: Gabor energy at three scales, each quantised into six levels of equal probability.
 
+use super::grey_plane::GreyPlane;
 use super::grid::centres;
-use super::plane::Plane;
-use super::{Moments, Word};
+use super::moments::Moments;
+use super::word::Word;
 
 const SCALES: usize = 3;
 const ORIENTATIONS: usize = 6;
-/// Even and odd filters of all orientations.
+/// Even and odd filters, one of each for every orientation.
 const FILTERS: usize = 2 * ORIENTATIONS;
 const SIDE: usize = 9;
-/// Wavelength and width of the filters, pixels of their scale.
+/// Wavelength and standard deviation of the filters, in pixels of their scale.
 const WAVELENGTH: f32 = 5.0;
 const SIGMA: f32 = 2.0;
-/// Sextiles of the standard normal.
+/// The sextiles of the standard normal distribution.
 const CUTS: [f32; 5] = [-0.967, -0.431, 0.0, 0.431, 0.967];
 
-/// Number of texture words.
+/// The number of texture words: 6 levels at each of 3 scales.
 pub(crate) const SIZE: u32 = 216;
 
-/// Filter bank, and mean and spread of the log energy at each scale in the frames learnt from.
+/// The filter bank, and the moments of the log energy at each scale.
 #[derive(Clone, Debug)]
-pub(crate) struct Texture {
+pub(crate) struct TextureWords {
     bank: Vec<[[f32; FILTERS]; SIDE]>,
     energy: [Moments; SCALES],
 }
 
-impl Default for Texture {
+impl Default for TextureWords {
     fn default() -> Self {
         Self { bank: bank(), energy: [Moments::default(); SCALES] }
     }
 }
 
-impl Texture {
-    /// A filter bank with what was learnt before.
+impl TextureWords {
+    /// Continues with moments that were learnt before.
     pub(crate) fn with_energy(energy: [Moments; SCALES]) -> Self {
         Self { energy, ..Self::default() }
     }
 
-    /// Log energy at each scale in the frames learnt from.
+    /// The moments of the log energy at each scale.
     pub(crate) fn learnt(&self) -> [Moments; SCALES] {
         self.energy
     }
 
-    /// One word for each position of a grid of `spacing` pixels.
+    /// Appends one word for each position on a grid of `spacing` pixels.
     pub(crate) fn extract(
         &mut self,
-        levels: &[Plane; SCALES],
+        levels: &[GreyPlane; SCALES],
         spacing: f32,
         learn: bool,
         first_id: u32,
@@ -68,8 +69,8 @@ impl Texture {
         }));
     }
 
-    /// Log energy over all orientations at each scale.
-    fn energies(&self, levels: &[Plane; SCALES], u: f32, v: f32) -> [f32; SCALES] {
+    /// The log energy over all orientations, at each scale.
+    fn energies(&self, levels: &[GreyPlane; SCALES], u: f32, v: f32) -> [f32; SCALES] {
         let mut energies = [0.0; SCALES];
         let mut zoom = 1.0;
         for (energy, level) in energies.iter_mut().zip(levels) {
@@ -93,12 +94,12 @@ impl Texture {
     }
 }
 
-/// Which of six parts of equal share a z-score falls in.
+/// The sextile of the normal distribution that a z-score falls in, 0 to 5.
 pub(super) fn sextile(z: f32) -> u32 {
     CUTS.iter().map(|&cut| u32::from(z > cut)).sum()
 }
 
-/// Even and odd Gabor filters, without answer to a constant.
+/// Even and odd Gabor filters whose response to a constant is 0.
 fn bank() -> Vec<[[f32; FILTERS]; SIDE]> {
     let offsets = || (0..SIDE * SIDE).map(|i| ((i % SIDE) as f32 - 4.0, (i / SIDE) as f32 - 4.0));
     let window = |(dx, dy): (f32, f32)| (-(dx * dx + dy * dy) / (2.0 * SIGMA * SIGMA)).exp();
@@ -128,11 +129,11 @@ mod tests {
                 *value = pixel(x, y);
             }
         }
-        Texture::default().energy(&patch)
+        TextureWords::default().energy(&patch)
     }
 
     #[test]
-    fn stripes_have_energy_and_an_even_patch_has_none() {
+    fn stripes_have_energy_and_a_uniform_patch_has_none() {
         let even = energy_of(|_, _| 0.7);
         let stripes = energy_of(|x, _| if x % 5 < 2 { 1.0 } else { 0.0 });
         assert!(even < -11.0, "{even}");

@@ -1,27 +1,27 @@
-//! Fuzz targets of sim-channel: emulators take any bytes, from hosts and from the water.
+//! Fuzz targets of sim-channel: emulators accept any bytes from hosts and from the channel.
 
-use sim_channel::modem::{Emulator, Host};
-use sim_channel::{Arrival, Duration, NodeId, Outcome, Position};
+use sim_channel::modem::{Emulator, HostId};
+use sim_channel::{Arrival, Duration, NodeId, ReceptionOutcome, NodePosition};
 
-/// Pieces of bytes from a host, their lengths and the pauses between them taken from the data too.
+/// Feeds bytes of a host in pieces; the data also decide the lengths of the pieces and the pauses between them.
 pub fn host(mut modem: impl Emulator, data: &[u8]) {
     let mut now = Duration::ZERO;
     let mut rest = data;
     while let Some((control, tail)) = rest.split_first() {
         let (piece, tail) = tail.split_at(tail.len().min(usize::from(control & 63) + 1));
         now += Duration::from_millis(u64::from(control >> 6) * 400);
-        modem.handle_host_bytes(Host::FIRST, piece, now);
-        settle(&mut modem, now);
+        modem.handle_host_bytes(HostId::FIRST, piece, now);
+        drain(&mut modem, now);
         rest = tail;
     }
-    settle(&mut modem, now + Duration::from_secs(60));
+    drain(&mut modem, now + Duration::from_secs(60));
 }
 
-/// A frame from the water.
-pub fn water(mut modem: impl Emulator, data: &[u8]) {
+/// Feeds a frame from the channel.
+pub fn channel(mut modem: impl Emulator, data: &[u8]) {
     let now = Duration::from_secs(5);
-    let place = Position::default();
-    let outcome = Outcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };
+    let position = NodePosition::default();
+    let outcome = ReceptionOutcome::Delivered { bytes: data.to_vec(), copy: 0, corrupted: true };
     let arrival = Arrival {
         transmission: 1,
         from: NodeId(1),
@@ -29,18 +29,18 @@ pub fn water(mut modem: impl Emulator, data: &[u8]) {
         at: now,
         sent_at: now - Duration::from_secs(2),
         range_m: 100.0,
-        sender: place,
-        receiver: place,
+        sender: position,
+        receiver: position,
         airtime: Duration::from_secs(1),
         outcome,
     };
     modem.handle_arrival(&arrival, now);
-    settle(&mut modem, now + Duration::from_secs(60));
+    drain(&mut modem, now + Duration::from_secs(60));
 }
 
-fn settle(modem: &mut impl Emulator, now: Duration) {
+fn drain(modem: &mut impl Emulator, now: Duration) {
     modem.handle_timeout(now);
     while modem.poll_transmit(now).is_some() {}
     while modem.poll_event().is_some() {}
-    modem.poll_host_bytes(Host::FIRST, now);
+    let _ = modem.poll_host_bytes(HostId::FIRST, now);
 }

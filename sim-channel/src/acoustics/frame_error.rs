@@ -1,13 +1,15 @@
-//! From signal to noise ratio to lost frames.
+//! Bit and frame errors as a function of the signal-to-noise ratio.
 
 /// Bit error rate of coherent QPSK or BPSK at `eb_n0_db`: erfc(sqrt(Eb/N0)) / 2.
 ///
 /// Source: J. G. Proakis, "Digital Communications".
+#[must_use]
 pub fn bit_error_rate(eb_n0_db: f64) -> f64 {
     erfc(10f64.powf(eb_n0_db / 10.0).sqrt()) / 2.0
 }
 
-/// Probability that at least one of `bytes` x 8 bits is wrong, errors falling independently.
+/// Probability 0..=1 that at least one bit of `bytes` bytes is wrong at `eb_n0_db`, with independent bit errors.
+#[must_use]
 pub fn frame_error_rate(eb_n0_db: f64, bytes: usize) -> f64 {
     let bits = 8.0 * bytes as f64;
     -(bits * (-bit_error_rate(eb_n0_db)).ln_1p()).exp_m1()

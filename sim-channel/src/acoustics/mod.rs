@@ -1,12 +1,20 @@
-//! Sound in water: absorption, spreading, ambient noise, and what a signal to noise ratio costs in frames.
+//! Sound in water: absorption, spreading, ambient noise, sound speed, and the frame errors at a signal-to-noise ratio.
+//!
+//! Every function states its source, its units and the range in which it holds.
 
-pub mod absorption;
-pub mod frame_error;
-pub mod noise;
-pub mod sound_speed;
-pub mod spreading;
+mod absorption;
+mod frame_error;
+mod noise;
+mod sound_speed;
+mod spreading;
 
-/// The sum of levels in decibels, as of uncorrelated powers.
+pub use absorption::thorp_db_per_km;
+pub use frame_error::{bit_error_rate, frame_error_rate};
+pub use noise::{wenz_db, wind_of_sea_state};
+pub use sound_speed::mackenzie_m_s;
+pub use spreading::transmission_loss_db;
+
+/// The sum of the powers of uncorrelated sources; all levels in decibels.
 pub(crate) fn sum_db(levels: &[f64]) -> f64 {
     10.0 * levels.iter().map(|level| 10f64.powf(level / 10.0)).sum::<f64>().log10()
 }

@@ -1,12 +1,15 @@
-//! The sea's own noise.
+//! Ambient noise of the sea.
 
 use super::sum_db;
 
-/// Noise level in dB re 1 uPa^2/Hz at `frequency_khz` (0.001..=100).
+/// Ambient noise level in dB re 1 uPa^2/Hz at `frequency_khz` (0.001..=100).
 ///
 /// `wind_m_s` is the wind speed at the surface, `shipping` 0 (none)..=1 (heavy). Turbulence, shipping, waves and thermal
-/// noise add as powers. Source: G. M. Wenz 1962, in the empirical form of R. Coates, "Underwater Acoustic Systems",
-/// as used by M. Stojanovic 2007.
+/// noise add as powers.
+///
+/// Source: G. M. Wenz 1962, in the empirical form of R. Coates, "Underwater Acoustic Systems", as M. Stojanovic used it
+/// in 2007.
+#[must_use]
 pub fn wenz_db(frequency_khz: f64, wind_m_s: f64, shipping: f64) -> f64 {
     let f = frequency_khz.max(1e-3);
     let turbulence = 17.0 - 30.0 * f.log10();
@@ -16,9 +19,10 @@ pub fn wenz_db(frequency_khz: f64, wind_m_s: f64, shipping: f64) -> f64 {
     sum_db(&[turbulence, ships, waves, thermal])
 }
 
-/// Wind speed in m/s that goes with a sea state 0..=6; higher states give that of 6.
+/// Typical wind speed in m/s at a sea state 0..=6; higher states give the speed of 6.
 ///
 /// Source: middle of the wind ranges in knots given with the noise curves of Wenz and of Knudsen (Urick).
+#[must_use]
 pub fn wind_of_sea_state(sea_state: u8) -> f64 {
     const KNOTS: [f64; 7] = [0.5, 5.0, 8.5, 13.5, 19.0, 24.5, 37.5];
     const M_S_PER_KNOT: f64 = 0.514_444;
@@ -30,20 +34,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn at_26_khz_waves_rule_and_match_their_term_alone() {
+    fn waves_dominate_the_noise_at_26_khz() {
         let waves = 50.0 + 7.5 * 10f64.sqrt() + 20.0 * 26f64.log10() - 40.0 * 26.4f64.log10();
         assert!((wenz_db(26.0, 10.0, 0.5) - waves).abs() < 0.1);
     }
 
     #[test]
-    fn at_100_hz_ships_rule() {
+    fn shipping_dominates_the_noise_at_100_hz() {
         let noise = wenz_db(0.1, 0.0, 1.0);
         let ships = 40.0 + 10.0 + 26.0 * 0.1f64.log10() - 60.0 * 0.13f64.log10();
         assert!((noise - ships).abs() < 0.1);
     }
 
     #[test]
-    fn at_100_khz_of_a_calm_sea_heat_rules() {
+    fn thermal_noise_dominates_a_calm_sea_at_100_khz() {
         assert!((wenz_db(100.0, 0.0, 0.0) - 25.0).abs() < 1.5);
     }
 

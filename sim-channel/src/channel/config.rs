@@ -1,16 +1,20 @@
-//! What the water does.
+//! The conditions of a channel.
 
 use super::Outage;
-use crate::{Duration, LossModel};
+use crate::loss::LossModel;
+use std::time::Duration;
 
-/// The conditions of a channel; may be changed while it runs with `set_config`.
+/// The conditions of a channel.
+///
+/// [`Channel::set_config`](super::Channel::set_config) changes them while the channel runs; [`presets`](super::presets)
+/// has the conditions of common situations.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ChannelConfig {
     /// Speed of sound, m/s; 1300..=1700 in water. Default 1500.
     pub sound_speed_m_s: f64,
-    /// Whether a node that transmits is deaf. Default true.
+    /// Whether a node cannot receive while it transmits. Default true.
     pub half_duplex: bool,
-    /// How frames are lost on each directed link. Default none.
+    /// Loss on each directed link without a model of its own. Default: no loss.
     pub loss: LossModel,
     /// Probability 0..=1 that a delivered frame arrives with flipped bits. Default 0.
     pub corruption: f64,
@@ -18,11 +22,11 @@ pub struct ChannelConfig {
     pub duplication: f64,
     /// Probability 0..=1 that a copy is handed over late, so that later frames overtake it. Default 0.
     pub reordering: f64,
-    /// How late such a copy is. Default 5 s.
+    /// Delay of such a late copy. Default 5 s.
     pub reorder_delay: Duration,
-    /// Beyond this slant range, in metres, nothing is noticed. Default: no limit.
+    /// Slant range beyond which no signal is detected, m. Default: no limit.
     pub max_range_m: f64,
-    /// When nothing gets through. Default never.
+    /// Scheduled silences of links, nodes or the channel. Default none.
     pub outages: Vec<Outage>,
 }
 

@@ -1,46 +1,63 @@
-//! Times at which nothing gets through.
+//! Scheduled silences of a channel.
 
-use crate::{Duration, NodeId};
+use crate::nodes::NodeId;
+use std::time::Duration;
 
 /// A scheduled silence of the whole channel, of a node, or of one direction of a link.
+///
+/// ```
+/// use sim_channel::{Channel, ChannelConfig, Duration, LossReason, NodeId, Outage, ReceptionOutcome, NodePosition};
+///
+/// let outages = vec![Outage::all(Duration::ZERO, Duration::from_secs(60))];
+/// let mut channel = Channel::new(ChannelConfig { outages, ..ChannelConfig::default() }, 1);
+/// channel.place(NodeId(1), NodePosition::new(0.0, 0.0, 0.0));
+/// channel.place(NodeId(2), NodePosition::new(300.0, 0.0, 0.0));
+/// channel.transmit(NodeId(1), vec![0; 8], Duration::from_millis(100), Duration::from_secs(30));
+///
+/// let arrival = channel.poll_arrival(Duration::MAX).unwrap();
+/// assert!(matches!(arrival.outcome, ReceptionOutcome::Lost { reason: LossReason::Outage, .. }));
+/// ```
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outage {
     /// Start, since the start of the run; inclusive.
     pub from: Duration,
     /// End, since the start of the run; exclusive. `Duration::MAX` for ever.
     pub until: Duration,
-    /// Whom it concerns.
+    /// The links that are silent.
     pub scope: OutageScope,
 }
 
-/// What an outage silences.
+/// The links that an outage silences.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[non_exhaustive]
 pub enum OutageScope {
-    /// Everything.
+    /// Every link of the channel.
     All,
-    /// All that a node sends or should receive.
+    /// Both directions of every link of one node.
     Node(NodeId),
-    /// One direction only; alone and for ever it makes a one-way link.
+    /// One direction of one link; for ever, it makes a one-way link.
     Link {
-        /// The sender that is not heard.
+        /// The sender that does not get through.
         from: NodeId,
-        /// The receiver that does not hear it.
+        /// The receiver that it does not reach.
         to: NodeId,
     },
 }
 
 impl Outage {
-    /// Silence of the whole channel between two times.
+    /// Silence of the whole channel from `from` (inclusive) to `until` (exclusive).
+    #[must_use]
     pub fn all(from: Duration, until: Duration) -> Self {
         Self { from, until, scope: OutageScope::All }
     }
 
-    /// `to` never hears `from`, while the other direction works.
+    /// `to` never receives `from`, while the other direction works.
+    #[must_use]
     pub fn one_way(from: NodeId, to: NodeId) -> Self {
         Self { from: Duration::ZERO, until: Duration::MAX, scope: OutageScope::Link { from, to } }
     }
 
-    /// Whether a reception over `start..end` on the link `from` -> `to` is touched.
+    /// Whether the outage touches a reception over `start..end` on the link `from` -> `to`.
     pub(crate) fn covers(&self, from: NodeId, to: NodeId, start: Duration, end: Duration) -> bool {
         let concerned = match self.scope {
             OutageScope::All => true,

@@ -14,7 +14,7 @@ fn ms(ms: u64) -> Duration {
 fn line(config: ChannelConfig, seed: u64, nodes: &[(NodeId, f64)]) -> Channel {
     let mut channel = Channel::new(config, seed);
     for (node, x_m) in nodes {
-        channel.place(*node, Position::new(*x_m, 0.0, 0.0));
+        channel.place(*node, NodePosition::new(*x_m, 0.0, 0.0));
     }
     channel
 }
@@ -29,12 +29,12 @@ fn drain(channel: &mut Channel) -> Vec<Arrival> {
 
 fn reason(arrival: &Arrival) -> Option<LossReason> {
     match &arrival.outcome {
-        Outcome::Lost { reason, .. } => Some(*reason),
-        Outcome::Delivered { .. } => None,
+        ReceptionOutcome::Lost { reason, .. } => Some(*reason),
+        ReceptionOutcome::Delivered { .. } => None,
     }
 }
 
-/// What became of transmission `number` at `node`.
+/// Reason of the loss of transmission `number` at `node`; `None` if it was delivered.
 fn fate(arrivals: &[Arrival], number: u64, node: NodeId) -> Option<LossReason> {
     reason(arrivals.iter().find(|a| a.transmission == number && a.to == node).expect("arrival"))
 }
@@ -48,7 +48,7 @@ fn delay_is_range_over_sound_speed_plus_airtime() {
     let arrival = channel.poll_arrival(ms(2500)).expect("complete");
     assert_eq!((arrival.from, arrival.to, arrival.sent_at, arrival.at), (A, B, SECOND, ms(2500)));
     assert_eq!(arrival.range_m, 1500.0);
-    assert_eq!(arrival.outcome, Outcome::Delivered { bytes: vec![7; 9], copy: 0, corrupted: false });
+    assert_eq!(arrival.outcome, ReceptionOutcome::Delivered { bytes: vec![7; 9], copy: 0, corrupted: false });
     assert_eq!(channel.poll_timeout(), None);
 }
 
@@ -64,24 +64,24 @@ fn every_other_node_gets_its_own_copy_nearest_first() {
 fn a_moved_node_changes_the_delay_of_later_frames_only() {
     let mut channel = pair(ChannelConfig::default(), 1);
     channel.transmit(A, vec![1], ms(100), Duration::ZERO);
-    channel.place(B, Position::new(3000.0, 0.0, 0.0));
+    channel.place(B, NodePosition::new(3000.0, 0.0, 0.0));
     channel.transmit(A, vec![2], ms(100), SECOND);
     let times: Vec<_> = drain(&mut channel).iter().map(|a| a.at).collect();
     assert_eq!(times, [ms(1100), ms(3100)]);
 }
 
 #[test]
-fn a_transmitter_is_deaf_to_what_overlaps_its_own_voice() {
+fn transmitter_misses_signals_that_overlap_its_own() {
     let mut channel = pair(ChannelConfig::default(), 1);
     let first = channel.transmit(A, vec![1], SECOND, Duration::ZERO);
     let second = channel.transmit(B, vec![2], SECOND, ms(1500));
     let arrivals = drain(&mut channel);
     assert_eq!(fate(&arrivals, first, B), Some(LossReason::SelfDeaf));
-    assert_eq!(fate(&arrivals, second, A), None, "A had ended long before");
+    assert_eq!(fate(&arrivals, second, A), None, "A had ended before");
 }
 
 #[test]
-fn a_signal_that_comes_during_the_own_voice_is_missed_too() {
+fn signal_during_own_transmission_is_missed() {
     let mut channel = pair(ChannelConfig::default(), 1);
     channel.transmit(B, vec![2], Duration::from_secs(3), Duration::ZERO);
     let late = channel.transmit(A, vec![1], SECOND, ms(100));
@@ -89,7 +89,7 @@ fn a_signal_that_comes_during_the_own_voice_is_missed_too() {
 }
 
 #[test]
-fn full_duplex_hears_itself_away() {
+fn full_duplex_receives_while_transmitting() {
     let mut channel = pair(ChannelConfig { half_duplex: false, ..Default::default() }, 1);
     channel.transmit(A, vec![1], SECOND, Duration::ZERO);
     channel.transmit(B, vec![2], SECOND, ms(1500));
@@ -104,7 +104,7 @@ fn collisions_are_judged_where_the_signals_meet() {
     let arrivals = drain(&mut channel);
     assert_eq!(fate(&arrivals, a, B), Some(LossReason::Collision));
     assert_eq!(fate(&arrivals, c, B), Some(LossReason::Collision));
-    assert_eq!(fate(&arrivals, a, C), None, "C had fallen silent before");
+    assert_eq!(fate(&arrivals, a, C), None, "C had ended before");
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn signals_that_touch_do_not_collide() {
 }
 
 #[test]
-fn busy_lasts_exactly_as_long_as_the_own_transmission() {
+fn node_is_busy_exactly_while_it_transmits() {
     let mut channel = pair(ChannelConfig::default(), 1);
     channel.transmit(A, vec![1], ms(200), SECOND);
     assert!(!channel.is_busy(A, ms(999)));
@@ -127,7 +127,7 @@ fn busy_lasts_exactly_as_long_as_the_own_transmission() {
 }
 
 #[test]
-fn an_outage_silences_what_it_touches_and_nothing_else() {
+fn outage_loses_only_the_frames_it_touches() {
     let config = ChannelConfig { outages: vec![Outage::all(ms(10_000), ms(20_000))], ..Default::default() };
     let mut channel = pair(config, 1);
     let sent = [ms(8_900), ms(8_901), ms(15_000), ms(18_999), ms(19_000)];
@@ -138,7 +138,7 @@ fn an_outage_silences_what_it_touches_and_nothing_else() {
 }
 
 #[test]
-fn a_one_way_link_carries_the_other_way() {
+fn one_way_link_carries_the_other_direction() {
     let config = ChannelConfig { outages: vec![Outage::one_way(A, B)], ..Default::default() };
     let mut channel = pair(config, 1);
     let there = channel.transmit(A, vec![1], ms(100), Duration::ZERO);
@@ -148,7 +148,7 @@ fn a_one_way_link_carries_the_other_way() {
 }
 
 #[test]
-fn out_of_range_is_told_and_disturbs_nobody() {
+fn out_of_range_frame_disturbs_no_other() {
     let config = ChannelConfig { max_range_m: 2000.0, ..Default::default() };
     let mut channel = line(config, 1, &[(A, 0.0), (B, 3000.0), (C, 4500.0)]);
     let far = channel.transmit(A, vec![1], SECOND, Duration::ZERO);
@@ -162,7 +162,7 @@ fn out_of_range_is_told_and_disturbs_nobody() {
 fn corruption_flips_bits_and_keeps_the_length() {
     let mut channel = pair(ChannelConfig { corruption: 1.0, ..Default::default() }, 1);
     channel.transmit(A, vec![0; 20], ms(100), Duration::ZERO);
-    let Outcome::Delivered { bytes, corrupted: true, .. } = drain(&mut channel).remove(0).outcome else {
+    let ReceptionOutcome::Delivered { bytes, corrupted: true, .. } = drain(&mut channel).remove(0).outcome else {
         panic!("delivered, corrupted")
     };
     let flipped: u32 = bytes.iter().map(|b| b.count_ones()).sum();
@@ -170,10 +170,10 @@ fn corruption_flips_bits_and_keeps_the_length() {
 }
 
 #[test]
-fn nothing_to_corrupt_is_not_corrupted() {
+fn empty_frame_is_not_corrupted() {
     let mut channel = pair(ChannelConfig { corruption: 1.0, ..Default::default() }, 1);
     channel.transmit(A, vec![], ms(100), Duration::ZERO);
-    let expected = Outcome::Delivered { bytes: vec![], copy: 0, corrupted: false };
+    let expected = ReceptionOutcome::Delivered { bytes: vec![], copy: 0, corrupted: false };
     assert_eq!(drain(&mut channel).remove(0).outcome, expected);
 }
 
@@ -182,7 +182,7 @@ fn duplicates_are_numbered() {
     let mut channel = pair(ChannelConfig { duplication: 1.0, ..Default::default() }, 1);
     channel.transmit(A, vec![5], ms(100), Duration::ZERO);
     let copies: Vec<_> = drain(&mut channel).into_iter().map(|a| a.outcome).collect();
-    let copy = |copy| Outcome::Delivered { bytes: vec![5], copy, corrupted: false };
+    let copy = |copy| ReceptionOutcome::Delivered { bytes: vec![5], copy, corrupted: false };
     assert_eq!(copies, [copy(0), copy(1)]);
 }
 
@@ -234,12 +234,12 @@ fn equal_seeds_repeat_and_other_seeds_differ() {
 }
 
 #[test]
-fn traffic_on_one_link_never_shifts_the_chance_of_another() {
-    let run = |chatter: bool| {
+fn traffic_on_one_link_leaves_other_links_unchanged() {
+    let run = |busy: bool| {
         let mut channel = line(stormy(), 9, &[(A, 0.0), (B, 1500.0), (C, 4500.0)]);
         for n in 0..100 {
             channel.transmit(A, vec![n as u8; 8], ms(100), ms(20_000 * n));
-            if chatter {
+            if busy {
                 channel.transmit(C, vec![1; 8], ms(100), ms(20_000 * n + 10_000));
             }
         }
@@ -267,23 +267,24 @@ fn loss_can_be_changed_while_running_and_per_link() {
 }
 
 #[test]
-fn a_node_on_a_track_is_heard_from_where_it_is() {
+fn node_on_a_track_transmits_from_its_current_position() {
     let mut channel = pair(ChannelConfig::default(), 1);
     let track = Track::new(vec![
-        (Duration::ZERO, Position::new(1500.0, 0.0, 0.0)),
-        (Duration::from_secs(1000), Position::new(3000.0, 0.0, 0.0)),
+        (Duration::ZERO, NodePosition::new(1500.0, 0.0, 0.0)),
+        (Duration::from_secs(1000), NodePosition::new(3000.0, 0.0, 0.0)),
     ]);
-    channel.follow(B, track, Duration::ZERO);
+    channel.follow_track(B, track, Duration::ZERO);
     channel.transmit(A, vec![1], ms(100), Duration::from_secs(500));
     assert_eq!(drain(&mut channel)[0].range_m, 2250.0);
     assert_eq!(channel.range_m(A, B), Some(2250.0));
 }
 
 #[test]
-fn an_hour_of_fifteen_talkative_nodes_passes_quickly() {
-    let mut channel = Channel::new(ChannelConfig { duplication: 0.05, reordering: 0.05, ..crate::presets::storm() }, 1);
+fn an_hour_of_fifteen_busy_nodes_runs_quickly() {
+    let mut channel =
+        Channel::new(ChannelConfig { duplication: 0.05, reordering: 0.05, ..crate::channel::presets::storm() }, 1);
     for n in 0..15u8 {
-        channel.place(NodeId(n), Position::new(200.0 * f64::from(n), 0.0, 0.0));
+        channel.place(NodeId(n), NodePosition::new(200.0 * f64::from(n), 0.0, 0.0));
     }
     let mut arrivals = 0;
     for second in 0..3600u64 {
@@ -298,7 +299,7 @@ fn an_hour_of_fifteen_talkative_nodes_passes_quickly() {
 }
 
 #[test]
-fn a_transmission_cut_short_is_lost_and_frees_the_sender() {
+fn transmission_cut_short_is_lost_and_frees_the_sender() {
     let mut channel = pair(ChannelConfig::default(), 1);
     let number = channel.transmit(A, vec![1], SECOND, Duration::ZERO);
     channel.cut_short(number, ms(300));
@@ -311,9 +312,9 @@ fn a_transmission_cut_short_is_lost_and_frees_the_sender() {
 }
 
 #[test]
-fn onsets_come_before_arrivals_and_only_to_who_can_hear() {
+fn onsets_precede_arrivals_at_listening_nodes() {
     let mut channel = pair(ChannelConfig::default(), 1);
-    channel.tell_onsets();
+    channel.report_onsets();
     channel.transmit(A, vec![1], SECOND, Duration::ZERO);
     assert_eq!(channel.poll_timeout(), Some(SECOND));
     let onset = channel.poll_onset(SECOND).expect("onset");
@@ -322,37 +323,37 @@ fn onsets_come_before_arrivals_and_only_to_who_can_hear() {
     assert!(channel.poll_arrival(2 * SECOND).is_some());
     channel.transmit(A, vec![1], SECOND, 10 * SECOND);
     channel.transmit(B, vec![1], SECOND, ms(10_900));
-    let told: Vec<_> = std::iter::from_fn(|| channel.poll_onset(20 * SECOND)).map(|onset| onset.to).collect();
-    assert_eq!(told, [A], "B spoke when A's signal came");
+    let receivers: Vec<_> = std::iter::from_fn(|| channel.poll_onset(20 * SECOND)).map(|onset| onset.to).collect();
+    assert_eq!(receivers, [A], "B transmitted when the signal of A came");
 }
 
 proptest! {
     #[test]
-    fn every_transmission_ends_once_at_every_other_node_and_in_order(
+    fn each_transmission_ends_once_at_each_other_node(
         seed in any::<u64>(),
-        places in proptest::collection::vec((0.0..5000.0f64, 0.0..5000.0f64), 1..7),
-        talk in proptest::collection::vec((0usize..7, 0u64..3000, 1u64..2000), 1..60),
+        positions in proptest::collection::vec((0.0..5000.0f64, 0.0..5000.0f64), 1..7),
+        traffic in proptest::collection::vec((0usize..7, 0u64..3000, 1u64..2000), 1..60),
     ) {
-        let config = ChannelConfig { duplication: 0.1, reordering: 0.1, ..crate::presets::under_ice() };
+        let config = ChannelConfig { duplication: 0.1, reordering: 0.1, ..crate::channel::presets::under_ice() };
         let mut channel = Channel::new(config, seed);
-        for (node, (x_m, y_m)) in (0u8..).zip(&places) {
-            channel.place(NodeId(node), Position::new(*x_m, *y_m, 0.0));
+        for (node, (x_m, y_m)) in (0u8..).zip(&positions) {
+            channel.place(NodeId(node), NodePosition::new(*x_m, *y_m, 0.0));
         }
         let mut now = Duration::ZERO;
         let mut arrivals = Vec::new();
-        for (node, pause, airtime) in &talk {
+        for (node, pause, airtime) in &traffic {
             now += ms(*pause);
             arrivals.extend(std::iter::from_fn(|| channel.poll_arrival(now)));
-            channel.transmit(NodeId((node % places.len()) as u8), vec![1, 2, 3], ms(*airtime), now);
+            channel.transmit(NodeId((node % positions.len()) as u8), vec![1, 2, 3], ms(*airtime), now);
         }
         arrivals.extend(drain(&mut channel));
         prop_assert!(arrivals.windows(2).all(|w| w[0].at <= w[1].at));
-        let first = |a: &&Arrival| !matches!(a.outcome, Outcome::Delivered { copy: 1, .. });
+        let first = |a: &&Arrival| !matches!(a.outcome, ReceptionOutcome::Delivered { copy: 1, .. });
         let mut ends: Vec<_> = arrivals.iter().filter(first).map(|a| (a.transmission, a.to)).collect();
-        prop_assert_eq!(ends.len(), talk.len() * (places.len() - 1));
+        prop_assert_eq!(ends.len(), traffic.len() * (positions.len() - 1));
         ends.sort();
         ends.dedup();
-        prop_assert_eq!(ends.len(), talk.len() * (places.len() - 1));
+        prop_assert_eq!(ends.len(), traffic.len() * (positions.len() - 1));
         prop_assert_eq!(channel.poll_timeout(), None);
     }
 }

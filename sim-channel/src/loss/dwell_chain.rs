@@ -1,22 +1,23 @@
-//! A continuous-time Markov chain over a few states, told by how long it dwells in each.
+//! A continuous-time Markov chain over a few states, described by its mean dwell in each.
 
-use crate::{Duration, Stream};
+use crate::random::RandomStream;
+use std::time::Duration;
 
-/// Mean dwell in each of `N` states, and where it goes from there.
+/// Mean dwell in each of `N` states, and the probabilities of the next state.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct DwellChain<const N: usize> {
     pub dwell: [Duration; N],
-    /// Row: from; column: to. Rows sum to 1, the diagonal is 0.
+    /// Row: present state; column: next state. Rows sum to 1, the diagonal is 0.
     pub jump: [[f64; N]; N],
 }
 
-/// Beyond this many of the longest mean dwells the past is forgotten (e^-200) and the state drawn afresh.
+/// After this many of the longest mean dwells the past has no influence (e^-200), and the state is drawn independently.
 const MEMORY_DWELLS: u32 = 200;
 
 impl<const N: usize> DwellChain<N> {
-    /// Share of time in each state.
+    /// Long-run share of time in each state.
     ///
-    /// The jump chain's stationary distribution, by iteration of its lazy version, weighted by the dwells.
+    /// Computed as the jump chain's stationary distribution, by iteration of its lazy version, weighted by the dwells.
     pub(super) fn stationary(&self) -> [f64; N] {
         let mut visits = [1.0 / N as f64; N];
         for _ in 0..2000 {
@@ -33,9 +34,9 @@ impl<const N: usize> DwellChain<N> {
     }
 }
 
-/// The chain at work on one link.
+/// The state of the chain on one link.
 #[derive(Clone, Debug)]
-pub(super) struct Walk<const N: usize> {
+pub(super) struct ChainWalk<const N: usize> {
     chain: DwellChain<N>,
     stationary: [f64; N],
     forget_after: Duration,
@@ -43,46 +44,46 @@ pub(super) struct Walk<const N: usize> {
     until: Duration,
 }
 
-impl<const N: usize> Walk<N> {
+impl<const N: usize> ChainWalk<N> {
     /// Starts in a state drawn from the stationary distribution.
-    pub(super) fn new(chain: DwellChain<N>, chance: &mut Stream) -> Self {
+    pub(super) fn new(chain: DwellChain<N>, rng: &mut RandomStream) -> Self {
         let longest = chain.dwell.iter().max().copied().unwrap_or_default();
         let stationary = chain.stationary();
         let forget_after = longest.saturating_mul(MEMORY_DWELLS);
         let mut walk = Self { chain, stationary, forget_after, state: 0, until: Duration::ZERO };
-        walk.restart(Duration::ZERO, chance);
+        walk.restart(Duration::ZERO, rng);
         walk
     }
 
-    /// The state at a time that never goes back.
-    pub(super) fn state_at(&mut self, at: Duration, chance: &mut Stream) -> usize {
+    /// The state at `at`, which never goes back.
+    pub(super) fn state_at(&mut self, at: Duration, rng: &mut RandomStream) -> usize {
         if at.saturating_sub(self.until) > self.forget_after {
-            self.restart(at, chance);
+            self.restart(at, rng);
         }
         while self.until < at {
-            self.state = pick(&self.chain.jump[self.state], chance);
-            let stay = self.dwell(chance);
+            self.state = pick(&self.chain.jump[self.state], rng);
+            let stay = self.dwell(rng);
             self.until = self.until.saturating_add(stay);
         }
         self.state
     }
 
-    fn restart(&mut self, at: Duration, chance: &mut Stream) {
-        self.state = pick(&self.stationary, chance);
-        let stay = self.dwell(chance);
+    fn restart(&mut self, at: Duration, rng: &mut RandomStream) {
+        self.state = pick(&self.stationary, rng);
+        let stay = self.dwell(rng);
         self.until = at.saturating_add(stay);
     }
 
-    /// At least a microsecond, so that walking always advances.
-    fn dwell(&self, chance: &mut Stream) -> Duration {
+    /// Draws a dwell of at least a microsecond, so that the walk always advances.
+    fn dwell(&self, rng: &mut RandomStream) -> Duration {
         let mean = self.chain.dwell[self.state].as_secs_f64();
-        Duration::try_from_secs_f64(chance.exponential(mean)).unwrap_or(Duration::MAX).max(Duration::from_micros(1))
+        Duration::try_from_secs_f64(rng.exponential(mean)).unwrap_or(Duration::MAX).max(Duration::from_micros(1))
     }
 }
 
-/// An index drawn with the given weights; the last one that has any weight if rounding leaves a rest.
-fn pick<const N: usize>(weights: &[f64; N], chance: &mut Stream) -> usize {
-    let mut rest = chance.uniform() * weights.iter().sum::<f64>();
+/// An index drawn with the given weights; the last one with a positive weight if rounding leaves a rest.
+fn pick<const N: usize>(weights: &[f64; N], rng: &mut RandomStream) -> usize {
+    let mut rest = rng.uniform() * weights.iter().sum::<f64>();
     let mut last = 0;
     for (index, weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
         last = index;
@@ -118,11 +119,11 @@ mod tests {
     }
 
     #[test]
-    fn walking_meets_the_shares_of_time_and_the_dwell() {
-        let mut chance = Stream::new(1, &[]);
-        let mut walk = Walk::new(chain(), &mut chance);
+    fn walk_matches_the_stationary_shares_and_dwell() {
+        let mut rng = RandomStream::new(1, &[]);
+        let mut walk = ChainWalk::new(chain(), &mut rng);
         let states: Vec<_> =
-            (0..1_000_000u64).map(|n| walk.state_at(Duration::from_millis(200 * n), &mut chance)).collect();
+            (0..1_000_000u64).map(|n| walk.state_at(Duration::from_millis(200 * n), &mut rng)).collect();
         let share = |state| states.iter().filter(|s| **s == state).count() as f64 / states.len() as f64;
         for (state, expected) in chain().stationary().into_iter().enumerate() {
             assert!((share(state) - expected).abs() < 0.02, "{state}: {} {expected}", share(state));
@@ -133,16 +134,16 @@ mod tests {
     }
 
     #[test]
-    fn a_long_pause_costs_no_walk() {
-        let mut chance = Stream::new(1, &[]);
-        let mut walk = Walk::new(chain(), &mut chance);
-        walk.state_at(Duration::from_secs(1 << 40), &mut chance);
+    fn long_pause_is_skipped_in_constant_time() {
+        let mut rng = RandomStream::new(1, &[]);
+        let mut walk = ChainWalk::new(chain(), &mut rng);
+        walk.state_at(Duration::from_secs(1 << 40), &mut rng);
     }
 
     #[test]
     fn zero_dwells_do_not_hang() {
-        let mut chance = Stream::new(1, &[]);
+        let mut rng = RandomStream::new(1, &[]);
         let chain = DwellChain { dwell: [Duration::ZERO; 2], jump: [[0.0, 1.0], [1.0, 0.0]] };
-        Walk::new(chain, &mut chance).state_at(Duration::from_secs(3600), &mut chance);
+        ChainWalk::new(chain, &mut rng).state_at(Duration::from_secs(3600), &mut rng);
     }
 }

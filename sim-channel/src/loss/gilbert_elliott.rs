@@ -1,18 +1,32 @@
-//! Bursty loss with a good and a bad state.
+//! Loss in bursts with a good and a bad state.
 
-use super::dwell_chain::{DwellChain, Walk};
-use super::{Frame, LinkLoss, Verdict};
-use crate::{Duration, Stream};
+use super::dwell_chain::{ChainWalk, DwellChain};
+use super::{FrameContext, FrameFate, LinkLoss};
+use crate::random::RandomStream;
+use std::time::Duration;
 
-/// Gilbert-Elliott loss, its dwell in seconds rather than in packets.
+/// Gilbert-Elliott loss: a good and a bad state with dwells in seconds.
 ///
-/// Source: E. N. Gilbert 1960, E. O. Elliott 1963; in continuous time, so that the loss does not depend on how often
-/// somebody sends. The state that counts is the one when a frame begins to arrive.
+/// ```
+/// use sim_channel::Duration;
+/// use sim_channel::loss::GilbertElliott;
+///
+/// let model = GilbertElliott {
+///     dwell_good: Duration::from_secs(90),
+///     dwell_bad: Duration::from_secs(30),
+///     loss_good: 0.0,
+///     loss_bad: 0.8,
+/// };
+/// assert_eq!((model.bad_share(), model.loss_rate()), (0.25, 0.2));
+/// ```
+///
+/// The state at the moment when a frame begins to arrive decides. The model runs in continuous time, so that the loss
+/// does not depend on the frame rate. Source: E. N. Gilbert 1960, E. O. Elliott 1963.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GilbertElliott {
-    /// Mean stay in the good state.
+    /// Mean length of a stay in the good state.
     pub dwell_good: Duration,
-    /// Mean stay in the bad state.
+    /// Mean length of a stay in the bad state.
     pub dwell_bad: Duration,
     /// Probability 0..=1 that a frame is lost in the good state.
     pub loss_good: f64,
@@ -21,42 +35,46 @@ pub struct GilbertElliott {
 }
 
 impl GilbertElliott {
-    /// Long-run share of frames lost.
+    /// Long-run share of frames lost, 0..=1.
+    #[must_use]
     pub fn loss_rate(&self) -> f64 {
         let bad = self.bad_share();
         bad * self.loss_bad + (1.0 - bad) * self.loss_good
     }
 
-    /// Long-run share of time in the bad state.
+    /// Long-run share of time in the bad state, 0..=1.
+    #[must_use]
     pub fn bad_share(&self) -> f64 {
         let (good, bad) = (self.dwell_good.as_secs_f64(), self.dwell_bad.as_secs_f64());
         if good + bad > 0.0 { bad / (good + bad) } else { 0.5 }
     }
 
-    /// Mean number of frames lost in a row, for frames `spacing` apart, if the good state loses none and the bad all.
+    /// Mean number of frames lost in a row, for frames `spacing` apart.
+    ///
+    /// It holds for a good state that loses no frame and a bad state that loses all.
+    #[must_use]
     pub fn mean_burst_frames(&self, spacing: Duration) -> f64 {
         let rate = 1.0 / self.dwell_good.as_secs_f64() + 1.0 / self.dwell_bad.as_secs_f64();
         let leaves = (1.0 - self.bad_share()) * (1.0 - (-rate * spacing.as_secs_f64()).exp());
         1.0 / leaves
     }
 
-    pub(super) fn instance(&self, chance: &mut Stream) -> Box<dyn LinkLoss> {
+    pub(super) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
         let chain = DwellChain { dwell: [self.dwell_good, self.dwell_bad], jump: [[0.0, 1.0], [1.0, 0.0]] };
-        Box::new(Fading { walk: Walk::new(chain, chance), loss: [self.loss_good, self.loss_bad] })
+        Box::new(MarkovFading { walk: ChainWalk::new(chain, rng), loss: [self.loss_good, self.loss_bad] })
     }
 }
 
-/// A walk over states, each with its loss.
 #[derive(Debug)]
-pub(super) struct Fading<const N: usize> {
-    pub walk: Walk<N>,
+pub(super) struct MarkovFading<const N: usize> {
+    pub walk: ChainWalk<N>,
     pub loss: [f64; N],
 }
 
-impl<const N: usize> LinkLoss for Fading<N> {
-    fn judge(&mut self, frame: &Frame, chance: &mut Stream) -> Verdict {
-        let state = self.walk.state_at(frame.at, chance);
-        Verdict::lost_if(chance.chance(self.loss[state]))
+impl<const N: usize> LinkLoss for MarkovFading<N> {
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
+        let state = self.walk.state_at(frame.at, rng);
+        FrameFate::lost_if(rng.bernoulli(self.loss[state]))
     }
 }
 
@@ -96,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn loss_does_not_depend_on_how_often_one_sends() {
+    fn loss_is_independent_of_the_frame_spacing() {
         let model = GilbertElliott {
             dwell_good: Duration::from_secs(20),
             dwell_bad: Duration::from_secs(20),

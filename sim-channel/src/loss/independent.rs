@@ -1,7 +1,7 @@
-//! Each frame is lost by itself, with one probability.
+//! Independent loss: each frame is lost with the same probability.
 
-use super::{Frame, LinkLoss, Verdict};
-use crate::Stream;
+use super::{FrameContext, FrameFate, LinkLoss};
+use crate::random::RandomStream;
 
 #[derive(Debug)]
 pub(super) struct Independent {
@@ -15,7 +15,7 @@ impl Independent {
 }
 
 impl LinkLoss for Independent {
-    fn judge(&mut self, _frame: &Frame, chance: &mut Stream) -> Verdict {
-        Verdict::lost_if(chance.chance(self.probability))
+    fn draw_fate(&mut self, _frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
+        FrameFate::lost_if(rng.bernoulli(self.probability))
     }
 }

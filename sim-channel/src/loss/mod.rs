@@ -1,57 +1,70 @@
-//! How frames are lost on one direction of a link.
+//! Loss models of directed links.
 //!
-//! A [`LossModel`] describes; each directed link runs its own instance, which holds whatever state the model has.
+//! A [`LossModel`] is a description. Each directed link runs an instance of its own, which holds the state of the model.
 
 mod dwell_chain;
+mod fits;
 mod gilbert_elliott;
-mod harbour;
 mod independent;
 mod range_table;
 mod snr;
 mod three_state;
 mod trace;
 
+pub use fits::{FitError, FittedLink};
 pub use gilbert_elliott::GilbertElliott;
-pub use harbour::{FitError, FittedLink};
 pub use range_table::{RangeTable, RangeTableError};
 pub use snr::Snr;
 pub use three_state::ThreeState;
 pub use trace::{Trace, TraceError};
 
-use crate::{Duration, Stream};
+use crate::random::RandomStream;
 use std::fmt::Debug;
+use std::time::Duration;
 
-/// A description of loss, the same for every link that is given it.
+/// A description of loss, of which each directed link runs its own instance.
+///
+/// ```
+/// use sim_channel::loss::{RangeTable, Snr};
+/// use sim_channel::{ChannelConfig, LossModel};
+///
+/// let half = LossModel::Independent { probability: 0.5 };
+/// let sonar = LossModel::from(Snr::default());
+/// let measured = LossModel::from(RangeTable::from_csv("500 0.95\n2000 0.4").unwrap());
+/// let config = ChannelConfig { loss: measured, ..ChannelConfig::default() };
+/// assert!(half != sonar && config.loss != half);
+/// ```
 #[derive(Clone, PartialEq, Debug, Default)]
+#[non_exhaustive]
 pub enum LossModel {
-    /// Nothing is lost.
+    /// Every frame that is in range is received.
     #[default]
     None,
-    /// Each frame is lost by itself.
+    /// Each frame is lost independently of the others.
     Independent {
         /// Probability 0..=1 that a frame is lost.
         probability: f64,
     },
-    /// Bursts: a good and a bad state.
+    /// Loss in bursts: a good and a bad state.
     GilbertElliott(GilbertElliott),
-    /// Bursts: a good, a medium and a bad state.
+    /// Loss in bursts: a good, a medium and a bad state.
     ThreeState(ThreeState),
-    /// From the signal to noise ratio at the receiver.
+    /// Loss from the signal-to-noise ratio at the receiver.
     Snr(Snr),
-    /// From delivery measured against range.
+    /// Loss from a table of delivery ratios against range.
     Range(RangeTable),
-    /// As recorded.
+    /// Loss replayed from a record.
     Trace(Trace),
 }
 
 impl LossModel {
-    /// A fresh instance for one link; draws its first state from `chance`.
-    pub(crate) fn instance(&self, chance: &mut Stream) -> Box<dyn LinkLoss> {
+    /// A new instance for one link; draws its first state from `rng`.
+    pub(crate) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
         match self {
             LossModel::None => Box::new(independent::Independent::new(0.0)),
             LossModel::Independent { probability } => Box::new(independent::Independent::new(*probability)),
-            LossModel::GilbertElliott(model) => model.instance(chance),
-            LossModel::ThreeState(model) => model.instance(chance),
+            LossModel::GilbertElliott(model) => model.instance(rng),
+            LossModel::ThreeState(model) => model.instance(rng),
             LossModel::Snr(model) => model.instance(),
             LossModel::Range(table) => table.instance(),
             LossModel::Trace(trace) => trace.instance(),
@@ -89,9 +102,9 @@ impl From<Trace> for LossModel {
     }
 }
 
-/// What a loss model may look at.
+/// The properties of a frame that a loss model may use.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct FrameContext {
     /// When the signal begins to arrive.
     pub at: Duration,
     pub airtime: Duration,
@@ -99,36 +112,35 @@ pub(crate) struct Frame {
     pub range_m: f64,
 }
 
-/// A model's word on one frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Verdict {
-    Heard,
+pub(crate) enum FrameFate {
+    Received,
     Lost,
-    /// So faint that it neither arrives nor disturbs.
+    /// Too faint to be received or to disturb others.
     OutOfRange,
 }
 
-impl Verdict {
+impl FrameFate {
     pub(crate) fn lost_if(lost: bool) -> Self {
-        if lost { Self::Lost } else { Self::Heard }
+        if lost { Self::Lost } else { Self::Received }
     }
 }
 
-/// A loss model at work on one directed link; frames come in order of time.
+/// An instance of a loss model on one directed link; frames come in order of time.
 pub(crate) trait LinkLoss: Debug + Send {
-    fn judge(&mut self, frame: &Frame, chance: &mut Stream) -> Verdict;
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Which of `frames` frames, `spacing` apart, a fresh instance loses.
+    /// For each of `frames` frames, `spacing` apart, whether a new instance loses it.
     pub(super) fn losses(model: &LossModel, spacing: Duration, frames: u32) -> Vec<bool> {
-        let mut chance = Stream::new(11, &[]);
-        let mut instance = model.instance(&mut chance);
-        let frame = |n| Frame { at: spacing * n, airtime: spacing / 2, bytes: 64, range_m: 1000.0 };
-        (0..frames).map(|n| instance.judge(&frame(n), &mut chance) != Verdict::Heard).collect()
+        let mut rng = RandomStream::new(11, &[]);
+        let mut instance = model.instance(&mut rng);
+        let frame = |n| FrameContext { at: spacing * n, airtime: spacing / 2, bytes: 64, range_m: 1000.0 };
+        (0..frames).map(|n| instance.draw_fate(&frame(n), &mut rng) != FrameFate::Received).collect()
     }
 
     pub(super) fn share(lost: &[bool]) -> f64 {
@@ -136,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn no_loss_loses_nothing_and_certain_loss_all() {
+    fn no_loss_delivers_all_and_certain_loss_none() {
         assert_eq!(share(&losses(&LossModel::None, Duration::from_secs(1), 1000)), 0.0);
         assert_eq!(share(&losses(&LossModel::Independent { probability: 1.0 }, Duration::from_secs(1), 1000)), 1.0);
     }

@@ -2,33 +2,47 @@
 
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
-use super::{Frame, LinkLoss, Verdict};
-use crate::Stream;
+use super::{FrameContext, FrameFate, LinkLoss};
+use crate::random::RandomStream;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// Delivery ratios at ranges, straight lines between; the first and the last hold beyond them.
+/// Delivery ratios at measured ranges, with linear interpolation between them; the first and the last value hold outside.
+///
+/// ```
+/// use sim_channel::loss::RangeTable;
+///
+/// let table = RangeTable::from_csv("# range_m delivery\n1000 0.9\n2000 0.5").unwrap();
+/// assert!((table.delivery(1500.0) - 0.7).abs() < 1e-9);
+/// ```
 #[derive(Clone, PartialEq, Debug)]
 pub struct RangeTable {
     points: Arc<[(f64, f64)]>,
 }
 
-/// What is wrong with a table.
+/// An error in a table of delivery ratios.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum RangeTableError {
     /// A line is not a range in metres and a ratio 0..=1; lines count from 1.
     #[error("line {line}: expected range_m and delivery ratio 0..=1")]
     Line {
-        /// Where.
+        /// Number of the line in the table.
         line: usize,
     },
-    /// There is no point in it.
+    /// The table contains no point.
     #[error("no point found")]
     Empty,
 }
 
 impl RangeTable {
-    /// Reads lines of range in metres and delivery ratio, by tab, blank, comma or semicolon; `#` lines are skipped.
+    /// Reads lines of range in metres and delivery ratio, separated by tab, blank, comma or semicolon.
+    ///
+    /// Lines that begin with `#` are skipped; the ranges may come in any order.
+    ///
+    /// # Errors
+    ///
+    /// The first wrong line, or [`RangeTableError::Empty`].
     pub fn from_csv(text: &str) -> Result<Self, RangeTableError> {
         let lines = (1..).zip(text.lines().map(str::trim));
         let points: Result<Vec<_>, _> = lines
@@ -40,7 +54,8 @@ impl RangeTable {
         if points.is_empty() { Err(RangeTableError::Empty) } else { Ok(Self { points: points.into() }) }
     }
 
-    /// Share of frames delivered at `range_m`.
+    /// Share of frames that are delivered at `range_m`, 0..=1.
+    #[must_use]
     pub fn delivery(&self, range_m: f64) -> f64 {
         let after = self.points.partition_point(|(range, _)| *range <= range_m);
         let below = after.checked_sub(1).and_then(|index| self.points.get(index));
@@ -57,8 +72,8 @@ impl RangeTable {
 }
 
 impl LinkLoss for RangeTable {
-    fn judge(&mut self, frame: &Frame, chance: &mut Stream) -> Verdict {
-        Verdict::lost_if(chance.chance(1.0 - self.delivery(frame.range_m)))
+    fn draw_fate(&mut self, frame: &FrameContext, rng: &mut RandomStream) -> FrameFate {
+        FrameFate::lost_if(rng.bernoulli(1.0 - self.delivery(frame.range_m)))
     }
 }
 
@@ -72,8 +87,8 @@ fn point(line: &str) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Duration;
     use crate::loss::tests::{losses, share};
+    use std::time::Duration;
 
     const TABLE: &str = "# range_m delivery\n500\t0.9\n1500,0.5\n2000 0\n";
 
@@ -88,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn loss_is_what_the_table_says_at_a_kilometre() {
+    fn loss_at_a_kilometre_matches_the_table() {
         let model = RangeTable::from_csv(TABLE).expect("table").into();
         assert!((share(&losses(&model, Duration::from_secs(1), 50_000)) - 0.3).abs() < 0.01);
     }

@@ -1,41 +1,44 @@
-//! Bursty loss with a good, a medium and a bad state.
+//! Loss in bursts with a good, a medium and a bad state.
 
 use super::LinkLoss;
-use super::dwell_chain::{DwellChain, Walk};
-use super::gilbert_elliott::Fading;
-use crate::{Duration, Stream};
+use super::dwell_chain::{ChainWalk, DwellChain};
+use super::gilbert_elliott::MarkovFading;
+use crate::random::RandomStream;
+use std::time::Duration;
 
-/// Three-state Markov loss in continuous time; states are good, medium, bad.
+/// Three-state Markov loss; the states are good, medium and bad.
 ///
-/// Source: Markov models fitted to packet loss in shallow water, as by B. Tomasi et al. 2010, in the layout of
-/// `links_3state.csv`; in continuous time for the reason given at `GilbertElliott`.
+/// The model runs in continuous time for the reason given at [`GilbertElliott`](super::GilbertElliott). Source: Markov
+/// models fitted to packet loss in shallow water, as by B. Tomasi et al. 2010, in the layout of `links_3state.csv`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ThreeState {
-    /// Mean stay in each state.
+    /// Mean length of a stay in each state.
     pub dwell: [Duration; 3],
     /// Probability 0..=1 that a frame is lost in each state.
     pub loss: [f64; 3],
-    /// When good ends: probability that medium follows, else bad.
+    /// Probability 0..=1 that medium follows good; otherwise bad follows.
     pub good_to_medium: f64,
-    /// When medium ends: probability that good follows, else bad.
+    /// Probability 0..=1 that good follows medium; otherwise bad follows.
     pub medium_to_good: f64,
-    /// When bad ends: probability that good follows, else medium.
+    /// Probability 0..=1 that good follows bad; otherwise medium follows.
     pub bad_to_good: f64,
 }
 
 impl ThreeState {
-    /// Long-run share of time in each state.
+    /// Long-run share of time in each state, 0..=1.
+    #[must_use]
     pub fn shares(&self) -> [f64; 3] {
         self.chain().stationary()
     }
 
-    /// Long-run share of frames lost.
+    /// Long-run share of frames lost, 0..=1.
+    #[must_use]
     pub fn loss_rate(&self) -> f64 {
         self.shares().iter().zip(&self.loss).map(|(share, loss)| share * loss).sum()
     }
 
-    pub(super) fn instance(&self, chance: &mut Stream) -> Box<dyn LinkLoss> {
-        Box::new(Fading { walk: Walk::new(self.chain(), chance), loss: self.loss })
+    pub(super) fn instance(&self, rng: &mut RandomStream) -> Box<dyn LinkLoss> {
+        Box::new(MarkovFading { walk: ChainWalk::new(self.chain(), rng), loss: self.loss })
     }
 
     fn chain(&self) -> DwellChain<3> {

@@ -2,44 +2,60 @@
 
 #![cfg_attr(not(test), deny(clippy::indexing_slicing, clippy::unwrap_used, clippy::expect_used))]
 
-use super::{Frame, LinkLoss, Verdict};
-use crate::{Duration, Stream};
+use super::{FrameContext, FrameFate, LinkLoss};
+use crate::random::RandomStream;
 use std::sync::Arc;
+use std::time::Duration;
 use thiserror::Error;
 
-/// A record of when frames got through.
+/// A record of the frames that got through and of those that did not.
 ///
-/// A frame shares the fate of the last record at or before the time it begins to arrive. After the end the record begins
-/// again, one mean spacing later.
+/// ```
+/// use sim_channel::Duration;
+/// use sim_channel::loss::Trace;
+///
+/// let trace = Trace::from_csv("time_s,delivered\n0,1\n2,0\n4,1\n6,1").unwrap();
+/// assert_eq!((trace.loss_rate(), trace.period()), (0.25, Duration::from_secs(8)));
+/// ```
+///
+/// A frame has the fate of the last record at or before the time at which it begins to arrive. After its end the record
+/// starts again, one mean spacing later.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Trace {
-    records: Arc<[Record]>,
+    records: Arc<[TraceRecord]>,
     period: Duration,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
-struct Record {
-    /// Since the first record.
+struct TraceRecord {
+    /// Time since the first record.
     at: Duration,
     delivered: bool,
 }
 
-/// What is wrong with a record.
+/// An error in a record of losses.
 #[derive(Clone, PartialEq, Eq, Debug, Error)]
+#[non_exhaustive]
 pub enum TraceError {
     /// A line is not `time,delivered`; lines count from 1.
     #[error("line {line}: expected time_s,delivered (0 or 1)")]
     Line {
-        /// Where.
+        /// Number of the line in the record.
         line: usize,
     },
-    /// There is no record in it.
+    /// The text contains no record.
     #[error("no record found")]
     Empty,
 }
 
 impl Trace {
-    /// Reads lines `time,delivered`: seconds, then 0 or 1 (or false, true); a header and `#` lines are skipped.
+    /// Reads lines `time,delivered`: seconds, then 0 or 1 (or false, true).
+    ///
+    /// A header and lines that begin with `#` are skipped.
+    ///
+    /// # Errors
+    ///
+    /// The first wrong line, or [`TraceError::Empty`].
     pub fn from_csv(text: &str) -> Result<Self, TraceError> {
         let mut records = Vec::new();
         for (line, content) in (1..).zip(text.lines().map(str::trim)) {
@@ -55,21 +71,27 @@ impl Trace {
         Self::from_records(records)
     }
 
-    /// Reads our own `frames.log`, one line a frame: `time_s direction bytes kind lost`, by blanks, commas or tabs.
+    /// Reads a `frames.log` of scenecast: lines `time_s direction bytes kind lost`, separated by blanks, commas or tabs.
     ///
-    /// Keeps the lines of one `direction` if one is named. Lines that are no such record are skipped, so that a log cut
-    /// off in mid-line still serves. `lost` counts as lost unless it is empty, 0, `false`, `no`, `ok`, `-` or `delivered`; `open` is
-    /// no record.
+    /// Only lines of `direction` are used, if it is given. Other lines are skipped, so that a log that ends in mid-line
+    /// can be read. The field `lost` means a lost frame unless it is empty, 0, `false`, `no`, `ok`, `-` or `delivered`;
+    /// a line with `open` is skipped.
+    ///
+    /// # Errors
+    ///
+    /// [`TraceError::Empty`] if no line is a record.
     pub fn from_frames_log(text: &str, direction: Option<&str>) -> Result<Self, TraceError> {
         Self::from_records(text.lines().filter_map(|line| log_record(line, direction)).collect())
     }
 
-    /// Share of the records that were lost.
+    /// Share of the records that were lost, 0..=1.
+    #[must_use]
     pub fn loss_rate(&self) -> f64 {
         self.records.iter().filter(|record| !record.delivered).count() as f64 / self.records.len() as f64
     }
 
-    /// How long the record lasts before it begins again.
+    /// Time after which the record starts again.
+    #[must_use]
     pub fn period(&self) -> Duration {
         self.period
     }
@@ -81,7 +103,8 @@ impl Trace {
         };
         let length = last.0 - first.0;
         let spacing = if timed.len() > 1 { length / (timed.len() - 1) as f64 } else { 1.0 };
-        let record = |(at, delivered): (f64, bool)| Record { at: Duration::from_secs_f64(at - first.0), delivered };
+        let record =
+            |(at, delivered): (f64, bool)| TraceRecord { at: Duration::from_secs_f64(at - first.0), delivered };
         let period = Duration::from_secs_f64(length + spacing).max(Duration::from_nanos(1));
         Ok(Self { records: timed.into_iter().map(record).collect(), period })
     }
@@ -98,12 +121,12 @@ impl Trace {
 }
 
 impl LinkLoss for Trace {
-    fn judge(&mut self, frame: &Frame, _chance: &mut Stream) -> Verdict {
-        Verdict::lost_if(!self.delivered_at(frame.at))
+    fn draw_fate(&mut self, frame: &FrameContext, _chance: &mut RandomStream) -> FrameFate {
+        FrameFate::lost_if(!self.delivered_at(frame.at))
     }
 }
 
-/// A time in seconds that a `Duration` can hold: 0..=10^9.
+/// A time in seconds within 0..=10^9, which a `Duration` can hold.
 fn seconds(text: &str) -> Option<f64> {
     text.trim().parse().ok().filter(|at| (0.0..=1e9).contains(at))
 }
@@ -125,7 +148,7 @@ fn log_record(line: &str, wanted: Option<&str>) -> Option<(f64, bool)> {
     let _bytes: u64 = fields.next()?.parse().ok()?;
     let _kind = fields.next()?;
     let lost = fields.next().unwrap_or_default().to_ascii_lowercase();
-    // The fate of a frame that was under way when the log ended is not known.
+    // The fate of a frame that was under way at the end of the log is not known.
     if lost == "open" {
         return None;
     }
@@ -138,7 +161,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_shares_the_fate_of_the_last_record() {
+    fn frame_shares_the_fate_of_the_last_record() {
         let trace = Trace::from_csv("time,delivered\n10,1\n12,0\n14,1\n").expect("record");
         let fate = |s| trace.delivered_at(Duration::from_secs_f64(s));
         assert_eq!([0.0, 1.9, 2.0, 3.9, 4.0, 5.9].map(fate), [true, true, false, false, true, true]);
@@ -159,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn our_own_log_is_read_by_direction_and_tolerantly() {
+    fn frames_log_is_read_by_direction_and_tolerantly() {
         let log = "# time_s direction bytes kind lost\n0.5 up 256 map 0\n1.5 down 32 directive noise\n2.5 up 256 map 1\n3.5 up 25";
         let up = Trace::from_frames_log(log, Some("up")).expect("records");
         assert_eq!((up.records.len(), up.loss_rate()), (2, 0.5));
@@ -169,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_unknown_fate_are_no_record() {
+    fn frames_of_unknown_fate_are_skipped() {
         let log = "# time_s direction bytes kind fate [reason]\n1.000 up 256 map ok\n2.000 up 256 map lost noise\n3.000 up 64 status ok\n4.000 up 256 map open\n";
         let trace = Trace::from_frames_log(log, Some("up")).expect("records");
         assert_eq!((trace.records.len(), trace.loss_rate()), (3, 1.0 / 3.0));

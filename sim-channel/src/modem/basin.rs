@@ -1,138 +1,171 @@
-//! Modems in one water: moves bytes between emulators and channel in order of time.
+//! A test basin: several emulated modems on one channel.
 
-use super::{Emulator, Fault, Host, ModemEvent};
-use crate::{Channel, Duration, NodeId, Talker};
+use super::{Emulator, Fault, HostId, ModemEvent};
+use crate::channel::{Channel, Interferer};
+use crate::nodes::NodeId;
 use std::collections::BTreeMap;
+use std::time::Duration;
 
-/// A channel and the emulated modems in it.
+/// A test basin: a channel and the emulated modems in it. It moves bytes between them in order of time.
+///
+/// ```
+/// use sim_channel::modem::Basin;
+/// use sim_channel::modem::transparent::{Transparent, TransparentConfig};
+/// use sim_channel::{Channel, ChannelConfig, Duration, NodeId, NodePosition};
+///
+/// let mut basin = Basin::new(Channel::new(ChannelConfig::default(), 1));
+/// for node in [1, 2] {
+///     basin.channel().place(NodeId(node), NodePosition::new(750.0 * f64::from(node), 0.0, 0.0));
+///     basin.add(NodeId(node), Box::new(Transparent::new(TransparentConfig::default())));
+/// }
+/// basin.handle_host_bytes(NodeId(1), b"hello", Duration::ZERO);
+///
+/// let mut received = Vec::new();
+/// while let Some(at) = basin.poll_timeout() {
+///     basin.advance(at);
+///     received.extend(basin.poll_host_bytes(NodeId(2)));
+/// }
+/// assert_eq!(received, b"hello");
+/// ```
+///
+/// The host loop is: write with [`handle_host_bytes`](Self::handle_host_bytes), pass time with
+/// [`advance`](Self::advance) at each [`poll_timeout`](Self::poll_timeout), and read with
+/// [`poll_host_bytes`](Self::poll_host_bytes).
 pub struct Basin {
     channel: Channel,
     modems: BTreeMap<NodeId, Box<dyn Emulator>>,
-    talkers: Vec<Talker>,
+    interferers: Vec<Interferer>,
     on_air: BTreeMap<NodeId, u64>,
     hung_up: Vec<NodeId>,
     now: Duration,
 }
 
 impl Basin {
-    /// The water alone; place nodes in the channel before their modems speak.
+    /// A basin without modems. Place the nodes in the channel before their modems transmit.
+    #[must_use]
     pub fn new(mut channel: Channel) -> Self {
-        channel.tell_onsets();
+        channel.report_onsets();
         Self {
             channel,
             modems: BTreeMap::new(),
-            talkers: Vec::new(),
+            interferers: Vec::new(),
             on_air: BTreeMap::new(),
             hung_up: Vec::new(),
             now: Duration::ZERO,
         }
     }
 
-    /// Adds the modem of a node, replacing the one it had.
+    /// Adds the modem of a node and replaces the one that it had.
     pub fn add(&mut self, node: NodeId, modem: Box<dyn Emulator>) {
         self.modems.insert(node, modem);
     }
 
-    /// Adds a stranger who talks at random and understands nobody; place its node in the channel.
-    pub fn add_talker(&mut self, talker: Talker) {
-        self.talkers.push(talker);
+    /// Adds an interferer; its node must be placed in the channel.
+    pub fn add_interferer(&mut self, interferer: Interferer) {
+        self.interferers.push(interferer);
     }
 
-    /// The water, to move nodes or to change its conditions.
+    /// The channel, to place nodes or to change its conditions.
     pub fn channel(&mut self) -> &mut Channel {
         &mut self.channel
     }
 
-    /// The latest time that was passed in.
+    /// The latest time that a call has passed in.
+    #[must_use]
     pub fn now(&self) -> Duration {
         self.now
     }
 
-    /// Another host at the modem of `node`; the first if it has no modem.
-    pub fn attach(&mut self, node: NodeId) -> Host {
-        self.modems.get_mut(&node).map_or(Host::FIRST, |modem| modem.attach())
+    /// Attaches another host to the modem of `node`; returns the first host if the node has no modem.
+    pub fn attach(&mut self, node: NodeId) -> HostId {
+        self.modems.get_mut(&node).map_or(HostId::FIRST, |modem| modem.attach())
     }
 
-    /// A host is gone.
-    pub fn detach(&mut self, node: NodeId, host: Host) {
+    /// Detaches a host from the modem of `node`; the first host always stays.
+    pub fn detach(&mut self, node: NodeId, host: HostId) {
         if let Some(modem) = self.modems.get_mut(&node) {
             modem.detach(host);
         }
     }
 
-    /// What the first host of `node` wrote at `now`; nothing happens if it has no modem.
+    /// Takes the bytes that the first host of `node` wrote at `now`. They are dropped if the node has no modem.
     pub fn handle_host_bytes(&mut self, node: NodeId, bytes: &[u8], now: Duration) {
-        self.handle_bytes_of(node, Host::FIRST, bytes, now);
+        self.handle_bytes_from(node, HostId::FIRST, bytes, now);
     }
 
-    /// What a host of `node` wrote at `now`; nothing happens if it has no modem.
-    pub fn handle_bytes_of(&mut self, node: NodeId, host: Host, bytes: &[u8], now: Duration) {
+    /// Takes the bytes that `host` of `node` wrote at `now`. They are dropped if the node has no modem.
+    pub fn handle_bytes_from(&mut self, node: NodeId, host: HostId, bytes: &[u8], now: Duration) {
         self.advance(now);
         if let Some(modem) = self.modems.get_mut(&node) {
             modem.handle_host_bytes(host, bytes, now);
         }
-        self.settle(now);
+        self.run_due(now);
     }
 
-    /// How many bytes the first host of `node` may write.
+    /// Number of bytes that the first host of `node` may write now; more would be lost.
+    #[must_use]
     pub fn host_room(&self, node: NodeId) -> usize {
-        self.modems.get(&node).map_or(0, |modem| modem.host_room(Host::FIRST))
+        self.modems.get(&node).map_or(0, |modem| modem.host_room(HostId::FIRST))
     }
 
-    /// What has reached the first host of `node` by the present.
+    /// Takes the bytes that have reached the first host of `node` by [`now`](Self::now).
+    #[must_use]
     pub fn poll_host_bytes(&mut self, node: NodeId) -> Vec<u8> {
-        self.poll_bytes_for(node, Host::FIRST)
+        self.poll_bytes_for(node, HostId::FIRST)
     }
 
-    /// What has reached a host of `node` by the present.
-    pub fn poll_bytes_for(&mut self, node: NodeId, host: Host) -> Vec<u8> {
+    /// Takes the bytes that have reached `host` of `node` by [`now`](Self::now).
+    #[must_use]
+    pub fn poll_bytes_for(&mut self, node: NodeId, host: HostId) -> Vec<u8> {
         let now = self.now;
         self.modems.get_mut(&node).map(|modem| modem.poll_host_bytes(host, now)).unwrap_or_default()
     }
 
-    /// A node whose modem closes the TCP connections of its hosts.
+    /// The next node whose modem closes the TCP connections of its hosts, as an S2C does when it restarts.
+    #[must_use]
     pub fn poll_hang_up(&mut self) -> Option<NodeId> {
         self.hung_up.pop()
     }
 
-    /// Breaks something of the modem of `node`.
+    /// Injects a fault into the modem of `node` at `now`.
     pub fn inject(&mut self, node: NodeId, fault: Fault, now: Duration) {
         self.advance(now);
         if let Some(modem) = self.modems.get_mut(&node) {
             modem.inject(fault, now);
         }
-        self.settle(now);
+        self.run_due(now);
     }
 
-    /// When something will happen next; a host may have bytes to read then.
+    /// Time of the next event; a host may have bytes to read then.
+    #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
         let hosts = self.modems.values().filter_map(|modem| modem.poll_host_timeout());
         self.next_due().into_iter().chain(hosts).min()
     }
 
-    /// Lets time pass up to `now`, every event at its own time.
+    /// Passes time up to `now`; each event happens at its own time.
     ///
-    /// Host bytes that fall due on the way wait to be polled.
+    /// Bytes that reach a host meanwhile wait until they are polled.
     pub fn advance(&mut self, now: Duration) {
         while let Some(at) = self.next_due().filter(|at| *at <= now) {
-            self.settle(at);
+            self.run_due(at);
         }
-        self.settle(now);
+        self.run_due(now);
     }
 
-    /// When a modem or the water has something to do.
+    /// Time of the next event of a modem, an interferer or the channel.
     fn next_due(&self) -> Option<Duration> {
-        let talkers = self.talkers.iter().filter_map(Talker::poll_timeout);
+        let interferers = self.interferers.iter().filter_map(Interferer::poll_timeout);
         let modems = self.modems.values().filter_map(|modem| modem.poll_timeout());
-        modems.chain(self.channel.poll_timeout()).chain(talkers).min()
+        modems.chain(self.channel.poll_timeout()).chain(interferers).min()
     }
 
-    /// Does everything that is due at `now`, until nothing is.
-    fn settle(&mut self, now: Duration) {
+    /// Runs all events that are due at `now`, and those that they cause.
+    fn run_due(&mut self, now: Duration) {
         self.now = self.now.max(now);
-        for talker in &mut self.talkers {
-            if let Some((bytes, airtime)) = talker.poll_transmit(now) {
-                self.channel.transmit(talker.node(), bytes, airtime, now);
+        for interferer in &mut self.interferers {
+            if let Some((bytes, airtime)) = interferer.poll_transmit(now) {
+                self.channel.transmit(interferer.node(), bytes, airtime, now);
             }
         }
         loop {
@@ -177,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_basin_may_live_on_another_thread() {
+    fn basin_can_move_to_another_thread() {
         fn sendable<T: Send>() {}
         sendable::<Basin>();
     }

@@ -1,4 +1,4 @@
-// The life line of the directive slots: queued -> on_air -> heard -> applied | refused.
+// The order status of the directive slots: queued -> on_air -> received -> applied | refused.
 
 const SLOTS = ["utility", "constraints", "settings", "budget", "requests", "fix", "limits", "fence"];
 const REASONS = {
@@ -40,8 +40,8 @@ export class Directive {
   /** A frame from the vehicle came back with its acks. */
   acknowledge(nowS) {
     for (const s of this.slots.values()) {
-      if (s.state === "heard") this.finish(s, nowS);
-      else if (s.state === "on_air" && s.arrived) this.move(s, "heard", nowS);
+      if (s.state === "received") this.finish(s, nowS);
+      else if (s.state === "on_air" && s.arrived) this.move(s, "received", nowS);
     }
   }
 

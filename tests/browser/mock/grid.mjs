@@ -1,4 +1,4 @@
-// A growing label grid with the second each cell was last heard.
+// A growing label grid with the second in which each cell was last received.
 
 export class Grid {
   constructor(cellM) {
@@ -29,12 +29,12 @@ export class Grid {
     return counts;
   }
 
-  /** The body of GET /vehicles/{id}/map; `planes` are those that the vehicle tells of. */
-  json(nowS, planes) {
+  /** The body of GET /vehicles/{id}/map; `layers` are those that the vehicle sends. */
+  json(nowS, layers) {
     const { x0, y0, width, height } = this.bounds();
     const labels = Buffer.alloc(width * height);
     const ages = Buffer.alloc(width * height * 2, 0xff);
-    const extra = planes.map((p) => ({ ...p, bytes: Buffer.alloc(width * height, 255) }));
+    const extra = layers.map((p) => ({ ...p, bytes: Buffer.alloc(width * height, 255) }));
     for (const c of this.cells.values()) {
       const at = (c.y - y0) * width + (c.x - x0);
       labels[at] = c.label;
@@ -47,12 +47,10 @@ export class Grid {
     const map = { version: this.version, x0, y0, width, height, cell_m: this.cellM };
     map.labels = labels.toString("base64");
     map.age_s = ages.toString("base64");
-    if (extra.length > 0) {
-      map.planes = extra.map((p) => ({
-        name: p.name, unit: p.unit, min: p.min, max: p.max, step: p.step,
-        data: p.bytes.toString("base64"), age_s: map.age_s,
-      }));
-    }
+    map.layers = extra.map((p) => ({
+      name: p.name, unit: p.unit, min: p.min, max: p.max, step: p.step ?? 0,
+      data: p.bytes.toString("base64"), age_s: map.age_s,
+    }));
     return map;
   }
 }

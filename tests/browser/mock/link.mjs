@@ -6,7 +6,7 @@ export class Direction {
     this.turns = [];
     this.frames = 0;
     this.lost = 0;
-    this.worst = 0;
+    this.maxBps = 0;
     this.bytes = { map: 0, status: 0, directive: 0, fix: 0, exemplar: 0, overhead: 0 };
   }
 
@@ -27,7 +27,7 @@ export class Direction {
     this.lost += lost;
     this.turns.push({ t: nowS, bits: (bytes + frames * 14) * 8, kept: 1 - lost / frames });
     this.turns = this.turns.filter((x) => x.t > nowS - 620);
-    this.worst = Math.max(this.worst, this.sum(nowS, 10) / 10);
+    this.maxBps = Math.max(this.maxBps, this.sum(nowS, 10) / 10);
     return lost < frames || frames === 0;
   }
 
@@ -40,7 +40,7 @@ export class Direction {
     const window = Math.max(1, Math.min(60, nowS));
     return {
       bps_1min: Math.round(recent.reduce((a, x) => a + x.bits, 0) / window),
-      worst_window_bps: Math.round(this.worst),
+      max_window_bps: Math.round(this.maxBps),
       loss: this.frames ? this.lost / this.frames : 0,
       frames: this.frames,
       lost: this.lost,

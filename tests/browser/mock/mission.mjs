@@ -22,8 +22,8 @@ export class Mission {
     this.loss = 0.1;
     this.budgetBps = 10000;
     this.shares = { directive: 10, status: 5, fix: 5, map: 50, exemplar: 20 };
-    this.spend = ["finer", "depth", "exemplars", "confidence"];
-    this.planes = false;
+    this.background = ["finer", "depth", "exemplars", "confidence"];
+    this.layers = false;
     this.ended = false;
     this.down = new Direction(7);
     this.history = [];
@@ -97,14 +97,14 @@ export class Mission {
   json() {
     return {
       now_s: this.nowS,
-      mission: { name: this.name, speed: this.speed, ended: this.ended },
+      mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
       link: {
-        budget_bps: this.budgetBps, shares: this.shares, spend: this.spend, budget_window_s: 10,
+        budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),
-        round_trip_s: this.vehicles[0].heardS === null ? null : 1.62,
-        backlog_bits: this.vehicles[0].told?.bits ?? null,
+        round_trip_s: this.vehicles[0].receivedS === null ? null : 1.62,
+        backlog_bits: this.vehicles[0].reported?.bits ?? null,
         history: this.history,
       },
     };

@@ -1,23 +1,23 @@
-// A stand-in for the daemon: serves daemon/console/ and /api/v1 over a synthetic mission.
+// A stand-in for the daemon: serves the page and /api/v2 with a synthetic mission.
 //
 //   node mock/server.mjs [--port 8470] [--scenario rich|empty|start|silent|refused|two|big]
 //
-// POST /mock steers it in tests:
+// Here the mission follows the clock. In stories it advances only when they say so, so that nothing changes between two reads.
+//
+// POST /mock controls it in tests:
 //   {"scenario": "rich", "advance": 60, "times": 3, "speed": 20, "silent": true, "refuse": "utility",
-//    "loss": 0.3, "planes": true, "coarse": true, "position": {"x_m": 5, ..},
+//    "loss": 0.3, "layers": true, "coarse": true, "position": {"x_m": 5, ..},
 //    "placement": {"version": 1, "east_m": 20, "north_m": -5}, "ended": true, "stream": false, "mute": true, "down": true}
 
 import http from "node:http";
-import { deflateSync } from "node:zlib";
 import { readFile } from "node:fs/promises";
 import { dirname, extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 import { Mission } from "./mission.mjs";
-import { encodePng } from "./png.mjs";
 import { faultOf, fit } from "./settings.mjs";
 
 const HERE = dirname(fileURLToPath(import.meta.url));
-const ASSETS = join(HERE, "../../../daemon/console");
+const ASSETS = join(HERE, "../../../daemon/console/page");
 const TYPES = {
   ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml",
   ".js": "text/javascript; charset=utf-8",
@@ -26,8 +26,8 @@ const POLICY =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; " +
   "base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
-/** Starts a mock; resolves to {url, close()}. */
-export async function startMock({ port = 0, scenario = "rich" } = {}) {
+/** Starts a mock; resolves to {url, close()}. The mission advances by itself if `live`. */
+export async function startMock({ port = 0, scenario = "rich", live = false } = {}) {
   const mock = { mission: new Mission(scenario), streams: new Set(), stream: true, down: false, mute: false };
   const server = http.createServer((req, res) => {
     route(mock, req, res).catch((error) => reply(res, error.status ?? 500, { error: error.message }));
@@ -36,15 +36,10 @@ export async function startMock({ port = 0, scenario = "rich" } = {}) {
     server.once("error", reject);
     server.listen(port, "127.0.0.1", resolve);
   });
-  let ticks = 0;
   const timer = setInterval(() => {
-    for (const vehicle of mock.mission.advance(0.25 * mock.mission.speed)) {
-      const { version } = mock.mission.vehicles.find((v) => v.id === vehicle).heard;
-      emit(mock, "map", { vehicle, version });
-    }
-    ticks += 1;
-    if (ticks % 4 === 0) emit(mock, "state", mock.mission.json());
-  }, 250);
+    if (live) advance(mock, mock.mission.speed);
+    emit(mock, "state", mock.mission.json());
+  }, 1000);
   const close = () => {
     clearInterval(timer);
     for (const s of mock.streams) s.destroy();
@@ -52,6 +47,13 @@ export async function startMock({ port = 0, scenario = "rich" } = {}) {
     return new Promise((resolve) => server.close(resolve));
   };
   return { url: `http://127.0.0.1:${server.address().port}`, close };
+}
+
+function advance(mock, seconds) {
+  for (const id of mock.mission.advance(seconds)) {
+    const { version } = mock.mission.vehicles.find((v) => v.id === id).replica;
+    emit(mock, "map", { vehicle: id, version });
+  }
 }
 
 function emit(mock, event, data) {
@@ -63,8 +65,8 @@ async function route(mock, req, res) {
   const { pathname } = new URL(req.url, "http://mock");
   if (pathname === "/mock") return steer(mock, await body(req), res);
   if (mock.down) return req.socket.destroy();
-  if (pathname === "/api/v1/events") return subscribe(mock, res);
-  if (pathname.startsWith("/api/v1/")) return api(mock, req, res, pathname.slice(8));
+  if (pathname === "/api/v2/events") return subscribe(mock, res);
+  if (pathname.startsWith("/api/v2/")) return api(mock, req, res, pathname.slice(8));
   return asset(pathname, res);
 }
 
@@ -80,14 +82,14 @@ async function api(mock, req, res, path) {
   const { mission } = mock;
   if (req.method === "POST") return post(mock, req, res, path);
   if (path === "state") return reply(res, 200, mission.json());
-  const [, id, what] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
+  const [, id, resource] = path.match(/^vehicles\/(\d+)\/(.+)$/) ?? [];
   const vehicle = mission.vehicles.find((v) => v.id === Number(id));
   if (!vehicle) return reply(res, 404, { error: "no such vehicle" });
-  if (what === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.planes ? mission.spend : []));
-  if (what === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
-  if (what === "map.png") return send(res, 200, "image/png", encodePng(vehicle.mapJson(mission.nowS, false), deflateSync));
-  const [, label] = what.match(/^exemplars\/(\d+)(-\d+)?\.webp$/) ?? [];
-  if (!vehicle.exemplars.get(Number(label))?.pictures.length) return reply(res, 404, { error: "not here" });
+  if (resource === "map") return reply(res, 200, vehicle.mapJson(mission.nowS, mission.layers ? mission.background : []));
+  if (resource === "fit") return reply(res, 200, fit(new URL(req.url, "http://mock").searchParams.get("bits_per_s"), mission));
+  if (resource.startsWith("map.")) return send(res, 200, "application/octet-stream", Buffer.from(`${resource} of the mock`));
+  const [, label] = resource.match(/^exemplars\/(\d+)(-\d+)?\.webp$/) ?? [];
+  if (!vehicle.exemplars.get(Number(label))?.images.length) return reply(res, 404, { error: "not received" });
   return send(res, 200, "image/webp", await readFile(join(HERE, `exemplars/${(Number(label) - 1) % 6}.webp`)));
 }
 
@@ -102,40 +104,40 @@ async function post(mock, req, res, path) {
     }
     const sum = Object.values(given.shares ?? {}).reduce((a, b) => a + b, 0);
     if (sum > 100) return reply(res, 422, { error: `shares add up to ${sum} percent: allowed is 100 or less` });
-    Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares, spend: given.spend ?? mission.spend });
-    const [answer] = mission.vehicles.map((v) => v.directive.issue("budget", mission.nowS));
-    return accepted(mock, res, answer);
+    Object.assign(mission, { budgetBps: bps, shares: given.shares ?? mission.shares, background: given.background ?? mission.background });
+    const [response] = mission.vehicles.map((v) => v.directive.issue("budget", mission.nowS));
+    return accepted(mock, res, response);
   }
-  const [, id, what] = path.match(/^vehicles\/(\d+)\/(\w+)$/) ?? [];
+  const [, id, resource] = path.match(/^vehicles\/(\d+)\/(\w+)$/) ?? [];
   const v = mission.vehicles.find((x) => x.id === Number(id));
   if (!v) return reply(res, 404, { error: "no such vehicle" });
-  if (what === "utility") {
+  if (resource === "utility") {
     const bad = Object.entries(given.weights ?? {}).find(([, w]) => !(w >= -1 && w <= 1));
     if (bad) return reply(res, 422, { error: `weight of label ${bad[0]} must be -1 to 1` });
     return accepted(mock, res, mission.utility(v, given));
   }
-  if (what === "exemplars") return accepted(mock, res, v.request(given, mission.nowS));
-  if (what === "constraints") {
+  if (resource === "exemplars") return accepted(mock, res, v.request(given, mission.nowS));
+  if (resource === "constraints") {
     return accepted(mock, res, v.directive.issue("constraints", mission.nowS, (s) => {
       if (s === "applied") Object.assign(v, { hold: given.hold, aborted: given.abort === true });
     }));
   }
-  if (what === "settings") {
+  if (resource === "settings") {
     const wrong = faultOf(given);
     if (wrong) return reply(res, 422, { error: wrong });
     const last = v.directive.slots.get("settings")?.state;
-    v.settings.ask(given, last);
+    v.settings.request(given, last);
     if ("planner" in given) v.planner = given.planner || null;
-    return accepted(mock, res, v.directive.issue("settings", mission.nowS, (s) => v.settings.settle(s)));
+    return accepted(mock, res, v.directive.issue("settings", mission.nowS, (s) => v.settings.finish(s)));
   }
   const orders = { fence: () => fence(given), limits: () => limits(given) };
-  if (what in orders) {
-    const order = orders[what]();
-    v[what] = order;
-    const answer = v.directive.issue(what, mission.nowS, (s) => {
-      if (s === "applied") v.inForce[what] = { version: answer.version, order };
+  if (resource in orders) {
+    const order = orders[resource]();
+    v[resource] = order;
+    const response = v.directive.issue(resource, mission.nowS, (s) => {
+      if (s === "applied") v.inForce[resource] = { version: response.version, order };
     });
-    return accepted(mock, res, answer);
+    return accepted(mock, res, response);
   }
   return reply(res, 404, { error: "no such thing" });
 }
@@ -147,15 +149,15 @@ function limits(given) {
   return Object.fromEntries(names.map((n) => [n, given[n] ?? null]));
 }
 
-function accepted(mock, res, answer) {
-  reply(res, 202, answer);
+function accepted(mock, res, response) {
+  reply(res, 202, response);
   emit(mock, "state", mock.mission.json());
 }
 
 function steer(mock, order, res) {
   if (order.scenario) mock.mission = new Mission(order.scenario);
   const { mission } = mock;
-  for (const key of ["loss", "planes", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
+  for (const key of ["loss", "layers", "ended", "speed", "position"]) if (key in order) mission[key] = order[key];
   if ("placement" in order) mission.vehicles[0].placement = order.placement;
   if ("coarse" in order) mission.vehicles[0].coarse = order.coarse;
   if ("silent" in order) mission.vehicles[0].silent = order.silent;
@@ -165,8 +167,7 @@ function steer(mock, order, res) {
   if ("stream" in order) mock.stream = order.stream;
   if (order.stream === false || order.down) for (const s of mock.streams) s.destroy();
   for (let i = 0; i < (order.times ?? 1); i += 1) {
-    const changed = order.advance ? mission.advance(order.advance) : [];
-    for (const v of changed) emit(mock, "map", { vehicle: v, version: mission.vehicles.find((x) => x.id === v).heard.version });
+    if (order.advance) advance(mock, order.advance);
     emit(mock, "state", mission.json());
   }
   reply(res, 200, { now_s: mission.nowS });
@@ -208,6 +209,6 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
     const at = process.argv.indexOf(`--${name}`);
     return at > 0 ? process.argv[at + 1] : otherwise;
   };
-  const { url } = await startMock({ port: Number(option("port", 8470)), scenario: option("scenario", "rich") });
+  const { url } = await startMock({ port: Number(option("port", 8470)), scenario: option("scenario", "rich"), live: true });
   console.log(url);
 }

@@ -1,33 +1,33 @@
-// Settings of the scene model: what was asked for, what is in force, what fits a budget.
+// Settings of the scene model: requested, in force, and those that fit a budget.
 
 const NUMBERS = {
   alpha: [1e-9, 1e3], beta: [1e-9, 1e3], gamma: [1e-12, 1e3], refine_words_per_s: [1, 1e8], frames_per_s: [0.01, 30],
 };
-const KEYS = ["planner", "cells", "planes", ...Object.keys(NUMBERS)];
+const KEYS = ["planner", "cells", "layers", ...Object.keys(NUMBERS)];
 const nothing = () => Object.fromEntries(KEYS.map((k) => [k, null]));
 const stated = (order) => Object.fromEntries(Object.entries(order).filter(([k, v]) => KEYS.includes(k) && v !== null));
 
 export class Settings {
-  asked = nothing();
+  requested = nothing();
   inForce = nothing();
 
-  ask(order, last) {
-    this.asked = { ...(last === "refused" ? this.inForce : this.asked), ...stated(order) };
+  request(order, last) {
+    this.requested = { ...(last === "refused" ? this.inForce : this.requested), ...stated(order) };
   }
 
-  settle(state) {
-    if (state === "applied") this.inForce = this.asked;
+  finish(state) {
+    if (state === "applied") this.inForce = this.requested;
   }
 
   json() {
-    return { asked: this.asked, in_force: this.inForce };
+    return { requested: this.requested, in_force: this.inForce };
   }
 }
 
 export function faultOf(order) {
   for (const [key, [low, high]] of Object.entries(NUMBERS)) {
     const value = order[key] ?? 0;
-    if (value !== 0 && !(value >= low && value <= high)) return `${key} ${value}: it takes ${low} to ${high}, or 0 as configured`;
+    if (value !== 0 && !(value >= low && value <= high)) return `${key} ${value}: the range is ${low} to ${high}, or 0 as configured`;
   }
   return null;
 }
@@ -37,14 +37,14 @@ const row = (settings, nats, labels, bps) => ({
 });
 const BEST = row({ alpha: 0.01, gamma: 1e-4, frames_per_s: 0.5, cells: "fine" }, 0.31, 16, 1900);
 const FEWER = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "fine" }, 0.29, 9, 800);
-const LEANEST = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "coarse" }, 0.2, 9, 90);
+const LOWEST_RATE = row({ alpha: 1, gamma: 1e-5, frames_per_s: 0.2, cells: "coarse" }, 0.2, 9, 90);
 
-export function fit(asked, mission) {
-  const bps = asked === null ? (mission.budgetBps * mission.shares.map) / 100 : Number(asked);
-  const chosen = [BEST, FEWER, LEANEST].find((r) => r.stream_bps <= bps) ?? null;
-  const given = chosen === null ? `no setting fits ${bps} bit/s: the leanest needs 90 bit/s, 0.11 nats (35 %) below the best`
-    : chosen === BEST ? "nothing is given up: it tells most of all settings"
+export function fit(bitsPerS, mission) {
+  const bps = bitsPerS === null ? (mission.budgetBps * mission.shares.map) / 100 : Number(bitsPerS);
+  const chosen = [BEST, FEWER, LOWEST_RATE].find((r) => r.stream_bps <= bps) ?? null;
+  const tradeOff = chosen === null ? `no setting fits ${bps} bit/s: the lowest rate is 90 bit/s, 0.11 nats (35 %) below the best`
+    : chosen === BEST ? "no trade-off: these are the most informative settings"
       : chosen === FEWER ? "fewer labels, fewer camera frames: 0.02 nats (6 %) below the best, which needs 1.9 kbit/s"
         : "coarser cells, fewer labels: 0.11 nats (35 %) below the best, which needs 1.9 kbit/s";
-  return { bits_per_s: bps, chosen, best: BEST, leanest: LEANEST, given_up: given };
+  return { bits_per_s: bps, chosen, best: BEST, lowest_rate: LOWEST_RATE, trade_off: tradeOff };
 }

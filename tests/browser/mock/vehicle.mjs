@@ -1,4 +1,4 @@
-// One synthetic vehicle: flies legs over the scene, tells its map in turns, hears directives.
+// One synthetic vehicle: flies legs over the scene, sends its map in turns, receives directives.
 
 import { habitat, confidence, floorDepth, surprise } from "./scene.mjs";
 import { Grid } from "./grid.mjs";
@@ -6,7 +6,7 @@ import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
 import { Settings } from "./settings.mjs";
 
-const PLANES = [
+const LAYERS = [
   { name: "confidence", unit: "", min: 0.125, max: 0.875, step: 0.25, at: confidence },
   { name: "depth", unit: "m", min: 10, max: 25, at: floorDepth },
   { name: "curiosity", unit: "bit", min: 2.5, max: 10.5, step: 1, at: surprise },
@@ -17,18 +17,18 @@ export class Vehicle {
     Object.assign(this, { id, turnS, speed, legs, footprint });
     this.name = `auv-${id}`;
     this.own = new Grid(cellM);
-    this.heard = new Grid(cellM);
+    this.replica = new Grid(cellM);
     this.up = new Direction(97 + id);
     this.directive = new Directive();
     this.published = new Map();
     this.weights = new Map();
     this.terms = { exploration: 0.2, curiosity: 0 };
-    Object.assign(this, { told: null, inForce: {}, fence: null, limits: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
+    Object.assign(this, { reported: null, inForce: {}, fence: null, limits: null, planner: null, settings: new Settings(), coarse: false, aborted: false });
     this.exemplars = new Map();
     this.track = [];
     this.hold = false;
     this.silent = false;
-    this.heardS = null;
+    this.receivedS = null;
     this.status = null;
     this.alongM = 0;
     this.pending = new Map();
@@ -51,7 +51,7 @@ export class Vehicle {
     return { x: x + (east ? on : width - on), y: y + n * lane + wander, heading };
   }
 
-  step(nowS, dt, loss, budgetBps, planes) {
+  step(nowS, dt, loss, budgetBps) {
     if (!this.hold && !this.aborted) this.alongM += this.speed * dt;
     const p = this.pose();
     this.observe(p, nowS);
@@ -77,24 +77,25 @@ export class Vehicle {
   }
 
   report(p, nowS, loss, budgetBps) {
-    const exemplar = [...this.exemplars.values()].find((e) => e.state === "coming");
+    const exemplar = [...this.exemplars.values()].find((e) => e.state === "receiving");
     const room = 0.7 * budgetBps * 1.25;
     const parts = { map: Math.min(room, 900 + this.pending.size * 6), status: 22, directive: 3, exemplar: exemplar ? 96 : 0 };
     if (!this.up.send(nowS, parts, loss)) return false;
-    this.heardS = nowS;
+    this.receivedS = nowS;
     for (const [key, c] of this.pending) {
       if (this.coarse && (c.x % 4 !== 0 || c.y % 4 !== 0)) continue;
-      this.heard.set(c.x, c.y, c.label, nowS);
+      this.replica.set(c.x, c.y, c.label, nowS);
       this.pending.delete(key);
     }
-    this.told = { at_s: nowS - 0.8, bits: this.pending.size * 8 + 1200 };
-    this.heard.version += 1;
+    this.reported = { at_s: nowS - 0.8, bits: this.pending.size * 8 + 1200 };
+    this.replica.version += 1;
     this.updatedS = nowS;
     this.status = {
       at_s: nowS - 0.8, x_m: p.x, y_m: p.y, z_m: -16.4 - 0.6 * Math.sin(nowS / 30),
       heading_deg: (p.heading + 360) % 360, sigma_m: 0.6 + 0.03 * (nowS - this.fixS),
       mode: this.aborted ? "abort" : this.hold ? "hold" : "survey",
-      ...this.way(),
+      activity: this.aborted ? "aborted: order" : this.hold ? "holding: order" : "surveying",
+      ...this.path(),
       cells: this.own.cells.size, labels: this.published.size, fix_age_s: nowS - this.fixS,
     };
     this.track.push([nowS, p.x, p.y]);
@@ -105,8 +106,8 @@ export class Vehicle {
   }
 
   /** Waypoint and path: the corners of the pattern from here on, one fewer where the lane has ended. */
-  way() {
-    if (this.hold || this.aborted) return { waypoint: null, path: [], path_goes_on: false };
+  path() {
+    if (this.hold || this.aborted) return { waypoint: null, path: [], path_continues: false };
     const { x, y, width, height } = this.legs;
     const lane = 1.9;
     const lanes = Math.floor(height / lane) + 1;
@@ -115,53 +116,53 @@ export class Vehicle {
     const corners = [];
     for (let i = n; i < lanes; i += 1) corners.push(at(i), ...(i + 1 < lanes ? [[at(i)[0], y + (i + 1) * lane]] : []));
     if (this.alongM % (width + lane) > width && corners.length > 1) corners.shift();
-    return { waypoint: corners[0], path: corners.slice(1, 8), path_goes_on: corners.length > 8 };
+    return { waypoint: corners[0], path: corners.slice(1, 8), path_continues: corners.length > 8 };
   }
 
   progress(e, nowS) {
     e.progress = Math.min(1, e.progress + 0.25);
     if (e.progress < 1) return;
-    e.state = "here";
+    e.state = "received";
     e.at_s = nowS;
-    const number = e.picture ?? 10 * e.label + e.pictures.length;
-    const kept = e.pictures.filter((p) => p.picture !== number);
-    const url = `/api/v1/vehicles/${this.id}/exemplars/${e.label}-${number}.webp`;
-    const size = e.picture ? 128 : 64;
-    e.pictures = [...kept, { picture: number, edge_px: size, can_grow: size < 128, bytes: e.bytes, url, at_s: nowS, asked: true }];
+    const number = e.larger ?? 10 * e.label + e.images.length;
+    const kept = e.images.filter((i) => i.number !== number);
+    const url = `/api/v2/vehicles/${this.id}/exemplars/${e.label}-${number}.webp`;
+    const size = e.larger ? 128 : 64;
+    e.images = [...kept, { number, edge_px: size, can_enlarge: size < 128, bytes: e.bytes, url, at_s: nowS, requested: true }];
   }
 
-  request({ label, what = "another", picture = null }, nowS) {
+  request({ label, action = "another", image = null }, nowS) {
     const before = this.exemplars.get(label);
-    const pictures = before?.pictures ?? [];
-    const state = what === "cancel" ? (pictures.length > 0 ? "here" : "none") : "queued";
-    const larger = what === "larger" ? picture ?? pictures.at(-1).picture : null;
+    const images = before?.images ?? [];
+    const state = action === "cancel" ? (images.length > 0 ? "received" : "none") : "queued";
+    const larger = action === "larger" ? image ?? images.at(-1).number : null;
     const bytes = (larger ? 4 : 1) * (380 + 24 * label);
-    this.exemplars.set(label, { label, state, progress: 0, bytes, at_s: null, picture: larger, pictures });
+    this.exemplars.set(label, { label, state, progress: 0, bytes, at_s: null, larger, images });
     return this.directive.issue("requests", nowS, (done) => {
-      const asked = [...this.exemplars.values()].filter((x) => x.state === "queued");
-      for (const x of asked) x.state = done === "refused" ? "refused" : "coming";
+      const queued = [...this.exemplars.values()].filter((x) => x.state === "queued");
+      for (const x of queued) x.state = done === "refused" ? "refused" : "receiving";
     });
   }
 
   exemplarJson(label) {
     const e = this.exemplars.get(label);
-    if (!e) return { state: "none", progress: 0, bytes: null, url: null, at_s: null, pictures: [] };
+    if (!e) return { state: "none", progress: 0, bytes: null, url: null, at_s: null, images: [] };
     const slot = this.directive.slots.get("requests");
     const state = e.state === "queued" && slot.state !== "queued" ? "on_air" : e.state;
-    const url = e.pictures.length > 0 ? `/api/v1/vehicles/${this.id}/exemplars/${label}.webp` : null;
-    return { state, progress: e.progress, bytes: e.bytes, url, at_s: e.at_s ?? e.pictures.at(-1)?.at_s ?? null, pictures: e.pictures };
+    const url = e.images.length > 0 ? `/api/v2/vehicles/${this.id}/exemplars/${label}.webp` : null;
+    return { state, progress: e.progress, bytes: e.bytes, url, at_s: e.at_s ?? e.images.at(-1)?.at_s ?? null, images: e.images };
   }
 
   json(nowS) {
-    const bounds = this.heard.bounds();
-    const area = this.heard.cellM ** 2;
-    const counts = [...this.heard.counts()].sort((a, b) => a[0] - b[0]);
+    const bounds = this.replica.bounds();
+    const area = this.replica.cellM ** 2;
+    const counts = [...this.replica.counts()].sort((a, b) => a[0] - b[0]);
     return {
-      id: this.id, name: this.name, heard_s: this.heardS, expected_interval_s: this.turnS,
-      next_contact_s: this.heardS === null ? null : this.nextTurnS, status: this.status, track: this.track,
+      id: this.id, name: this.name, last_received_s: this.receivedS, expected_interval_s: this.turnS,
+      next_contact_s: this.receivedS === null ? null : this.nextTurnS, status: this.status, track: this.track,
       map: {
-        version: this.heard.version, cell_m: this.heard.cellM, ...bounds,
-        explored_cells: this.heard.cells.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null,
+        version: this.replica.version, cell_m: this.replica.cellM, ...bounds,
+        explored_cells: this.replica.cells.size, updated_s: this.updatedS ?? null, epoch: 0, placement: this.placement ?? null,
       },
       labels: counts.map(([id, cells]) => ({
         id, cells, area_m2: cells * area, weight: this.weights.get(id) ?? 0, exemplar: this.exemplarJson(id),
@@ -174,17 +175,17 @@ export class Vehicle {
 
   link(nowS) {
     const { loss, goodput_bps: goodput } = this.up.json(nowS);
-    const water = { loss, goodput_bps: goodput };
+    const up = { loss, goodput_bps: goodput };
     return {
-      up: water, down: { loss, goodput_bps: 12 }, round_trip_s: this.heardS === null ? null : 1.62,
-      one_way_s: this.heardS === null ? null : 0.81, clock_ahead_s: 0, dropped: {}, backlog: this.backlog(nowS, goodput),
+      up, down: { loss, goodput_bps: 12 }, round_trip_s: this.receivedS === null ? null : 1.62,
+      one_way_s: this.receivedS === null ? null : 0.81, clock_offset_s: 0, dropped: {}, backlog: this.backlog(nowS, goodput),
     };
   }
 
-  /** What it had still to send when it was heard last. */
+  /** The backlog of its last report. */
   backlog(nowS, goodput) {
-    if (this.told === null) return null;
-    const { at_s, bits } = this.told;
+    if (this.reported === null) return null;
+    const { at_s, bits } = this.reported;
     const takes = (n) => (n === 0 ? 0 : goodput >= 1 ? n / goodput : null);
     return {
       at_s, bits, empty_s: takes(bits) === null ? null : nowS + takes(bits),
@@ -192,7 +193,7 @@ export class Vehicle {
     };
   }
 
-  mapJson(nowS, spend) {
-    return this.heard.json(nowS, PLANES.filter((p) => spend.includes(p.name)));
+  mapJson(nowS, streams) {
+    return this.replica.json(nowS, LAYERS.filter((p) => streams.includes(p.name)));
   }
 }

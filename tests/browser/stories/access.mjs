@@ -4,7 +4,7 @@ import { PHONE, WIDE } from "../stage.mjs";
 
 const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
 
-/** No serious or critical violation of WCAG 2.2 A and AA. The page's policy forbids inline scripts, so axe comes through the devtools. */
+/** No serious or critical violation of WCAG 2.2 A and AA. The policy of the page forbids inline scripts, so axe is loaded through the devtools. */
 async function clean(s) {
   await s.page.evaluate(await (await import("node:fs/promises")).readFile(AXE, "utf8"));
   const { violations, passes } = await s.page.evaluate(() =>
@@ -17,7 +17,7 @@ async function clean(s) {
 const states = [["rich", null], ["empty", "empty"], ["silent", "silent"], ["refused", "refused"]];
 const audits = ["light", "dark", "red"].flatMap((theme) =>
   states.map(([name, scenario]) => ({
-    name: `axe finds nothing serious: ${name}, ${theme}`,
+    name: `axe finds no serious fault: ${name}, ${theme}`,
     theme, scenario, size: WIDE,
     async run(s) {
       await s.page.locator("#vehicle .values").waitFor();
@@ -35,7 +35,7 @@ const audits = ["light", "dark", "red"].flatMap((theme) =>
   })));
 
 const editing = ["light", "dark", "red"].map((theme) => ({
-  name: `axe finds nothing serious while a fence is edited and an abort is asked for: ${theme}`,
+  name: `axe finds no serious fault in a fence edit and an abort: ${theme}`,
   theme,
   scenario: "rich",
   async run(s) {
@@ -74,7 +74,7 @@ export default [
     },
   },
   {
-    name: "on a phone nothing is wider than the screen and the tabs change panels",
+    name: "on a phone all fits the screen and the tabs change panels",
     size: PHONE,
     async run(s) {
       const over = await s.page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
@@ -95,7 +95,7 @@ export default [
     },
   },
   {
-    name: "the page asks nothing of any other host and holds no inline script or style",
+    name: "the page uses no other host and no inline script or style",
     bare: true,
     async run(s) {
       const hosts = new Set();

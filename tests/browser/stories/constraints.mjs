@@ -28,10 +28,10 @@ async function draw(s, tool, ...places) {
 const AROUND = [[0.03, 0.06], [0.97, 0.06], [0.97, 0.94], [0.03, 0.94]];
 const CROSSED = [[0.1, 0.1], [0.3, 0.3], [0.3, 0.1], [0.1, 0.3]];
 
-/** Colours along a line of the map, for what is drawn solid and what dashed: the share of pixels in `tone`. */
-const share = (s, from, to, tone) => s.inPage(({ view }, [a, b, name]) => {
+/** The share of the pixels along a line of the map that have the colour `tone`: it tells solid lines from dashed ones. */
+const share = (s, from, to, tone) => s.inPage(({ view, ink }, [a, b, name]) => {
   const c = document.getElementById("chart").getContext("2d");
-  const wanted = getComputedStyle(document.documentElement).getPropertyValue(name).match(/[0-9a-f]{2}/gi).map((v) => parseInt(v, 16));
+  const wanted = ink(name);
   let hits = 0;
   for (let i = 0; i < 400; i += 1) {
     const [x, y] = view.toScreen(a[0] + ((b[0] - a[0]) * i) / 400, a[1] + ((b[1] - a[1]) * i) / 400);
@@ -43,7 +43,7 @@ const share = (s, from, to, tone) => s.inPage(({ view }, [a, b, name]) => {
 
 export default [
   {
-    name: "a fence drawn on the map is sent, followed, and stays with the vehicle",
+    name: "a fence drawn on the map is sent and its status shown",
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await clear(s);
@@ -80,19 +80,19 @@ export default [
     },
   },
   {
-    name: "a fence that the vehicle refuses says why",
+    name: "a refused fence shows the reason",
     scenario: "rich",
     async run(s) {
       await open(s);
       await s.steer({ refuse: "fence", loss: 0 });
       await draw(s, "Draw fence", ...AROUND);
       await sendFence(s).click();
-      await s.shows("[aria-labelledby=fence-title] .lifeline", /Refused.*the vehicle is outside of it/s, { advance: 3 });
+      await s.shows("[aria-labelledby=fence-title] .order-status", /Refused.*the vehicle is outside of it/s, { advance: 3 });
       assert.match(await sendFence(s).innerText(), /again/);
     },
   },
   {
-    name: "after a refusal the fence in force can be taken up again",
+    name: "after a refusal the fence in force can be edited",
     scenario: "rich",
     async run(s) {
       const force = [[-20, -20], [30, -20], [30, 30], [-20, 30]];
@@ -110,12 +110,12 @@ export default [
     },
   },
   {
-    name: "an outline that crosses itself or has too few corners is not sent, and says so beside it",
+    name: "an outline that crosses itself is not sent and shows its fault",
     async run(s) {
       await clear(s);
       await s.button("Add keep-out").click();
       await click(s, CROSSED[0], CROSSED[1]);
-      await s.shows(".outline .error", /2 corners: it takes 3 to 34/);
+      await s.shows(".outline .error", /2 corners: an outline has 3 to 34/);
       assert.ok(await sendFence(s).isDisabled());
       await click(s, CROSSED[2], CROSSED[3]);
       await s.shows(".outline .error", /side after corner 1 crosses or touches the one after corner 3/);
@@ -129,7 +129,7 @@ export default [
     },
   },
   {
-    name: "a corner is dragged, a side gets one more, and a chosen one is deleted",
+    name: "corners are dragged, added to a side, and deleted",
     scenario: "rich",
     async run(s) {
       await open(s);
@@ -184,7 +184,7 @@ export default [
     },
   },
   {
-    name: "corners are set with a finger on a phone without panning the map",
+    name: "on a phone a finger sets corners without panning the map",
     scenario: "rich",
     size: PHONE,
     async run(s) {
@@ -200,7 +200,7 @@ export default [
     },
   },
   {
-    name: "a return point outside the fence is objected to at once",
+    name: "a return point outside the fence shows its fault at once",
     scenario: "rich",
     async run(s) {
       await open(s);
@@ -214,7 +214,7 @@ export default [
     },
   },
   {
-    name: "limits are checked as they are typed, sent as a whole and followed",
+    name: "limits are checked while typed, and sent as a whole",
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await open(s);
@@ -227,7 +227,7 @@ export default [
       await s.shows("#depth_m-fault", /both ends, or neither/);
       await field(s, "Depth, m, highest").fill("500");
       await field(s, "Silence, s").fill("0");
-      await s.shows("#silence_s-fault", /whole numbers from 1 to 65535/);
+      await s.shows("#silence_s-fault", /1 to 65535, whole numbers/);
       await field(s, "Silence, s").fill("900");
       await s.page.getByLabel("On silence").selectOption("return");
       await sendLimits(s).click();
@@ -257,27 +257,27 @@ export default [
     },
   },
   {
-    name: "an edit that goes on while the last one is on its way is not taken for another console's",
+    name: "an edit during a send is not taken for another console's",
     scenario: "rich",
     async run(s) {
       await open(s);
       await draw(s, "Draw fence", ...AROUND);
-      let goOn = null;
-      const drawn = new Promise((resolve) => (goOn = resolve));
+      let release = null;
+      const drawn = new Promise((resolve) => (release = resolve));
       await s.page.route("**/fence", (route) => drawn.then(() => route.continue()));
       await sendFence(s).click();
       await draw(s, "Add keep-out", [0.4, 0.4], [0.5, 0.4], [0.5, 0.5]);
-      goOn();
+      release();
       await s.until("its version", async () => (await slot(s, "fence"))?.version === 1);
       const { now_s } = await s.get("/state");
       await s.until("states after it", () => s.inPage(({ store }, now) => store.snapshot.now_s > now + 1, now_s), { advance: 1 });
-      assert.equal(await s.page.locator("[aria-labelledby=fence-title] .others").isVisible(), false);
+      assert.equal(await s.page.locator("[aria-labelledby=fence-title] .replaced").isVisible(), false);
       assert.equal(await s.page.locator(".outlines > li").count(), 2, "the edit is still there");
       assert.equal(await sendFence(s).isDisabled(), false);
     },
   },
   {
-    name: "a fence changed by another console shows, with a draft as a warning",
+    name: "a fence changed by another console is a warning on a draft",
     scenario: "rich",
     async run(s) {
       await open(s);
@@ -285,15 +285,15 @@ export default [
       await sendFence(s).click();
       await s.until("its version", async () => (await slot(s, "fence"))?.version === 1);
       await s.post("/vehicles/1/fence", { fence: [[-30, -30], [40, -30], [40, 40]] });
-      await s.shows("[aria-labelledby=fence-title] .others", /Changed by another console \(version 2\) since you sent yours/);
+      await s.shows("[aria-labelledby=fence-title] .replaced", /Changed by another console \(version 2\) after your order/);
       await s.page.getByRole("button", { name: "Fence: 3 corners, as numbers" }).waitFor();
       await draw(s, "Add keep-out", [0.1, 0.1], [0.2, 0.1], [0.2, 0.2]);
       await s.post("/vehicles/1/fence", {});
-      await s.shows("[aria-labelledby=fence-title] .others", /meanwhile; sending replaces it/);
+      await s.shows("[aria-labelledby=fence-title] .replaced", /meanwhile: Send replaces that change/);
       await s.button("Discard fence edits").click();
       await s.until("theirs", async () => (await s.page.locator(".outlines > li").count()) === 0);
       await s.page.getByRole("button", { name: "OK: Fence changed by another console" }).click();
-      await s.until("no note", async () => !(await s.page.locator("[aria-labelledby=fence-title] .others").isVisible()));
+      await s.until("no note", async () => !(await s.page.locator("[aria-labelledby=fence-title] .replaced").isVisible()));
     },
   },
 ];

@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 
-const SMOOTH_MS = 20;
+const USABLE_MS = 1000;
+const FRAME_MS = 20;
 const PAINTED_MS = 200;
 const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
 
@@ -18,14 +19,13 @@ export default [
       cdp.on("Network.loadingFinished", (e) => {
         if (["Document", "Script", "Stylesheet", "Image", "Other"].includes(kinds.get(e.requestId))) bytes += e.encodedDataLength;
       });
-      const [ms] = await s.best((t) => t < 1000, async () => {
-        bytes = 0;
-        await s.page.reload();
-        await s.ready();
-        return s.page.evaluate(() => performance.getEntriesByName("scenecast-ready")[0].startTime);
-      });
-      s.figures.push(`usable after ${Math.round(ms)} ms`, `${Math.round(bytes / 1000)} kB`);
-      assert.ok(ms < 1000, `ready after ${ms} ms`);
+      const before = await s.cpuMs();
+      await s.page.reload();
+      await s.ready();
+      const ms = (await s.cpuMs()) - before;
+      const wall = await s.page.evaluate(() => performance.getEntriesByName("scenecast-ready")[0].startTime);
+      s.figures.push(`usable after ${Math.round(ms)} ms of CPU time, ${Math.round(wall)} ms on the clock`, `${Math.round(bytes / 1000)} kB`);
+      assert.ok(ms < USABLE_MS, `ready after ${ms} ms of CPU time`);
       assert.ok(bytes > 10000 && bytes < 400000, `${bytes} bytes`);
     },
   },
@@ -33,22 +33,20 @@ export default [
     name: "a map of more than 512 by 512 cells pans smoothly",
     scenario: "big",
     async run(s) {
-      const [ms] = await s.best((t) => t < SMOOTH_MS, async () => median(await s.page.evaluate(async () => {
+      const before = await s.cpuMs();
+      await s.page.evaluate(async () => {
         const { view, redraw } = await import("/js/map/chart.js");
         const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
-        const spent = [];
         for (let i = 0; i < 60; i += 1) {
           view.panBy(i < 30 ? 3 : -3, 1);
-          const start = performance.now();
           redraw();
           await frame();
           await frame();
-          spent.push((performance.now() - start) / 2);
         }
-        return spent;
-      })));
-      s.figures.push(`${ms.toFixed(1)} ms a frame`);
-      assert.ok(ms < SMOOTH_MS, `${ms} ms a frame`);
+      });
+      const ms = ((await s.cpuMs()) - before) / 120;
+      s.figures.push(`${ms.toFixed(1)} ms of CPU time a frame`);
+      assert.ok(ms < FRAME_MS, `${ms} ms a frame`);
     },
   },
   {
@@ -56,36 +54,9 @@ export default [
     unmocked: true,
     async run(s) {
       await s.post("/vehicles/1/constraints", { hold: false });
-      const late = () => s.page.evaluate(async () => {
-        const { store } = await import("/js/store.js");
-        const wanted = 15;
-        // The mission's clock against ours: no state comes before it was made, so the quickest one tells best.
-        let clock = Infinity;
-        const seen = new Map();
-        const { speed } = store.snapshot.mission;
-        const source = new EventSource("/api/v1/events");
-        source.addEventListener("state", (event) => {
-          const at = performance.now();
-          const state = JSON.parse(event.data);
-          clock = Math.min(clock, at - (1000 * state.now_s) / speed);
-          const { version, updated_s } = state.vehicles[0].map;
-          if (!seen.has(version)) seen.set(version, updated_s);
-        });
-        const painted = [];
-        let shown = store.map?.version ?? 0;
-        while (painted.length < wanted) {
-          await new Promise((resolve) => store.addEventListener("map", resolve, { once: true }));
-          await new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
-          const { version } = store.map;
-          if (version > shown && seen.has(version)) painted.push([performance.now(), seen.get(version)]);
-          shown = version;
-        }
-        source.close();
-        return painted.map(([at, updated]) => at - clock - (1000 * updated) / speed);
-      });
-      const [ms] = await s.best((t) => t < PAINTED_MS, async () => median(await late()));
-      s.figures.push(`median ${Math.round(ms)} ms from arrival to paint`);
-      assert.ok(ms < PAINTED_MS, `${ms} ms`);
+      const [ms, machine] = await latency(s);
+      s.figures.push(`median ${Math.round(ms)} ms from arrival to paint, of which other programs take ${Math.round(machine)} ms`);
+      assert.ok(ms - machine < PAINTED_MS, `${ms} ms, of which other programs take ${machine} ms`);
     },
   },
   {
@@ -94,44 +65,82 @@ export default [
     async run(s) {
       const cdp = await s.context.newCDPSession(s.page);
       let events = 0;
-      const go = async (batches) => {
+      const run = async (batches) => {
         for (let i = 0; i < batches; i += 1) {
           const { now_s } = await s.steer({ advance: 15, times: 50 });
           events += 100;
           await s.until("the last state", () => s.inPage(({ store }, now) => store.snapshot.now_s >= now, now_s));
         }
       };
-      /** Milliseconds for the page to take a state and to paint it. */
-      const taking = () => s.inPage(async ({ store }) => {
-        const spent = [];
-        for (let i = 0; i < 40; i += 1) {
-          const start = performance.now();
-          store.take(structuredClone(store.snapshot));
-          spent.push(performance.now() - start);
-          await new Promise((resolve) => requestAnimationFrame(resolve));
-        }
-        return spent.toSorted((a, b) => a - b)[20];
-      });
+      /** Milliseconds of CPU time for the page to process a state and to paint it. */
+      const processing = async () => {
+        const before = await s.cpuMs();
+        await s.inPage(async ({ store }) => {
+          for (let i = 0; i < 40; i += 1) {
+            store.setSnapshot(structuredClone(store.snapshot));
+            await new Promise((resolve) => requestAnimationFrame(resolve));
+          }
+        });
+        return ((await s.cpuMs()) - before) / 40;
+      };
       const measure = async () => {
         await cdp.send("HeapProfiler.collectGarbage");
         const { nodes, jsEventListeners } = await cdp.send("Memory.getDOMCounters");
         const { usedSize } = await cdp.send("Runtime.getHeapUsage");
-        return { nodes, jsEventListeners, usedSize, takeMs: await taking() };
+        return { nodes, jsEventListeners, usedSize, stateMs: await processing() };
       };
-      // Track, history and map are full by then.
-      await go(10);
+      // Then track, history and map are full.
+      await run(10);
       const first = await measure();
-      await go(30);
+      await run(30);
       const last = await measure();
       const { now_s } = await s.get("/state");
       const mb = (n) => (n / 1e6).toFixed(1);
       s.figures.push(`${events} events, ${(now_s / 3600).toFixed(1)} h`, `heap ${mb(first.usedSize)} to ${mb(last.usedSize)} MB`,
-        `${first.nodes} to ${last.nodes} nodes`, `a state takes ${first.takeMs.toFixed(1)} to ${last.takeMs.toFixed(1)} ms`);
+        `${first.nodes} to ${last.nodes} nodes`, `a state takes ${first.stateMs.toFixed(1)} to ${last.stateMs.toFixed(1)} ms`);
       assert.ok(last.nodes < first.nodes * 1.1 + 100, `${first.nodes} -> ${last.nodes} nodes`);
       assert.ok(last.jsEventListeners < first.jsEventListeners * 1.1 + 20, `${first.jsEventListeners} -> ${last.jsEventListeners} listeners`);
       assert.ok(last.usedSize < first.usedSize * 1.2 + 1e6, `${first.usedSize} -> ${last.usedSize} bytes`);
-      const [again] = await s.best((t) => t < first.takeMs * 1.5 + 4, taking);
-      assert.ok(again < first.takeMs * 1.5 + 4, `a state takes ${first.takeMs} -> ${again} ms`);
+      assert.ok(last.stateMs < first.stateMs * 1.5 + 4, `a state takes ${first.stateMs} -> ${last.stateMs} ms`);
     },
   },
 ];
+
+/** Medians in milliseconds over 15 updates of the map: from its arrival at the surface until it is painted, and by how much a request
+ *  to the surface and the next paint take longer at that time than they take at best, since other programs use the machine. */
+async function latency(s) {
+  const samples = await s.page.evaluate(async () => {
+    const { store } = await import("/js/store.js");
+    const painted = () => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+    const { speed } = store.snapshot.mission;
+    // The offset of the mission's clock: no state arrives before it was made, so the quickest one is the best estimate.
+    let offset = Infinity;
+    const updates = new Map();
+    const source = new EventSource("/api/v2/events");
+    source.addEventListener("state", (event) => {
+      const at = performance.now();
+      const state = JSON.parse(event.data);
+      offset = Math.min(offset, at - (1000 * state.now_s) / speed);
+      const { version, updated_s } = state.vehicles[0].map;
+      if (!updates.has(version)) updates.set(version, updated_s);
+    });
+    const found = [];
+    let shown = store.map?.version ?? 0;
+    while (found.length < 15) {
+      await new Promise((resolve) => store.addEventListener("map", resolve, { once: true }));
+      await painted();
+      const at = performance.now();
+      const { version } = store.map;
+      if (version > shown && updates.has(version)) {
+        await (await fetch("/api/v2/state")).json();
+        await painted();
+        found.push({ at, updated: (1000 * updates.get(version)) / speed, roundTrip: performance.now() - at });
+      }
+      shown = version;
+    }
+    source.close();
+    return found.map(({ at, updated, roundTrip }) => [at - offset - updated, roundTrip]);
+  });
+  const best = Math.min(...samples.map(([, roundTrip]) => roundTrip));
+  return [median(samples.map(([ms]) => ms)), median(samples.map(([, roundTrip]) => roundTrip - best))];
+}

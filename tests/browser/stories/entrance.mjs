@@ -1,4 +1,5 @@
 import assert from "node:assert/strict";
+import { API } from "../stage.mjs";
 
 const enter = async (s, token) => {
   await s.page.getByLabel(/Token of this surface/).fill(token);
@@ -7,7 +8,7 @@ const enter = async (s, token) => {
 
 export default [
   {
-    name: "who has no token is asked for it, a wrong one is refused, the right one opens the page and is remembered",
+    name: "the form refuses a wrong token and opens the page with the right one",
     locked: true,
     bare: true,
     async run(s) {
@@ -20,12 +21,12 @@ export default [
       assert.ok(cookie.httpOnly && cookie.sameSite === "Strict" && !cookie.value.includes(s.token), "a cookie that is not the token");
       await s.page.reload();
       await s.until("the page again", () => s.page.evaluate(() => document.body.dataset.feed === "open"));
-      assert.equal((await fetch(`${s.url}/api/v1/state`)).status, 401);
+      assert.equal((await fetch(`${s.url}${API}/state`)).status, 401);
     },
     tolerates: /401/,
   },
   {
-    name: "a page whose session the surface has forgotten goes to the login by itself",
+    name: "a page without a valid session opens the login form",
     locked: true,
     bare: true,
     async run(s) {

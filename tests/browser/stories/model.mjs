@@ -9,24 +9,24 @@ const force = (s, key) => s.page.locator(".limit", { has: field(s, key) }).locat
 
 export default [
   {
-    name: "settings of the scene model are checked as they are typed, sent and followed until they are in force",
+    name: "settings are checked while typed, sent, and shown in force",
     async run(s) {
       await s.shows("#vehicle .age", /Status/, { ms: 60000, advance: 5 });
       await open(s);
       await field(s, "gamma").fill("5000");
-      await s.shows("#gamma-fault", /It takes 1e-12 to 1000, or 0 as configured/);
+      await s.shows("#gamma-fault", /The range is 1e-12 to 1000, or 0 as configured/);
       assert.ok(await send(s).isDisabled());
       await field(s, "gamma").fill("1e-5");
       await field(s, "frames_per_s").fill("0.001");
       await s.shows("#frames_per_s-fault", /0.01 to 30/);
       await field(s, "frames_per_s").fill("0.25");
-      await field(s, "planes").selectOption("depth");
+      await field(s, "layers").selectOption("depth");
       await field(s, "cells").selectOption("coarse-to-fine");
-      await s.until("what is in force beside the draft", () => force(s, "gamma").isVisible());
+      await s.until("the value in force beside the draft", () => force(s, "gamma").isVisible());
       await send(s).click();
       await s.until("the message", () => sent(s).length === 1);
-      const { gamma, frames_per_s: frames, planes, cells } = sent(s)[0];
-      assert.deepEqual([gamma, frames, planes, cells], [1e-5, 0.25, "depth", "coarse-to-fine"]);
+      const { gamma, frames_per_s: frames, layers, cells } = sent(s)[0];
+      assert.deepEqual([gamma, frames, layers, cells], [1e-5, 0.25, "depth", "coarse-to-fine"]);
       await s.shows("#model .steps [aria-current]", /Applied/, { ms: 240000, advance: 2 });
       // A version before this one may have been applied, too.
       await s.until("the settings in force", async () => (await s.vehicle()).settings.in_force?.gamma === 1e-5, { ms: 240000, advance: 2 });
@@ -34,11 +34,11 @@ export default [
     },
   },
   {
-    name: "a field that was cleared goes back to what is configured, one never set stays as it is",
+    name: "a cleared field means as configured, an empty one unchanged",
     scenario: "rich",
     async run(s) {
       await open(s);
-      assert.equal(await field(s, "alpha").getAttribute("placeholder"), "as it is");
+      assert.equal(await field(s, "alpha").getAttribute("placeholder"), "unchanged");
       await field(s, "alpha").fill("0.5");
       await send(s).click();
       await s.shows("#model .steps [aria-current]", /Applied/, { advance: 2 });
@@ -52,42 +52,42 @@ export default [
     },
   },
   {
-    name: "fit to budget fills the fields, says what is given up, and sends nothing by itself",
+    name: "fit to budget fills the fields, names the trade-off, and sends no order",
     scenario: "rich",
     async run(s) {
       await open(s);
-      await field(s, "planes").selectOption("none");
+      await field(s, "layers").selectOption("none");
       await s.page.locator("#fit-bps").fill("1000");
       await s.button("Fit to budget").click();
       await s.shows("#fitted", /a stream of 800 bit\/s\. Fewer labels, fewer camera frames: 0\.02 nats \(6 %\) below the best/);
       assert.equal(await field(s, "alpha").inputValue(), "1");
       assert.equal(await field(s, "cells").inputValue(), "fine");
-      assert.equal(await field(s, "planes").inputValue(), "none");
+      assert.equal(await field(s, "layers").inputValue(), "none");
       assert.equal(sent(s).length, 0);
       await send(s).click();
       await s.until("the message", () => sent(s).length === 1);
-      assert.deepEqual(sent(s)[0], { alpha: 1, beta: 0.1, gamma: 1e-5, refine_words_per_s: 50000, frames_per_s: 0.2, cells: "fine", planes: "none" });
+      assert.deepEqual(sent(s)[0], { alpha: 1, beta: 0.1, gamma: 1e-5, refine_words_per_s: 50000, frames_per_s: 0.2, cells: "fine", layers: "none" });
       await s.shows("#model .steps [aria-current]", /Applied/, { advance: 2 });
-      assert.equal(await s.page.locator("#model .others").isVisible(), false);
+      assert.equal(await s.page.locator("#model .replaced").isVisible(), false);
     },
   },
   {
-    name: "where nothing fits the leanest is named and no field changes",
+    name: "where no settings fit, the lowest rate is shown",
     scenario: "rich",
     async run(s) {
       await open(s);
       await s.page.locator("#fit-bps").fill("50");
       await s.page.locator("#fit-bps").press("Enter");
-      await s.shows("#model .error:not(:empty)", /no setting fits 50 bit\/s: the leanest needs 90 bit\/s/);
+      await s.shows("#model .error:not(:empty)", /no setting fits 50 bit\/s: the lowest rate is 90 bit\/s/);
       assert.equal(await field(s, "alpha").inputValue(), "");
       await s.page.locator("#fit-bps").fill("0");
       await s.button("Fit to budget").click();
-      await s.shows("#model .error:not(:empty)", /It takes 1 to 10000000 bit\/s/);
+      await s.shows("#model .error:not(:empty)", /The range is 1 to 10000000 bit\/s/);
       assert.ok(await send(s).isDisabled());
     },
   },
   {
-    name: "refused settings say why, and the planner's order is not taken for another console's",
+    name: "refused settings show the reason; the planner's order counts as ours",
     scenario: "rich",
     size: PHONE,
     async run(s) {
@@ -96,7 +96,7 @@ export default [
       await field(s, "beta").fill("2");
       await send(s).click();
       await s.shows("#model .steps [aria-current]", /Refused/, { advance: 2 });
-      await s.shows("#model .lifeline .note", /outside what the vehicle accepts/);
+      await s.shows("#model .order-status .note", /outside what the vehicle accepts/);
       assert.equal((await s.vehicle()).settings.in_force.beta, null);
       await s.page.getByRole("tab", { name: "Labels" }).click();
       await s.page.selectOption("#planner", "greedy");
@@ -104,7 +104,7 @@ export default [
       await s.until("the planner in force", async () => (await s.vehicle()).settings.in_force.planner === "greedy", { advance: 2 });
       await open(s);
       await s.shows("#model .steps [aria-current]", /Applied/);
-      assert.equal(await s.page.locator("#model .others").isVisible(), false);
+      assert.equal(await s.page.locator("#model .replaced").isVisible(), false);
     },
   },
 ];

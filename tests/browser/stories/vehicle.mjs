@@ -4,10 +4,9 @@ export default [
   {
     name: "the vehicle's status is shown with its age",
     async run(s) {
-      await s.shows("#vehicle .age", /Status .* old · heard .* ago, due every/, { ms: 60000, advance: 5 });
-      const { status } = await s.inPage(({ store }) => ({ status: store.vehicle.status }));
-      const shown = (await s.page.locator("#vehicle .values").innerText()).replaceAll("\u202f", " ").replaceAll("\u2212", "-");
-      assert.ok(shown.includes(`${(-status.z_m).toFixed(1)} m`), shown);
+      await s.shows("#vehicle .age", /Status .* old · received .* ago, due every/, { ms: 60000, advance: 5 });
+      const [depth, shown] = await s.inPage(({ store }) => [-store.vehicle.status.z_m, document.querySelector("#vehicle .values").innerText]);
+      assert.ok(shown.replaceAll("\u202f", " ").replaceAll("\u2212", "-").includes(`${depth.toFixed(1)} m`), shown);
     },
   },
   {
@@ -35,7 +34,7 @@ export default [
     },
   },
   {
-    name: "a late joiner sees what others have sent",
+    name: "a late joiner sees the orders of others",
     scenario: "rich",
     async run(s) {
       await s.post("/vehicles/1/utility", { weights: { 1: 0.5 }, exploration: 0.2 });
@@ -47,7 +46,7 @@ export default [
     },
   },
   {
-    name: "a late joiner knows the fence and limits in force while others are on their way",
+    name: "a late joiner sees the fence and limits in force",
     scenario: "rich",
     async run(s) {
       const applied = (slot) => async () => (await s.vehicle()).directive.slots.find((x) => x.slot === slot)?.state === "applied";

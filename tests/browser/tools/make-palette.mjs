@@ -1,4 +1,4 @@
-// Prints the 254 label colours of daemon/console/js/palette-table.js.
+// Prints the 254 label colours of daemon/console/page/js/palette-table.js.
 //
 // The first seven are the set of Okabe and Ito (2008). Every next colour is the sRGB candidate
 // farthest, in OKLab, from all earlier ones and from the two sea colours, where the distance is the

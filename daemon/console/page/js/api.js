@@ -1,67 +1,69 @@
-// The HTTP API of the daemon: reads, and writes that carry the header the server asks for.
+// The HTTP API of the daemon: reads, and orders with the header that the server requires.
 
-const BASE = "/api/v1";
+export const BASE = "/api/v2";
+const TIMEOUT_MS = 10000;
 
-export class Refused extends Error {}
+/** The message is one line for people. */
+export class ApiError extends Error {}
 
 async function read(path) {
-  const answer = await fetch(BASE + path, { cache: "no-store", signal: AbortSignal.timeout(10000) });
-  const said = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Refused(said.error ?? `${answer.status} ${answer.statusText}`);
-  return said;
+  const response = await fetch(BASE + path, { cache: "no-store", signal: AbortSignal.timeout(TIMEOUT_MS) });
+  const body = await response.json().catch(() => ({}));
+  if (!response.ok) throw new ApiError(body.error ?? `${response.status} ${response.statusText}`);
+  return body;
 }
 
-async function write(path, body) {
-  let answer;
+async function write(path, order) {
+  let response;
   try {
-    answer = await fetch(BASE + path, {
+    response = await fetch(BASE + path, {
       method: "POST",
       headers: { "content-type": "application/json", "x-scenecast": "1" },
-      body: JSON.stringify(body),
-      signal: AbortSignal.timeout(10000),
+      body: JSON.stringify(order),
+      signal: AbortSignal.timeout(TIMEOUT_MS),
     });
   } catch {
-    throw new Refused("scenecast did not answer; nothing was sent");
+    throw new ApiError("scenecast did not answer; the order was not sent");
   }
-  const said = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw new Refused(said.error ?? `refused with status ${answer.status}`);
-  return said;
+  const body = await response.json().catch(() => ({}));
+  if (!response.ok) throw new ApiError(body.error ?? `refused with status ${response.status}`);
+  return body;
 }
 
 export const sendUtility = (id, utility) => write(`/vehicles/${id}/utility`, utility);
-/** `what`: another, larger or cancel; `picture`: the number of the one to enlarge. */
-export const askExemplar = (id, label, what, picture = null) =>
-  write(`/vehicles/${id}/exemplars`, { label, what, ...(picture && { picture }) });
+/** `action`: another, larger or cancel; `image`: the number of the image to enlarge. */
+export const requestExemplar = (id, label, action, image = null) =>
+  write(`/vehicles/${id}/exemplars`, { label, action, ...(image && { image }) });
 export const sendConstraints = (id, order) => write(`/vehicles/${id}/constraints`, order);
 export const sendFence = (id, fence) => write(`/vehicles/${id}/fence`, fence);
 export const sendLimits = (id, limits) => write(`/vehicles/${id}/limits`, limits);
 export const sendPlanner = (id, planner) => write(`/vehicles/${id}/settings`, { planner });
 export const sendSettings = (id, settings) => write(`/vehicles/${id}/settings`, settings);
-/** The settings that tell most within so many bits a second; null: within the map's share of the vehicle's budget. */
+/** The most informative settings within `bps` bit/s; null: within the map's share of the vehicle's budget. */
 export const readFit = (id, bps) => read(`/vehicles/${id}/fit${bps === null ? "" : `?bits_per_s=${bps}`}`);
-/** `shares` in percent by class, `spend` what left-over bits go to, in order; null leaves them as they are. */
-export const sendBudget = (bps, shares = null, spend = null) =>
-  write("/budget", { budget_bps: bps, ...(shares && { shares }), ...(spend && { spend }) });
+/** `shares` in percent by class; `background`: the streams that use spare capacity, in order. Null leaves them unchanged. */
+export const sendBudget = (bps, shares = null, background = null) =>
+  write("/budget", { budget_bps: bps, ...(shares && { shares }), ...(background && { background }) });
 
-/** Goes to the login if the surface takes a token and no longer knows ours. */
-export async function logInIfAsked() {
-  const answer = await fetch(`${BASE}/state`, { cache: "no-store", signal: AbortSignal.timeout(10000) }).catch(() => null);
-  if (answer?.status === 401) location.assign("/login");
+/** Opens the login form if the surface requires a token and our session is not valid. */
+export async function logInIfRequired() {
+  const response = await fetch(`${BASE}/state`, { cache: "no-store", signal: AbortSignal.timeout(TIMEOUT_MS) }).catch(() => null);
+  if (response?.status === 401) location.assign("/login");
 }
 
-/** The map of a vehicle with its planes as typed arrays, rows from the south. */
+/** The map of a vehicle with its layers as typed arrays, rows from the south. */
 export async function readMap(id) {
   const m = await read(`/vehicles/${id}/map`);
   const labels = decode(m.labels);
   const age = ages(m.age_s);
   if (labels.length !== m.width * m.height || age.length !== labels.length) {
-    throw new Refused("the map's planes do not fit its size");
+    throw new ApiError("the map's layers do not fit its size");
   }
-  const planes = (m.planes ?? []).map((p) => ({ ...p, data: decode(p.data), age: p.age_s ? ages(p.age_s) : null }));
-  return { ...m, labels, age, planes };
+  const layers = m.layers.map((p) => ({ ...p, data: decode(p.data), age: p.age_s ? ages(p.age_s) : null }));
+  return { ...m, labels, age, layers };
 }
 
-/** Seconds, two bytes each, the low one first; 65535 = never. */
+/** Seconds, two bytes each, little-endian; 65535 = never. */
 function ages(base64) {
   const raw = decode(base64);
   const age = new Uint16Array(raw.length / 2);

@@ -1,5 +1,5 @@
-// The operator's own names, colours and merges of labels. Kept in this browser only, per mission,
-// vehicle and epoch: the vehicle knows ids, nothing here is sent. See daemon/console/README.md.
+// The operator's own names, colours and merges of labels. They are kept in this browser only, for each mission, vehicle and
+// epoch, and are not sent: the vehicle knows label numbers only. See README.md.
 
 import { recall, remember } from "./prefs.js";
 import { store } from "./store.js";
@@ -8,29 +8,29 @@ import { redShade, rgb, tableColour } from "./palette.js";
 
 const EMPTY = { names: {}, colours: {}, merged: {} };
 let loadedKey = null;
-let page = EMPTY;
+let book = EMPTY;
 
 function key() {
   const v = store.vehicle;
   const mission = store.snapshot?.mission;
-  return `book.${mission?.id ?? mission?.name ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
+  return `book.${mission?.id ?? ""}.${v?.id ?? 0}.${v?.map.epoch ?? 0}`;
 }
 
 function current() {
   if (key() !== loadedKey) {
     loadedKey = key();
-    page = { ...structuredClone(EMPTY), ...recall(loadedKey, {}) };
+    book = { ...structuredClone(EMPTY), ...recall(loadedKey, {}) };
   }
-  return page;
+  return book;
 }
 
 function change(edit) {
   edit(current());
-  remember(loadedKey, page);
-  store.tell("book");
+  remember(loadedKey, book);
+  store.emit("book");
 }
 
-/** The label under which `id` is shown: itself, or the one it was merged into. */
+/** The label that `id` is shown as: itself, or the label that it was merged into. */
 export function shownAs(id) {
   const { merged } = current();
   let at = id;
@@ -44,7 +44,6 @@ export const colourOf = (id) => current().colours[id] ?? tableColour(id);
 
 /** [r, g, b] in which `id` is painted now: its colour, or a shade of red in the red theme. */
 export const tintOf = (id) => (theme() === "red" ? redShade(id) : rgb(colourOf(id)));
-
 
 export function rename(id, name) {
   change((b) => {

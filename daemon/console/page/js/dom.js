@@ -17,7 +17,7 @@ export function h(spec, props = {}, ...children) {
 
 export const $ = (id) => document.getElementById(id);
 
-/** Sets text only when it differs, so that selections and screen readers are left in peace. */
+/** Sets text only when it differs, so that selections persist and screen readers stay quiet. */
 export function text(node, value) {
   if (node.textContent !== value) node.textContent = value;
 }
@@ -30,9 +30,9 @@ export function show(node, visible) {
   if (node.hidden === visible) node.hidden = !visible;
 }
 
-/** Says something once to screen readers; values that tick by the second are not announced. */
-export function announce(words) {
-  $("announce").textContent = words;
+/** Announces `message` once to screen readers; values that change each second are not announced. */
+export function announce(message) {
+  $("announce").textContent = message;
 }
 
 /** Keeps one child per key in `list`, in the order of `items`; `make` builds, `update` refreshes. */
@@ -54,15 +54,9 @@ export function keyed(list, items, key, make, update) {
   for (const gone of old.values()) gone.remove();
 }
 
-/** A definition row whose value can be refreshed: [row, setter(value, age?)]. */
+/** A definition row and the function that sets its value. */
 export function row(name, title = "") {
   const value = h("dd");
   const line = h("div", { title }, h("dt", {}, name), value);
   return [line, (v) => text(value, v)];
-}
-
-export function download(name, type, parts) {
-  const url = URL.createObjectURL(new Blob(parts, { type }));
-  h("a", { href: url, download: name }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 10000);
 }

@@ -1,21 +1,21 @@
-// The stream of changes, re-opened with a growing pause when it drops or falls quiet.
+// The stream of server-sent events. It is opened again, after a growing pause, when it breaks off or falls silent.
 
-import { logInIfAsked } from "./api.js";
+import { BASE, logInIfRequired } from "./api.js";
 import { store } from "./store.js";
 
-const QUIET_MS = 6000;
-const FIRST_PAUSE_MS = 500;
-const LONGEST_PAUSE_MS = 15000;
+const SILENCE_TIMEOUT_MS = 6000;
+const MIN_PAUSE_MS = 500;
+const MAX_PAUSE_MS = 15000;
 
 let source = null;
-let pauseMs = FIRST_PAUSE_MS;
-let heardMs = 0;
+let pauseMs = MIN_PAUSE_MS;
+let receivedMs = 0;
 let timer = 0;
 
 export function startFeed() {
   open();
   setInterval(() => {
-    if (source && performance.now() - heardMs > QUIET_MS) dropped();
+    if (source && performance.now() - receivedMs > SILENCE_TIMEOUT_MS) drop();
   }, 1000);
   addEventListener("online", retryNow);
   document.addEventListener("visibilitychange", () => {
@@ -30,40 +30,40 @@ export function retryNow() {
 }
 
 function open() {
-  heardMs = performance.now();
-  source = new EventSource("/api/v1/events");
+  receivedMs = performance.now();
+  source = new EventSource(`${BASE}/events`);
   source.addEventListener("state", (event) => {
-    opened();
-    store.take(JSON.parse(event.data));
+    confirmOpen();
+    store.setSnapshot(JSON.parse(event.data));
   });
   source.addEventListener("map", (event) => {
-    heardMs = performance.now();
+    receivedMs = performance.now();
     const { vehicle, version } = JSON.parse(event.data);
-    if (store.snapshot) store.wantMap(vehicle, { version, epoch: store.maps.get(vehicle)?.epoch ?? 0 });
+    if (store.snapshot) store.fetchMap(vehicle, { version, epoch: store.maps.get(vehicle)?.epoch ?? 0 });
   });
-  source.addEventListener("error", dropped);
+  source.addEventListener("error", drop);
 }
 
-function opened() {
-  heardMs = performance.now();
+function confirmOpen() {
+  receivedMs = performance.now();
   if (store.connected) return;
-  pauseMs = FIRST_PAUSE_MS;
+  pauseMs = MIN_PAUSE_MS;
   setFeed("open", 0);
 }
 
-function dropped() {
+function drop() {
   source?.close();
   source = null;
-  logInIfAsked();
+  logInIfRequired();
   clearTimeout(timer);
   timer = setTimeout(open, pauseMs);
   setFeed("lost", performance.now() + pauseMs);
-  pauseMs = Math.min(LONGEST_PAUSE_MS, pauseMs * 2);
+  pauseMs = Math.min(MAX_PAUSE_MS, pauseMs * 2);
 }
 
 function setFeed(state, retryMs) {
   const sinceMs = store.feed.state === state ? store.feed.sinceMs : performance.now();
   store.feed = { state, sinceMs, retryMs };
   document.body.dataset.feed = state;
-  store.tell("feed");
+  store.emit("feed");
 }

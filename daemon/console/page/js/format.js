@@ -1,4 +1,4 @@
-// Numbers as an operator reads them.
+// Numbers as text for the operator.
 
 const DASH = "\u2013";
 const THIN = "\u202f";

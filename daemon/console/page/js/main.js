@@ -1,9 +1,8 @@
-// Starts the page: every part listens to the store, the feed fills it.
+// Starts the page. Every part listens to the store, and the feed fills it.
 
 import { startCloud } from "./cloud/cloud.js";
 import { startFeed } from "./feed.js";
 import { startChart } from "./map/chart.js";
-import { startTools } from "./map/tools.js";
 import { startBanners } from "./panel/banners.js";
 import { startBar } from "./panel/bar.js";
 import { startConstraints } from "./panel/constraints.js";
@@ -12,6 +11,7 @@ import { startLabels } from "./panel/labels.js";
 import { startLink } from "./panel/link.js";
 import { startModel } from "./panel/model.js";
 import { startTabs } from "./panel/tabs.js";
+import { startTools } from "./panel/tools.js";
 import { startVehicle } from "./panel/vehicle.js";
 import { store } from "./store.js";
 import { onTheme, startTheme } from "./theme.js";
@@ -29,6 +29,6 @@ startChart();
 startCloud();
 startTools();
 startKeys();
-onTheme(() => store.tell("theme"));
+onTheme(() => store.emit("theme"));
 startFeed();
-setInterval(() => store.tell("tick"), 1000);
+setInterval(() => store.emit("tick"), 1000);

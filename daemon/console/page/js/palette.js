@@ -14,13 +14,13 @@ export function rgb(hex) {
   return [n >> 16, (n >> 8) & 255, n & 255];
 }
 
-// Cividis (Nuñez, Anderton and Renslow 2018), nine knots: one reading order for every kind of sight.
+// Cividis (Nuñez, Anderton and Renslow 2018), nine knots: its order can be read with every kind of colour vision.
 export const CIVIDIS = [
   [0, 34, 78], [33, 58, 112], [76, 83, 109], [108, 110, 114], [125, 124, 120],
   [150, 144, 118], [181, 170, 104], [217, 199, 77], [254, 232, 56],
 ];
 
-// Inferno (van der Walt and Smith 2015) without its ends, which are as dark and as bright as the sea: a second such order.
+// Inferno (van der Walt and Smith 2015) without its ends, which are as dark and as bright as the sea: a second scale of this kind.
 export const INFERNO = [
   [33, 12, 74], [86, 16, 110], [137, 34, 106], [187, 55, 84], [227, 89, 50], [249, 140, 10], [249, 201, 50],
 ];

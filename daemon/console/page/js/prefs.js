@@ -1,4 +1,4 @@
-// What this browser remembers, under keys that begin with "scenecast.". Losing it loses no mission data.
+// Preferences that this browser stores under keys that begin with "scenecast.". They hold no mission data.
 
 const PREFIX = "scenecast.";
 
@@ -15,6 +15,6 @@ export function remember(key, value) {
   try {
     localStorage.setItem(PREFIX + key, JSON.stringify(value));
   } catch {
-    // Private windows and full disks: the page works on, it only forgets.
+    // A private window or a full disk: the page works without stored preferences.
   }
 }

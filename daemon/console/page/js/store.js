@@ -1,4 +1,4 @@
-// What the page knows: the last state from the daemon, how old it is, the chosen vehicle, the maps.
+// The data of the page: the last state from the daemon and its age, the selected vehicle, the maps.
 
 import { readMap } from "./api.js";
 
@@ -8,33 +8,33 @@ export const store = new (class extends EventTarget {
   feed = { state: "connecting", sinceMs: performance.now(), retryMs: 0 };
   selectedId = null;
   maps = new Map();
-  /** Why the map of a vehicle is not the newest, by vehicle. */
+  /** Why the map of a vehicle is not the latest, by vehicle. */
   mapFaults = new Map();
   #fetching = new Set();
 
-  /** Calls `fn` on each named event: state, map, feed, select, tick, book, highlight. */
+  /** Calls `fn` on each named event: state, map, feed, select, tick, tab, view, edit, book, highlight, theme. */
   on(names, fn) {
     for (const name of names.split(" ")) this.addEventListener(name, fn);
   }
 
-  tell(name, detail) {
+  emit(name, detail) {
     this.dispatchEvent(new CustomEvent(name, { detail }));
   }
 
-  take(snapshot) {
+  setSnapshot(snapshot) {
     const first = this.snapshot === null;
     if (!first && snapshot.now_s < this.snapshot.now_s - 5) this.maps.clear();
     this.snapshot = snapshot;
     this.receivedMs = performance.now();
     if (!this.vehicle) this.selectedId = snapshot.vehicles[0]?.id ?? null;
-    this.tell("state");
+    this.emit("state");
     if (first) performance.mark("scenecast-ready");
-    for (const v of snapshot.vehicles) this.wantMap(v.id, v.map);
+    for (const v of snapshot.vehicles) this.fetchMap(v.id, v.map);
   }
 
   select(id) {
     this.selectedId = id;
-    this.tell("select");
+    this.emit("select");
   }
 
   get vehicle() {
@@ -45,7 +45,7 @@ export const store = new (class extends EventTarget {
     return this.maps.get(this.selectedId) ?? null;
   }
 
-  /** Mission time now: the server's clock, carried on by ours between two states. */
+  /** Mission time now: the server's clock, advanced by ours between two states. */
   get nowS() {
     if (!this.snapshot) return 0;
     const { now_s, mission } = this.snapshot;
@@ -57,23 +57,23 @@ export const store = new (class extends EventTarget {
     return this.feed.state === "open";
   }
 
-  /** Fetches a map when its version or epoch is not the one here; one fetch a vehicle at a time. */
-  async wantMap(id, seen) {
+  /** Fetches a map unless we have its version and epoch; one request at a time for each vehicle. */
+  async fetchMap(id, latest) {
     const have = this.maps.get(id);
-    if (have && have.version === seen.version && have.epoch === seen.epoch) return;
+    if (have && have.version === latest.version && have.epoch === latest.epoch) return;
     if (this.#fetching.has(id)) return;
-    if (seen.width === 0 || seen.height === 0) {
-      this.maps.set(id, { ...seen, labels: new Uint8Array(0), age: new Uint16Array(0), planes: [], fetchedS: this.nowS });
-      this.tell("map", { id });
+    if (latest.width === 0 || latest.height === 0) {
+      this.maps.set(id, { ...latest, labels: new Uint8Array(0), age: new Uint16Array(0), layers: [], fetchedS: this.nowS });
+      this.emit("map", { id });
       return;
     }
     this.#fetching.add(id);
     try {
       const map = await readMap(id);
-      const said = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
-      this.maps.set(id, { ...map, epoch: said?.epoch ?? 0, fetchedS: map.at_s ?? this.nowS });
+      const summary = this.snapshot?.vehicles.find((v) => v.id === id)?.map;
+      this.maps.set(id, { ...map, epoch: summary?.epoch ?? 0, fetchedS: map.at_s ?? this.nowS });
       this.mapFaults.delete(id);
-      this.tell("map", { id });
+      this.emit("map", { id });
     } catch (error) {
       this.mapFaults.set(id, error.message);
     } finally {
@@ -82,15 +82,21 @@ export const store = new (class extends EventTarget {
   }
 })();
 
-/** Seconds since a time on the mission clock, or null. */
+/** The mission and the vehicle, as a key of what this page remembers. */
+export function missionKey(vehicle) {
+  const { mission } = store.snapshot;
+  return `${mission.id}.${vehicle.id}`;
+}
+
+/** Seconds since a mission time, or null. */
 export const ageOf = (s) => (s === null || s === undefined ? null : Math.max(0, store.nowS - s));
 
-/** Silent: nothing heard for three times the expected interval. A mission that ended is not silent. */
+/** Silent: no frame for three times the expected interval. A mission that has ended is not silent. */
 export function isSilent(vehicle) {
   if (store.snapshot.mission.ended) return false;
-  const age = vehicle.heard_s === null ? store.nowS : ageOf(vehicle.heard_s);
+  const age = vehicle.last_received_s === null ? store.nowS : ageOf(vehicle.last_received_s);
   return age > 3 * vehicle.expected_interval_s;
 }
 
-/** Stale: what is shown of this vehicle may no longer be so. */
+/** Stale: the values shown of this vehicle may have changed since. */
 export const isStale = (vehicle) => !store.connected || isSilent(vehicle);

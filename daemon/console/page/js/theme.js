@@ -1,4 +1,4 @@
-// Day, night, and red for eyes that stay adapted to the dark.
+// Themes: day, night, and red, which keeps eyes adapted to the dark.
 
 import { $ } from "./dom.js";
 import { recall, remember } from "./prefs.js";

@@ -1,9 +1,11 @@
-//! What a vehicle may do: fence, limits, hold and abort.
+//! Fence, limits, hold and abort.
 
-use super::geojson::{self, Frame};
-use super::{Ctl, figures};
+use super::follow::follow;
+use super::geojson::{self, CoordinateFrame};
+use super::session::Session;
+use super::text;
 use crate::orders::ConstraintsOrder;
-use crate::state::{InForce, LifeLine, Slot, State, Vehicle};
+use crate::state::{AppliedOrder, MissionState, OrderProgress, OrderStatus, VehicleState};
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
 use scenecast_surface::{FenceOrder, LimitsOrder};
@@ -11,106 +13,109 @@ use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What was sent last, how far it has come, and what is in force meanwhile.
+/// The last order sent, its progress, and the order in force.
 #[derive(Debug, Serialize)]
-struct Told<'a, T> {
+struct OrderView<'a, T> {
     sent: &'a Option<T>,
-    slot: Option<&'a Slot>,
-    in_force: &'a Option<InForce<T>>,
+    slot: Option<&'a OrderProgress>,
+    in_force: &'a Option<AppliedOrder<T>>,
 }
 
-impl Ctl {
-    /// Prints the fence that was sent last, and the one in force.
-    pub async fn fence(&self) -> Result<(), UserError> {
-        let state = self.state().await?;
-        let v = self.choose(&state)?;
-        let told = Told { sent: &v.fence, slot: slot(v, "fence"), in_force: &v.fence_in_force };
-        self.tell(&told, || told.text(state.now_s, fence_text))
-    }
-
-    /// Sends the fence, keep-outs and return point of a GeoJSON file in place of the last.
-    pub async fn set_fence(&self, file: &Path, metres: bool) -> Result<(), UserError> {
-        let state = self.state().await?;
-        let v = self.choose(&state)?;
-        let frame = if metres { Frame::Metres } else { frame(&state) };
-        self.order(v, "fence", &geojson::read_fence(file, frame)?).await
-    }
-
-    /// Sends that there is no fence, no keep-out and no return point.
-    pub async fn clear_fence(&self) -> Result<(), UserError> {
-        let state = self.state().await?;
-        self.order(self.choose(&state)?, "fence", &FenceOrder::default()).await
-    }
-
-    /// Moves the return point, in metres of the world, or takes it away; fence and keep-outs stay as sent last.
-    pub async fn set_return_point(&self, at: Option<[f64; 2]>) -> Result<(), UserError> {
-        let state = self.state().await?;
-        let v = self.choose(&state)?;
-        let order = FenceOrder { return_point: at, ..v.fence.clone().unwrap_or_default() };
-        order.read().map_err(UserError::Input)?;
-        self.order(v, "fence", &order).await
-    }
-
-    /// Prints the limits that were sent last, and those in force.
-    pub async fn limits(&self) -> Result<(), UserError> {
-        let state = self.state().await?;
-        let v = self.choose(&state)?;
-        let told = Told { sent: &v.limits, slot: slot(v, "limits"), in_force: &v.limits_in_force };
-        self.tell(&told, || told.text(state.now_s, limits_text))
-    }
-
-    /// Sends limits in place of the last; with `keep` those that are not named stay as they were sent last.
-    pub async fn set_limits(&self, named: LimitsOrder, keep: bool) -> Result<(), UserError> {
-        let state = self.state().await?;
-        let v = self.choose(&state)?;
-        let before = v.limits.clone().filter(|_| keep).unwrap_or_default();
-        let order = LimitsOrder {
-            depth_m: named.depth_m.or(before.depth_m),
-            altitude_m: named.altitude_m.or(before.altitude_m),
-            distance_m: named.distance_m.or(before.distance_m),
-            time_s: named.time_s.or(before.time_s),
-            silence_s: named.silence_s.or(before.silence_s),
-            on_silence: named.on_silence.or(before.on_silence),
-            on_breach: named.on_breach.or(before.on_breach),
-            on_abort: named.on_abort.or(before.on_abort),
-        };
-        order.read().map_err(UserError::Input)?;
-        self.order(v, "limits", &order).await
-    }
-
-    /// Tells the vehicle to stay, to abort, or to go on.
-    pub async fn constrain(&self, order: ConstraintsOrder) -> Result<(), UserError> {
-        let state = self.state().await?;
-        self.order(self.choose(&state)?, "constraints", &order).await
-    }
-
-    async fn order(&self, vehicle: &Vehicle, what: &str, order: &impl Serialize) -> Result<(), UserError> {
-        let accepted = self.client.post(&format!("/api/v1/vehicles/{}/{what}", vehicle.id), order).await?;
-        self.follow(accepted).await
-    }
+/// Prints the last fence sent and the one in force.
+pub async fn show_fence(session: &Session) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let v = session.choose(&state)?;
+    let view = OrderView { sent: &v.orders.fence, slot: slot(v, "fence"), in_force: &v.orders.fence_in_force };
+    session.print(&view, || view.text(state.now_s, fence_text))
 }
 
-/// Longitude and latitude where the mission is on the Earth, as in the files that `ctl map` writes.
-fn frame(state: &State) -> Frame {
+/// Sends the fence, the keep-outs and the return point of a GeoJSON file.
+pub async fn set_fence(session: &Session, file: &Path, metres: bool) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let v = session.choose(&state)?;
+    let frame = if metres { CoordinateFrame::Metres } else { frame(&state) };
+    send(session, v, "fence", &geojson::read_fence(file, frame)?).await
+}
+
+/// Removes the fence, the keep-outs and the return point.
+pub async fn clear_fence(session: &Session) -> Result<(), UserError> {
+    let state = session.state().await?;
+    send(session, session.choose(&state)?, "fence", &FenceOrder::default()).await
+}
+
+/// Moves the return point, in metres in the world frame, or removes it. Fence and keep-outs stay as last sent.
+pub async fn set_return_point(session: &Session, at: Option<[f64; 2]>) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let v = session.choose(&state)?;
+    let order = FenceOrder { return_point: at, ..v.orders.fence.clone().unwrap_or_default() };
+    order.read().map_err(UserError::Input)?;
+    send(session, v, "fence", &order).await
+}
+
+/// Prints the last limits sent and those in force.
+pub async fn show_limits(session: &Session) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let v = session.choose(&state)?;
+    let view = OrderView { sent: &v.orders.limits, slot: slot(v, "limits"), in_force: &v.orders.limits_in_force };
+    session.print(&view, || view.text(state.now_s, limits_text))
+}
+
+/// Sends limits. Limits that are not given stay as last sent if `keep`, else they are removed.
+pub async fn set_limits(session: &Session, given: LimitsOrder, keep: bool) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let v = session.choose(&state)?;
+    let last = v.orders.limits.clone().filter(|_| keep).unwrap_or_default();
+    let order = LimitsOrder {
+        depth_m: given.depth_m.or(last.depth_m),
+        altitude_m: given.altitude_m.or(last.altitude_m),
+        distance_m: given.distance_m.or(last.distance_m),
+        time_s: given.time_s.or(last.time_s),
+        silence_s: given.silence_s.or(last.silence_s),
+        on_silence: given.on_silence.or(last.on_silence),
+        on_breach: given.on_breach.or(last.on_breach),
+        on_abort: given.on_abort.or(last.on_abort),
+    };
+    order.read().map_err(UserError::Input)?;
+    send(session, v, "limits", &order).await
+}
+
+/// Orders the vehicle to hold, to abort, or to resume its survey.
+pub async fn send_constraints(session: &Session, order: ConstraintsOrder) -> Result<(), UserError> {
+    let state = session.state().await?;
+    send(session, session.choose(&state)?, "constraints", &order).await
+}
+
+async fn send(
+    session: &Session,
+    vehicle: &VehicleState,
+    resource: &str,
+    order: &impl Serialize,
+) -> Result<(), UserError> {
+    let accepted = session.client.post(&format!("/api/v2/vehicles/{}/{resource}", vehicle.id), order).await?;
+    follow(session, accepted).await
+}
+
+/// Longitude and latitude if the mission has an origin, as in the files of `ctl map`.
+fn frame(state: &MissionState) -> CoordinateFrame {
     let origin = state.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
-    origin.map_or(Frame::Metres, |origin| Frame::Wgs84(TangentPlane::new(origin)))
+    origin.map_or(CoordinateFrame::Metres, |origin| CoordinateFrame::Wgs84(TangentPlane::new(origin)))
 }
 
-fn slot<'a>(vehicle: &'a Vehicle, name: &str) -> Option<&'a Slot> {
-    vehicle.directive.slots.iter().find(|s| s.slot == name)
+fn slot<'a>(vehicle: &'a VehicleState, name: &str) -> Option<&'a OrderProgress> {
+    vehicle.orders.directive.slots.iter().find(|s| s.slot == name)
 }
 
-impl<T: PartialEq> Told<'_, T> {
-    fn text(&self, now_s: f64, text: fn(&T) -> String) -> String {
+impl<T: PartialEq> OrderView<'_, T> {
+    fn text(&self, now_s: f64, describe: fn(&T) -> String) -> String {
         let Some((sent, slot)) = self.sent.as_ref().zip(self.slot) else {
-            return "nothing was sent since the surface started; the vehicle keeps what it has\n".to_owned();
+            return "none sent since the surface started; the vehicle keeps those that it has\n".to_owned();
         };
-        let age = figures::span(now_s - slot.changed_s);
-        let mut out = format!("{}, {age} ago\n{}", figures::slot(slot), text(sent));
-        if slot.state != LifeLine::Applied {
+        let age = text::span(now_s - slot.changed_s);
+        let mut out = format!("{}, {age} ago\n{}", text::order(slot), describe(sent));
+        if slot.state != OrderStatus::Applied {
             match self.in_force {
-                Some(f) => out += &format!("in force: version {}\n{}", f.version, text(&f.order)),
-                None => out += "in force: not known here\n",
+                Some(f) => out += &format!("in force: version {}\n{}", f.version, describe(&f.order)),
+                None => out += "in force: unknown to this surface\n",
             }
         }
         out
@@ -141,8 +146,8 @@ fn limits_text(order: &LimitsOrder) -> String {
     line("depth", band(order.depth_m));
     line("altitude", band(order.altitude_m));
     line("distance", order.distance_m.map(|m| format!("{m:.0} m")));
-    line("time", order.time_s.map(figures::span));
-    line("silence", order.silence_s.map(figures::span));
+    line("time", order.time_s.map(text::span));
+    line("silence", order.silence_s.map(text::span));
     for (name, reaction) in
         [("on silence", &order.on_silence), ("on breach", &order.on_breach), ("on abort", &order.on_abort)]
     {

@@ -1,4 +1,4 @@
-//! A fence from a GeoJSON file (RFC 7946), as a GIS writes it.
+//! Reads a fence from a GeoJSON file (RFC 7946).
 
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
@@ -6,19 +6,18 @@ use scenecast_surface::FenceOrder;
 use serde_json::Value;
 use std::path::Path;
 
-/// Longest file that is read.
-const MOST_BYTES: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 
-/// What the coordinates of a file are.
+/// The coordinates of a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Frame {
+pub(super) enum CoordinateFrame {
     /// Metres east and north of the mission's origin.
     Metres,
-    /// Longitude and latitude, WGS 84, about that origin.
+    /// Longitude and latitude, WGS 84, converted around that origin.
     Wgs84(TangentPlane),
 }
 
-/// What an outline or point of a file is meant to be: the property `role` of its feature.
+/// The property `role` of a feature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Role {
     Fence,
@@ -27,42 +26,42 @@ enum Role {
 }
 
 /// Reads fence, keep-outs and return point.
-pub(super) fn read_fence(file: &Path, frame: Frame) -> Result<FenceOrder, UserError> {
-    let problem = |what: String| UserError::file(file, what);
-    let size = std::fs::metadata(file).map_err(|e| problem(e.to_string()))?.len();
-    if size > MOST_BYTES {
-        return Err(problem(format!("it has {size} bytes: at most {MOST_BYTES} are read")));
+pub(super) fn read_fence(file: &Path, frame: CoordinateFrame) -> Result<FenceOrder, UserError> {
+    let error = |line: String| UserError::file(file, line);
+    let size = std::fs::metadata(file).map_err(|e| error(e.to_string()))?.len();
+    if size > MAX_BYTES {
+        return Err(error(format!("it has {size} bytes: at most {MAX_BYTES} are read")));
     }
-    let text = std::fs::read(file).map_err(|e| problem(e.to_string()))?;
-    let whole: Value = serde_json::from_slice(&text).map_err(|e| problem(format!("it is no JSON: {e}")))?;
-    let order = fence_of(&whole, frame).map_err(problem)?;
-    order.read().map_err(problem)?;
+    let text = std::fs::read(file).map_err(|e| error(e.to_string()))?;
+    let whole: Value = serde_json::from_slice(&text).map_err(|e| error(format!("it is not JSON: {e}")))?;
+    let order = fence_of(&whole, frame).map_err(error)?;
+    order.read().map_err(error)?;
     Ok(order)
 }
 
-fn fence_of(whole: &Value, frame: Frame) -> Result<FenceOrder, String> {
+fn fence_of(whole: &Value, frame: CoordinateFrame) -> Result<FenceOrder, String> {
     let mut order = FenceOrder::default();
     match whole["type"].as_str() {
         Some("FeatureCollection") => {
             let features = whole["features"].as_array().ok_or("the collection has no list of features")?;
             for (i, feature) in features.iter().enumerate() {
-                take(&mut order, feature, frame).map_err(|why| format!("features[{i}]: {why}"))?;
+                add(&mut order, feature, frame).map_err(|line| format!("features[{i}]: {line}"))?;
             }
         }
-        Some("Feature") => take(&mut order, whole, frame)?,
+        Some("Feature") => add(&mut order, whole, frame)?,
         Some("Polygon" | "MultiPolygon" | "Point") => {
-            take(&mut order, &serde_json::json!({ "geometry": whole }), frame)?;
+            add(&mut order, &serde_json::json!({ "geometry": whole }), frame)?;
         }
-        other => return Err(format!("type {}: it takes a FeatureCollection", other.unwrap_or("is missing"))),
+        other => return Err(format!("type {}: expected a FeatureCollection", other.unwrap_or("is missing"))),
     }
     if order == FenceOrder::default() {
-        return Err("there is neither polygon nor point in it".to_owned());
+        return Err("it contains neither polygon nor point".to_owned());
     }
     Ok(order)
 }
 
-/// Takes a feature into the order.
-fn take(order: &mut FenceOrder, feature: &Value, frame: Frame) -> Result<(), String> {
+/// Adds a feature to the order.
+fn add(order: &mut FenceOrder, feature: &Value, frame: CoordinateFrame) -> Result<(), String> {
     let (geometry, role) = (&feature["geometry"], role(feature)?);
     let coordinates = &geometry["coordinates"];
     let rings: Vec<&Value> = match geometry["type"].as_str() {
@@ -77,7 +76,7 @@ fn take(order: &mut FenceOrder, feature: &Value, frame: Frame) -> Result<(), Str
         Some("MultiPolygon") => coordinates.as_array().ok_or("coordinates are missing")?.iter().collect(),
         other => {
             let other = other.unwrap_or("null");
-            return Err(format!("geometry {other}: it takes a Polygon, or a Point for the return point"));
+            return Err(format!("geometry {other}: expected a Polygon, or a Point for the return point"));
         }
     };
     for polygon in rings {
@@ -87,7 +86,7 @@ fn take(order: &mut FenceOrder, feature: &Value, frame: Frame) -> Result<(), Str
             Some(Role::ReturnPoint) => return Err("the return point is a Point".to_owned()),
             Some(Role::Fence) | None if order.fence.is_none() => order.fence = Some(outline),
             Some(Role::Fence) | None => {
-                return Err("a second fence: give what to stay outside of the property role = keep_out".to_owned());
+                return Err("a second fence: an area to stay out of has the property role = keep_out".to_owned());
             }
         }
     }
@@ -100,17 +99,17 @@ fn role(feature: &Value) -> Result<Option<Role>, String> {
         Value::String(s) if s == "fence" => Ok(Some(Role::Fence)),
         Value::String(s) if s == "keep_out" => Ok(Some(Role::KeepOut)),
         Value::String(s) if s == "return_point" => Ok(Some(Role::ReturnPoint)),
-        other => Err(format!("role {other}: it takes fence, keep_out or return_point")),
+        other => Err(format!("role {other}: expected fence, keep_out or return_point")),
     }
 }
 
-/// The corners of a polygon without the last, which is the first again.
-fn outline(polygon: &Value, frame: Frame) -> Result<Vec<[f64; 2]>, String> {
+/// The corners of a polygon, without the last corner, which repeats the first.
+fn outline(polygon: &Value, frame: CoordinateFrame) -> Result<Vec<[f64; 2]>, String> {
     let rings = polygon.as_array().ok_or("coordinates are missing")?;
     let [ring] = &rings[..] else {
         return Err(format!("{} holes: draw each as a polygon with role = keep_out", rings.len().saturating_sub(1)));
     };
-    let corners = ring.as_array().ok_or("the outline is no list of corners")?;
+    let corners = ring.as_array().ok_or("the outline is not a list of corners")?;
     let mut corners: Vec<&Value> = corners.iter().collect();
     if corners.len() > 1 && corners.first() == corners.last() {
         corners.pop();
@@ -118,13 +117,13 @@ fn outline(polygon: &Value, frame: Frame) -> Result<Vec<[f64; 2]>, String> {
     corners.into_iter().map(|corner| place(corner, frame)).collect()
 }
 
-fn place(at: &Value, frame: Frame) -> Result<[f64; 2], String> {
-    let (x, y) = at[0].as_f64().zip(at[1].as_f64()).ok_or(format!("{at} is no place"))?;
+fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], String> {
+    let (x, y) = at[0].as_f64().zip(at[1].as_f64()).ok_or(format!("{at} is not a place"))?;
     match frame {
-        Frame::Metres => Ok([x, y]),
-        Frame::Wgs84(plane) => {
+        CoordinateFrame::Metres => Ok([x, y]),
+        CoordinateFrame::Wgs84(plane) => {
             let place = LatLon::new(y, x).ok_or(format!(
-                "[{x}, {y}] is no longitude and latitude; --metres takes metres east and north of the origin"
+                "[{x}, {y}] is not a longitude and latitude; --metres reads metres east and north of the origin"
             ))?;
             let (x, y) = plane.to_plane(place);
             Ok([x, y])
@@ -136,7 +135,7 @@ fn place(at: &Value, frame: Frame) -> Result<[f64; 2], String> {
 mod tests {
     use super::*;
 
-    fn read(json: &str, frame: Frame) -> Result<FenceOrder, String> {
+    fn read(json: &str, frame: CoordinateFrame) -> Result<FenceOrder, String> {
         fence_of(&serde_json::from_str(json).unwrap(), frame)
     }
 
@@ -151,11 +150,11 @@ mod tests {
                 {{"type": "Feature", "properties": {{"id": 3}}, "geometry": {SQUARE}}},
                 {{"type": "Feature", "properties": null, "geometry": {{"type": "Point", "coordinates": [5, 6, -3]}}}}]}}"#
         );
-        let order = read(&json, Frame::Metres).unwrap();
+        let order = read(&json, CoordinateFrame::Metres).unwrap();
         assert_eq!(order.fence, Some(vec![[0.0, 0.0], [90.0, 0.0], [90.0, 60.0], [0.0, 60.0]]));
         assert_eq!(order.keep_outs, [vec![[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]]);
         assert_eq!(order.return_point, Some([5.0, 6.0]));
-        assert_eq!(read(SQUARE, Frame::Metres).unwrap().fence, order.fence);
+        assert_eq!(read(SQUARE, CoordinateFrame::Metres).unwrap().fence, order.fence);
     }
 
     #[test]
@@ -165,16 +164,18 @@ mod tests {
         let [a, b, c] = [corner(0.0, 0.0), corner(1000.0, 0.0), corner(1000.0, 500.0)];
         let at = |p: LatLon| format!("[{}, {}]", p.lon_deg, p.lat_deg);
         let json = format!(r#"{{"type": "Polygon", "coordinates": [[{}, {}, {}, {}]]}}"#, at(a), at(b), at(c), at(a));
-        let fence = read(&json, Frame::Wgs84(plane)).unwrap().fence.unwrap();
+        let fence = read(&json, CoordinateFrame::Wgs84(plane)).unwrap().fence.unwrap();
         for (is, ought) in fence.iter().zip([[0.0, 0.0], [1000.0, 0.0], [1000.0, 500.0]]) {
             assert!((is[0] - ought[0]).hypot(is[1] - ought[1]) < 0.001, "{is:?} instead of {ought:?}");
         }
-        assert!(read(SQUARE.replace("60", "600").as_str(), Frame::Wgs84(plane)).unwrap_err().contains("--metres"));
+        assert!(
+            read(SQUARE.replace("60", "600").as_str(), CoordinateFrame::Wgs84(plane)).unwrap_err().contains("--metres")
+        );
     }
 
     #[test]
-    fn what_is_no_fence_is_refused_with_its_place_and_what_it_takes() {
-        let refused = |json: &str| read(json, Frame::Metres).unwrap_err();
+    fn a_faulty_file_is_refused_with_the_place_of_the_fault() {
+        let refused = |json: &str| read(json, CoordinateFrame::Metres).unwrap_err();
         let in_list = |feature: &str| refused(&format!(r#"{{"type": "FeatureCollection", "features": [{feature}]}}"#));
         assert!(refused("[]").contains("FeatureCollection"));
         assert!(refused(r#"{"type": "FeatureCollection", "features": []}"#).contains("neither polygon nor point"));
@@ -183,12 +184,14 @@ mod tests {
         let line = r#"{"geometry": {"type": "LineString", "coordinates": [[0,0],[9,0]]}}"#;
         assert_eq!(
             in_list(line),
-            "features[0]: geometry LineString: it takes a Polygon, or a Point for the return point"
+            "features[0]: geometry LineString: expected a Polygon, or a Point for the return point"
         );
         let role = format!(r#"{{"properties": {{"role": "wall"}}, "geometry": {SQUARE}}}"#);
         assert!(in_list(&role).contains("keep_out or return_point"));
         let plain = format!(r#"{{"geometry": {SQUARE}}}"#);
         assert!(in_list(&format!("{plain}, {plain}")).contains("features[1]: a second fence"));
-        assert!(in_list(r#"{"geometry": {"type": "Polygon", "coordinates": [[["a", 0]]]}}"#).contains("is no place"));
+        assert!(
+            in_list(r#"{"geometry": {"type": "Polygon", "coordinates": [[["a", 0]]]}}"#).contains("is not a place")
+        );
     }
 }

@@ -1,78 +1,78 @@
-//! Settings of a vehicle: shown, sent, or picked to fit a budget.
+//! Settings of a vehicle: shown, sent, or fitted to a budget.
 
-use super::{Ctl, figures};
-use crate::fit::{Fit, Fitted};
-use crate::state::Vehicle;
+use super::follow::follow;
+use super::session::Session;
+use super::text;
+use crate::fit::{Fit, FittedSettings};
+use crate::state::VehicleState;
 use scenecast_core::UserError;
 use scenecast_surface::SettingsOrder;
 
-/// What is to be sent.
+/// A change of settings.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SettingsChange {
-    /// What is named.
+    /// The given settings.
     pub order: SettingsOrder,
-    /// Whether the rest is to fit a budget: bits a second, or none for the map's share.
+    /// Whether to fit the other settings to a budget: bit/s, or `None` for the share of the map.
     pub fit: Option<Option<f64>>,
-    /// Whether to say what would be sent, and to send nothing.
+    /// Whether to print the order instead of sending it.
     pub dry_run: bool,
 }
 
-impl Ctl {
-    /// Sends settings, or prints those asked for and in force if there is nothing to send.
-    pub async fn settings(&self, change: SettingsChange) -> Result<(), UserError> {
-        let state = self.state().await?;
-        let vehicle = self.choose(&state)?;
-        if change == SettingsChange::default() {
-            return self.tell(&vehicle.settings, || table(vehicle));
-        }
-        // The refusal of what no vehicle could obey needs no surface.
-        change.order.read().map_err(UserError::Input)?;
-        let order = match change.fit {
-            None => change.order,
-            Some(bits_per_s) => {
-                let (fit, chosen) = self.fit(vehicle.id, bits_per_s).await?;
-                eprintln!("fits {:.0} bit/s with {:.0} bit/s: {}", fit.bits_per_s, chosen.stream_bps, fit.given_up);
-                merged(change.order, chosen.settings)
-            }
-        };
-        if change.dry_run {
-            return self.tell(&order, || lines(&order, |name, value| format!("{name:<20} {value}\n")));
-        }
-        let accepted = self.client.post(&format!("/api/v1/vehicles/{}/settings", vehicle.id), &order).await?;
-        self.follow(accepted).await
+/// Sends settings, or prints those requested and in force if there is no change.
+pub async fn change_settings(session: &Session, change: SettingsChange) -> Result<(), UserError> {
+    let state = session.state().await?;
+    let vehicle = session.choose(&state)?;
+    if change == SettingsChange::default() {
+        return session.print(&vehicle.orders.settings, || table(vehicle));
     }
-
-    async fn fit(&self, vehicle: u8, bits_per_s: Option<f64>) -> Result<(Fit, Fitted), UserError> {
-        let query = bits_per_s.map_or(String::new(), |b| format!("?bits_per_s={b}"));
-        let (bytes, _) = self.client.get(&format!("/api/v1/vehicles/{vehicle}/fit{query}")).await?;
-        let fit: Fit = serde_json::from_slice(&bytes).map_err(|e| self.client.unlike(&e))?;
-        let chosen = fit.chosen.clone().ok_or_else(|| UserError::Failed(fit.given_up.clone()))?;
-        Ok((fit, chosen))
+    // An order that no vehicle can obey is refused before a fit is requested.
+    change.order.read().map_err(UserError::Input)?;
+    let order = match change.fit {
+        None => change.order,
+        Some(bits_per_s) => {
+            let (fit, chosen) = fit(session, vehicle.id, bits_per_s).await?;
+            eprintln!("fits {:.0} bit/s with {:.0} bit/s: {}", fit.bits_per_s, chosen.stream_bps, fit.trade_off);
+            merged(change.order, chosen.settings)
+        }
+    };
+    if change.dry_run {
+        return session.print(&order, || lines(&order, |name, value| format!("{name:<20} {value}\n")));
     }
+    let accepted = session.client.post(&format!("/api/v2/vehicles/{}/settings", vehicle.id), &order).await?;
+    follow(session, accepted).await
 }
 
-/// What is named goes before what fits.
-fn merged(named: SettingsOrder, fitting: SettingsOrder) -> SettingsOrder {
+async fn fit(session: &Session, vehicle: u8, bits_per_s: Option<f64>) -> Result<(Fit, FittedSettings), UserError> {
+    let query = bits_per_s.map_or(String::new(), |b| format!("?bits_per_s={b}"));
+    let (bytes, _) = session.client.get(&format!("/api/v2/vehicles/{vehicle}/fit{query}")).await?;
+    let fit: Fit = serde_json::from_slice(&bytes).map_err(|e| session.client.unreadable(&e))?;
+    let chosen = fit.chosen.clone().ok_or_else(|| UserError::Failed(fit.trade_off.clone()))?;
+    Ok((fit, chosen))
+}
+
+/// The given settings, and fitted ones for the others.
+fn merged(given: SettingsOrder, fitted: SettingsOrder) -> SettingsOrder {
     SettingsOrder {
-        planner: named.planner.or(fitting.planner),
-        cells: named.cells.or(fitting.cells),
-        planes: named.planes.or(fitting.planes),
-        alpha: named.alpha.or(fitting.alpha),
-        beta: named.beta.or(fitting.beta),
-        gamma: named.gamma.or(fitting.gamma),
-        refine_words_per_s: named.refine_words_per_s.or(fitting.refine_words_per_s),
-        frames_per_s: named.frames_per_s.or(fitting.frames_per_s),
+        planner: given.planner.or(fitted.planner),
+        cells: given.cells.or(fitted.cells),
+        layers: given.layers.or(fitted.layers),
+        alpha: given.alpha.or(fitted.alpha),
+        beta: given.beta.or(fitted.beta),
+        gamma: given.gamma.or(fitted.gamma),
+        refine_words_per_s: given.refine_words_per_s.or(fitted.refine_words_per_s),
+        frames_per_s: given.frames_per_s.or(fitted.frames_per_s),
     }
 }
 
-/// Name and value of each setting that an order names.
-fn named(order: &SettingsOrder) -> [(&'static str, Option<String>); 8] {
+/// The name of each setting, and its value if the order has one.
+fn values(order: &SettingsOrder) -> [(&'static str, Option<String>); 8] {
     let text = |value: &Option<String>| value.as_ref().map(|v| if v.is_empty() { configured() } else { v.clone() });
     let number = |value: Option<f64>| value.map(|v| if v == 0.0 { configured() } else { v.to_string() });
     [
         ("planner", text(&order.planner)),
         ("cells", text(&order.cells)),
-        ("planes", text(&order.planes)),
+        ("layers", text(&order.layers)),
         ("alpha", number(order.alpha)),
         ("beta", number(order.beta)),
         ("gamma", number(order.gamma)),
@@ -86,23 +86,23 @@ fn configured() -> String {
 }
 
 fn lines(order: &SettingsOrder, line: impl Fn(&str, &str) -> String) -> String {
-    named(order).iter().filter_map(|(name, value)| Some(line(name, value.as_ref()?))).collect()
+    values(order).iter().filter_map(|(name, value)| Some(line(name, value.as_ref()?))).collect()
 }
 
-fn table(vehicle: &Vehicle) -> String {
-    let settings = &vehicle.settings;
-    let unnamed = || "as it was".to_owned();
-    let in_force = settings.in_force.as_ref().map(named);
-    let mut out = format!("{:<20} {:<26} in force\n", "setting", "asked for");
-    for (index, (name, asked)) in named(&settings.asked).into_iter().enumerate() {
+fn table(vehicle: &VehicleState) -> String {
+    let settings = &vehicle.orders.settings;
+    let unset = || "not set".to_owned();
+    let in_force = settings.in_force.as_ref().map(values);
+    let mut out = format!("{:<20} {:<26} in force\n", "setting", "requested");
+    for (index, (name, requested)) in values(&settings.requested).into_iter().enumerate() {
         let in_force = match &in_force {
-            Some(values) => values[index].1.clone().unwrap_or_else(unnamed),
-            None => "not known".to_owned(),
+            Some(all) => all[index].1.clone().unwrap_or_else(unset),
+            None => "unknown".to_owned(),
         };
-        out += &format!("{name:<20} {:<26} {in_force}\n", asked.unwrap_or_else(unnamed));
+        out += &format!("{name:<20} {:<26} {in_force}\n", requested.unwrap_or_else(unset));
     }
-    let slot = vehicle.directive.slots.iter().find(|s| s.slot == "settings");
-    out + &slot.map_or("nothing sent by this surface yet\n".to_owned(), |s| format!("{}\n", figures::slot(s)))
+    let slot = vehicle.orders.directive.slots.iter().find(|s| s.slot == "settings");
+    out + &slot.map_or("no settings sent by this surface yet\n".to_owned(), |s| format!("{}\n", text::order(s)))
 }
 
 #[cfg(test)]
@@ -110,13 +110,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_named_goes_before_what_fits() {
-        let fitting =
+    fn given_settings_precede_fitted_ones() {
+        let fitted =
             SettingsOrder { alpha: Some(0.1), gamma: Some(1e-4), cells: Some("coarse".into()), ..Default::default() };
-        let named = SettingsOrder { alpha: Some(0.0), planes: Some(String::new()), ..Default::default() };
-        let order = merged(named, fitting);
+        let given = SettingsOrder { alpha: Some(0.0), layers: Some(String::new()), ..Default::default() };
+        let order = merged(given, fitted);
         assert_eq!((order.alpha, order.gamma, order.cells.as_deref()), (Some(0.0), Some(1e-4), Some("coarse")));
-        let said = lines(&order, |name, value| format!("{name} {value}; "));
-        assert_eq!(said, "cells coarse; planes as configured; alpha as configured; gamma 0.0001; ");
+        let text = lines(&order, |name, value| format!("{name} {value}; "));
+        assert_eq!(text, "cells coarse; layers as configured; alpha as configured; gamma 0.0001; ");
     }
 }

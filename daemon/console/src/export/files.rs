@@ -1,8 +1,8 @@
-//! The formats: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
+//! File formats: indexed PNG with world file and projection, GeoJSON, PLY, CSV.
 
-use super::place::{lon_lat, well_known_text};
+use super::cells::{ExploredCell, MapCells};
+use super::projection::{lon_lat, well_known_text};
 use super::regions::{Polygon, regions};
-use super::{Cells, Explored};
 use crate::state::Origin;
 use scenecast_core::label_picture;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
@@ -10,27 +10,27 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// An indexed PNG, north up, pixel value = label.
-pub(crate) fn indexed_png(cells: &Cells) -> Option<Vec<u8>> {
+pub(crate) fn indexed_png(cells: &MapCells) -> Option<Vec<u8>> {
     let grid: LabelGrid = cells.bounds.cells().zip(cells.labels.iter().copied()).collect();
     label_picture::encode(&grid).ok()
 }
 
-/// The six lines of a world file: size of a pixel, and the middle of the north-west one.
-pub(crate) fn world_file(cells: &Cells) -> String {
+/// The six lines of a world file: the size of a pixel and the centre of the north-west pixel.
+pub(crate) fn world_file(cells: &MapCells) -> String {
     let (west, _) = cells.corner_m(0, 0);
     let (_, north) = cells.corner_m(0, cells.bounds.height.max(1));
     let (cell, half) = (cells.cell_m, cells.cell_m / 2.0);
     [cell, 0.0, 0.0, -cell, west + half, north - half].map(|v| format!("{v}\n")).concat()
 }
 
-/// The `.aux.xml` file beside a PNG, where GDAL and QGIS look for the projection.
+/// The `.aux.xml` file in which GDAL and QGIS look for the projection of a PNG.
 pub(crate) fn projection(origin: Option<Origin>) -> String {
     let text = well_known_text(origin).replace('"', "&quot;");
     format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n</PAMDataset>\n")
 }
 
 /// Regions of equal label: WGS 84 if the mission has an origin, else metres east and north of it.
-pub(crate) fn geojson(cells: &Cells, origin: Option<Origin>) -> String {
+pub(crate) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let corner = |&(column, row): &(u32, u32)| {
         let (x, y) = cells.corner_m(column, row);
         let Some(origin) = origin else { return json!([x, y]) };
@@ -48,12 +48,12 @@ pub(crate) fn geojson(cells: &Cells, origin: Option<Origin>) -> String {
         })
     };
     let all = regions(&cells.labels, cells.bounds.width, cells.bounds.height);
-    let mut about = json!({ "map_version": cells.version, "mission_time_s": cells.at_s });
+    let mut facts = json!({ "map_version": cells.version, "mission_time_s": cells.at_s });
     if origin.is_none() {
-        about["coordinates"] = json!("metres east and north of the mission's origin");
+        facts["coordinates"] = json!("metres east and north of the mission's origin");
     }
     let features: Vec<Value> = all.into_iter().map(feature).collect();
-    json!({ "type": "FeatureCollection", "scenecast": about, "features": features }).to_string()
+    json!({ "type": "FeatureCollection", "scenecast": facts, "features": features }).to_string()
 }
 
 /// Degrees to a tenth of a millimetre.
@@ -61,32 +61,32 @@ fn tidy(degrees: f64) -> f64 {
     (degrees * 1e9).round() / 1e9
 }
 
-/// ASCII PLY: the middle of each explored cell in metres east, north and up (0: no depth is known), colour, label.
-pub(crate) fn ply(cells: &Cells) -> String {
+/// ASCII PLY: the centre of each explored cell in metres east, north and up (0 where the depth is unknown), colour, label.
+pub(crate) fn ply(cells: &MapCells) -> String {
     let count = cells.explored().count();
     let mut out = format!(
         "ply\nformat ascii 1.0\ncomment scenecast map, metres east, north, up\nelement vertex {count}\n\
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );
-    let depth = cells.planes.iter().find(|p| p.name == PlaneKind::Depth.name());
-    for Explored { at, x, y, label, .. } in cells.explored() {
+    let depth = cells.layers.iter().find(|l| l.name == PlaneKind::Depth.name());
+    for ExploredCell { at, x, y, label, .. } in cells.explored() {
         let [red, green, blue] = scenecast_core::palette::colour(label);
-        let up = depth.and_then(|plane| plane.value(at)).map_or(0.0, |depth| -depth);
+        let up = depth.and_then(|layer| layer.value(at)).map_or(0.0, |depth| -depth);
         let _ = writeln!(out, "{x:.3} {y:.3} {up:.3} {red} {green} {blue} {label}");
     }
     out
 }
 
-/// A line for each explored cell: the middle in metres, label, age in seconds, what is known of each plane.
-pub(crate) fn csv(cells: &Cells) -> String {
+/// One line for each explored cell: the centre in metres, the label, its age in seconds, the value of each layer if known.
+pub(crate) fn csv(cells: &MapCells) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
-    cells.planes.iter().for_each(|plane| out.extend([",", plane.name]));
-    for Explored { at, x, y, label, age_s } in cells.explored() {
+    cells.layers.iter().for_each(|layer| out.extend([",", layer.name]));
+    for ExploredCell { at, x, y, label, age_s } in cells.explored() {
         let age = if age_s == u16::MAX { String::new() } else { age_s.to_string() };
         let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");
-        for plane in &cells.planes {
-            let value = plane.value(at).map_or(String::new(), |value| format!("{value:.3}"));
+        for layer in &cells.layers {
+            let value = layer.value(at).map_or(String::new(), |value| format!("{value:.3}"));
             let _ = write!(out, ",{value}");
         }
     }

@@ -94,8 +94,8 @@ impl Outlines {
         Self { left, taken: vec![[false; 4]; count], corners }
     }
 
-    /// The ring from an edge that nobody has followed yet. Where two edges of the patch leave a corner the right turn is
-    /// taken, so that a ring stays with what lies on its right and never touches itself.
+    /// Follows the ring from an edge that no other ring contains. Where two edges of the patch leave a corner, it takes the right
+    /// turn, so that a ring never touches itself.
     fn follow(&mut self, corner: usize, step: usize) -> Option<(u32, Ring)> {
         let patch = self.left[corner][step];
         if patch == NONE || self.taken[corner][step] {
@@ -132,7 +132,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn a_hole_that_touches_the_edge_at_a_corner_stays_a_hole() {
+    fn a_hole_that_touches_the_edge_stays_a_hole() {
         #[rustfmt::skip]
         let labels = [1, 1, 1,
                       1, 0, 1,
@@ -145,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn outlines_have_the_area_of_their_cells_and_never_touch_themselves(
+        fn outlines_have_the_area_of_their_cells_and_are_simple(
             labels in proptest::collection::vec(0u8..4, 12 * 9)
         ) {
             for (label, polygons) in regions(&labels, 12, 9) {

@@ -1,108 +1,107 @@
-//! What is told of the link.
+//! The acoustic link.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The link as a whole.
+/// The link to all vehicles together.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Link {
-    /// Bits on air a second that the surface may send.
+pub struct LinkSummary {
+    /// The bit budget of the surface on air, bit/s.
     pub budget_bps: u32,
-    /// Window of the budget, a duration.
+    /// The window of the budget, a duration.
     pub budget_window_s: f64,
-    /// Least shares of the classes in percent.
+    /// The minimum share of each class, percent.
     pub shares: BTreeMap<String, u8>,
-    /// What bits that nobody else needs are spent on, in this order: finer, depth, exemplars, confidence,
-    /// curiosity.
+    /// The background streams that use spare capacity, in this order: finer, depth, exemplars, confidence, curiosity.
     #[serde(default)]
-    pub spend: Vec<String>,
-    /// Frames of no known vehicle, or unreadable.
-    pub strangers: u64,
-    /// From the vehicles, as the surface heard it.
-    pub up: Direction,
-    /// To the vehicles, as the surface sent it.
-    pub down: Direction,
-    /// Two-way travel time to the first vehicle that has one, a duration.
+    pub background: Vec<String>,
+    /// Frames that could not be read or came from an unknown vehicle.
+    pub unknown_senders: u64,
+    /// From the vehicles, as received by the surface.
+    pub up: LinkDirection,
+    /// To the vehicles, as sent by the surface.
+    pub down: LinkDirection,
+    /// Two-way travel time to the first vehicle with a measurement, a duration.
     pub round_trip_s: Option<f64>,
-    /// Bits that wait at the vehicles; null where nobody knows.
+    /// Bits that wait at the vehicles; null while it is unknown.
     pub backlog_bits: Option<u64>,
-    /// Rates on air, every 5 s, the last 20 minutes.
-    pub history: Vec<Rates>,
+    /// Rates on air, one every 5 s for the last 20 minutes.
+    pub history: Vec<LinkRates>,
 }
 
-/// One direction of the link, since the surface began.
+/// One direction of the link since the start of the surface.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Direction {
-    /// Bits on air a second, over a minute.
+pub struct LinkDirection {
+    /// The mean rate on air of the last minute, bit/s.
     pub bps_1min: f64,
-    /// Most bits on air a second over any window of the budget.
-    pub worst_window_bps: f64,
-    /// Share of frames that was lost, 0 to 1.
+    /// The highest rate on air in any window of the budget, bit/s.
+    pub max_window_bps: f64,
+    /// The share of frames that were lost, 0 to 1.
     pub loss: f64,
-    /// Frames.
+    /// The number of frames.
     pub frames: u64,
-    /// Frames that were lost.
+    /// The number of lost frames.
     pub lost: u64,
-    /// Useful bits a second.
+    /// The mean rate of useful payload, bit/s.
     pub goodput_bps: f64,
     /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, curiosity, overhead.
     pub bytes_by_class: BTreeMap<String, u64>,
 }
 
-/// Rates on air.
+/// The rates on air at one time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Rates {
-    /// When.
+pub struct LinkRates {
+    /// Mission time.
     pub t_s: u64,
-    /// From the vehicles, bits a second.
+    /// From the vehicles, bit/s.
     pub up_bps: f64,
-    /// To the vehicles, bits a second.
+    /// To the vehicles, bit/s.
     pub down_bps: f64,
 }
 
-/// What was measured of the water to one vehicle lately.
+/// Recent measurements of the channel to one vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct VehicleLink {
+pub struct VehicleChannel {
     /// From the vehicle.
-    pub up: Water,
+    pub up: ChannelQuality,
     /// To the vehicle.
-    pub down: Water,
+    pub down: ChannelQuality,
     /// Two-way travel time, a duration.
     pub round_trip_s: Option<f64>,
     /// One-way travel time, a duration.
     pub one_way_s: Option<f64>,
-    /// The vehicle's clock minus the surface's.
-    pub clock_ahead_s: Option<f64>,
-    /// Frames from it that the surface dropped, by reason: truncated, version, not_for_us, checksum, malformed,
-    /// old_session, duplicate, late, no_base, stranger, unauthenticated (no proof of the key), keyed (under a key, and
-    /// here is none).
+    /// The clock of the vehicle minus that of the surface, a duration.
+    pub clock_offset_s: Option<f64>,
+    /// Its frames that the surface dropped, by reason: truncated, version, not_for_us, checksum, malformed, old_session,
+    /// duplicate, late, base_missing, unknown_sender, unauthenticated (without a proof of the key), key_missing (under a key
+    /// that the surface does not have).
     pub dropped: BTreeMap<String, u64>,
-    /// What the vehicle has still to send; null before it has said so.
-    pub backlog: Option<Backlog>,
+    /// The backlog of the vehicle; null before its first report.
+    pub backlog: Option<ReportedBacklog>,
 }
 
-/// One direction of the water.
+/// The quality of the channel in one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Water {
-    /// Share of the last 64 frames that was lost, 0 to 1.
+pub struct ChannelQuality {
+    /// The share of the last 64 frames that were lost, 0 to 1.
     pub loss: f64,
-    /// Useful bits a second, over a minute.
+    /// The mean rate of useful payload in the last minute, bit/s.
     pub goodput_bps: f64,
 }
 
-/// What a vehicle has still to send: what it said last, less what has come in since.
+/// The backlog by the last report of the vehicle, less the bits received since.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Backlog {
-    /// When it said so.
+pub struct ReportedBacklog {
+    /// When the report was received.
     pub at_s: f64,
-    /// Bits that wait, about.
+    /// Approximate bits that the vehicle still has to send.
     pub bits: u64,
-    /// When all of it will be here at the goodput of the last minute; null while nothing comes in.
+    /// When all of them will have arrived at the goodput of the last minute; null while the goodput is 0.
     pub empty_s: Option<f64>,
-    /// Of these bits, labels of the map: by so much the map here lags behind the vehicle's.
+    /// The part of these bits that are labels of the map.
     pub map_bits: u64,
-    /// About how old the map here is against the vehicle's, a duration: the age of what the vehicle said, and what `map_bits`
-    /// take at the goodput; null while nothing comes in.
+    /// The approximate lag of this map behind the vehicle's, a duration: the age of the report plus the time for `map_bits` at the
+    /// goodput of the last minute; null while the goodput is 0.
     pub map_lag_s: Option<f64>,
 }

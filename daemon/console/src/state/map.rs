@@ -1,4 +1,4 @@
-//! What is told of a map.
+//! A map.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,71 +6,70 @@ use serde::{Deserialize, Serialize};
 /// A map without its cells.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MapSummary {
-    /// Counts up whenever a label or a plane changes.
+    /// A number that grows with each change of a label or a layer.
     pub version: u64,
-    /// Edge of a cell, metres.
+    /// Width of a cell, metres.
     pub cell_m: f64,
-    /// Column of the south-west cell; its west edge is at `x0 * cell_m` metres east.
+    /// Column of the south-west cell. Its west side is `x0 * cell_m` metres east of the map's origin.
     pub x0: i32,
     /// Row of the south-west cell.
     pub y0: i32,
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Cells with a label.
+    /// Number of cells with a label.
     pub explored_cells: u32,
     /// When the vehicle last confirmed or changed the map.
     pub updated_s: Option<f64>,
-    /// Counts up when labels begin to mean something else.
+    /// A number that grows when the labels change their meaning.
     pub epoch: u8,
-    /// Where it lies in the world; null while no fix has moved it.
-    pub placement: Option<Placement>,
+    /// The place of the map in the world; null while no fix has moved it.
+    pub placement: Option<MapPlacement>,
 }
 
-/// By how much a vehicle's map must be moved to lie where it belongs in the world.
+/// The shift from a vehicle's map to the world frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Placement {
-    /// Counts the moves.
+pub struct MapPlacement {
+    /// The number of changes.
     pub version: u8,
-    /// Add to its places, metres east.
+    /// Metres to add to the east.
     pub east_m: f64,
-    /// Add to its places, metres north.
+    /// Metres to add to the north.
     pub north_m: f64,
 }
 
 /// A map with its cells, row by row from the south-west.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Map {
-    /// Counts up whenever a label or a plane changes.
+pub struct MapBody {
+    /// A number that grows with each change of a label or a layer.
     pub version: u64,
-    /// When the ages were true.
+    /// Mission time to which the ages refer.
     pub at_s: f64,
-    /// Column of the south-west cell; its west edge is at `x0 * cell_m` metres east.
+    /// Column of the south-west cell. Its west side is `x0 * cell_m` metres east of the map's origin.
     pub x0: i32,
     /// Row of the south-west cell.
     pub y0: i32,
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Edge of a cell, metres.
+    /// Width of a cell, metres.
     pub cell_m: f64,
     /// Base64: one byte a cell, 0 = unexplored.
     pub labels: String,
-    /// Base64: two bytes a cell, little-endian: seconds since the cell was heard of, 65535 = never.
+    /// Base64: two bytes a cell, little-endian: seconds since the cell was received, 65535 = never.
     pub age_s: String,
-    /// What else was heard of the cells.
-    pub planes: Vec<Plane>,
+    /// The other layers of which values were received.
+    pub layers: Vec<LayerBody>,
 }
 
-/// A quantity of each cell that a vehicle tells of where labels leave room. It may be older than the label of its cell, and
-/// then speaks of an earlier one; where a cell has no label it does not count.
+/// A quantity of each cell that the vehicle sends in addition to the labels. A value may be older than the label of its cell, and
+/// then refers to an earlier label. The value of a cell without a label has no meaning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Plane {
-    /// `confidence`: how sure the vehicle's model is of the label, 0 to 1; `depth`: of the sea floor;
-    /// `curiosity`: how badly the model explains what the cell shows, the mean surprise of a word in bits (the binary
-    /// logarithm of the perplexity).
+pub struct LayerBody {
+    /// `confidence`: the share of the words of the cell that carry its label, 0 to 1; `depth`: of the sea floor; `curiosity`: the
+    /// mean surprise of the cell's words in bits (the binary logarithm of the perplexity).
     pub name: String,
     /// `m`, `bit`, or empty.
     pub unit: String,
@@ -78,16 +77,16 @@ pub struct Plane {
     pub min: f64,
     /// The middle of the highest level.
     pub max: f64,
-    /// What a level spans: the true value lies half of it at most from the one in `data`, and a fifth of it more where a
-    /// cell stays in its level at the edge.
+    /// The width of a level: the true value differs by at most half of it from the value in `data`, and by a fifth of it more
+    /// where a cell stays in its level at the edge.
     pub step: f64,
-    /// Base64: one byte a cell in the order of `labels`, 0 to 254 for `min` to `max`, in between linear; 255 = not known.
+    /// Base64: one byte a cell in the order of `labels`, 0 to 254 linearly from `min` to `max`; 255 = unknown.
     pub data: String,
-    /// Base64, as of the labels: seconds since the level of the cell was heard of.
+    /// Base64, as for the labels: seconds since the value of the cell was received.
     pub age_s: String,
 }
 
-/// A map, or a plane of it, has changed.
+/// A label or a layer of a map has changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MapEvent {
     /// Address of the vehicle.

@@ -7,11 +7,11 @@ use crate::geodesy::LatLon;
 use crate::nmea::Sentence;
 use serde::Deserialize;
 
-/// What asks gpsd for reports.
+/// The request that makes gpsd send reports.
 pub const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
 
 /// Longest line that is taken: a sky view of many satellites has some kilobytes.
-pub const LONGEST_LINE: usize = 16_384;
+pub const MAX_LINE: usize = 16_384;
 
 /// Members of a report that are of use; units of gpsd: degrees, metres, metres a second.
 #[derive(Deserialize)]
@@ -30,19 +30,18 @@ struct Report {
     heading: Option<f64>,
 }
 
-/// What a report says, and the standard deviation of its position in metres if it tells one.
+/// The content of a report, and the standard deviation of its position in metres if it has one.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Said {
     /// As sentences of NMEA 0183 would.
     pub sentences: Vec<Sentence>,
-    /// Of the position.
     pub sigma_m: Option<f64>,
 }
 
-/// gpsd tells errors with 95 % confidence: 1.96 standard deviations.
+/// gpsd gives errors with 95 % confidence: 1.96 standard deviations.
 const CONFIDENCE: f64 = 1.96;
 
-/// What a line says; `None` if it is no report or says what cannot be.
+/// Parses a line; `None` if it is no report or has impossible values.
 pub fn parse(line: &[u8]) -> Option<Said> {
     let report: Report = serde_json::from_slice(line).ok()?;
     match report.class.as_str() {
@@ -88,7 +87,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// From gpsd_json(5).
     const TPV: &str = r#"{"class":"TPV","device":"/dev/pts/1","time":"2005-06-08T10:34:48.283Z","ept":0.005,"lat":46.498293369,"lon":7.567411672,"alt":1343.127,"eph":36.000,"epv":32.321,"track":10.3788,"speed":0.091,"climb":-0.085,"mode":3}"#;
 
     #[test]

@@ -1,4 +1,4 @@
-//! What a receiver says, made into positions that can be believed.
+//! Positions from a receiver, checked for plausibility.
 
 use crate::geodesy::LatLon;
 use crate::nmea::Sentence;
@@ -12,13 +12,11 @@ use std::time::Duration;
 /// The language of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GpsLanguage {
-    /// NMEA 0183 lines.
     Nmea,
-    /// gpsd's JSON.
     Gpsd,
 }
 
-/// Why something that a receiver said is not used.
+/// Reasons to refuse a position of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GpsFault {
     /// A line with a wrong checksum.
@@ -27,21 +25,20 @@ pub enum GpsFault {
     Unreadable,
     /// A line longer than allowed.
     Overlong,
-    /// The receiver says that it has no position.
+    /// The receiver reports that it has no position.
     NoPosition,
     /// The same time of measurement, or the same place to the last digit while under way, again and again.
     Frozen,
-    /// The place that the receiver tells is too far from the last one for the speed of a vessel.
+    /// The position is too far from the last one for the speed of a vessel.
     Jump,
 }
 
 impl GpsFault {
-    /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Checksum => "checksum",
-            Self::Unreadable => "unreadable",
-            Self::Overlong => "overlong",
+            Self::Unreadable => "malformed",
+            Self::Overlong => "too_long",
             Self::NoPosition => "no_position",
             Self::Frozen => "frozen",
             Self::Jump => "jump",
@@ -52,11 +49,9 @@ impl GpsFault {
 /// A position that can be believed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GpsFix {
-    /// Where.
     pub place: LatLon,
     /// Standard deviation in each direction, metres.
     pub sigma_m: f64,
-    /// When it was told.
     pub at: Instant,
 }
 
@@ -67,7 +62,7 @@ pub struct Gps {
     lines: Lines,
     faults: BTreeMap<GpsFault, u64>,
     fix: Option<GpsFix>,
-    /// Last place told, its time of day, and since when nothing of it has changed.
+    /// The last position, its time of day, and the time since which neither has changed.
     told: Option<(LatLon, Option<f64>, Instant)>,
     utc_changed: Option<(f64, Instant)>,
     /// Places in a row that were too far from the last good one, and the last of them.
@@ -83,18 +78,18 @@ impl Gps {
     const PLAIN_SIGMA_M: f64 = 3.0;
     /// Faster is no vessel, m/s.
     const FASTEST_M_S: f64 = 30.0;
-    /// A place that stays the same to the last digit for so long is frozen, if the receiver says that it moves.
+    /// A position that keeps its last digit for this long is frozen if the receiver reports motion.
     const FROZEN: Duration = Duration::from_secs(5);
     /// So many places in a row, near each other, are believed however far they are from the last good one.
     const JUMPS_BELIEVED: u32 = 10;
     /// Slower than this the course over ground is noise, m/s.
     const COURSE_SPEED_M_S: f64 = 0.5;
 
-    /// A receiver that has said nothing.
+    /// A receiver without a report yet.
     pub fn new(language: GpsLanguage) -> Self {
         let longest = match language {
-            GpsLanguage::Nmea => nmea::LONGEST_LINE,
-            GpsLanguage::Gpsd => gpsd::LONGEST_LINE,
+            GpsLanguage::Nmea => nmea::MAX_LINE,
+            GpsLanguage::Gpsd => gpsd::MAX_LINE,
         };
         Self {
             language,
@@ -110,7 +105,7 @@ impl Gps {
         }
     }
 
-    /// What was not used so far, by reason.
+    /// Refused reports, by reason.
     pub fn faults(&self) -> impl Iterator<Item = (GpsFault, u64)> + '_ {
         self.faults
             .iter()
@@ -118,7 +113,6 @@ impl Gps {
             .chain((self.lines.overlong() > 0).then_some((GpsFault::Overlong, self.lines.overlong())))
     }
 
-    /// The last good position.
     pub fn fix(&self) -> Option<GpsFix> {
         self.fix
     }
@@ -131,7 +125,7 @@ impl Gps {
         compass.or_else(|| course().and_then(|(_, course, _)| course))
     }
 
-    /// A connection was opened: what to say to the receiver, and half a line is none.
+    /// Returns the request to send on a new connection, and drops a half line of the old one.
     pub fn handle_open(&mut self) -> &'static [u8] {
         self.lines.clear();
         match self.language {
@@ -260,7 +254,7 @@ mod tests {
             found.extend(gps.handle_bytes(piece, at(1.0)));
         }
         assert_eq!(found.len(), 2);
-        assert_eq!((found[0].sigma_m, faults(&gps)), (3.0, vec![("unreadable", 1)]));
+        assert_eq!((found[0].sigma_m, faults(&gps)), (3.0, vec![("malformed", 1)]));
     }
 
     #[test]
@@ -269,7 +263,7 @@ mod tests {
         let wrong = gga(29.5, 1).replace("4.92", "5.92").replace("$GP", "$GN");
         assert!(gps.handle_bytes(wrong.as_bytes(), at(0.0)).is_empty());
         assert!(gps.handle_bytes(&[&[b'$'; 4000][..], b"\r\n"].concat(), at(0.0)).is_empty());
-        assert_eq!(faults(&gps), [("checksum", 1), ("overlong", 1)]);
+        assert_eq!(faults(&gps), [("checksum", 1), ("too_long", 1)]);
     }
 
     #[test]
@@ -281,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_stays_while_the_receiver_says_it_moves_is_frozen_and_a_vessel_at_anchor_is_not() {
+    fn a_frozen_receiver_is_refused_but_a_vessel_at_anchor_is_not() {
         for (knots, frozen) in [(4.0, true), (0.0, false)] {
             let mut gps = Gps::new(GpsLanguage::Nmea);
             for s in 0..20 {
@@ -293,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_refused_and_a_place_that_stays_there_is_believed_in_the_end() {
+    fn a_jump_is_refused_until_the_new_position_persists() {
         let mut gps = Gps::new(GpsLanguage::Nmea);
         gps.handle_bytes(gga(29.5, 0).as_bytes(), at(0.0));
         assert!(gps.handle_bytes(gga(29.6, 1).as_bytes(), at(1.0)).is_empty(), "11 km in a second");
@@ -322,7 +316,7 @@ mod tests {
         assert!((found[0].sigma_m - 2.0).abs() < 1e-9);
         assert_eq!(gps.heading_rad(at(0.0)), Some(std::f64::consts::PI));
         gps.handle_bytes(b"{\"class\":\"TPV\",\"mode\":0}\n{\"class\":\n", at(1.0));
-        assert_eq!(faults(&gps), [("unreadable", 1), ("no_position", 1)]);
+        assert_eq!(faults(&gps), [("malformed", 1), ("no_position", 1)]);
     }
 
     proptest! {

@@ -1,21 +1,21 @@
-//! The setting that tells most of those whose stream fits, and what it gives up.
+//! The most informative setting whose stream fits a budget, and the trade-off.
 
 use super::table::{Row, TuningTable};
 
-/// What fits, beside the best of all and the leanest of all.
+/// The setting that fits a budget, the best setting, and the one with the lowest rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// Bits a second that the stream may take.
+    /// The budget of the stream, bit/s.
     pub bits_per_s: f64,
-    /// The setting with the highest mutual information that fits; none does if this is empty.
+    /// The setting with the highest mutual information within the budget; `None` if no setting fits.
     pub chosen: Option<Row>,
     /// The setting with the highest mutual information.
     pub best: Row,
-    /// The setting with the smallest stream.
-    pub leanest: Row,
+    /// The setting with the lowest rate.
+    pub lowest_rate: Row,
 }
 
-/// No setting of the table speaks of cells of this size.
+/// The table has no setting for cells of this size.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "the tuning table has settings for cells of {sizes} and none for those of {cell_m} m; make one with scenecast tune and name it in scene.tuning_table"
@@ -26,15 +26,15 @@ pub struct NoRow {
 }
 
 impl TuningTable {
-    /// The setting with the highest mutual information whose stream takes at most `bits_per_s`, of those with a model of cells
-    /// of `cell_m` metres; of equals the one with the smaller stream.
+    /// The setting with the highest mutual information whose stream takes at most `bits_per_s`, among those for cells of `cell_m`
+    /// metres. Of two equal ones, the one with the lower rate.
     pub fn fit(&self, cell_m: f64, bits_per_s: f64) -> Result<Fit, NoRow> {
         let rows = || self.rows().filter(|row| (row.setting.cell_m / cell_m - 1.0).abs() < 0.005);
-        let (Some(best), Some(leanest)) = (most(rows()), least(rows())) else {
+        let (Some(best), Some(lowest_rate)) = (most(rows()), least(rows())) else {
             return Err(NoRow { cell_m, sizes: self.sizes() });
         };
         let chosen = most(rows().filter(|row| row.measurement.stream_bps <= bits_per_s));
-        Ok(Fit { bits_per_s, chosen: chosen.copied(), best: *best, leanest: *leanest })
+        Ok(Fit { bits_per_s, chosen: chosen.copied(), best: *best, lowest_rate: *lowest_rate })
     }
 
     fn sizes(&self) -> String {
@@ -44,7 +44,7 @@ impl TuningTable {
     }
 }
 
-/// The row with the highest mutual information; of equals the one with the smaller stream.
+/// The row with the highest mutual information. Of two equal ones, the one with the lower rate.
 pub fn most<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
     let key = |row: &Row| (row.measurement.mutual_information_nats, -row.measurement.stream_bps);
     rows.max_by(|a, b| {
@@ -53,23 +53,23 @@ pub fn most<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
     })
 }
 
-/// The row with the smallest stream.
+/// The row with the lowest rate.
 pub fn least<'a>(rows: impl Iterator<Item = &'a Row>) -> Option<&'a Row> {
     rows.min_by(|a, b| a.measurement.stream_bps.total_cmp(&b.measurement.stream_bps))
 }
 
 impl Fit {
-    /// What is given up against the best setting, or that none fits; one line for people.
-    pub fn said(&self) -> String {
-        let (best, leanest) = (&self.best.measurement, &self.leanest.measurement);
+    /// The loss in comparison with the best setting, or that no setting fits; one line for people.
+    pub fn trade_off(&self) -> String {
+        let (best, lowest_rate) = (&self.best.measurement, &self.lowest_rate.measurement);
         match &self.chosen {
             None => format!(
-                "no setting fits {}: the leanest needs {}, {} below the best",
+                "no setting fits {}: the lowest rate is {}, {} below the best",
                 rate(self.bits_per_s),
-                rate(leanest.stream_bps),
-                self.loss(&self.leanest)
+                rate(lowest_rate.stream_bps),
+                self.loss(&self.lowest_rate)
             ),
-            Some(row) if row == &self.best => "nothing is given up: it tells most of all settings".to_owned(),
+            Some(row) if row == &self.best => "no trade-off: these are the most informative settings".to_owned(),
             Some(row) => format!(
                 "{}: {} below the best, which needs {}",
                 differences(row, &self.best),
@@ -79,7 +79,7 @@ impl Fit {
         }
     }
 
-    /// Mutual information that a setting lacks, nats.
+    /// The loss of mutual information in comparison with the best setting, nats.
     pub fn lost_nats(&self, row: &Row) -> f64 {
         (self.best.measurement.mutual_information_nats - row.measurement.mutual_information_nats).max(0.0)
     }
@@ -90,7 +90,7 @@ impl Fit {
     }
 }
 
-/// In what a setting is less than the best one.
+/// The differences from the best setting.
 fn differences(row: &Row, best: &Row) -> String {
     let mut less = Vec::new();
     if row.setting.cells != best.setting.cells {
@@ -158,24 +158,27 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_tells_most_within_the_budget_is_chosen_and_says_what_it_gives_up() {
+    fn the_best_row_within_the_budget_is_chosen_with_its_loss() {
         let fit = |bits_per_s| known().fit(0.25, bits_per_s).unwrap();
         let alpha = |fit: &Fit| fit.chosen.map(|row| row.setting.alpha);
         assert_eq!(alpha(&fit(14_000.0)), Some(1.0));
-        assert_eq!(fit(14_000.0).said(), "nothing is given up: it tells most of all settings");
+        assert_eq!(fit(14_000.0).trade_off(), "no trade-off: these are the most informative settings");
         assert_eq!(alpha(&fit(13_999.0)), Some(0.1));
-        assert_eq!(fit(5000.0).said(), "fewer labels: 0.02 nats (7 %) below the best, which needs 14.0 kbit/s");
+        assert_eq!(fit(5000.0).trade_off(), "fewer labels: 0.02 nats (7 %) below the best, which needs 14.0 kbit/s");
         let lean = fit(100.0);
         assert_eq!(alpha(&lean), Some(0.01));
         let said = "coarser cells, fewer camera frames: 0.10 nats (33 %) below the best, which needs 14.0 kbit/s";
-        assert_eq!(lean.said(), said);
+        assert_eq!(lean.trade_off(), said);
     }
 
     #[test]
-    fn where_nothing_fits_the_leanest_is_named() {
+    fn where_no_setting_fits_the_lowest_rate_is_named() {
         let fit = known().fit(0.25, 50.0).unwrap();
-        assert_eq!((fit.chosen, fit.leanest.setting.alpha), (None, 0.01));
-        assert_eq!(fit.said(), "no setting fits 50 bit/s: the leanest needs 90 bit/s, 0.10 nats (33 %) below the best");
+        assert_eq!((fit.chosen, fit.lowest_rate.setting.alpha), (None, 0.01));
+        assert_eq!(
+            fit.trade_off(),
+            "no setting fits 50 bit/s: the lowest rate is 90 bit/s, 0.10 nats (33 %) below the best"
+        );
     }
 
     #[test]
@@ -208,7 +211,7 @@ pub(super) mod tests {
             for row in table.rows().filter(|row| row.measurement.stream_bps <= bits_per_s) {
                 prop_assert!(row.measurement.mutual_information_nats <= told);
             }
-            prop_assert!(!fit.said().is_empty());
+            prop_assert!(!fit.trade_off().is_empty());
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The table of `scenecast tune`: a line a setting, with what it reaches and what its stream takes.
+//! The table of `scenecast tune`: a line for each setting, with its information and bit rate.
 
 use crate::UserError;
 use scenecast_protocol::directive::CellBand;
@@ -9,9 +9,8 @@ const TITLE: &str = "# scenecast tuning table 2";
 const HEAD: &str = "inputs,cell_m,alpha,beta,gamma,refine_words_per_s,frames_per_s,cells,mutual_information_nats,\
 normalised_mutual_information,null_mutual_information_nats,mosaic_mutual_information_nats,labels,map_bytes,stream_bps";
 /// Most lines that are read.
-const MOST_ROWS: usize = 100_000;
+const MAX_ROWS: usize = 100_000;
 
-/// One setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Edge of a cell of the model, metres.
@@ -26,7 +25,7 @@ pub struct Setting {
     pub refine_words_per_s: f64,
     /// Camera frames a second that the scene model sees.
     pub frames_per_s: f64,
-    /// Which cells are told: fine or coarse.
+    /// The published cells: fine or coarse.
     pub cells: CellBand,
 }
 
@@ -51,7 +50,7 @@ pub struct Measurement {
     pub mosaic_mutual_information_nats: f64,
     /// Different labels in the final map.
     pub labels: usize,
-    /// Bytes of all chunks that say the final map from nothing.
+    /// Bytes of all chunks that code the final map against an empty one.
     pub map_bytes: usize,
     /// Bits of all chunks of the survey over its time.
     pub stream_bps: f64,
@@ -60,16 +59,14 @@ pub struct Measurement {
 /// A setting with its figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// The setting.
     pub setting: Setting,
-    /// Its figures.
     pub measurement: Measurement,
 }
 
 /// Settings with their figures, none twice, in order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TuningTable {
-    /// What the figures of each row were measured with.
+    /// The conditions under which each row was measured.
     rows: Vec<(String, Row)>,
 }
 
@@ -83,7 +80,7 @@ impl TuningTable {
     /// Reads the text of `file`.
     ///
     /// # Errors
-    /// The file, the line and what is wrong with it; a table without a row.
+    /// The file, the line and the fault; a table without a row.
     pub fn parse(file: &str, text: &str) -> Result<Self, UserError> {
         let table = Self::read(text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
         if table.rows.is_empty() {
@@ -92,7 +89,7 @@ impl TuningTable {
         Ok(table)
     }
 
-    /// Reads a table's text; the error is the line and what is wrong with it.
+    /// Reads the text of a table; the error is the line and its fault.
     pub fn read(text: &str) -> Result<Self, (usize, String)> {
         let mut lines = text.lines().enumerate();
         if lines.next().is_none_or(|(_, title)| title.trim_end() != TITLE) {
@@ -105,20 +102,18 @@ impl TuningTable {
         for (index, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
             let (inputs, row) = parse(line).map_err(|what| (index + 1, what))?;
             table.insert(inputs, row);
-            if table.rows.len() > MOST_ROWS {
-                return Err((index + 1, format!("more than {MOST_ROWS} lines")));
+            if table.rows.len() > MAX_ROWS {
+                return Err((index + 1, format!("more than {MAX_ROWS} lines")));
             }
         }
         Ok(table)
     }
 
-    /// The table's text.
     pub fn text(&self) -> String {
         let lines = self.rows.iter().map(|(inputs, row)| line(inputs, row));
         format!("{TITLE}\n{HEAD}\n{}", lines.collect::<String>())
     }
 
-    /// The rows.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().map(|(_, row)| row)
     }
@@ -212,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_line_of_the_table_is_refused_with_its_number_and_what_is_allowed() {
+    fn a_malformed_row_is_refused_with_its_line_and_the_rule() {
         let text = filled().text();
         let refused = |from: &str, to: &str| TuningTable::read(&text.replacen(from, to, 1)).unwrap_err();
         assert_eq!(refused("table 2", "table 3").0, 1);

@@ -1,5 +1,6 @@
-//! Fuzz targets of the modem drivers: what must hold for any bytes of a port.
+//! Fuzz targets of the modem drivers, for any bytes of a port.
 
+use scenecast_core::MicromodemRate;
 use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser};
 use scenecast_drivers::modem::s2c::{LineParser, S2c, S2cConfig, S2cMode};
 use scenecast_drivers::modem::{Class, Destination, Driver};
@@ -47,7 +48,7 @@ pub fn s2c_driver(data: &[u8]) {
 /// A driver for a Micromodem; the first byte chooses its rate.
 pub fn micromodem_driver(data: &[u8]) {
     let Some((first, data)) = data.split_first() else { return };
-    let config = MicromodemConfig { address: 10, rate: Rate::of(first % 6), baud: Some(19_200) };
+    let config = MicromodemConfig { address: 10, rate: MicromodemRate::of(first % 6), baud: Some(19_200) };
     feed(&mut Micromodem::new(config), data);
 }
 

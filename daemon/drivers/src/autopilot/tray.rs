@@ -1,9 +1,9 @@
-//! What an autopilot has ready for its host.
+//! The outbox of an autopilot: bytes, steps and notes for its host.
 
 use super::{Counters, Step};
 use std::collections::VecDeque;
 
-/// Bytes, way and notes that wait to be fetched, at most [`Tray::MOST`] of each, and counters.
+/// Bytes, way and notes that wait to be fetched, at most [`Tray::MAX`] of each, and counters.
 #[derive(Debug, Default)]
 pub struct Tray {
     pub(super) outputs: VecDeque<Vec<u8>>,
@@ -14,18 +14,18 @@ pub struct Tray {
 
 impl Tray {
     /// Most of each that waits.
-    pub(super) const MOST: usize = 256;
+    pub(super) const MAX: usize = 256;
 
-    /// Bytes for the autopilot; what nobody fetches is stale.
+    /// Queues bytes for the autopilot; the newest are dropped when the queue is full.
     pub(super) fn write(&mut self, bytes: Vec<u8>) {
-        if self.outputs.len() < Self::MOST {
+        if self.outputs.len() < Self::MAX {
             self.outputs.push_back(bytes);
         }
     }
 
     /// A stretch of way. None is lost: where too many wait, it is added to the last one.
     pub fn walk(&mut self, step: Step) {
-        let is_full = self.steps.len() >= Self::MOST;
+        let is_full = self.steps.len() >= Self::MAX;
         match self.steps.back_mut() {
             Some(last) if is_full => {
                 let (dx_m, dy_m) = (last.dx_m + step.dx_m, last.dy_m + step.dy_m);
@@ -37,7 +37,7 @@ impl Tray {
 
     /// Something that a person should read.
     pub(super) fn note(&mut self, text: impl Into<String>) {
-        if self.notes.len() < Self::MOST {
+        if self.notes.len() < Self::MAX {
             self.notes.push_back(text.into());
         }
     }
@@ -62,7 +62,7 @@ mod tests {
             tray.note("the same");
             tray.write(vec![0]);
         }
-        assert!([tray.steps.len(), tray.notes.len(), tray.outputs.len()].iter().all(|&n| n == Tray::MOST));
+        assert!([tray.steps.len(), tray.notes.len(), tray.outputs.len()].iter().all(|&n| n == Tray::MAX));
         let (x, y) = tray.steps.iter().fold((0.0, 0.0), |(x, y), s| (x + s.dx_m, y + s.dy_m));
         assert_eq!((x, y), (10_000.0, -20_000.0));
         assert_eq!(tray.steps.iter().map(|s| s.unseen).sum::<Duration>(), Duration::from_secs(5));

@@ -1,4 +1,4 @@
-//! What every driver of a modem is: bytes in, bytes out, no IO.
+//! The trait of every modem driver: bytes in, bytes out, no IO.
 
 use bytes::Bytes;
 use scenecast_core::{ModemAddress, UsblLine};
@@ -12,9 +12,9 @@ pub type Token = u64;
 /// How urgent a transmission is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
-    /// What somebody waits for: never behind bulk that the modem holds.
+    /// Urgent: never queued behind bulk in the modem.
     Command,
-    /// Acknowledgements: a later one replaces what it did not get to say.
+    /// Acknowledgements: a later one replaces an earlier one that was not sent.
     Service,
     /// The rest, in the order in which it was given.
     Bulk,
@@ -23,9 +23,7 @@ pub enum Class {
 /// Whom a transmission is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Destination {
-    /// One modem.
     Modem(ModemAddress),
-    /// Every modem in range.
     Everybody,
 }
 
@@ -34,13 +32,8 @@ pub enum Destination {
 pub enum Refusal {
     /// It is larger than the modem carries.
     #[error("a frame of {bytes} bytes is larger than the modem's {most}")]
-    TooLong {
-        /// Bytes given.
-        bytes: usize,
-        /// Most bytes that fit.
-        most: usize,
-    },
-    /// There is nothing in it.
+    TooLong { bytes: usize, most: usize },
+    /// The frame is empty.
     #[error("a frame without bytes")]
     Empty,
     /// The modem cannot reach this destination.
@@ -51,22 +44,20 @@ pub enum Refusal {
     NotReady,
 }
 
-/// Something heard.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reception {
-    /// Sender; `None` where the modem does not tell.
+    /// The sender; `None` where the modem does not report it.
     pub src: Option<ModemAddress>,
-    /// What was heard.
     pub bytes: Bytes,
-    /// How well, as the modem tells it: more is better.
+    /// Signal quality in the modem's unit; higher is better.
     pub quality: Option<i32>,
     /// Slant range to the sender, metres.
     pub range_m: Option<f64>,
 }
 
-/// What a driver tells.
+/// An event of a driver.
 ///
-/// Each token that was accepted gets one of `Sent` (for what is not acknowledged), `Delivered`, `Failed` and `Unknown`.
+/// Each accepted token gets one of `Sent` (if it is not acknowledged), `Delivered`, `Failed` and `Unknown`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     /// The modem is set up: it takes transmissions.
@@ -81,17 +72,15 @@ pub enum Event {
     Delivered(Token),
     /// It did not get there.
     Failed(Token),
-    /// Nobody knows.
     Unknown(Token),
-    /// Something was heard.
     Received(Reception),
     /// A position of another modem.
     Usbl(UsblLine),
     /// The modem asks for at most so many frames of a cycle ([`scenecast_protocol::mac::Access::Polled`]).
     Poll(u32),
-    /// The modem put so many bits on air beside what it was given: its own repeats.
+    /// Bits on air of the modem's own repeats.
     Repeated(u64),
-    /// The modem, or the way to it, was lost: what it held is gone. [`Self::Ready`] follows when it is back.
+    /// The modem or its port was lost, with all that it held. [`Self::Ready`] follows when it is back.
     Reset,
     /// Something that a person must change, in his words: a wrong address, a setting that is not taken.
     Refused(String),
@@ -99,15 +88,13 @@ pub enum Event {
 
 /// A driver: a state machine between the link and the bytes of a port.
 ///
-/// The host handles all events before it asks for output, for what the modem asks is answered with what the link gives.
+/// The host handles all events before it polls output: the link's frames answer the modem's requests.
 pub trait Driver: Send {
     /// How the medium is shared, and units of transmission.
     fn profile(&self) -> ModemProfile;
 
-    /// Whether transmissions are taken.
     fn is_ready(&self) -> bool;
 
-    /// Takes a transmission.
     fn send(&mut self, dst: Destination, bytes: Vec<u8>, class: Class, now: Instant) -> Result<Token, Refusal>;
 
     /// Whether a cycle may begin; only modems that poll have any.
@@ -118,16 +105,14 @@ pub trait Driver: Send {
     /// Has the modem begin a cycle between these two.
     fn begin_cycle(&mut self, _from: ModemAddress, _to: Destination, _cycle: Cycle, _now: Instant) {}
 
-    /// The port was opened.
     fn handle_open(&mut self, now: Instant);
 
     /// The port was closed, or failed.
     fn handle_closed(&mut self, now: Instant);
 
-    /// Takes what came over the port.
+    /// Bytes from the port.
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
 
-    /// Lets time pass.
     fn handle_timeout(&mut self, now: Instant);
 
     /// When [`Self::handle_timeout`] has something to do.
@@ -136,10 +121,10 @@ pub trait Driver: Send {
     /// Bytes for the port; to be asked until there are none, after everything else.
     fn poll_output(&mut self, now: Instant) -> Option<Vec<u8>>;
 
-    /// The next thing that it tells.
+    /// The next event.
     fn poll_event(&mut self) -> Option<Event>;
 
-    /// Whether the port has been silent for so long that it should be opened anew.
+    /// Whether the port has been silent for so long that it should be opened again.
     fn wants_reopening(&self, _now: Instant) -> bool {
         false
     }

@@ -7,7 +7,6 @@
 /// Bytes that framing adds at most to a frame of up to 1016 bytes: two delimiters, a code for each 254 bytes.
 pub const OVERHEAD_BYTES: u64 = 7;
 
-/// The byte between frames.
 pub const DELIMITER: u8 = b'+';
 
 /// A frame between two delimiters.
@@ -43,7 +42,7 @@ impl Deframer {
         Self { collected: Vec::new(), most: most + most / 254 + 2, overlong: false }
     }
 
-    /// Takes bytes of the stream; calls `found` for each frame. What makes no sense is skipped up to the next delimiter.
+    /// Takes bytes of the stream; calls `found` for each frame. Invalid bytes are skipped up to the next delimiter.
     pub fn push(&mut self, bytes: &[u8], mut found: impl FnMut(Vec<u8>)) {
         for &byte in bytes {
             if byte != DELIMITER {

@@ -1,4 +1,4 @@
-//! What `scenecast modem-sim` emulates: the water, the modems in it, and what goes wrong when.
+//! The scenario of `scenecast modem-sim`: the channel, its modems, and the schedule of faults.
 
 mod modem;
 mod reader;
@@ -19,14 +19,11 @@ use std::time::Duration;
 use toml::de::DeTable;
 
 /// Most modems and strangers together: each is a node of the channel.
-const MOST_NODES: usize = 100;
+const MAX_NODES: usize = 100;
 
-/// A whole scenario.
 #[derive(Debug)]
 pub struct Scenario {
-    /// Of everything random.
     pub seed: u64,
-    /// The water.
     pub channel: ChannelConfig,
     /// Links that lose in their own way.
     pub links: Vec<(NodeId, NodeId, LossModel)>,
@@ -34,12 +31,12 @@ pub struct Scenario {
     pub modems: Vec<Modem>,
     /// Others who talk on the same water.
     pub strangers: Vec<Stranger>,
-    /// When, to which modem, what.
+    /// Time, modem and fault.
     pub faults: Vec<(Duration, usize, Trouble)>,
 }
 
 impl Scenario {
-    /// Reads a file; whatever is wrong is told with file, line, key and what is allowed.
+    /// Reads a file; errors name the file, the line, the key and the allowed values.
     pub fn load(path: &Path) -> Result<Self, UserError> {
         let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
         Self::read(Source { path, text: &text })
@@ -68,8 +65,8 @@ impl Scenario {
         let faults = file.tables("fault")?.into_iter().map(|table| trouble::read(table, &names));
         let faults = faults.collect::<Result<Vec<_>, _>>()?;
         file.finish()?;
-        if modems.len() + strangers.len() > MOST_NODES {
-            return Err(source.problem(0, format!("more than {MOST_NODES} modems and strangers are not allowed")));
+        if modems.len() + strangers.len() > MAX_NODES {
+            return Err(source.problem(0, format!("more than {MAX_NODES} modems and strangers are not allowed")));
         }
         Ok(Self { seed, channel, links, modems, strangers, faults })
     }

@@ -2,23 +2,21 @@
 
 use super::reader::Reader;
 use super::seconds;
-use super::water::{FARTHEST_M, LONGEST_S};
+use super::water::{MAX_DISTANCE_M, MAX_S};
 use scenecast_core::UserError;
 use sim_channel::modem::Emulator;
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
 use sim_channel::modem::s2c::{Interpreter, S2c, S2cConfig};
 use sim_channel::modem::transparent::{Transparent, TransparentConfig};
 use sim_channel::usbl::UsblConfig;
-use sim_channel::{Position, Track};
+use sim_channel::{NodePosition, Track};
 use std::net::SocketAddr;
 use std::time::Duration;
 
-/// One emulated modem.
 #[derive(Debug)]
 pub struct Modem {
     /// For people, and the name of its symbolic link.
     pub name: String,
-    /// What it is.
     pub make: Make,
     /// How its host reaches it.
     pub place: Place,
@@ -28,7 +26,7 @@ pub struct Modem {
     pub(super) at: usize,
 }
 
-/// The kind of a modem and what is set of it.
+/// The kind of a modem and its settings.
 #[derive(Debug, Clone)]
 pub enum Make {
     S2c(S2cConfig),
@@ -36,10 +34,8 @@ pub enum Make {
     Transparent(TransparentConfig),
 }
 
-/// The port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// A pseudo-terminal.
     Pty,
     /// A TCP port; port 0 for any that is free.
     Tcp(SocketAddr),
@@ -73,7 +69,6 @@ impl Make {
     }
 }
 
-/// A modem of `[[modem]]`.
 pub(super) fn read(table: Reader<'_>, seed: u64) -> Result<Modem, UserError> {
     const NAME: &str = "a name of letters, digits, - and _";
     let name = table.text("name")?.ok_or_else(|| table.missing("name", NAME))?;
@@ -121,11 +116,11 @@ fn read_place(table: &Reader<'_>) -> Result<Place, UserError> {
 
 fn read_track(table: &Reader<'_>) -> Result<Track, UserError> {
     const TAKES: &str = "rows [time in s, metres east, metres north, metres down], times growing";
-    let range = -FARTHEST_M..=LONGEST_S;
-    let place = |[x, y, z]: [f64; 3]| Position::new(x, y, z);
-    let position = table.numbers::<3>("position_m", -FARTHEST_M..=FARTHEST_M, "m")?;
+    let range = -MAX_DISTANCE_M..=MAX_S;
+    let place = |[x, y, z]: [f64; 3]| NodePosition::new(x, y, z);
+    let position = table.numbers::<3>("position_m", -MAX_DISTANCE_M..=MAX_DISTANCE_M, "m")?;
     let Some(rows) = table.rows::<4>("track", range, TAKES)? else {
-        return Ok(Track::new(vec![(Duration::ZERO, position.map_or_else(Position::default, place))]));
+        return Ok(Track::new(vec![(Duration::ZERO, position.map_or_else(NodePosition::default, place))]));
     };
     if position.is_some() {
         return Err(table.wrong("position_m", "nothing beside a track"));

@@ -16,7 +16,7 @@ pub struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// A problem at a byte of the text, as `FILE:LINE: what`.
+    /// An error at a byte of the text, as `FILE:LINE: cause`.
     pub fn problem(&self, at: usize, what: impl Display) -> UserError {
         let line = self.text.get(..at).map_or(1, |before| before.matches('\n').count() + 1);
         UserError::Input(format!("{}:{line}: {what}", self.path.display()))
@@ -40,7 +40,6 @@ impl<'a> Reader<'a> {
         Self { source, name, at, table, known: RefCell::new(Vec::new()) }
     }
 
-    /// The file.
     pub fn path(&self) -> &'a Path {
         self.source.path
     }
@@ -61,7 +60,7 @@ impl<'a> Reader<'a> {
         found.map(|(name, value)| (value, name.span().start))
     }
 
-    /// Refuses what a key was given.
+    /// Refuses the value of a key.
     pub fn wrong(&self, key: &'static str, takes: impl Display) -> UserError {
         let at = self.value(key).map_or(self.at, |(_, at)| at);
         let given = self.value(key).map(|(value, _)| value.span());
@@ -102,7 +101,6 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// One of several words.
     pub fn choice<T: Clone>(&self, key: &'static str, words: &[(&str, T)]) -> Found<T> {
         let Some((value, _)) = self.value(key) else { return Ok(None) };
         let given = match value.get_ref() {
@@ -113,7 +111,6 @@ impl<'a> Reader<'a> {
         given.map(|(_, t)| Some(t.clone())).ok_or_else(|| self.wrong(key, format!("one of {}", all.join(", "))))
     }
 
-    /// True or false.
     pub fn flag(&self, key: &'static str) -> Found<bool> {
         let Some((value, _)) = self.value(key) else { return Ok(None) };
         match value.get_ref() {

@@ -78,7 +78,7 @@ fn every_complaint_names_file_line_key_and_what_is_allowed() {
 }
 
 #[test]
-fn the_water_is_read_with_its_presets_links_outages_and_strangers() {
+fn the_channel_is_read_with_presets_links_and_outages() {
     let text = format!(
         "{PAIR}[channel]\npreset = \"under_ice\"\nduplication = 0.5\n[[link]]\nfrom = \"a\"\nto = \"b\"\nloss = {{ model = \"snr\", sea_state = 3 }}\n\
          [[outage]]\nfrom = \"b\"\nto = \"a\"\n[[stranger]]\nposition_m = [100, 0, 5]\n"

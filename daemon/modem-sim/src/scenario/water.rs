@@ -1,32 +1,29 @@
-//! `[channel]`, `[[link]]`, `[[outage]]` and `[[stranger]]`: what the water does, and who else talks.
+//! `[channel]`, `[[link]]`, `[[outage]]` and `[[stranger]]`: the channel, and other transmitters.
 
 use super::reader::Reader;
 use super::{index_of, node, seconds};
 use scenecast_core::UserError;
-use sim_channel::acoustics::noise::wind_of_sea_state;
+use sim_channel::acoustics::wind_of_sea_state;
 use sim_channel::loss::{GilbertElliott, RangeTable, Snr, ThreeState, Trace};
-use sim_channel::{ChannelConfig, LossModel, NodeId, Outage, OutageScope, Position, presets};
+use sim_channel::{ChannelConfig, LossModel, NodeId, NodePosition, Outage, OutageScope, presets};
 use std::time::Duration;
 
 /// Somebody who talks at random and understands nobody.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stranger {
-    /// Where it is.
-    pub position: Position,
-    /// Bytes of a transmission.
+    pub position: NodePosition,
     pub bytes: usize,
     /// How long a transmission takes.
     pub airtime: Duration,
-    /// Mean pause between transmissions.
     pub mean_gap: Duration,
 }
 
 /// Longest time that a scenario speaks of, s.
-pub(super) const LONGEST_S: f64 = 1e7;
+pub(super) const MAX_S: f64 = 1e7;
 /// Farthest place from the origin, m.
-pub(super) const FARTHEST_M: f64 = 1e6;
+pub(super) const MAX_DISTANCE_M: f64 = 1e6;
 
-/// A preset, and what is said beside it.
+/// A preset, and the keys beside it.
 pub(super) fn read_channel(table: Reader<'_>) -> Result<ChannelConfig, UserError> {
     let mut channel = table.choice("preset", &presets::ALL)?.map_or_else(ChannelConfig::default, |preset| preset());
     if let Some(loss) = table.table("loss")? {
@@ -38,7 +35,7 @@ pub(super) fn read_channel(table: Reader<'_>) -> Result<ChannelConfig, UserError
     set(&mut channel.duplication, table.number("duplication", 0.0..=1.0, "")?);
     set(&mut channel.reordering, table.number("reordering", 0.0..=1.0, "")?);
     set(&mut channel.reorder_delay, table.number("reorder_delay_s", 0.0..=600.0, "s")?.map(seconds));
-    set(&mut channel.max_range_m, table.number("max_range_m", 1.0..=FARTHEST_M, "m")?);
+    set(&mut channel.max_range_m, table.number("max_range_m", 1.0..=MAX_DISTANCE_M, "m")?);
     table.finish()?;
     Ok(channel)
 }
@@ -61,8 +58,8 @@ pub(super) fn read_link(table: Reader<'_>, names: &[&str]) -> Result<(NodeId, No
 
 /// A silence of everything, of a `modem`, or of one direction `from` .. `to`.
 pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, UserError> {
-    let from = table.number("from_s", 0.0..=LONGEST_S, "s")?.map_or(Duration::ZERO, seconds);
-    let until = table.number("until_s", 0.0..=LONGEST_S, "s")?.map_or(Duration::MAX, seconds);
+    let from = table.number("from_s", 0.0..=MAX_S, "s")?.map_or(Duration::ZERO, seconds);
+    let until = table.number("until_s", 0.0..=MAX_S, "s")?.map_or(Duration::MAX, seconds);
     if until <= from {
         return Err(table.wrong("until_s", "a time after from_s"));
     }
@@ -80,9 +77,9 @@ pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, U
 
 /// Somebody else on the same water.
 pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, UserError> {
-    let position = table.numbers("position_m", -FARTHEST_M..=FARTHEST_M, "m")?;
+    let position = table.numbers("position_m", -MAX_DISTANCE_M..=MAX_DISTANCE_M, "m")?;
     let stranger = Stranger {
-        position: position.map_or_else(Position::default, |[x, y, z]| Position::new(x, y, z)),
+        position: position.map_or_else(NodePosition::default, |[x, y, z]| NodePosition::new(x, y, z)),
         bytes: table.whole("bytes", 1..=4096, "bytes")?.unwrap_or(32) as usize,
         airtime: seconds(table.number("airtime_s", 0.01..=60.0, "s")?.unwrap_or(0.5)),
         mean_gap: seconds(table.number("mean_gap_s", 0.01..=86_400.0, "s")?.unwrap_or(20.0)),
@@ -117,8 +114,8 @@ fn probability(table: &Reader<'_>, key: &'static str) -> Result<f64, UserError> 
 }
 
 fn dwell(table: &Reader<'_>, key: &'static str) -> Result<Duration, UserError> {
-    let given = table.number(key, 0.001..=LONGEST_S, "s")?;
-    given.map(seconds).ok_or_else(|| table.missing(key, format!("a number from 0.001 to {LONGEST_S} s")))
+    let given = table.number(key, 0.001..=MAX_S, "s")?;
+    given.map(seconds).ok_or_else(|| table.missing(key, format!("a number from 0.001 to {MAX_S} s")))
 }
 
 fn independent(table: &Reader<'_>) -> Result<LossModel, UserError> {

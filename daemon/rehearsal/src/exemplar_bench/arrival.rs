@@ -3,20 +3,22 @@
 use super::Spread;
 use crate::virtual_time::VirtualTime;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
+use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_core::UserError;
 use scenecast_host::{SurfaceHost, VehicleHost, VehicleHostEvent, channel_station};
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::map::Cell;
+use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{Page, Wish};
 use scenecast_vehicle::{Durable, MapUpdate};
 use serde::Serialize;
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -103,7 +105,7 @@ pub(super) struct ExemplarBench {
     channel: Channel,
     next_change: Instant,
     next_fix: Instant,
-    rng: Stream,
+    rng: RandomStream,
     frames: u64,
     lost: u64,
 }
@@ -112,7 +114,7 @@ impl ExemplarBench {
     pub(super) fn new(setting: ArrivalSetting, patches: &[RgbImage], seed: u64) -> Result<Self, UserError> {
         let mut config = Config::default();
         // The other coder gains no byte on noise, so it is not tried.
-        config.map.codec = "context".to_owned();
+        config.map.codec = Codec::Context;
         let now = Instant::ZERO;
         let modem = scenecast_config::modem_profile(&config, config.channel.bit_rate);
         let area = Area { west: 0.0, south: 0.0, east: 16.0, north: 16.0 };
@@ -124,8 +126,8 @@ impl ExemplarBench {
             },
             seed,
         );
-        channel.place(SURFACE, Position::default());
-        channel.place(VEHICLE, Position::new(config.channel.range_m, 0.0, -16.0));
+        channel.place(SURFACE, NodePosition::default());
+        channel.place(VEHICLE, NodePosition::new(config.channel.range_m, 0.0, -16.0));
         let vehicle = scenecast_vehicle::assemble(
             &config,
             scenecast_config::authenticity(&config)?,
@@ -155,7 +157,7 @@ impl ExemplarBench {
             channel,
             next_change: now,
             next_fix: now,
-            rng: Stream::new(seed, &[5]),
+            rng: RandomStream::new(seed, &[5]),
             frames: 0,
             lost: 0,
         })
@@ -226,12 +228,12 @@ impl VirtualTime for ExemplarBench {
         self.vehicle.handle_timeout(now);
         self.surface.handle_timeout(now);
         while let Some(arrival) = self.channel.poll_arrival(now.into()) {
-            let delivered = matches!(arrival.outcome, Outcome::Delivered { .. });
+            let delivered = matches!(arrival.outcome, ReceptionOutcome::Delivered { .. });
             if arrival.to == SURFACE {
                 self.frames += 1;
                 self.lost += u64::from(!delivered);
             }
-            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             match arrival.to {
                 SURFACE => self.surface.link_mut().handle_bytes(&bytes, now),
                 _ => self.vehicle.link_mut().handle_bytes(&bytes, now),
@@ -239,7 +241,7 @@ impl VirtualTime for ExemplarBench {
         }
         if now >= self.next_fix {
             self.next_fix = now + Duration::from_secs_f64(FIX_S);
-            let fix = Fix { x_m: 8.0, y_m: 8.0, sigma_m: 1.0, age_s: 0.5 };
+            let fix = Fix { position: WorldPoint::new(8.0, 8.0), sigma_m: 1.0, age_s: 0.5 };
             // Before the vehicle is known there is no slot for it.
             let _ = self.surface.surface_mut().send_fix(self.address, fix, now);
         }

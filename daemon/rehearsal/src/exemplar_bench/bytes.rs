@@ -3,12 +3,12 @@
 use super::Spread;
 use crate::world::World;
 use image::RgbImage;
-use scene_model::exemplars::Exemplar;
+use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_protocol::exemplar::edge_px;
-use scenecast_protocol::exemplar::{HEAD, most_bytes};
+use scenecast_protocol::exemplar::{HEAD, max_bytes};
 use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
@@ -37,7 +37,7 @@ pub struct Sizes {
     /// Bytes of the exemplar that the vehicle sends.
     pub sent: Option<Spread>,
     /// Share of the sent exemplars with at least that similarity.
-    pub good_share: f64,
+    pub similar_share: f64,
     /// Similarity of the sent exemplars: median and minimum.
     pub ssim: [f64; 2],
 }
@@ -77,7 +77,8 @@ pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserErr
         PatchSource::Reef(seed) => World::procedural(*seed, mpp),
         PatchSource::Photo(path) => World::from_files(path, None, mpp)?,
     };
-    let mut mapper = Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?;
+    let mut mapper =
+        Mapper::new(&config, scenecast_files::configured_vocabulary(config.scene.vocabulary.as_deref())?, 0, seed)?;
     let (area, camera) = (world.area(), &config.camera);
     for i in 0..FRAMES.0 * FRAMES.1 {
         let along = |k: u32, n: u32, low: f64, high: f64| low + (high - low) * (f64::from(k) + 0.5) / f64::from(n);
@@ -87,7 +88,7 @@ pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserErr
         let pose = Pose { x, y, z: -16.0, yaw_rad: 0.0 };
         mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
     }
-    let of_label = |images: Vec<Exemplar>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
+    let of_label = |images: Vec<ExemplarPatch>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
     Ok(mapper.gallery().into_values().flat_map(of_label).collect())
 }
 
@@ -125,7 +126,7 @@ fn measure(patches: &[RgbImage], size: u8) -> Measured {
             let good = (0..=100).filter_map(|quality| compress(&patch, quality)).filter(|c| c.ssim >= GOOD_SSIM);
             measured.fewest.extend(good.map(|c| c.bytes.len() + HEAD).min());
         }
-        if let Some(sent) = compress_to(&patch, GOOD_SSIM, most_bytes(size)) {
+        if let Some(sent) = compress_to(&patch, GOOD_SSIM, max_bytes(size)) {
             measured.sent.push(sent.bytes.len() + HEAD);
             measured.ssim.push(sent.ssim);
         }
@@ -143,7 +144,7 @@ impl Measured {
             patches: self.sent.len(),
             fewest: Spread::of(self.fewest.iter().map(|&n| n as f64)),
             sent: Spread::of(self.sent.iter().map(|&n| n as f64)),
-            good_share: good as f64 / self.ssim.len().max(1) as f64,
+            similar_share: good as f64 / self.ssim.len().max(1) as f64,
             ssim: [at(self.ssim.len() / 2), at(0)],
         }
     }

@@ -13,7 +13,7 @@ pub use bytes::{Bytes, PatchSource, Sizes, photos, sizes};
 pub struct Spread {
     pub median: f64,
     pub p95: f64,
-    pub worst: f64,
+    pub max: f64,
 }
 
 impl Spread {
@@ -23,6 +23,6 @@ impl Spread {
         values.sort_by(f64::total_cmp);
         let last = values.len().checked_sub(1)?;
         let at = |share: f64| (values[(share * last as f64).round() as usize] * 100.0).round() / 100.0;
-        Some(Self { median: at(0.5), p95: at(0.95), worst: at(1.0) })
+        Some(Self { median: at(0.5), p95: at(0.95), max: at(1.0) })
     }
 }

@@ -49,7 +49,7 @@ fn state(bench: &ExemplarBench, label: u8) -> Option<AskState> {
 }
 
 #[test]
-fn a_small_exemplar_arrives_grows_and_another_follows() {
+fn a_small_image_grows_and_another_follows_after_the_survey() {
     let mut bench = bench(IDLE, 1);
     let (_, small) = bench.get(3, Wish::Another).unwrap().unwrap();
     let first = bench.page(3).unwrap().picture(None).unwrap().clone();
@@ -82,7 +82,7 @@ fn what_is_cancelled_costs_no_more_bits() {
 }
 
 #[test]
-fn a_request_waits_for_the_first_exemplar() {
+fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
     let mut bench = bench(IDLE, 3);
     let gallery = bench.vehicle.vehicle().exemplars().clone();
     bench.vehicle.handle_exemplars(Default::default());
@@ -97,7 +97,7 @@ fn a_request_waits_for_the_first_exemplar() {
 }
 
 #[test]
-fn background_exemplars_come_once_and_yield_to_requests() {
+fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut bench = bench(IDLE, 4);
     spend(&mut bench, &["exemplars"]);
     let until = bench.now + std::time::Duration::from_secs(120);
@@ -114,7 +114,7 @@ fn background_exemplars_come_once_and_yield_to_requests() {
 }
 
 #[test]
-fn background_streams_get_only_ends_of_frames_under_load() {
+fn while_the_map_waits_background_images_get_only_frame_ends() {
     let loaded = ArrivalSetting { loaded: true, ..IDLE };
     let map_bytes = |names: &[&str]| {
         let mut bench = bench(loaded, 5);

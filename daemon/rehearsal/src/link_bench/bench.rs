@@ -5,14 +5,15 @@ use super::tally::Tally;
 use crate::virtual_time::VirtualTime;
 use scenecast_host::{FrameEvent, LinkEnd, LinkHost, channel_station};
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceEvent, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Envelope, MissionId, SlotState, VehicleStatus};
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position, Stream};
+use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -34,7 +35,7 @@ pub struct LinkSetting {
     pub loss: LossModel,
     pub vehicles: u8,
     /// Whether the surface knows none of them at the start and calls so often.
-    pub call_every: Option<Duration>,
+    pub discovery_period: Option<Duration>,
     /// Bit budget of each end.
     pub budget_bps: u32,
 }
@@ -42,7 +43,7 @@ pub struct LinkSetting {
 impl LinkSetting {
     /// One known vehicle, and a budget that does not bind.
     pub fn new(range_m: f64, frame_bytes: usize, loss: LossModel) -> Self {
-        Self { range_m, frame_bytes, loss, vehicles: 1, call_every: None, budget_bps: BIT_RATE_BPS }
+        Self { range_m, frame_bytes, loss, vehicles: 1, discovery_period: None, budget_bps: BIT_RATE_BPS }
     }
 
     /// The modem of every end.
@@ -112,13 +113,13 @@ impl LinkBench {
             ..ChannelConfig::default()
         };
         let mut channel = Channel::new(config, seed);
-        channel.place(SURFACE, Position::default());
-        let mut rng = Stream::new(seed, &[1]);
+        channel.place(SURFACE, NodePosition::default());
+        let mut rng = RandomStream::new(seed, &[1]);
         let mut draw = || (rng.uniform() * 2f64.powi(53)) as u64;
         let mut vehicles = Vec::new();
         for number in 1..=setting.vehicles {
             let angle = f64::from(number) / f64::from(setting.vehicles) * std::f64::consts::TAU;
-            let place = Position::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
+            let place = NodePosition::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
             channel.place(NodeId(number), place);
             vehicles.push(BenchVehicle::new(setting, address(number), draw(), now));
         }
@@ -161,7 +162,7 @@ impl LinkBench {
         assert!(bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
         let airtime = self.modem.airtime(bytes.len());
         let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
-        self.tally.hasty += u64::from(busy_until.is_some_and(|at| self.now < at));
+        self.tally.early_frames += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
         *self.tally.airtime.entry((who, kind)).or_default() += airtime;
         self.channel.transmit(from, bytes, airtime, self.now.into());
@@ -194,7 +195,7 @@ impl VirtualTime for LinkBench {
                 _ if arrival.from == SURFACE => self.tally.down.count(&arrival.outcome),
                 _ => {}
             }
-            let Outcome::Delivered { bytes, .. } = arrival.outcome else { continue };
+            let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
                 self.heard.insert(arrival.to, self.now);
             }
@@ -231,7 +232,7 @@ fn poll_frame<E: LinkEnd>(host: &mut LinkHost<E>, now: Instant) -> Option<(Vec<u
     let mut kind = "";
     while let Some(event) = host.poll_event() {
         if let FrameEvent::Sent { kind: of_frame, .. } = event {
-            kind = of_frame;
+            kind = of_frame.name();
         }
     }
     Some((bytes, kind))
@@ -279,7 +280,7 @@ pub(super) fn surface(setting: &LinkSetting, seed: u64, now: Instant) -> LinkHos
 }
 
 fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
-    let known = if setting.call_every.is_none() { setting.vehicles } else { 0 };
+    let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),
         modem: setting.modem(),
@@ -288,7 +289,7 @@ fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
         shares: Shares::default(),
         master: MasterConfig::default(),
         vehicles: (1..=known).map(address).collect(),
-        call_every: setting.call_every,
+        discovery_period: setting.discovery_period,
         authenticity: None,
     }
 }

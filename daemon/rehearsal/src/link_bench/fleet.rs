@@ -21,13 +21,13 @@ pub struct FleetRow {
     /// Share of frames lost each way, collisions not counted.
     pub loss: f64,
     /// Seconds until all were known.
-    pub found_s: f64,
+    pub discovered_s: f64,
     /// Time that a turn of each takes with changing hands.
     pub fair_share_s: f64,
     /// Greatest age of any vehicle's map, once each was heard.
-    pub oldest_s: f64,
-    /// `oldest_s` over `fair_share_s`.
-    pub oldest_shares: f64,
+    pub max_age_s: f64,
+    /// `max_age_s` over `fair_share_s`.
+    pub max_age_shares: f64,
     /// Useful payload of all over the channel's capacity for it.
     pub efficiency: f64,
     /// Worst window of any transmitter over the budget plus one transmission.
@@ -44,7 +44,7 @@ impl Ages {
     fn sample(&mut self, bench: &LinkBench) {
         for vehicle in &bench.vehicles {
             let taken = bench.surface.end().vehicle(vehicle.address).and_then(|v| v.replica().taken());
-            let settled = bench.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_settled();
+            let settled = bench.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
             let age = bench.now.since(taken.unwrap_or(Instant::ZERO));
             self.oldest = self.oldest.max(if settled { Duration::ZERO } else { age });
         }
@@ -56,7 +56,7 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     let loss = 0.1;
     let mut setting = LinkSetting::new(1000.0, 256, LossModel::Independent { probability: loss });
     setting.vehicles = VEHICLES;
-    setting.call_every = Some(Duration::from_secs(60));
+    setting.discovery_period = Some(Duration::from_secs(60));
     let mut bench = LinkBench::new(&setting, seed);
     bench.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
     let began = bench.now;
@@ -83,10 +83,10 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
         range_km: 1.0,
         frame_bytes: 256,
         loss,
-        found_s: round(found.as_secs_f64()),
+        discovered_s: round(found.as_secs_f64()),
         fair_share_s: round(fair_share_s),
-        oldest_s: round(ages.oldest.as_secs_f64()),
-        oldest_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
+        max_age_s: round(ages.oldest.as_secs_f64()),
+        max_age_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
         efficiency: round(useful_bps / (10_000.0 * (1.0 - loss))),
         budget_use: round(budget_use(&bench)),
     }

@@ -213,7 +213,7 @@ impl StateSource for OpaqueSource {
         self.waiting + RUN_HEAD * self.queue.len()
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         self.waiting + self.flying == 0
     }
 

@@ -25,7 +25,7 @@ fn the_replica_is_equal_once_every_byte_got_through() {
         source.fill(bytes.min(CELLS));
         pass(&mut source, &mut replica, &mut number);
         assert_eq!(source.target(), replica.shown());
-        assert!(source.is_settled());
+        assert!(source.is_converged());
     }
 }
 

@@ -5,7 +5,7 @@ use super::trial::{Flow, LinkEffort};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::schedule::Audit;
 use serde::Serialize;
-use sim_channel::{LossModel, Stream, presets};
+use sim_channel::{LossModel, RandomStream, presets};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -39,7 +39,7 @@ pub struct LinkRow {
     /// Issue to applied: 95th percentile.
     pub directive_p95_s: f64,
     /// Issue to known at the surface: 95th percentile.
-    pub known_p95_s: f64,
+    pub directive_known_p95_s: f64,
     /// Last change to equality: 95th percentile.
     pub converge_p95_s: f64,
     /// Share of stops that kept the bound of convergence.
@@ -49,7 +49,7 @@ pub struct LinkRow {
     /// Times that the two ends were found to differ.
     pub resyncs: u64,
     /// Frames that began sooner than the modem turns around.
-    pub hasty: u64,
+    pub early_frames: u64,
 }
 
 /// Where and how a row is measured.
@@ -86,15 +86,15 @@ impl LinkCase {
     /// Measures the row; all chance is drawn from `seed`.
     pub fn measure(&self, effort: &LinkEffort, seed: u64) -> Result<LinkRow, IssueError> {
         let setting = self.setting();
-        let mut rng = Stream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
+        let mut rng = RandomStream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
         let mut seed = || (rng.uniform() * 2f64.powi(53)) as u64;
         let mut flowing = LinkBench::under_load(&setting, seed());
         let Flow { useful_bps, loss } = flowing.measure_flow(effort.saturated, None)?;
         let loss = self.loss.unwrap_or(loss);
         let mut directed = LinkBench::under_load(&setting, seed());
-        let directives = directed.measure_directives(effort.directives, &mut Stream::new(seed(), &[]))?;
+        let directives = directed.measure_directives(effort.directives, &mut RandomStream::new(seed(), &[]))?;
         let mut stopped = LinkBench::under_load(&setting, seed());
-        let convergence = stopped.measure_convergence(effort.stops, loss, &mut Stream::new(seed(), &[]));
+        let convergence = stopped.measure_convergence(effort.stops, loss, &mut RandomStream::new(seed(), &[]));
         let benches = [flowing, directed, stopped];
         Ok(LinkRow {
             range_km: self.range_km,
@@ -104,12 +104,12 @@ impl LinkCase {
             efficiency: round(useful_bps / (f64::from(BIT_RATE_BPS) * (1.0 - loss))),
             directive_median_s: round(directives.applied.median()),
             directive_p95_s: round(directives.applied.p95()),
-            known_p95_s: round(directives.known.p95()),
+            directive_known_p95_s: round(directives.known.p95()),
             converge_p95_s: round(convergence.time.p95()),
             converge_within: round(convergence.within),
             budget_use: round(benches.iter().map(budget_use).fold(0.0, f64::max)),
             resyncs: benches.iter().map(resyncs).sum(),
-            hasty: benches.iter().map(|w| w.tally.hasty).sum(),
+            early_frames: benches.iter().map(|w| w.tally.early_frames).sum(),
         })
     }
 }

@@ -1,6 +1,6 @@
 //! Account of the airtime and of the frames on the medium.
 
-use sim_channel::{LossReason, Outcome};
+use sim_channel::{LossReason, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -17,12 +17,14 @@ pub struct FrameCount {
 
 impl FrameCount {
     /// Counts the outcome of a frame.
-    pub fn count(&mut self, outcome: &Outcome) {
+    pub fn count(&mut self, outcome: &ReceptionOutcome) {
         self.sent += 1;
         match outcome {
-            Outcome::Lost { reason: LossReason::SelfDeaf | LossReason::Collision, .. } => self.talked_over += 1,
-            Outcome::Lost { .. } => self.lost += 1,
-            Outcome::Delivered { .. } => {}
+            ReceptionOutcome::Lost { reason: LossReason::SelfDeaf | LossReason::Collision, .. } => {
+                self.talked_over += 1
+            }
+            ReceptionOutcome::Lost { .. } => self.lost += 1,
+            ReceptionOutcome::Delivered { .. } => {}
         }
     }
 
@@ -38,7 +40,7 @@ pub struct Tally {
     /// Time on air by sender (`surface`, `vehicle`) and kind of frame.
     pub airtime: BTreeMap<(&'static str, &'static str), Duration>,
     /// Frames that began sooner after a frame for the same end had come in than its modem turns around.
-    pub hasty: u64,
+    pub early_frames: u64,
     /// From the surface.
     pub down: FrameCount,
     /// Times that the surface forgot the state of a vehicle, or met one.

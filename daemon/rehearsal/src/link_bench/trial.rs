@@ -3,11 +3,12 @@
 use super::bench::{LinkBench, LinkSetting, auv};
 use super::summary::Summary;
 use crate::virtual_time::VirtualTime;
-use scenecast_protocol::directive::{Fix, LifeLine, Slot, SlotId, Utility};
+use scenecast_protocol::coordinates::WorldPoint;
+use scenecast_protocol::directive::{Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::map::StateReplica;
 use scenecast_protocol::time::Instant;
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 use std::time::Duration;
 
 /// Bytes that wait at a vehicle under load: more than the longest turn takes.
@@ -75,7 +76,7 @@ impl LinkBench {
         self.tally = Default::default();
         while self.now < until {
             if fix_every.is_some() {
-                let fix = Fix { x_m: 10.0, y_m: -20.0, sigma_m: 1.0, age_s: 0.5 };
+                let fix = Fix { position: WorldPoint::new(10.0, -20.0), sigma_m: 1.0, age_s: 0.5 };
                 self.surface.end_mut().issue(auv(), Slot::Fix(fix), self.now)?;
             }
             self.run((fix_every.unwrap_or(time)).min(until.since(self.now)));
@@ -85,7 +86,7 @@ impl LinkBench {
     }
 
     /// Issues `count` directives, each a random while after the last one is known to be applied.
-    pub fn measure_directives(&mut self, count: usize, rng: &mut Stream) -> Result<Directives, IssueError> {
+    pub fn measure_directives(&mut self, count: usize, rng: &mut RandomStream) -> Result<Directives, IssueError> {
         let (mut applied, mut known) = (Vec::new(), Vec::new());
         for _ in 0..count {
             self.run(Duration::from_secs_f64(1.0 + rng.uniform() * 30.0));
@@ -94,7 +95,7 @@ impl LinkBench {
             let slot = Slot::Utility(Utility { weights, ..Utility::default() });
             let version = self.surface.end_mut().issue(auv(), slot, issued)?;
             self.run_until(issued + GIVE_UP_TIMEOUT, |w| {
-                w.view().is_some_and(|v| v.slots().any(|s| s.life == LifeLine::Applied))
+                w.view().is_some_and(|v| v.slots().any(|s| s.status == OrderStatus::Applied))
             });
             known.push(self.now.since(issued).as_secs_f64());
             let at = self.vehicle().applied.get(&(SlotId::Utility, version)).copied();
@@ -104,7 +105,7 @@ impl LinkBench {
     }
 
     /// Stops the source `count` times at a random moment with a random number of bytes waiting, and waits for equality.
-    pub fn measure_convergence(&mut self, count: usize, loss: f64, rng: &mut Stream) -> Convergence {
+    pub fn measure_convergence(&mut self, count: usize, loss: f64, rng: &mut RandomStream) -> Convergence {
         let mut times = Vec::new();
         let mut within = 0;
         for _ in 0..count {

@@ -6,7 +6,7 @@ use scenecast_core::LatLon;
 use scenecast_core::gps::GpsLanguage;
 use scenecast_protocol::time::Instant;
 use scenecast_surface::position::{Mounting, Relay, RelayConfig, UsblSighting};
-use sim_channel::Position;
+use sim_channel::NodePosition;
 use sim_channel::usbl::{UsblConfig, UsblFix, UsblHead};
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ const GPS_PART: f64 = 0.4;
 /// The instruments, and a sighting that the head has not reported yet.
 #[derive(Debug)]
 pub(super) struct Anchored {
-    at: Position,
+    at: NodePosition,
     instruments: Instruments,
     head: UsblHead,
     seconds: u32,
@@ -29,7 +29,7 @@ pub(super) struct Anchored {
 
 impl Anchored {
     /// With the head at a place; the relay is for the surface.
-    pub(super) fn new(config: &Config, at: Position, origin: Option<LatLon>, seed: u64) -> (Self, Relay) {
+    pub(super) fn new(config: &Config, at: NodePosition, origin: Option<LatLon>, seed: u64) -> (Self, Relay) {
         let (origin, sigma) = (origin.unwrap_or(NOWHERE), config.navigation.fix_sigma_m);
         let head_sigma = sigma * (1.0 - 2.0 * GPS_PART * GPS_PART).sqrt();
         let usbl = UsblConfig {
@@ -56,7 +56,7 @@ impl Anchored {
     }
 
     /// The vehicle answers from where it is now; its answer is under way for `travel`.
-    pub(super) fn range(&mut self, vehicle: &Position, travel: Duration, now: Instant) {
+    pub(super) fn range(&mut self, vehicle: &NodePosition, travel: Duration, now: Instant) {
         let mut fix = self.head.measure(&self.at, vehicle, now.into());
         fix.ready_at = fix.ready_at.saturating_add(travel);
         self.sighted = Some(fix);

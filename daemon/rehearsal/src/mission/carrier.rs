@@ -2,13 +2,13 @@
 
 use crate::frames_log::FramesLog;
 use crate::modem_rig::{ModemRig, SURFACE, VEHICLE};
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::UserError;
 use scenecast_drivers::modem::Station;
 use scenecast_host::{SurfaceHost, VehicleHost, channel_station};
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::time::Instant;
-use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, Outcome, Position};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, ReceptionOutcome};
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -32,13 +32,13 @@ impl Carrier {
     /// The medium that the configuration names, and the stations of vehicle and surface.
     pub(super) fn new(config: &Config, seed: u64, now: Instant) -> Result<(Self, [Station; 2]), UserError> {
         let channel = Channel::new(channel_config(config), seed);
-        let (medium, stations) = match config.modem.kind.as_str() {
-            "tcp" | "udp" => {
+        let (medium, stations) = match config.modem.kind {
+            ModemKind::Tcp | ModemKind::Udp => {
                 let profile = scenecast_config::modem_profile(config, config.channel.bit_rate);
                 let window = Duration::from_secs_f64(config.link.budget_window_s);
                 (Medium::Channel(channel), [(); 2].map(|()| channel_station(profile, window, now)))
             }
-            _ => {
+            ModemKind::S2c | ModemKind::Micromodem | ModemKind::Transparent => {
                 let (rig, stations) = ModemRig::new(config, channel, seed, now)?;
                 (Medium::Modems(rig), stations)
             }
@@ -47,7 +47,7 @@ impl Carrier {
         Ok((carrier, stations))
     }
 
-    pub(super) fn place(&mut self, end: usize, position: Position) {
+    pub(super) fn place(&mut self, end: usize, position: NodePosition) {
         match &mut self.medium {
             Medium::Channel(channel) => channel.place(NODES[end], position),
             Medium::Modems(rig) => rig.place(end, position),
@@ -78,7 +78,7 @@ impl Carrier {
                 surface.handle_timeout(now);
                 while let Some(arrival) = channel.poll_arrival(now.into()) {
                     self.log.handle_fate(&arrival);
-                    let Outcome::Delivered { bytes, .. } = &arrival.outcome else { continue };
+                    let ReceptionOutcome::Delivered { bytes, .. } = &arrival.outcome else { continue };
                     if arrival.to == NODES[VEHICLE] {
                         vehicle.link_mut().handle_bytes(bytes, now);
                     } else {

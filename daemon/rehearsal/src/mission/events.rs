@@ -10,7 +10,7 @@ use scenecast_files::RecordedFrame;
 use scenecast_host::{CameraPose, FrameEvent, SurfaceHostEvent, VehicleHostEvent};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SurfaceOutput;
-use sim_channel::Position;
+use sim_channel::NodePosition;
 use std::time::Duration;
 
 /// The camera is asked again so late after the survey that it never matters.
@@ -84,9 +84,9 @@ impl Mission {
     fn handle_vehicle_event(&mut self, event: VehicleHostEvent) {
         match event {
             VehicleHostEvent::Persist => self.vehicle.handle_persisted(),
-            VehicleHostEvent::Waypoint(x, y) => {
-                self.logbook.note_waypoint(self.vehicle.vehicle(), (x, y));
-                self.motion.set_target(Some((x, y)));
+            VehicleHostEvent::Waypoint(to) => {
+                self.logbook.note_waypoint(self.vehicle.vehicle(), to);
+                self.motion.set_target(Some(to.xy()));
             }
             VehicleHostEvent::Hold => self.motion.set_target(None),
             VehicleHostEvent::Surface => self.motion.come_up(),
@@ -99,7 +99,7 @@ impl Mission {
 
     fn log_sent(&mut self, end: usize, event: &FrameEvent) {
         if let FrameEvent::Sent { bytes, kind } = *event {
-            self.carrier.log_sent(end, bytes, kind, self.times.now);
+            self.carrier.log_sent(end, bytes, kind.name(), self.times.now);
         }
     }
 
@@ -114,14 +114,14 @@ impl Mission {
         self.vehicle.steer(now);
         self.pump();
         let navigator = self.vehicle.vehicle().navigator();
-        let o = self.motion.step(navigator.position(), STEP_S);
+        let o = self.motion.step(navigator.position().xy(), STEP_S);
         let depth = self.motion.depth_m(navigator.depth_m(), self.survey_depth_m(), STEP_S);
         self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, depth, now);
         self.place_vehicle();
     }
 
-    fn true_place(&self) -> Position {
-        Position::new(self.motion.x_m, self.motion.y_m, self.vehicle.vehicle().navigator().depth_m())
+    fn true_place(&self) -> NodePosition {
+        NodePosition::new(self.motion.x_m, self.motion.y_m, self.vehicle.vehicle().navigator().depth_m())
     }
 
     pub(super) fn place_vehicle(&mut self) {
@@ -171,7 +171,8 @@ impl Mission {
         let now = self.times.now;
         let t_s = now.as_secs_f64();
         let navigator = self.vehicle.vehicle().navigator();
-        let ((x_m, y_m), depth_m, heading_rad) = (navigator.position(), navigator.depth_m(), navigator.heading_rad());
+        let ((x_m, y_m), depth_m, heading_rad) =
+            (navigator.position().xy(), navigator.depth_m(), navigator.heading_rad());
         let file = Default::default();
         self.camera.record(image, &RecordedFrame { t_s, file, x_m, y_m, depth_m, heading_rad, scale })?;
         if !self.mapper.takes(t_s) {

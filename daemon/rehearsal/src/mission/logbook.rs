@@ -1,5 +1,6 @@
 //! The record that a mission's report is made from.
 
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
@@ -31,9 +32,9 @@ pub(crate) struct Logbook {
 }
 
 impl Logbook {
-    pub(super) fn note_waypoint(&mut self, vehicle: &Vehicle, to: (f64, f64)) {
+    pub(super) fn note_waypoint(&mut self, vehicle: &Vehicle, to: MapPoint) {
         let navigator = vehicle.navigator();
-        self.legs.push((navigator.to_world(navigator.position()), navigator.to_world(to)));
+        self.legs.push((navigator.to_world(navigator.position()).xy(), navigator.to_world(to).xy()));
     }
 
     pub(super) fn note_applied(&mut self, applied: AppliedSlot) {

@@ -22,7 +22,7 @@ use carrier::Carrier;
 pub use logbook::Leg;
 use logbook::Logbook;
 use meters::Meters;
-use scenecast_config::{Config, cell_m};
+use scenecast_config::{Config, OperatorScript, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_drivers::modem::Station;
 use scenecast_host::{SurfaceHost, VehicleHost};
@@ -33,7 +33,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{Surface, SurfaceOutput};
 use scenecast_vehicle::{Durable, Mapper, Vehicle};
-use sim_channel::Position;
+use sim_channel::NodePosition;
 use std::time::Duration;
 use timetable::Timetable;
 
@@ -75,16 +75,21 @@ impl Mission {
         let area = camera.survey_area(&config)?;
         let vehicle = vehicle_host(&config, at_vehicle, area, seed, now)?;
         let mut surface = surface_host(&config, at_surface, seed, now)?;
-        let (x, y) = vehicle.vehicle().navigator().position();
+        let (x, y) = vehicle.vehicle().navigator().position().xy();
         let drift = config.navigation.drift_percent / 100.0;
         let motion = Motion::new(x, y, config.survey.speed_m_s, drift, seed);
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
-        let surface_place = Position::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
+        let surface_place = NodePosition::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
         carrier.place(SURFACE, surface_place);
-        let (anchored, relay) = Anchored::new(&config, surface_place, scenecast_config::origin(&config)?, seed ^ 0x6B5);
+        let (anchored, relay) = Anchored::new(&config, surface_place, config.mission.origin_deg, seed ^ 0x6B5);
         surface.surface_mut().set_relay(relay);
         let mut mission = Self {
-            mapper: Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?,
+            mapper: Mapper::new(
+                &config,
+                scenecast_files::configured_vocabulary(config.scene.vocabulary.as_deref())?,
+                0,
+                seed,
+            )?,
             address: scenecast_config::vehicle_address(&config)?,
             script: script(&config, area),
             times: Timetable::new(&config, now),
@@ -170,7 +175,7 @@ impl Mission {
 
     /// Whether the survey has ended and the operator has everything.
     pub fn is_drained(&self) -> bool {
-        self.times.ended.is_some() && self.vehicle().is_settled() && self.meters.labels.agreement() >= 1.0
+        self.times.ended.is_some() && self.vehicle().is_converged() && self.meters.labels.agreement() >= 1.0
     }
 
     /// Runs until `until`, or a little beyond the last event before it.
@@ -217,7 +222,7 @@ impl Mission {
 
     /// Metres between the vehicle's true and its estimated position.
     pub fn position_error_m(&self) -> f64 {
-        let (x, y) = self.vehicle().navigator().world();
+        let (x, y) = self.vehicle().navigator().world().xy();
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
     }
 
@@ -250,9 +255,9 @@ fn surface_host(config: &Config, station: Station, seed: u64, now: Instant) -> R
 
 fn script(config: &Config, area: Area) -> Script {
     let survey = &config.survey;
-    match config.operator.script.as_str() {
-        "scripted" => Script::of_survey(survey.duration_s),
-        "fenced" => Script::fenced(survey.duration_s, area, survey.speed_m_s),
-        _ => Script::none(),
+    match config.operator.script {
+        OperatorScript::Scripted => Script::of_survey(survey.duration_s),
+        OperatorScript::Fenced => Script::fenced(survey.duration_s, area, survey.speed_m_s),
+        OperatorScript::None => Script::none(),
     }
 }

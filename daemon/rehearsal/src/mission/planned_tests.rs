@@ -2,6 +2,7 @@
 
 use super::Mission;
 use super::tuned_tests::mission;
+use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::wire::{PlannedPath, VehicleMode};
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -9,9 +10,9 @@ use std::time::Duration;
 /// Waypoint and path in decimetres.
 type Plan = (Option<(i32, i32)>, Vec<(i32, i32)>);
 
-fn plan(waypoint: Option<(f64, f64)>, path: &PlannedPath) -> Plan {
-    let dm = |(x, y): (f64, f64)| ((x * 10.0).round() as i32, (y * 10.0).round() as i32);
-    (waypoint.map(dm), path.places.iter().copied().map(dm).collect())
+fn plan(waypoint: Option<MapPoint>, path: &PlannedPath) -> Plan {
+    let dm = |p: MapPoint| ((p.x_m * 10.0).round() as i32, (p.y_m * 10.0).round() as i32);
+    (waypoint.map(dm), path.points.iter().copied().map(dm).collect())
 }
 
 impl Mission {
@@ -41,7 +42,7 @@ impl Mission {
 }
 
 #[test]
-fn the_operator_soon_sees_the_plan_in_force() {
+fn the_shown_plan_is_the_vehicles_and_soon_the_current_one() {
     let mut mission = mission(&["channel.loss=0.1"]);
     let mut had = VecDeque::new();
     assert!(mission.watch_plans(&mut had, 90) > 1, "the legs of the lawnmower");

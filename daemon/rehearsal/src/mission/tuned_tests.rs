@@ -3,10 +3,10 @@
 use super::{Mission, MissionOptions};
 use crate::world::World;
 use scenecast_protocol::directive::SlotId;
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, PlaneKind};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::SlotState;
 use scenecast_surface::SettingsOrder;
 use std::time::Duration;
 
@@ -78,12 +78,12 @@ fn same(a: &LabelGrid, b: &LabelGrid) -> bool {
 }
 
 #[test]
-fn maps_agree_when_settings_change_during_the_survey() {
+fn priors_frame_rate_and_layers_change_during_a_mission() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
     assert!(frames >= 50 && labels > 1 && mission.heard_of(PlaneKind::Confidence) > 0);
-    mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "planes": "depth"}"#);
+    mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
     // Frames that were on their way when the settings changed have arrived.
     mission.fly_to(mission.now().as_secs_f64() + 30.0);
@@ -94,7 +94,7 @@ fn maps_agree_when_settings_change_during_the_survey() {
     assert!((9..=11).contains(&(mission.logbook.track.len() - frames)), "one frame in ten seconds is seen");
     assert_eq!(mission.heard_of(PlaneKind::Confidence), confidence, "a plane that is not told costs nothing");
     assert!(mission.heard_of(PlaneKind::Depth) > depth);
-    mission.tune(r#"{"frames_per_s": 0, "planes": "", "gamma": 0}"#);
+    mission.tune(r#"{"frames_per_s": 0, "layers": "", "gamma": 0}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "what an order does not name stays");
     mission.fly_to(mission.now().as_secs_f64() + 60.0);
     assert!(mission.heard_of(PlaneKind::Confidence) > confidence);
@@ -130,10 +130,10 @@ fn only_coarse_cells_are_told_until_all_are_wanted_again() {
 #[test]
 fn coarse_cells_need_far_fewer_bits() {
     let bytes = |cells: &str| {
-        let mut mission = mission(&["channel.loss=0", "map.planes=[]", cells]);
+        let mut mission = mission(&["channel.loss=0", "map.layers=[]", cells]);
         mission.fly_to(200.0);
         mission.drain();
-        mission.surface().view(mission.address).unwrap().stats().heard_by_class
+        mission.surface().view(mission.address).unwrap().stats().received_by_class
             [&scenecast_protocol::schedule::Class::Map]
     };
     let (fine, coarse) = (bytes("map.cells=fine"), bytes("map.cells=coarse"));

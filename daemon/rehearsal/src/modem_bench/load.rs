@@ -7,6 +7,7 @@ use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::Station;
 use scenecast_host::{FrameEvent, LinkHost};
+use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::directive::{Slot, SlotId, Utility};
 use scenecast_protocol::link::{
     PeerView, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
@@ -14,9 +15,9 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::MasterConfig;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
 use sim_channel::modem::{Emulator, Fault};
-use sim_channel::{Channel, ChannelConfig, LossModel, Position, Stream};
+use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -86,8 +87,8 @@ impl ModemBench {
         now: Instant,
     ) -> Result<Self, UserError> {
         let config = &setting.config;
-        rig.place(VEHICLE, Position::new(0.0, 0.0, 10.0));
-        rig.place(SURFACE, Position::new(setting.range_m, 0.0, 10.0));
+        rig.place(VEHICLE, NodePosition::new(0.0, 0.0, 10.0));
+        rig.place(SURFACE, NodePosition::new(setting.range_m, 0.0, 10.0));
         let address = scenecast_config::vehicle_address(config)?;
         let (mission, window) = (MissionId(7), Duration::from_secs_f64(config.link.budget_window_s));
         let vehicle = VehicleConfig {
@@ -108,7 +109,7 @@ impl ModemBench {
             shares: Shares::default(),
             master: MasterConfig::default(),
             vehicles: vec![address],
-            call_every: None,
+            discovery_period: None,
             authenticity: None,
         };
         let source = OpaqueSource::default();
@@ -161,7 +162,7 @@ impl ModemBench {
 
     /// Issues directives at random moments: from issue to applied, seconds.
     pub fn measure_directives(&mut self, count: usize, seed: u64) -> Summary {
-        let mut rng = Stream::new(seed, &[7]);
+        let mut rng = RandomStream::new(seed, &[7]);
         let mut latencies = Vec::new();
         for _ in 0..count {
             self.run(Duration::from_secs_f64(5.0 + rng.uniform() * 30.0));

@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bursts_use_most_of_the_modem_and_directives_pass() {
+    fn bursts_fill_the_modem_and_directives_overtake_them() {
         let row = measure_burst(2, Duration::from_secs(1200), 60).unwrap();
         assert!(row.share >= 0.8, "{row:?}");
         assert!(row.directive_p95_s < 25.0, "{row:?}");

@@ -4,7 +4,7 @@ use super::ModemSetting;
 use scenecast_drivers::modem::s2c::{Line, LineParser};
 use sim_channel::modem::Basin;
 use sim_channel::modem::s2c::{S2c, S2cConfig};
-use sim_channel::{Channel, NodeId, Position};
+use sim_channel::{Channel, NodeId, NodePosition};
 use std::time::Duration;
 
 const FROM: NodeId = NodeId(1);
@@ -18,7 +18,7 @@ pub fn push(setting: &ModemSetting, seed: u64, time: Duration) -> f64 {
     const WARM_UP: Duration = Duration::from_secs(60);
     let mut basin = Basin::new(Channel::new(setting.channel(), seed));
     for (node, x) in [(FROM, 0.0), (TO, setting.range_m)] {
-        basin.channel().place(node, Position::new(x, 0.0, 10.0));
+        basin.channel().place(node, NodePosition::new(x, 0.0, 10.0));
         let baud = Some(setting.config.modem.baud);
         basin.add(node, Box::new(S2c::new(S2cConfig { baud, seed, ..S2cConfig::new(node.0) })));
     }

@@ -3,10 +3,11 @@
 use super::scene::{CELL_M, Scene};
 use scenecast_core::Area;
 use scenecast_motion::{length_m, stretches_outside};
-use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon};
+use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
+use scenecast_protocol::directive::{Fence, PlannerKind, Polygon};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_vehicle::{Course, Footprint, Steering};
-use sim_channel::Stream;
+use sim_channel::RandomStream;
 
 /// Edge of the camera's footprint, metres: eight cells.
 const SIGHT_M: f64 = 2.0;
@@ -39,10 +40,10 @@ pub(crate) struct Drive {
 impl Task {
     /// A fence with cut corners, one or two keep-outs, and a start inside.
     pub fn draw(scene: &Scene, seed: u64) -> Self {
-        let mut rng = Stream::new(seed, &[0x91A7]);
+        let mut rng = RandomStream::new(seed, &[0x91A7]);
         let Area { east, north, .. } = scene.area;
-        let place = |x: f64, y: f64| Place::from_metres(x, y).unwrap_or_default();
-        let cut = |rng: &mut Stream| (0.03 + 0.12 * rng.uniform()) * east.min(north);
+        let place = |x: f64, y: f64| DecimetrePoint::nearest(WorldPoint::new(x, y)).unwrap_or_default();
+        let cut = |rng: &mut RandomStream| (0.03 + 0.12 * rng.uniform()) * east.min(north);
         let [a, b, c, d] = [cut(&mut rng), cut(&mut rng), cut(&mut rng), cut(&mut rng)];
         let fence = [
             (a, 0.0),
@@ -75,7 +76,7 @@ impl Task {
         let inside: Vec<Cell> = cells(scene.area).filter(|&c| bounds.holds(middle(c))).collect();
         let area = inside.len() as f64 * CELL_M * CELL_M;
         let utility: f64 = inside.iter().map(|&c| scene.utility.weight(scene.labels.get(c))).sum();
-        let fence = Fence { return_point: Place::from_metres(start.0, start.1), ..fence };
+        let fence = Fence { return_point: DecimetrePoint::nearest(WorldPoint::new(start.0, start.1)), ..fence };
         Self { fence, start, limit_m: SHARE * area / SIGHT_M, mean_per_m: utility * SIGHT_M / area.max(1e-9) }
     }
 }

@@ -21,7 +21,7 @@ pub struct Trial {
     /// Utility a metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
     pub utility_per_m: [f64; 3],
     /// The same of `horizon` if it knows the whole map from the start.
-    pub known_map_per_m: f64,
+    pub map_known_per_m: f64,
     /// Breaches of fence, keep-outs and limit, by the track audit.
     pub violations: usize,
     pub(crate) scene: Scene,
@@ -44,7 +44,7 @@ pub struct PlanningTable {
     /// common classes weigh alike.
     pub median: Medians,
     /// Median of `horizon` if it knows the whole map from the start: the difference is the cost of not knowing it.
-    pub told_all: f64,
+    pub map_known: f64,
     pub violations: usize,
     pub seeds: u64,
 }
@@ -69,7 +69,7 @@ pub fn drive_all(
     each: &mut dyn FnMut(f64, &Trial) -> Result<(), UserError>,
 ) -> Result<PlanningTable, UserError> {
     let real = images.iter().map(|(i, l)| Scene::from_files(i, l, seed)).collect::<Result<Vec<_>, _>>()?;
-    let (mut found, mut told_all) = (Vec::new(), Vec::new());
+    let (mut found, mut map_known) = (Vec::new(), Vec::new());
     let mut violations = 0;
     for n in 0..SEEDS {
         let reef = Scene::procedural(seed.wrapping_add(n));
@@ -78,13 +78,13 @@ pub fn drive_all(
             let trial = trial(scene, seed.wrapping_add(n));
             violations += trial.violations;
             found.push(trial.utility_per_m);
-            told_all.push(trial.known_map_per_m);
+            map_known.push(trial.map_known_per_m);
             each((n + 1) as f64 / SEEDS as f64, &trial)?;
         }
     }
     let [lawnmower, greedy, horizon] = [0, 1, 2].map(|i| median(found.iter().map(|f| f[i]).collect()));
     let median_of = Medians { lawnmower, greedy, horizon };
-    Ok(PlanningTable { median: median_of, told_all: median(told_all), violations, seeds: SEEDS })
+    Ok(PlanningTable { median: median_of, map_known: median(map_known), violations, seeds: SEEDS })
 }
 
 fn trial(scene: Scene, seed: u64) -> Trial {
@@ -93,9 +93,9 @@ fn trial(scene: Scene, seed: u64) -> Trial {
     let all = drive::drive(&scene, &task, PlannerKind::Horizon, MapKnowledge::All);
     let rate = |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9);
     let utility_per_m = drives.each_ref().map(rate);
-    let known_map_per_m = rate(&all);
+    let map_known_per_m = rate(&all);
     let violations = drives.iter().chain([&all]).map(|d| d.violations(&task)).sum();
-    Trial { name: scene.name.clone(), utility_per_m, known_map_per_m, violations, scene, task, drives: drives.into() }
+    Trial { name: scene.name.clone(), utility_per_m, map_known_per_m, violations, scene, task, drives: drives.into() }
 }
 
 /// Rounded to a thousandth.
@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(a.violations, 0);
         assert!(a.utility_per_m.iter().all(|&u| u > 0.0), "{:?}", a.utility_per_m);
         let lawnmower = a.utility_per_m[0];
-        assert!(a.known_map_per_m > lawnmower, "{} against {lawnmower}", a.known_map_per_m);
+        assert!(a.map_known_per_m > lawnmower, "{} against {lawnmower}", a.map_known_per_m);
         assert!(a.drives.iter().all(|d| d.metres() > 0.5 * a.task.limit_m), "the limit is made use of");
     }
 }

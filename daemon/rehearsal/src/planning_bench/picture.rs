@@ -32,7 +32,9 @@ pub fn picture(trial: &Trial) -> image::ImageResult<Vec<u8>> {
             (f64::from(left) + x * px, f64::from(height) - y * px)
         };
         for outline in trial.task.fence.outlines() {
-            outline.edges().for_each(|(a, b)| line(&mut image, place(a.metres()), place(b.metres()), 1, OUTLINE));
+            outline
+                .edges()
+                .for_each(|(a, b)| line(&mut image, place(a.to_world().xy()), place(b.to_world().xy()), 1, OUTLINE));
         }
         for (reach, colour) in [(2, SHADE), (1, TRACK)] {
             drive.track.windows(2).for_each(|leg| line(&mut image, place(leg[0]), place(leg[1]), reach, colour));

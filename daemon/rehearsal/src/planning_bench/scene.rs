@@ -55,7 +55,7 @@ impl Scene {
 
     fn reef(seed: u64, width: u32, height: u32) -> Self {
         const PX: u32 = 10;
-        let reef = scene_model::generate::reef(seed, width, height, 3 * PX, 8);
+        let reef = scenecast_worlds::reef(seed, width, height, 3 * PX, 8);
         let world = World::from_reef(&reef, CELL_M / f64::from(PX));
         Self::new(format!("reef-{seed}"), &reef.image, f64::from(PX), &world, seed)
     }

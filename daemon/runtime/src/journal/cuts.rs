@@ -127,7 +127,7 @@ fn a_record_torn_at_any_byte_leaves_the_one_before() {
 }
 
 #[test]
-fn a_rewrite_cut_at_any_step_leaves_old_or_new_state() {
+fn a_write_cut_at_any_step_leaves_the_old_or_the_new_state() {
     let mut outcomes = Vec::new();
     for steps in 0.. {
         let mut confirmed = false;

@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_record_is_damage_but_an_old_block_is_not() {
+    fn a_missing_record_is_damage_but_an_old_last_block_is_not() {
         let file = |numbers: &[u64]| numbers.iter().flat_map(|&n| encode(n, b"body")).collect::<Vec<u8>>();
         assert_eq!(scan(&file(&[5, 6, 8])), Err(Damage::At { offset: 2 * BLOCK }));
         let with_old = file(&[5, 6, 3]);

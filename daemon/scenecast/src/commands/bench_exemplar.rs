@@ -74,7 +74,7 @@ impl ExemplarBench {
 
 fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
     println!("10 kbit/s, 10 % of the frames lost. Seconds from the order to the image:");
-    println!("row                  asked  came   median     p95   worst  in 30 s  bytes median  vehicle bit/s");
+    println!("row                  asked  came   median     p95     max  in 30 s  bytes median  vehicle bit/s");
     for (name, a) in rows {
         let s = a.seconds.map_or([0.0; 3], in_order);
         println!(
@@ -92,7 +92,7 @@ fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
     println!();
     println!("Bytes of the patches that the vehicle picked, from {} sources:", bytes.sources);
     println!(
-        "edge  patches  fewest at SSIM 0.9: median    p95  worst  sent: median    p95  worst  at 0.9  SSIM median  least"
+        "edge  patches  fewest at SSIM 0.9: median    p95    max  sent: median    p95    max  at 0.9  SSIM median  least"
     );
     for s in &bytes.sizes {
         let sent = s.sent.map_or([0.0; 3], in_order);
@@ -110,7 +110,7 @@ fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
             sent[0],
             sent[1],
             sent[2],
-            100.0 * s.good_share,
+            100.0 * s.similar_share,
             s.ssim[0],
             s.ssim[1]
         );
@@ -120,5 +120,5 @@ fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
 }
 
 fn in_order(s: Spread) -> [f64; 3] {
-    [s.median, s.p95, s.worst]
+    [s.median, s.p95, s.max]
 }

@@ -71,7 +71,7 @@ fn print_row(r: &LinkRow) {
         r.efficiency,
         r.directive_median_s,
         r.directive_p95_s,
-        r.known_p95_s,
+        r.directive_known_p95_s,
         r.converge_p95_s,
         r.converge_within,
         r.budget_use,
@@ -108,9 +108,9 @@ fn print_fleet(f: &FleetRow) {
         f.range_km,
         f.frame_bytes,
         f.loss * 100.0,
-        f.found_s,
-        f.oldest_s,
-        f.oldest_shares
+        f.discovered_s,
+        f.max_age_s,
+        f.max_age_shares
     );
     println!("{:.0} s; efficiency {:.3}, budget used {:.2}.", f.fair_share_s, f.efficiency, f.budget_use);
 }

@@ -56,7 +56,7 @@ fn print(found: &Localisation) {
     for r in &found.runs {
         let count = |name| r.outliers.get(name).copied().unwrap_or(0);
         let at_relay: u64 =
-            ["depth", "outlier", "range_only", "too_vague", "unreadable", "no_gps"].into_iter().map(count).sum();
+            ["depth", "outlier", "range_only", "too_uncertain", "malformed", "no_gps"].into_iter().map(count).sum();
         println!(
             "{:>5} {:>8.2} {:>7.2} {:>6.3} {:>14.2} {:>6.3} {:>6} {:>5} {:>17} {:>11}",
             r.seed,

@@ -58,7 +58,7 @@ impl Planning {
             return Ok(());
         }
         let m = table.median;
-        println!("{:<17} {:>9.3} {:>8.3} {:>8.3} {:>9.3}", "median", m.lawnmower, m.greedy, m.horizon, table.told_all);
+        println!("{:<17} {:>9.3} {:>8.3} {:>8.3} {:>9.3}", "median", m.lawnmower, m.greedy, m.horizon, table.map_known);
         println!(
             "horizon: {:.2} x lawnmower, {:.2} x greedy; {} violations; {} seeds",
             m.horizon / m.lawnmower.max(1e-9),
@@ -81,7 +81,7 @@ fn print_trial(t: &Trial) {
     println!(
         "{:<17} {lawnmower:>9.3} {greedy:>8.3} {horizon:>8.3} {:>9.3} {:>18.2} {:>15.2} {:>11}",
         t.name,
-        t.known_map_per_m,
+        t.map_known_per_m,
         horizon / lawnmower.max(1e-9),
         horizon / greedy.max(1e-9),
         t.violations

@@ -3,9 +3,7 @@
 /// A place with its uncertainty: covariance in m2, xx, xy, yy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// East, metres.
     pub x_m: f64,
-    /// North, metres.
     pub y_m: f64,
     /// Covariance of x and y, square metres: xx, xy, yy.
     pub cov_m2: [f64; 3],
@@ -31,7 +29,6 @@ impl Estimate {
 /// What became of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// It was used.
     Used,
     /// It is too far from what was expected.
     Outlier,
@@ -52,9 +49,7 @@ pub struct PlaneFilter {
 #[derive(Debug, Clone, Copy)]
 struct State {
     at_s: f64,
-    /// x, y, metres.
     place: [f64; 2],
-    /// Metres a second.
     velocity: [f64; 2],
     /// Covariance of one axis: place, place-velocity, velocity; both axes have the noise of the rounder measurement.
     p: [[f64; 3]; 2],
@@ -152,7 +147,6 @@ impl State {
         self
     }
 
-    /// Mahalanobis distance squared.
     fn distance2(&self, seen: &Estimate) -> f64 {
         let (dx, dy) = (seen.x_m - self.place[0], seen.y_m - self.place[1]);
         let [xx, xy, yy] = seen.cov_m2;
@@ -179,11 +173,11 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim_channel::Stream;
+    use sim_channel::RandomStream;
 
     #[test]
     fn a_steady_way_becomes_known_better_than_it_is_measured() {
-        let mut dice = Stream::new(1, &[]);
+        let mut dice = RandomStream::new(1, &[]);
         let mut filter = PlaneFilter::new(0.02);
         let mut worst: f64 = 0.0;
         for s in 0..200 {
@@ -201,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_is_refused_and_a_place_that_is_told_again_and_again_is_believed() {
+    fn an_echo_is_refused_until_it_repeats() {
         let mut filter = PlaneFilter::new(0.02);
         for s in 0..20 {
             filter.update(&Estimate::round(0.0, 0.0, 1.0), f64::from(s));

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_stays_while_the_vehicle_is_near_and_goes_to_the_stand_off_when_it_is_not() {
+    fn the_ship_moves_only_when_the_vehicle_is_far() {
         let mut follow = Follow::new(20.0, 10.0);
         assert_eq!(follow.next((25.0, 0.0), (0.0, 0.0), (0.0, 0.0)), None, "within the dead band");
         assert_eq!(follow.next((100.0, 0.0), (0.0, 0.0), (0.0, 0.0)), Some((20.0, 0.0)));

@@ -4,18 +4,17 @@ use super::filter::{Estimate, PlaneFilter, Verdict};
 use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, TangentPlane};
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// How the relay works.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RelayConfig {
     /// Origin of the world frame; `None`: the first good position.
     pub origin: Option<LatLon>,
-    /// What the GPS speaks.
     pub language: GpsLanguage,
     /// How the USBL head is mounted.
     pub mounting: Mounting,
@@ -36,18 +35,16 @@ pub enum RelayFault {
     Outlier,
     /// It is too uncertain to be of use.
     TooVague,
-    /// It came too late.
     TooOld,
 }
 
 impl RelayFault {
-    /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Usbl(fault) => fault.name(),
             Self::NoGps => "no_gps",
             Self::Outlier => "outlier",
-            Self::TooVague => "too_vague",
+            Self::TooVague => "too_uncertain",
             Self::TooOld => "too_old",
         }
     }
@@ -57,7 +54,6 @@ impl RelayFault {
 #[derive(Debug)]
 struct Seen {
     filter: PlaneFilter,
-    /// As its status said.
     depth: Option<(f64, Instant)>,
     sighted: Option<Instant>,
     fixed: Option<Instant>,
@@ -122,7 +118,6 @@ impl Relay {
         self.faults.iter().map(|(&f, &n)| (f, n))
     }
 
-    /// Fixes given so far.
     pub fn fixes(&self) -> u64 {
         self.fixes
     }
@@ -152,7 +147,6 @@ impl Relay {
         self.gps.handle_open()
     }
 
-    /// Bytes of the GPS.
     pub fn handle_gps(&mut self, bytes: &[u8], now: Instant) {
         for fix in self.gps.handle_bytes(bytes, now) {
             let plane = self.plane.get_or_insert_with(|| TangentPlane::new(fix.place));
@@ -231,7 +225,8 @@ impl Relay {
             return Ok(None);
         }
         self.seen(vehicle).fixed = Some(now);
-        Ok(Some(Fix { x_m: place.x_m, y_m: place.y_m, sigma_m: place.sigma_m(), age_s }))
+        let position = WorldPoint { east_m: place.x_m, north_m: place.y_m };
+        Ok(Some(Fix { position, sigma_m: place.sigma_m(), age_s }))
     }
 }
 
@@ -286,7 +281,7 @@ mod tests {
         assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(0.0)), Err(RelayFault::NoGps));
         anchored(&mut relay, 100.0, -50.0, 30);
         let fix = relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(29.0)).unwrap().unwrap();
-        assert!((fix.x_m - 130.0).abs() < 0.5 && (fix.y_m + 10.0).abs() < 0.5, "{fix:?}");
+        assert!((fix.position.east_m - 130.0).abs() < 0.5 && (fix.position.north_m + 10.0).abs() < 0.5, "{fix:?}");
         assert!((1.0..2.0).contains(&fix.sigma_m) && fix.age_s == 0.8, "{fix:?}");
         assert_eq!(relay.handle_usbl(vehicle(), &sighting(30.0, 40.0, 20.0), at(30.0)), Ok(None), "one in 10 s");
     }
@@ -318,7 +313,7 @@ mod tests {
             let [range_m, bearing_rad, elevation_rad, accuracy_m, age_s] = numbers;
             let s = UsblSighting { range_m, bearing_rad, elevation_rad, accuracy_m, age_s };
             if let Ok(Some(fix)) = relay.handle_usbl(vehicle(), &s, at(5.0)) {
-                prop_assert!(fix.x_m.is_finite() && fix.y_m.is_finite() && fix.sigma_m.is_finite());
+                prop_assert!(fix.position.east_m.is_finite() && fix.position.north_m.is_finite() && fix.sigma_m.is_finite());
             }
         }
     }

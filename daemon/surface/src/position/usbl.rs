@@ -5,7 +5,6 @@ use super::filter::Estimate;
 /// What a head told of the vehicle, relative to the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsblSighting {
-    /// Slant range, metres.
     pub range_m: f64,
     /// Bearing clockwise, radians: from true north if the head has a compass of its own, else from the bow.
     pub bearing_rad: f64,
@@ -52,10 +51,9 @@ pub enum UsblFault {
 }
 
 impl UsblFault {
-    /// Name in the API.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Unreadable => "unreadable",
+            Self::Unreadable => "malformed",
             Self::RangeOnly => "range_only",
             Self::Depth => "depth",
             Self::NoHeading => "no_heading",
@@ -64,7 +62,7 @@ impl UsblFault {
 }
 
 /// Longest range that any head has, metres.
-const LONGEST_M: f64 = 20_000.0;
+const MAX_M: f64 = 20_000.0;
 /// Accuracy over range from which only the range is good.
 const RANGE_ONLY: f64 = 0.5;
 /// Standard deviation of a depth that the vehicle tells, metres.
@@ -82,7 +80,7 @@ pub fn offset(
     let s = sighting;
     let numbers = [s.range_m, s.bearing_rad, s.elevation_rad, s.accuracy_m, s.age_s];
     let is_readable = numbers.iter().all(|n| n.is_finite())
-        && (0.0..=LONGEST_M).contains(&s.range_m)
+        && (0.0..=MAX_M).contains(&s.range_m)
         && s.bearing_rad.abs() <= 7.0
         && s.elevation_rad.abs() <= std::f64::consts::FRAC_PI_2 + 1e-6
         && s.accuracy_m >= 0.0;

@@ -3,24 +3,26 @@
 use crate::progress::Progress;
 use clap::{Args, Subcommand};
 use image::RgbImage;
-use scene_model::words::{WordConfig, WordExtractor};
+use scene_model::words::WordConfig;
 use scenecast_core::UserError;
 use scenecast_files::read_image;
 use scenecast_files::write_whole;
+use scenecast_scoring::train_vocabulary;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-/// Make the vocabularies that images are put into words with.
+/// Train the vocabulary that turns images into visual words.
 #[derive(Debug, Subcommand)]
 pub enum Vocabulary {
     Train(Train),
 }
 
-/// Learn a vocabulary from a folder of images
+/// Train a vocabulary on a folder of images
 ///
-/// That is the tones and the spread of colours and textures that words are measured against. Take images of a site like the one to come, by the same camera and light. Words then mean the same in every mission,
-/// from its first frame on; with the vocabulary that ships, the first frames of a mission are learnt from instead. Use it as
-/// scene.vocabulary of a vehicle, or with scenecast scene run --vocabulary. Images named *_label are passed over.
+/// A vocabulary holds the typical tones and the spread of colours and textures, to which visual words are related. Use images
+/// of a similar site, with the same camera and light. Words then have the same meaning in every mission from its first frame.
+/// The built-in vocabulary adapts to the first frames of each mission instead. Set scene.vocabulary of the vehicle to the
+/// file, or use scenecast scene run --vocabulary. Images named *_label are skipped.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast vocabulary train --images last-dive --out reef.vocabulary")]
 pub struct Train {
@@ -59,7 +61,7 @@ impl Train {
             image.map_err(|e| *problem.borrow_mut() = Some(e)).ok().map(|image| (image, self.cell_px))
         };
         // The first image that cannot be read ends the work.
-        let measures = WordExtractor::train(&WordConfig::default(), || files.iter().map_while(read));
+        let measures = train_vocabulary(&WordConfig::default(), || files.iter().map_while(read));
         drop(progress);
         if let Some(problem) = problem.into_inner() {
             return Err(problem);

@@ -10,13 +10,12 @@ use std::path::Path;
 /// Class that stands for "not annotated".
 const IGNORE: u8 = 255;
 /// Most different classes of places.
-const MOST_CLASSES: usize = 255;
+const MAX_CLASSES: usize = 255;
 
 /// Annotations as they were read.
 pub(crate) enum Annotated {
     /// A class a pixel of the mosaic.
     Pixels {
-        /// The classes.
         classes: GrayImage,
         /// Classes that do not count.
         ignore: Vec<u8>,
@@ -55,8 +54,8 @@ impl Annotated {
             }
             let next = names.len();
             let index = *names.entry(class).or_insert(next);
-            if index >= MOST_CLASSES {
-                return Err(lines.problem(format!("more than {MOST_CLASSES} different classes")));
+            if index >= MAX_CLASSES {
+                return Err(lines.problem(format!("more than {MAX_CLASSES} different classes")));
             }
             places.push((at, index as u8));
         }

@@ -5,14 +5,14 @@ use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
 
 /// Most cells of the rectangle around a map.
-const MOST_CELLS: u64 = 1 << 26;
+const MAX_CELLS: u64 = 1 << 26;
 
 /// The rectangle around cells from (west, south) to (east, north); a problem if it is too large for a picture.
 pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<Rect, String> {
     let (width, height) = ((east - west + 1) as u64, (north - south + 1) as u64);
-    if width.saturating_mul(height) > MOST_CELLS {
+    if width.saturating_mul(height) > MAX_CELLS {
         return Err(format!(
-            "the map would reach over {width} x {height} cells, more than {MOST_CELLS}: a position far off, or --cell-size too small"
+            "the map would reach over {width} x {height} cells, more than {MAX_CELLS}: a position far off, or --cell-size too small"
         ));
     }
     Ok(Rect { x: west as i32, y: south as i32, width: width as u32, height: height as u32 })

@@ -7,9 +7,8 @@ use scenecast_core::UserError;
 use std::time::Instant;
 
 /// Longest time between two sightings that is refined for, seconds.
-const LONGEST_GAP_S: f64 = 60.0;
+const MAX_GAP_S: f64 = 60.0;
 
-/// When words are resampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Schedule {
     /// All words, so many times, when everything was seen.
@@ -18,12 +17,9 @@ pub(crate) enum Schedule {
     Online(f64),
 }
 
-/// What learning took.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Effort {
-    /// Words resampled.
     pub(crate) resampled: u64,
-    /// Time of resampling.
     pub(crate) seconds: f64,
     /// CPU time of resampling, all threads together.
     pub(crate) cpu_seconds: f64,
@@ -62,7 +58,7 @@ pub(crate) fn learn(
     let reading = if matches!(schedule, Schedule::Online(_)) { 1.0 } else { 0.3 };
     while let Some(Sighting { t_s, observations, done }) = source.next()? {
         if let (Schedule::Online(rate), Some(last)) = (schedule, last) {
-            let gap = f64::clamp(t_s - last, 0.0, LONGEST_GAP_S);
+            let gap = f64::clamp(t_s - last, 0.0, MAX_GAP_S);
             gaps = (gaps.0 + gap, gaps.1 + 1);
             refine(model, &mut effort, rate * gap);
         }

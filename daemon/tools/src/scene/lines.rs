@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Most bytes of a line.
-const MOST_BYTES: usize = 1 << 20;
+const MAX_BYTES: usize = 1 << 20;
 
 /// The lines of a file that say something: not empty, no comment behind `#`.
 pub(super) struct Lines {
@@ -19,13 +19,9 @@ pub(super) struct Lines {
     number: u64,
 }
 
-/// A line.
 pub(super) struct Line<'a> {
-    /// Without white space around.
     pub(super) text: &'a str,
-    /// Counted from 1.
     pub(super) number: u64,
-    /// Where it begins, bytes.
     pub(super) offset: u64,
 }
 
@@ -69,15 +65,15 @@ impl Lines {
         loop {
             self.buffer.clear();
             let offset = self.offset;
-            let read = (&mut self.reader).take(MOST_BYTES as u64 + 1).read_until(b'\n', &mut self.buffer);
+            let read = (&mut self.reader).take(MAX_BYTES as u64 + 1).read_until(b'\n', &mut self.buffer);
             let read = read.map_err(|e| UserError::file(&self.path, e))?;
             if read == 0 {
                 return Ok(None);
             }
             self.number += 1;
             self.offset += read as u64;
-            if read > MOST_BYTES {
-                return Err(self.problem(format!("the line is longer than {MOST_BYTES} bytes")));
+            if read > MAX_BYTES {
+                return Err(self.problem(format!("the line is longer than {MAX_BYTES} bytes")));
             }
             let says_something = |text: &str| !text.is_empty() && !text.starts_with('#');
             match std::str::from_utf8(&self.buffer) {

@@ -27,15 +27,12 @@ use scenecast_core::UserError;
 
 /// What was seen at one time.
 pub(crate) struct Sighting {
-    /// Seconds.
     pub(crate) t_s: f64,
-    /// Words in the world.
     pub(crate) observations: Vec<Observation>,
     /// Share of the source that was read by now.
     pub(crate) done: f64,
 }
 
-/// Where words come from.
 pub(crate) trait Source {
     /// The next sighting, in order of time; none at the end.
     fn next(&mut self) -> Result<Option<Sighting>, UserError>;

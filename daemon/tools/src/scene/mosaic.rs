@@ -8,12 +8,11 @@ use scenecast_files::read_image;
 use std::path::Path;
 
 /// Least edge of a cell: with less there is nothing to see in one.
-const LEAST_CELL_PX: f64 = 4.0;
+const MIN_CELL_PX: f64 = 4.0;
 
 /// A mosaic, its top left corner at the origin: x grows to the right, y upwards, so y is below 0.
 pub(crate) struct Mosaic {
     observations: Option<Vec<Observation>>,
-    /// Width and height, pixels.
     pub(crate) size: (u32, u32),
     /// Edge of a cell, pixels.
     pub(crate) cell_px: f32,
@@ -30,9 +29,9 @@ impl Mosaic {
         let cell_px = cell_m / metres_per_pixel;
         let image = read_image(path)?.to_rgb8();
         let (width, height) = image.dimensions();
-        if cell_px < LEAST_CELL_PX {
+        if cell_px < MIN_CELL_PX {
             let what =
-                format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {LEAST_CELL_PX} are needed");
+                format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {MIN_CELL_PX} are needed");
             return Err(UserError::Input(what));
         }
         if f64::from(width.min(height)) < cell_px {

@@ -3,17 +3,17 @@
 use super::Annotated;
 use super::bounds::around;
 use image::{GrayImage, Luma};
-use scene_model::score::{Annotations, LabelGrid, SceneScore, score};
 use scene_model::topics::{FlatCell, SceneModel, coord_of};
 use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
+use scenecast_scoring::{Annotations, LabelGrid, SceneScore, score};
 use std::collections::BTreeMap;
 
 /// Mutual information of labels and classes, and of displaced labels and classes.
 pub(crate) type Quality = SceneScore;
 
 /// Most cells times classes that are counted.
-const MOST_COUNTS: u64 = 1 << 27;
+const MAX_COUNTS: u64 = 1 << 27;
 /// Class of cells that have none.
 const NONE: u8 = 255;
 
@@ -21,7 +21,7 @@ const NONE: u8 = 255;
 ///
 /// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
 pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
-    let refused = |e: scene_model::score::AnnotationError| UserError::Input(e.to_string());
+    let refused = |e: scenecast_scoring::AnnotationError| UserError::Input(e.to_string());
     match annotated {
         Annotated::Pixels { classes, ignore } => {
             let annotations = Annotations::new(classes, classes.dimensions(), cell_px, ignore).map_err(refused)?;
@@ -52,7 +52,7 @@ impl Sheet {
         layers.dedup();
         let classes = places.iter().map(|place| u64::from(place.1) + 1).max().unwrap_or(1);
         let cells = u64::from(bounds.width) * u64::from(bounds.height) * layers.len() as u64;
-        if cells * classes > MOST_COUNTS {
+        if cells * classes > MAX_COUNTS {
             let what =
                 format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
             return Err(UserError::Input(what));
@@ -104,7 +104,7 @@ mod tests {
     use scene_model::topics::SceneConfig;
 
     #[test]
-    fn labels_that_follow_the_classes_tell_everything_in_every_layer() {
+    fn labels_equal_to_the_classes_have_full_information() {
         let config = SceneConfig { cell_m: [1.0; 3], vocabulary: 4, gamma: 0.01, ..SceneConfig::default() };
         let mut model = SceneModel::new(config).unwrap();
         let (mut seen, mut places) = (Vec::new(), Vec::new());

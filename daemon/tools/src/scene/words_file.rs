@@ -9,16 +9,15 @@ use scenecast_core::UserError;
 use std::path::Path;
 
 /// Words of one sighting at most; so much is held at once.
-const MOST_WORDS: usize = 1 << 16;
+const MAX_WORDS: usize = 1 << 16;
 /// Most different words, as the scene model has it.
-const MOST_VOCABULARY: u32 = 1 << 20;
+const MAX_VOCABULARY: u32 = 1 << 20;
 
 /// A file of words, read twice: once to check all of it, then as it is learnt from.
 ///
 /// A line is a place and the words there: seconds, metres, word ids. A first line that begins with `t` names the columns.
 pub(crate) struct WordsFile {
     lines: Lines,
-    /// Number of different words.
     pub(crate) vocabulary: u32,
     /// Where each line begins, in order of time, if the file has another order.
     order: Option<std::vec::IntoIter<Mark>>,
@@ -48,7 +47,7 @@ impl WordsFile {
         let mut lines = Lines::open(path)?;
         let mut extent = Extent::new(cell_m);
         let (mut marks, mut largest, mut words, mut begun) = (Vec::new(), 0, 0u64, 0);
-        let most = vocabulary.unwrap_or(MOST_VOCABULARY);
+        let most = vocabulary.unwrap_or(MAX_VOCABULARY);
         let mut seen = Vec::new();
         while let Some(line) = lines.next()? {
             let Line { number, offset, .. } = line;
@@ -120,7 +119,7 @@ impl WordsFile {
 impl Source for WordsFile {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         let Some((t_s, mut observations)) = self.next_line()? else { return Ok(None) };
-        while observations.len() < MOST_WORDS {
+        while observations.len() < MAX_WORDS {
             let Some((later_s, more)) = self.next_line()? else { break };
             if self.in_time && later_s != t_s {
                 self.ahead = Some((later_s, more));

@@ -4,10 +4,8 @@ use super::ssim::Luma;
 use image::RgbImage;
 use scenecast_protocol::exemplar::{strip, unstrip};
 
-/// A compressed patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compressed {
-    /// As on the wire.
     pub bytes: Vec<u8>,
     /// Structural similarity with the patch.
     pub ssim: f64,
@@ -87,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_is_spent_than_the_likeness_asks_for_and_never_more_than_allowed() {
+    fn compression_stops_at_the_similarity_and_the_byte_limit() {
         let smooth = patch(64, 20);
         let enough = compress_to(&smooth, 0.9, 700).unwrap();
         assert!(enough.ssim >= 0.9 && enough.bytes.len() <= 700, "{} at {}", enough.bytes.len(), enough.ssim);

@@ -24,15 +24,15 @@ pub fn middle(patch: &RgbImage, size: u8) -> Option<(u8, RgbImage)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::exemplar::{Exemplar, most_bytes};
+    use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 
     #[test]
-    fn an_image_fits_its_budget_and_is_a_file_again_at_the_other_end() {
+    fn an_image_fits_its_budget_and_decodes_at_the_other_end() {
         let patch = RgbImage::from_fn(128, 128, |x, y| image::Rgb([(x * 2) as u8, (y * 2) as u8, ((x ^ y) * 2) as u8]));
         for size in [0, 1, 2] {
             let (cut, small) = middle(&patch, size).unwrap();
             assert_eq!((u32::from(cut), small.width()), (u32::from(size.min(1)), edge_px(cut)));
-            let bytes = compress_to(&small, GOOD_SSIM, most_bytes(cut)).unwrap().bytes;
+            let bytes = compress_to(&small, GOOD_SSIM, max_bytes(cut)).unwrap().bytes;
             let sent = Exemplar { epoch: 1, label: 5, serial: 2, size: cut, picture: 1, bytes };
             assert!(sent.encode().len() <= 700 << (2 * cut));
             let file = Exemplar::decode(&sent.encode()).unwrap().webp().unwrap();

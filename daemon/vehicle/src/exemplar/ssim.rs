@@ -8,7 +8,6 @@
 
 use image::RgbImage;
 
-/// Edge of the window.
 const WINDOW: usize = 11;
 const SIGMA: f64 = 1.5;
 /// (K1 L)^2 and (K2 L)^2.

@@ -6,11 +6,8 @@ use std::collections::VecDeque;
 /// What the sensors told of a stretch of way, uncorrected.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Way {
-    /// East, metres.
     pub(super) dx_m: f64,
-    /// North, metres.
     pub(super) dy_m: f64,
-    /// Length, metres.
     pub(super) length_m: f64,
 }
 
@@ -23,7 +20,7 @@ pub(super) struct Odometer {
 
 impl Odometer {
     /// Most steps that are kept, whatever their rate.
-    const MOST: usize = 20_000;
+    const MAX: usize = 20_000;
 
     fn last(&self) -> Way {
         self.track.back().map_or_else(Way::default, |(_, way)| *way)
@@ -35,7 +32,7 @@ impl Odometer {
         self.track.push_back((now, way));
         let is_old = |at: Instant| now.since(at).as_secs_f64() > memory_s;
         // One entry that is older stays: what is younger lies between it and the next.
-        while self.track.len() > Self::MOST || self.track.get(1).is_some_and(|(at, _)| is_old(*at)) {
+        while self.track.len() > Self::MAX || self.track.get(1).is_some_and(|(at, _)| is_old(*at)) {
             self.track.pop_front();
         }
     }
@@ -60,7 +57,7 @@ impl Odometer {
             }
             (Some((_, last)), None) => *last,
             // Before the first step it was where it began.
-            (None, Some(_)) if self.track.len() < Self::MOST => Way::default(),
+            (None, Some(_)) if self.track.len() < Self::MAX => Way::default(),
             (None, Some(_)) => return None,
             (None, None) => Way::default(),
         };

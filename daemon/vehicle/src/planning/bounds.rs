@@ -16,7 +16,7 @@ pub struct Bounds {
 impl Bounds {
     /// The bounds of a fence that was checked.
     pub fn new(fence: &Fence, clearance_m: f64) -> Self {
-        let metres = |p: &Polygon| p.0.iter().map(|v| v.metres()).collect();
+        let metres = |p: &Polygon| p.0.iter().map(|v| v.to_world().xy()).collect();
         Self {
             fence: fence.fence.as_ref().map(metres),
             keep_outs: fence.keep_outs.iter().map(metres).collect(),
@@ -53,7 +53,6 @@ impl Bounds {
     }
 }
 
-/// Metres between two places.
 pub fn distance(a: Point, b: Point) -> f64 {
     (a.0 - b.0).hypot(a.1 - b.1)
 }
@@ -95,10 +94,10 @@ fn to_segment(p: Point, a: Point, b: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::directive::Place;
+    use scenecast_protocol::coordinates::DecimetrePoint;
 
     fn square(x: i32, y: i32, side: i32) -> Polygon {
-        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         Polygon(vec![place(x, y), place(x + side, y), place(x + side, y + side), place(x, y + side)])
     }
 

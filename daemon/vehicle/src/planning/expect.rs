@@ -3,9 +3,7 @@
 /// Labels of a rectangle of cells, row by row from the south-west; 0 = not seen.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
-    /// One label a cell.
     pub labels: &'a [u8],
-    /// Cells of a row.
     pub width: usize,
 }
 
@@ -41,7 +39,6 @@ const MIX: f32 = 0.05;
 const NEW: f32 = 0.05;
 
 impl<'a> Expectation<'a> {
-    /// Takes what was seen.
     pub fn new(seen: Seen<'a>) -> Self {
         Self::with(seen, REACH, MIX)
     }
@@ -149,7 +146,7 @@ mod tests {
     /// Mean log-likelihood of the hidden cells by the expectation and by the shares of the seen map.
     fn likelihoods(truth: &[u8], width: usize, seed: u64) -> (f64, f64) {
         let mut seen = vec![0u8; truth.len()];
-        let mut chance = sim_channel::Stream::new(seed, &[7]);
+        let mut chance = sim_channel::RandomStream::new(seed, &[7]);
         let height = truth.len() / width;
         for _ in 0..40 {
             let (x, y) = (chance.below(width - 8), chance.below(height - 8));
@@ -173,9 +170,9 @@ mod tests {
     }
 
     #[test]
-    fn hidden_cells_of_procedural_reefs_are_likelier_than_by_the_maps_overall_mix() {
+    fn hidden_cells_are_predicted_better_than_by_overall_shares() {
         for seed in 1..=6 {
-            let reef = scene_model::generate::reef(seed, 120, 90, 8, 8);
+            let reef = scenecast_worlds::reef(seed, 120, 90, 8, 8);
             let truth: Vec<u8> = reef.truth.iter().map(|c| c + 1).collect();
             let (by_place, by_mix) = likelihoods(&truth, 120, seed);
             assert!(by_place > by_mix + 0.05, "seed {seed}: {by_place} against {by_mix}");

@@ -11,7 +11,6 @@ use super::{Planner, Question, greedy};
 /// is shown on the way back.
 #[derive(Debug)]
 pub struct Horizon {
-    /// Steps ahead.
     pub steps: usize,
     /// Ways kept after each step.
     pub beam: usize,

@@ -5,8 +5,7 @@ use scenecast_core::Area;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Most places a side.
-const MOST_SIDE: usize = 192;
+const MAX_SIDE: usize = 192;
 /// Steps to the eight places around, in the order of the bits of a move mask.
 const MOVES: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
@@ -40,7 +39,7 @@ impl Lattice {
         };
         let (west, east) = fold(area.west, area.east, |p| p.0);
         let (south, north) = fold(area.south, area.north, |p| p.1);
-        let step_m = step_m.max((east - west).max(north - south) / (MOST_SIDE - 2) as f64).max(1e-3);
+        let step_m = step_m.max((east - west).max(north - south) / (MAX_SIDE - 2) as f64).max(1e-3);
         // Places beyond the area lie a whole number of steps from its corner.
         let before = |from: f64, to: f64| ((to - from) / step_m - 1e-9).ceil().max(0.0);
         let origin = (area.west - before(west, area.west) * step_m, area.south - before(south, area.south) * step_m);
@@ -68,12 +67,10 @@ impl Lattice {
         (self.columns, self.rows)
     }
 
-    /// Number of places.
     pub fn places(&self) -> usize {
         self.moves.len()
     }
 
-    /// Where a place is.
     pub fn place(&self, node: Node) -> Point {
         let (column, row) = (node % self.columns, node / self.columns);
         (self.origin.0 + column as f64 * self.step_m, self.origin.1 + row as f64 * self.step_m)
@@ -170,13 +167,14 @@ impl Ways {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::directive::{Fence, Place, Polygon};
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Fence, Polygon};
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 10.0 };
 
     /// A wall from the southern edge to two metres before the northern one.
     fn walled() -> (Bounds, Lattice) {
-        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         let wall = Polygon(vec![place(9, -1), place(11, -1), place(11, 8), place(9, 8)]);
         let bounds = Bounds::new(&Fence { keep_outs: vec![wall], ..Fence::default() }, 0.5);
         let lattice = Lattice::new(AREA, &[], 1.0, &bounds);
@@ -222,6 +220,6 @@ mod tests {
         let home = lattice.entry((-35.0, 5.0), &Bounds::default()).unwrap();
         assert!(distance(lattice.place(home), (-35.0, 5.0)) < 1.0);
         let huge = Lattice::new(AREA, &[(-35_000.0, 5.0)], 1.0, &Bounds::default());
-        assert!(huge.places() <= MOST_SIDE * MOST_SIDE);
+        assert!(huge.places() <= MAX_SIDE * MAX_SIDE);
     }
 }

@@ -26,7 +26,6 @@ pub struct Question<'a> {
     pub lattice: &'a Lattice,
     /// What is to be gained.
     pub worth: &'a Worth,
-    /// Where the way begins.
     pub from: Node,
     /// Ways from the place where it must be able to end.
     pub home: &'a Ways,
@@ -75,14 +74,15 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
     use scenecast_core::Area;
-    use scenecast_protocol::directive::{Fence, Place, Polygon, Utility};
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Fence, Polygon, Utility};
     use scenecast_protocol::map::{Cell, LabelGrid};
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
 
     /// The answer of a planner on a patchy map with a keep-out, and whether each of its places may be gone to.
     fn ask(kind: PlannerKind, corner: (i32, i32), start: usize, left_m: f64, weights: (i8, i8)) -> (Vec<Node>, bool) {
-        let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
         let (x, y) = corner;
         let keep_out = Polygon(vec![place(x, y), place(x + 4, y + 1), place(x + 2, y + 5)]);
         let bounds = Bounds::new(&Fence { keep_outs: vec![keep_out], ..Fence::default() }, 0.5);
@@ -108,7 +108,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         #[test]
-        fn every_way_is_allowed_leaves_the_way_home_and_is_the_same_again(
+        fn every_plan_is_allowed_leaves_a_return_path_and_repeats(
             corner in (1i32..15, 1i32..8), start in 0usize..100_000, left_m in 0.0f64..80.0,
             weights in (-100i8..=100, -100i8..=100),
         ) {

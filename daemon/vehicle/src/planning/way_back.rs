@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn of_the_ways_home_that_are_equally_short_the_one_that_shows_most_is_gone() {
+    fn of_equally_short_return_paths_the_most_valuable_is_taken() {
         let lattice = Lattice::new(AREA, &[], 1.0, &Bounds::default());
         let node = |x, y| lattice.entry((x, y), &Bounds::default()).unwrap();
         let (from, home) = (node(16.0, 8.0), lattice.ways(node(2.0, 2.0)));

@@ -30,7 +30,7 @@ impl Knowledge {
 }
 
 /// Worth of the next look at a cell that was looked at before, against the look before that.
-const AGAIN: f32 = 0.2;
+const REPEATED_LOOK: f32 = 0.2;
 
 /// Worth of the next look at each block, the square between four places of a lattice. A place shows the four blocks around it.
 #[derive(Debug, Clone)]
@@ -80,12 +80,10 @@ impl Worth {
         [first, first + 1, first + self.columns, first + self.columns + 1]
     }
 
-    /// Worth of a block.
     pub fn of(&self, block: usize) -> f32 {
         self.blocks[block]
     }
 
-    /// Number of blocks.
     pub fn blocks(&self) -> usize {
         self.blocks.len()
     }
@@ -94,20 +92,16 @@ impl Worth {
 /// The cells whose worth counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// Westernmost column.
     pub x: i32,
-    /// Southernmost row.
     pub y: i32,
-    /// Columns.
     pub width: usize,
-    /// Rows.
     pub height: usize,
     /// Edge of a cell, metres.
     pub cell_m: f64,
 }
 
 /// Most cells whose worth is reckoned one by one.
-const MOST_CELLS: f64 = 4e6;
+const MAX_CELLS: f64 = 4e6;
 
 impl Window {
     /// The cells of an area; fewer where that would be too many.
@@ -117,8 +111,8 @@ impl Window {
         let count =
             |from: i32, to: f64| f64::from((((to / cell_m - 1e-9).ceil().clamp(-1e9, 1e9) as i32) - from).max(1));
         let (width, height) = (count(x, area.east), count(y, area.north));
-        let height = height.min((MOST_CELLS / width).max(1.0));
-        Self { x, y, width: width.min(MOST_CELLS) as usize, height: height as usize, cell_m }
+        let height = height.min((MAX_CELLS / width).max(1.0));
+        Self { x, y, width: width.min(MAX_CELLS) as usize, height: height as usize, cell_m }
     }
 
     /// The middle of a cell of the window, metres.
@@ -145,7 +139,7 @@ impl Window {
             worth.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
         }
         let looks = self.copy(&known.looks);
-        worth.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= AGAIN.powi(i32::from(n)));
+        worth.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
         worth
     }
 }

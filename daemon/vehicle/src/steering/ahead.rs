@@ -16,7 +16,6 @@ impl Corners {
         Self { start, places: Vec::new(), metres: 0.0 }
     }
 
-    /// Where it ends.
     fn end(&self) -> Point {
         self.places.last().copied().unwrap_or(self.start)
     }
@@ -37,13 +36,13 @@ impl Corners {
 
     /// Whether more corners would not be told.
     fn is_full(&self) -> bool {
-        self.places.len() > PlannedPath::MOST
+        self.places.len() > PlannedPath::MAX_POINTS
     }
 
-    fn told(mut self) -> PlannedPath {
-        let goes_on = self.is_full();
-        self.places.truncate(PlannedPath::MOST);
-        PlannedPath { places: self.places, goes_on }
+    fn told(mut self) -> PathAhead {
+        let continues = self.is_full();
+        self.places.truncate(PlannedPath::MAX_POINTS);
+        PathAhead { points: self.places, continues }
     }
 }
 
@@ -52,22 +51,30 @@ fn is_straight(a: Point, b: Point, c: Point) -> bool {
     x * u + y * v > 0.0 && (x * v - y * u).abs() < 1e-3 * x.hypot(y) * u.hypot(v)
 }
 
+/// The path that is planned after a waypoint, in the world frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PathAhead {
+    /// East and north of each further waypoint in metres.
+    pub points: Vec<Point>,
+    /// Whether the plan has more waypoints than these.
+    pub continues: bool,
+}
+
 impl Steering {
-    /// The plan after the waypoint that [`Self::next`] gave last, from which `left_m` metres may be gone. Places are of the
-    /// world.
-    pub fn ahead(&self, waypoint: Point, left_m: f64) -> PlannedPath {
-        let left_m = left_m - self.home_leg_m;
+    /// The plan after the waypoint that [`Self::next`] gave last, from which `left_m` metres may be gone.
+    pub fn ahead(&self, waypoint: Point, left_m: f64) -> PathAhead {
+        let left_m = left_m - self.grounds.last_leg_m();
         let mut way = Corners::new(waypoint);
-        self.plan.iter().for_each(|&node| way.go(self.lattice.place(node)));
+        self.plan.iter().for_each(|&node| way.go(self.grounds.lattice().place(node)));
         let Some(&(mut end)) = self.plan.back() else { return way.told() };
-        for goal in self.planner.beyond() {
+        for goal in self.choice.planner().beyond() {
             if way.is_full() {
                 break;
             }
-            let straight = self.lattice.straight(end, goal);
-            for node in straight.unwrap_or_else(|| self.lattice.ways(end).to(goal)) {
-                let place = self.lattice.place(node);
-                if !self.leaves_way_home(node, way.metres + distance(way.end(), place), left_m) {
+            let straight = self.grounds.lattice().straight(end, goal);
+            for node in straight.unwrap_or_else(|| self.grounds.lattice().ways(end).to(goal)) {
+                let place = self.grounds.lattice().place(node);
+                if !self.grounds.leaves_return(node, way.metres + distance(way.end(), place), left_m) {
                     return way.told();
                 }
                 way.go(place);
@@ -78,12 +85,12 @@ impl Steering {
     }
 
     /// The way home after a waypoint of it.
-    pub fn ahead_home(&self, waypoint: Point) -> PlannedPath {
+    pub fn ahead_home(&self, waypoint: Point) -> PathAhead {
         let mut way = Corners::new(waypoint);
         let home = self.home();
-        if let Some((_, end, nodes)) = self.way_home(waypoint) {
-            nodes.into_iter().for_each(|node| way.go(self.lattice.place(node)));
-            if self.bounds.allows_exit(home, self.lattice.place(end)) {
+        if let Some((_, end, nodes)) = self.grounds.return_path(waypoint) {
+            nodes.into_iter().for_each(|node| way.go(self.grounds.lattice().place(node)));
+            if self.grounds.bounds().allows_exit(home, self.grounds.lattice().place(end)) {
                 way.go(home);
             }
         }
@@ -96,7 +103,8 @@ mod tests {
     use super::*;
     use crate::{Course, Footprint};
     use scenecast_core::Area;
-    use scenecast_protocol::directive::{Fence, Place, PlannerKind, Polygon, Utility};
+    use scenecast_protocol::coordinates::DecimetrePoint;
+    use scenecast_protocol::directive::{Fence, PlannerKind, Polygon, Utility};
     use scenecast_protocol::map::{Cell, LabelGrid};
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 12.0 };
@@ -107,7 +115,7 @@ mod tests {
     }
 
     /// The waypoint from the start, and what is told to come after it.
-    fn first(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> (Point, PlannedPath) {
+    fn first(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> (Point, PathAhead) {
         let from = steering.start();
         let Course::Go(to) = steering.next(from, (map, 1), utility, left_m) else { panic!("nowhere to go") };
         (to, steering.ahead(to, left_m - distance(from, to)))
@@ -120,22 +128,22 @@ mod tests {
             way.go(to);
         }
         let folded = [(3.6, 0.0), (7.2, 3.6), (5.4, 1.8)];
-        assert_eq!(way.told(), PlannedPath { places: folded.to_vec(), goes_on: false });
+        assert_eq!(way.told(), PathAhead { points: folded.to_vec(), continues: false });
         let stairs = |steps: i32| {
             let mut way = Corners::new((0.0, 0.0));
             (1..=steps).for_each(|i| way.go((f64::from(i / 2), f64::from((i + 1) / 2))));
             way.told()
         };
-        assert_eq!((stairs(7).places.len(), stairs(7).goes_on), (7, false));
-        assert_eq!((stairs(8).places, stairs(8).goes_on), (stairs(7).places, true));
+        assert_eq!((stairs(7).points.len(), stairs(7).continues), (7, false));
+        assert_eq!((stairs(8).points, stairs(8).continues), (stairs(7).points, true));
     }
 
     #[test]
     fn the_lawnmower_tells_the_legs_that_it_then_goes() {
         let mut steering = steering(PlannerKind::Horizon);
         let (mut at, told) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
-        assert_eq!((told.places.len(), told.goes_on), (4, false));
-        for place in told.places {
+        assert_eq!((told.points.len(), told.continues), (4, false));
+        for place in told.points {
             let Course::Go(to) = steering.next(at, (&LabelGrid::default(), 1), None, f64::INFINITY) else { panic!() };
             assert!(distance(to, place) < 1e-9, "{to:?} instead of {place:?}");
             at = to;
@@ -147,7 +155,7 @@ mod tests {
         let metres = |left_m: f64| {
             let mut steering = steering(PlannerKind::Lawnmower);
             let (to, told) = first(&mut steering, &LabelGrid::default(), None, left_m);
-            let way: Vec<Point> = [steering.start(), to].into_iter().chain(told.places).collect();
+            let way: Vec<Point> = [steering.start(), to].into_iter().chain(told.points).collect();
             let gone: f64 = way.windows(2).map(|w| distance(w[0], w[1])).sum();
             gone + distance(way[way.len() - 1], steering.home())
         };
@@ -166,25 +174,25 @@ mod tests {
         let utility = Utility { weights: [(2, 100), (1, -5)].into(), ..Utility::default() };
         let mut steering = steering(PlannerKind::Horizon);
         let (to, told) = first(&mut steering, &map(true), Some(&utility), f64::INFINITY);
-        assert!(!told.places.is_empty());
+        assert!(!told.points.is_empty());
         let Course::Go(next) = steering.next(to, (&map(true), 1), Some(&utility), f64::INFINITY) else { panic!() };
-        assert!(told.places[0] == next || is_straight(to, next, told.places[0]), "{next:?} is on no leg of {told:?}");
+        assert!(told.points[0] == next || is_straight(to, next, told.points[0]), "{next:?} is on no leg of {told:?}");
         let Course::Go(west) = steering.next(to, (&map(false), 2), Some(&utility), f64::INFINITY) else { panic!() };
         assert_ne!(steering.ahead(west, f64::INFINITY), told);
     }
 
     #[test]
     fn the_way_home_is_told_round_what_is_kept_out() {
-        let place = |x, y| Place { x_dm: 10 * x, y_dm: 10 * y };
+        let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         let wall = Polygon(vec![place(9, -5), place(11, -5), place(11, 8), place(9, 8)]);
         let mut steering = steering(PlannerKind::Lawnmower);
-        let return_point = Some(Place { x_dm: 31, y_dm: 33 });
+        let return_point = Some(DecimetrePoint::new(31, 33));
         steering.set_fence(&Fence { keep_outs: vec![wall], return_point, ..Fence::default() });
         let Course::Go(to) = steering.next_home((17.0, 3.0)) else { panic!("no way") };
         let told = steering.ahead_home(to);
-        assert_eq!((told.places.last(), told.goes_on), (Some(&(3.1, 3.3)), false));
-        assert!(told.places.iter().any(|p| p.1 > 8.0), "{told:?}");
-        let way: Vec<Point> = std::iter::once(to).chain(told.places).collect();
+        assert_eq!((told.points.last(), told.continues), (Some(&(3.1, 3.3)), false));
+        assert!(told.points.iter().any(|p| p.1 > 8.0), "{told:?}");
+        let way: Vec<Point> = std::iter::once(to).chain(told.points).collect();
         assert!(way.windows(2).all(|w| steering.bounds().allows_leg(w[0], w[1])));
     }
 }

@@ -2,7 +2,8 @@
 
 use super::{Vehicle, VehicleOutput};
 use crate::planning::{Point, distance};
-use crate::steering::Course;
+use crate::steering::{Course, PathAhead};
+use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::directive::{Constraints, Fence, Limits, Reaction};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode, VehicleStatus};
@@ -72,16 +73,16 @@ impl Vehicle {
     /// Where it believes to be in the world. When that has moved under it, the way is chosen afresh: the rest of the last leg
     /// might cross an outline now.
     fn placed(&mut self) -> Point {
-        let (east, north) = self.navigator.to_world((0.0, 0.0));
+        let (east, north) = self.navigator.to_world(MapPoint::default()).xy();
         if (east, north) != self.steering.placed() {
             self.steering.set_placement(east, north);
             self.forget_way();
         }
-        self.navigator.to_world(self.navigator.position())
+        self.navigator.to_world(self.navigator.position()).xy()
     }
 
-    fn is_reached(&self, waypoint: Point) -> bool {
-        distance(waypoint, self.navigator.position()) < self.steering.arrival_m()
+    fn is_reached(&self, waypoint: MapPoint) -> bool {
+        waypoint.distance_m(self.navigator.position()) < self.steering.arrival_m()
     }
 
     fn watch(&mut self, at: Point) {
@@ -121,8 +122,8 @@ impl Vehicle {
                 self.go((to, path), VehicleMode::Survey, ModeReason::Survey);
             }
             Course::UsedUp => self.go_home(at, self.guard.tighter()),
-            Course::There => self.stay(VehicleMode::Hold, ModeReason::NoWay),
-            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoWay),
+            Course::There => self.stay(VehicleMode::Hold, ModeReason::NoPath),
+            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
         }
     }
 
@@ -133,18 +134,19 @@ impl Vehicle {
         }
         match self.steering.next_home(at) {
             Course::Go(to) => self.go((to, self.steering.ahead_home(to)), VehicleMode::Return, why),
-            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoWay),
+            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
             Course::There | Course::UsedUp => self.stay(VehicleMode::Hold, why),
         }
     }
 
     /// Goes to a place of the world; the host goes by the vehicle's own reckoning.
-    fn go(&mut self, (to, mut path): (Point, PlannedPath), mode: VehicleMode, reason: ModeReason) {
+    fn go(&mut self, (to, path): (Point, PathAhead), mode: VehicleMode, reason: ModeReason) {
         self.course = Doing { motion: Motion::Going, mode, reason, ..self.course };
-        let to = self.navigator.to_map(to);
-        path.places.iter_mut().for_each(|place| *place = self.navigator.to_map(*place));
-        (self.waypoint, self.path) = (Some(to), path);
-        self.outputs.push_back(VehicleOutput::Waypoint(to.0, to.1));
+        let to_map = |(east_m, north_m)| self.navigator.to_map(WorldPoint { east_m, north_m });
+        let waypoint = to_map(to);
+        let points = path.points.into_iter().map(to_map).collect();
+        (self.waypoint, self.path) = (Some(waypoint), PlannedPath { points, continues: path.continues });
+        self.outputs.push_back(VehicleOutput::Waypoint(waypoint));
     }
 
     fn stay(&mut self, mode: VehicleMode, reason: ModeReason) {
@@ -164,7 +166,6 @@ impl Vehicle {
         self.forget_way();
     }
 
-    /// It goes nowhere now.
     fn forget_way(&mut self) {
         (self.waypoint, self.path) = (None, PlannedPath::default());
     }
@@ -189,13 +190,11 @@ impl Vehicle {
     }
 
     pub(super) fn status(&self, now: Instant) -> VehicleStatus {
-        let (x_m, y_m) = self.navigator.position();
         VehicleStatus {
             mode: self.course.mode,
             reason: self.course.reason,
             autopilot_silent: self.autopilot_silent,
-            x_m,
-            y_m,
+            position: self.navigator.position(),
             depth_m: self.navigator.depth_m(),
             heading_deg: self.navigator.heading_rad().to_degrees().rem_euclid(360.0),
             sigma_m: self.navigator.sigma_m(),

@@ -2,9 +2,9 @@
 
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use image::RgbImage;
-use scene_model::exemplars::Exemplar as Picture;
-use scenecast_protocol::directive::{Request, Requests};
-use scenecast_protocol::exemplar::{Exemplar, most_bytes};
+use scene_model::exemplars::ExemplarPatch as Picture;
+use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
+use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::Extra;
@@ -24,7 +24,7 @@ struct Shown {
 /// What was answered to a request.
 #[derive(Debug)]
 struct Answer {
-    request: Request,
+    request: ExemplarRequest,
     /// The number of the picture; 0: that there is none.
     number: u8,
     /// While it is on its way.
@@ -44,7 +44,7 @@ struct Unasked {
 pub(super) struct Gallery {
     /// By label, the best first.
     pictures: BTreeMap<u8, Vec<Picture>>,
-    requests: Requests,
+    requests: ExemplarRequests,
     /// The run of the surface that asks.
     series: Option<u16>,
     answers: Vec<Answer>,
@@ -57,7 +57,7 @@ pub(super) struct Gallery {
 
 impl Gallery {
     /// Most requests at a time.
-    pub(super) const MOST_REQUESTS: usize = 8;
+    pub(super) const MAX_REQUESTS: usize = 8;
 
     /// The pictures of each label from now on, the best first.
     pub(super) fn set_pictures(&mut self, pictures: BTreeMap<u8, Vec<Picture>>) {
@@ -70,7 +70,7 @@ impl Gallery {
 
     /// What is wanted from now on, by the surface's run `series`; what is not wanted any more is not sent to its end, and what
     /// nobody asked for gives way.
-    pub(super) fn replace_requests(&mut self, requests: Requests, series: Option<u16>, link: &mut VehicleLink) {
+    pub(super) fn replace_requests(&mut self, requests: ExemplarRequests, series: Option<u16>, link: &mut VehicleLink) {
         if self.series.is_some() && series != self.series {
             // Another run of the surface was shown nothing.
             self.shown.clear();
@@ -105,7 +105,7 @@ impl Gallery {
 
     /// Whether something is asked for that the surface does not have.
     fn is_asked(&self) -> bool {
-        let is_met = |r: &Request| self.answers.iter().any(|a| a.request == *r && a.object.is_none());
+        let is_met = |r: &ExemplarRequest| self.answers.iter().any(|a| a.request == *r && a.object.is_none());
         !self.requests.wanted.iter().all(is_met)
     }
 
@@ -120,7 +120,7 @@ impl Gallery {
         }
     }
 
-    fn answer(&mut self, request: Request, epoch: u8, link: &mut VehicleLink) {
+    fn answer(&mut self, request: ExemplarRequest, epoch: u8, link: &mut VehicleLink) {
         let before = self.answers.iter().position(|a| a.request == request);
         let was_none = before.and_then(|at| self.answers.get(at)).map(|a| a.number == 0);
         let chosen = if was_none == Some(false) { None } else { self.choose(request) };
@@ -146,7 +146,9 @@ impl Gallery {
         let Some(label) = unseen.copied().max_by(|&a, &b| weight(a).total_cmp(&weight(b)).then(b.cmp(&a))) else {
             return;
         };
-        let Some((number, picture)) = self.choose(Request { label, ..Request::default() }) else { return };
+        let Some((number, picture)) = self.choose(ExemplarRequest { label, ..ExemplarRequest::default() }) else {
+            return;
+        };
         let head = Exemplar { epoch, label, serial: 0, size: 0, picture: 0, bytes: Vec::new() };
         let Some(exemplar) = fill(head, number, &picture.patch, 0) else { return };
         self.note_shown(label, number, picture);
@@ -155,7 +157,7 @@ impl Gallery {
     }
 
     /// The picture that a request means: the one that it names while it is known, else the best that was not shown.
-    fn choose(&self, request: Request) -> Option<(u8, Picture)> {
+    fn choose(&self, request: ExemplarRequest) -> Option<(u8, Picture)> {
         let shown = self.shown.get(&request.label).map_or(&[][..], Vec::as_slice);
         let pictures = self.pictures.get(&request.label).map_or(&[][..], Vec::as_slice);
         if request.picture != 0 {
@@ -168,7 +170,8 @@ impl Gallery {
         let is_shown = |p: &&Picture| shown.iter().any(|s| is_same(&s.picture, p));
         let new = pictures.iter().find(|p| !is_shown(p))?;
         let is_taken = |n: &u8| shown.iter().any(|s| s.number == *n);
-        let numbers = (0..Request::MOST_PICTURE).map(|i| (number_of(new) - 1 + i) % Request::MOST_PICTURE + 1);
+        let numbers =
+            (0..ExemplarRequest::MAX_PICTURE).map(|i| (number_of(new) - 1 + i) % ExemplarRequest::MAX_PICTURE + 1);
         Some((numbers.into_iter().find(|n| !is_taken(n))?, new.clone()))
     }
 
@@ -207,7 +210,7 @@ fn number_of(picture: &Picture) -> u8 {
     let bits =
         picture.t_s.to_bits() ^ picture.place.0.to_bits().rotate_left(21) ^ picture.place.1.to_bits().rotate_left(42);
     let mixed = (bits ^ bits >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
-    (mixed % u64::from(Request::MOST_PICTURE)) as u8 + 1
+    (mixed % u64::from(ExemplarRequest::MAX_PICTURE)) as u8 + 1
 }
 
 fn is_same(a: &Picture, b: &Picture) -> bool {
@@ -217,6 +220,6 @@ fn is_same(a: &Picture, b: &Picture) -> bool {
 /// The object of a picture, as large as asked for and there is; `None` if it cannot be compressed.
 fn fill(head: Exemplar, picture: u8, patch: &Arc<RgbImage>, size: u8) -> Option<Exemplar> {
     let (size, image) = middle(patch, size)?;
-    let bytes = compress_to(&image, GOOD_SSIM, most_bytes(size))?.bytes;
+    let bytes = compress_to(&image, GOOD_SSIM, max_bytes(size))?.bytes;
     Some(Exemplar { size, picture, bytes, ..head })
 }

@@ -15,12 +15,13 @@ use super::navigator::Navigator;
 use super::steering::Steering;
 use course::Doing;
 use gallery::Gallery;
-use scene_model::exemplars::Exemplar as Picture;
-use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, Utility};
+use scene_model::exemplars::ExemplarPatch as Picture;
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::{LabelGrid, PlaneSource};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{PlannedPath, SlotState};
+use scenecast_protocol::wire::PlannedPath;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use tuning::Telling;
@@ -31,7 +32,6 @@ pub use place::LastPlace;
 /// What must survive a restart of the vehicle, so that nothing is applied twice and no label changes its meaning.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Durable {
-    /// Slots seen.
     pub inbox: SlotInboxState,
     /// Epoch of the label ids in use.
     pub epoch: u8,
@@ -72,10 +72,8 @@ pub enum VehicleOutput {
     /// for later, and send nothing.
     Persist,
     /// Go there, metres east and north in the map's frame.
-    Waypoint(f64, f64),
-    /// Stay where you are.
+    Waypoint(MapPoint),
     Hold,
-    /// Come up.
     Surface,
     /// Have the scene model follow these settings; what they do not name is as configured. A run begins with
     /// [`Vehicle::settings`].
@@ -89,17 +87,12 @@ pub enum VehicleOutput {
 /// A decision about a slot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AppliedSlot {
-    /// Which slot.
     pub id: SlotId,
-    /// Which version of it.
     pub version: u16,
-    /// The decision.
     pub state: SlotState,
-    /// When.
     pub at: Instant,
 }
 
-/// The vehicle.
 pub struct Vehicle {
     link: VehicleLink,
     navigator: Navigator,
@@ -111,7 +104,7 @@ pub struct Vehicle {
     explored: u32,
     guard: Guard,
     course: Doing,
-    waypoint: Option<(f64, f64)>,
+    waypoint: Option<MapPoint>,
     /// What is planned after the waypoint.
     path: PlannedPath,
     /// An order was applied that may change the way; the surface is to hear what comes of it.
@@ -206,11 +199,10 @@ impl Vehicle {
     }
 
     /// Whether the surface is known to have everything.
-    pub fn is_settled(&self) -> bool {
-        self.link.is_settled() && self.whole_png.as_ref().is_none_or(WholePng::is_settled)
+    pub fn is_converged(&self) -> bool {
+        self.link.is_converged() && self.whole_png.as_ref().is_none_or(WholePng::is_converged)
     }
 
-    /// Counters of the link.
     pub fn stats(&self) -> &LinkStats {
         self.link.stats()
     }
@@ -225,7 +217,6 @@ impl Vehicle {
         self.link.assume_budget_spent(now);
     }
 
-    /// The utility in force.
     pub fn utility(&self) -> Option<&Utility> {
         self.utility.as_ref()
     }
@@ -259,7 +250,7 @@ impl Vehicle {
             None => self.tell(now),
         }
         let at = self.navigator.position();
-        self.steering.handle_view(at);
+        self.steering.handle_view(at.xy());
         update.perplexity.iter().for_each(|&(cell, p)| self.steering.handle_perplexity(cell, p));
     }
 
@@ -292,10 +283,9 @@ impl Vehicle {
         gallery.tend(durable.epoch, weight, link);
     }
 
-    /// Takes received bytes.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
-        if let Some(at) = self.link.last_heard() {
+        if let Some(at) = self.link.last_received() {
             self.guard.handle_surface_heard(at);
         }
         while let Some(event) = self.link.poll_event() {

@@ -7,9 +7,10 @@ use scenecast_config::Config;
 use scenecast_core::Area;
 use scenecast_motion::Motion;
 use scenecast_motion::stretches_outside;
+use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    CellBand, Change, Constraints, Fence, Figure, Limits, Place, PlannerKind, Polygon, Reaction, RefusalReason,
-    Settings, Slot, Utility,
+    CellBand, Change, Constraints, Fence, Figure, Limits, PlannerKind, Polygon, Reaction, RefusalReason, Settings,
+    Slot, Utility,
 };
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
@@ -43,7 +44,7 @@ impl Sea {
         let profile = profile(&config);
         let now = Instant::ZERO;
         let vehicle = crate::assemble(&config, None, profile, AREA, Durable::default(), seed, now).unwrap();
-        let (x, y) = vehicle.navigator().position();
+        let (x, y) = vehicle.navigator().position().xy();
         Self { vehicle, motion: Motion::new(x, y, 0.5, drift, seed), now, fence: Fence::default(), limit: None }
     }
 
@@ -60,7 +61,7 @@ impl Sea {
 
     fn see(&mut self, seed: u64) {
         let patch = |x: i32, y: i32| (((x / 9 + 3 * (y / 7)) as u64).wrapping_mul(seed | 1) >> 40) as u8 % 4 + 1;
-        let (x, y) = self.vehicle.navigator().position();
+        let (x, y) = self.vehicle.navigator().position().xy();
         let (x, y) = ((x / 0.25) as i32, (y / 0.25) as i32);
         let cells = (-6..6).flat_map(|dy| (-6..6).map(move |dx| (x + dx, y + dy)));
         let mut known: Vec<(Cell, u8)> = self.vehicle.cells().collect();
@@ -77,18 +78,18 @@ impl Sea {
         let at = self.vehicle.navigator().position();
         while let Some(output) = self.vehicle.poll_output() {
             match output {
-                VehicleOutput::Waypoint(x, y) => {
+                VehicleOutput::Waypoint(to) => {
                     let navigator = self.vehicle.navigator();
-                    self.check(navigator.to_world(at), navigator.to_world((x, y)));
+                    self.check(navigator.to_world(at).xy(), navigator.to_world(to).xy());
                     self.check_path();
-                    self.motion.set_target(Some((x, y)));
+                    self.motion.set_target(Some(to.xy()));
                 }
                 VehicleOutput::Hold => self.motion.set_target(None),
                 VehicleOutput::Surface => self.motion.come_up(),
                 _ => {}
             }
         }
-        let o = self.motion.step(at, STEP_S);
+        let o = self.motion.step(at.xy(), STEP_S);
         self.vehicle.handle_odometry(o.dx_m, o.dy_m, o.heading_rad, self.vehicle.navigator().depth_m(), self.now);
         if let Some((_, used)) = &mut self.limit {
             *used += o.dx_m.hypot(o.dy_m);
@@ -110,8 +111,8 @@ impl Sea {
     /// What is told to come after the waypoint, too.
     fn check_path(&self) {
         let (vehicle, navigator) = (&self.vehicle, self.vehicle.navigator());
-        let waypoint = navigator.to_world(vehicle.waypoint().unwrap());
-        let path: Vec<(f64, f64)> = vehicle.path().places.iter().map(|&p| navigator.to_world(p)).collect();
+        let waypoint = navigator.to_world(vehicle.waypoint().unwrap()).xy();
+        let path: Vec<(f64, f64)> = vehicle.path().points.iter().map(|&p| navigator.to_world(p).xy()).collect();
         let way: Vec<(f64, f64)> = std::iter::once(waypoint).chain(path).collect();
         assert_eq!(stretches_outside(&way, &self.fence), 0, "{way:?} leaves {:?}", self.fence);
         let returns = vehicle.mode().0 == VehicleMode::Return;
@@ -123,12 +124,11 @@ impl Sea {
 }
 
 fn fence() -> impl Strategy<Value = Slot> {
-    let corner =
-        |x: std::ops::Range<i32>, y: std::ops::Range<i32>| (x, y).prop_map(|(x_dm, y_dm)| Place { x_dm, y_dm });
+    let corner = |x: std::ops::Range<i32>, y: std::ops::Range<i32>| (x, y).prop_map(|(x, y)| DecimetrePoint::new(x, y));
     let outline =
         (corner(-20..8, -20..8), corner(150..410, -20..8), corner(150..410, 120..310), corner(-20..8, 120..310));
     let keep_out = (0i32..350, 0i32..250, 10i32..120).prop_map(|(x, y, r)| {
-        let at = |dx: i32, dy: i32| Place { x_dm: x + dx, y_dm: y + dy };
+        let at = |dx: i32, dy: i32| DecimetrePoint::new(x + dx, y + dy);
         Polygon(vec![at(-r, -r), at(r, -r / 2), at(r / 3, r)])
     });
     let home = proptest::option::of(corner(0..200, 0..150));
@@ -165,7 +165,7 @@ fn order() -> impl Strategy<Value = Slot> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn no_waypoint_leads_out_of_the_fence_into_a_keep_out_or_beyond_a_limit(
+    fn no_waypoint_leaves_the_fence_or_exceeds_a_limit(
         orders in proptest::collection::vec((0u32..160, order()), 1..12),
         drift in 0.0f64..0.05, seed: u64, fixes: bool,
     ) {
@@ -180,7 +180,7 @@ proptest! {
                 }
                 if fixes && step % 20 == 0 {
                     let (x, y) = (sea.motion.x_m, sea.motion.y_m);
-                    sea.vehicle.navigator.handle_fix(x, y, 0.3, sea.now, sea.now);
+                    sea.vehicle.navigator.handle_fix(WorldPoint::new(x, y), 0.3, sea.now, sea.now);
                 }
             }
         }
@@ -189,13 +189,13 @@ proptest! {
 
 /// A fence from the origin to (20, 20) m with a return point at (5, 5) m.
 fn small_fence() -> Fence {
-    let place = |x: i32, y: i32| Place { x_dm: 10 * x, y_dm: 10 * y };
+    let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
     let fence = Polygon(vec![place(-1, -1), place(20, -1), place(20, 20), place(-1, 20)]);
     Fence { fence: Some(fence), keep_outs: Vec::new(), return_point: Some(place(5, 5)) }
 }
 
 #[test]
-fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
+fn a_breach_is_reported_until_the_operator_answers() {
     let mut sea = Sea::new(0.0, 1);
     sea.tell(Slot::Fence(small_fence()));
     sea.step();
@@ -212,38 +212,38 @@ fn a_breach_is_answered_and_said_and_not_forgotten_until_the_operator_speaks() {
 }
 
 #[test]
-fn an_order_takes_the_path_away_until_there_is_a_new_one_and_a_vehicle_that_stays_has_none() {
+fn an_order_clears_the_path_until_a_new_one_is_planned() {
     let mut sea = Sea::new(0.0, 1);
     sea.see(1);
     sea.step();
     let survey = sea.vehicle.path().clone();
-    assert!(survey.places.len() > 3 && sea.vehicle.waypoint().is_some(), "{survey:?}");
+    assert!(survey.points.len() > 3 && sea.vehicle.waypoint().is_some(), "{survey:?}");
     sea.tell(Slot::Fence(small_fence()));
-    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().places.len()), (None, 0), "not of the old plan");
+    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().points.len()), (None, 0), "not of the old plan");
     sea.step();
-    assert!(!sea.vehicle.path().places.is_empty() && sea.vehicle.path() != &survey);
+    assert!(!sea.vehicle.path().points.is_empty() && sea.vehicle.path() != &survey);
     sea.tell(Slot::Constraints(Constraints { hold: true, abort: false }));
     sea.step();
-    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().places.len()), (None, 0));
+    assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().points.len()), (None, 0));
     sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
     sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Return), ..Limits::default() }));
     sea.vehicle.navigator.set_pose(17.0, 17.0, 0.0, 16.0, sea.now);
     sea.step();
     assert_eq!(sea.vehicle.mode().0, VehicleMode::Return);
-    assert_eq!(sea.vehicle.path().places.last(), Some(&(5.0, 5.0)), "home");
+    assert_eq!(sea.vehicle.path().points.last(), Some(&MapPoint::new(5.0, 5.0)), "home");
 }
 
 #[test]
-fn a_fence_stays_where_it_is_in_the_world_when_a_fix_moves_the_map() {
+fn a_fence_stays_in_the_world_when_a_fix_moves_the_map() {
     let mut sea = Sea::new(0.0, 1);
     sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
     sea.tell(Slot::Fence(small_fence()));
     sea.step();
-    let fix = |sea: &mut Sea, x, y| sea.vehicle.navigator.handle_fix(x, y, 0.1, sea.now, sea.now);
+    let fix = |sea: &mut Sea, x, y| sea.vehicle.navigator.handle_fix(WorldPoint::new(x, y), 0.1, sea.now, sea.now);
     assert!(fix(&mut sea, 18.0, 10.0).is_used());
     sea.step();
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
-    let (east, _) = sea.vehicle.waypoint().unwrap();
+    let east = sea.vehicle.waypoint().unwrap().x_m;
     assert!(east < 12.0, "{east}: 20 m east of the origin is 12 m east on its map now");
     // Its own reckoning stays within the numbers of the fence all the time.
     sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
@@ -254,7 +254,7 @@ fn a_fence_stays_where_it_is_in_the_world_when_a_fix_moves_the_map() {
         .map(|_| sea.step())
         .last()
         .map(|()| sea.vehicle.navigator())
-        .map(|n| n.to_world(n.position()))
+        .map(|n| n.to_world(n.position()).xy())
         .unwrap();
     assert!((x - 5.0).hypot(y - 5.0) < 1.0, "({x}, {y}): the return point is of the world, too");
 }
@@ -274,11 +274,13 @@ fn silence_and_abort_bring_the_vehicle_home_or_up() {
 }
 
 #[test]
-fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
+fn the_last_good_fence_survives_a_refusal_and_a_restart() {
     let mut sea = Sea::new(0.0, 1);
     sea.tell(Slot::Fence(small_fence()));
     let far = Fence {
-        fence: small_fence().fence.map(|p| Polygon(p.0.iter().map(|v| Place { x_dm: v.x_dm + 900, ..*v }).collect())),
+        fence: small_fence()
+            .fence
+            .map(|p| Polygon(p.0.iter().map(|v| DecimetrePoint { east_dm: v.east_dm + 900, ..*v }).collect())),
         ..Fence::default()
     };
     sea.tell(Slot::Fence(far));
@@ -292,7 +294,7 @@ fn the_last_good_fence_stays_in_force_through_a_refusal_and_a_restart() {
 }
 
 #[test]
-fn settings_out_of_range_are_refused_and_those_in_force_survive_a_restart() {
+fn bad_settings_are_refused_and_good_ones_survive_a_restart() {
     let figure = |value: f64| Change::To(Figure::new(value).unwrap());
     let mut sea = Sea::new(0.0, 1);
     let asked = Settings {

@@ -3,9 +3,8 @@
 use super::gallery::Gallery;
 use super::{LastPlace, Vehicle, VehicleOutput};
 use crate::FixVerdict;
-use scenecast_protocol::directive::{
-    Budget, Constraints, Fence, Limits, LimitsFault, Place, RefusalReason, Slot, Utility,
-};
+use scenecast_protocol::coordinates::DecimetrePoint;
+use scenecast_protocol::directive::{Budget, Constraints, Fence, Limits, LimitsFault, RefusalReason, Slot, Utility};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
@@ -27,9 +26,7 @@ impl Vehicle {
             Slot::Requests(requests) if requests.wanted.iter().any(|r| r.label == 0 || r.label > self.labels) => {
                 Err(RefusalReason::UnknownLabel)
             }
-            Slot::Requests(requests) if requests.wanted.len() > Gallery::MOST_REQUESTS => {
-                Err(RefusalReason::OutOfRange)
-            }
+            Slot::Requests(requests) if requests.wanted.len() > Gallery::MAX_REQUESTS => Err(RefusalReason::OutOfRange),
             Slot::Requests(requests) => {
                 let series = self.link.persistent_state().series;
                 self.gallery.replace_requests(requests, series, &mut self.link);
@@ -40,7 +37,7 @@ impl Vehicle {
             Slot::Fence(fence) => self.apply_fence(&fence),
             Slot::Fix(fix) => {
                 let taken = now - Duration::from_secs_f64(fix.age_s);
-                match self.navigator.handle_fix(fix.x_m, fix.y_m, fix.sigma_m, taken, now) {
+                match self.navigator.handle_fix(fix.position, fix.sigma_m, taken, now) {
                     FixVerdict::Used => {
                         self.fixes_applied += 1;
                         self.durable.place = Some(LastPlace::of(&self.navigator));
@@ -79,8 +76,8 @@ impl Vehicle {
     /// one, and hold and abort, stay at hand.
     fn apply_fence(&mut self, fence: &Fence) -> Result<(), RefusalReason> {
         fence.check().map_err(|_| RefusalReason::Contradiction)?;
-        let (x, y) = self.navigator.to_world(self.navigator.position());
-        let is_inside = Place::from_metres(x, y).is_some_and(|at| fence.allows(at));
+        let at = self.navigator.to_world(self.navigator.position());
+        let is_inside = DecimetrePoint::nearest(at).is_some_and(|at| fence.allows(at));
         if fence.outlines().next().is_some() && !is_inside {
             return Err(RefusalReason::Outside);
         }

@@ -2,7 +2,7 @@
 
 use super::Vehicle;
 use crate::Navigator;
-use crate::planning::distance;
+use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::map::Cell;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Placement, PlannedPath};
@@ -29,9 +29,9 @@ fn metres(dm: i32) -> f64 {
 impl LastPlace {
     /// Where a vehicle is now.
     pub fn of(navigator: &Navigator) -> Self {
-        let (x, y) = navigator.position();
-        let placement = navigator.placement().map(|p| (p.version, dm(p.east_m), dm(p.north_m)));
-        Self { at_dm: (dm(x), dm(y)), placement }
+        let at = navigator.position();
+        let placement = navigator.placement().map(|p| (p.version, dm(p.origin.east_m), dm(p.origin.north_m)));
+        Self { at_dm: (dm(at.x_m), dm(at.y_m)), placement }
     }
 
     /// The same place for a map that begins anew, whose frame is the world's at first.
@@ -41,14 +41,15 @@ impl LastPlace {
         Self { at_dm, placement: None }
     }
 
-    /// East and north in the map's frame, metres.
-    pub fn at(self) -> (f64, f64) {
-        (metres(self.at_dm.0), metres(self.at_dm.1))
+    /// The position in the map frame.
+    pub fn at(self) -> MapPoint {
+        MapPoint { x_m: metres(self.at_dm.0), y_m: metres(self.at_dm.1) }
     }
 
     /// Where the map lies in the world.
     pub fn placement(self) -> Option<Placement> {
-        self.placement.map(|(version, east, north)| Placement { version, east_m: metres(east), north_m: metres(north) })
+        let (version, east, north) = self.placement?;
+        Some(Placement { version, origin: WorldPoint { east_m: metres(east), north_m: metres(north) } })
     }
 }
 
@@ -57,7 +58,7 @@ impl Vehicle {
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         let before = self.navigator.position();
         self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
-        self.guard.handle_way(distance(before, (x_m, y_m)));
+        self.guard.handle_way(before.distance_m(MapPoint { x_m, y_m }));
     }
 
     /// For so long nobody measured the way: it may be anywhere that it could have gone to, and counts as gone there.
@@ -72,7 +73,6 @@ impl Vehicle {
         self.telling.seen.iter()
     }
 
-    /// The position estimate.
     pub fn navigator(&self) -> &Navigator {
         &self.navigator
     }
@@ -82,8 +82,8 @@ impl Vehicle {
         self.fixes_applied
     }
 
-    /// Where it is going, east and north in the map's frame, metres.
-    pub fn waypoint(&self) -> Option<(f64, f64)> {
+    /// The current goal in the map frame.
+    pub fn waypoint(&self) -> Option<MapPoint> {
         self.waypoint
     }
 
@@ -113,16 +113,16 @@ mod tests {
         let at = Instant::from_secs_f64;
         let mut before = Navigator::new(0.0, 0.0, 10.0, 0.01).with_start_sigma(20.0);
         before.handle_odometry(50.0, 0.0, 0.0, 10.0, at(50.0));
-        assert!(before.handle_fix(57.0, 3.0, 0.5, at(50.0), at(51.0)).is_used());
+        assert!(before.handle_fix(WorldPoint::new(57.0, 3.0), 0.5, at(50.0), at(51.0)).is_used());
         let last = LastPlace::of(&before);
         // It drifted 12 m to the north while its computer was off.
         let mut after = Navigator::resume(last, 10.0, 0.01);
-        assert_eq!((after.position(), after.placement()), ((50.0, 0.0), before.placement()));
-        assert!(after.handle_fix(57.0, 15.0, 0.5, at(1.0), at(1.0)).is_used());
+        assert_eq!((after.position(), after.placement()), (MapPoint::new(50.0, 0.0), before.placement()));
+        assert!(after.handle_fix(WorldPoint::new(57.0, 15.0), 0.5, at(1.0), at(1.0)).is_used());
         assert_eq!(after.placement(), before.placement(), "the map lies where it lay");
-        let (x, y) = after.position();
+        let (x, y) = after.position().xy();
         assert!((x - 50.0).abs() < 0.5 && (y - 12.0).abs() < 0.5, "{x} {y}");
-        let (x, y) = LastPlace::of(&before).for_new_map().at();
+        let (x, y) = LastPlace::of(&before).for_new_map().at().xy();
         assert!((x - 57.0).abs() < 0.5 && (y - 3.0).abs() < 0.5, "a new map begins where it is in the world");
     }
 }

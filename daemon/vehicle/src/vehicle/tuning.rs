@@ -15,7 +15,6 @@ const COARSE_AFTER_S: f64 = 30.0;
 /// The map as the vehicle sees it, of which it may tell a part.
 #[derive(Debug, Default)]
 pub(super) struct Telling {
-    /// In force.
     pub(super) settings: Settings,
     /// Every cell that the scene model has a label for.
     pub(super) seen: LabelGrid,
@@ -24,9 +23,7 @@ pub(super) struct Telling {
     planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
     /// As configured: seconds of the budget, 0: never coarse.
     coarse_after_s: f64,
-    /// As configured.
     is_coarse: bool,
-    /// As configured.
     told_planes: PlaneSet,
 }
 

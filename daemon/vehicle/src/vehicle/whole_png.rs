@@ -31,7 +31,7 @@ impl WholePng {
     }
 
     /// Whether the surface has the newest version.
-    pub(super) fn is_settled(&self) -> bool {
+    pub(super) fn is_converged(&self) -> bool {
         self.outstanding.is_none() && self.sent == self.version
     }
 

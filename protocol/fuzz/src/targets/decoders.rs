@@ -1,22 +1,22 @@
-//! Bytes as everything that the wire and the key file have but the map.
+//! Arbitrary bytes as every format of the wire and the key file, except the map.
 
 use super::raw::{self, Script};
-use scenecast_protocol::directive::VersionedSlot;
-use scenecast_protocol::link::{Flight, SlotInbox, Window};
+use scenecast_protocol::directive::{SlotState, VersionedSlot};
+use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
 use scenecast_protocol::map::{PlaneChunk, PlaneReplica};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Frame, FrameBuilder, Header, MAX_WINDOW, MissionId, Reader, Seal, SessionId,
-    SlotState, Stamp, VehicleStatus,
+    AckStatement, Address, Envelope, Frame, FrameBuilder, FrameKind, Header, MAX_WINDOW, MissionId, Reader, Seal,
+    SessionId, Stamp, VehicleStatus,
 };
 use std::time::Duration;
 
 const MISSION: MissionId = MissionId(7);
 
-/// A header that is read can be written and reads the same; a tag or CRC in the bytes is never taken for another.
+/// A decoded header can be encoded and reads the same; bytes that verify under one seal verify under no other.
 pub fn frame(data: &[u8]) {
     let key = MissionKey::from_bytes([9; 16]);
     let session = key.session(MISSION.0, 1, 2, 3, data.len().is_multiple_of(2));
@@ -39,7 +39,7 @@ fn reads_back(header: &Header) {
     assert_eq!(&again.header, header);
 }
 
-/// The losses of a statement ascend and read back; both ends take any statement and any window of frames.
+/// The losses of a statement ascend and read back; both ends accept any statement and any window of frames.
 pub fn ack(data: &[u8]) {
     let mut reader = Reader::new(data);
     let Ok(statement) = AckStatement::decode(&mut reader) else { return };
@@ -54,9 +54,9 @@ pub fn ack(data: &[u8]) {
     hear(Script(reader.rest()));
 }
 
-/// Any numbers may be heard, and a statement on them is made.
+/// Any frame numbers may come in, and a statement on them is made.
 fn hear(mut script: Script<'_>) {
-    let mut window = Window::default();
+    let mut window = LinkWindow::default();
     while !script.is_over() {
         let (number, base, what) = (script.u16(), script.u16() % 2048 + 1, script.u8());
         if let Ok(number) = window.accept(number, base)
@@ -88,12 +88,12 @@ fn header() -> Header {
         stamp: None,
         nonce: None,
         ack: None,
-        hello: false,
+        kind: FrameKind::Numbered,
         keyed: false,
     }
 }
 
-/// A body has at most as many chunks as bytes, and those of a sound one can be written into a frame again.
+/// A body has at most as many chunks as bytes, and sound chunks can be written into a frame again.
 pub fn chunks(data: &[u8]) {
     let mut bytes = raw::head(&header());
     bytes.extend_from_slice(data);
@@ -117,7 +117,7 @@ fn write_again(frame: &Frame<'_>) {
     assert!(again.chunks().are_sound() && again.chunks().eq(short));
 }
 
-/// A stamp reads back, and any clock can be followed from any moment.
+/// A stamp reads back, and any clock can be tracked from any time.
 pub fn stamp(data: &[u8]) {
     let mut script = Script(data);
     let (clock_ms, a, b, c) =
@@ -135,7 +135,7 @@ pub fn stamp(data: &[u8]) {
     let _ = map.to_ours(clock_ms, at);
 }
 
-/// A pose or report that is read can be written and reads the same.
+/// A decoded pose or report can be encoded and reads the same.
 pub fn status(data: &[u8]) {
     let (mut pose, mut report) = (VehicleStatus::default(), VehicleStatus::default());
     if pose.read_pose(data).is_ok() {
@@ -152,7 +152,7 @@ pub fn status(data: &[u8]) {
     }
 }
 
-/// A plane chunk that is read can be written and reads the same; what it says is taken or refused, levels in bounds.
+/// A decoded plane chunk can be encoded and reads the same; it is applied or refused, with levels in range.
 pub fn plane_chunk(data: &[u8]) {
     let Some(chunk) = PlaneChunk::decode(data) else { return };
     assert_eq!(chunk.encode(), data);
@@ -164,7 +164,7 @@ pub fn plane_chunk(data: &[u8]) {
     }
 }
 
-/// A readable slot can be written and reads the same; no version is admitted twice.
+/// A decoded slot can be encoded and reads the same; no version is admitted twice.
 pub fn slot(data: &[u8]) {
     let mut inbox = SlotInbox::default();
     let mut script = Script(data);
@@ -183,7 +183,7 @@ pub fn slot(data: &[u8]) {
     }
 }
 
-/// Any parts are taken within bounds.
+/// Any parts are handled within bounds.
 pub fn object(data: &[u8]) {
     let mut receiver = ObjectReceiver::default();
     let mut script = Script(data);
@@ -203,7 +203,7 @@ pub fn object(data: &[u8]) {
     assert!(format!("{receiver:?}").len() < 4 << 20);
 }
 
-/// A key that is read can be written and reads the same; an error names a line that is there.
+/// A parsed key can be written and reads the same; an error names an existing line.
 pub fn key_text(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     match MissionKey::parse(&text) {

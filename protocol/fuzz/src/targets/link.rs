@@ -1,6 +1,6 @@
-//! An end that has met its peer, and a script of what happens to it.
+//! An end in contact with its peer, and a script of inputs.
 
-use super::peer::{MISSION, Peer, authenticity, vehicle};
+use super::peer::{FuzzPeer, MISSION, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
@@ -14,10 +14,10 @@ use std::time::Duration;
 
 const BUDGET_BPS: u32 = 4000;
 const WINDOW: Duration = Duration::from_secs(10);
-/// Characters of an end's `Debug` output without its map, where all that it keeps is as large as it may be.
-const MOST_KEPT: usize = 6 << 20;
+/// The longest `Debug` output of an end without its map, while all that it keeps has the largest size.
+const MAX_KEPT: usize = 6 << 20;
 
-/// What the link is to carry but not to show: its size is not the link's.
+/// A value that the link carries and that has no `Debug` output, because its size is not the link's.
 #[derive(Default)]
 pub struct Opaque<T>(pub T);
 
@@ -45,7 +45,7 @@ impl StateReplica for Opaque<Replica> {
     }
 }
 
-/// A state that is nothing but so many bytes, so that no time goes to coding it; any bytes are some of it.
+/// A state that is only a number of bytes, so that no time goes to coding; any bytes are a part of it.
 #[derive(Debug, Default)]
 pub struct Pile {
     waiting: usize,
@@ -70,7 +70,7 @@ impl StateSource for Pile {
     fn backlog_bytes(&self) -> usize {
         self.waiting
     }
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         self.waiting + self.in_flight == 0
     }
     fn digest(&self) -> u16 {
@@ -94,7 +94,7 @@ impl StateReplica for Pile {
 
 /// A state whose host can add to it.
 pub trait Grow: StateSource {
-    /// About `amount` more bytes.
+    /// Adds about `amount` bytes.
     fn grow(&mut self, amount: u8, now: Instant);
 }
 
@@ -121,21 +121,21 @@ pub fn planes() -> impl Iterator<Item = (PlaneSource, u8)> {
 pub type Vehicle<S = Pile> = VehicleLink<S>;
 pub type Surface<R = Opaque<Replica>> = SurfaceLink<R>;
 
-/// An end as its host drives it.
-pub trait End: fmt::Debug {
+/// An end as its host runs it.
+pub trait FuzzEnd: fmt::Debug {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant);
     fn poll_transmit(&mut self, now: Instant) -> Option<Transmit>;
     fn handle_transmit_outcome(&mut self, now: Instant);
-    /// The modem asks for frames.
+    /// The modem requests frames.
     fn poll(&mut self, frames: u32, now: Instant);
     fn wakeup(&self, now: Instant) -> Option<Instant>;
-    /// Takes every event, decides about what is to be decided; says how many there were.
+    /// Takes every event and decides about every slot; returns the number of events.
     fn drain(&mut self, now: Instant) -> usize;
-    /// Something that the host does by itself.
+    /// An action of the host.
     fn act(&mut self, what: u8, with: u8, now: Instant);
 }
 
-/// What the first byte of an input chooses.
+/// The setup that the first byte of an input selects.
 #[derive(Clone, Copy)]
 pub struct Setup {
     choice: u8,
@@ -161,8 +161,8 @@ impl Setup {
         }
     }
 
-    pub fn peer(self, us: Address, end: Address) -> Peer {
-        Peer::new(us, end, authenticity(self.choice))
+    pub fn peer(self, us: Address, end: Address) -> FuzzPeer {
+        FuzzPeer::new(us, end, authenticity(self.choice))
     }
 
     pub fn vehicle<S: Grow>(self, source: S, now: Instant) -> Vehicle<S> {
@@ -188,7 +188,7 @@ impl Setup {
             shares: Shares::default(),
             master: MasterConfig::default(),
             vehicles: vec![vehicle()],
-            call_every: (self.choice & 0x20 != 0).then_some(Duration::from_secs(60)),
+            discovery_period: (self.choice & 0x20 != 0).then_some(Duration::from_secs(60)),
             authenticity: authenticity(self.choice),
         };
         let mut link = SurfaceLink::new(config, 12, now);
@@ -198,16 +198,16 @@ impl Setup {
 }
 
 /// One end on its modem.
-struct Host<'a, E> {
+struct FuzzHost<'a, E> {
     link: &'a mut E,
     modem: ModemProfile,
     in_modem: u32,
     audit: Audit,
-    /// Events of received frames.
+    /// Events caused by received frames.
     events: usize,
 }
 
-impl<E: End> Host<'_, E> {
+impl<E: FuzzEnd> FuzzHost<'_, E> {
     /// The next frame of the end, which then is in its modem.
     fn poll_transmit(&mut self, now: Instant) -> Option<Vec<u8>> {
         let transmit = self.link.poll_transmit(now)?;
@@ -233,10 +233,17 @@ impl<E: End> Host<'_, E> {
     }
 }
 
-/// Lets an end meet its peer, which then is replaced by one that follows the script; says to how many events that led.
-pub fn run<E: End>(setup: Setup, mut end: E, mut partner: impl End, mut peer: Peer, script: &[u8]) -> usize {
+/// Brings an end in contact with its peer, then replaces the peer by one that follows the script.
+/// Returns the number of events.
+pub fn run<E: FuzzEnd>(
+    setup: Setup,
+    mut end: E,
+    mut partner: impl FuzzEnd,
+    mut peer: FuzzPeer,
+    script: &[u8],
+) -> usize {
     let mut now = Instant::from_secs_f64(1000.0);
-    let host = |link| Host { link, modem: setup.modem(), in_modem: 0, audit: Audit::new(WINDOW), events: 0 };
+    let host = |link| FuzzHost { link, modem: setup.modem(), in_modem: 0, audit: Audit::new(WINDOW), events: 0 };
     let mut end = host(&mut end);
     meet(&mut end, &mut partner, &mut peer, &mut now);
     let mut script = Script(script);
@@ -244,12 +251,13 @@ pub fn run<E: End>(setup: Setup, mut end: E, mut partner: impl End, mut peer: Pe
     while !script.is_over() {
         step(&mut end, &mut peer, &mut script, &mut past, &mut now);
     }
-    assert!(format!("{:?}", end.link).len() < MOST_KEPT);
+    assert!(format!("{:?}", end.link).len() < MAX_KEPT);
     end.events
 }
 
-/// Ten exchanges over calm water: they have met, and each has said something that is not acknowledged yet.
-fn meet<E: End>(end: &mut Host<'_, E>, partner: &mut impl End, peer: &mut Peer, now: &mut Instant) {
+/// Ten exchanges over a lossless channel. Afterwards both are in contact, and each has a
+/// frame that is not acknowledged.
+fn meet<E: FuzzEnd>(end: &mut FuzzHost<'_, E>, partner: &mut impl FuzzEnd, peer: &mut FuzzPeer, now: &mut Instant) {
     for _ in 0..10 {
         *now = *now + Duration::from_millis(1500);
         partner.poll(4, *now);
@@ -272,9 +280,9 @@ fn meet<E: End>(end: &mut Host<'_, E>, partner: &mut impl End, peer: &mut Peer, 
     }
 }
 
-fn step<E: End>(
-    end: &mut Host<'_, E>,
-    peer: &mut Peer,
+fn step<E: FuzzEnd>(
+    end: &mut FuzzHost<'_, E>,
+    peer: &mut FuzzPeer,
     script: &mut Script<'_>,
     past: &mut Vec<Vec<u8>>,
     now: &mut Instant,
@@ -299,7 +307,7 @@ fn step<E: End>(
         11 => end.handle_outcome(*now),
         12 => end.link.poll(how.into(), *now),
         13 => end.link.act(how, script.u8(), *now),
-        // The modem takes and sends whatever there is.
+        // The modem accepts and transmits everything.
         14 => (0..how).for_each(|_| {
             *now = *now + Duration::from_millis(10);
             speak(end, peer, *now);
@@ -311,7 +319,7 @@ fn step<E: End>(
     end.link.drain(*now);
 }
 
-fn receive<E: End>(end: &mut Host<'_, E>, peer: &mut Peer, bytes: &[u8], now: Instant) {
+fn receive<E: FuzzEnd>(end: &mut FuzzHost<'_, E>, peer: &mut FuzzPeer, bytes: &[u8], now: Instant) {
     end.link.drain(now);
     end.link.handle_frame(bytes, now);
     let events = end.link.drain(now);
@@ -320,8 +328,8 @@ fn receive<E: End>(end: &mut Host<'_, E>, peer: &mut Peer, bytes: &[u8], now: In
     assert!(events == 0 || peer.may_be_believed(bytes), "an event of a frame that was not sealed");
 }
 
-/// The end speaks until its modem is full, which must be at some time.
-fn speak<E: End>(end: &mut Host<'_, E>, peer: &mut Peer, now: Instant) {
+/// The end transmits until its modem is full, which must happen.
+fn speak<E: FuzzEnd>(end: &mut FuzzHost<'_, E>, peer: &mut FuzzPeer, now: Instant) {
     while let Some(bytes) = end.poll_transmit(now) {
         peer.note_heard(&bytes);
     }

@@ -3,7 +3,7 @@
 use scenecast_protocol::map::{Cell, LabelGrid, MAX_LABEL};
 use scenecast_protocol::map_codec::{ChunkFile, MAX_PATCH_CELLS, decode, restored_png};
 
-/// Decoding refuses the bytes or returns a change that could be meant.
+/// Decoding refuses the bytes or returns a plausible change.
 pub fn map_chunk(data: &[u8]) {
     let Some((&choice, chunk)) = data.split_first() else { return };
     let base = base(choice);
@@ -16,7 +16,7 @@ pub fn map_chunk(data: &[u8]) {
     let _ = ChunkFile::from_bytes(chunk);
 }
 
-/// Nothing, stripes, or blocks around the origin.
+/// An empty map, stripes, or blocks around the origin.
 pub fn base(choice: u8) -> LabelGrid {
     let label = |x: i32, y: i32| match choice % 3 {
         0 => 0,

@@ -1,6 +1,6 @@
-//! What must hold for any bytes: plain functions, run by libFuzzer and by `tests/fuzz_corpus.rs` alike.
+//! Properties for any bytes: plain functions, run by libFuzzer and by `tests/fuzz_corpus.rs` alike.
 //!
-//! A function panics if the protocol breaks a promise.
+//! A function panics if a property does not hold.
 
 mod decoders;
 pub mod link;
@@ -15,7 +15,7 @@ pub use map_chunk::{base, map_chunk};
 pub use surface::{surface_events, surface_link};
 pub use vehicle::{vehicle_events, vehicle_link};
 
-/// A target takes any bytes.
+/// A target accepts any bytes.
 pub type Target = fn(&[u8]);
 
 /// Every target by the name of its corpus.

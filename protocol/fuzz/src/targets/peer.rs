@@ -1,10 +1,10 @@
-//! What the true peer of an end knows: it can seal anything.
+//! The knowledge of an end's true peer, with which any frame can be sealed.
 
 use super::raw::{self, Script};
 use scenecast_protocol::link::{Authenticity, Flight};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, Header, MissionId, Reader, SessionId, Stamp, unwrap_number,
+    AckStatement, Address, Envelope, FrameKind, Header, MissionId, Reader, SessionId, Stamp, unwrap_number,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 pub const MISSION: MissionId = MissionId(7);
 
-/// How frames are sealed, by two bits.
+/// The four ways of sealing frames, by two bits.
 pub fn authenticity(choice: u8) -> Option<Authenticity> {
     let key = Arc::new(MissionKey::from_bytes([9; 16]));
     (choice & 3 != 0).then(|| Authenticity { key, all: choice & 3 > 1, encrypt: choice & 3 == 3 })
@@ -22,17 +22,17 @@ pub fn vehicle() -> Address {
     Address::vehicle(1).expect("a vehicle")
 }
 
-type Run = (SessionId, u64);
+type FuzzRun = (SessionId, u64);
 
 /// Seals frames as the peer of the end under test does.
-pub struct Peer {
+pub struct FuzzPeer {
     pub us: Address,
     pub end: Address,
     authenticity: Option<Authenticity>,
-    own: Run,
-    theirs: Run,
-    /// The end's last call for vehicles that it does not know.
-    call: Option<Run>,
+    own: FuzzRun,
+    theirs: FuzzRun,
+    /// The end's last discovery call.
+    call: Option<FuzzRun>,
     /// Our frames; the end's statements judge them.
     flight: Flight<()>,
     /// Highest number of the end's frames.
@@ -41,28 +41,28 @@ pub struct Peer {
     sealed: BTreeSet<Vec<u8>>,
 }
 
-impl Peer {
+impl FuzzPeer {
     pub fn new(us: Address, end: Address, authenticity: Option<Authenticity>) -> Self {
         let nobody = (SessionId::from_random(1), 0);
         let (flight, sealed) = (Flight::default(), BTreeSet::new());
         Self { us, end, authenticity, own: nobody, theirs: nobody, call: None, flight, heard: 0, sealed }
     }
 
-    /// A frame that the true peer has sent, before it was replaced by us.
+    /// Notes a frame that the true peer has sent, before this one replaced it.
     pub fn note_sent(&mut self, bytes: &[u8]) {
         self.sealed.insert(bytes.to_vec());
         let Ok(envelope) = Envelope::decode(bytes, |_| true) else { return };
         if envelope.header.to == Address::EVERYBODY {
             return;
         }
-        if envelope.header.hello {
+        if envelope.header.kind.is_hello() {
             self.begin_run((envelope.header.session, envelope.header.nonce.unwrap_or_default()));
         } else {
             self.flight.push(());
         }
     }
 
-    /// A frame that the end has sent.
+    /// Notes a frame that the end has sent.
     pub fn note_heard(&mut self, bytes: &[u8]) {
         let ours = |to| to == self.us || to == Address::EVERYBODY;
         let envelope = Envelope::decode(bytes, ours).expect("a frame for its peer");
@@ -70,21 +70,21 @@ impl Peer {
         let run = (header.session, header.nonce.unwrap_or_default());
         if header.to == Address::EVERYBODY {
             self.call = Some(run);
-        } else if header.hello && run != self.theirs && header.session != self.own.0 {
+        } else if header.kind.is_hello() && run != self.theirs && header.session != self.own.0 {
             (self.theirs, self.flight, self.heard) = (run, Flight::default(), 0);
-        } else if !header.hello {
+        } else if !header.kind.is_hello() {
             self.heard = self.heard.max(unwrap_number(header.number, self.heard));
             header.ack.iter().for_each(|ack| drop(self.flight.handle_statement(ack)));
         }
     }
 
-    fn begin_run(&mut self, run: Run) {
+    fn begin_run(&mut self, run: FuzzRun) {
         if run != self.own {
             (self.own, self.flight, self.heard) = (run, Flight::default(), 0);
         }
     }
 
-    /// Whether these bytes prove that they come from a holder of the key, or nothing must prove that.
+    /// Whether these bytes come from a holder of the key, or no key is needed.
     pub fn may_be_believed(&self, bytes: &[u8]) -> bool {
         !self.is_keyed(false) || self.sealed.contains(bytes)
     }
@@ -93,7 +93,7 @@ impl Peer {
         self.authenticity.as_ref().is_some_and(|a| hello || a.all || self.us == Address::SURFACE)
     }
 
-    /// A hello; a bit of `what` begins a new run, another one calls everybody or answers a call.
+    /// A hello. Bits of `what` select a new run, and the answer to a discovery call or a frame to everybody.
     pub fn hello(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
         let keyed = self.is_keyed(true);
         if what & 1 != 0 {
@@ -109,7 +109,7 @@ impl Peer {
             base: 1,
             nonce: keyed.then_some(nonce),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed,
             ..self.header(what, script)
         };
@@ -120,7 +120,7 @@ impl Peer {
         bytes
     }
 
-    /// A numbered frame whose header follows `what` and the script, and whose body is the script's.
+    /// A numbered frame whose header follows `what` and the script, with a body from the script.
     pub fn numbered(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
         let mut header = self.header(what, script);
         let mut number = self.flight.next_number();
@@ -173,7 +173,7 @@ impl Peer {
             stamp,
             nonce: None,
             ack,
-            hello: false,
+            kind: FrameKind::Numbered,
             keyed: self.is_keyed(false),
         }
     }
@@ -184,9 +184,9 @@ impl Peer {
         bytes.extend_from_slice(body);
         let (session, nonce) = if self.us == Address::SURFACE { (0, 0) } else { (self.theirs.0.get(), self.theirs.1) };
         match self.authenticity.as_ref().filter(|_| header.keyed) {
-            None if header.hello => raw::close_with_crc(&mut bytes, MISSION, session),
+            None if header.kind.is_hello() => raw::close_with_crc(&mut bytes, MISSION, session),
             None => raw::close_with_crc(&mut bytes, MISSION, self.theirs.0.get()),
-            Some(a) if header.hello => {
+            Some(a) if header.kind.is_hello() => {
                 let (m, s, n) = (MISSION.0.to_be_bytes(), session.to_be_bytes(), nonce.to_be_bytes());
                 let tag = a.key.hello_tag(&[&m, &s, &n, &bytes]);
                 bytes.extend_from_slice(&tag);

@@ -3,7 +3,7 @@
 use crc::{CRC_24_OPENPGP, CRC_32_ISCSI, Crc};
 use scenecast_protocol::wire::{FrameBuilder, Header, MissionId, Seal};
 
-/// The bytes of a header with its ack statement.
+/// The bytes of a header with its acknowledgement statement.
 pub fn head(header: &Header) -> Vec<u8> {
     let builder = FrameBuilder::new(header, 4096);
     let len = builder.len(true);
@@ -23,7 +23,7 @@ pub fn close_with_crc(frame: &mut Vec<u8>, mission: MissionId, session: u16) {
     frame.extend_from_slice(&digest.finalize().to_be_bytes()[usize::from(short)..]);
 }
 
-/// A reader of instructions that reads zeros past the end.
+/// A reader of instructions that yields zeros past the end.
 pub struct Script<'a>(pub &'a [u8]);
 
 impl<'a> Script<'a> {
@@ -41,7 +41,7 @@ impl<'a> Script<'a> {
         u16::from_be_bytes([self.u8(), self.u8()])
     }
 
-    /// A length in one byte, and so many bytes, or what is left.
+    /// A length in one byte, and as many bytes, or the rest.
     pub fn bytes(&mut self) -> &'a [u8] {
         let length = usize::from(self.u8()).min(self.0.len());
         let (bytes, rest) = self.0.split_at(length);

@@ -1,7 +1,8 @@
 //! A script against the surface's end.
 
-use super::link::{End, Pile, Setup, Surface, run};
+use super::link::{FuzzEnd, Pile, Setup, Surface, run};
 use super::peer::vehicle;
+use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Constraints, Fix, Slot, Utility};
 use scenecast_protocol::link::Transmit;
 use scenecast_protocol::map::StateReplica;
@@ -9,24 +10,24 @@ use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 
-/// What a surface hears never harms it: the first byte is the setup, the others are the script.
+/// No received bytes harm a surface. The first byte is the setup, the others are the script.
 pub fn surface_link(data: &[u8]) {
     surface_events(data);
 }
 
-/// As [`surface_link`]; says how many events the script led to.
+/// As [`surface_link`]; returns the number of events.
 pub fn surface_events(data: &[u8]) -> usize {
     let Some((&choice, script)) = data.split_first() else { return 0 };
     let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
     let peer = setup.peer(vehicle(), Address::SURFACE);
-    // A pile says nothing before it grows: what the surface hears of a map is the script's.
+    // A pile sends no content before it grows, so all that the surface receives of a map is from the script.
     let surface: Surface = setup.surface(begin);
     let mut partner = setup.vehicle(Pile::default(), begin);
     (1..3).for_each(|what| partner.act(what, 3, begin));
     run(setup, surface, partner, peer, script)
 }
 
-impl<R: StateReplica> End for Surface<R> {
+impl<R: StateReplica> FuzzEnd for Surface<R> {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.handle_frame(bytes, now);
     }
@@ -58,7 +59,7 @@ impl<R: StateReplica> End for Surface<R> {
         let slot = match what % 4 {
             0 => Slot::Utility(Utility { weights, ..Utility::default() }),
             1 => Slot::Constraints(Constraints { hold: with & 1 != 0, abort: with & 2 != 0 }),
-            2 => Slot::Fix(Fix { x_m: f64::from(with), ..Fix::default() }),
+            2 => Slot::Fix(Fix { position: WorldPoint::new(f64::from(with), 0.0), ..Fix::default() }),
             _ => return self.set_shares(Shares([with % 20; 5])),
         };
         let _ = self.issue(vehicle(), slot, now);

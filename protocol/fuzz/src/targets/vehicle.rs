@@ -1,20 +1,21 @@
 //! A script against the vehicle's end.
 
-use super::link::{End, Grow, Pile, Setup, Surface, Vehicle, planes, run};
+use super::link::{FuzzEnd, Grow, Pile, Setup, Surface, Vehicle, planes, run};
 use super::peer::vehicle;
-use scenecast_protocol::directive::{RefusalReason, SlotId};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{RefusalReason, SlotId, SlotState};
 use scenecast_protocol::link::{Transmit, VehicleEvent};
 use scenecast_protocol::map::{Cell, PlaneKind};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, PlannedPath, SlotState, VehicleStatus};
+use scenecast_protocol::wire::{Address, PlannedPath, VehicleStatus};
 
-/// What a vehicle hears never harms it: the first byte is the setup, the others are the script.
+/// No received bytes harm a vehicle. The first byte is the setup, the others are the script.
 pub fn vehicle_link(data: &[u8]) {
     vehicle_events(data);
 }
 
-/// As [`vehicle_link`]; says how many events the script led to.
+/// As [`vehicle_link`]; returns the number of events.
 pub fn vehicle_events(data: &[u8]) -> usize {
     let Some((&choice, script)) = data.split_first() else { return 0 };
     let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
@@ -26,7 +27,7 @@ pub fn vehicle_events(data: &[u8]) -> usize {
     run(setup, vehicle, surface, peer, script)
 }
 
-impl<S: Grow> End for Vehicle<S> {
+impl<S: Grow> FuzzEnd for Vehicle<S> {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.handle_frame(bytes, now);
     }
@@ -65,9 +66,9 @@ impl<S: Grow> End for Vehicle<S> {
             0 => self.source_mut().grow(with, now),
             1 => drop(self.push_object(vec![with; 40 + usize::from(with) * 20])),
             2 => {
-                let places = (1..=with % 11).map(|i| (f64::from(i), f64::from(i ^ with))).collect();
-                let path = PlannedPath { places, goes_on: with > 127 };
-                let waypoint = (with > 9).then_some((0.0, 0.0));
+                let points = (1..=with % 11).map(|i| MapPoint::new(f64::from(i), f64::from(i ^ with))).collect();
+                let path = PlannedPath { points, continues: with > 127 };
+                let waypoint = (with > 9).then_some(MapPoint::default());
                 self.set_status(VehicleStatus { labels: with, waypoint, path, ..VehicleStatus::default() });
             }
             3 => self.decide(SlotId::ALL[usize::from(with % 6)], SlotState::Refused(RefusalReason::TooOld), now),

@@ -1,28 +1,28 @@
-//! Calling for vehicles that are not known.
+//! Discovery calls, by which the surface looks for unknown vehicles.
 
-use crate::link::Transmit;
 use crate::link::run::{Authenticity, Identity};
+use crate::link::{Transmit, TransmitKind};
 use crate::mac::{ModemProfile, quarter_seconds};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, FrameBuilder, Header, MissionId, Seal, SessionId};
+use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal, SessionId};
 use std::time::Duration;
 
-/// Calls everybody from time to time; who is not spoken with answers at a moment of its own choosing.
+/// Transmits a discovery call from time to time. Each vehicle that is not in contact answers at a random time.
 #[derive(Debug)]
 pub(super) struct Discovery {
-    /// Longest time between two calls; `None`: only configured vehicles are spoken with.
+    /// The longest time between two calls; `None` disables them.
     every: Option<Duration>,
     pause: Duration,
     next: Instant,
     open: Option<(Identity, Instant)>,
-    /// Longest one-way propagation.
+    /// The longest one-way propagation time.
     reach: Duration,
 }
 
 impl Discovery {
-    /// Pause before the second call while nobody is known.
+    /// Pause before the second call while no vehicle is known.
     const FIRST_PAUSE: Duration = Duration::from_secs(5);
-    /// Time in which called vehicles choose when to answer.
+    /// The time from which called vehicles choose when to answer.
     const ANSWERS: Duration = Duration::from_secs(2);
 
     pub(super) fn new(every: Option<Duration>, anybody_known: bool, reach: Duration, now: Instant) -> Self {
@@ -31,28 +31,27 @@ impl Discovery {
         Self { every, pause, next, open: None, reach }
     }
 
-    /// When the next call is due, or when the answers to the last one are all in.
+    /// When the next call is due, or when the time for answers ends.
     pub(super) fn next_wakeup(&self, now: Instant) -> Option<Instant> {
         self.every?;
         Some(self.listens_until(now).unwrap_or(self.next))
     }
 
-    /// Until when the medium is left to those who answer.
+    /// The end of the time in which the medium is left to answers.
     pub(super) fn listens_until(&self, now: Instant) -> Option<Instant> {
         self.open.map(|(_, until)| until).filter(|&until| now < until)
     }
 
-    /// Whether it is time to call.
     pub(super) fn is_due(&self, now: Instant) -> bool {
         self.every.is_some() && now >= self.next && self.listens_until(now).is_none()
     }
 
-    /// The budget does not allow a call before `at`.
+    /// Moves the next call to `at`, because the budget does not allow it before.
     pub(super) fn postpone(&mut self, at: Instant) {
         self.next = self.next.max(at);
     }
 
-    /// A call.
+    /// The frame of a call, with which the time for answers begins.
     pub(super) fn write(
         &mut self,
         mission: MissionId,
@@ -74,7 +73,7 @@ impl Discovery {
             stamp: None,
             nonce: authenticity.map(|_| own.nonce),
             ack: None,
-            hello: true,
+            kind: FrameKind::Hello,
             keyed: authenticity.is_some(),
         };
         let builder = FrameBuilder::new(&header, modem.frame_bytes);
@@ -87,7 +86,7 @@ impl Discovery {
         self.open = Some((own, until));
         self.next = until + self.pause;
         self.pause = (self.pause * 2).min(self.every.unwrap_or_default()).max(Self::FIRST_PAUSE);
-        Transmit { to: Address::EVERYBODY, bytes, kind: "call" }
+        Transmit { to: Address::EVERYBODY, bytes, kind: TransmitKind::DiscoveryCall }
     }
 
     /// Whether a hello answers the last call.
@@ -98,7 +97,7 @@ impl Discovery {
         authenticity: Option<&Authenticity>,
         now: Instant,
     ) -> bool {
-        let Some((call, until)) = self.open.filter(|_| envelope.header.hello) else { return false };
+        let Some((call, until)) = self.open.filter(|_| envelope.header.kind.is_hello()) else { return false };
         let session = call.session.get();
         let sound = match authenticity {
             Some(a) => envelope.open(&Seal::Hello(&a.key, mission, session, call.nonce)).is_some(),
@@ -107,7 +106,7 @@ impl Discovery {
         sound && now < until + Duration::from_secs(10)
     }
 
-    /// Bytes of a call.
+    /// The length of a call in bytes.
     pub(super) const fn bytes(keyed: bool) -> usize {
         if keyed { 9 + 8 + 8 } else { 9 + 3 }
     }

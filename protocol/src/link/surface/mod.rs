@@ -1,104 +1,35 @@
 //! The surface's end of the link.
+//!
+//! [`SurfaceLink`] joins parts that own their state: `fleet` (the known vehicles, each a `peer`), `discovery` (calls
+//! for unknown ones), `polled` (cycles of a modem that polls). `transmit` decides when a frame goes out.
 
-mod backlog;
+mod config;
 mod discovery;
-mod grant;
+mod event;
+mod fleet;
 mod peer;
 mod planes;
 mod polled;
-mod pool;
-mod turn;
-mod view;
+mod transmit;
 
+pub use config::SurfaceConfig;
+pub use event::{IssueError, SurfaceEvent};
+pub use peer::PeerView;
 pub use polled::Cycle;
-pub use view::PeerView;
 
-use crate::directive::{Slot, SlotId, VersionedSlot};
-use crate::link::{Authenticity, DropReason, FrameNumber, Transmit};
-use crate::mac::{Access, MasterConfig, ModemProfile};
+use crate::directive::{Slot, VersionedSlot};
+use crate::link::{DropReason, FrameNumber, Transmit};
+use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, MissionId, Seal};
+use crate::wire::{Address, Envelope, Seal};
 use discovery::Discovery;
-use peer::Peer;
-use std::collections::{BTreeMap, VecDeque};
-use std::time::Duration;
-use turn::{Ready, room_for_slot};
+use fleet::Fleet;
+use peer::{Ready, VehiclePeer, room_for_slot};
+use std::collections::VecDeque;
 
-/// Settings of the surface's end.
-#[derive(Debug, Clone)]
-pub struct SurfaceConfig {
-    /// Mission.
-    pub mission: MissionId,
-    /// The modem.
-    pub modem: ModemProfile,
-    /// Bits a second on air.
-    pub budget_bps: u32,
-    /// Window of the budget.
-    pub budget_window: Duration,
-    /// Least share of each class while it has something to send.
-    pub shares: Shares,
-    /// How turns are granted.
-    pub master: MasterConfig,
-    /// The vehicles to speak with from the beginning.
-    pub vehicles: Vec<Address>,
-    /// Longest time between two calls for vehicles that are not known; `None`: there are no calls.
-    pub call_every: Option<Duration>,
-    /// How frames are made authentic, if they are.
-    pub authenticity: Option<Authenticity>,
-}
-
-/// Why a slot cannot be issued.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum IssueError {
-    /// There is no such vehicle.
-    #[error("no such vehicle")]
-    NoVehicle,
-    /// It does not fit a frame.
-    #[error("it takes {bytes} bytes, and a frame has room for {room}: set a larger link.frame_bytes or say less")]
-    TooLarge {
-        /// Bytes of the slot.
-        bytes: usize,
-        /// Bytes that fit.
-        room: usize,
-    },
-}
-
-/// What the link tells its host.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SurfaceEvent {
-    /// A vehicle answered a call that nobody had known of.
-    VehicleFound(Address),
-    /// The operator's map of a vehicle has changed.
-    MapChanged(Address),
-    /// A status came in.
-    Status(Address),
-    /// A vehicle has applied or refused a slot.
-    SlotSettled(Address, SlotId),
-    /// All of an object came in.
-    Object(Address, Vec<u8>),
-    /// More of an object came in.
-    ObjectProgress {
-        /// From whom.
-        vehicle: Address,
-        /// Its first bytes, once they are held.
-        head: Option<Vec<u8>>,
-        /// Bytes held.
-        held: usize,
-        /// Bytes of the whole object.
-        total: usize,
-    },
-    /// A vehicle began a new run; its map starts empty.
-    VehicleRestarted(Address),
-}
-
-impl SurfaceEvent {
-    /// Bytes of an object that [`Self::ObjectProgress`] shows.
-    pub const OBJECT_HEAD: usize = 4;
-}
-
-/// A frame that the modem has.
+/// A frame in the modem.
 #[derive(Debug, Clone, Copy)]
 struct OnAir {
     to: Address,
@@ -107,16 +38,14 @@ struct OnAir {
     last: bool,
 }
 
-/// The surface's end of the link: grants turns, holds a replica a vehicle, sends each its directive.
+/// The surface's end of the link: grants turns, holds a replica for each vehicle, sends each its directive.
 #[derive(Debug)]
 pub struct SurfaceLink<R: StateReplica = Replica> {
     config: SurfaceConfig,
-    peers: BTreeMap<Address, Peer<R>>,
+    fleet: Fleet<R>,
     budget: BitBudget,
     shares: ClassShares,
-    /// Whose turn it is; the surface speaks with one vehicle at a time.
-    current: Option<Address>,
-    /// What is left of the surface's own turn.
+    /// The frames of the surface's own turn that are still to go out.
     turn: VecDeque<Ready>,
     in_modem: VecDeque<OnAir>,
     discovery: Discovery,
@@ -124,29 +53,27 @@ pub struct SurfaceLink<R: StateReplica = Replica> {
     series: u16,
     random: u64,
     events: VecDeque<SurfaceEvent>,
-    /// Frames that no vehicle that we know has sent.
-    strangers: u64,
+    unknown_senders: u64,
 }
 
 impl<R: StateReplica> SurfaceLink<R> {
-    /// An end that has met nobody; `seed` is random for each run.
+    /// An end without contact; `seed` must be random for each run.
     pub fn new(config: SurfaceConfig, seed: u64, now: Instant) -> Self {
         let mut random = seed;
         let series = crate::random::next(&mut random) as u16;
-        let known = !config.vehicles.is_empty();
+        let is_any_known = !config.vehicles.is_empty();
         let mut link = Self {
-            peers: BTreeMap::new(),
+            fleet: Fleet::new(),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
             shares: ClassShares::new(config.shares),
-            current: None,
             turn: VecDeque::new(),
             in_modem: VecDeque::new(),
-            discovery: Discovery::new(config.call_every, known, config.master.max_propagation, now),
+            discovery: Discovery::new(config.discovery_period, is_any_known, config.master.max_propagation, now),
             cycle: polled::Cycles::default(),
             series,
             random,
             events: VecDeque::new(),
-            strangers: 0,
+            unknown_senders: 0,
             config,
         };
         for vehicle in link.config.vehicles.clone() {
@@ -158,26 +85,26 @@ impl<R: StateReplica> SurfaceLink<R> {
     fn add(&mut self, vehicle: Address, now: Instant) {
         let seed = crate::random::next(&mut self.random);
         let c = &self.config;
-        let peer = Peer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
-        self.peers.insert(vehicle, peer);
+        let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
+        self.fleet.insert(vehicle, peer);
     }
 
-    /// A vehicle as it is known now.
+    /// The current view of a vehicle; `None` if it is unknown.
     pub fn vehicle(&self, vehicle: Address) -> Option<PeerView<'_, R>> {
-        self.peers.get(&vehicle).map(PeerView)
+        self.fleet.get(vehicle).map(PeerView)
     }
 
-    /// The vehicles that are known.
+    /// The known vehicles, in the order of their addresses.
     pub fn vehicles(&self) -> impl Iterator<Item = Address> + '_ {
-        self.peers.keys().copied()
+        self.fleet.addresses()
     }
 
-    /// Frames of this mission that no known vehicle has sent, or that could not be read.
-    pub fn strangers(&self) -> u64 {
-        self.strangers
+    /// Frames that no known vehicle has sent, or that could not be read.
+    pub fn unknown_senders(&self) -> u64 {
+        self.unknown_senders
     }
 
-    /// Issues a new version of a slot to a vehicle.
+    /// Issues a new version of a slot to a vehicle; returns the version.
     pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, IssueError> {
         let seal = Seal::bytes(self.config.authenticity.is_some(), self.config.modem.frame_bytes);
         let room = room_for_slot(self.config.modem.frame_bytes, seal);
@@ -185,18 +112,18 @@ impl<R: StateReplica> SurfaceLink<R> {
         if bytes > room {
             return Err(IssueError::TooLarge { bytes, room });
         }
-        self.peers.get_mut(&vehicle).map(|p| p.issue(slot, now)).ok_or(IssueError::NoVehicle)
+        self.fleet.get_mut(vehicle).map(|p| p.issue(slot, now)).ok_or(IssueError::NoVehicle)
     }
 
-    /// Issues a new version of a slot to several vehicles; each acknowledges and decides for itself.
+    /// Issues a new version of a slot to several vehicles; each acknowledges and decides by itself.
     pub fn issue_to(&mut self, vehicles: &[Address], slot: &Slot, now: Instant) -> Result<Vec<u16>, IssueError> {
-        if vehicles.iter().any(|v| !self.peers.contains_key(v)) {
+        if vehicles.iter().any(|&v| self.fleet.get(v).is_none()) {
             return Err(IssueError::NoVehicle);
         }
         vehicles.iter().map(|&v| self.issue(v, slot.clone(), now)).collect()
     }
 
-    /// An earlier run of this end may have sent until `now`: the budget counts as spent.
+    /// Counts the budget as spent, because an earlier run of this end may have transmitted until `now`.
     pub fn assume_budget_spent(&mut self, now: Instant) {
         self.budget.assume_spent(now);
     }
@@ -206,7 +133,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         self.budget.set_rate(bits_per_s, now);
     }
 
-    /// The surface's own bit budget.
+    /// The surface's own bit budget in bit/s.
     pub fn budget_bps(&self) -> u32 {
         self.budget.bits_per_s()
     }
@@ -221,29 +148,29 @@ impl<R: StateReplica> SurfaceLink<R> {
         self.shares.shares()
     }
 
-    /// The next thing to tell the host.
+    /// The next event; the host calls this until it returns `None`.
     pub fn poll_event(&mut self) -> Option<SurfaceEvent> {
         self.events.pop_front()
     }
 
-    /// Takes received bytes.
+    /// Handles the bytes of one received frame; a frame that cannot be used is counted and dropped.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         let envelope = match Envelope::decode(bytes, |to| to == Address::SURFACE) {
             Ok(envelope) if envelope.header.from.is_vehicle() => envelope,
-            Ok(_) => return self.drop_strange(DropReason::Stranger),
-            Err(e) => return self.drop_strange(e.into()),
+            Ok(_) => return self.drop_unknown(DropReason::UnknownSender),
+            Err(e) => return self.drop_unknown(e.into()),
         };
         let from = envelope.header.from;
         let authenticity = self.config.authenticity.as_ref();
         if self.discovery.is_answered_by(&envelope, self.config.mission, authenticity, now) {
-            return self.handle_here(from, now);
+            return self.handle_call_answer(from, now);
         }
-        let Some(peer) = self.peers.get_mut(&from) else { return self.drop_strange(DropReason::Stranger) };
+        let is_current = self.fleet.is_current(from);
+        let Some(peer) = self.fleet.get_mut(from) else { return self.drop_unknown(DropReason::UnknownSender) };
         peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);
-        if peer.out_of_step {
-            peer.resync(now);
-            if self.current == Some(from) && !self.turn.is_empty() {
-                // What is left of the turn was written for the run that has ended.
+        if peer.resync_if_out_of_step(now) {
+            if is_current && !self.turn.is_empty() {
+                // The rest of the turn was written for the run that has ended.
                 self.turn.clear();
                 match self.in_modem.back_mut() {
                     Some(sent) => sent.last = true,
@@ -252,14 +179,11 @@ impl<R: StateReplica> SurfaceLink<R> {
             }
             self.events.push_back(SurfaceEvent::MapChanged(from));
         }
-        let wait = if peer.pair.is_proven() { Duration::from_secs(2) } else { Duration::ZERO };
-        if peer.pair.unstated() > 0 || (peer.pair.is_met() && !peer.pair.is_proven()) {
-            peer.answer_due.get_or_insert(now + wait);
-        }
+        peer.owe_answer(now);
     }
 
-    fn handle_here(&mut self, from: Address, now: Instant) {
-        match self.peers.get_mut(&from) {
+    fn handle_call_answer(&mut self, from: Address, now: Instant) {
+        match self.fleet.get_mut(from) {
             Some(peer) => peer.master.hurry(now),
             None => {
                 self.add(from, now);
@@ -268,10 +192,10 @@ impl<R: StateReplica> SurfaceLink<R> {
         }
     }
 
-    fn drop_strange(&mut self, reason: DropReason) {
-        self.strangers += 1;
-        if let Some(first) = self.peers.values_mut().next() {
-            first.pair.stats.drop(reason);
+    fn drop_unknown(&mut self, reason: DropReason) {
+        self.unknown_senders += 1;
+        if let Some(first) = self.fleet.first_mut() {
+            first.drop_frame(reason);
         }
     }
 
@@ -281,16 +205,16 @@ impl<R: StateReplica> SurfaceLink<R> {
             self.budget.handle_delay(self.in_modem.len(), now);
         }
         let Some(sent) = self.in_modem.pop_front() else { return };
-        let Some(peer) = self.peers.get_mut(&sent.to) else { return };
+        let Some(peer) = self.fleet.get_mut(sent.to) else { return };
         peer.handle_sent(sent.number, now);
         if sent.last {
-            let losable = peer.pair.stats.loss_in.copies(0.03, 8) - 1;
+            let losable = peer.stats().loss_in.copies(0.03, 8) - 1;
             peer.master.handle_turn_sent(&self.config.modem, losable, now);
             self.cycle.handle_turn_sent();
         }
     }
 
-    /// The modem put `bits` on air beside what it was given, as one that repeats by itself does.
+    /// The modem put `bits` on air beside those it was given, for example by repeating a frame itself.
     pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
         self.budget.spend(bits, now);
     }

@@ -1,4 +1,4 @@
-//! Turns where a cycle of the modem is the grant, as the cycle-init of a WHOI Micromodem is.
+//! Turns where a cycle of the modem is the grant, as with the cycle-init of a WHOI Micromodem.
 
 use super::SurfaceLink;
 use crate::link::Transmit;
@@ -7,30 +7,30 @@ use crate::time::Instant;
 use crate::wire::Address;
 use std::time::Duration;
 
-/// Time in which the modem has to ask for the frames of a cycle of ours.
+/// The modem must request the frames of our cycle within this time.
 const GIVE_UP: Duration = Duration::from_secs(30);
 
-/// A cycle for the modem to begin.
+/// A cycle that the modem is to begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cycle {
-    /// Who sends.
+    /// The end that sends in this cycle.
     pub from: Address,
-    /// Who receives.
+    /// The end that receives in this cycle.
     pub to: Address,
-    /// Frames to be asked of the sender, at most.
+    /// The most frames that the modem should request.
     pub frames: u32,
 }
 
-/// Where the surface is between its own cycle and the vehicle's.
+/// The progress between the surface's own cycle and the vehicle's.
 #[derive(Debug, Default)]
 pub(super) struct Cycles {
-    /// A cycle that the host is still to begin.
+    /// A cycle that the host must still begin.
     wanted: Option<Cycle>,
-    /// Frames that the modem has asked us for and not got.
+    /// Frames that the modem has requested and not received yet.
     polled: u32,
     /// The vehicle whose cycle follows ours.
     answer_of: Option<Address>,
-    /// When our last cycle was to begin.
+    /// When our last cycle was due to begin.
     began: Instant,
 }
 
@@ -60,24 +60,24 @@ impl<R: StateReplica> SurfaceLink<R> {
         Some(Cycle { from: Address::SURFACE, to, frames: self.turn.len() as u32 })
     }
 
-    /// The modem never asked for what our cycle was to carry.
+    /// Gives up a cycle of which the modem has requested no frame.
     fn give_up_cycle(&mut self, now: Instant) {
         self.turn.clear();
         (self.cycle.polled, self.cycle.answer_of) = (0, None);
-        if let Some(peer) = self.current.and_then(|a| self.peers.get_mut(&a)) {
+        if let Some(peer) = self.fleet.current_mut() {
             peer.master.postpone(now);
         }
     }
 
-    /// When a cycle that the modem has not begun is given up.
-    pub(super) fn gives_up_at(&self) -> Option<Instant> {
+    /// When a cycle is given up that the modem has not begun.
+    pub(super) fn cycle_gives_up_at(&self) -> Option<Instant> {
         (!self.turn.is_empty()).then(|| self.cycle.began + GIVE_UP)
     }
 
-    /// The modem asks for `frames` frames of the surface's own cycle.
+    /// The modem requests `frames` frames of the surface's own cycle.
     pub fn handle_poll(&mut self, frames: u32) {
         self.cycle.polled = frames;
-        // What does not fit the cycle is not said in it: the next one says what then is worth saying.
+        // Frames that do not fit into the cycle are dropped; the next cycle carries what is current by then.
         while self.turn.len() > frames.max(1) as usize {
             self.turn.pop_back();
         }

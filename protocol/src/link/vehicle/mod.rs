@@ -1,257 +1,201 @@
 //! The vehicle's end of the link.
+//!
+//! [`VehicleLink`] joins parts that own their state: `content` (what waits to be sent), `repeat` (copies
+//! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn`
+//! writes frames, `receive` handles them.
 
-mod call;
-mod extras;
-mod fill;
+mod background;
+mod config;
+mod content;
+mod discovery;
+mod event;
 mod planes;
 mod receive;
 mod repeat;
+mod status;
+mod timing;
 mod turn;
 
-use super::{Authenticity, LinkStats, Pair, SlotInbox, SlotInboxState, Wakeup};
-use crate::directive::{Slot, SlotId};
-use crate::mac::{Access, ClockMap, Floor, ModemProfile};
-use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, StateSource};
-use crate::object::{ObjectId, ObjectSender, SymbolRun};
-use crate::schedule::{BitBudget, Class, ClassShares, Shares, SpendOrder};
+pub use config::VehicleConfig;
+pub use event::VehicleEvent;
+
+use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
+use crate::directive::{SlotId, SlotState};
+use crate::mac::{Access, ClockMap, Floor};
+use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, PlaneSource, StateSource};
+use crate::object::ObjectId;
+use crate::schedule::{BitBudget, Shares, SpendOrder};
 use crate::time::Instant;
-use crate::wire::{Address, MissionId, SessionId, SlotState, VehicleStatus};
-use planes::PlaneOut;
+use crate::wire::{Address, VehicleStatus};
+use content::{Carried, VehicleContent};
+use discovery::CallReply;
+use repeat::Repeater;
 use std::collections::VecDeque;
 use std::time::Duration;
-
-/// Settings of the vehicle's end.
-#[derive(Debug, Clone)]
-pub struct VehicleConfig {
-    /// Own address.
-    pub address: Address,
-    /// Mission.
-    pub mission: MissionId,
-    /// The modem.
-    pub modem: ModemProfile,
-    /// Bits a second on air.
-    pub budget_bps: u32,
-    /// Window of the budget.
-    pub budget_window: Duration,
-    /// Least share of each class while it has something to send.
-    pub shares: Shares,
-    /// Time between two statuses; longer where the budget is small, so that they take at most a tenth of it.
-    pub status_period: Duration,
-    /// How frames are made authentic, if they are.
-    pub authenticity: Option<Authenticity>,
-}
-
-/// What the link tells its host.
-#[derive(Debug, Clone, PartialEq)]
-pub enum VehicleEvent {
-    /// A new version of a slot came in. The host decides about it ([`VehicleLink::decide`]), makes the decision durable, and
-    /// confirms that with [`VehicleLink::handle_persisted`]; only then is it acknowledged.
-    Slot {
-        /// Which slot.
-        id: SlotId,
-        /// Its version in the surface's series.
-        version: u16,
-        /// What it says; `None` if it is unreadable and can only be refused.
-        content: Option<Slot>,
-    },
-    /// The surface has all of an object.
-    ObjectDelivered(ObjectId),
-    /// The surface began a new run; it gets everything afresh.
-    SurfaceRestarted,
-}
-
-#[derive(Debug)]
-enum Part<C> {
-    Map(C),
-    Plane(PlaneKind, Vec<(Cell, u8)>),
-    PlaneDigest(PlaneKind),
-    Object(ObjectId, SymbolRun),
-    Pose,
-    Report,
-}
-
-impl<C> Part<C> {
-    fn class(&self) -> Class {
-        match self {
-            Self::Map(_) => Class::Map,
-            Self::Plane(kind, _) | Self::PlaneDigest(kind) => (*kind).into(),
-            Self::Object(..) => Class::Exemplar,
-            Self::Pose | Self::Report => Class::Status,
-        }
-    }
-}
-
-/// What a frame carried, each with its bytes.
-type Carried<C> = Vec<(Part<C>, usize)>;
-
-/// A frame that was sent.
-#[derive(Debug)]
-struct Said {
-    number: u64,
-    bytes: Vec<u8>,
-}
-
-/// The last frame of the surface that a stamp of ours can name.
-#[derive(Debug, Clone, Copy)]
-struct HeardLast {
-    number: u64,
-    at: Instant,
-}
+use timing::SurfaceTiming;
 
 /// The vehicle's end of the link: replicates a state and the status upward, receives the directive.
 #[derive(Debug)]
 pub struct VehicleLink<S: StateSource = MapSource> {
     config: VehicleConfig,
-    pair: Pair<Carried<S::Carried>>,
+    pair: LinkPair<Carried<S::Carried>>,
     budget: BitBudget,
-    source: S,
-    planes: Vec<PlaneOut>,
-    objects: ObjectSender,
-    shares: ClassShares,
-    spend: SpendOrder,
+    content: VehicleContent<S>,
     inbox: SlotInbox,
-    status: Option<VehicleStatus>,
-    pose_due: Instant,
-    report_due: Instant,
-    /// Slot that the next report begins with: one that does not fit a frame goes on in the next.
-    report_from: usize,
     floor: Floor,
-    /// Frames of this turn, to be sent again if nothing else is left to say, or if the surface has not heard the last of them.
-    said: VecDeque<Said>,
-    said_frames: usize,
-    repeats: VecDeque<Vec<u8>>,
-    /// Where the modem decides when to speak: when the surface is to have our acknowledgement, or our hello.
+    repeater: Repeater,
+    timing: SurfaceTiming,
+    call_reply: CallReply,
+    /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
     answer_due: Option<Instant>,
-    /// The session and nonce of a call that is to be answered.
-    called: Option<(SessionId, u64)>,
     /// When the budget allows the next frame, if it did not allow the last one that was wanted.
     blocked_until: Option<Instant>,
-    heard: Option<HeardLast>,
-    clock: Option<ClockMap>,
-    one_way: Option<Duration>,
-    /// Seeds the choice of when to answer a call.
-    random: u64,
     events: VecDeque<VehicleEvent>,
 }
 
 impl<S: StateSource> VehicleLink<S> {
-    /// An end that has met nobody and replicates `source`; `seed` is random for each run, `restored` is what survived the
-    /// last one.
+    /// An end without contact that replicates `source`. `seed` must be random for each run; `restored` is the state
+    /// that survived the last one.
     pub fn with_source(config: VehicleConfig, source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
-        let pair = Pair::new(config.mission, config.address, Address::SURFACE, config.authenticity.clone(), seed);
         Self {
-            pair,
+            pair: LinkPair::new(config.mission, config.address, Address::SURFACE, config.authenticity.clone(), seed),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
-            shares: ClassShares::new(config.shares),
-            spend: SpendOrder::default(),
-            config,
-            source,
-            planes: Vec::new(),
-            objects: ObjectSender::default(),
+            content: VehicleContent::new(source, config.shares, config.status_period, now),
             inbox: SlotInbox::restore(restored),
-            status: None,
-            pose_due: now,
-            report_due: now,
-            report_from: 0,
             floor: Floor::default(),
-            said: VecDeque::new(),
-            said_frames: 0,
-            repeats: VecDeque::new(),
+            repeater: Repeater::default(),
+            timing: SurfaceTiming::default(),
+            call_reply: CallReply::new(seed),
             answer_due: None,
-            called: None,
             blocked_until: None,
-            heard: None,
-            clock: None,
-            one_way: None,
-            random: seed ^ 0x0CA1_15EA,
             events: VecDeque::new(),
+            config,
         }
     }
 
-    /// What is replicated.
+    /// The replicated state as the vehicle holds it.
     pub fn source(&self) -> &S {
-        &self.source
+        &self.content.source
     }
 
-    /// What is replicated, to change it.
+    /// The replicated state, to be changed.
     pub fn source_mut(&mut self) -> &mut S {
-        self.forget_said();
-        &mut self.source
+        self.repeater.forget();
+        &mut self.content.source
+    }
+
+    /// Replicates these planes beside the state, each with its part of the map's share in percent.
+    pub fn set_planes(&mut self, planes: impl IntoIterator<Item = (PlaneSource, u8)>) {
+        self.content.set_planes(planes);
+    }
+
+    /// The planes that are sent: those that have a share or are a background stream.
+    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
+        self.content.planes()
+    }
+
+    /// Selects the planes that are sent from now on; the others pause, and continue where
+    /// they were when selected again.
+    pub fn set_told_planes(&mut self, is_told: impl Fn(PlaneKind) -> bool) {
+        self.repeater.forget();
+        self.content.set_told_planes(is_told);
+    }
+
+    /// As [`PlaneSource::set_coarse_limit`], for each plane.
+    pub fn set_coarse_planes(&mut self, after_bytes: Option<usize>) {
+        self.content.set_coarse_planes(after_bytes);
+    }
+
+    /// Sets quantities of cells of a plane, if it is replicated.
+    pub fn set_plane(&mut self, kind: PlaneKind, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
+        if self.content.set_plane(kind, cells, now) {
+            self.repeater.forget();
+        }
     }
 
     /// Whether the surface is known to hold the replicated state, its planes, and every object.
-    pub fn is_settled(&self) -> bool {
-        self.source.is_settled() && self.planes().all(StateSource::is_settled) && self.objects.is_empty()
+    pub fn is_converged(&self) -> bool {
+        self.content.is_converged()
     }
 
-    /// The status to tell next; position and time are the host's at the moment of the call.
+    /// Sets the status to send next; its position and time are those at the moment of the call.
     pub fn set_status(&mut self, status: VehicleStatus) {
-        self.status = Some(status);
+        self.content.status.set(status);
     }
 
-    /// Whether a status would go into a frame written now, so that the host may bring it up to date.
+    /// Whether a status would go into a frame written now, so that the host should set a current one.
     pub fn wants_status(&self, now: Instant) -> bool {
-        now >= self.pose_due.min(self.report_due)
+        self.content.status.is_due(now)
     }
 
-    /// Queues an object for the surface.
+    /// Makes a pose due at once, because the vehicle's behaviour has changed since the last one.
+    pub fn owe_pose(&mut self, now: Instant) {
+        self.content.status.owe_pose(now);
+    }
+
+    /// Queues an object of at most [`crate::object::MAX_OBJECT`] bytes.
     pub fn push_object(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
-        self.objects.push(bytes)
+        self.content.objects.push(bytes)
     }
 
-    /// Stops sending every object.
+    /// Queues an object that is sent with spare capacity only ([`crate::schedule::Extra::Exemplars`]).
+    pub fn push_extra_object(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.content.objects.push_extra(bytes)
+    }
+
+    /// Stops sending every object, requested or not.
     pub fn cancel_objects(&mut self) {
-        self.objects.cancel_all();
+        self.content.objects.cancel_all();
     }
 
-    /// Stops sending an object.
+    /// Stops sending an object; an unknown one is ignored.
     pub fn cancel_object(&mut self, id: ObjectId) {
-        self.objects.cancel(id);
+        self.content.objects.cancel(id);
     }
 
-    /// An earlier run of this end may have sent until `now`: the budget counts as spent.
+    /// Counts the budget as spent, because an earlier run of this end may have transmitted until `now`.
     pub fn assume_budget_spent(&mut self, now: Instant) {
         self.budget.assume_spent(now);
     }
 
-    /// Changes the bit budget; the surface learns of it by the next report.
+    /// Changes the bit budget; the next report informs the surface.
     pub fn set_budget(&mut self, bits_per_s: u32, now: Instant) {
         self.budget.set_rate(bits_per_s, now);
-        self.owe_report(now);
+        self.content.status.owe_report(now);
     }
 
-    /// The bit budget.
+    /// The bit budget in bit/s.
     pub fn budget_bps(&self) -> u32 {
         self.budget.bits_per_s()
     }
 
     /// Changes the least shares of the classes.
     pub fn set_shares(&mut self, shares: Shares) {
-        self.shares.set(shares);
+        self.content.shares.set(shares);
     }
 
     /// The least shares of the classes.
     pub fn shares(&self) -> Shares {
-        self.shares.shares()
+        self.content.shares.shares()
     }
 
-    /// The vehicle does something else than it said: the next turn begins with a pose.
-    pub fn owe_pose(&mut self, now: Instant) {
-        self.pose_due = now;
+    /// Changes the background streams and their order.
+    pub fn set_spend(&mut self, order: SpendOrder) {
+        self.content.spend = order;
     }
 
-    /// The surface does not know all that a report says.
-    fn owe_report(&mut self, now: Instant) {
-        (self.report_due, self.report_from) = (now, 0);
+    /// The background streams in their order.
+    pub fn spend(&self) -> SpendOrder {
+        self.content.spend
     }
 
-    /// The host's decision about the latest version of a slot.
+    /// Takes the host's decision about the latest version of a slot.
     pub fn decide(&mut self, id: SlotId, state: SlotState, now: Instant) {
         self.inbox.decide(id, state);
-        self.owe_report(now);
+        self.content.status.owe_report(now);
     }
 
-    /// What must survive a restart.
+    /// The state that must survive a restart.
     pub fn persistent_state(&self) -> &SlotInboxState {
         self.inbox.state()
     }
@@ -263,27 +207,27 @@ impl<S: StateSource> VehicleLink<S> {
         }
     }
 
-    /// Counters.
+    /// Counters and estimates of the link.
     pub fn stats(&self) -> &LinkStats {
         &self.pair.stats
     }
 
-    /// The surface's clock, once a frame with a stamp was heard.
+    /// The surface's clock, once a frame with a stamp was received.
     pub fn surface_clock(&self) -> Option<&ClockMap> {
-        self.clock.as_ref()
+        self.timing.clock()
     }
 
-    /// When a frame of the surface was last taken, in this pair of runs.
-    pub fn last_heard(&self) -> Option<Instant> {
-        self.heard.map(|h| h.at)
+    /// When a frame of the surface was last received, in this pair of runs.
+    pub fn last_received(&self) -> Option<Instant> {
+        self.timing.last_received()
     }
 
-    /// One-way propagation, as the surface has measured it.
+    /// One-way propagation time, as the surface has measured it.
     pub fn one_way(&self) -> Option<Duration> {
-        self.one_way
+        self.timing.one_way()
     }
 
-    /// The next thing to tell the host.
+    /// The next event; the host calls this until it returns `None`.
     pub fn poll_event(&mut self) -> Option<VehicleEvent> {
         self.events.pop_front()
     }
@@ -296,42 +240,39 @@ impl<S: StateSource> VehicleLink<S> {
         self.floor.handle_sent();
     }
 
-    /// The modem put `bits` on air beside what it was given, as one that repeats by itself does.
+    /// The modem put `bits` on air beside those it was given, for example by repeating a frame itself.
     pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
         self.budget.spend(bits, now);
     }
 
-    /// The modem asks for `frames` frames of a cycle that begins now ([`crate::mac::Access::Polled`]).
+    /// The modem requests `frames` frames of a cycle that begins now ([`crate::mac::Access::Polled`]).
     pub fn handle_poll(&mut self, frames: u32) {
         self.begin_turn();
         self.floor.handle_poll(frames);
     }
 
-    /// Begins a new run toward the surface, which then forgets what it has.
+    /// Begins a new run toward the surface, which then discards its copy of our state.
     pub fn renew(&mut self, now: Instant) {
         self.pair.renew();
         self.forget_peer(now);
     }
 
-    /// The surface holds nothing of ours any more.
+    /// The surface holds none of our state any more.
     fn forget_peer(&mut self, now: Instant) {
-        self.source.handle_peer_restart(now);
-        self.planes.iter_mut().for_each(|p| p.source.handle_peer_restart(now));
-        self.objects.handle_peer_restart();
-        (self.pose_due, self.heard) = (now, None);
-        self.owe_report(now);
-        self.forget_said();
+        self.content.handle_peer_restart(now);
+        self.timing.handle_peer_restart();
+        self.repeater.forget();
     }
 
-    /// When [`Self::poll_transmit`] next may have a frame, if the link is not waiting for the surface.
+    /// When [`Self::poll_transmit`] may next have a frame, unless the link waits for the surface.
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
         self.next_wakeup().map(|at| (at, Wakeup::Turn))
     }
 }
 
 impl VehicleLink {
-    /// An end that replicates a label map and has met nobody; `seed` is random for each run, `restored` is what survived the
-    /// last one.
+    /// An end without contact that replicates a label map. `seed` must be random for each run; `restored` is the state
+    /// that survived the last one.
     pub fn new(
         config: VehicleConfig,
         codec: crate::map_codec::Codec,
@@ -342,30 +283,31 @@ impl VehicleLink {
         Self::with_source(config, MapSource::new(codec), seed, restored, now)
     }
 
-    /// Sets labels of cells; what the surface does not hold yet is sent when there is room.
+    /// Sets labels of cells; returns how many changed. Cells that the surface does not hold yet are
+    /// sent when there is room.
     pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
-        let changed = self.source.set(cells, now);
+        let changed = self.content.source.set(cells, now);
         if changed > 0 {
-            self.forget_said();
+            self.repeater.forget();
         }
         changed
     }
 
-    /// Label ids start afresh: begins a new run toward the surface, which then forgets the map it has.
+    /// Empties the map and begins a new run, so that label ids can be assigned again.
     pub fn begin_epoch(&mut self, now: Instant) {
-        self.source.clear(now);
-        self.planes.iter_mut().for_each(|p| p.source.clear(now));
+        self.content.source.clear(now);
+        self.content.planes.iter_mut().for_each(|p| p.source.clear(now));
         self.renew(now);
         self.cancel_objects();
     }
 
     /// The map as the vehicle sees it.
     pub fn map(&self) -> &LabelGrid {
-        self.source.target()
+        self.content.source.target()
     }
 
-    /// Versions of the map so far.
+    /// Counts versions of the map.
     pub fn map_version(&self) -> u64 {
-        self.source.version()
+        self.content.source.version()
     }
 }

@@ -1,6 +1,6 @@
 //! Planes of the map: what of them goes into a frame, and when they are worth a turn.
 
-use super::{Carried, Part, VehicleLink};
+use super::content::{Carried, Part, VehicleContent};
 use crate::map::{Cell, PlaneKind, PlaneSource, StateSource};
 use crate::schedule::Class;
 use crate::time::Instant;
@@ -24,9 +24,9 @@ impl PlaneOut {
     }
 }
 
-impl<S: StateSource> VehicleLink<S> {
+impl<S: StateSource> VehicleContent<S> {
     /// Replicates these planes beside the state, each with its part of the map's share in percent.
-    pub fn set_planes(&mut self, planes: impl IntoIterator<Item = (PlaneSource, u8)>) {
+    pub(super) fn set_planes(&mut self, planes: impl IntoIterator<Item = (PlaneSource, u8)>) {
         let mut shares = [0; Class::PLANES.len()];
         self.planes.clear();
         for (source, share) in planes {
@@ -38,28 +38,29 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// The planes that are told: those that have a share or a place in the spending of left-over bits.
-    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
+    pub(super) fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
         let has_bits = |p: &&PlaneOut| p.has_share || self.spend.iter().any(|extra| extra.class() == p.class());
         self.planes.iter().filter(|p| p.is_told).filter(has_bits).map(|p| &p.source)
     }
 
     /// Which of the planes are told from now on; the others rest, and go on from there when they are told again.
-    pub fn set_told_planes(&mut self, is_told: impl Fn(PlaneKind) -> bool) {
-        self.forget_said();
+    pub(super) fn set_told_planes(&mut self, is_told: impl Fn(PlaneKind) -> bool) {
         self.planes.iter_mut().for_each(|p| p.is_told = is_told(p.source.scale().kind()));
     }
 
     /// As [`PlaneSource::set_coarse_limit`], for each plane.
-    pub fn set_coarse_planes(&mut self, after_bytes: Option<usize>) {
+    pub(super) fn set_coarse_planes(&mut self, after_bytes: Option<usize>) {
         self.planes.iter_mut().for_each(|p| p.source.set_coarse_limit(after_bytes));
     }
 
-    /// Sets quantities of cells of a plane; nothing happens if it is not replicated.
-    pub fn set_plane(&mut self, kind: PlaneKind, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
-        let Some(plane) = self.plane_mut(kind) else { return };
-        if plane.source.set(cells, now) > 0 {
-            self.forget_said();
-        }
+    /// Sets quantities of cells of a plane, if it is replicated; returns whether the plane has changed.
+    pub(super) fn set_plane(
+        &mut self,
+        kind: PlaneKind,
+        cells: impl IntoIterator<Item = (Cell, f64)>,
+        now: Instant,
+    ) -> bool {
+        self.plane_mut(kind).is_some_and(|plane| plane.source.set(cells, now) > 0)
     }
 
     pub(super) fn plane_mut(&mut self, kind: PlaneKind) -> Option<&mut PlaneOut> {

@@ -1,21 +1,23 @@
-//! What the vehicle's end does with a frame.
+//! Handling of received frames.
 
-use super::{Carried, HeardLast, Part, VehicleEvent, VehicleLink};
+use super::content::Carried;
+use super::discovery::CallReply;
+use super::{VehicleEvent, VehicleLink};
 use crate::directive::{Slot, VersionedSlot};
 use crate::link::DropReason;
 use crate::mac::{Access, Grant};
 use crate::map::StateSource;
 use crate::time::Instant;
-use crate::wire::{Address, ChunkKind, Envelope, Header, Stamp};
+use crate::wire::{Address, ChunkKind, Envelope, Header};
 use std::time::Duration;
 
 impl<S: StateSource> VehicleLink<S> {
-    /// Takes received bytes.
+    /// Handles the bytes of one received frame; a frame that cannot be used is counted in [`Self::stats`] and dropped.
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         let us = self.config.address;
         let envelope = match Envelope::decode(bytes, |to| to == us || to == Address::EVERYBODY) {
             Ok(envelope) if envelope.header.from == Address::SURFACE => envelope,
-            Ok(_) => return self.pair.stats.drop(DropReason::Stranger),
+            Ok(_) => return self.pair.stats.drop(DropReason::UnknownSender),
             Err(e) => return self.pair.stats.drop(e.into()),
         };
         if envelope.header.to == Address::EVERYBODY {
@@ -24,12 +26,11 @@ impl<S: StateSource> VehicleLink<S> {
         let inbound = match self.pair.handle_frame(&envelope) {
             Ok(inbound) => inbound,
             Err(DropReason::NoBase) => {
-                // The surface builds on what we never acknowledged: it took us for another run in between.
+                // The surface builds on frames that we never acknowledged: in between it took us for another run.
                 return self.renew(now);
             }
             Err(DropReason::Unauthenticated) => {
-                self.report_due = self.report_due.min(now + Duration::from_secs(60));
-                return;
+                return self.content.status.owe_report_by(now + Duration::from_secs(60));
             }
             Err(_) => return,
         };
@@ -47,12 +48,15 @@ impl<S: StateSource> VehicleLink<S> {
             self.pair.stats.drop(DropReason::Malformed);
         }
         self.handle_fates(fates, now);
-        self.objects.set_loss(self.pair.stats.loss_out.expected());
+        self.content.objects.set_loss(self.pair.stats.loss_out.expected());
         for (slot, number) in slots.iter().zip(number.into_iter().cycle()) {
             self.handle_slot(slot, number, bytes.len(), now);
         }
         if is_latest {
-            self.handle_stamp(&header, number, bytes.len(), now);
+            if let Some(number) = number {
+                let airtime = self.config.modem.airtime(bytes.len());
+                self.timing.handle_frame(number, header.stamp.as_ref(), airtime, now);
+            }
             self.handle_turn(&header, now);
         }
         if lacks_base {
@@ -61,50 +65,40 @@ impl<S: StateSource> VehicleLink<S> {
         self.owe_answer(now);
     }
 
+    /// Answers a discovery call, unless the surface is in contact with us.
+    fn handle_call(&mut self, envelope: &Envelope<'_>, now: Instant) {
+        const CONTACT_TIMEOUT: Duration = Duration::from_secs(60);
+        if !CallReply::is_call(&self.config, envelope) {
+            return self.pair.stats.drop(DropReason::Checksum);
+        }
+        if self.pair.is_met() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
+            return;
+        }
+        let grant = self.call_reply.handle_call(&self.config, &envelope.header, now);
+        self.begin_turn();
+        self.floor.handle_grant(Some(grant));
+    }
+
     fn handle_turn(&mut self, header: &Header, now: Instant) {
         let Some(quarters) = header.turn else { return };
-        self.called = None;
+        self.call_reply.cancel();
         self.begin_turn();
-        if header.hello {
-            // It does not tell what the surface has heard.
-            self.forget_said();
+        if header.kind.is_hello() {
+            // A hello does not acknowledge our frames, so it is not known which of them to repeat.
+            self.repeater.forget();
         }
-        let grant = Grant::heard(quarters, header.remaining, &self.config.modem, now);
+        let grant = Grant::received(quarters, header.remaining, &self.config.modem, now);
         self.floor.handle_grant((quarters > 0).then_some(grant));
     }
 
-    fn handle_stamp(&mut self, header: &Header, number: Option<u64>, bytes: usize, now: Instant) {
-        // A hello may be a replay: it tells no time.
-        let Some(number) = number else { return };
-        self.heard = Some(HeardLast { number, at: now });
-        if let Some(Stamp::Surface { clock_ms, one_way }) = header.stamp {
-            self.one_way = one_way.or(self.one_way);
-            let ago = self.config.modem.airtime(bytes) + self.one_way.unwrap_or_default();
-            self.clock.get_or_insert_default().measure(clock_ms, ago, now);
-        }
-    }
-
     fn handle_fates(&mut self, fates: Vec<(Carried<S::Carried>, bool)>, now: Instant) {
-        for (part, bytes, delivered) in fates.into_iter().flat_map(|(c, d)| c.into_iter().map(move |(p, b)| (p, b, d)))
-        {
-            if delivered {
-                self.pair.stats.deliver(part.class(), bytes, now);
-            }
-            match part {
-                Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
-                Part::Plane(kind, carried) => {
-                    if let Some(plane) = self.plane_mut(kind) {
-                        plane.source.handle_fate(carried, delivered, now);
-                    }
+        for (carried, delivered) in fates {
+            for (part, bytes) in carried {
+                if delivered {
+                    self.pair.stats.deliver(part.class(), bytes, now);
                 }
-                Part::Object(id, run) => {
-                    if self.objects.handle_fate(id, &run, delivered) {
-                        self.events.push_back(VehicleEvent::ObjectDelivered(id));
-                    }
-                }
-                Part::Pose if !delivered => self.pose_due = now,
-                Part::Report if !delivered => self.owe_report(now),
-                Part::Pose | Part::Report | Part::PlaneDigest(_) => {}
+                let object = self.content.handle_fate(part, delivered, now);
+                self.events.extend(object.map(VehicleEvent::ObjectDelivered));
             }
         }
     }
@@ -120,15 +114,15 @@ impl<S: StateSource> VehicleLink<S> {
             window.hold_back(number);
         }
         if let Some(Slot::Fix(fix)) = &mut slot.content {
-            // It was as old as it says when it left.
-            let under_way = self.config.modem.airtime(frame_bytes) + self.one_way.unwrap_or_default();
-            fix.age_s += under_way.as_secs_f64();
+            // The age in the slot is that at the start of the transmission.
+            fix.age_s += self.timing.transit(self.config.modem.airtime(frame_bytes)).as_secs_f64();
         }
         self.events.push_back(VehicleEvent::Slot { id: slot.id, version: slot.version, content: slot.content });
         self.answer_due = Some(now);
     }
 
-    /// Where the modem decides when to speak, the surface hears of what came in after a while, or with what is sent anyway.
+    /// Where the modem decides when to transmit, an acknowledgement or hello goes out within a second,
+    /// by itself if need be.
     fn owe_answer(&mut self, now: Instant) {
         if matches!(self.config.modem.access, Access::ModemOwned { .. })
             && (self.pair.unstated() > 0 || self.pair.must_greet())

@@ -1,81 +1,123 @@
-//! Saying again what was said: at the end of a turn, as far as that saves the next one, and at the beginning of a turn, what
-//! the surface has not heard of the last. A frame that is sent again is the same frame, byte for byte.
+//! Repetition of frames, byte for byte, to save the turn that a loss would cost.
+//!
+//! A turn ends with copies of its frames as long as a copy costs less airtime than the turn it is likely to save, and
+//! begins with the frames of the previous turn that the surface has not acknowledged.
 
-use super::{Said, VehicleLink};
-use crate::link::Transmit;
-use crate::mac::Access;
-use crate::map::StateSource;
-use crate::time::Instant;
+use crate::mac::{Access, ModemProfile};
 use std::collections::VecDeque;
 use std::time::Duration;
 
-impl<S: StateSource> VehicleLink<S> {
-    /// Nothing was said in this turn yet. Where turns are taken, the surface has spoken after the end of our last one: what
-    /// it has not judged of that has not reached it, and if this is little, it is said again as it was.
-    pub(super) fn begin_turn(&mut self) {
-        const FEW: usize = 8;
-        let horizon = self.pair.horizon();
-        self.said.retain(|s| s.number > horizon);
-        self.said_frames = 0;
-        let all = self.said.len() as u64 == self.pair.outstanding();
-        let repeats = self.config.modem.access == Access::Shared && !self.pair.must_greet();
-        if !repeats || self.said.len() > FEW || !all {
-            self.said.clear();
+/// A frame of the current turn.
+#[derive(Debug)]
+struct SentFrame {
+    number: u64,
+    bytes: Vec<u8>,
+}
+
+/// The state of the link that decides how many copies of a turn are worth sending.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RepeatTerms {
+    pub(super) modem: ModemProfile,
+    /// Frames whose fate the surface has not reported.
+    pub(super) outstanding: u64,
+    /// Expected share of lost frames, in 0..=1.
+    pub(super) loss: f64,
+    /// Whether the bit budget, not the modem, limits the link at the moment.
+    pub(super) is_budget_bound: bool,
+    /// Time from the end of a turn to the beginning of the next, if both directions get through.
+    pub(super) handover: Duration,
+}
+
+/// The frames of the current turn and the copies that are still to be sent.
+#[derive(Debug, Default)]
+pub(super) struct Repeater {
+    sent: VecDeque<SentFrame>,
+    /// New frames of this turn, including those that are no longer kept.
+    new_frames: usize,
+    queue: VecDeque<Vec<u8>>,
+}
+
+impl Repeater {
+    /// A longer unacknowledged turn is not repeated.
+    const MAX_REPEATED_TURN: usize = 8;
+    /// Frames of a turn that are kept.
+    const MAX_KEPT: usize = 64;
+    const MAX_COPIES: i32 = 6;
+
+    /// Begins a turn. Where turns alternate, the surface has transmitted since the end of our last turn, so it has
+    /// missed every frame after `horizon`. If these are few and no other frame is outstanding, they are queued again.
+    pub(super) fn begin_turn(&mut self, horizon: u64, outstanding: u64, may_repeat: bool) {
+        self.sent.retain(|s| s.number > horizon);
+        self.new_frames = 0;
+        let has_all = self.sent.len() as u64 == outstanding;
+        if !may_repeat || self.sent.len() > Self::MAX_REPEATED_TURN || !has_all {
+            self.sent.clear();
         }
-        self.repeats = self.said.iter().map(|s| s.bytes.clone()).collect();
+        self.queue = self.sent.iter().map(|s| s.bytes.clone()).collect();
     }
 
-    /// What was said is not what would be said now.
-    pub(super) fn forget_said(&mut self) {
-        self.said.clear();
-        self.repeats.clear();
+    pub(super) fn end_turn(&mut self) {
+        self.queue.clear();
     }
 
-    /// How often a turn of `frames` frames, `bytes` in all, is said where nothing else is left to say: as long as saying it
-    /// once more takes less time than the next turn would, times the chance that this makes that one needless. Never where
-    /// the budget is what limits the link, or where frames of earlier turns are of unknown fate: then another turn is
-    /// needed anyway.
-    pub(super) fn copies(&self, frames: u32, bytes: usize, now: Instant) -> u32 {
-        const MOST: i32 = 6;
-        let modem = &self.config.modem;
-        let budget_binds = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
-        let covered = self.pair.outstanding() <= self.said.len() as u64;
-        if modem.access != Access::Shared || !covered || (budget_binds && !self.budget.is_plentiful(now)) {
+    /// Drops every kept frame: the state has changed, so their content is outdated.
+    pub(super) fn forget(&mut self) {
+        self.sent.clear();
+        self.queue.clear();
+    }
+
+    /// The next copy, and whether the turn ends with it. Copies at the beginning of a turn may be known to the surface
+    /// by now, so a new frame always follows them.
+    pub(super) fn pop(&mut self) -> Option<(Vec<u8>, bool)> {
+        let bytes = self.queue.pop_front()?;
+        Some((bytes, self.queue.is_empty() && self.new_frames > 0))
+    }
+
+    /// Frames of this turn that are kept.
+    pub(super) fn kept(&self) -> u32 {
+        self.sent.len() as u32
+    }
+
+    /// Total size of the kept frames in bytes.
+    pub(super) fn kept_bytes(&self) -> usize {
+        self.sent.iter().map(|s| s.bytes.len()).sum()
+    }
+
+    /// New frames of this turn so far.
+    pub(super) fn new_frames(&self) -> usize {
+        self.new_frames
+    }
+
+    /// How often a turn of `frames` frames, `bytes` in all, is sent when nothing new is left: another copy is sent as
+    /// long as it takes less time than the next turn would, times the probability that it makes that turn needless.
+    /// There are no copies where the budget limits the link, or where frames of earlier turns are outstanding: then
+    /// another turn is needed anyway.
+    pub(super) fn copies(&self, frames: u32, bytes: usize, terms: &RepeatTerms) -> u32 {
+        let modem = &terms.modem;
+        let is_covered = terms.outstanding <= self.sent.len() as u64;
+        if modem.access != Access::Shared || !is_covered || terms.is_budget_bound {
             return 1;
         }
-        let loss = self.pair.stats.loss_out.expected().clamp(0.0, 0.95);
+        let loss = terms.loss.clamp(0.0, 0.95);
         let incomplete = |copies: i32| 1.0 - (1.0 - loss.powi(copies)).powi(frames.min(1000) as i32);
-        let again = modem.time_of(bytes as u64 * 8 + modem.overhead_bits * u64::from(frames)).as_secs_f64();
-        let next_turn = self.time_of_hands().as_secs_f64();
-        let worth = |copies: i32| again < (incomplete(copies) - incomplete(copies + 1)) * next_turn;
-        (1..MOST).find(|&copies| !worth(copies)).unwrap_or(MOST) as u32
+        let copy_s = modem.time_of(bytes as u64 * 8 + modem.overhead_bits * u64::from(frames)).as_secs_f64();
+        let next_turn_s = terms.handover.as_secs_f64();
+        let pays_off = |copies: i32| copy_s < (incomplete(copies) - incomplete(copies + 1)) * next_turn_s;
+        (1..Self::MAX_COPIES).find(|&copies| !pays_off(copies)).unwrap_or(Self::MAX_COPIES) as u32
     }
 
-    /// Time from the end of a turn to the beginning of the next, if both ways get through.
-    pub(super) fn time_of_hands(&self) -> Duration {
-        let modem = &self.config.modem;
-        (modem.turn_around + self.one_way.unwrap_or(Duration::from_millis(300))) * 2 + modem.airtime(32)
-    }
-
-    /// The last `count` frames of this turn, round and round, the last one at the end: it tells what follows.
-    pub(super) fn again(&self, count: u32) -> VecDeque<Vec<u8>> {
-        let mut again: VecDeque<Vec<u8>> =
-            self.said.iter().rev().map(|s| s.bytes.clone()).cycle().take(count as usize).collect();
-        again.make_contiguous().reverse();
-        again
-    }
-
-    /// Keeps what was said in this turn; once all is said, the rest of the turn goes to saying it again.
-    pub(super) fn remember(&mut self, transmit: &Transmit, said_all: bool, remaining: u32) {
-        const MOST_KEPT: usize = 64;
-        self.said_frames += 1;
-        if self.said.len() == MOST_KEPT {
-            self.said.pop_front();
+    /// Keeps a new frame of this turn. If it is the last new one, `copies` further frames fill the rest of the turn:
+    /// the kept frames in turn, ending with this one, whose header announces how many follow.
+    pub(super) fn keep(&mut self, number: u64, bytes: &[u8], copies: Option<u32>) {
+        self.new_frames += 1;
+        if self.sent.len() == Self::MAX_KEPT {
+            self.sent.pop_front();
         }
-        let number = self.pair.next_number() - 1;
-        self.said.push_back(Said { number, bytes: transmit.bytes.clone() });
-        if said_all && remaining > 0 {
-            self.repeats = self.again(remaining);
+        self.sent.push_back(SentFrame { number, bytes: bytes.to_vec() });
+        if let Some(copies) = copies {
+            let latest_first = self.sent.iter().rev().map(|s| s.bytes.clone()).cycle();
+            self.queue = latest_first.take(copies as usize).collect();
+            self.queue.make_contiguous().reverse();
         }
     }
 }

@@ -1,40 +1,41 @@
-//! When the vehicle speaks, and how a turn ends.
+//! When the vehicle transmits, and how a turn ends.
 
-use super::{Carried, VehicleLink};
-use crate::link::Transmit;
+use super::VehicleLink;
+use super::content::{Carried, FillContext, Part};
+use super::repeat::RepeatTerms;
+use crate::link::{Transmit, TransmitKind};
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Backlog, FrameBuilder, Stamp};
+use crate::wire::{Address, FrameBuilder, FrameKind};
 use std::time::Duration;
 
 /// Frames smaller than this have no room for both a status and a stamp.
 const SMALL_FRAME: usize = 48;
 
 /// A frame about to be filled.
-struct Plan {
+struct FramePlan {
     /// Frames of this turn after this one.
     remaining: u32,
-    /// Whether nothing new is expected to follow it in this turn.
+    /// Whether no new frame is expected to follow it in this turn.
     is_last_new: bool,
 }
 
 impl<S: StateSource> VehicleLink<S> {
-    /// The next frame, if it is our turn, there is a reason to speak and the budget allows it.
+    /// The next frame, if it is our turn, there is a reason to transmit and the budget allows it. The host calls this
+    /// after every event and at [`Self::poll_timeout`] until it returns `None`.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let modem = self.config.modem;
-        let mut released = self.source.handle_timeout(now);
-        self.planes.iter_mut().for_each(|p| released |= p.source.handle_timeout(now));
-        if released {
-            self.forget_said();
+        if self.content.handle_timeout(now) {
+            self.repeater.forget();
         }
         if self.floor.is_over(&modem, now) {
             self.end_turn();
         }
         let open = self.floor.frames(&modem, now).min(u32::from(u8::MAX));
-        let nobody = !self.pair.has_heard() && self.called.is_none();
-        if open == 0 || nobody || !self.has_reason_to_speak(now) {
+        let nobody = !self.pair.has_contact() && !self.call_reply.is_pending();
+        if open == 0 || nobody || !self.has_reason_to_transmit(now) {
             return None;
         }
         let bits = modem.bits_on_air(modem.frame_bytes);
@@ -47,63 +48,53 @@ impl<S: StateSource> VehicleLink<S> {
         }
         self.blocked_until = None;
         if self.pair.is_met() && self.pair.is_full() {
-            // The surface has heard nothing for so long that numbers run out.
+            // The surface has acknowledged no frame for so long that the frame numbers run out.
             self.renew(now);
         }
-        let (transmit, last) = match (self.called.take(), self.repeats.pop_front()) {
-            (Some(call), _) => (self.write_here(call), true),
-            (None, Some(bytes)) => {
-                self.pair.stats.repeated_bytes += bytes.len() as u64;
-                // What is said again at the beginning of a turn may be known by now: something new always follows it.
-                let last = self.repeats.is_empty() && self.said_frames > 0;
-                (Transmit { to: Address::SURFACE, bytes, kind: "again" }, last)
-            }
-            (None, None) => self.write_frame(frames, now),
-        };
+        let (transmit, last) = self.next_frame(frames, now);
         self.floor.spend(last);
         self.budget.spend(modem.bits_on_air(transmit.bytes.len()), now);
         Some(transmit)
     }
 
-    fn end_turn(&mut self) {
-        self.floor.give_up();
-        self.repeats.clear();
+    /// The frame to send now, of at most `frames` in this turn, and whether the turn ends with it.
+    fn next_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
+        if let Some(bytes) = self.call_reply.take(&self.config) {
+            self.pair.stats.count(Class::Overhead, bytes.len());
+            return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Hello }, true);
+        }
+        if let Some((bytes, last)) = self.repeater.pop() {
+            self.pair.stats.repeated_bytes += bytes.len() as u64;
+            return (Transmit { to: Address::SURFACE, bytes, kind: TransmitKind::Repeat }, last);
+        }
+        self.write_frame(frames, now)
     }
 
-    fn has_reason_to_speak(&self, now: Instant) -> bool {
+    pub(super) fn begin_turn(&mut self) {
+        let may_repeat = self.config.modem.access == Access::Shared && !self.pair.must_greet();
+        self.repeater.begin_turn(self.pair.horizon(), self.pair.outstanding(), may_repeat);
+    }
+
+    fn end_turn(&mut self) {
+        self.floor.give_up();
+        self.repeater.end_turn();
+    }
+
+    fn has_reason_to_transmit(&self, now: Instant) -> bool {
         if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return true;
         }
-        let answer = self.answer_due.is_some_and(|at| now >= at) || self.called.is_some();
-        let news = self.backlog_bytes(now) > 0;
-        answer || (self.pair.is_met() && (news || (self.status.is_some() && self.wants_status(now))))
-    }
-
-    /// What waits and may be sent, for people.
-    pub(super) fn backlog(&self, now: Instant) -> Backlog {
-        let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-        let others = self.shared_plane_backlog() + self.objects.backlog_bytes() + self.extra_backlog(now);
-        Backlog { map_bytes: bytes(self.source.told_backlog_bytes()), other_bytes: bytes(others) }
-    }
-
-    /// About how many bytes wait and may be sent.
-    fn backlog_bytes(&self, now: Instant) -> usize {
-        let own = self.source.backlog_bytes() + self.shared_plane_backlog() + self.objects.backlog_bytes();
-        own + self.extra_backlog(now)
-    }
-
-    /// When something that is held back becomes due.
-    fn next_due(&self) -> Option<Instant> {
-        let planes = self.planes().filter_map(StateSource::next_due);
-        self.source.next_due().into_iter().chain(planes).min()
+        let answer = self.answer_due.is_some_and(|at| now >= at) || self.call_reply.is_pending();
+        let news = self.content.backlog_bytes(&self.budget, now) > 0;
+        answer || (self.pair.is_met() && (news || self.content.status.is_waiting(now)))
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
         if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return self.floor.next_wakeup();
         }
-        let status = self.status.as_ref().filter(|_| self.pair.is_met()).map(|_| self.pose_due.min(self.report_due));
-        let held = self.next_due().filter(|_| self.pair.is_met());
+        let status = self.content.status.next_due().filter(|_| self.pair.is_met());
+        let held = self.content.next_due().filter(|_| self.pair.is_met());
         let due = [status, held, self.answer_due].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
@@ -113,106 +104,125 @@ impl<S: StateSource> VehicleLink<S> {
 
     fn frames_wanted(&self, now: Instant) -> u32 {
         let room = self.config.modem.frame_bytes.saturating_sub(14).max(1);
-        let bytes = self.backlog_bytes(now);
+        let bytes = self.content.backlog_bytes(&self.budget, now);
         bytes.div_ceil(room).clamp(1, 255) as u32
     }
 
-    /// Room for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and then
-    /// now and again.
+    /// Bytes for an acknowledgement: in the first frames of a turn, as many as it takes for one to get through, and
+    /// then in every eighth frame.
     fn ack_room(&self, is_last_new: bool) -> usize {
-        const SELDOM: usize = 8;
+        const ACK_INTERVAL: usize = 8;
         let size = self.config.modem.frame_bytes;
-        let said = self.said_frames;
+        let sent = self.repeater.new_frames();
         let usual = if size < SMALL_FRAME { 3 } else { size / 6 };
-        if said == 0 && self.pair.statement_bytes() > 4 * usual {
-            // So much was lost that the statement would fall ever further behind.
+        if sent == 0 && self.pair.statement_bytes() > 4 * usual {
+            // So many frames were lost that the acknowledgements would fall ever further behind.
             return size / 2;
         }
-        let early = said < self.pair.stats.loss_out.copies(0.001, 12) as usize;
-        match early || is_last_new || said.is_multiple_of(SELDOM) {
+        let early = sent < self.pair.stats.loss_out.copies(0.001, 12) as usize;
+        match early || is_last_new || sent.is_multiple_of(ACK_INTERVAL) {
             true => usual,
             false => 0,
         }
     }
 
-    fn plan(&self, frames: u32, now: Instant) -> Plan {
+    fn repeat_terms(&self, now: Instant) -> RepeatTerms {
+        let modem = self.config.modem;
+        let is_limited = f64::from(self.budget.bits_per_s()) < modem.bit_rate_bps / 2.0;
+        let one_way = self.timing.one_way().unwrap_or(Duration::from_millis(300));
+        RepeatTerms {
+            modem,
+            outstanding: self.pair.outstanding(),
+            loss: self.pair.stats.loss_out.expected(),
+            is_budget_bound: is_limited && !self.budget.is_plentiful(now),
+            handover: (modem.turn_around + one_way) * 2 + modem.airtime(32),
+        }
+    }
+
+    fn plan(&self, frames: u32, now: Instant) -> FramePlan {
         if matches!(self.config.modem.access, Access::ModemOwned { .. }) {
-            return Plan { remaining: 0, is_last_new: false };
+            return FramePlan { remaining: 0, is_last_new: false };
         }
         let wanted = self.frames_wanted(now);
-        let said = self.said.len() as u32 + wanted;
-        let copies = self.copies(said, self.config.modem.frame_bytes * said as usize, now);
-        let repeats = said * (copies - 1);
-        Plan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1 }
+        let turn = self.repeater.kept() + wanted;
+        let bytes = self.config.modem.frame_bytes * turn as usize;
+        let repeats = turn * (self.repeater.copies(turn, bytes, &self.repeat_terms(now)) - 1);
+        FramePlan { remaining: (wanted + repeats).min(frames) - 1, is_last_new: wanted == 1 || frames == 1 }
     }
 
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
         let greets = self.pair.must_greet();
-        let plan = if greets { Plan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
+        let plan = if greets { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
         let wish = (plan.is_last_new && !greets).then(|| self.wish(now));
-        let stamp = self.stamp(now).filter(|_| plan.is_last_new || self.said_frames == 0);
+        let has_stamp = size >= SMALL_FRAME && (plan.is_last_new || self.repeater.new_frames() == 0);
+        let stamp = self.timing.stamp(now).filter(|_| has_stamp);
         let ack_room = self.ack_room(plan.is_last_new);
-        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, false);
+        let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FrameKind::Numbered);
         let mut carried = Carried::new();
         if !greets {
-            self.fill(&mut builder, &mut carried, now);
+            let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
+            let context = FillContext { budget: &self.budget, slots, refused_frames, now };
+            carried = self.content.fill(&mut builder, &context);
         }
         let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
-        let said_all = takes_turns && !greets && self.backlog_bytes(now) == 0;
-        let remaining = match said_all {
-            // What was said is said again as far as that is of use.
+        let is_complete = takes_turns && !greets && self.content.backlog_bytes(&self.budget, now) == 0;
+        let remaining = match is_complete {
+            // The rest of the turn is filled with copies as far as they pay off.
             true if !carried.is_empty() => {
-                let said = self.said.len() as u32 + 1;
-                let bytes = self.said.iter().map(|s| s.bytes.len()).sum::<usize>() + builder.len(true);
-                (said * (self.copies(said, bytes, now) - 1)).min(frames - 1)
+                let turn = self.repeater.kept() + 1;
+                let bytes = self.repeater.kept_bytes() + builder.len(true);
+                (turn * (self.repeater.copies(turn, bytes, &self.repeat_terms(now)) - 1)).min(frames - 1)
             }
             true => 0,
-            // Where nothing more fits, what is left waits for the next turn.
+            // No chunk fits into this frame: the rest waits for the next turn.
             false if carried.is_empty() => 0,
             false => plan.remaining,
         };
         builder.set_remaining(remaining.min(255) as u8);
         let last = remaining == 0;
-        let transmit = self.close(builder, carried, greets, last || said_all || !takes_turns);
+        let kind = FrameKind::hello_if(greets);
+        let transmit = self.close(builder, carried, kind, last || is_complete || !takes_turns);
         if !greets {
-            self.remember(&transmit, said_all, remaining);
+            let copies = (is_complete && remaining > 0).then_some(remaining);
+            self.repeater.keep(self.pair.next_number() - 1, &transmit.bytes, copies);
         }
         self.answer_due = greets.then(|| now + Duration::from_secs(10));
         (transmit, last && takes_turns)
     }
 
-    fn close(&mut self, builder: FrameBuilder, carried: Carried<S::Carried>, hello: bool, short: bool) -> Transmit {
-        let kind = carried.iter().max_by_key(|(_, n)| *n).map_or("ack", |(p, _)| p.class().name());
+    fn close(&mut self, builder: FrameBuilder, carried: Carried<S::Carried>, kind: FrameKind, short: bool) -> Transmit {
+        let mainly = carried
+            .iter()
+            .max_by_key(|(_, n)| *n)
+            .map_or(TransmitKind::Acknowledgement, |(p, _)| TransmitKind::Content(p.class()));
         let payload: usize = carried.iter().map(|(_, n)| n).sum();
         for (part, n) in &carried {
             self.pair.stats.count(part.class(), *n);
+            self.pair.stats.chunks_sent += u64::from(matches!(part, Part::Map(_)));
         }
-        let bytes = self.pair.finish_frame(builder, carried, hello, short);
+        let bytes = self.pair.finish_frame(builder, carried, kind, short);
         self.pair.stats.count(Class::Overhead, bytes.len().saturating_sub(payload));
-        Transmit { to: Address::SURFACE, bytes, kind }
+        Transmit { to: Address::SURFACE, bytes, kind: mainly }
     }
 
-    fn stamp(&self, now: Instant) -> Option<Stamp> {
-        let heard = self.heard.filter(|_| self.config.modem.frame_bytes >= SMALL_FRAME)?;
-        Some(Stamp::Vehicle { clock_ms: Stamp::clock(now), heard: heard.number as u8, held: now.since(heard.at) })
-    }
-
-    /// When another turn would be of use, as the turn byte says it.
+    /// When another turn would be of use, in the quarter seconds of the turn byte.
     fn wish(&self, now: Instant) -> u8 {
         let modem = &self.config.modem;
         let affordable = self.budget.earliest(modem.bits_on_air(modem.frame_bytes) * 2, now).since(now);
-        let idle = self.source.is_quiet() && self.extras_are_quiet(now) && self.objects.has_only_extra();
-        let pause = self.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
-        let wait = if idle { affordable.max(pause).min(self.config.status_period) } else { affordable };
+        let pause = self.content.next_due().map_or(self.idle_pause(), |due| self.idle_pause().min(due.since(now)));
+        let wait = match self.content.is_idle(&self.budget, now) {
+            true => affordable.max(pause).min(self.config.status_period),
+            false => affordable,
+        };
         quarter_seconds(wait, 254)
     }
 
-    /// Pause between turns while nothing is to be said: turns that only ask take at most a tenth of the budget.
+    /// Pause between turns while no content waits: empty turns take at most a tenth of the budget.
     fn idle_pause(&self) -> Duration {
-        const ASK_AND_ANSWER_BITS: f64 = 240.0;
+        const EMPTY_TURN_BITS: f64 = 240.0;
         let tenth = f64::from(self.budget.bits_per_s()) / 10.0;
-        Duration::from_secs_f64((ASK_AND_ANSWER_BITS / tenth).max(1.0))
+        Duration::from_secs_f64((EMPTY_TURN_BITS / tenth).max(1.0))
     }
 }

@@ -10,22 +10,22 @@ fn square(side: i32, label: impl Fn(i32) -> u8) -> Vec<(Cell, u8)> {
     (0..side * side).map(|i| (Cell::new(i % side - 20, i / side), label(i))).collect()
 }
 
-/// A source and a replica with a sure link between them.
-struct Ends {
+/// A source and a replica with a reliable link between them.
+struct TestEnds {
     source: MapSource,
     replica: Replica,
     number: u64,
     sent_cells: usize,
 }
 
-impl Ends {
+impl TestEnds {
     fn new(settle_s: f64) -> Self {
         let mut source = MapSource::new(Codec::Context);
-        source.set_settle_time(Duration::from_secs_f64(settle_s));
+        source.set_debounce(Duration::from_secs_f64(settle_s));
         Self { source, replica: Replica::default(), number: 0, sent_cells: 0 }
     }
 
-    /// Sends one chunk of at most `room` bytes; `fate` says whether it arrives.
+    /// Sends one chunk of at most `room` bytes; `fate` is whether it arrives.
     fn send(&mut self, room: usize, fate: bool, now: Instant) -> bool {
         self.source.handle_timeout(now);
         let Some((bytes, carried)) = self.source.next_chunk(room, now) else { return false };
@@ -49,7 +49,7 @@ impl Ends {
     }
 }
 
-/// What the counts ought to be.
+/// Compares the incremental counts with a full count.
 fn check(source: &MapSource) {
     let cells = source.target.iter().chain(source.acked.iter()).map(|(cell, _)| cell);
     let cells: std::collections::BTreeSet<Cell> = cells.collect();
@@ -67,11 +67,11 @@ proptest! {
 
     /// Steps: seconds that pass, labels that change, whether the chunks of the step arrive.
     #[test]
-    fn once_the_model_rests_the_replica_becomes_equal_within_the_longest_wait(
+    fn the_replica_converges_once_the_model_is_stable(
         settle_s in prop_oneof![Just(0.0), 0.1f64..20.0],
         steps in proptest::collection::vec((0.0f64..8.0, any::<u64>(), 0u8..3, any::<bool>()), 1..40),
     ) {
-        let mut ends = Ends::new(settle_s);
+        let mut ends = TestEnds::new(settle_s);
         let mut now = 1.0;
         for (passed, labels, sends, fate) in steps {
             now += passed;
@@ -81,18 +81,18 @@ proptest! {
                 ends.send(30, fate, at(now));
             }
             check(&ends.source);
-            prop_assert_eq!(ends.source.is_settled(), ends.source.target() == ends.source.acked());
+            prop_assert_eq!(ends.source.is_converged(), ends.source.target() == ends.source.acked());
         }
         ends.send_all(at(now + settle_s * 8.0 + 0.1));
-        prop_assert!(ends.source.is_settled() && ends.is_equal());
+        prop_assert!(ends.source.is_converged() && ends.is_equal());
         prop_assert_eq!(ends.replica.base_digest(), ends.source.digest());
     }
 
     #[test]
-    fn nothing_starves_beside_cells_that_are_worth_more_and_change_all_the_time(
+    fn no_cell_starves_beside_busy_valuable_ones(
         weights in proptest::collection::vec(0.0f64..1.0, 8), settle_s in 0.0f64..3.0, busy in 1i32..40, seed: u64,
     ) {
-        let mut ends = Ends::new(settle_s);
+        let mut ends = TestEnds::new(settle_s);
         ends.source.set_interest(|label| weights[usize::from(label) % 8]);
         ends.source.set([(Cell::new(500, 500), 9)], at(0.0));
         ends.send_all(at(0.0));
@@ -110,30 +110,30 @@ proptest! {
 }
 
 #[test]
-fn a_flip_that_is_taken_back_costs_nothing_and_one_that_stands_is_sent() {
-    let mut ends = Ends::new(5.0);
+fn only_flips_that_last_are_sent() {
+    let mut ends = TestEnds::new(5.0);
     ends.source.set(square(8, |_| 1), at(0.0));
     ends.send_all(at(0.0));
     assert!(ends.is_equal(), "what was never seen goes out at once");
     ends.source.set([(Cell::new(-20, 0), 2), (Cell::new(-19, 0), 2)], at(10.0));
-    assert_eq!((ends.source.backlog_bytes(), ends.source.is_quiet(), ends.source.is_settled()), (0, true, false));
+    assert_eq!((ends.source.backlog_bytes(), ends.source.is_quiet(), ends.source.is_converged()), (0, true, false));
     assert_eq!(ends.source.next_due(), Some(at(15.0)));
     ends.source.set([(Cell::new(-20, 0), 1)], at(12.0));
     assert!(!ends.send(200, true, at(14.9)));
     assert_eq!(ends.source.flips_suppressed(), 2);
     assert!(ends.send(200, true, at(15.0)) && ends.is_equal());
     assert_eq!(ends.sent_cells, 65);
-    // The model is certain: at once.
-    ends.source.set_confident([(Cell::new(-18, 0), 3, MOST_CONFIDENT)], at(20.0));
+    // The model is certain, so the label is sent at once.
+    ends.source.set_confident([(Cell::new(-18, 0), 3, MAX_CONFIDENCE)], at(20.0));
     assert!(ends.send(200, true, at(20.0)) && ends.is_equal());
     ends.source.set([(Cell::new(-18, 0), 4)], at(21.0));
-    ends.source.set_confident([(Cell::new(-18, 0), 4, MOST_CONFIDENT)], at(22.0));
+    ends.source.set_confident([(Cell::new(-18, 0), 4, MAX_CONFIDENCE)], at(22.0));
     assert!(ends.send(200, true, at(22.0)) && ends.is_equal());
 }
 
 #[test]
-fn a_cell_that_never_rests_is_told_now_and_then() {
-    let mut ends = Ends::new(2.0);
+fn a_cell_that_keeps_flipping_is_sent_sometimes() {
+    let mut ends = TestEnds::new(2.0);
     ends.source.set([(Cell::new(0, 0), 1)], at(0.0));
     ends.send_all(at(0.0));
     for step in 0..600 {
@@ -145,45 +145,8 @@ fn a_cell_that_never_rests_is_told_now_and_then() {
     assert!(ends.source.flips_suppressed() > 500);
 }
 
-/// Bytes until the painted map agrees with `share` of the target, and until it is equal.
-fn bytes_until(share: f64, side: i32, coarse_after: Option<usize>, room: usize, scene: usize) -> (usize, usize) {
-    use crate::map_codec::procedural::{Chance, Scene};
-    let plane = Scene::ALL[scene].draw(&mut Chance::new(5), side as usize, side as usize, 8);
-    let mut ends = Ends::new(0.0);
-    ends.source.set_coarse_limit(coarse_after);
-    ends.source.set(square(side, |i| plane.get((i % side) as usize, (i / side) as usize).max(1)), at(0.0));
-    let (mut bytes, mut early) = (0, None);
-    while let Some((chunk, carried)) = ends.source.next_chunk(room, at(bytes as f64 / 125.0)) {
-        bytes += chunk.len();
-        ends.number += 1;
-        assert!(ends.replica.apply(ends.number, &chunk, at(0.0)));
-        ends.replica.advance_base(ends.number);
-        ends.source.handle_fate(carried, true, at(0.0));
-        let painted = |&(cell, label): &(Cell, u8)| ends.replica.painted(cell).is_some_and(|(l, _)| l == label);
-        let agree = ends.source.target().iter().filter(painted).count();
-        if early.is_none() && agree as f64 >= share * f64::from(side * side) {
-            early = Some(bytes);
-        }
-    }
-    assert!(ends.is_equal() && ends.source.is_settled());
-    (early.expect("equal in the end"), bytes)
-}
-
 #[test]
-fn coarse_first_shows_the_whole_early_and_costs_little_more() {
-    let mut total = (0, 0);
-    for scene in 0..4 {
-        let fine = bytes_until(0.6, 192, None, 256, scene);
-        let coarse = bytes_until(0.6, 192, Some(3000), 256, scene);
-        println!("scene {scene}: {fine:?} {coarse:?}");
-        assert!(coarse.0 * 100 <= fine.0 * 90, "scene {scene}: {coarse:?} against {fine:?}");
-        total = (total.0 + fine.1, total.1 + coarse.1);
-    }
-    assert!(total.1 * 100 <= total.0 * 115, "{total:?}");
-}
-
-#[test]
-fn choosing_the_next_chunk_looks_at_the_tiles_that_changed_and_no_others() {
+fn choosing_a_chunk_inspects_changed_tiles_only() {
     let mut source = MapSource::new(Codec::Context);
     source.set(square(1024, |i| (i / 50 % 6) as u8 + 1), at(0.0));
     source.handle_peer_restart(at(0.0));

@@ -1,14 +1,14 @@
-//! Binary arithmetic coding with 16-bit probabilities, bit by bit, without a wasted bit at the end.
+//! Binary arithmetic coding with 16-bit probabilities; not a bit is wasted at the end.
 
-use crate::map_codec::bits::{BitReader, BitWriter};
+use crate::bytes::{BitReader, BitWriter};
 
-/// Codes one decision at a time; the encoder takes `bit`, the decoder ignores it, both return the decision.
+/// Codes one decision at a time. An encoder writes `bit`, a decoder ignores it, and both return the decision.
 pub(super) trait BitCoder {
     /// `one` is the probability of `true` in 1/65536, from 1 to 65535.
     fn code(&mut self, bit: bool, one: u32) -> bool;
 }
 
-/// Width of the window on the code value, bits.
+/// Width of the window on the code value in bits.
 const WINDOW: u32 = 32;
 
 /// The interval that the decisions so far leave: `low..low + range` in units of the window.
@@ -21,7 +21,7 @@ struct Interval {
 impl Interval {
     const START: Self = Self { low: 0, range: 1 << WINDOW };
 
-    /// Takes the part of `bit`; true lies below.
+    /// Narrows the interval to the part of `bit`; the lower part stands for `true`.
     fn narrow(&mut self, bit: bool, split: u64) {
         if bit {
             self.range = split;
@@ -35,7 +35,7 @@ impl Interval {
         (self.range >> 16) * u64::from(one)
     }
 
-    /// The number inside that needs the fewest leading bits, zeros following, and how many bits it needs.
+    /// The number inside that needs the fewest leading bits, followed by zeros, and the number of these bits.
     fn shortest(&self) -> (u64, u32) {
         let candidates = (0..=WINDOW).map(|bits| {
             let step = 1u64 << (WINDOW - bits);
@@ -45,7 +45,6 @@ impl Interval {
     }
 }
 
-/// Writes decisions.
 #[derive(Debug)]
 pub(super) struct Encoder {
     out: BitWriter,
@@ -53,17 +52,17 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    /// Goes on where `out` ends.
+    /// Continues after the bits in `out`.
     pub(super) fn new(out: BitWriter) -> Self {
         Self { out, interval: Interval::START }
     }
 
-    /// Bits that the chunk would need if it ended here.
+    /// The length of the chunk in bits if it ended here.
     pub(super) fn bits(&self) -> usize {
         self.out.len() + self.interval.shortest().1 as usize
     }
 
-    /// The bytes, ending with the shortest string that stands for all decisions.
+    /// The bytes, which end with the shortest string that stands for all decisions.
     pub(super) fn finish(mut self) -> Vec<u8> {
         let (value, bits) = self.interval.shortest();
         self.interval.low = value;
@@ -99,12 +98,12 @@ impl BitCoder for Encoder {
     }
 }
 
-/// Reads decisions; bits past the end read as zero.
+/// Reads decisions; bits past the end are zero.
 #[derive(Debug)]
 pub(super) struct Decoder<'a> {
     bits: BitReader<'a>,
     interval: Interval,
-    /// Code value above the interval's low end.
+    /// The code value above the interval's lower end.
     above: u64,
     /// Bits of the code value that have left the window.
     shifted: usize,
@@ -112,7 +111,7 @@ pub(super) struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// Goes on where `bits` stands.
+    /// Continues at the position of `bits`.
     pub(super) fn new(mut bits: BitReader<'a>) -> Self {
         let start = bits.position();
         let above = (0..WINDOW).fold(0, |value, _| value << 1 | u64::from(bits.bit().unwrap_or(false)));
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn decisions_read_back_and_every_ending_but_the_right_one_is_refused() {
+    fn decisions_read_back_and_wrong_endings_are_refused() {
         for seed in 0..400 {
             let said = decisions(seed, seed as usize % 97);
             let mut head = BitWriter::default();

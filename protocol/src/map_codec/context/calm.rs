@@ -1,14 +1,14 @@
-//! Does a cell far from any border or change keep its label?
+//! The decision whether a cell far from any border or change keeps its label.
 
 use super::recent::Recent;
-use super::stage::{Contexts, Layout};
+use super::stage::{Contexts, StageLayout};
 use super::view::View;
 
-pub(super) const LAYOUT: Layout = Layout {
+pub(super) const LAYOUT: StageLayout = StageLayout {
     direct: &[6 * Recent::RATES, 5 * Recent::GAPS, 500],
     keyed: &[10],
     sets: [6, Recent::RATES, 10],
-    curves: 1,
+    apms: 1,
 };
 
 pub(super) fn contexts(view: &View, noise: usize, calm: &Recent, border: &Recent) -> Contexts {

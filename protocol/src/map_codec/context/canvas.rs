@@ -1,12 +1,12 @@
-//! The patch and what lies around it, as the coder sees it: new labels where it has been, old ones elsewhere.
+//! The patch and its surroundings during coding: new labels where cells are coded, old ones elsewhere.
 
-use crate::map::{Rect, UNEXPLORED};
+use crate::grid::{Rect, UNEXPLORED};
 use crate::map_codec::lattice::Lattice;
 use crate::map_codec::window::Patch;
 
-/// Cells around the patch that contexts look at.
+/// The width of the margin around the patch in which contexts look.
 pub(super) const MARGIN: usize = 3;
-/// Cells around the patch whose labels are expected first.
+/// The width of the margin around the patch whose labels are expected first.
 const CENSUS_MARGIN: i64 = 16;
 
 /// Labels in and around a patch.
@@ -19,9 +19,9 @@ pub(super) struct Canvas {
     now: Vec<u8>,
     /// Cells by label, in the base around the patch and as coded.
     census: [u32; 256],
-    /// Labels that the census has met.
+    /// The number of labels in the census.
     kinds: usize,
-    /// How noisy the base is: share of cells with none like them around, in six classes.
+    /// How noisy the base is: the share of cells without an equal neighbour, in six classes.
     pub(super) noise: usize,
 }
 
@@ -41,12 +41,12 @@ impl Canvas {
         Self { width, height, stride, base: held.clone(), now: held, census, kinds, noise }
     }
 
-    /// Where the cell in `column` of `row` lies.
+    /// The index of the cell in `column` of `row`.
     pub(super) fn at(&self, column: usize, row: usize) -> usize {
         (row + MARGIN) * self.stride + column + MARGIN
     }
 
-    /// The label that the cell had.
+    /// The label of the cell in the base.
     pub(super) fn held(&self, at: usize) -> u8 {
         self.base[at]
     }
@@ -57,14 +57,13 @@ impl Canvas {
         self.now[at.wrapping_add_signed(east + north * self.stride as isize)]
     }
 
-    /// Whether the cell `east` and `north` of the cell has been coded and changed.
+    /// Whether the cell `east` and `north` of the cell is coded and has changed.
     #[inline(always)]
     pub(super) fn changed(&self, at: usize, east: isize, north: isize) -> bool {
         let i = at.wrapping_add_signed(east + north * self.stride as isize);
         self.now[i] != self.base[i]
     }
 
-    /// Writes the cell's new label.
     pub(super) fn set(&mut self, at: usize, label: u8) {
         self.now[at] = label;
         let count = &mut self.census[usize::from(label)];
@@ -72,17 +71,16 @@ impl Canvas {
         *count += 1;
     }
 
-    /// How many labels other than `held` are in use around.
+    /// The number of labels in use around, without `held`.
     pub(super) fn kinds_beside(&self, held: u8) -> usize {
         self.kinds - usize::from(held != UNEXPLORED && self.count(held) > 0)
     }
 
-    /// How many cells hold `label`, nearly.
+    /// The approximate number of cells with `label`.
     pub(super) fn count(&self, label: u8) -> u32 {
         self.census[usize::from(label)]
     }
 
-    /// The coded patch.
     pub(super) fn into_patch(self, rect: Rect) -> Patch {
         let inside = |cells: &[u8]| -> Vec<u8> {
             let rows = cells.chunks(self.stride).skip(MARGIN).take(self.height);

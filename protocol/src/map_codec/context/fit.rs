@@ -7,9 +7,9 @@ use crate::map_codec::grow::Growth;
 use crate::map_codec::lattice::Lattice;
 use crate::map_codec::window::Patch;
 
-/// The chunk of at most `room` bytes with the most changes found along `growth`; `None` if not even its seed fits.
+/// The chunk of at most `room` bytes with the most changes along `growth`; `None` if not even its seed fits.
 ///
-/// Each trial codes a whole patch, so there are few: up to [`TRIALS`] once something fits.
+/// Each trial codes a whole patch, so there are few: at most [`TRIALS`] once one fits.
 pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room: usize) -> Option<MapChunk> {
     let (mut least, mut too_large) = (0, growth.areas.len());
     let mut best: Option<MapChunk> = None;
@@ -31,23 +31,23 @@ pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room:
         } else {
             (too_large, short) = (guess, Some((patch, reach)));
         }
-        // Where the bits of this trial say that the room ends.
+        // The size at which the room ends, by the bits of this trial.
         let by_size = growth.areas.partition_point(|area| area.cells() <= goal).saturating_sub(1);
         guess = by_size.clamp(least, too_large.max(least + 1) - 1);
     }
     let best = best?;
     let longer = short.and_then(|(patch, reach)| {
         let part = patch.first_cells(reach.cells.max(1)).changes();
-        let worth = part.len() > best.changes.len() && part.iter().any(|&(cell, _)| cell == growth.seed());
-        if worth { cut(base, &patch, reach, room) } else { None }
+        let is_useful = part.len() > best.changes.len() && part.iter().any(|&(cell, _)| cell == growth.seed());
+        if is_useful { cut(base, &patch, reach, room) } else { None }
     });
     let holds_seed = |chunk: &MapChunk| chunk.changes.iter().any(|&(cell, _)| cell == growth.seed());
     Some(longer.filter(|chunk| holds_seed(chunk) && chunk.changes.len() > best.changes.len()).unwrap_or(best))
 }
 
-/// Patches to code before settling for one that fits.
+/// Patches to code before one that fits is accepted.
 const TRIALS: usize = 4;
-/// Per cent of the room that are full enough to look no further.
+/// Percentage of the room that is full enough to stop the search.
 const FULL_ENOUGH: usize = 94;
 
 fn write_whole(base: Lattice<'_>, patch: &Patch, room: usize) -> (Vec<u8>, Reach) {
@@ -64,7 +64,7 @@ pub(in crate::map_codec) fn prefix_chunk(base: Lattice<'_>, patch: &Patch, room:
 fn cut(base: Lattice<'_>, patch: &Patch, reach: Reach, room: usize) -> Option<MapChunk> {
     let width = patch.rect.width as usize;
     let mut cells = reach.cells;
-    // The head grows by the length of the last row: a few cells fewer may fit.
+    // The header grows by the length of the last row, so a few cells fewer may fit.
     for _ in 0..8 {
         let changed = |i: &usize| patch.base.get(*i) != patch.outcome.get(*i);
         cells = (0..cells).rev().find(changed)? + 1;

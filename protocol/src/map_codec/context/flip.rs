@@ -1,15 +1,15 @@
-//! Does a cell near a border or a change keep its label?
+//! The decision whether a cell near a border or a change keeps its label.
 
 use super::canvas::Canvas;
 use super::recent::Recent;
-use super::stage::{Contexts, Layout};
+use super::stage::{Contexts, StageLayout};
 use super::view::View;
 
-pub(super) const LAYOUT: Layout = Layout {
+pub(super) const LAYOUT: StageLayout = StageLayout {
     direct: &[108, 512, 320, 1024, 180, 162, 5 * Recent::GAPS, 256, 30 * Recent::RATES, 900],
     keyed: &[5, 5],
     sets: [9, 12, Recent::RATES],
-    curves: 27,
+    apms: 27,
 };
 
 pub(super) fn contexts(canvas: &Canvas, view: &View, wide: usize, calm: &Recent, border: &Recent) -> Contexts {
@@ -46,7 +46,7 @@ pub(super) fn contexts(canvas: &Canvas, view: &View, wide: usize, calm: &Recent,
             (0, 0),
         ],
         sets: [same, unseen_class * 4 + changes, border.rate()],
-        curve: same * 3 + changes.min(2),
+        apm: same * 3 + changes.min(2),
     }
 }
 
@@ -68,7 +68,7 @@ pub(super) fn wider_ring(canvas: &Canvas, at: usize, held: u8) -> usize {
     }
 }
 
-/// The label that most of the eight around hold, other than this cell's and none, and how many.
+/// The most frequent label among the eight neighbours other than this cell's and unexplored, and its number of cells.
 pub(super) fn leading_other(view: &View) -> (u8, usize) {
     let mut best = (0, 0);
     for &label in view.behind[..4].iter().chain(&view.ahead[..4]) {

@@ -1,18 +1,18 @@
-//! Which label does a cell get that changes? Candidates one after another.
+//! The decision about the label of a changed cell, by one candidate after another.
 
 use super::canvas::Canvas;
-use super::stage::{Contexts, Layout};
+use super::stage::{Contexts, StageLayout};
 use super::view::{View, magnitude};
-use crate::map::MAX_LABEL;
+use crate::grid::MAX_LABEL;
 
-pub(super) const LAYOUT: Layout = Layout {
+pub(super) const LAYOUT: StageLayout = StageLayout {
     direct: &[512, 512, 2048, 512, 256, 704, 128, 128],
     keyed: &[8, 8, 8, 128, 128],
     sets: [8, 18, 32],
-    curves: 16,
+    apms: 16,
 };
 
-/// Labels around a cell by weight of votes, heaviest first.
+/// Labels around a cell by votes, most votes first.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Votes {
     labels: [(u8, u8); 16],
@@ -39,8 +39,6 @@ impl Votes {
         votes.labels[..votes.count].sort_by_key(|&(_, weight)| std::cmp::Reverse(weight));
         votes
     }
-
-    /// Candidates with their weights.
     pub(super) fn ranked(&self) -> &[(u8, u8)] {
         &self.labels[..self.count]
     }
@@ -58,7 +56,7 @@ pub(super) fn others(canvas: &Canvas, view: &View, votes: &Votes) -> Vec<u8> {
     labels
 }
 
-/// Contexts of "it is `candidate`", the one in place `rank`, with `left` labels in use not yet ruled out.
+/// Contexts of the decision for `candidate`, which has rank `rank`, while `left` labels in use are not ruled out.
 pub(super) fn contexts(view: &View, votes: &Votes, candidate: u8, rank: usize, left: usize) -> Contexts {
     let flips = usize::from(view.held != 0);
     let few = rank.min(3);
@@ -93,7 +91,7 @@ pub(super) fn contexts(view: &View, votes: &Votes, candidate: u8, rank: usize, l
             (hash([candidate, w, s, sw, se]), (ten & 15) * 8 + state),
         ],
         sets: [state, flips * 9 + ring.count_ones() as usize, (ten & 15) * 2 + flips],
-        curve: flips * 8 + few * 2 + usize::from(voted),
+        apm: flips * 8 + few * 2 + usize::from(voted),
     }
 }
 

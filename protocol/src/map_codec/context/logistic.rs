@@ -1,16 +1,16 @@
-//! Probabilities and their log odds in integers: the same on every CPU.
+//! Probabilities and their logits in integers, so that every CPU computes the same.
 
 use std::sync::LazyLock;
 
-/// Log odds are in 1/256 of a binary order of magnitude and lie within plus or minus this.
-pub(super) const MAX_ODDS: i32 = 4095;
+/// Logits are in 1/256 of a binary order of magnitude, and lie between minus and plus this.
+pub(super) const MAX_LOGIT: i32 = 4095;
 
 /// log2 of 1 + i/256, in 1/256.
 const MANTISSA: [u8; 256] = {
     let mut table = [0u8; 256];
     let mut i = 0;
     while i < 256 {
-        // Eight squarings give eight bits of the logarithm.
+        // Eight squarings yield eight bits of the logarithm.
         let mut x = (256 + i as u64) << 22;
         let mut bits = 0u16;
         let mut step = 0;
@@ -30,23 +30,23 @@ const MANTISSA: [u8; 256] = {
     table
 };
 
-/// log2 of `x` in 1/256; `x` at least 1.
+/// log2 of `x` in 1/256; `x` must be at least 1.
 pub(super) fn log2(x: u32) -> i32 {
     let top = 31 - x.leading_zeros() as i32;
     let fraction = ((u64::from(x) << 8 >> top) & 255) as usize;
     top * 256 + i32::from(MANTISSA[fraction])
 }
 
-/// Log odds of a probability in 1/2^32.
-pub(super) fn odds(p: u32) -> i32 {
-    (log2(p.max(1)) - log2((u32::MAX - p).max(1))).clamp(-MAX_ODDS, MAX_ODDS)
+/// The logit of a probability in 1/2^32.
+pub(super) fn logit(p: u32) -> i32 {
+    (log2(p.max(1)) - log2((u32::MAX - p).max(1))).clamp(-MAX_LOGIT, MAX_LOGIT)
 }
 
 static PROBABILITY: LazyLock<Vec<u16>> = LazyLock::new(|| {
-    let of = |p: u32| odds(p << 16 | 0x8000);
+    let of = |p: u32| logit(p << 16 | 0x8000);
     let mut p = 1;
-    let table = (-MAX_ODDS..=MAX_ODDS).map(|odds| {
-        while p < 65_535 && of(p) < odds {
+    let table = (-MAX_LOGIT..=MAX_LOGIT).map(|logit| {
+        while p < 65_535 && of(p) < logit {
             p += 1;
         }
         p as u16
@@ -54,9 +54,9 @@ static PROBABILITY: LazyLock<Vec<u16>> = LazyLock::new(|| {
     table.collect()
 });
 
-/// Probability in 1/65536, from 1 to 65535, of log odds.
-pub(super) fn probability(odds: i32) -> u32 {
-    let at = (odds.clamp(-MAX_ODDS, MAX_ODDS) + MAX_ODDS) as usize;
+/// The probability in 1/65536, from 1 to 65535, of a logit.
+pub(super) fn probability(logit: i32) -> u32 {
+    let at = (logit.clamp(-MAX_LOGIT, MAX_LOGIT) + MAX_LOGIT) as usize;
     PROBABILITY.get(at).map_or(32_768, |&p| u32::from(p))
 }
 
@@ -65,9 +65,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn log_odds_and_probability_undo_each_other() {
+    fn logit_and_probability_are_inverse() {
         for p in [1u32, 2, 9, 100, 3000, 32_768, 60_000, 65_500, 65_534] {
-            let back = probability(odds(p << 16 | 0x8000));
+            let back = probability(logit(p << 16 | 0x8000));
             assert!(back.abs_diff(p) <= 1 + p.min(65_536 - p) / 100, "{p} came back as {back}");
         }
         assert_eq!(log2(1), 0);

@@ -1,8 +1,10 @@
-//! The `context` coder: binary decisions, contexts mixed in integers, a shipped prior, state fresh for each chunk.
+//! The `context` coder: binary decisions with mixed contexts (Mahoney, PAQ), in integers, from a
+//! shipped prior for each chunk.
 
 mod arith;
 mod calm;
 mod canvas;
+mod estimate;
 mod fit;
 mod flip;
 mod label;
@@ -10,26 +12,24 @@ mod logistic;
 mod model;
 mod prior;
 mod recent;
-mod slot;
 mod stage;
-mod train;
+pub mod training;
 mod unseen;
 mod view;
 
 use super::DecodeError;
-use super::bits::{BitReader, BitWriter};
-use super::header::Header;
+use super::header::ChunkHeader;
 use super::window::Patch;
-use crate::map::Rect;
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::Rect;
 use crate::map_codec::lattice::Lattice;
 use arith::{Decoder, Encoder};
 use canvas::Canvas;
 pub(super) use fit::{best_chunk, prefix_chunk};
 use model::Model;
 use prior::Prior;
-pub use train::{PRIOR_SCENES, train_prior};
 
-/// Where the last row ends.
+/// The length of the last row.
 ///
 /// ```text
 ///  bits  1     as many as width - 1 has, if short
@@ -63,23 +63,22 @@ impl LastRow {
     }
 }
 
-/// Cells of a patch in the order they are coded, as (column, row).
+/// The cells of a patch in coding order, as (column, row).
 fn order(width: usize, height: usize, last: LastRow) -> impl Iterator<Item = (usize, usize)> {
     let cells = (height - 1) * width + last.0;
     (0..cells).map(move |i| (i % width, i / width))
 }
 
-/// How far a patch got within the room.
+/// How much of a patch fits the room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Reach {
-    /// Cells coded within the room.
     cells: usize,
-    /// Whether that is all of them.
+    /// Whether that is the whole patch.
     all: bool,
 }
 
-/// The chunk for the first `cells` of `patch`, and how many of them fit `room_bits`; the rest was not looked at.
-fn write(base: Lattice<'_>, head: &Header, patch: &Patch, last: LastRow, room_bits: usize) -> (Vec<u8>, Reach) {
+/// The chunk for the first `cells` of `patch`, and how many of them fit `room_bits`; the encoder stops there.
+fn write(base: Lattice<'_>, head: &ChunkHeader, patch: &Patch, last: LastRow, room_bits: usize) -> (Vec<u8>, Reach) {
     let (width, height) = (patch.rect.width as usize, patch.rect.height as usize);
     let mut bits = BitWriter::default();
     head.write(&mut bits);
@@ -114,7 +113,7 @@ pub(super) fn read(mut bits: BitReader<'_>, base: Lattice<'_>, rect: Rect) -> Re
     if decoder.ended_well() { Ok(canvas.into_patch(rect)) } else { Err(DecodeError::Corrupt) }
 }
 
-/// Head of a `context` chunk for `rect`.
-fn head(base: Lattice<'_>, rect: Rect) -> Header {
+/// The header of a `context` chunk for `rect`.
+fn head(base: Lattice<'_>, rect: Rect) -> ChunkHeader {
     super::chunk::header_for(base, super::header::Body::Context, rect)
 }

@@ -1,4 +1,4 @@
-//! A patch as a string of decisions: which cells keep their label, and what the others get.
+//! A patch as a string of decisions: which cells keep their label, and which labels the others get.
 
 use super::arith::BitCoder;
 use super::canvas::Canvas;
@@ -6,12 +6,12 @@ use super::label::{self, Votes};
 use super::prior::Prior;
 use super::recent::Recent;
 use super::stage::{Contexts, Stage};
-use super::unseen::{self, Run};
+use super::unseen::{self, CellRun};
 use super::view::View;
 use super::{calm, flip};
-use crate::map::{MAX_LABEL, UNEXPLORED};
+use crate::grid::{MAX_LABEL, UNEXPLORED};
 
-/// Adaptive state of a chunk; made afresh from the prior for each.
+/// The adaptive state of a chunk, initialised from the prior for each.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) calm: Stage,
@@ -20,10 +20,10 @@ pub(super) struct Model {
     pub(super) label: Stage,
     inside: Recent,
     border: Recent,
-    run: Run,
+    run: CellRun,
 }
 
-/// Probability of `true`, in 1/65536, that a label past the candidates is none.
+/// Probability, in 1/65536, that a label other than the candidates is unexplored.
 const CLEARED: u32 = 1 << 12;
 
 impl Model {
@@ -35,11 +35,11 @@ impl Model {
             label: Stage::new(&label::LAYOUT, &prior.label),
             inside: Recent::default(),
             border: Recent::default(),
-            run: Run::default(),
+            run: CellRun::default(),
         }
     }
 
-    /// Codes one cell: an encoder takes `wanted` as its new label, a decoder ignores it. `None` if no label is left.
+    /// Codes one cell. An encoder takes `wanted` as its new label, a decoder ignores it. `None` if no label is left.
     pub(super) fn code_cell(
         &mut self,
         coder: &mut impl BitCoder,
@@ -111,7 +111,7 @@ fn decide(stage: &mut Stage, coder: &mut impl BitCoder, contexts: &Contexts, bit
     bit
 }
 
-/// A label that is not in use around, by its place among those: low ones are likely.
+/// A label that is not in use around, by its index among those; low ones are more likely.
 fn new_label(coder: &mut impl BitCoder, canvas: &Canvas, held: u8, wanted: u8) -> Option<u8> {
     let free = || (1..=MAX_LABEL).filter(|&label| canvas.count(label) == 0 && label != held);
     let place = free().take_while(|&label| label < wanted).count();
@@ -128,5 +128,6 @@ fn new_label(coder: &mut impl BitCoder, canvas: &Canvas, held: u8, wanted: u8) -
     None
 }
 
-/// How many new labels, as bits, come next, and how likely it is one of them, in 1/65536; the last one is sure.
+/// Groups of new labels: the logarithm of the size, and the probability of this group in 1/65536;
+/// the last one is certain.
 const NEW_LABELS: [(u32, u32); 6] = [(2, 26_000), (2, 32_000), (3, 45_000), (4, 45_000), (5, 40_000), (8, 65_535)];

@@ -1,24 +1,23 @@
-//! What the coder knows before the first cell: trained on procedural maps, shipped with the program.
+//! The start state of the coder, trained on procedural maps and shipped with the program.
 
-use super::slot::Slot;
-use super::stage::{INPUTS, Layout, SETS, stored_odds};
+use super::estimate::BitEstimate;
+use super::stage::{INPUTS, SETS, StageLayout, stored_logit};
 use super::{calm, flip, label, logistic, unseen};
 use std::sync::LazyLock;
 
-/// State of one kind of decision at the start of a chunk.
+/// The state of one kind of decision at the start of a chunk.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct StagePrior {
-    /// Direct contexts one after another, then what keyed ones start from.
-    pub(super) slots: Vec<Slot>,
-    /// Weights of the mixers side by side, in 1/65536.
+    /// Estimates of the direct contexts one after another, then the start values of the keyed ones.
+    pub(super) slots: Vec<BitEstimate>,
+    /// Weights of the parallel mixers, in 1/65536.
     pub(super) weights: Vec<[i32; INPUTS]>,
-    /// Weights of the mixers among each other, in 1/65536.
+    /// Weights of the final mixer, in 1/65536.
     pub(super) second: Vec<[i32; SETS]>,
-    /// Points of the correction curves, 1/2^32.
-    pub(super) curves: Vec<u32>,
+    /// Points of the adaptive probability maps, in 1/2^32.
+    pub(super) apms: Vec<u32>,
 }
 
-/// State of all kinds of decision.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Prior {
     pub(super) calm: StagePrior,
@@ -27,8 +26,8 @@ pub(super) struct Prior {
     pub(super) label: StagePrior,
 }
 
-/// Written by `scenecast map train-prior --seed 1 --out prior.bin`; part of the wire format: another table is another
-/// coder.
+/// Written by `scenecast map train-prior --seed 1 --out prior.bin`. It is part of the wire format:
+/// another table makes another coder.
 const TABLE: &[u8] = include_bytes!("prior.bin");
 
 static SHIPPED: LazyLock<Prior> = LazyLock::new(|| Prior::from_bytes(TABLE).unwrap_or_else(Prior::blank));
@@ -42,7 +41,7 @@ impl Prior {
         &SHIPPED
     }
 
-    /// A prior that knows nothing.
+    /// A prior without knowledge: every probability is one half.
     pub(super) fn blank() -> Self {
         Self {
             calm: calm::LAYOUT.blank(),
@@ -52,14 +51,14 @@ impl Prior {
         }
     }
 
-    /// Reads a table; `None` if it is not one of this layout.
+    /// Reads a table; `None` if it has another layout.
     ///
     /// ```text
-    ///      for calm, flip, unseen, label:  slots x (log odds i16, visits u16), weights x i16 / 2^12, curves x log odds i16
+    ///      for calm, flip, unseen, label:  estimates x (logit i16, visits u16), weights x i16 / 2^12, maps x logit i16
     /// ```
-    /// Little-endian; log odds in 1/256 of a factor of two.
+    /// Little-endian; logits in 1/256 of a factor of two.
     pub(super) fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let mut reader = Reader(bytes);
+        let mut reader = TableReader(bytes);
         let prior = Self {
             calm: reader.stage(&calm::LAYOUT)?,
             flip: reader.stage(&flip::LAYOUT)?,
@@ -76,7 +75,7 @@ impl Prior {
         let layouts = [&calm::LAYOUT, &flip::LAYOUT, &unseen::LAYOUT, &label::LAYOUT];
         for (stage, layout) in stages.into_iter().zip(layouts) {
             for slot in &stage.slots {
-                out.extend(stored_odds(slot.p).to_le_bytes());
+                out.extend(stored_logit(slot.p).to_le_bytes());
                 out.extend(slot.visits.to_le_bytes());
             }
             let used = stage.weights.iter().flat_map(|row| row.iter().take(layout.inputs()));
@@ -84,25 +83,25 @@ impl Prior {
                 let weight = (weight >> WEIGHT_SHIFT).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
                 out.extend(weight.to_le_bytes());
             }
-            for &point in &stage.curves {
-                out.extend(stored_odds(point).to_le_bytes());
+            for &point in &stage.apms {
+                out.extend(stored_logit(point).to_le_bytes());
             }
         }
         out
     }
 }
 
-struct Reader<'a>(&'a [u8]);
+struct TableReader<'a>(&'a [u8]);
 
-impl Reader<'_> {
-    fn stage(&mut self, layout: &Layout) -> Option<StagePrior> {
-        let slots = (0..layout.slots()).map(|_| Some(Slot { p: self.probability()?, visits: self.visits()? }));
+impl TableReader<'_> {
+    fn stage(&mut self, layout: &StageLayout) -> Option<StagePrior> {
+        let slots = (0..layout.slots()).map(|_| Some(BitEstimate { p: self.probability()?, visits: self.visits()? }));
         let slots = slots.collect::<Option<_>>()?;
         let weights = (0..layout.rows()).map(|_| self.row(layout.inputs()));
         let weights = weights.collect::<Option<_>>()?;
-        let second = (0..layout.curves).map(|_| self.row(SETS)).collect::<Option<_>>()?;
-        let curves = (0..layout.curve_points()).map(|_| self.probability()).collect::<Option<_>>()?;
-        Some(StagePrior { slots, weights, second, curves })
+        let second = (0..layout.apms).map(|_| self.row(SETS)).collect::<Option<_>>()?;
+        let apms = (0..layout.apm_points()).map(|_| self.probability()).collect::<Option<_>>()?;
+        Some(StagePrior { slots, weights, second, apms })
     }
 
     fn row<const N: usize>(&mut self, used: usize) -> Option<[i32; N]> {
@@ -126,7 +125,7 @@ impl Reader<'_> {
     fn visits(&mut self) -> Option<u16> {
         let (number, rest) = self.0.split_first_chunk()?;
         self.0 = rest;
-        Some(u16::from_le_bytes(*number).min(Slot::MOST_VISITS))
+        Some(u16::from_le_bytes(*number).min(BitEstimate::MAX_VISITS))
     }
 }
 
@@ -139,19 +138,5 @@ mod tests {
         let prior = Prior::from_bytes(TABLE).expect("a table of this layout");
         assert_eq!(prior.to_bytes().len(), TABLE.len());
         assert!(Prior::from_bytes(&TABLE[1..]).is_none());
-    }
-
-    #[test]
-    #[ignore = "takes minutes: cargo test --release -p scenecast-protocol -- --ignored shipped_table_is"]
-    fn the_shipped_table_is_what_training_gives_for_the_documented_seed() {
-        assert!(crate::map_codec::train_prior(1, crate::map_codec::PRIOR_SCENES, &mut |_| ()) == TABLE);
-    }
-
-    #[test]
-    fn training_repeats_itself_and_gives_a_table_of_this_layout() {
-        let table = |seed| crate::map_codec::train_prior(seed, 2, &mut |_| ());
-        assert!(table(1) == table(1));
-        assert!(table(1) != table(2));
-        assert!(Prior::from_bytes(&table(1)).is_some());
     }
 }

@@ -1,4 +1,4 @@
-//! What the cells coded so far tell about how often labels change.
+//! How often labels have changed among the cells coded so far.
 
 use super::view::magnitude;
 
@@ -11,9 +11,9 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// Values of [`Recent::rate`].
+    /// The number of values of [`Recent::rate`].
     pub(super) const RATES: usize = 50;
-    /// Values of [`Recent::gap`].
+    /// The number of values of [`Recent::gap`].
     pub(super) const GAPS: usize = 20;
 
     pub(super) fn note(&mut self, kept: bool) {
@@ -22,7 +22,7 @@ impl Recent {
         self.since = if kept { self.since + 1 } else { 0 };
     }
 
-    /// How many changes there were, and one in how many cells.
+    /// The number of changes and their rate, as a context.
     pub(super) fn rate(&self) -> usize {
         let sure = match self.changes {
             0 => 0,
@@ -34,12 +34,12 @@ impl Recent {
         sure * 10 + self.one_in() - 2
     }
 
-    /// Binary order of magnitude, 2 to 11, of how many cells there are to a change.
+    /// The logarithm of the number of cells for each change, 2 to 11.
     pub(super) fn one_in(&self) -> usize {
         (((self.visits + 8) / (self.changes + 1)).max(1).ilog2() as usize).clamp(2, 11)
     }
 
-    /// Order of magnitude of the cells since the last change.
+    /// The magnitude of the number of cells since the last change.
     pub(super) fn gap(&self) -> usize {
         magnitude(self.since).min(Self::GAPS - 1)
     }

@@ -1,67 +1,65 @@
-//! One kind of decision: its contexts, their mixing and a last correction.
+//! One kind of decision: its contexts, their mixing and a final adaptive probability map (APM, also SSE; Shkarin 2002).
 
-use super::logistic::{MAX_ODDS, odds, probability};
+use super::estimate::BitEstimate;
+use super::logistic::{MAX_LOGIT, logit, probability};
 use super::prior::StagePrior;
-use super::slot::Slot;
+use std::collections::BTreeMap;
 
-/// Most contexts of one kind of decision.
-pub(super) const MOST_DIRECT: usize = 10;
-/// Most contexts that go by label.
-pub(super) const MOST_KEYED: usize = 5;
-/// Inputs of the mixer: every context and a constant; those without a context stay zero.
-pub(super) const INPUTS: usize = MOST_DIRECT + MOST_KEYED + 1;
-/// Labels that a keyed context keeps apart at a time.
+pub(super) const MAX_DIRECT: usize = 10;
+pub(super) const MAX_KEYED: usize = 5;
+/// Inputs of the mixer: every context and a constant; inputs without a context stay zero.
+pub(super) const INPUTS: usize = MAX_DIRECT + MAX_KEYED + 1;
+/// The number of labels that a keyed context distinguishes at a time.
 const KEYED_PLACES: usize = 2048;
-/// Mixers side by side, each with its own choice of weights.
+/// Parallel mixers, each with its own selection of weights.
 pub(super) const SETS: usize = 3;
-/// Steps of the correction curve.
-const CURVE: usize = 33;
-const CURVE_STEP: i32 = 256;
-/// Weight of one; weights are in 1/65536.
+/// Points of an adaptive probability map.
+const APM_POINTS: usize = 33;
+const APM_STEP: i32 = 256;
+/// A weight of 1; weights are in 1/65536.
 const ONE: i32 = 1 << 16;
 
-/// How many values each context of a kind of decision has.
+/// The number of values of each context of a kind of decision.
 #[derive(Debug)]
-pub(super) struct Layout {
-    /// Contexts that are numbers below this.
+pub(super) struct StageLayout {
+    /// For each direct context, the number of its values.
     pub(super) direct: &'static [usize],
-    /// Contexts that go by a key too: what they start from has this many values.
+    /// For each keyed context, the number of its start values.
     pub(super) keyed: &'static [usize],
-    /// Choices of weights.
+    /// For each mixer, the number of its sets of weights.
     pub(super) sets: [usize; SETS],
-    /// Choices of correction curve.
-    pub(super) curves: usize,
+    /// The number of adaptive probability maps.
+    pub(super) apms: usize,
 }
 
-impl Layout {
-    /// Mixer inputs in use.
+impl StageLayout {
     pub(super) fn inputs(&self) -> usize {
         self.direct.len() + self.keyed.len() + 1
     }
 
-    /// Slots that a prior gives.
+    /// The number of estimates in a prior.
     pub(super) fn slots(&self) -> usize {
         self.direct.iter().chain(self.keyed).sum()
     }
 
-    /// Choices of weights of all mixers.
+    /// Sets of weights of all mixers.
     pub(super) fn rows(&self) -> usize {
         self.sets.iter().sum()
     }
 
-    /// Points of all correction curves.
-    pub(super) fn curve_points(&self) -> usize {
-        self.curves * CURVE
+    /// Points of all adaptive probability maps.
+    pub(super) fn apm_points(&self) -> usize {
+        self.apms * APM_POINTS
     }
 
-    /// A prior that knows nothing.
+    /// A prior without knowledge: every probability is one half.
     pub(super) fn blank(&self) -> StagePrior {
-        let curve = (0..CURVE as i32).map(|i| probability((i - 16) * CURVE_STEP) << 16);
+        let apm = (0..APM_POINTS as i32).map(|i| probability((i - 16) * APM_STEP) << 16);
         StagePrior {
-            slots: vec![Slot::BLANK; self.slots()],
+            slots: vec![BitEstimate::BLANK; self.slots()],
             weights: vec![[ONE * 3 / 10; INPUTS]; self.rows()],
-            second: vec![[ONE / 3; SETS]; self.curves],
-            curves: curve.cycle().take(self.curve_points()).collect(),
+            second: vec![[ONE / 3; SETS]; self.apms],
+            apms: apm.cycle().take(self.apm_points()).collect(),
         }
     }
 }
@@ -69,86 +67,84 @@ impl Layout {
 /// The contexts of one decision.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Contexts {
-    pub(super) direct: [usize; MOST_DIRECT],
-    /// Key, and what it starts from.
-    pub(super) keyed: [(u32, usize); MOST_KEYED],
+    pub(super) direct: [usize; MAX_DIRECT],
+    /// The key, and the context whose estimate is the start value.
+    pub(super) keyed: [(u32, usize); MAX_KEYED],
     pub(super) sets: [usize; SETS],
-    pub(super) curve: usize,
+    pub(super) apm: usize,
 }
 
-/// Adaptive state of one kind of decision; predict, then update, in turn.
+/// The adaptive state of one kind of decision; prediction and update alternate.
 #[derive(Debug, Clone)]
 pub(super) struct Stage {
-    layout: &'static Layout,
+    layout: &'static StageLayout,
     prior: &'static StagePrior,
-    slots: Vec<Slot>,
-    keyed: Vec<Vec<(u32, Slot)>>,
+    slots: Vec<BitEstimate>,
+    keyed: Vec<Vec<(u32, BitEstimate)>>,
     weights: Vec<[i32; INPUTS]>,
     second: Vec<[i32; SETS]>,
-    curves: Vec<u32>,
+    apms: Vec<u32>,
     last: Last,
-    /// How fast weights follow, in 1/2^20 of odds times error.
+    /// How fast weights follow, in 1/2^20 of logit times error.
     pub(super) weight_rate: i32,
-    /// Decisions counted for training.
-    pub(super) tally: Option<Box<Tally>>,
+    pub(super) counts: Option<Box<VisitCounts>>,
 }
 
-/// How often each slot was visited and how often the decision was `true`, within one chunk.
+/// Counts of decisions in each context within one chunk: all of them, and those that were `true`.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tally {
-    /// By slot of the prior; (visits, true).
-    pub(super) direct: Vec<(u32, u32)>,
-    /// By what the slot started from and key.
-    pub(super) keyed: std::collections::BTreeMap<(usize, u32), (u32, u32)>,
+pub struct VisitCounts {
+    direct: Vec<(u32, u32)>,
+    /// By the context whose estimate a keyed one starts from, and by key.
+    keyed: BTreeMap<(usize, u32), (u32, u32)>,
 }
 
-/// What the last prediction was made of.
+/// The parts of the last prediction, which the update needs.
 #[derive(Debug, Clone, Copy, Default)]
 struct Last {
-    places: [usize; MOST_DIRECT],
-    keyed: [usize; MOST_KEYED],
-    /// Slot of the prior that each keyed context started from.
-    starts: [usize; MOST_KEYED],
-    odds: [i32; INPUTS],
+    places: [usize; MAX_DIRECT],
+    keyed: [usize; MAX_KEYED],
+    /// The estimate of the prior from which each keyed context started.
+    starts: [usize; MAX_KEYED],
+    logit: [i32; INPUTS],
     sets: [usize; SETS],
     mixed: [u32; SETS],
-    mixed_odds: [i32; SETS],
+    mixed_logits: [i32; SETS],
     second: usize,
     both: u32,
-    curve: usize,
+    apm: usize,
 }
 
-/// No key: labels and their pairs stay below.
+/// Not a key: labels and their pairs are below.
 const NO_KEY: u32 = u32::MAX;
 /// How fast weights follow while coding.
 const WEIGHT_RATE: i32 = 3;
-/// How fast correction curves follow: 1/2^n of the error.
-const CURVE_SHIFT: u32 = 7;
+/// How fast adaptive probability maps follow: 1/2^n of the error.
+const APM_SHIFT: u32 = 7;
 
 impl Stage {
-    pub(super) fn new(layout: &'static Layout, prior: &'static StagePrior) -> Self {
+    pub(super) fn new(layout: &'static StageLayout, prior: &'static StagePrior) -> Self {
         Self {
             layout,
             prior,
             slots: prior.slots.clone(),
-            keyed: layout.keyed.iter().map(|_| vec![(NO_KEY, Slot::BLANK); KEYED_PLACES]).collect(),
+            keyed: layout.keyed.iter().map(|_| vec![(NO_KEY, BitEstimate::BLANK); KEYED_PLACES]).collect(),
             weights: prior.weights.clone(),
             second: prior.second.clone(),
-            curves: prior.curves.clone(),
+            apms: prior.apms.clone(),
             last: Last::default(),
             weight_rate: WEIGHT_RATE,
-            tally: None,
+            counts: None,
         }
     }
 
-    /// Probability of `true`, in 1/65536, from 1 to 65535.
+    /// The probability of `true` in 1/65536, from 1 to 65535.
     pub(super) fn predict(&mut self, contexts: &Contexts) -> u32 {
         let mut first = 0;
         let mut input = 0;
         for (&values, &context) in self.layout.direct.iter().zip(&contexts.direct) {
             debug_assert!(context < values, "context {input} is {context} of {values}");
             self.last.places[input] = first + context;
-            self.last.odds[input] = self.slots[first + context].odds();
+            self.last.logit[input] = self.slots[first + context].logit();
             first += values;
             input += 1;
         }
@@ -161,11 +157,11 @@ impl Stage {
             }
             self.last.keyed[i] = place;
             self.last.starts[i] = first + start;
-            self.last.odds[input] = held.1.odds();
+            self.last.logit[input] = held.1.logit();
             first += values;
             input += 1;
         }
-        self.last.odds[input] = 256;
+        self.last.logit[input] = 256;
         self.mix(contexts)
     }
 
@@ -174,75 +170,85 @@ impl Stage {
         for (i, (&choices, &choice)) in self.layout.sets.iter().zip(&contexts.sets).enumerate() {
             debug_assert!(choice < choices);
             self.last.sets[i] = first + choice;
-            let odds = weigh(&self.weights[first + choice], &self.last.odds);
-            (self.last.mixed[i], self.last.mixed_odds[i]) = (probability(odds), odds);
+            let logit = weigh(&self.weights[first + choice], &self.last.logit);
+            (self.last.mixed[i], self.last.mixed_logits[i]) = (probability(logit), logit);
             first += choices;
         }
-        self.last.second = contexts.curve;
-        let odds = weigh(&self.second[contexts.curve], &self.last.mixed_odds);
-        self.last.both = probability(odds);
-        let along = odds + 16 * CURVE_STEP;
-        let (step, rest) = ((along / CURVE_STEP) as usize, (along % CURVE_STEP) as u64);
-        let at = contexts.curve * CURVE + step;
-        let between = u64::from(self.curves[at]) * (256 - rest) + u64::from(self.curves[at + 1]) * rest;
-        self.last.curve = if rest < 128 { at } else { at + 1 };
+        self.last.second = contexts.apm;
+        let logit = weigh(&self.second[contexts.apm], &self.last.mixed_logits);
+        self.last.both = probability(logit);
+        let along = logit + 16 * APM_STEP;
+        let (step, rest) = ((along / APM_STEP) as usize, (along % APM_STEP) as u64);
+        let at = contexts.apm * APM_POINTS + step;
+        let between = u64::from(self.apms[at]) * (256 - rest) + u64::from(self.apms[at + 1]) * rest;
+        self.last.apm = if rest < 128 { at } else { at + 1 };
         let corrected = (between >> 24) as u32;
-        (probability(odds) + corrected).div_ceil(2).clamp(1, 65_535)
+        (probability(logit) + corrected).div_ceil(2).clamp(1, 65_535)
     }
 
-    /// Learns what the decision was.
+    /// Learns from the decision that was predicted last.
     pub(super) fn update(&mut self, bit: bool) {
         let goal = if bit { 65_536 } else { 0 };
         for (&mixed, row) in self.last.mixed.iter().zip(self.last.sets) {
-            follow(&mut self.weights[row], &self.last.odds, (goal - mixed as i32) * self.weight_rate);
+            follow(&mut self.weights[row], &self.last.logit, (goal - mixed as i32) * self.weight_rate);
         }
         let error = (goal - self.last.both as i32) * self.weight_rate / 2;
-        follow(&mut self.second[self.last.second], &self.last.mixed_odds, error);
-        let point = &mut self.curves[self.last.curve];
+        follow(&mut self.second[self.last.second], &self.last.mixed_logits, error);
+        let point = &mut self.apms[self.last.apm];
         let goal = if bit { i64::from(u32::MAX) } else { 0 };
-        *point = (i64::from(*point) + ((goal - i64::from(*point)) >> CURVE_SHIFT)) as u32;
+        *point = (i64::from(*point) + ((goal - i64::from(*point)) >> APM_SHIFT)) as u32;
         for &place in &self.last.places[..self.layout.direct.len()] {
             self.slots[place].update(bit);
         }
         for (table, &place) in self.keyed.iter_mut().zip(&self.last.keyed) {
             table[place].1.update(bit);
         }
-        if let Some(tally) = &mut self.tally {
+        if let Some(counts) = &mut self.counts {
             let keys = self.keyed.iter().zip(&self.last.keyed).map(|(table, &place)| table[place].0);
-            tally.count(&self.last.places[..self.layout.direct.len()], self.last.starts.iter().copied().zip(keys), bit);
+            counts.count(
+                &self.last.places[..self.layout.direct.len()],
+                self.last.starts.iter().copied().zip(keys),
+                bit,
+            );
         }
     }
 
-    /// Takes over weights and curves.
     pub(super) fn carry(&mut self, before: &Self) {
         self.weights.clone_from(&before.weights);
         self.second.clone_from(&before.second);
-        self.curves.clone_from(&before.curves);
+        self.apms.clone_from(&before.apms);
     }
 
-    /// Puts weights and curves as they are now into a prior.
+    /// Copies weights and adaptive probability maps into a prior.
     pub(super) fn teach(&self, prior: &mut StagePrior) {
         prior.weights.clone_from(&self.weights);
         prior.second.clone_from(&self.second);
-        prior.curves.clone_from(&self.curves);
+        prior.apms.clone_from(&self.apms);
     }
 }
 
-/// Largest weight either way; keeps all sums within 32 bits.
-const MOST_WEIGHT: i32 = (1 << 19) - 1;
+/// The largest weight of either sign; keeps all sums within 32 bits.
+const MAX_WEIGHT: i32 = (1 << 19) - 1;
 
-fn weigh<const N: usize>(weights: &[i32; N], odds: &[i32; N]) -> i32 {
-    let sum: i32 = weights.iter().zip(odds).map(|(&weight, &odds)| (weight >> 5) * odds).sum();
-    (sum >> 11).clamp(-MAX_ODDS, MAX_ODDS)
+fn weigh<const N: usize>(weights: &[i32; N], logit: &[i32; N]) -> i32 {
+    let sum: i32 = weights.iter().zip(logit).map(|(&weight, &logit)| (weight >> 5) * logit).sum();
+    (sum >> 11).clamp(-MAX_LOGIT, MAX_LOGIT)
 }
 
-fn follow<const N: usize>(weights: &mut [i32; N], odds: &[i32; N], error: i32) {
-    for (weight, &odds) in weights.iter_mut().zip(odds) {
-        *weight = (*weight + ((odds * error + (1 << 19)) >> 20)).clamp(-MOST_WEIGHT, MOST_WEIGHT);
+fn follow<const N: usize>(weights: &mut [i32; N], logit: &[i32; N], error: i32) {
+    for (weight, &logit) in weights.iter_mut().zip(logit) {
+        *weight = (*weight + ((logit * error + (1 << 19)) >> 20)).clamp(-MAX_WEIGHT, MAX_WEIGHT);
     }
 }
 
-impl Tally {
+impl VisitCounts {
+    /// Each context with its decisions and those that were `true`; a context that starts several keyed ones comes
+    /// up once for each key.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, u32, u32)> + '_ {
+        let direct = self.direct.iter().enumerate().map(|(context, &(visits, ones))| (context, visits, ones));
+        direct.chain(self.keyed.iter().map(|(&(start, _), &(visits, ones))| (start, visits, ones)))
+    }
+
     fn count(&mut self, places: &[usize], keyed: impl Iterator<Item = (usize, u32)>, bit: bool) {
         let note = |entry: &mut (u32, u32)| *entry = (entry.0 + 1, entry.1 + u32::from(bit));
         for &place in places {
@@ -255,7 +261,7 @@ impl Tally {
     }
 }
 
-/// Log odds as a prior stores them.
-pub(super) fn stored_odds(p: u32) -> i16 {
-    odds(p) as i16
+/// A logit as a prior stores it.
+pub(super) fn stored_logit(p: u32) -> i16 {
+    logit(p) as i16
 }

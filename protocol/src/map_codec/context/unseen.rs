@@ -1,27 +1,27 @@
-//! Does a cell without a label stay without?
+//! The decision whether an unexplored cell stays unexplored.
 
 use super::canvas::Canvas;
-use super::stage::{Contexts, Layout, MOST_KEYED};
+use super::stage::{Contexts, MAX_KEYED, StageLayout};
 use super::view::{View, magnitude};
 
-pub(super) const LAYOUT: Layout =
-    Layout { direct: &[256, 256, 512, 64, 81, 256, 1024, 144], keyed: &[], sets: [9, 16, 16], curves: 9 };
+pub(super) const LAYOUT: StageLayout =
+    StageLayout { direct: &[256, 256, 512, 64, 81, 256, 1024, 144], keyed: &[], sets: [9, 16, 16], apms: 9 };
 
-/// Length of the present run of seen or unseen cells along the row.
+/// The length of the current run of explored or unexplored cells along the row.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Run {
+pub(super) struct CellRun {
     length: usize,
     seen: bool,
 }
 
-impl Run {
+impl CellRun {
     pub(super) fn note(&mut self, column: usize, seen: bool) {
         self.length = if column > 0 && seen == self.seen { self.length + 1 } else { 1 };
         self.seen = seen;
     }
 }
 
-pub(super) fn contexts(canvas: &Canvas, at: usize, place: (usize, usize), view: &View, run: &Run) -> Contexts {
+pub(super) fn contexts(canvas: &Canvas, at: usize, place: (usize, usize), view: &View, run: &CellRun) -> Contexts {
     let unseen = view.ring(0);
     let new = view.changed;
     let row = (-3..=3).fold(0, |mask, east| mask << 1 | usize::from(canvas.changed(at, east, -1)));
@@ -45,8 +45,8 @@ pub(super) fn contexts(canvas: &Canvas, at: usize, place: (usize, usize), view: 
             0,
             0,
         ],
-        keyed: [(0, 0); MOST_KEYED],
+        keyed: [(0, 0); MAX_KEYED],
         sets: [states[0] * 3 + states[1], edges, new & 15],
-        curve: states[0] * 3 + states[1],
+        apm: states[0] * 3 + states[1],
     }
 }

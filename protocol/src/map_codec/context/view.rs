@@ -17,7 +17,7 @@ pub(super) struct View {
     pub(super) held: u8,
     /// w, s, sw, se, ww, ss, ssw, sse, sww, see.
     pub(super) behind: [u8; 10],
-    /// Which of those changed, lowest bit first.
+    /// A bit mask of those that changed, lowest bit first.
     pub(super) changed: usize,
     /// e, n, ne, nw, ee, nn.
     pub(super) ahead: [u8; 6],
@@ -37,17 +37,17 @@ impl View {
         Self { held: canvas.held(at), behind, changed, ahead: AHEAD.map(|(east, north)| canvas.near(at, east, north)) }
     }
 
-    /// Which of the first `count` behind hold `label`, lowest bit first.
+    /// A bit mask of the first `count` behind that hold `label`, lowest bit first.
     pub(super) fn behind_mask(&self, label: u8, count: usize) -> usize {
         mask(&self.behind[..count], label)
     }
 
-    /// Which of e, n, ne, nw hold `label`, lowest bit first.
+    /// A bit mask of e, n, ne, nw that hold `label`, lowest bit first.
     pub(super) fn ahead_mask(&self, label: u8) -> usize {
         mask(&self.ahead[..4], label)
     }
 
-    /// Which of the eight around hold `label`: w, s, sw, se, e, n, ne, nw, lowest bit first.
+    /// A bit mask of the eight neighbours that hold `label`: w, s, sw, se, e, n, ne, nw, lowest bit first.
     pub(super) fn ring(&self, label: u8) -> usize {
         self.behind_mask(label, 4) | self.ahead_mask(label) << 4
     }

@@ -1,13 +1,13 @@
-//! The bytes of a PNG file that never go on the wire.
+//! The constant bytes of a PNG file, which are not transmitted.
 
 use super::pixels::{Depth, Palette};
-use crate::map::Rect;
+use crate::grid::Rect;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 const INDEXED: u8 = 3;
 
-/// A PNG file around a raw deflate stream; its palette is grey, the level being the label.
+/// A PNG file around a raw deflate stream, with a grey palette whose level is the label.
 pub(super) fn restore(rect: Rect, depth: Depth, palette: &Palette, stream: &[u8], scanlines: &[u8]) -> Vec<u8> {
     let mut head = Vec::from(rect.width.to_be_bytes());
     head.extend(rect.height.to_be_bytes());

@@ -1,7 +1,7 @@
 //! The largest `png` chunk that fits.
 
 use super::deflate::Deflater;
-use super::{Effort, head, write};
+use super::{DeflateEffort, head, write};
 use crate::map_codec::MapChunk;
 use crate::map_codec::chunk::chunk;
 use crate::map_codec::grow::Growth;
@@ -14,7 +14,7 @@ pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room:
     let patch_of = |i: usize| growth.window.patch(*growth.areas.get(i)?).trimmed();
     let mut best = patch_of(0)?;
     let (mut fitting, mut too_large, mut step) = (0, growth.areas.len(), 1);
-    // Steps that double, then halving: most rooms hold few changes.
+    // Doubling steps, then bisection, because most rooms hold few changes.
     while fitting + 1 < too_large {
         let i = (fitting + step).min((fitting + too_large) / 2).max(fitting + 1);
         let patch = patch_of(i)?;
@@ -27,14 +27,14 @@ pub(in crate::map_codec) fn best_chunk(base: Lattice<'_>, growth: &Growth, room:
     if too_large < growth.areas.len() {
         best = fitter.fill(best, &patch_of(too_large)?)?;
     }
-    let bytes = write(&mut fitter.deflater, &head(base, best.rect), &best, Effort::Full);
+    let bytes = write(&mut fitter.deflater, &head(base, best.rect), &best, DeflateEffort::Full);
     (bytes.len() <= room).then(|| chunk(&best, bytes))
 }
 
-/// The `png` chunk that says the same as `chunk`, if it is shorter.
+/// The `png` chunk with the content of `chunk`, if it is shorter.
 pub(in crate::map_codec) fn smaller(base: Lattice<'_>, other: &MapChunk) -> Option<MapChunk> {
     let patch = Patch::of(base, &other.changes)?;
-    let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, Effort::Quick);
+    let bytes = write(&mut Deflater::new(), &head(base, patch.rect), &patch, DeflateEffort::Quick);
     (bytes.len() < other.bytes.len()).then(|| chunk(&patch, bytes))
 }
 
@@ -46,7 +46,7 @@ struct Fitter<'a> {
 
 impl Fitter<'_> {
     fn fits(&mut self, patch: &Patch) -> bool {
-        write(&mut self.deflater, &head(self.base, patch.rect), patch, Effort::Quick).len() <= self.room
+        write(&mut self.deflater, &head(self.base, patch.rect), patch, DeflateEffort::Quick).len() <= self.room
     }
 
     /// `inner` with as many further changes of `outer` as fit.

@@ -1,13 +1,13 @@
-//! Patch to scanlines and back.
+//! Conversion between patches and scanlines.
 
 use std::collections::BTreeMap;
 
-use crate::map::{MAX_LABEL, Rect, UNEXPLORED};
+use crate::bytes::{BitReader, BitWriter};
+use crate::grid::{MAX_LABEL, Rect, UNEXPLORED};
 use crate::map_codec::DecodeError;
-use crate::map_codec::bits::{BitReader, BitWriter};
 use crate::map_codec::window::Patch;
 
-/// Pixel value, or palette entry, of a cell that becomes unexplored.
+/// The pixel value, or palette entry, of a cell that becomes unexplored.
 const CLEARED: u8 = 255;
 
 /// Bits a pixel: 1, 2, 4 or 8.
@@ -26,7 +26,7 @@ impl Depth {
     }
 }
 
-/// What the pixels above 0 stand for.
+/// The meaning of the pixels above 0.
 ///
 /// ```text
 ///  bits  1       2        8 if listed   8 x count
@@ -34,21 +34,20 @@ impl Depth {
 ///      | listed | depth  | count - 1   | entries |
 ///      +--------+--------+-------------+---------+
 /// ```
-/// * listed: 0 = a pixel is the label itself (255 = becomes unexplored), 1 = pixel i is entry i - 1.
+/// * listed: 0 = a pixel is the label itself (255 makes a cell unexplored), 1 = pixel i is entry i - 1.
 /// * depth: 1, 2, 4, 8 bits a pixel. Zero bits fill the last byte.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Palette {
-    /// A pixel is the label itself.
     Labels {
         /// The largest pixel in use.
         highest: u8,
     },
-    /// A pixel is one more than a place in the list.
+    /// A pixel is an index of the list plus 1.
     List(Vec<u8>),
 }
 
 impl Palette {
-    /// The palettes worth trying: the labels themselves, and a list if that makes pixels narrower.
+    /// The palettes to try: the labels themselves, and a list if that makes pixels narrower.
     pub(super) fn choices(patch: &Patch) -> Vec<Self> {
         let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
         for (_, label) in patch.changes() {
@@ -70,7 +69,7 @@ impl Palette {
         Depth::ALL.into_iter().find(|d| d.holds(highest)).unwrap_or(Depth(8))
     }
 
-    /// The depths worth trying: the narrowest that holds every pixel, and a byte a pixel.
+    /// The depths to try: the narrowest that holds every pixel, and a byte a pixel.
     pub(super) fn depths(&self) -> impl Iterator<Item = Depth> + use<> {
         let narrowest = self.narrowest();
         std::iter::once(narrowest)
@@ -122,17 +121,15 @@ fn stored(label: u8) -> u8 {
     if label == UNEXPLORED { CLEARED } else { label }
 }
 
-/// Bytes of a scanline with its filter byte.
+/// Length of a scanline with its filter byte.
 fn stride(rect: Rect, depth: Depth) -> usize {
     1 + (rect.width as usize * usize::from(depth.0)).div_ceil(8)
 }
-
-/// Bytes of all scanlines.
 pub(super) fn packed_len(rect: Rect, depth: Depth) -> usize {
     stride(rect, depth) * rect.height as usize
 }
 
-/// Scanlines of the patch, each with filter 0 (which wins on label maps).
+/// Scanlines of the patch, each with filter 0, which is best on label maps.
 pub(super) fn pack(patch: &Patch, palette: &Palette, depth: Depth) -> Vec<u8> {
     let width = patch.rect.width as usize;
     let mut out = Vec::with_capacity(packed_len(patch.rect, depth));
@@ -148,7 +145,7 @@ pub(super) fn pack(patch: &Patch, palette: &Palette, depth: Depth) -> Vec<u8> {
     out
 }
 
-/// What becomes of the cells that hold `held`.
+/// Applies the scanlines to the cells in `held`.
 pub(super) fn unpack(
     rect: Rect,
     held: &[u8],

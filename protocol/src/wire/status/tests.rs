@@ -1,6 +1,8 @@
 //! Layout of the status, and what is refused.
 
 use super::*;
+use crate::coordinates::WorldPoint;
+use crate::directive::RefusalReason;
 use proptest::prelude::*;
 
 #[test]
@@ -12,8 +14,7 @@ fn golden_bytes_of_a_status() {
         mode: VehicleMode::Hold,
         autopilot_silent: false,
         reason: ModeReason::Fence,
-        x_m: 1.5,
-        y_m: -0.1,
+        position: MapPoint::new(1.5, -0.1),
         depth_m: 18.0,
         heading_deg: 90.0,
         sigma_m: 1.25,
@@ -33,7 +34,7 @@ fn golden_bytes_of_a_status() {
     let (pose, (report, _)) = (status.encode_pose(99), status.encode_report(99, 0).unwrap());
     assert_eq!(pose, [0x22, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]);
     assert_eq!(report, [1, 9, 0xBE, 0xEF, 0x9C, 0x42, 3, 0xE5, 0xF0, 0b1000_0100, 7, 2, 0x12]);
-    let mut back = VehicleStatus { waypoint: Some((1.0, 2.0)), ..VehicleStatus::default() };
+    let mut back = VehicleStatus { waypoint: Some(MapPoint::new(1.0, 2.0)), ..VehicleStatus::default() };
     back.read_pose(&pose).unwrap();
     back.read_report(&report).unwrap();
     assert_eq!(back, status);
@@ -41,8 +42,8 @@ fn golden_bytes_of_a_status() {
     assert_eq!((helpless[0], &helpless[1..]), (0x2A, &pose[1..]));
     back.read_pose(&helpless).unwrap();
     assert!(std::mem::take(&mut back.autopilot_silent));
-    let path = PlannedPath { places: vec![(3.0, 2.0), (3.0, 9.5)], goes_on: true };
-    let going = VehicleStatus { waypoint: Some((1.0, -2.0)), path, ..status.clone() };
+    let path = PlannedPath { points: vec![MapPoint::new(3.0, 2.0), MapPoint::new(3.0, 9.5)], continues: true };
+    let going = VehicleStatus { waypoint: Some(MapPoint::new(1.0, -2.0)), path, ..status.clone() };
     let way = going.encode_pose(99);
     let (place, then) = ([0, 0, 10, 0xFF, 0xFF, 0xEC], [0xA4, 0x0A, 0x14, 0x00, 0x25, 0x80]);
     assert_eq!(way, [&[0x32], &pose[1..], &place, &then].concat());
@@ -55,7 +56,7 @@ fn golden_bytes_of_a_status() {
     assert_eq!(back.read_pose(&[&way[..], &[0]].concat()), Err(StatusError::BadField));
     back.read_pose(&pose).unwrap();
     assert_eq!(back, status, "it is not kept without its waypoint");
-    let placement = Some(Placement { version: 2, east_m: 12.5, north_m: -0.1 });
+    let placement = Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) });
     let placed = VehicleStatus { placement, ..status.clone() };
     let (long, _) = placed.encode_report(99, 0).unwrap();
     assert_eq!(long, [&report[..], &[2, 0, 0, 125, 0xFF, 0xFF, 0xFF]].concat());
@@ -79,12 +80,12 @@ proptest! {
     }
 
     #[test]
-    fn reports_of_any_size_tell_of_every_slot_that_was_decided_about(
+    fn reports_of_any_size_cover_every_decided_slot(
         decided in proptest::collection::vec((any::<u8>(), 0u8..10), SLOTS),
         room in 0usize..30,
         moved in any::<bool>(),
     ) {
-        let placement = moved.then_some(Placement { version: 1, east_m: 2.5, north_m: -7.0 });
+        let placement = moved.then_some(Placement { version: 1, origin: WorldPoint::new(2.5, -7.0) });
         let mut status = VehicleStatus { budget_bps: 100, placement, ..VehicleStatus::default() };
         for (slot, (version_low, code)) in status.slots.iter_mut().zip(decided) {
             let state = SlotState::from_code(code).unwrap();

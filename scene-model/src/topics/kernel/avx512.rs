@@ -1,26 +1,26 @@
 //! The Gibbs step in AVX-512: the same arithmetic as the portable one, one block of 16 slots in a register.
 //!
-//! With one or two blocks the label counts of each seat stay in a register, and the steps of several seats are woven so that
-//! one seat's latency is another's time to work.
+//! With one or two blocks, the label counts of each active cell stay in registers. The steps of several cells are
+//! interleaved, so that the processor works on one cell while it waits for the results of another.
 
 use std::arch::x86_64::*;
 
-use super::Move;
+use super::active_cell::ActiveCell;
 use super::gibbs::choose_block;
-use super::seat::{Moves, Seat};
 use crate::random::unit_f32;
+use crate::topics::label_changes::{LabelChange, LabelChanges};
 use crate::topics::labels::{Counts, LANES, Labels, Lanes, UNLABELLED, label_of, pack, word_of};
 
-/// As the portable `advance`.
+/// Has the contract of the portable `advance`.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
-pub(super) fn advance(labels: &Labels, seats: &mut [Seat], steps: usize, moves: &mut Moves) {
+pub(super) fn advance(labels: &Labels, active_cells: &mut [ActiveCell], steps: usize, changes: &mut LabelChanges) {
     match labels.blocks {
-        1 => advance_few_blocks::<1>(labels, seats, steps, moves),
-        2 => advance_few_blocks::<2>(labels, seats, steps, moves),
+        1 => advance_few_blocks::<1>(labels, active_cells, steps, changes),
+        2 => advance_few_blocks::<2>(labels, active_cells, steps, changes),
         _ => {
             for _ in 0..steps {
-                for seat in seats.iter_mut() {
-                    step(labels, seat, moves);
+                for active in active_cells.iter_mut() {
+                    step(labels, active, changes);
                 }
             }
         }
@@ -29,33 +29,38 @@ pub(super) fn advance(labels: &Labels, seats: &mut [Seat], steps: usize, moves: 
 
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
-fn advance_few_blocks<const B: usize>(labels: &Labels, seats: &mut [Seat], steps: usize, moves: &mut Moves) {
-    if let Ok(seats) = <&mut [Seat; 4]>::try_from(&mut *seats) {
-        return advance_in_registers::<B, 4>(labels, seats, steps, moves);
+fn advance_few_blocks<const B: usize>(
+    labels: &Labels,
+    active_cells: &mut [ActiveCell],
+    steps: usize,
+    changes: &mut LabelChanges,
+) {
+    if let Ok(active_cells) = <&mut [ActiveCell; 4]>::try_from(&mut *active_cells) {
+        return advance_in_registers::<B, 4>(labels, active_cells, steps, changes);
     }
-    for seat in seats {
-        advance_in_registers::<B, 1>(labels, std::array::from_mut(seat), steps, moves);
+    for active in active_cells {
+        advance_in_registers::<B, 1>(labels, std::array::from_mut(active), steps, changes);
     }
 }
 
-/// `B` blocks and `N` seats, few enough that their label counts stay in registers.
+/// `B` blocks and `N` active cells, few enough that their label counts stay in registers.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
 fn advance_in_registers<const B: usize, const N: usize>(
     labels: &Labels,
-    seats: &mut [Seat; N],
+    active_cells: &mut [ActiveCell; N],
     steps: usize,
-    moves: &mut Moves,
+    changes: &mut LabelChanges,
 ) {
     let one = _mm512_set1_ps(1.0);
     let birth = labels.birth_slot().unwrap_or(UNLABELLED);
     let weigher = Weigher::new(labels);
     let (prior, rate, gain) = (&labels.prior[..B], &labels.rate[..B], &labels.rate_gain[..B]);
-    let mut near: [[__m512; B]; N] = std::array::from_fn(|n| std::array::from_fn(|b| load(&seats[n].near[b])));
+    let mut near: [[__m512; B]; N] = std::array::from_fn(|n| std::array::from_fn(|b| load(&active_cells[n].near[b])));
     for _ in 0..steps {
-        for (seat, near) in seats.iter_mut().zip(&mut near) {
-            let unit = unit_f32(seat.key, seat.count());
-            let packed = seat.words[seat.at];
+        for (active, near) in active_cells.iter_mut().zip(&mut near) {
+            let unit = unit_f32(active.key, active.count());
+            let packed = active.words[active.at];
             let (word, old) = (word_of(packed), label_of(packed));
             let row = &labels.rows[word as usize * B..][..B];
             let mut sums = [_mm512_setzero_ps(); B];
@@ -68,18 +73,18 @@ fn advance_in_registers<const B: usize, const N: usize>(
             }
             let new = choose(&sums, unit);
             let counted = if new == birth { UNLABELLED } else { new };
-            seat.births += u16::from(new == birth);
+            active.births += u16::from(new == birth);
             for (b, near) in near.iter_mut().enumerate() {
                 let arrived = slot_mask(counted.wrapping_sub((b * LANES) as u32));
                 *near = _mm512_mask_add_ps(*near, arrived, *near, one);
             }
-            seat.words[seat.at] = pack(word, new);
-            seat.at += 1;
-            moves.note(Move { word, old: old as u16, new: new as u16 });
+            active.words[active.at] = pack(word, new);
+            active.at += 1;
+            changes.record(LabelChange { word, old: old as u16, new: new as u16 });
         }
     }
-    for (seat, near) in seats.iter_mut().zip(near) {
-        seat.near.iter_mut().zip(near).for_each(|(kept, near)| store(kept, near));
+    for (active, near) in active_cells.iter_mut().zip(near) {
+        active.near.iter_mut().zip(near).for_each(|(kept, near)| store(kept, near));
     }
 }
 
@@ -102,17 +107,17 @@ fn choose<const B: usize>(sums: &[__m512; B], unit: f32) -> u32 {
 
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
-fn step(labels: &Labels, seat: &mut Seat, moves: &mut Moves) {
+fn step(labels: &Labels, active: &mut ActiveCell, changes: &mut LabelChanges) {
     let blocks = labels.blocks;
-    let unit = unit_f32(seat.key, seat.count());
-    let packed = seat.words[seat.at];
+    let unit = unit_f32(active.key, active.count());
+    let packed = active.words[active.at];
     let (word, old) = (word_of(packed), label_of(packed));
-    seat.leave(labels, old);
+    active.leave(labels, old);
     let rows = &labels.rows[word as usize * blocks..][..blocks];
     let rates = labels.rate[..blocks].iter().zip(&labels.rate_gain[..blocks]);
     let weigher = Weigher::new(labels);
     let mut sum = _mm512_setzero_ps();
-    let parts = seat.here.iter().zip(&mut seat.sums).zip(rows).zip(rates);
+    let parts = active.here.iter().zip(&mut active.sums).zip(rows).zip(rates);
     for (block, (((here, sums), row), (rate, gain))) in parts.enumerate() {
         let own = slot_mask(old.wrapping_sub((block * LANES) as u32));
         sum = _mm512_add_ps(sum, weigher.weigh(load(here), row, rate, gain, own));
@@ -122,15 +127,14 @@ fn step(labels: &Labels, seat: &mut Seat, moves: &mut Moves) {
     let passed = passed(scanned, aim);
     let lane = lane_of(passed) as usize;
     let start = if passed == 0 { 0.0 } else { pick(scanned, lane_of(passed - 1)) };
-    let block = choose_block(&seat.sums[..blocks], lane, _mm512_cvtss_f32(aim) - start);
+    let block = choose_block(&active.sums[..blocks], lane, _mm512_cvtss_f32(aim) - start);
     let new = (block * LANES + lane) as u32;
-    seat.join(labels, new);
-    seat.words[seat.at] = pack(word, new);
-    seat.at += 1;
-    moves.note(Move { word, old: old as u16, new: new as u16 });
+    active.join(labels, new);
+    active.words[active.at] = pack(word, new);
+    active.at += 1;
+    changes.record(LabelChange { word, old: old as u16, new: new as u16 });
 }
 
-/// Weights of one block of slots.
 #[derive(Clone, Copy)]
 struct Weigher {
     beta: __m512,
@@ -156,7 +160,7 @@ impl Weigher {
     }
 }
 
-/// Running sums over the lanes by column, then row, and the point to aim at (in every lane); see the portable `choose`.
+/// Running sums over the lanes by column, then row, and the sum to look for (in every lane). See the portable `choose`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
 fn scan(sum: __m512, unit: f32) -> (__m512, __m512) {
@@ -184,20 +188,19 @@ fn passed(sums: __m512, aim: __m512) -> u32 {
     _mm512_cmp_ps_mask::<_CMP_LE_OQ>(sums, aim).count_ones().min(15)
 }
 
-/// The lane at a place in the order by column, then row.
+/// The lane at a rank in the order by column, then row.
 #[inline(always)]
-fn lane_of(place: u32) -> u32 {
-    (place & 3) * 4 + (place >> 2)
+fn lane_of(rank: u32) -> u32 {
+    (rank & 3) * 4 + (rank >> 2)
 }
 
-/// The value of one lane.
 #[inline]
 #[target_feature(enable = "avx512f")]
 fn pick(values: __m512, lane: u32) -> f32 {
     _mm512_cvtss_f32(_mm512_permutexvar_ps(_mm512_set1_epi32(lane as i32), values))
 }
 
-/// Mask of one lane, none if it lies outside of the block.
+/// The mask of one lane; empty if the lane is outside the block.
 #[inline(always)]
 fn slot_mask(lane: u32) -> __mmask16 {
     (1u64 << lane.min(63)) as __mmask16

@@ -1,43 +1,45 @@
-//! One Gibbs pass over the words of one cell: the inner loop.
+//! The Gibbs step of one word: the inner loop of the sampler.
 //!
 //! The arithmetic is fixed so that every implementation gives the same labels bit for bit: f32 without fused
 //! operations, slots in blocks of 16 lanes, block sums added in order, and the scan over lanes as a 4 x 4 tree (below)
 //! whose partial sums never fall.
-#![allow(
-    clippy::needless_range_loop,
-    reason = "lane loops over several arrays are what the compiler turns into vectors"
-)]
+#![allow(clippy::needless_range_loop, reason = "the compiler vectorises lane loops over several arrays")]
 
-use super::Move;
-use super::seat::{Moves, Seat};
+use super::active_cell::ActiveCell;
 use crate::random::unit_f32;
+use crate::topics::label_changes::{LabelChange, LabelChanges};
 use crate::topics::labels::{LANES, Labels, Lanes, label_of, pack, word_of};
 
-/// Draws a new label for the next `steps` words of each seat, given global counts that stand still.
+/// Draws a new label for the next `steps` words of each active cell, given frozen global counts.
 ///
-/// Each word's own label is taken out exactly: one from its cell, one from its word, one from its label's total. Words
-/// that sit in the birth slot do not make that slot more likely until the counts are settled. `BLOCKS` is the number
-/// of blocks if it is known at compile time, else 0. The seats' cells are no neighbours, so they do not see each other
-/// and are only side by side to keep the machine busy.
+/// The current label of the word is removed exactly: one from its cell, one from its word, one from its label's total.
+/// Words that took the birth slot do not make that slot more likely before the end of the phase. `BLOCKS` is the number
+/// of blocks if it is known at compile time, else 0. The cells are not neighbours, so their steps are independent; they
+/// are interleaved to hide latency.
 #[inline(always)]
-pub(super) fn advance<const BLOCKS: usize>(labels: &Labels, seats: &mut [Seat], steps: usize, moves: &mut Moves) {
+pub(super) fn advance<const BLOCKS: usize>(
+    labels: &Labels,
+    active_cells: &mut [ActiveCell],
+    steps: usize,
+    changes: &mut LabelChanges,
+) {
     for _ in 0..steps {
-        for seat in seats.iter_mut() {
-            step::<BLOCKS>(labels, seat, moves);
+        for active in active_cells.iter_mut() {
+            step::<BLOCKS>(labels, active, changes);
         }
     }
 }
 
 #[inline(always)]
-fn step<const BLOCKS: usize>(labels: &Labels, seat: &mut Seat, moves: &mut Moves) {
+fn step<const BLOCKS: usize>(labels: &Labels, active: &mut ActiveCell, changes: &mut LabelChanges) {
     let blocks = if BLOCKS == 0 { labels.blocks } else { BLOCKS };
-    let unit = unit_f32(seat.key, seat.count());
-    let packed = seat.words[seat.at];
+    let unit = unit_f32(active.key, active.count());
+    let packed = active.words[active.at];
     let (word, old) = (word_of(packed), label_of(packed));
-    seat.leave(labels, old);
+    active.leave(labels, old);
     let row = &labels.rows[word as usize * blocks..][..blocks];
     let (rate, gain) = (&labels.rate[..blocks], &labels.rate_gain[..blocks]);
-    let (here, sums) = (&seat.here[..blocks], &mut seat.sums[..blocks]);
+    let (here, sums) = (&active.here[..blocks], &mut active.sums[..blocks]);
     let mut sum = [0.0f32; LANES];
     for block in 0..blocks {
         let own = old.wrapping_sub((block * LANES) as u32);
@@ -55,16 +57,16 @@ fn step<const BLOCKS: usize>(labels: &Labels, seat: &mut Seat, moves: &mut Moves
         sums[block].0 = sum;
     }
     let new = choose(&sum, sums, unit, blocks);
-    seat.join(labels, new);
-    seat.words[seat.at] = pack(word, new);
-    seat.at += 1;
-    moves.note(Move { word, old: old as u16, new: new as u16 });
+    active.join(labels, new);
+    active.words[active.at] = pack(word, new);
+    active.at += 1;
+    changes.record(LabelChange { word, old: old as u16, new: new as u16 });
 }
 
-/// The slot where the running sum of the weights passes `unit` x total.
+/// The slot at which the running sum of the weights passes `unit` x total: a draw in proportion to the weights.
 ///
-/// Lanes are taken as four rows of four: the sum at row r, column c is the rows 0..=r of column c plus all columns
-/// before c. The order is by column, then row; then, within a lane, by block.
+/// The 16 lanes form four rows of four. The sum at row r, column c covers the rows 0..=r of column c and all columns
+/// before c, so the order is by column, then by row. Within a lane it is by block.
 #[inline(always)]
 fn choose(lane_sums: &[f32; LANES], block_sums: &[Lanes], unit: f32, blocks: usize) -> u32 {
     let q = lane_sums;
@@ -100,7 +102,8 @@ fn choose(lane_sums: &[f32; LANES], block_sums: &[Lanes], unit: f32, blocks: usi
     (block * LANES + lane) as u32
 }
 
-/// The first block whose running sum in `lane` passes `aim`; rounding may put `aim` at the end, then the last that adds.
+/// The first block whose running sum in `lane` passes `aim`. If rounding has put `aim` at the end, the last block
+/// with a weight above 0.
 #[inline(always)]
 pub(super) fn choose_block(block_sums: &[Lanes], lane: usize, aim: f32) -> usize {
     let all = block_sums[block_sums.len() - 1].0[lane];

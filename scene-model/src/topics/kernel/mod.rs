@@ -1,46 +1,45 @@
-//! The inner loops, compiled for the vector units that the machine has.
+//! The inner loops of the sampler, compiled for several widths of vectors.
 //!
-//! There is one source for each loop. It is compiled for the baseline of the target and again for AVX2 and AVX-512;
-//! the compiler may not reorder or fuse floating-point operations, so all of them give the same labels bit for bit.
+//! Each loop has one portable source, which is compiled for the baseline of the target and for AVX2; `avx512.rs` has
+//! the Gibbs step in intrinsics. The compiler may not reorder or fuse floating-point operations, so all versions give
+//! the same labels bit for bit.
 
 #![allow(unsafe_code, reason = "calling code that is compiled for vector units found at run time")]
 
+mod active_cell;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod gibbs;
-mod seat;
 mod votes;
 
+use super::label_changes::LabelChanges;
 use super::labels::Labels;
-pub(crate) use seat::{Job, Moves, Seat};
-pub(crate) use votes::Ballot;
+pub(crate) use active_cell::{ActiveCell, Job};
+pub(crate) use votes::LabelVotes;
 
-/// A word that changed its label.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Move {
-    pub(crate) word: u32,
-    pub(crate) old: u16,
-    pub(crate) new: u16,
-}
-
-/// Vector units that the inner loops are compiled for.
+/// The vector instructions that the inner loops use.
+///
+/// Every kernel gives the same labels bit for bit, so the choice affects the speed alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kernel {
-    /// What every machine of the target has: SSE2, NEON.
+    /// The baseline of the target: SSE2 on x86-64, NEON on aarch64.
     Portable,
-    /// 256-bit vectors.
+    /// 256-bit vectors of x86-64 (AVX2, POPCNT and BMI).
     Avx2,
-    /// 512-bit vectors.
+    /// 512-bit vectors of x86-64 (the subsets F, BW, DQ and VL).
     Avx512,
 }
 
 impl Kernel {
-    /// The widest that this machine has.
+    /// Returns the widest kernel that this machine can run.
+    #[must_use]
     pub fn detect() -> Self {
         [Self::Avx512, Self::Avx2].into_iter().find(|kernel| kernel.is_available()).unwrap_or(Self::Portable)
     }
 
-    /// Whether this machine has it.
+    /// Whether this machine has the instructions.
+    #[must_use]
     pub fn is_available(self) -> bool {
         match self {
             Self::Portable => true,
@@ -53,7 +52,8 @@ impl Kernel {
         }
     }
 
-    /// Short name for reports.
+    /// The name in reports: `portable`, `avx2` or `avx512`.
+    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
@@ -76,67 +76,73 @@ fn has_avx512() -> bool {
 }
 
 impl Kernel {
-    /// See [`gibbs::advance`].
-    pub(crate) fn advance(self, labels: &Labels, seats: &mut [Seat], steps: usize, moves: &mut Moves) {
+    /// Resamples the next `steps` words of each active cell: see [`gibbs::advance`].
+    pub(crate) fn advance(
+        self,
+        labels: &Labels,
+        active_cells: &mut [ActiveCell],
+        steps: usize,
+        changes: &mut LabelChanges,
+    ) {
         match self {
             // SAFETY: a model takes a kernel only if `is_available`, so the machine has these instructions.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => unsafe { avx512::advance(labels, seats, steps, moves) },
+            Self::Avx512 => unsafe { avx512::advance(labels, active_cells, steps, changes) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { advance_avx2(labels, seats, steps, moves) },
-            _ => advance(labels, seats, steps, moves),
+            Self::Avx2 => unsafe { advance_avx2(labels, active_cells, steps, changes) },
+            _ => advance(labels, active_cells, steps, changes),
         }
     }
 
-    /// See [`votes::vote`].
-    pub(crate) fn vote(self, ballot: &Ballot<'_>, words: &[u32], votes: &mut [u32]) -> f64 {
+    /// Counts the MAP labels of a cell's words: see [`votes::map_labels`].
+    pub(crate) fn map_labels(self, votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
         match self {
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => unsafe { vote_avx512(ballot, words, votes) },
+            Self::Avx512 => unsafe { map_labels_avx512(votes, words, tally) },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { vote_avx2(ballot, words, votes) },
-            _ => vote(ballot, words, votes),
+            Self::Avx2 => unsafe { map_labels_avx2(votes, words, tally) },
+            _ => map_labels(votes, words, tally),
         }
     }
 }
 
 #[inline(always)]
-fn advance(labels: &Labels, seats: &mut [Seat], steps: usize, moves: &mut Moves) {
+fn advance(labels: &Labels, active_cells: &mut [ActiveCell], steps: usize, changes: &mut LabelChanges) {
     match labels.blocks {
-        1 => gibbs::advance::<1>(labels, seats, steps, moves),
-        2 => gibbs::advance::<2>(labels, seats, steps, moves),
-        7 => gibbs::advance::<7>(labels, seats, steps, moves),
-        _ => gibbs::advance::<0>(labels, seats, steps, moves),
+        1 => gibbs::advance::<1>(labels, active_cells, steps, changes),
+        2 => gibbs::advance::<2>(labels, active_cells, steps, changes),
+        7 => gibbs::advance::<7>(labels, active_cells, steps, changes),
+        _ => gibbs::advance::<0>(labels, active_cells, steps, changes),
     }
 }
 
 #[inline(always)]
-fn vote(ballot: &Ballot<'_>, words: &[u32], votes: &mut [u32]) -> f64 {
-    match ballot.labels.blocks {
-        1 => votes::vote::<1>(ballot, words, votes),
-        2 => votes::vote::<2>(ballot, words, votes),
-        7 => votes::vote::<7>(ballot, words, votes),
-        _ => votes::vote::<0>(ballot, words, votes),
+fn map_labels(votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
+    match votes.labels.blocks {
+        1 => votes::map_labels::<1>(votes, words, tally),
+        2 => votes::map_labels::<2>(votes, words, tally),
+        7 => votes::map_labels::<7>(votes, words, tally),
+        _ => votes::map_labels::<0>(votes, words, tally),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,popcnt,bmi1,bmi2")]
-fn advance_avx2(labels: &Labels, seats: &mut [Seat], steps: usize, moves: &mut Moves) {
-    advance(labels, seats, steps, moves);
+fn advance_avx2(labels: &Labels, active_cells: &mut [ActiveCell], steps: usize, changes: &mut LabelChanges) {
+    advance(labels, active_cells, steps, changes);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,popcnt,bmi1,bmi2")]
-fn vote_avx2(ballot: &Ballot<'_>, words: &[u32], votes: &mut [u32]) -> f64 {
-    vote(ballot, words, votes)
+fn map_labels_avx2(votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
+    map_labels(votes, words, tally)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,popcnt,bmi1,bmi2")]
-fn vote_avx512(ballot: &Ballot<'_>, words: &[u32], votes: &mut [u32]) -> f64 {
-    vote(ballot, words, votes)
+fn map_labels_avx512(votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
+    map_labels(votes, words, tally)
 }

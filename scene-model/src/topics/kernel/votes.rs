@@ -1,40 +1,39 @@
-//! MAP labels and likelihood of the words of one cell.
-#![allow(
-    clippy::needless_range_loop,
-    reason = "lane loops over several arrays are what the compiler turns into vectors"
-)]
+//! The maximum a posteriori (MAP) labels and the likelihood of the words of one cell.
+#![allow(clippy::needless_range_loop, reason = "the compiler vectorises lane loops over several arrays")]
 
 use crate::topics::labels::{LANES, Labels, Lanes, label_of, word_of};
 
-/// What the words of a cell are judged by.
-pub(crate) struct Ballot<'a> {
+/// The label counts of one cell and its neighbours, and the global counts: all that the MAP labels
+/// of its words depend on.
+pub(crate) struct LabelVotes<'a> {
     pub(crate) labels: &'a Labels,
-    /// Label counts of the cell and its neighbours.
+    /// Label counts of the cell and its neighbours, these weighted by appearance affinity.
     pub(crate) near: &'a [Lanes],
-    /// (n_k + alpha) / (n_k. + V beta) of labels in use, 0 of others.
+    /// (n_k + alpha) / (n_k. + V beta) for each label in use, 0 for other slots.
     pub(crate) share: &'a [Lanes],
 }
 
-/// Adds the MAP slot of each word to `votes`; returns the logarithm of the product of their unnormalised likelihoods.
+/// Counts the MAP slots of `words` into `tally`, one number a slot. Returns the logarithm of the product
+/// of the words' unnormalised likelihoods.
 #[inline(always)]
-pub(super) fn vote<const BLOCKS: usize>(ballot: &Ballot<'_>, words: &[u32], votes: &mut [u32]) -> f64 {
+pub(super) fn map_labels<const BLOCKS: usize>(votes: &LabelVotes<'_>, words: &[u32], tally: &mut [u32]) -> f64 {
     let mut likelihood = LogProduct::default();
     for &packed in words {
-        let (slot, p) = vote_one::<BLOCKS>(ballot, packed);
-        votes[slot] += 1;
+        let (slot, p) = map_label::<BLOCKS>(votes, packed);
+        tally[slot] += 1;
         likelihood.multiply(f64::from(p));
     }
     likelihood.ln()
 }
 
-/// MAP slot of a word, and its unnormalised probability; `BLOCKS` as in the kernel.
+/// The MAP slot of a word, and the word's unnormalised probability. `BLOCKS` is as in the Gibbs step.
 #[inline(always)]
-fn vote_one<const BLOCKS: usize>(ballot: &Ballot<'_>, packed: u32) -> (usize, f32) {
-    let labels = ballot.labels;
+fn map_label<const BLOCKS: usize>(votes: &LabelVotes<'_>, packed: u32) -> (usize, f32) {
+    let labels = votes.labels;
     let blocks = if BLOCKS == 0 { labels.blocks } else { BLOCKS };
     let own_slot = label_of(packed) as usize;
     let row = &labels.rows[word_of(packed) as usize * blocks..][..blocks];
-    let (near, share) = (&ballot.near[..blocks], &ballot.share[..blocks]);
+    let (near, share) = (&votes.near[..blocks], &votes.share[..blocks]);
     let mut best = [-1.0f32; LANES];
     let mut slots = [0i32; LANES];
     let mut sums = [0.0f32; LANES];
@@ -50,7 +49,7 @@ fn vote_one<const BLOCKS: usize>(ballot: &Ballot<'_>, packed: u32) -> (usize, f3
             slots[lane] = if better { (block * LANES + lane) as i32 } else { slots[lane] };
         }
     }
-    // The word's own label, without the word, takes part on its own.
+    // The weight of the word's own label has to leave out the word itself, so it is computed apart from the others.
     let (block, lane) = (own_slot / LANES, own_slot % LANES);
     let rate = labels.rate[block].0[lane] + labels.rate_gain[block].0[lane];
     let here = near[block].0[lane] - 1.0 + labels.prior[block].0[lane];
@@ -61,7 +60,7 @@ fn vote_one<const BLOCKS: usize>(ballot: &Ballot<'_>, packed: u32) -> (usize, f3
     (if is_own { own_slot } else { slot }, fold(sums, |a, b| a + b))
 }
 
-/// Folds 16 lanes by halves.
+/// Folds 16 lanes by halves, in an order that does not depend on the vector width.
 #[inline(always)]
 fn fold<T: Copy>(lanes: [T; LANES], with: impl Fn(T, T) -> T) -> T {
     let eight: [T; 8] = std::array::from_fn(|i| with(lanes[i], lanes[i + 8]));
@@ -69,7 +68,7 @@ fn fold<T: Copy>(lanes: [T; LANES], with: impl Fn(T, T) -> T) -> T {
     with(with(four[0], four[2]), with(four[1], four[3]))
 }
 
-/// Logarithm of a long product: the mantissa in a float, the exponent apart.
+/// The logarithm of a long product. Mantissa and exponent are kept apart, so that the product cannot underflow.
 struct LogProduct {
     mantissa: f64,
     exponent: i64,
@@ -99,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_logarithm_of_a_product_is_the_sum_of_logarithms() {
+    fn logarithm_of_a_product_is_the_sum_of_logarithms() {
         let factors: Vec<f64> = (1..400).map(|i| 1e-4 * f64::from(i)).collect();
         let mut product = LogProduct::default();
         factors.iter().for_each(|&factor| product.multiply(factor));

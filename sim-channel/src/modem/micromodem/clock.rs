@@ -1,17 +1,16 @@
-//! The modem's calendar clock, in the spellings of its sentences.
+//! The modem's calendar clock, in the formats of its sentences.
 
-use crate::Duration;
+use std::time::Duration;
 
-/// Seconds since 1970 at the start of the run; set by `CCTMS` and `CCCLK`.
+/// Set by `CCTMS` and `CCCLK`.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Clock {
-    /// Time since 1970 when `now` was zero; may be before 1970 only by saturation.
+pub(super) struct ModemClock {
+    /// Time since 1970 at virtual time zero; saturates at 1970.
     epoch: Duration,
 }
 
-/// Year, month, day, hour, minute, second.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Civil {
+pub(super) struct CivilTime {
     pub year: u32,
     pub month: u32,
     pub day: u32,
@@ -22,22 +21,21 @@ pub(super) struct Civil {
 
 const DAY_S: u64 = 86_400;
 
-impl Clock {
+impl ModemClock {
     pub(super) fn new(unix_s: u64) -> Self {
         Self { epoch: Duration::from_secs(unix_s) }
     }
 
     /// Makes the clock show `civil` at `now`.
-    pub(super) fn set(&mut self, civil: Civil, now: Duration) {
+    pub(super) fn set(&mut self, civil: CivilTime, now: Duration) {
         self.epoch = Duration::from_secs(civil.unix_s()).saturating_sub(now);
     }
 
-    fn at(&self, now: Duration) -> (Civil, u32) {
+    fn at(&self, now: Duration) -> (CivilTime, u32) {
         let time = self.epoch.saturating_add(now);
-        (Civil::of_unix_s(time.as_secs()), time.subsec_micros())
+        (CivilTime::of_unix_s(time.as_secs()), time.subsec_micros())
     }
 
-    /// `HHMMSS`
     pub(super) fn hhmmss(&self, now: Duration) -> String {
         let (c, _) = self.at(now);
         format!("{:02}{:02}{:02}", c.hour, c.minute, c.second)
@@ -55,28 +53,28 @@ impl Clock {
         format!("{:04}{:02}{:02}{:02}{:02}{:02}.{us:06}", c.year, c.month, c.day, c.hour, c.minute, c.second)
     }
 
-    /// `YYYYMMDD,HHMMSS.ffff`, as in `CAXST`.
+    /// The time as `YYYYMMDD,HHMMSS.ffff`, as in `CAXST`.
     pub(super) fn date_and_time(&self, now: Duration) -> String {
         let (c, _) = self.at(now);
         format!("{:04}{:02}{:02},{}", c.year, c.month, c.day, self.hhmmss_fraction(now))
     }
 
-    /// `YYYY-MM-DDTHH:MM:SSZ`
+    /// The time as `YYYY-MM-DDTHH:MM:SSZ`, as in `CATMQ`.
     pub(super) fn iso(&self, now: Duration) -> String {
         let (c, _) = self.at(now);
         format!("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", c.year, c.month, c.day, c.hour, c.minute, c.second)
     }
 }
 
-impl Civil {
-    /// From six numbers; `None` if there is no such time since 1970.
+impl CivilTime {
+    /// `None` if there is no such time since 1970.
     pub(super) fn new([year, month, day, hour, minute, second]: [u32; 6]) -> Option<Self> {
         let civil = Self { year, month, day, hour, minute, second };
         let plausible = (1970..=9999).contains(&year) && hour < 24 && minute < 60 && second < 60;
         (plausible && Self::of_unix_s(civil.unix_s()) == civil).then_some(civil)
     }
 
-    /// From `YYYY-MM-DDTHH:MM:SSZ`, the `Z` optional.
+    /// Reads `YYYY-MM-DDTHH:MM:SSZ`; the `Z` is optional.
     pub(super) fn parse_iso(text: &str) -> Option<Self> {
         let (date, time) = text.trim_end_matches('Z').split_once('T')?;
         let mut parts = date.splitn(3, '-').chain(time.splitn(3, ':'));
@@ -96,7 +94,6 @@ impl Civil {
         days * DAY_S + u64::from(self.hour * 3600 + self.minute * 60 + self.second)
     }
 
-    /// The inverse of `unix_s`.
     fn of_unix_s(unix_s: u64) -> Self {
         let days = unix_s / DAY_S + 719_468;
         let era_day = days % 146_097;
@@ -125,22 +122,22 @@ mod tests {
     fn every_day_of_two_centuries_comes_back() {
         for day in 0..73_000 {
             let unix_s = day * DAY_S + 4321;
-            assert_eq!(Civil::of_unix_s(unix_s).unix_s(), unix_s);
+            assert_eq!(CivilTime::of_unix_s(unix_s).unix_s(), unix_s);
         }
     }
 
     #[test]
-    fn known_dates() {
-        let of = Civil::of_unix_s;
-        assert_eq!(Some(of(0)), Civil::new([1970, 1, 1, 0, 0, 0]));
-        assert_eq!(Some(of(951_782_400)), Civil::new([2000, 2, 29, 0, 0, 0]));
-        assert_eq!(Some(of(1_749_250_863)), Civil::new([2025, 6, 6, 23, 1, 3]));
+    fn known_dates_convert_both_ways() {
+        let of = CivilTime::of_unix_s;
+        assert_eq!(Some(of(0)), CivilTime::new([1970, 1, 1, 0, 0, 0]));
+        assert_eq!(Some(of(951_782_400)), CivilTime::new([2000, 2, 29, 0, 0, 0]));
+        assert_eq!(Some(of(1_749_250_863)), CivilTime::new([2025, 6, 6, 23, 1, 3]));
     }
 
     #[test]
-    fn the_clock_shows_what_it_was_set_to_and_runs_on() {
-        let mut clock = Clock::new(0);
-        let set = Civil::parse_iso("2025-06-06T23:01:03Z").expect("time");
+    fn clock_runs_on_from_the_time_it_was_set_to() {
+        let mut clock = ModemClock::new(0);
+        let set = CivilTime::parse_iso("2025-06-06T23:01:03Z").expect("time");
         clock.set(set, Duration::from_secs(100));
         let now = Duration::from_micros(101_000_935);
         assert_eq!(clock.iso(now), "2025-06-06T23:01:04Z");
@@ -154,7 +151,7 @@ mod tests {
         for text in
             ["2025-02-30T00:00:00Z", "1960-01-01T00:00:00Z", "2025-01-01T24:00:00Z", "2025-01-01", "", "x-y-zTa:b:c"]
         {
-            assert_eq!(Civil::parse_iso(text), None, "{text}");
+            assert_eq!(CivilTime::parse_iso(text), None, "{text}");
         }
     }
 }

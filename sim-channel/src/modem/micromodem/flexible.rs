@@ -1,57 +1,56 @@
 //! `CCTDP`, `CARDP`: the flexible data protocol.
 
-use super::Micromodem;
-use super::packet::{Kind, Packet};
+use super::base::MicromodemBase;
+use super::packet::{Packet, PacketKind};
 use super::rates::{flexible_airtime, flexible_data, flexible_mini_bytes};
-use super::receive::Signal;
-use super::sentence::{Sentence, from_hex, to_hex};
-use super::transmit::Outgoing;
-use crate::Duration;
+use super::sentence::{NmeaSentence, from_hex, to_hex};
+use super::signal::PacketSignal;
+use super::statistics;
+use super::transmitter::QueuedPacket;
+use std::time::Duration;
 
-impl Micromodem {
-    /// `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`
-    pub(super) fn on_flexible_command(&mut self, sentence: &Sentence, now: Duration) {
-        let fields = (sentence.number::<u8>(0), sentence.number::<u8>(1), from_hex(sentence.text(4)));
-        let (Some(dst), Some(rate), Some(data)) = fields else {
-            return self.complain("NMEA", 1, "CCTDP: wrong field", now);
-        };
-        let (ack, reserved) = (sentence.text(2), sentence.text(3));
-        let sizes = flexible_mini_bytes(rate).map(|mini| (data.len().min(mini), data.len().saturating_sub(mini)));
-        let fits = sizes.filter(|(_, rest)| *rest <= flexible_data(rate).0 && !data.is_empty());
-        let Some((mini, rest)) = fits else {
-            return self.tell(&format!("CATDP,1,0,{dst},{rate},{ack},{reserved},0,0"), now);
-        };
-        let number = self.unique.wrapping_add(1);
-        self.tell(&format!("CATDP,0,{number},{dst},{rate},{ack},{reserved},{mini},{rest}"), now);
-        let mut packet = Packet::new(Kind::Flexible, self.address(), dst);
-        (packet.rate, packet.ack) = (rate, ack == "1");
-        let (head, tail) = data.split_at(mini);
-        packet.frames.push(Some(head.to_vec()));
-        packet.frames.extend(tail.chunks(flexible_data(rate).1).map(|frame| Some(frame.to_vec())));
-        let expected = packet.frames.len() as u8;
-        self.air.queue.push_back(Outgoing {
-            airtime: flexible_airtime(rate, mini, rest),
-            bytes: data.len(),
-            packet_type: 5,
-            expected,
-            told: true,
-            then_ask: false,
-            packet,
-        });
-    }
-
-    /// `$CARDP,<src>,<dst>,<rate>,<ack>,<reserved>,<mini>,<data>`, the last two empty or triples joined by `;`.
-    pub(super) fn on_flexible(&mut self, packet: &Packet, signal: &Signal, now: Duration) {
-        let base64 = self.nvram.is_on("recv.base64data");
-        let (mini, data) = packet.frames.split_at(packet.frames.len().min(1));
-        let (mini, data) = (triples(mini, base64), triples(data, base64));
-        let Packet { src, dst, rate, ack, .. } = packet;
-        self.tell(&format!("CARDP,{src},{dst},{rate},{},0,{mini},{data}", u8::from(*ack)), now);
-        self.tell_statistics(packet, signal, 5, now);
-    }
+/// The host sends flexible data: `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`.
+pub(super) fn on_command(base: &mut MicromodemBase, sentence: &NmeaSentence, now: Duration) {
+    let fields = (sentence.number::<u8>(0), sentence.number::<u8>(1), from_hex(sentence.text(4)));
+    let (Some(dst), Some(rate), Some(data)) = fields else {
+        return base.report_error("NMEA", 1, "CCTDP: wrong field", now);
+    };
+    let (ack, reserved) = (sentence.text(2), sentence.text(3));
+    let sizes = flexible_mini_bytes(rate).map(|mini| (data.len().min(mini), data.len().saturating_sub(mini)));
+    let fits = sizes.filter(|(_, rest)| *rest <= flexible_data(rate).0 && !data.is_empty());
+    let Some((mini, rest)) = fits else {
+        return base.report(&format!("CATDP,1,0,{dst},{rate},{ack},{reserved},0,0"), now);
+    };
+    let number = base.transmitter.next_number();
+    base.report(&format!("CATDP,0,{number},{dst},{rate},{ack},{reserved},{mini},{rest}"), now);
+    let mut packet = Packet::new(PacketKind::Flexible, base.address(), dst);
+    (packet.rate, packet.ack) = (rate, ack == "1");
+    let (head, tail) = data.split_at(mini);
+    packet.frames.push(Some(head.to_vec()));
+    packet.frames.extend(tail.chunks(flexible_data(rate).1).map(|frame| Some(frame.to_vec())));
+    let expected = packet.frames.len() as u8;
+    base.transmitter.push(QueuedPacket {
+        airtime: flexible_airtime(rate, mini, rest),
+        bytes: data.len(),
+        packet_type: 5,
+        expected,
+        reported: true,
+        then_request_data: false,
+        packet,
+    });
 }
 
-/// `crc_ok;nbytes;data` for each frame.
+/// `$CARDP,<src>,<dst>,<rate>,<ack>,<reserved>,<mini>,<data>`, the last two empty or triples joined by `;`.
+pub(super) fn on_packet(base: &mut MicromodemBase, packet: &Packet, signal: &PacketSignal, now: Duration) {
+    let base64 = base.nvram.is_on("recv.base64data");
+    let (mini, data) = packet.frames.split_at(packet.frames.len().min(1));
+    let (mini, data) = (triples(mini, base64), triples(data, base64));
+    let Packet { src, dst, rate, ack, .. } = packet;
+    base.report(&format!("CARDP,{src},{dst},{rate},{},0,{mini},{data}", u8::from(*ack)), now);
+    statistics::report_reception(base, packet, signal, 5, now);
+}
+
+/// The frames as triples `crc_ok;nbytes;data`, joined by `;`.
 fn triples(frames: &[Option<Vec<u8>>], base64: bool) -> String {
     let triple = |frame: &Option<Vec<u8>>| match frame {
         Some(bytes) => format!("1;{};{}", bytes.len(), if base64 { to_base64(bytes) } else { to_hex(bytes) }),
@@ -60,7 +59,7 @@ fn triples(frames: &[Option<Vec<u8>>], base64: bool) -> String {
     frames.iter().map(triple).collect::<Vec<_>>().join(";")
 }
 
-/// RFC 4648, with padding.
+/// Base64 of RFC 4648, with padding.
 fn to_base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let group = |chunk: &[u8]| {

@@ -1,8 +1,8 @@
-//! The configuration: names of three letters or dotted, values as they were written.
+//! The configuration: names of three letters or with dots, and values as the host wrote them.
 
 use std::collections::BTreeMap;
 
-/// Names and factory values that mean something here, and a few that clients set or read.
+/// Names that have an effect in the emulator, and a few that clients set or read, with their factory values.
 const FACTORY: [(&str, &str); 22] = [
     ("AGN", "250"),
     ("ASD", "0"),
@@ -28,10 +28,10 @@ const FACTORY: [(&str, &str); 22] = [
     ("recv.base64data", "0"),
 ];
 
-/// The most names that are kept; more are echoed and forgotten.
-const LIMIT: usize = 512;
+/// Further names are echoed and forgotten.
+const MAX_NAMES: usize = 512;
 
-/// What `CCCFG` has set.
+/// The values that `CCCFG` has set.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Nvram {
     values: BTreeMap<String, String>,
@@ -45,7 +45,7 @@ impl Nvram {
     }
 
     pub(super) fn set(&mut self, name: &str, value: &str) {
-        if self.values.contains_key(name) || self.values.len() < LIMIT {
+        if self.values.contains_key(name) || self.values.len() < MAX_NAMES {
             self.values.insert(name.to_string(), value.to_string());
         }
     }

@@ -1,4 +1,4 @@
-//! What Micromodem emulators say to each other. The layout is this crate's own.
+//! The packets between Micromodem emulators. The layout is this crate's own.
 //!
 //! ```text
 //! byte 0  magic 0xCA   1 kind   2 source   3 destination   4 rate   5 flags (1: ack, 2: ascii)   6 frames
@@ -7,48 +7,53 @@
 //! then for each frame: 2 bytes length, bytes, 2 bytes CRC-16 of the bytes
 //! ```
 
-use crate::modem::crc::crc16;
+use crate::modem::emulator::crc::crc16;
 
-/// A packet on air.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Packet {
-    pub kind: Kind,
+pub(crate) struct Packet {
+    pub kind: PacketKind,
     pub src: u8,
     pub dst: u8,
     pub rate: u8,
     pub ack: bool,
     pub ascii: bool,
-    /// For a cycle init, the number of frames asked for; else the number that follows.
-    pub frames_told: u8,
+    /// Number of frames: requested, in a cycle init; contained, in other packets.
+    pub frame_count: u8,
     pub header_version: u8,
     pub number: u8,
-    /// `None` for a frame whose bytes were damaged.
+    /// `None` for a damaged frame.
     pub frames: Vec<Option<Vec<u8>>>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Kind {
+pub(crate) enum PacketKind {
     /// Minipacket before an FSK packet, or a request for an uplink.
     CycleInit,
-    /// Frames of data.
     Data,
-    /// One frame that holds the numbers of frames received.
+    /// One frame with the numbers of the frames received.
     Ack,
-    /// Flexible data: the first frame is the minipacket's part.
+    /// Flexible data; the first frame is the minipacket.
     Flexible,
     Ping,
     PingReply,
-    /// 13 bits in one frame.
+    /// One frame with 13 bits of user data.
     User,
 }
 
-const KINDS: [Kind; 7] =
-    [Kind::CycleInit, Kind::Data, Kind::Ack, Kind::Flexible, Kind::Ping, Kind::PingReply, Kind::User];
+const KINDS: [PacketKind; 7] = [
+    PacketKind::CycleInit,
+    PacketKind::Data,
+    PacketKind::Ack,
+    PacketKind::Flexible,
+    PacketKind::Ping,
+    PacketKind::PingReply,
+    PacketKind::User,
+];
 const MAGIC: u8 = 0xCA;
 const HEADER_BYTES: usize = 11;
 
 impl Packet {
-    pub(super) fn new(kind: Kind, src: u8, dst: u8) -> Self {
+    pub(super) fn new(kind: PacketKind, src: u8, dst: u8) -> Self {
         Self {
             kind,
             src,
@@ -56,19 +61,18 @@ impl Packet {
             rate: 0,
             ack: false,
             ascii: false,
-            frames_told: 0,
+            frame_count: 0,
             header_version: 0,
             number: 0,
             frames: Vec::new(),
         }
     }
 
-    /// Whether it is modulated as PSK.
     pub(super) fn is_psk(&self) -> bool {
         match self.kind {
-            Kind::Data | Kind::Ack => self.rate > 0,
-            Kind::Flexible => true,
-            Kind::CycleInit | Kind::Ping | Kind::PingReply | Kind::User => false,
+            PacketKind::Data | PacketKind::Ack => self.rate > 0,
+            PacketKind::Flexible => true,
+            PacketKind::CycleInit | PacketKind::Ping | PacketKind::PingReply | PacketKind::User => false,
         }
     }
 
@@ -79,7 +83,7 @@ impl Packet {
     pub(super) fn encode(&self) -> Vec<u8> {
         let kind = KINDS.iter().position(|kind| *kind == self.kind).unwrap_or_default() as u8;
         let flags = u8::from(self.ack) | u8::from(self.ascii) << 1;
-        let mut out = vec![MAGIC, kind, self.src, self.dst, self.rate, flags, self.frames_told];
+        let mut out = vec![MAGIC, kind, self.src, self.dst, self.rate, flags, self.frame_count];
         out.extend([self.header_version, self.number]);
         out.extend(crc16(&out).to_be_bytes());
         for frame in self.frames.iter().flatten() {
@@ -90,11 +94,11 @@ impl Packet {
         out
     }
 
-    /// `None` if the header is not whole; frames beyond damage in a length are missing.
+    /// `None` if the header is damaged; frames behind a damaged length are missing.
     pub(super) fn decode(bytes: &[u8]) -> Option<Self> {
         let (header, mut rest) = bytes.split_at_checked(HEADER_BYTES)?;
         let (checked, crc) = header.split_at_checked(HEADER_BYTES - 2)?;
-        let [MAGIC, kind, src, dst, rate, flags, frames_told, header_version, number] = checked else { return None };
+        let [MAGIC, kind, src, dst, rate, flags, frame_count, header_version, number] = checked else { return None };
         if crc != crc16(checked).to_be_bytes() {
             return None;
         }
@@ -113,7 +117,7 @@ impl Packet {
             rate: *rate,
             ack: flags & 1 != 0,
             ascii: flags & 2 != 0,
-            frames_told: *frames_told,
+            frame_count: *frame_count,
             header_version: *header_version,
             number: *number,
             frames,
@@ -130,11 +134,11 @@ mod tests {
         Packet {
             rate: 5,
             ack: true,
-            frames_told: 3,
+            frame_count: 3,
             header_version: 1,
             number: 7,
             frames,
-            ..Packet::new(Kind::Data, 1, 2)
+            ..Packet::new(PacketKind::Data, 1, 2)
         }
     }
 
@@ -147,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_told_frame_by_frame() {
+    fn damage_is_found_frame_by_frame() {
         let mut bytes = packet().encode();
         bytes[HEADER_BYTES + 2] ^= 1;
         let damaged = Packet::decode(&bytes).expect("header");
@@ -158,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn cut_bytes_are_survived() {
+    fn truncated_packets_are_survived() {
         let bytes = packet().encode();
         for len in 0..bytes.len() {
             assert!(Packet::decode(&bytes[..len]).is_none_or(|packet| packet.frames.len() < 3));

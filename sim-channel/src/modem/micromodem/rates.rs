@@ -1,22 +1,22 @@
-//! Packets of each rate: how many frames of how many bytes, and how long they are on air.
+//! Packets of each rate: number and size of their frames, and their airtime.
 
-use crate::Duration;
+use std::time::Duration;
 
-/// What a packet of one rate carries; air times for a band of 5 kHz.
+/// Frames and airtime of a packet at one rate, in a band of 5 kHz.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Rate {
+pub(super) struct PacketRate {
     pub number: u8,
     pub max_frames: u8,
     pub frame_bytes: usize,
-    /// Air time of a packet with all its frames, ms.
+    /// Airtime of a packet with all its frames, ms.
     full_ms: u64,
 }
 
-const fn rate(number: u8, max_frames: u8, frame_bytes: usize, full_ms: u64) -> Rate {
-    Rate { number, max_frames, frame_bytes, full_ms }
+const fn rate(number: u8, max_frames: u8, frame_bytes: usize, full_ms: u64) -> PacketRate {
+    PacketRate { number, max_frames, frame_bytes, full_ms }
 }
 
-const RATES: [Rate; 7] = [
+const RATES: [PacketRate; 7] = [
     rate(0, 1, 32, 3200),
     rate(1, 3, 64, 3100),
     rate(2, 3, 64, 3100),
@@ -26,15 +26,15 @@ const RATES: [Rate; 7] = [
     rate(6, 6, 32, 3250),
 ];
 
-/// Probe and header of a PSK packet.
-const PSK_START: u64 = 250;
+/// Probe and header of a PSK packet, ms.
+const PSK_START_MS: u64 = 250;
 /// A cycle-init, ping or user minipacket, FH-FSK.
 pub(super) const FSK_MINI: Duration = Duration::from_millis(900);
 /// An acknowledgement after a PSK packet.
 pub(super) const PSK_MINI: Duration = Duration::from_millis(500);
 
-impl Rate {
-    /// `None` above 6.
+impl PacketRate {
+    /// `None` for a number above 6.
     pub(super) fn of(number: u8) -> Option<Self> {
         RATES.get(usize::from(number)).copied()
     }
@@ -43,14 +43,14 @@ impl Rate {
         self.number == 0
     }
 
-    /// Air time of a packet of so many frames: fixed for each frame, however full it is.
+    /// Airtime of a packet of `frames` frames; a frame takes the same time however full it is.
     pub(super) fn airtime(&self, frames: u8) -> Duration {
-        let start = if self.is_fsk() { 0 } else { PSK_START };
+        let start = if self.is_fsk() { 0 } else { PSK_START_MS };
         let per_frame = (self.full_ms - start) / u64::from(self.max_frames);
         Duration::from_millis(start + per_frame * u64::from(frames))
     }
 
-    /// How the statistics name a packet: 1 FSK, 3 PSK.
+    /// Packet type in the statistics: 1 FSK, 3 PSK.
     pub(super) fn packet_type(&self) -> u8 {
         if self.is_fsk() { 1 } else { 3 }
     }
@@ -66,7 +66,7 @@ pub(super) fn flexible_mini_bytes(rate: u8) -> Option<usize> {
     }
 }
 
-/// Most bytes of a flexible data packet beyond its minipacket, and the bytes of each frame there.
+/// Maximal bytes of a flexible data packet beyond its minipacket, and the bytes of each frame there.
 pub(super) fn flexible_data(rate: u8) -> (usize, usize) {
     match rate {
         1 => (192, 64),
@@ -75,14 +75,14 @@ pub(super) fn flexible_data(rate: u8) -> (usize, usize) {
     }
 }
 
-/// Air time of a flexible data packet: start, minipacket, and what follows in proportion to its length.
+/// Airtime of a flexible data packet: start, and minipacket and data in proportion to their length.
 pub(super) fn flexible_airtime(rate: u8, mini: usize, data: usize) -> Duration {
     let bits_per_second = match rate {
         1 => 500,
         3 => 1200,
         _ => 5300,
     };
-    Duration::from_millis(PSK_START + (mini + data) as u64 * 8000 / bits_per_second)
+    Duration::from_millis(PSK_START_MS + (mini + data) as u64 * 8000 / bits_per_second)
 }
 
 #[cfg(test)]
@@ -91,15 +91,16 @@ mod tests {
 
     #[test]
     fn frames_are_those_of_the_table() {
-        let frames: Vec<_> = (0..7).filter_map(Rate::of).map(|rate| (rate.max_frames, rate.frame_bytes)).collect();
+        let frames: Vec<_> =
+            (0..7).filter_map(PacketRate::of).map(|rate| (rate.max_frames, rate.frame_bytes)).collect();
         assert_eq!(frames, [(1, 32), (3, 64), (3, 64), (2, 256), (2, 256), (8, 256), (6, 32)]);
-        assert_eq!(Rate::of(7), None);
+        assert_eq!(PacketRate::of(7), None);
     }
 
     #[test]
     fn full_packets_take_about_three_seconds() {
         for number in 0..7 {
-            let rate = Rate::of(number).expect("rate");
+            let rate = PacketRate::of(number).expect("rate");
             assert!((2900..3500).contains(&rate.airtime(rate.max_frames).as_millis()), "{number}");
         }
     }

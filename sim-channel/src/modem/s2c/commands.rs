@@ -1,235 +1,274 @@
-//! The commands that carry no message.
+//! The command interpreter: carries out each input of a host and replies exactly once.
 
-use super::config::Interpreter;
-use super::input::Input;
-use super::reply::Mode;
-use super::send_command::{Problem, SendCommand, Service};
-use super::settings::Refusal;
-use super::{Event, Physical, S2c};
-use crate::Duration;
+use super::S2c;
+use super::base::{Interpreter, PortMode, ReceiverMode, S2cTask, SettingError, Settings};
+use super::input::{HeaderErrorKind, HostInput, SendCommand, SendService};
+use std::time::Duration;
 
-/// What there is to say to a command.
-enum Answer {
-    Text(String),
+const UNKNOWN_COMMAND: &str = "ERROR UNKNOWN COMMAND";
+const WRONG_FORMAT: &str = "ERROR WRONG FORMAT";
+const OUT_OF_RANGE: &str = "ERROR OUT OF RANGE";
+/// Bytes that `@ZL` accepts for the pool.
+const POOL_RANGE: std::ops::RangeInclusive<usize> = 8096..=2_097_152;
+
+/// The reply to a command.
+enum CommandReply {
     Bytes(Vec<u8>),
     /// Lines, closed by an empty one.
     Lines(String),
-    Silence,
+    None,
 }
 
-impl From<&str> for Answer {
+impl From<&str> for CommandReply {
     fn from(text: &str) -> Self {
-        Answer::Text(text.to_string())
+        CommandReply::Bytes(text.as_bytes().to_vec())
+    }
+}
+
+impl From<String> for CommandReply {
+    fn from(text: String) -> Self {
+        CommandReply::Bytes(text.into_bytes())
     }
 }
 
 impl S2c {
-    /// Does what the host wrote and answers exactly once, before anything that follows from it.
-    pub(super) fn on_input(&mut self, input: Input, now: Duration) {
+    /// Carries out an input of the requesting host; the reply comes before the notifications that follow from it.
+    pub(super) fn on_input(&mut self, input: HostInput, now: Duration) {
         match input {
-            Input::Data(bytes) => self.send_raw(&bytes, now),
-            Input::WrongFormat if self.in_data_mode() => self.reply("", "ERROR WRONG FORMAT", now),
-            Input::WrongFormat => self.plain_line("ERROR WRONG FORMAT", now),
-            Input::Escape => {
-                self.mode = Mode::Command;
-                self.plain_line("OK", now);
+            HostInput::Data(bytes) => self.bursts.submit_raw(&mut self.base, &bytes, now),
+            HostInput::WrongFormat if self.base.port.in_data_mode() => self.base.reply("", WRONG_FORMAT, now),
+            HostInput::WrongFormat => self.base.reply_unwrapped(WRONG_FORMAT, now),
+            HostInput::Escape => {
+                self.base.port.set_mode(PortMode::Command);
+                self.base.reply_unwrapped("OK", now);
             }
-            Input::Send(Ok(command)) => {
+            HostInput::Send(Ok(command)) => {
                 let name = command.service.name();
-                let answer = self.on_send(command, now);
-                self.reply(name, answer, now);
+                let reply = self.on_send(command, now);
+                self.base.reply(name, reply, now);
             }
-            Input::Send(Err(error)) => {
-                let text = match error.problem {
-                    Problem::Format => "ERROR WRONG FORMAT",
-                    Problem::Range => "ERROR OUT OF RANGE",
+            HostInput::Send(Err(error)) => {
+                let text = match error.kind {
+                    HeaderErrorKind::Format => WRONG_FORMAT,
+                    HeaderErrorKind::Range => OUT_OF_RANGE,
                 };
-                self.reply(error.name, text, now);
+                self.base.reply(error.name, text, now);
             }
-            Input::Command(text) => self.on_command(&text, now),
+            HostInput::Command(text) => self.on_command(&text, now),
         }
     }
 
     fn on_send(&mut self, command: SendCommand, now: Duration) -> &'static str {
-        if now < self.busy_until {
-            return "BUSY BACKOFF STATE";
+        let Self { base, messages, bursts, .. } = self;
+        if let Some(refusal) = base.condition.refusal(now) {
+            return refusal;
         }
-        if self.physical != Physical::Listen {
-            return "ERROR PHY OFF";
-        }
+        let in_backoff = bursts.in_backoff(command.dst, now);
         match command.service {
-            Service::Burst => self.send_burst(command, now),
-            Service::Instant(flag) => self.send_instant(command, flag, now),
-            Service::Synchronous(time) => self.send_synchronous(command, time, now),
-            Service::Piggyback => self.send_piggyback(command, now),
+            SendService::Burst => bursts.submit(base, command, now),
+            SendService::Instant(flag) => messages.instant.submit(base, command, flag, in_backoff, now),
+            SendService::Synchronous(time) => messages.synchronous.submit(base, command, time, in_backoff, now),
+            SendService::Piggyback => messages.piggyback.submit(base, command, now),
         }
     }
 
     fn on_command(&mut self, text: &str, now: Duration) {
         let (name, value) = split(text);
-        let answer = match name.as_bytes() {
+        let key = name.get(1..).unwrap_or_default();
+        let reply = match name.as_bytes() {
             [] if text.is_empty() => "OK".into(),
-            [b'?', ..] => self.query(&name, now),
-            [b'!', ..] => self.set(name.get(1..).unwrap_or_default(), value, now),
-            [b'@', ..] => self.option(name.get(1..).unwrap_or_default(), value),
-            [b'&', ..] => self.store(&name),
+            [b'?', ..] => self.query(key, now),
+            [b'!', ..] => self.set(key, value, now).into(),
+            [b'@', ..] => self.set_option(key, value).into(),
+            [b'&', ..] => self.store(key),
             _ => self.plain_command(&name, value, now),
         };
-        match answer {
-            Answer::Text(body) => self.reply(&name, body, now),
-            Answer::Bytes(body) => self.reply(&name, body, now),
-            Answer::Lines(body) => self.reply(&name, body, now),
-            Answer::Silence => {}
+        match reply {
+            CommandReply::Bytes(body) => self.base.reply(&name, body, now),
+            CommandReply::Lines(body) => self.base.reply(&name, body, now),
+            CommandReply::None => {}
         }
     }
 
-    fn query(&mut self, name: &str, now: Duration) -> Answer {
-        match name {
-            "?S" if self.config.interpreter == Interpreter::Net => Answer::Lines(self.status(now)),
-            "?S" => Answer::Text(self.status(now)),
-            "?P" => Answer::Lines(self.multipath()),
-            "?ZSL" => Answer::Lines(self.channels()),
-            "?NOISE" => Answer::Bytes(self.noise()),
-            _ => match self.value(name.get(1..).unwrap_or_default(), now) {
-                Some(value) => Answer::Text(value),
-                None => "ERROR UNKNOWN COMMAND".into(),
-            },
+    fn query(&mut self, key: &str, now: Duration) -> CommandReply {
+        match key {
+            "S" if self.base.config.interpreter == Interpreter::Net => CommandReply::Lines(self.status(now)),
+            "S" => self.status(now).into(),
+            "P" => CommandReply::Lines(self.reception.multipath()),
+            "ZSL" => CommandReply::Lines(self.protocol_ids()),
+            "NOISE" => CommandReply::Bytes(self.noise()),
+            _ => self.value(key, now).map_or(UNKNOWN_COMMAND.into(), CommandReply::from),
         }
     }
 
-    fn set(&mut self, key: &str, value: &str, now: Duration) -> Answer {
-        if self.config.needs_control && !self.controls {
-            return "ERROR NOT ACCEPTED".into();
+    /// `AT?S`: one line in the AT interpreter; five lines and an empty one in NET.
+    fn status(&self, now: Duration) -> String {
+        let Self { base, bursts, .. } = self;
+        let state = bursts.state_name(base.condition.receiver(), now);
+        let free = bursts.free(base);
+        if base.config.interpreter == Interpreter::At {
+            return format!("{state} {free}");
+        }
+        let remote = bursts.peer().unwrap_or_else(|| base.settings.byte("AR"));
+        let promiscuous = if base.settings.get("RP") == 1 { "ON" } else { "OFF" };
+        format!(
+            "Local Address: {}\r\nRemote Address: {remote}\r\nAcoustic Link: {state}\r\nPool Status: {free}\r\n\
+             Promiscuous Mode: {promiscuous}\r\n",
+            base.address()
+        )
+    }
+
+    /// `AT?ZSL`: protocol ids and the bytes free for each.
+    fn protocol_ids(&self) -> String {
+        format!("{}: {}\r\n", self.base.settings.get("ZS"), self.bursts.free(&self.base))
+    }
+
+    /// `AT?NOISE`: a binary sample of the ambient noise.
+    fn noise(&mut self) -> Vec<u8> {
+        const SAMPLES: usize = 64;
+        let mut out = format!("NOISE,{SAMPLES},1,0,0,").into_bytes();
+        out.extend((0..SAMPLES).map(|_| self.base.board.rng.below(256) as u8));
+        out
+    }
+
+    /// A value on one line; each part knows the values of its own state.
+    fn value(&self, key: &str, now: Duration) -> Option<String> {
+        let Self { base, reception, usbl, messages, bursts } = self;
+        Some(match key {
+            "MODE" => if base.config.interpreter == Interpreter::At { "AT" } else { "NET" }.to_string(),
+            "PID" => base.settings.shown("ZS")?,
+            "BV" => "23.9".to_string(),
+            "BL" | "BR" => if bursts.is_online() { base.config.bit_rate } else { 0 }.to_string(),
+            "ZL" => base.settings.pool.to_string(),
+            "UT" => format!("{:.6}", base.clock(now).as_secs_f64()),
+            "CLOCK" => base.clock_us(now).to_string(),
+            _ => {
+                return reception
+                    .value(key)
+                    .or_else(|| bursts.value(key))
+                    .or_else(|| messages.value(key))
+                    .or_else(|| usbl.value(key))
+                    .or_else(|| base.options.value(key))
+                    .or_else(|| base.settings.shown(key));
+            }
+        })
+    }
+
+    fn set(&mut self, key: &str, value: &str, now: Duration) -> &'static str {
+        if self.base.config.needs_control && !self.base.options.control() {
+            return "ERROR NOT ACCEPTED";
         }
         if key == "UT" {
             return self.set_clock(value, now);
         }
-        match self.settings.set(key, value, self.is_online()) {
-            Ok(true) => "OK".into(),
-            Ok(false) => "[*]OK".into(),
-            Err(Refusal::Unknown) => "ERROR UNKNOWN COMMAND".into(),
-            Err(Refusal::NotANumber) => "ERROR WRONG FORMAT".into(),
-            Err(Refusal::OutOfRange) => "ERROR OUT OF RANGE".into(),
+        match self.base.settings.set(key, value, self.bursts.is_online()) {
+            Ok(true) => "OK",
+            Ok(false) => "[*]OK",
+            Err(SettingError::Unknown) => UNKNOWN_COMMAND,
+            Err(SettingError::NotANumber) => WRONG_FORMAT,
+            Err(SettingError::OutOfRange) => OUT_OF_RANGE,
         }
     }
 
-    /// `!UT<seconds>[.fraction]`; only ever forward of the run's own clock.
-    fn set_clock(&mut self, value: &str, now: Duration) -> Answer {
+    /// Sets the physical clock: `!UT<seconds>[.fraction]`.
+    fn set_clock(&mut self, value: &str, now: Duration) -> &'static str {
         match value.parse().ok().and_then(|seconds: f64| Duration::try_from_secs_f64(seconds).ok()) {
             Some(time) if time < Duration::from_secs(1 << 40) => {
-                self.clock_offset = time.saturating_sub(now);
-                "OK".into()
+                self.base.set_clock(time, now);
+                "OK"
             }
-            Some(_) => "ERROR OUT OF RANGE".into(),
-            None => "ERROR WRONG FORMAT".into(),
+            Some(_) => OUT_OF_RANGE,
+            None => WRONG_FORMAT,
         }
     }
 
-    fn option(&mut self, key: &str, value: &str) -> Answer {
-        let switch = match (key, value) {
-            ("CTRL", "") => {
-                self.controls = true;
-                return "OK".into();
-            }
-            ("ZD", "") => {
-                self.burst.dropped = 0;
-                return "OK".into();
-            }
-            ("ZO", "") => {
-                self.burst.overflowed = 0;
-                return "OK".into();
-            }
-            ("ZL", bytes) => return self.set_pool(bytes),
-            (_, "0") => false,
-            (_, "1") => true,
-            ("ZX" | "ZU" | "ZF" | "ZA", _) => return "ERROR OUT OF RANGE".into(),
-            _ => return "ERROR UNKNOWN COMMAND".into(),
-        };
-        match key {
-            "ZX" => self.options.extended = switch,
-            "ZU" => self.options.usbl = switch,
-            "ZF" => self.options.networking = switch,
-            "ZA" => self.options.other = switch,
-            _ => return "ERROR UNKNOWN COMMAND".into(),
+    fn set_option(&mut self, key: &str, value: &str) -> &'static str {
+        if key == "ZL" {
+            return self.set_pool(value);
         }
-        "OK".into()
+        if value.is_empty() && self.bursts.reset_counter(key) {
+            return "OK";
+        }
+        self.base.options.set(key, value)
     }
 
-    fn set_pool(&mut self, bytes: &str) -> Answer {
+    fn set_pool(&mut self, bytes: &str) -> &'static str {
         match bytes.parse() {
-            Ok(8096..=2_097_152) if self.burst.bytes() > 0 => "ERROR BUFFER IS NOT EMPTY".into(),
-            Ok(bytes @ 8096..=2_097_152) => {
-                self.settings.pool = bytes;
-                "OK".into()
+            Ok(bytes) if !POOL_RANGE.contains(&bytes) => OUT_OF_RANGE,
+            Ok(_) if self.bursts.undelivered() > 0 => "ERROR BUFFER IS NOT EMPTY",
+            Ok(bytes) => {
+                self.base.settings.pool = bytes;
+                "OK"
             }
-            Ok(_) => "ERROR OUT OF RANGE".into(),
-            Err(_) => "ERROR WRONG FORMAT".into(),
+            Err(_) => WRONG_FORMAT,
         }
     }
 
-    fn store(&mut self, name: &str) -> Answer {
-        match name {
-            "&W" => self.stored = self.settings.clone(),
-            "&F" => self.settings = super::settings::Settings::factory(self.config.address, self.config.remote),
-            "&V" => return Answer::Lines(self.all_settings()),
-            _ => return "ERROR UNKNOWN COMMAND".into(),
+    fn store(&mut self, key: &str) -> CommandReply {
+        let base = &mut self.base;
+        match key {
+            "W" => base.stored = base.settings.clone(),
+            "F" => base.settings = Settings::factory(base.config.address, base.config.remote),
+            "V" => return CommandReply::Lines(base.settings.listing()),
+            _ => return UNKNOWN_COMMAND.into(),
         }
         "OK".into()
     }
 
-    fn plain_command(&mut self, name: &str, value: &str, now: Duration) -> Answer {
+    fn plain_command(&mut self, name: &str, value: &str, now: Duration) -> CommandReply {
+        let at_interpreter = self.base.config.interpreter == Interpreter::At;
         match (name, value) {
-            ("A", "") => self.enter(Physical::Listen),
-            ("N", "") => self.enter(Physical::Noise),
-            ("D", "") => self.enter(Physical::Deaf),
-            ("O", "") if self.config.interpreter == Interpreter::At => {
-                self.mode = Mode::Data;
-                Answer::Silence
+            ("A", "") => self.enter(ReceiverMode::Listen).into(),
+            ("N", "") => self.enter(ReceiverMode::Noise).into(),
+            ("D", "") => self.enter(ReceiverMode::Deaf).into(),
+            ("O", "") if at_interpreter => {
+                self.base.port.set_mode(PortMode::Data);
+                CommandReply::None
             }
-            ("C", "") if self.config.interpreter == Interpreter::At => {
-                self.mode = Mode::Command;
+            ("C", "") if at_interpreter => {
+                self.base.port.set_mode(PortMode::Command);
                 "OK".into()
             }
             ("I0", "") => "1.9".into(),
             ("I1", "") => "phy:S2C PHY 0.9, mac:D-MAC v1.8".into(),
             ("I7", "") => "EvoLogics GmbH (emulated)".into(),
             ("Z0", "") => {
-                self.board.plan(now, Event::Reboot);
-                Answer::Silence
+                self.base.board.schedule(now, S2cTask::Reboot);
+                CommandReply::None
             }
-            ("Z1", "") => self.drop_and_tell(now),
+            ("Z1", "") => self.drop_bursts(now).into(),
             ("Z3", "") => {
-                self.board.plan(now, Event::CancelMessages);
+                self.base.board.schedule(now, S2cTask::CancelMessages);
                 "OK".into()
             }
             ("Z4", "") => {
-                self.board.plan(now, Event::CancelMessages);
-                self.drop_and_tell(now)
+                self.base.board.schedule(now, S2cTask::CancelMessages);
+                self.drop_bursts(now).into()
             }
             ("H", "0" | "1" | "") => {
-                self.close_connection(now);
+                self.bursts.close(&mut self.base, &mut self.messages, now);
                 "OK".into()
             }
-            _ => "ERROR UNKNOWN COMMAND".into(),
+            _ => UNKNOWN_COMMAND.into(),
         }
     }
 
-    fn enter(&mut self, physical: Physical) -> Answer {
-        self.physical = physical;
-        match physical {
-            Physical::Listen => "INITIATION LISTEN".into(),
-            Physical::Noise => "INITIATION NOISE".into(),
-            Physical::Deaf => "INITIATION DEAF".into(),
+    fn enter(&mut self, mode: ReceiverMode) -> &'static str {
+        self.base.condition.set_receiver(mode);
+        match mode {
+            ReceiverMode::Listen => "INITIATION LISTEN",
+            ReceiverMode::Noise => "INITIATION NOISE",
+            ReceiverMode::Deaf => "INITIATION DEAF",
         }
     }
 
-    /// The bytes dropped are told after the reply.
-    fn drop_and_tell(&mut self, now: Duration) -> Answer {
-        let bytes = self.drop_bursts(now);
+    /// The number of bytes dropped is reported after the reply.
+    fn drop_bursts(&mut self, now: Duration) -> &'static str {
+        let bytes = self.bursts.drop_all(&mut self.base, &mut self.messages, now);
         if bytes > 0 {
-            self.board.plan(now, Event::Notify(format!("DROPCNT,{bytes}")));
+            self.base.board.schedule(now, S2cTask::Notify(format!("DROPCNT,{bytes}")));
         }
-        "OK".into()
+        "OK"
     }
 }
 

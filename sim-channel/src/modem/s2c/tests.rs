@@ -1,8 +1,8 @@
-//! Transcripts and behaviour at the host's port.
+//! Behaviour of the S2C at the host's port.
 
-mod bench;
 mod burst;
 mod faults;
 mod instant;
+mod rig;
 mod soak;
 mod start_up;

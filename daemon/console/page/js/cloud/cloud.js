@@ -1,4 +1,4 @@
-// The 3-D view of the map as a coloured point cloud, in place of the flat one when switched on.
+// The 3-D view: the map as a coloured point cloud in place of the flat chart.
 
 import { $, h, show, text } from "../dom.js";
 import { metres } from "../format.js";
@@ -7,7 +7,7 @@ import { rgb } from "../palette.js";
 import { isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
 import { Orbit } from "./orbit.js";
-import { cellPoints, craftShape, depthPlane, gridLines, meanHeight } from "./points.js";
+import { cellPoints, vehicleShape, depthPlane, gridLines, meanHeight } from "./points.js";
 import { Renderer } from "./renderer.js";
 
 export const cloud = { on: false };
@@ -29,7 +29,7 @@ export function startCloud() {
   store.on("state feed", redraw);
 }
 
-/** Shows or hides the cloud; stays hidden and says why when there is no WebGL. */
+/** Shows or hides the cloud; without WebGL it stays hidden and a note gives the reason. */
 export function toggleCloud() {
   cloud.on = !cloud.on;
   try {
@@ -89,9 +89,9 @@ function draw() {
   const { map, vehicle } = store;
   if (!map || !vehicle) return;
   built ??= build(map);
-  const craft = craftShape(vehicle, built.floor, built.flat, colour(isStale(vehicle) ? "map-stale" : "map-text"));
-  renderer.set("craft", "LINES", craft.lines.places, craft.lines.tints);
-  renderer.set("hull", "TRIANGLES", craft.hull.places, craft.hull.tints);
+  const marker = vehicleShape(vehicle, built.floor, built.flat, colour(isStale(vehicle) ? "map-stale" : "map-text"));
+  renderer.set("vehicle", "LINES", marker.lines.places, marker.lines.tints);
+  renderer.set("hull", "TRIANGLES", marker.hull.places, marker.hull.tints);
   const ratio = devicePixelRatio || 1;
   const [width, height] = [canvas.clientWidth * ratio, canvas.clientHeight * ratio].map((v) => Math.max(1, Math.round(v)));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });

@@ -1,4 +1,4 @@
-// Four-by-four matrices, columns first, as WebGL takes them.
+// Four-by-four matrices in column-major order, as WebGL requires.
 
 export function perspective(fov, aspect, near, far) {
   const f = 1 / Math.tan(fov / 2);

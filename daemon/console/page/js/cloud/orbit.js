@@ -1,4 +1,4 @@
-// A camera that turns about a place on the sea floor.
+// A camera that orbits a place on the sea floor.
 
 import { lookAt, multiply, perspective } from "./matrix.js";
 
@@ -32,7 +32,7 @@ export class Orbit {
     this.distance = 1.5 * Math.max(4, east - west, north - south);
   }
 
-  /** World to clip space, and the pixels that one metre at distance 1 takes. */
+  /** The matrix from world to clip space, and the pixels of one metre at distance 1. */
   matrix(width, height) {
     const flat = Math.cos(this.elevation) * this.distance;
     const eye = [

@@ -1,10 +1,10 @@
-// The map as vertices: cells at their depth, the vehicle, its track, a grid to judge sizes by.
+// The map as vertices: cells at their depth, the vehicle, its track, a grid.
 
 import { shownAs, tintOf } from "../book.js";
 import { rgb } from "../palette.js";
 import { nice } from "../format.js";
 
-export const depthPlane = (map) => map.planes.find((p) => p.name === "depth") ?? null;
+export const depthPlane = (map) => map.layers.find((p) => p.name === "depth") ?? null;
 
 /** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. */
 export function cellPoints(map) {
@@ -28,7 +28,7 @@ export function meanHeight(places) {
   return places.length ? sum / (places.length / 3) : 0;
 }
 
-/** Line segments: a grid of round metres at height `z` about the map. */
+/** Line segments of a grid of round metres at height `z` around the map. */
 export function gridLines([west, south, east, north], z, hex) {
   const step = nice(Math.max(east - west, north - south) / 4);
   const [w, s, e, n] = [west, south, east, north].map((v, i) => (i < 2 ? Math.floor : Math.ceil)(v / step) * step);
@@ -39,7 +39,7 @@ export function gridLines([west, south, east, north], z, hex) {
 }
 
 /** The vehicle at its depth (or just over a flat map), a plumb line to the floor, its track, its bow. */
-export function craftShape(vehicle, floor, flat, hex) {
+export function vehicleShape(vehicle, floor, flat, hex) {
   const places = [];
   const hull = [];
   const s = vehicle.status;

@@ -1,4 +1,4 @@
-// Draws coloured points and lines with WebGL; knows nothing of maps.
+// Draws coloured points, lines and triangles with WebGL.
 
 const VERTEX = `
 attribute vec3 place;

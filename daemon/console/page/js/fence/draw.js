@@ -1,39 +1,38 @@
-// Fences on the map: in force solid, under way dashed, refused dotted, and the one being edited with its corners.
+// Fences on the map: solid in force, dashed on the way, dotted when refused; and the edited one with its corners.
 
-import { FONT, haloText } from "../map/overlays.js";
-import { slotOf } from "../panel/lifeline.js";
+import { FONT, haloText } from "../canvas.js";
+import { slotOf } from "../order/status.js";
 import { store } from "../store.js";
 import { fenceOrder, middle, pen } from "./edit.js";
 import { faults, fromServer, nameOutline } from "./plan.js";
 
-const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], heard: [9, 6], refused: [2, 5] };
+const DASH = { applied: [], queued: [9, 6], on_air: [9, 6], received: [9, 6], refused: [2, 5] };
 
 export function drawFences(c, view, ink, vehicle, chosen) {
   const slot = slotOf(vehicle, "fence");
   c.globalAlpha = chosen ? 1 : 0.55;
-  const force = vehicle.fence_in_force;
-  if (force) drawPlan(c, view, ink, fromServer(force.order), [], "");
+  const inForce = vehicle.fence_in_force;
+  if (inForce) drawPlan(c, view, ink, fromServer(inForce.order), [], "");
   if (slot && slot.state !== "applied" && vehicle.fence) {
     drawPlan(c, view, ink, fromServer(vehicle.fence), DASH[slot.state] ?? [9, 6], slot.state === "refused" ? "refused" : "not in force yet");
   }
   c.globalAlpha = 1;
   if (!chosen || !pen.shown) return;
   const plan = fenceOrder.value(vehicle);
-  const edited = fenceOrder.changed(vehicle);
-  if (edited) drawEdited(c, view, ink, plan, fromServer(vehicle.fence));
+  if (fenceOrder.isChanged(vehicle)) drawEdited(c, view, ink, plan, fromServer(vehicle.fence));
   drawHandles(c, view, ink, plan);
 }
 
-/** Only what the edit has changed is drawn as a draft: the rest is as it was sent. */
+/** Draws as a draft only those parts that the edit has changed. */
 function drawEdited(c, view, ink, plan, sent) {
   const wrong = faults(plan);
   const known = new Set(sent.outlines.map((o) => JSON.stringify(o)));
   const changed = plan.outlines.map((o, i) => wrong.outlines[i] !== null || !known.has(JSON.stringify(o)));
-  const home = JSON.stringify(plan.home) === JSON.stringify(sent.home) && !wrong.home ? null : plan.home;
-  drawPlan(c, view, ink, { ...plan, home }, [4, 3], "draft", wrong, changed);
+  const returnPoint = JSON.stringify(plan.returnPoint) === JSON.stringify(sent.returnPoint) && !wrong.returnPoint ? null : plan.returnPoint;
+  drawPlan(c, view, ink, { ...plan, returnPoint }, [4, 3], "draft", wrong, changed);
 }
 
-/** Lines over any label: a wide halo, then the tone. */
+/** Strokes the path so that it shows on any label: a wide halo, then the tone. */
 function stroke(c, ink, tone, dash, width = 2.5) {
   c.lineJoin = "round";
   for (const [style, w, d] of [[ink.sea, width + 2.5, []], [tone, width, dash]]) {
@@ -60,10 +59,10 @@ function drawPlan(c, view, ink, plan, dash, word, wrong = null, changed = null) 
     stroke(c, ink, tone, dash);
     name(c, view, ink, corners, nameOutline(plan, i) + (word && `, ${word}`));
   }
-  if (plan.home) drawHome(c, view, ink, plan.home, wrong?.home ? ink.bad : ink.fence, word);
+  if (plan.returnPoint) drawReturnPoint(c, view, ink, plan.returnPoint, wrong?.returnPoint ? ink.bad : ink.fence, word);
 }
 
-/** Slanting lines within the path: where the vehicle must not go, without hiding the labels. */
+/** Hatches the path, where the vehicle must not go, without hiding the labels. */
 function hatch(c, corners, tone) {
   const xs = corners.map((p) => p[0]);
   const ys = corners.map((p) => p[1]);
@@ -84,16 +83,16 @@ function hatch(c, corners, tone) {
   c.restore();
 }
 
-function name(c, view, ink, corners, words) {
+function name(c, view, ink, corners, title) {
   const [x, y] = corners.reduce((a, b) => (b[1] < a[1] - 1 || (b[1] < a[1] + 1 && b[0] < a[0]) ? b : a));
   c.font = FONT;
   const left = x > view.width - 140;
   c.textAlign = left ? "right" : "left";
-  haloText(c, words, x + (left ? -8 : 8), y - 7, ink);
+  haloText(c, title, x + (left ? -8 : 8), y - 7, ink);
 }
 
-function drawHome(c, view, ink, home, tone, word) {
-  const [x, y] = view.toScreen(...home);
+function drawReturnPoint(c, view, ink, place, tone, word) {
+  const [x, y] = view.toScreen(...place);
   c.beginPath();
   c.arc(x, y, 8, 0, 2 * Math.PI);
   c.moveTo(x - 4, y);
@@ -112,7 +111,7 @@ function drawHandles(c, view, ink, plan) {
       const [x, y] = view.toScreen(...p);
       if (points.length > 2 && pen.tool === null) dot(c, ink, view.toScreen(...middle(p, points[(k + 1) % points.length])), 3.5, ink.sea);
       const chosen = pen.outline === i && pen.corner === k;
-      dot(c, ink, [x, y], chosen ? 8 : 6, chosen ? ink.accent : ink.craft);
+      dot(c, ink, [x, y], chosen ? 8 : 6, chosen ? ink.accent : ink.vehicle);
     });
   }
 }

@@ -1,7 +1,7 @@
-// Editing a plan on the map: click to add corners, drag them, delete them; the same by keys.
+// Editing a plan on the map: add, drag and delete corners by pointer or by keys.
 
 import { sendFence } from "../api.js";
-import { Order } from "../panel/order.js";
+import { Order } from "../order/order.js";
 import { store } from "../store.js";
 import { fromServer, toOrder } from "./plan.js";
 import { snap } from "./polygon.js";
@@ -9,18 +9,17 @@ import { snap } from "./polygon.js";
 const REACH_PX = 14;
 const STEP_PX = 10;
 
-/** The fence of each vehicle: sent, edited, on its way. */
-export const fenceOrder = new Order("fence", (v) => fromServer(v.fence), (v, plan) => sendFence(v.id, toOrder(plan)));
+export const fenceOrder = new Order("fence", (v) => fromServer(v.fence), (v, value) => sendFence(v.id, toOrder(value())));
 
-/** What the next click on the map does ("corner" | "home" | null), and which corner is chosen. */
+/** The tool of the next click on the map ("corner" | "return_point" | null), and the chosen corner. */
 export const pen = { tool: null, outline: null, corner: null, shown: false };
 
-store.on("select", () => put(null));
+store.on("select", () => pickTool(null));
 
-/** Takes up a tool, or lays it down; `outline` is the one that clicks add corners to. */
-export function put(tool, outline = null) {
+/** Selects a tool, or none; clicks add corners to `outline`. */
+export function pickTool(tool, outline = null) {
   Object.assign(pen, { tool, outline, corner: null });
-  store.tell("draft");
+  store.emit("edit");
 }
 
 export const plan = () => fenceOrder.value(store.vehicle);
@@ -31,29 +30,29 @@ function change(edit) {
   fenceOrder.set(store.vehicle, next);
 }
 
-/** Begins an outline; there is one fence at most, and it comes first. */
+/** Begins an outline. There is at most one fence, and it is the first outline. */
 export function begin(kind) {
   const { outlines } = plan();
-  if (kind === "fence" && outlines[0]?.kind === "fence") return put("corner", 0);
+  if (kind === "fence" && outlines[0]?.kind === "fence") return pickTool("corner", 0);
   change((p) => (kind === "fence" ? p.outlines.unshift({ kind, points: [] }) : p.outlines.push({ kind, points: [] })));
-  return put("corner", kind === "fence" ? 0 : plan().outlines.length - 1);
+  return pickTool("corner", kind === "fence" ? 0 : plan().outlines.length - 1);
 }
 
-/** Ends drawing; an outline without corners is dropped. */
+/** Ends drawing and drops outlines without corners. */
 export function finish() {
   if (plan().outlines.some((o) => o.points.length === 0)) {
     change((p) => (p.outlines = p.outlines.filter((o) => o.points.length > 0)));
   }
-  put(null);
+  pickTool(null);
 }
 
 export function removeOutline(i) {
-  put(null);
+  pickTool(null);
   change((p) => p.outlines.splice(i, 1));
 }
 
-export function setHome(home) {
-  change((p) => (p.home = home && snap(home)));
+export function setReturnPoint(place) {
+  change((p) => (p.returnPoint = place && snap(place)));
 }
 
 export function setCorner(i, k, place) {
@@ -67,37 +66,37 @@ export function addCorner(i, k, place) {
 export function removeCorner(i, k) {
   change((p) => p.outlines[i].points.splice(k, 1));
   pen.corner = null;
-  store.tell("draft");
+  store.emit("edit");
 }
 
-/** A press on the map at (x, y) metres that did not pan; true if it was for the plan. */
+/** A click on the map at (x, y) metres; true if it edited the plan. */
 export function clickAt(x, y) {
-  if (pen.tool === "home") {
-    setHome([x, y]);
-    put(null);
+  if (pen.tool === "return_point") {
+    setReturnPoint([x, y]);
+    pickTool(null);
     return true;
   }
   if (pen.tool !== "corner") return false;
   const { points } = plan().outlines[pen.outline];
   addCorner(pen.outline, points.length, [x, y]);
   pen.corner = points.length;
-  store.tell("draft");
+  store.emit("edit");
   return true;
 }
 
-/** What lies under a press: a corner, the middle of a side, the return point; then how to drag it. */
+/** The handlers of a press at (px, py) on a corner, the middle of a side or the return point; else null. */
 export function grab(view, px, py) {
   if (!pen.shown || !store.vehicle) return null;
   const near = (p) => {
     const [x, y] = view.toScreen(...p);
     return Math.hypot(x - px, y - py) < REACH_PX;
   };
-  const { outlines, home } = plan();
+  const { outlines, returnPoint } = plan();
   for (const [i, { points }] of outlines.entries()) {
     const k = points.findIndex(near);
     if (k >= 0) return dragCorner(view, i, k);
   }
-  if (pen.tool === null && home && near(home)) return { move: (x, y) => setHome(view.toWorld(x, y)), press() {} };
+  if (pen.tool === null && returnPoint && near(returnPoint)) return { move: (x, y) => setReturnPoint(view.toWorld(x, y)), press() {} };
   if (pen.tool === null) return grabMiddle(view, outlines, near);
   return null;
 }
@@ -123,14 +122,14 @@ function dragCorner(view, i, k) {
   const choose = () => {
     if (pen.tool !== "corner") pen.outline = i;
     pen.corner = pen.outline === i ? k : null;
-    store.tell("draft");
+    store.emit("edit");
   };
   // Pressing the first corner of the outline being drawn closes it.
   const closes = pen.tool === "corner" && pen.outline === i && k === 0 && plan().outlines[i].points.length > 2;
   return { move: (x, y) => (choose(), setCorner(i, k, view.toWorld(x, y))), press: () => (closes ? finish() : choose()) };
 }
 
-/** Every corner of the plan in order, for going through them by keys. */
+/** Every corner of the plan, in the order in which keys select them. */
 const corners = () => plan().outlines.flatMap((o, i) => o.points.map((_, k) => [i, k]));
 
 function next(view, step) {
@@ -142,7 +141,7 @@ function next(view, step) {
   if (pen.tool === "corner") pen.tool = null;
   const place = plan().outlines[i].points[k];
   if (!view.holds([...place, ...place])) view.centre(...place);
-  store.tell("draft");
+  store.emit("edit");
 }
 
 const chosen = () => (pen.shown && pen.corner !== null ? plan().outlines[pen.outline]?.points[pen.corner] : null);
@@ -153,7 +152,7 @@ function nudge(view, dx, dy) {
   if (place) setCorner(pen.outline, pen.corner, [place[0] + dx * step, place[1] + dy * step]);
 }
 
-/** Keys on the map while the plan is shown for editing. */
+/** Keys on the map while the plan is edited. */
 export function penKeys(view) {
   const drop = () => chosen() && removeCorner(pen.outline, pen.corner);
   return {

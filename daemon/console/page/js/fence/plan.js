@@ -1,20 +1,20 @@
-// A plan: the fence, keep-outs and return point of one vehicle, as edited and as the API says them.
+// A plan: the fence, the keep-outs and the return point of one vehicle, and its form in the API.
 //
-//   { outlines: [{ kind: "fence" | "keep_out", points: [[x, y], ..] }], home: [x, y] | null }   metres
+//   { outlines: [{ kind: "fence" | "keep_out", points: [[x, y], ..] }], returnPoint: [x, y] | null }   metres in the world
 
-import { covers, holds, MOST_KEEP_OUTS, outlineFault } from "./polygon.js";
+import { covers, holds, MAX_KEEP_OUTS, outlineFault } from "./polygon.js";
 
 export function fromServer(fence) {
   const outlines = (fence?.keep_outs ?? []).map((points) => ({ kind: "keep_out", points }));
   if (fence?.fence) outlines.unshift({ kind: "fence", points: fence.fence });
-  return { outlines, home: fence?.return_point ?? null };
+  return { outlines, returnPoint: fence?.return_point ?? null };
 }
 
-export function toOrder({ outlines, home }) {
+export function toOrder({ outlines, returnPoint }) {
   const order = { keep_outs: outlines.filter((o) => o.kind === "keep_out").map((o) => o.points) };
   const fence = outlines.find((o) => o.kind === "fence");
   if (fence) order.fence = fence.points;
-  if (home) order.return_point = home;
+  if (returnPoint) order.return_point = returnPoint;
   return order;
 }
 
@@ -23,28 +23,28 @@ export function nameOutline({ outlines }, i) {
   return `Keep-out ${outlines.slice(0, i + 1).filter((o) => o.kind === "keep_out").length}`;
 }
 
-/** What is wrong, beside what: a line or null for each outline, and for the return point. */
-export function faults({ outlines, home }) {
+/** The fault of each outline and of the return point: one line, or null. */
+export function faults({ outlines, returnPoint }) {
   const fence = outlines.find((o) => o.kind === "fence");
   const own = outlines.map((o) => outlineFault(o.points));
   const sound = outlines.filter((_, i) => own[i] === null);
   const of = outlines.map((o, i) => {
     if (own[i]) return own[i];
-    if (o.kind === "keep_out" && sound.includes(fence) && covers(o.points, fence.points)) return "It leaves nothing of the fence";
+    if (o.kind === "keep_out" && sound.includes(fence) && covers(o.points, fence.points)) return "It covers the whole fence";
     const before = outlines.slice(0, i).filter((x) => x.kind === "keep_out").length;
-    return o.kind === "keep_out" && before >= MOST_KEEP_OUTS ? `More than ${MOST_KEEP_OUTS} keep-outs` : null;
+    return o.kind === "keep_out" && before >= MAX_KEEP_OUTS ? `More than ${MAX_KEEP_OUTS} keep-outs` : null;
   });
-  return { outlines: of, home: home ? homeFault(sound, home) : null };
+  return { outlines: of, returnPoint: returnPoint ? returnPointFault(sound, returnPoint) : null };
 }
 
-function homeFault(sound, home) {
-  if (!home.every((m) => Math.abs(m) <= 838860.7)) return "It is not a place within 838 km";
-  const bad = sound.find((o) => holds(o.points, home) !== (o.kind === "fence"));
+function returnPointFault(sound, place) {
+  if (!place.every((m) => Math.abs(m) <= 838860.7)) return "It is not a place within 838 km";
+  const bad = sound.find((o) => holds(o.points, place) !== (o.kind === "fence"));
   if (!bad) return null;
   return bad.kind === "fence" ? "It lies outside the fence" : "It lies in a keep-out";
 }
 
 export const isSound = (plan) => {
-  const { outlines, home } = faults(plan);
-  return home === null && outlines.every((f) => f === null);
+  const { outlines, returnPoint } = faults(plan);
+  return returnPoint === null && outlines.every((f) => f === null);
 };

@@ -1,13 +1,13 @@
-// Which outlines a vehicle could obey: the rules of protocol/src/directive/{polygon,fence}.rs, in whole
-// decimetres as on the wire, so that the page objects where the daemon would.
+// Which outlines a vehicle can obey: the rules of protocol/src/directive/{polygon,fence}.rs in whole decimetres, as on the
+// wire, so that the page refuses the same outlines as the daemon.
 
-export const MOST_CORNERS = 34;
-export const MOST_KEEP_OUTS = 15;
-const REACH_DM = 8388607;
+export const MAX_CORNERS = 34;
+export const MAX_KEEP_OUTS = 15;
+const MAX_DM = 8388607;
 
 const dm = ([x, y]) => [Math.round(x * 10), Math.round(y * 10)];
 
-/** Metres as the wire can say them. */
+/** Metres as the wire can represent them. */
 export const snap = ([x, y]) => dm([x, y]).map((d) => (d === 0 ? 0 : d / 10));
 
 const cross = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -38,12 +38,12 @@ function contains(points, p) {
   return inside;
 }
 
-/** What is wrong with an outline in metres, or null. */
+/** The fault of an outline in metres, or null. */
 export function outlineFault(metres) {
   const points = metres.map(dm);
   const n = points.length;
-  if (n < 3 || n > MOST_CORNERS) return `${n} ${n === 1 ? "corner" : "corners"}: it takes 3 to ${MOST_CORNERS}`;
-  const far = points.findIndex((p) => !p.every((d) => Math.abs(d) <= REACH_DM));
+  if (n < 3 || n > MAX_CORNERS) return `${n} ${n === 1 ? "corner" : "corners"}: an outline has 3 to ${MAX_CORNERS}`;
+  const far = points.findIndex((p) => !p.every((d) => Math.abs(d) <= MAX_DM));
   if (far >= 0) return `Corner ${far + 1} is not a place within 838 km`;
   const sides = edges(points);
   const twice = sides.findIndex(([a, b]) => same(a, b));
@@ -61,7 +61,7 @@ export function outlineFault(metres) {
   return null;
 }
 
-/** Whether keep-out `points` leaves nothing of `fence`, both in metres. */
+/** Whether keep-out `points` covers all of `fence`, both in metres. */
 export function covers(points, fence) {
   const [keepOut, field] = [points.map(dm), fence.map(dm)];
   const apart = !edges(field).some((e) => edges(keepOut).some((f) => meet(e, f)));

@@ -1,4 +1,4 @@
-// The operator's map: puts layers, overlays and vehicles on the canvas whenever something changed.
+// The operator's map: draws layers, overlays and vehicles on the canvas after each change.
 
 import { $, show, text } from "../dom.js";
 import { ago, count, span } from "../format.js";
@@ -7,7 +7,7 @@ import { ageOf, isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
 import { drawFences } from "../fence/draw.js";
 import { clickAt, finish, grab, pen, penKeys } from "../fence/edit.js";
-import { drawCraft, drawSurface } from "./craft.js";
+import { drawVehicle, drawSurface } from "./vehicle-marker.js";
 import { overhang } from "./coarse.js";
 import { boxInWorld, inWorld, viewOf } from "./frames.js";
 import { listen } from "./input.js";
@@ -17,11 +17,11 @@ import { drawGrid, drawNorth, drawRings, drawScaleBar } from "./overlays.js";
 import { extent, rectangle } from "./raster.js";
 import { showReadout } from "./readout.js";
 import { View } from "./view.js";
-import { wayOf } from "./way.js";
+import { pathOf } from "./path.js";
 
 export const view = new View();
 export const options = { grid: recall("grid", true), rings: recall("rings", false) };
-const FENCE_REACH = 4;
+const MAX_FIT_RATIO = 4;
 const canvas = $("chart");
 let ink = {};
 let dirty = false;
@@ -32,7 +32,7 @@ export function startChart() {
   onTheme(readInk);
   readInk();
   listen(canvas, view, {
-    changed: () => (redraw(), store.tell("view")),
+    changed: () => (redraw(), store.emit("view")),
     point: hover,
     click,
     grab: (px, py) => (measure.on ? null : grab(view, px, py)),
@@ -40,7 +40,7 @@ export function startChart() {
   });
   canvas.addEventListener("focus", redraw);
   canvas.addEventListener("blur", redraw);
-  store.on("state map select feed book highlight tick draft", () => {
+  store.on("state map select feed book highlight tick edit", () => {
     keepInView();
     redraw();
   });
@@ -59,14 +59,14 @@ export function fit() {
   view.mode = "fit";
   const all = bounds();
   if (all) view.fit(all);
-  store.tell("view");
+  store.emit("view");
   redraw();
 }
 
 export function follow() {
   view.mode = view.mode === "follow" ? "free" : "follow";
   keepInView();
-  store.tell("view");
+  store.emit("view");
   redraw();
 }
 
@@ -83,13 +83,13 @@ function end() {
 
 function measureKey() {
   toggleMeasure();
-  store.tell("view");
+  store.emit("view");
 }
 
 function keepInView() {
   if (pen.tool && view.mode !== "free") {
     view.mode = "free";
-    store.tell("view");
+    store.emit("view");
   }
   const s = store.vehicle?.status;
   if (view.mode === "follow" && s) view.centre(...inWorld(store.vehicle, s.x_m, s.y_m));
@@ -107,13 +107,13 @@ function extentOf(map) {
   return extents.get(map);
 }
 
-/** What "fit" shows: every map, every vehicle and its way ahead; fences and the surface too, unless the map would be lost. */
+/** The box that Fit shows: every map, every vehicle and its planned path; fences and the surface as well, unless the map would become tiny. */
 function bounds() {
   const boxes = [];
   for (const v of store.snapshot?.vehicles ?? []) {
     const s = v.status;
     const map = store.maps.get(v.id);
-    const own = [map && extentOf(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], ...(s ? wayOf(s).map(([x, y]) => [x, y, x, y]) : [])];
+    const own = [map && extentOf(map), s && [s.x_m - 4, s.y_m - 4, s.x_m + 4, s.y_m + 4], ...(s ? pathOf(s).map(([x, y]) => [x, y, x, y]) : [])];
     boxes.push(...own.filter(Boolean).map((box) => boxInWorld(v, box)));
   }
   if (boxes.length === 0) return store.snapshot ? [-10, -10, 10, 10] : null;
@@ -122,14 +122,14 @@ function bounds() {
   const corners = (store.snapshot?.vehicles ?? []).flatMap((v) => v.fence?.fence ?? []);
   const further = [...corners, ...(surface ? [[surface.x_m, surface.y_m]] : [])];
   const all = around([near, ...further.map(([x, y]) => [x, y, x, y])]);
-  return reach(all) <= FENCE_REACH * reach(near) ? all : near;
+  return reach(all) <= MAX_FIT_RATIO * reach(near) ? all : near;
 }
 
 const around = (boxes) => boxes.reduce((a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])]);
 const reach = ([west, south, east, north]) => Math.max(east - west, north - south);
 
 function readInk() {
-  for (const name of ["sea", "text", "grid", "craft", "track", "stale", "accent", "fence", "keepout", "bad"]) ink[name] = colour(`map-${name}`);
+  for (const name of ["sea", "text", "grid", "vehicle", "track", "stale", "accent", "fence", "keepout", "bad"]) ink[name] = colour(`map-${name}`);
   redraw();
 }
 
@@ -179,7 +179,7 @@ function draw() {
   if (options.rings && centre) drawRings(c, view, ink, ...centre);
   if (surface) drawSurface(c, view, ink, surface);
   for (const v of byChoice) drawFences(c, view, ink, v, v.id === store.selectedId);
-  for (const v of byChoice) drawCraft(c, viewOf(view, v), ink, v, v.id === store.selectedId);
+  for (const v of byChoice) drawVehicle(c, viewOf(view, v), ink, v, v.id === store.selectedId);
   drawMeasure(c, view, ink);
   if (byKeys()) drawCross(c);
   drawScaleBar(c, view, ink);
@@ -189,10 +189,10 @@ function draw() {
   readout();
 }
 
-/** The surface's position while its GPS knows it, or null. */
+/** The position of the surface while its GPS fix is valid, or null. */
 function surfaceAt() {
   const p = store.snapshot?.position;
-  return p?.is_good && p.x_m !== null ? p : null;
+  return p?.is_valid && p.x_m !== null ? p : null;
 }
 
 function drawMap(c, vehicle) {
@@ -223,13 +223,13 @@ function drawCross(c) {
 function plates() {
   const v = store.vehicle;
   show($("map-empty"), Boolean(v) && v.map.explored_cells === 0);
-  text($("map-empty"), v?.heard_s === null ? `Nothing heard from ${v.name} yet.` : "No cell of the map has arrived yet.");
+  text($("map-empty"), v?.last_received_s === null ? `No frame received from ${v.name} yet.` : "No cell of the map has arrived yet.");
   show($("map-age"), Boolean(v));
   if (!v) return;
   const age = ageOf(v.map.updated_s);
   const late = isStale(v);
   $("map-age").classList.toggle("stale", late);
-  const state = late ? `stale, changed ${ago(age)}` : age === null ? "nothing yet" : `changed ${span(age)} ago`;
+  const state = late ? `stale, changed ${ago(age)}` : age === null ? "no data yet" : `changed ${span(age)} ago`;
   text($("map-age"), `Map v${v.map.version} · ${state} · ${count(v.map.explored_cells)} cells`);
   canvas.dataset.layer = layer.name;
 }

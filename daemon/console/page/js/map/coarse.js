@@ -1,11 +1,11 @@
-// Cells that came only coarsely. When the budget is short, a vehicle sends every fourth cell both ways first: one
-// label that stands for a block of 4 x 4. The block is shown pale around the cell that was sent, never as cells.
+// Coarse cells. When the budget is short, a vehicle first sends every fourth cell in both directions. One such cell stands for
+// a block of 4 x 4 cells, which is painted pale and is in no count, area or export.
 
 const SIDE = 4;
 const PALE = 76;
 const found = new WeakMap();
 
-/** Blocks that one lattice cell stands for: [{ at, x, y }], its index and south-west cell in the map's array. */
+/** The blocks of which only one cell was received: [{ at, x, y }], its index and south-west cell in the map's array. */
 export function coarseBlocks(map) {
   if (!found.has(map)) found.set(map, search(map));
   return found.get(map);
@@ -30,7 +30,7 @@ function aloneInBlock(is, x, y) {
   return true;
 }
 
-/** Whether a cell west or south of the block's own touches it: then the map may just end here, in every cell. */
+/** Whether a cell west or south of the block touches it: then the finely sent map may end here. */
 function besides(is, { x, y }) {
   return [[-1, -1], [0, -1], [1, -1], [-1, 0], [-1, 1]].some(([dx, dy]) => is(x + dx, y + dy));
 }

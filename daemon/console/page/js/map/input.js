@@ -1,10 +1,10 @@
-// Pan and zoom by mouse, finger and keys.
+// Pan and zoom by mouse, fingers and keys.
 
 const KEY_PAN_PX = 60;
 
-/** Wires `canvas`; calls `changed()` after the view moved, `point(px, py | null)` as the pointer moves,
- *  `click(px, py)` for a press that did not pan; `grab(px, py)` gives what a press there drags instead of the map,
- *  {move(px, py), press()}, or null. `keys` go before the own ones; "Shift+ArrowLeft" is one with shift. */
+/** Listens on `canvas`. Calls `changed()` after the view moved, `point(px, py | null)` when the pointer moves and
+ *  `click(px, py)` for a press that did not pan. `grab(px, py)` returns the handlers of a press that does not pan,
+ *  {move(px, py), press()}, or null. `keys` override the keys of this module; "Shift+ArrowLeft" is a key with shift. */
 export function listen(canvas, view, { changed, point, click, grab, keys }) {
   const fingers = new Map();
   let moved = 0;
@@ -45,7 +45,7 @@ export function listen(canvas, view, { changed, point, click, grab, keys }) {
   };
   canvas.addEventListener("pointerup", lift);
   canvas.addEventListener("pointercancel", lift);
-  // A tapped cell stays read out; a mouse that left does not.
+  // The readout of a tapped cell stays; a mouse that leaves the map hides it.
   canvas.addEventListener("pointerleave", (event) => event.pointerType !== "touch" && point(null, null));
 
   canvas.addEventListener(

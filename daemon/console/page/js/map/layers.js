@@ -1,4 +1,4 @@
-// Which plane of the map is painted, its legend, and the canvas that holds it until something changes.
+// The chosen layer of the map, its legend, and the canvases that hold painted maps until they change.
 
 import { $, h, show } from "../dom.js";
 import { shownAs, tintOf } from "../book.js";
@@ -24,7 +24,7 @@ onTheme(() => {
 
 /** The layers that the chosen vehicle's map can show. */
 export function layerNames() {
-  return ["label", "age", ...(store.map?.planes.map((p) => p.name).sort() ?? [])];
+  return ["label", "age", ...(store.map?.layers.map((p) => p.name).sort() ?? [])];
 }
 
 export function setLayer(name) {
@@ -32,10 +32,10 @@ export function setLayer(name) {
   drawLegend();
 }
 
-/** The painted canvas of a vehicle's map; painted again only when its key changes. */
+/** The canvas of a vehicle's map, painted again only when its key changes. */
 export function canvasOf(vehicle, map) {
   const chosen = vehicle.id === store.selectedId;
-  const plane = map.planes.find((p) => p.name === layer.name);
+  const plane = map.layers.find((p) => p.name === layer.name);
   const age = layer.name === "age" ? Math.floor((store.nowS - map.fetchedS) / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
   const key = chosen
     ? `${map.epoch}.${map.version}.${layer.name}.${age}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`
@@ -55,7 +55,7 @@ export function canvasOf(vehicle, map) {
 
 const coarsely = new Map();
 
-/** What a vehicle's map holds only coarsely, painted pale below its cells in the label layer, or null. */
+/** The coarse blocks of a vehicle's map, painted pale below its cells in the label layer, or null. */
 export function coarseCanvasOf(vehicle, map) {
   if (vehicle.id !== store.selectedId || layer.name !== "label" || coarseBlocks(map).length === 0) return null;
   const key = `${map.epoch}.${map.version}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`;
@@ -77,7 +77,7 @@ export function ageTop(map) {
 
 export function drawLegend() {
   const map = store.map;
-  const plane = map?.planes.find((p) => p.name === layer.name);
+  const plane = map?.layers.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
   const coarse = layer.name === "label" && Boolean(map) && coarseBlocks(map).length > 0;
   const look = plane ? lookOf(plane) : { at: ramp, low: "now", high: span(top) };
@@ -88,7 +88,7 @@ export function drawLegend() {
   show(box, Boolean(map) && (layer.name !== "label" || coarse));
   if (box.hidden) return;
   if (coarse) {
-    const words = `pale: one cell of 16 was sent, the rest is not known yet`;
+    const words = `pale: one cell of 16 was sent, the rest is unknown`;
     box.replaceChildren(h("span.pale", { "aria-hidden": "true" }), h("span", {}, words));
     return;
   }

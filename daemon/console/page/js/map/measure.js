@@ -1,6 +1,6 @@
-// The measure tool: click two or more points, read the legs and the sum.
+// The measure tool: two or more points, the length of each leg and the sum.
 
-import { FONT, haloText } from "./overlays.js";
+import { FONT, haloText } from "../canvas.js";
 import { degrees, metres } from "../format.js";
 
 export const measure = { on: false, points: [], pointer: null };

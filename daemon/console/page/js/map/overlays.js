@@ -1,18 +1,7 @@
-// What lies over the map and belongs to no vehicle: grid, scale bar, north arrow, range rings.
+// Overlays that belong to no vehicle: grid, scale bar, north arrow, range rings.
 
+import { FONT, haloText } from "../canvas.js";
 import { metres, minus, nice } from "../format.js";
-
-export const FONT = '11px ui-sans-serif, system-ui, -apple-system, "Segoe UI", "Liberation Sans", sans-serif';
-
-/** Text with a halo in the sea's colour, so that it reads on any label. */
-export function haloText(c, string, x, y, ink) {
-  c.lineWidth = 3;
-  c.lineJoin = "round";
-  c.strokeStyle = ink.sea;
-  c.strokeText(string, x, y);
-  c.fillStyle = ink.text;
-  c.fillText(string, x, y);
-}
 
 export function drawGrid(c, view, ink) {
   const step = nice(120 / view.scale) || 1;
@@ -83,7 +72,7 @@ export function drawNorth(c, view, ink) {
   haloText(c, "N", x, y + 35, ink);
 }
 
-/** Rings at round ranges about (x, y). */
+/** Rings around (x, y) at round ranges. */
 export function drawRings(c, view, ink, x, y) {
   const step = nice(160 / view.scale);
   const [px, py] = view.toScreen(x, y);

@@ -1,13 +1,13 @@
-// How a plane is painted: its scale of colours, and which values are the ends of it.
+// How a layer is painted: its colour scale and the values at the ends of the scale.
 
 import { CIVIDIS, INFERNO, ramp } from "../palette.js";
 import { planeText } from "./readout.js";
 
-/** Share of the cells that may lie beyond each end of a scale. Few cells are far more surprising than all others. */
+/** The share of the cells that may lie beyond each end of a scale, since a few cells are far more surprising than all others. */
 const BEYOND = { curiosity: 0.02 };
 const looks = new WeakMap();
 
-/** The bytes of the plane between which its scale goes, and whether any lie below and above. */
+/** The lowest and the highest byte on the scale of the layer, and whether cells lie below or above. */
 function ends(plane) {
   const cells = new Uint32Array(256);
   for (const v of plane.data) cells[v] += 1;
@@ -24,7 +24,7 @@ function ends(plane) {
   return { low, high, below: any(0, low), above: any(high + 1, 255) };
 }
 
-/** Of a plane: `tone(byte, red)` the colour of a cell, `at(t, red)` of a place on the scale, `low` and `high` the texts of its ends. */
+/** Of a layer: `tone(byte, red)` is the colour of a cell, `at(t, red)` that of a place on the scale; `low` and `high` are the texts at its ends. */
 export function lookOf(plane) {
   if (looks.has(plane)) return looks.get(plane);
   const { low, high, below, above } = ends(plane);

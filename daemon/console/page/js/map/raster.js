@@ -1,4 +1,4 @@
-// One map version painted once into an offscreen canvas, one pixel a cell, north up.
+// Paints a version of a map into an offscreen canvas, one pixel a cell, north up.
 
 import { ramp } from "../palette.js";
 import { current as theme } from "../theme.js";
@@ -53,7 +53,7 @@ function paint(map, rgbaOf) {
 
 const mix = (a, b, t) => a.map((v, i) => v + (b[i] - v) * t);
 
-/** Labels in their colours; greyed when stale, the rest faint when one is highlighted: label -> [r, g, b, a]. */
+/** The colour of each label, label -> [r, g, b, a]: grey when stale, faint when another label is highlighted. */
 export function labelTones({ tintOf, shownAs, stale, highlight }) {
   const table = new Array(256);
   const lookup = (label) => {
@@ -72,7 +72,7 @@ export function paintLabels(map, look) {
   return paint(map, (_, label) => tones(label));
 }
 
-/** Seconds since each cell was heard, on the sequential scale from 0 to `top`. */
+/** The age of each cell, on the sequential scale from 0 to `top` seconds. */
 export function paintAge(map, sinceFetchS, top) {
   return paint(map, (at) => {
     const age = map.age[at];
@@ -80,7 +80,7 @@ export function paintAge(map, sinceFetchS, top) {
   });
 }
 
-/** A plane the server offers: bytes 0..254 between its least and greatest value, 255 unknown; faint when stale. */
+/** A layer of the server: bytes 0..254 from its lowest to its highest value, 255 unknown; faint when stale. */
 export function paintPlane(map, plane, stale) {
   const look = lookOf(plane);
   return paint(map, (at) => {
@@ -91,7 +91,7 @@ export function paintPlane(map, plane, stale) {
   });
 }
 
-/** Another vehicle's map: only where it has been, since its label ids mean something else. */
+/** Another vehicle's map: only its explored cells, since its label numbers have another meaning. */
 export function paintFootprint(map) {
   return paint(map, () => [128, 128, 128, 80]);
 }

@@ -1,4 +1,4 @@
-// What lies under the pointer, or under the cross at the centre when the map is used by keys.
+// The readout of the cell under the pointer, or under the cross at the centre when the map is used by keys.
 
 import { $, show, text } from "../dom.js";
 import { metres, minus, none, percent, span } from "../format.js";
@@ -7,7 +7,7 @@ import { ageOf, store } from "../store.js";
 import { blockAt } from "./coarse.js";
 import { onMap } from "./frames.js";
 
-/** The cell under (x, y) metres of the map's frame: {label, ageS, planes} or null when outside the map; each plane with its own age. */
+/** The cell at (x, y) metres in the map's frame: {label, ageS, layers}, each layer with its own age; null outside the map. */
 export function cellAt(map, x, y) {
   const cx = Math.floor(x / map.cell_m) - map.x0;
   const cy = Math.floor(y / map.cell_m) - map.y0;
@@ -16,13 +16,13 @@ export function cellAt(map, x, y) {
   if (map.labels[at] === 0) return null;
   const since = ageOf(map.fetchedS) ?? 0;
   const seconds = (ages) => (!ages || ages[at] === 65535 ? null : ages[at] + since);
-  const planes = map.planes
+  const layers = map.layers
     .filter((p) => p.data[at] !== 255)
     .map((p) => ({ ...p, value: p.min + ((p.max - p.min) * p.data[at]) / 254, ageS: seconds(p.age) }));
-  return { label: map.labels[at], ageS: seconds(map.age), planes };
+  return { label: map.labels[at], ageS: seconds(map.age), layers };
 }
 
-/** The label that stands for the unexplored cell under (x, y) metres, where the map came coarsely; else null. */
+/** The label of the coarse block around the unexplored cell at (x, y) metres, or null. */
 function coarseAt(map, x, y) {
   const block = blockAt(map, Math.floor(x / map.cell_m) - map.x0, Math.floor(y / map.cell_m) - map.y0);
   return block && map.labels[block.at];
@@ -39,24 +39,24 @@ export function showReadout(world) {
   if (origin) parts.push(latLon(origin, ...world));
   if (cell) {
     parts.push(nameOf(shownAs(cell.label)));
-    parts.push(cell.ageS === null ? `age ${none}` : `heard ${span(cell.ageS)} ago`);
-    for (const p of cell.planes) parts.push(`${p.name} ${levelOf(p)}${p.ageS === null ? "" : `, heard ${span(p.ageS)} ago`}`);
+    parts.push(cell.ageS === null ? `age ${none}` : `received ${span(cell.ageS)} ago`);
+    for (const p of cell.layers) parts.push(`${p.name} ${levelOf(p)}${p.ageS === null ? "" : `, received ${span(p.ageS)} ago`}`);
   } else {
     const block = store.map ? coarseAt(store.map, ...own) : null;
-    parts.push(block === null ? "unexplored" : `not sent; ${nameOf(shownAs(block))} at the one cell sent of 16 around`);
+    parts.push(block === null ? "unexplored" : `not sent; ${nameOf(shownAs(block))} at the one cell of 16 that was sent`);
   }
   text(plate, parts.join("  ·  "));
   return cell;
 }
 
-/** A value of a plane, or from where to where its level goes if the server tells the step. */
+/** The value of a layer, or the bounds of its level if the server gives the step. */
 function levelOf(p) {
   const half = (p.step ?? 0) / 2;
   const low = planeText(p, p.value - half);
   return half > 0 ? `${low} to ${planeText(p, p.value + half)}` : low;
 }
 
-/** A quantity without a unit is a share. */
+/** A value with its unit; a value without a unit is a share. */
 export const planeText = (p, value) => (p.unit === "" ? percent(value) : `${minus(String(Number(value.toFixed(1))))} ${p.unit}`);
 
 const A = 6378137;
@@ -64,7 +64,7 @@ const E2 = (2 - 1 / 298.257223563) / 298.257223563;
 const meridianRadius = (lat) => (A * (1 - E2)) / (1 - E2 * Math.sin(lat) ** 2) ** 1.5;
 
 /** Latitude and longitude of a place near `origin`: the inverse transverse Mercator projection about it on WGS 84
- * (Snyder, USGS Professional Paper 1395, p. 63), as the daemon's exports have it. */
+ * (Snyder, USGS Professional Paper 1395, p. 63), as in the daemon's exports. */
 export function toLatLon(origin, x, y) {
   const lat0 = (origin.lat_deg * Math.PI) / 180;
   let lat = lat0;

@@ -1,4 +1,4 @@
-// Where the map is on the screen: metres east and north <-> CSS pixels.
+// The view: metres east and north <-> CSS pixels.
 
 const MIN_SCALE = 0.02;
 const MAX_SCALE = 400;
@@ -44,7 +44,7 @@ export class View {
     this.north = y;
   }
 
-  /** Shows all of [west, south, east, north], with room for the plates at the edges. */
+  /** Shows all of [west, south, east, north], with a margin for the plates at the edges. */
   fit([west, south, east, north]) {
     const room = Math.min(56, this.width / 8);
     const across = Math.max(4, east - west);

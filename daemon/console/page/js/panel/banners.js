@@ -1,4 +1,4 @@
-// What the operator must not miss: no connection, a silent vehicle, a mission that ended.
+// Alarms: no connection, a silent vehicle, a map that is not up to date, the end of the mission.
 
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
@@ -14,7 +14,7 @@ export function startBanners() {
 function update() {
   const banners = current();
   const heads = banners.map((b) => b.head).join(". ");
-  if (heads !== announced) announce(heads || "All in order again.");
+  if (heads !== announced) announce(heads || "All alarms have cleared.");
   announced = heads;
   keyed($("banners"), banners, (b) => b.key, make, refresh);
   show($("banners"), $("banners").childElementCount > 0);
@@ -25,7 +25,7 @@ function current() {
   if (store.feed.state === "lost") found.push(lost());
   for (const v of store.snapshot?.vehicles ?? []) {
     if (isSilent(v)) found.push(silent(v));
-    if (store.connected && store.mapFaults.has(v.id)) found.push(mapless(v));
+    if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
   }
   if (store.snapshot?.mission.ended) found.push(ended());
   return found;
@@ -37,24 +37,24 @@ function lost() {
   const next = wait > 0 ? `trying again in ${span(Math.ceil(wait))}` : "trying now";
   return {
     key: "lost", kind: "bad", head: "No connection to scenecast",
-    body: `for ${since}; ${next}. Everything shown is old and grows older.`, retry: true,
+    body: `for ${since}; ${next}. All values shown are out of date.`, retry: true,
   };
 }
 
 function silent(v) {
   const every = `a frame is expected every ${span(v.expected_interval_s)}`;
-  const heard = v.heard_s === null
-    ? `nothing heard since the start; ${every}.`
-    : `last heard ${span(ageOf(v.heard_s))} ago at ${missionTime(v.heard_s)}; ${every}.`;
-  return { key: `silent-${v.id}`, kind: "warn", head: `${v.name} is silent`, body: `${heard} ${contact(v)}` };
+  const last = v.last_received_s === null
+    ? `no frame received since the start; ${every}.`
+    : `last frame received ${span(ageOf(v.last_received_s))} ago at ${missionTime(v.last_received_s)}; ${every}.`;
+  return { key: `silent-${v.id}`, kind: "warn", head: `${v.name} is silent`, body: `${last} ${contact(v)}` };
 }
 
-function mapless(v) {
-  return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date here`, body: `${store.mapFaults.get(v.id)}.` };
+function outdated(v) {
+  return { key: `map-${v.id}`, kind: "warn", head: `The map of ${v.name} is not up to date`, body: `${store.mapFaults.get(v.id)}.` };
 }
 
 export function contact(v) {
-  if (v.next_contact_s === null) return "No next contact is known.";
+  if (v.next_contact_s === null) return "The next contact is unknown.";
   const wait = v.next_contact_s - store.nowS;
   const when = missionTime(v.next_contact_s);
   return wait >= 0 ? `Next contact in ${span(wait)}, at ${when}.` : `Contact was due ${span(-wait)} ago, at ${when}.`;

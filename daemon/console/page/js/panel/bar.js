@@ -1,4 +1,4 @@
-// The line at the top: mission, vehicles to choose from, mission time, the state of the feed.
+// The bar at the top: mission, choice of vehicle, mission time, state of the feed.
 
 import { $, h, keyed, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
@@ -21,15 +21,15 @@ function update() {
 }
 
 function make(vehicle) {
-  return h("button.craft", { type: "button", onclick: () => store.select(vehicle.id) },
-    h("span.dot", { "aria-hidden": "true" }), h("span.name"), h("span.heard"));
+  return h("button.vehicle-choice", { type: "button", onclick: () => store.select(vehicle.id) },
+    h("span.dot", { "aria-hidden": "true" }), h("span.name"), h("span.received"));
 }
 
 function refresh(node, vehicle) {
   const silent = isSilent(vehicle);
-  const heard = vehicle.heard_s === null ? "not heard yet" : `heard ${span(ageOf(vehicle.heard_s))} ago`;
+  const received = vehicle.last_received_s === null ? "no frame yet" : `received ${span(ageOf(vehicle.last_received_s))} ago`;
   node.setAttribute("aria-pressed", String(vehicle.id === store.selectedId));
-  node.dataset.state = !store.connected ? "none" : silent ? "silent" : vehicle.heard_s === null ? "none" : "heard";
+  node.dataset.state = !store.connected ? "none" : silent ? "silent" : vehicle.last_received_s === null ? "none" : "received";
   text(node.children[1], vehicle.name);
-  text(node.children[2], silent && vehicle.heard_s !== null ? `silent ${span(ageOf(vehicle.heard_s))}` : heard);
+  text(node.children[2], silent && vehicle.last_received_s !== null ? `silent ${span(ageOf(vehicle.last_received_s))}` : received);
 }

@@ -1,67 +1,71 @@
-// The bit budget and the least shares of the classes: dragged while the mission runs, sent when let go.
+// The bit budget, the minimum shares of the classes and the use of spare capacity. A change is sent when the control is released.
 
 import { sendBudget } from "../api.js";
 import { h, show, text } from "../dom.js";
 import { rate } from "../format.js";
+import { Order } from "../order/order.js";
+import { replacedNote } from "../order/sent-versions.js";
+import { orderStatus, slotOf } from "../order/status.js";
 import { store } from "../store.js";
-import { lifeline, slotOf } from "./lifeline.js";
-import { Order } from "./order.js";
-import { othersNote } from "./ours.js";
-import { spendBox } from "./spend.js";
+import { backgroundBox } from "./background.js";
 
 const CLASSES = ["directive", "status", "fix", "map", "exemplar"];
-const LET_GO_MS = 400;
-const [LEAST_BPS, MOST_BPS] = [10, 1e5];
+const RELEASE_MS = 400;
+const [MIN_BPS, MAX_BPS] = [10, 1e5];
 
 function read() {
-  const { budget_bps, shares, spend } = store.snapshot.link;
-  return { budget_bps, shares: shares ?? null, spend: spend ?? null };
+  const { budget_bps, shares, background } = store.snapshot.link;
+  return { budget_bps, shares, background };
 }
-const moved = (part, now) => now && JSON.stringify(now) !== JSON.stringify(read()[part]) ? now : null;
-const order = new Order("budget", read, (_, { budget_bps: bps, shares, spend }) => sendBudget(bps, moved("shares", shares), moved("spend", spend)));
+/** A member of the edit if it differs from the server's. */
+const moved = (member, now) => (JSON.stringify(now) !== JSON.stringify(read()[member]) ? now : null);
+const order = new Order("budget", read, (_, value) => {
+  const { budget_bps: bps, shares, background } = value();
+  return sendBudget(bps, moved("shares", shares), moved("background", background));
+});
 
 const number = h("input", { type: "number", id: "budget", min: 1, step: 1, required: true, oninput: () => (typed = true) });
-const slider = h("input", { type: "range", min: 0, max: 1, step: 0.01, "aria-label": "Budget, logarithmic", oninput: slide, onchange: soon });
+const slider = h("input", { type: "range", min: 0, max: 1, step: 0.01, "aria-label": "Budget, logarithmic", oninput: slide, onchange: sendSoon });
 const bar = h("div.stack", { "aria-hidden": "true" });
 const free = h("span.free");
 const rows = Object.fromEntries(CLASSES.map((c, i) => [c, shareRow(c, i)]));
 const rest = h("output.value");
-const shareBox = h("div.shares", { role: "group", "aria-label": "Least shares of the classes" },
-  h("h3", {}, "Least shares of what is sent, %"), bar, ...CLASSES.map((c) => rows[c].row),
+const shareBox = h("div.shares", { role: "group", "aria-label": "Minimum shares of the classes" },
+  h("h3", {}, "Minimum shares, %"), bar, ...CLASSES.map((c) => rows[c].row),
   h("div.share-row", {}, h("span.swatch"), h("span", {}, "free"), h("span"), rest));
-const extras = spendBox(() => value().spend, (spend) => {
+const streams = backgroundBox(() => value().background, (background) => {
   clearTimeout(timer);
-  order.set(store.vehicle, { ...value(), spend });
-  soon();
+  order.set(store.vehicle, { ...value(), background });
+  sendSoon();
 });
-const error = h("p.error", { role: "alert" });
-const others = othersNote(order.ours, "Budget");
-const line = lifeline("Budget");
+const errorLine = h("p.error", { role: "alert" });
+const replaced = replacedNote(order.sentVersions, "Budget");
+const status = orderStatus("Budget");
 let typed = false;
 let timer = 0;
 
 bar.append(...CLASSES.flatMap((c) => [rows[c].segment, rows[c].handle]), free);
 const form = h("form.budget", { onsubmit: submit, onkeydown: (event) => event.key === "Escape" && forget() },
   h("label", { for: "budget" }, "Budget, bit/s"), number, h("button", { type: "submit" }, "Set"));
-export const budgetParts = [form, slider, shareBox, extras.node, error, others.node, line.node];
+export const budgetParts = [form, slider, shareBox, streams.node, errorLine, replaced.node, status.node];
 
 function shareRow(name, i) {
-  const range = h("input", { type: "range", min: 0, max: 100, step: 1, "aria-label": `Least share of ${name}, percent`, oninput: () => setShare(name, range.valueAsNumber), onchange: soon });
+  const range = h("input", { type: "range", min: 0, max: 100, step: 1, "aria-label": `Minimum share of ${name}, percent`, oninput: () => setShare(name, range.valueAsNumber), onchange: sendSoon });
   const value = h("output.value");
   const row = h("div.share-row", { data: { share: name } }, h("span.swatch", { data: { tone: String(i) } }), h("span", {}, name), range, value);
-  const handle = h("span.handle", { title: `Drag: least share of ${name}`, onpointerdown: (event) => drag(event, name, handle) });
+  const handle = h("span.handle", { title: `Drag: minimum share of ${name}`, onpointerdown: (event) => drag(event, name, handle) });
   return { row, range, value, segment: h("span.segment", { data: { tone: String(i) } }), handle };
 }
 
 const value = () => order.value(store.vehicle);
 
-/** What one class may take at most: the shares add up to 100 or less. */
+/** Sets the share of one class, at most so that the shares add up to 100. */
 function setShare(name, percent) {
-  const { shares, ...else_ } = value();
+  const { shares, ...others } = value();
   const taken = CLASSES.reduce((sum, c) => sum + (c === name ? 0 : shares[c]), 0);
   const share = Math.round(Math.min(100 - taken, Math.max(0, percent)));
   clearTimeout(timer);
-  order.set(store.vehicle, { ...else_, shares: { ...shares, [name]: share } });
+  order.set(store.vehicle, { ...others, shares: { ...shares, [name]: share } });
 }
 
 function drag(event, name, handle) {
@@ -72,15 +76,15 @@ function drag(event, name, handle) {
   const move = (e) => setShare(name, (100 * (e.clientX - box.left)) / box.width - before);
   const end = () => {
     handle.removeEventListener("pointermove", move);
-    soon();
+    sendSoon();
   };
   handle.addEventListener("pointermove", move);
   handle.addEventListener("lostpointercapture", end, { once: true });
 }
 
-/** The slider is logarithmic, two digits. */
-const bpsAt = (t) => Number((LEAST_BPS * (MOST_BPS / LEAST_BPS) ** t).toPrecision(2));
-const placeOf = (bps) => Math.log(bps / LEAST_BPS) / Math.log(MOST_BPS / LEAST_BPS);
+/** The slider is logarithmic, with two digits. */
+const bpsAt = (t) => Number((MIN_BPS * (MAX_BPS / MIN_BPS) ** t).toPrecision(2));
+const placeOf = (bps) => Math.log(bps / MIN_BPS) / Math.log(MAX_BPS / MIN_BPS);
 
 function slide() {
   clearTimeout(timer);
@@ -88,15 +92,15 @@ function slide() {
   order.set(store.vehicle, { ...value(), budget_bps: bpsAt(slider.valueAsNumber) });
 }
 
-/** Sends once hands are off: keys let go of a slider at each step. */
-function soon() {
+/** Sends after a pause, since each press of a key releases a slider. */
+function sendSoon() {
   clearTimeout(timer);
-  timer = setTimeout(send, LET_GO_MS);
+  timer = setTimeout(send, RELEASE_MS);
 }
 
 async function send() {
   const vehicle = store.vehicle;
-  if (!order.changed(vehicle)) return;
+  if (!order.isChanged(vehicle)) return;
   if (!(await order.send(vehicle))) order.revert(vehicle);
 }
 
@@ -120,19 +124,18 @@ function forget() {
 export function refreshBudget() {
   const vehicle = store.vehicle;
   if (!vehicle) return;
-  const { error: problem, waiting } = order.settle(vehicle);
-  const { budget_bps: bps, shares, spend } = value();
+  const { error, waiting } = order.progress(vehicle);
+  const { budget_bps: bps, shares, background } = value();
   if (!typed) number.value = bps;
-  if (document.activeElement !== slider || !order.changed(vehicle)) slider.value = placeOf(bps);
+  if (document.activeElement !== slider || !order.isChanged(vehicle)) slider.value = placeOf(bps);
   slider.setAttribute("aria-valuetext", rate(bps));
-  show(shareBox, shares !== null);
-  if (shares) refreshShares(shares);
-  extras.refresh(spend);
-  text(error, problem ?? "");
-  others.update(vehicle);
+  refreshShares(shares);
+  streams.refresh(background);
+  text(errorLine, error ?? "");
+  replaced.update(vehicle);
   const slot = slotOf(vehicle, "budget");
-  show(line.node, slot !== null || waiting !== null);
-  line.update(slot, waiting);
+  show(status.node, slot !== null || waiting !== null);
+  status.update(slot, waiting);
 }
 
 function refreshShares(shares) {

@@ -1,4 +1,4 @@
-// Where the vehicle may go and when it stops by itself: fence and limits.
+// The panel of constraints: fence and limits.
 
 import { $, h } from "../dom.js";
 import { fenceOrder, finish, pen } from "../fence/edit.js";
@@ -8,14 +8,14 @@ import { limitsOrder, limitsPart, update as updateLimits } from "./limits.js";
 
 export function startConstraints() {
   $("constraints").append(h("header", {}, h("h2", { id: "constraints-title" }, "Constraints")), fencePart, limitsPart);
-  store.on("state select draft feed", update);
+  store.on("state select edit feed", update);
   store.on("tick", () => pen.shown && update());
   store.on("tab", () => {
     const shown = document.body.dataset.tab === "constraints";
     if (pen.shown && !shown && store.vehicle && pen.tool) finish();
     pen.shown = shown;
     update();
-    store.tell("draft");
+    store.emit("edit");
   });
 }
 
@@ -23,7 +23,7 @@ function update() {
   updateFence();
   updateLimits();
   const v = store.vehicle;
-  const unsent = Boolean(v) && (fenceOrder.changed(v) || limitsOrder.changed(v));
+  const unsent = Boolean(v) && (fenceOrder.isChanged(v) || limitsOrder.isChanged(v));
   $("tab-constraints").classList.toggle("unsent", unsent);
-  $("tab-constraints").title = unsent ? "Edits that were not sent" : "";
+  $("tab-constraints").title = unsent ? "Edits that are not sent" : "";
 }

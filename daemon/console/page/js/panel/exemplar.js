@@ -1,103 +1,103 @@
-// The representative pictures of a label: ask, follow the life line, look at them, ask for more or none.
+// The exemplars of a label: request them, follow their arrival, view them, request more, cancel.
 
-import { askExemplar } from "../api.js";
+import { requestExemplar } from "../api.js";
 import { $, h, show, text } from "../dom.js";
 import { ago, bytes, percent } from "../format.js";
 import { nameOf } from "../book.js";
+import { slotOf } from "../order/status.js";
 import { ageOf, store } from "../store.js";
-import { slotOf } from "./lifeline.js";
 
-const WORDS = { queued: "Queued", on_air: "On air", none_yet: "None yet", coming: "Coming", refused: "Refused" };
-const UNDER_WAY = ["queued", "on_air", "none_yet", "coming"];
+const NAMES = { queued: "Queued", on_air: "On air", not_available: "None yet", receiving: "Receiving", refused: "Refused" };
+const PENDING = ["queued", "on_air", "not_available", "receiving"];
 const errors = new Map();
-let looking = null;
+let viewer = null;
 
 export function exemplar(of) {
-  const ask = h("button.ask", { type: "button", onclick: () => request(of()) }, "Show me");
-  const picture = h("button.picture", { type: "button", onclick: () => look(of()) }, h("img", { alt: "", width: 44, height: 44 }));
+  const ask = h("button.request", { type: "button", onclick: () => request(of()) }, "Request");
+  const image = h("button.image", { type: "button", onclick: () => view(of()) }, h("img", { alt: "", width: 44, height: 44 }));
   const state = h("span.state");
   const bar = h("progress", { max: 1 });
   const cancel = h("button.cancel", { type: "button", onclick: () => request(of(), "cancel") }, "Cancel");
-  const box = h("div.exemplar", {}, ask, picture, state, bar, cancel);
-  box.parts = { ask, picture, state, bar, cancel };
+  const box = h("div.exemplar", {}, ask, image, state, bar, cancel);
+  box.parts = { ask, image, state, bar, cancel };
   return box;
 }
 
-/** `what`: another, larger (of `picture`) or cancel. */
-async function request(label, what = "another", picture = null) {
+/** `action`: another, larger (of `image`) or cancel. */
+async function request(label, action = "another", image = null) {
   const key = `${store.selectedId}.${label.id}`;
   try {
     errors.delete(key);
-    await askExemplar(store.selectedId, label.id, what, picture);
+    await requestExemplar(store.selectedId, label.id, action, image);
   } catch (error) {
     errors.set(key, error.message);
   }
-  store.tell("draft");
+  store.emit("edit");
 }
 
 export function refreshExemplar(box, label, name) {
   const e = label.exemplar;
-  const { ask, picture, state, bar, cancel } = box.parts;
+  const { ask, image, state, bar, cancel } = box.parts;
   const error = errors.get(`${store.selectedId}.${label.id}`);
-  const here = e.url !== null;
-  const waits = UNDER_WAY.includes(e.state);
-  show(picture, here);
-  show(ask, !here && !waits);
-  text(ask, e.state === "refused" ? "Ask again" : "Show me");
-  ask.setAttribute("aria-label", `${ask.textContent}: a picture of ${name}`);
-  show(state, error !== undefined || waits || e.state === "refused");
-  const done = e.state === "coming" ? ` ${percent(e.progress)}` : "";
-  text(state, error ?? `${WORDS[e.state] ?? ""}${done}`);
+  const received = e.url !== null;
+  const pending = PENDING.includes(e.state);
+  show(image, received);
+  show(ask, !received && !pending);
+  text(ask, e.state === "refused" ? "Request again" : "Request");
+  ask.setAttribute("aria-label", `${ask.textContent}: an image of ${name}`);
+  show(state, error !== undefined || pending || e.state === "refused");
+  const done = e.state === "receiving" ? ` ${percent(e.progress)}` : "";
+  text(state, error ?? `${NAMES[e.state] ?? ""}${done}`);
   const why = e.state === "refused" ? slotOf(store.vehicle, "requests")?.reason : null;
-  state.title = error ?? why ?? (e.state === "none_yet" ? "The vehicle has no such picture yet, and sends it when it has" : "");
+  state.title = error ?? why ?? (e.state === "not_available" ? "The vehicle has no such image yet and sends it once it has one" : "");
   state.dataset.state = error ? "refused" : e.state;
-  show(bar, e.state === "coming");
+  show(bar, e.state === "receiving");
   bar.value = e.progress;
-  bar.setAttribute("aria-label", `Picture of ${name}`);
-  show(cancel, waits);
-  cancel.setAttribute("aria-label", `Cancel the picture of ${name}`);
-  if (looking?.id === label.id) looking.refresh(label);
-  if (!here) return;
-  const img = picture.firstElementChild;
-  const newest = e.pictures.at(-1);
-  const url = `${newest.url}?at=${newest.at_s}`;
+  bar.setAttribute("aria-label", `Image of ${name}`);
+  show(cancel, pending);
+  cancel.setAttribute("aria-label", `Cancel the image of ${name}`);
+  if (viewer?.id === label.id) viewer.refresh(label);
+  if (!received) return;
+  const img = image.firstElementChild;
+  const latest = e.images.at(-1);
+  const url = `${latest.url}?at=${latest.at_s}`;
   if (img.getAttribute("src") !== url) img.src = url;
-  picture.setAttribute("aria-label", `Picture of ${name}, enlarge`);
+  image.setAttribute("aria-label", `Image of ${name}, enlarge`);
 }
 
-function look(label) {
+function view(label) {
   const dialog = $("dialog");
   const close = () => dialog.close();
-  const shown = h("div.pictures");
-  const another = h("button", { type: "button", onclick: () => request(looking.label) }, "Another");
-  const cancel = h("button", { type: "button", onclick: () => request(looking.label, "cancel") }, "Cancel");
+  const shown = h("div.images");
+  const another = h("button", { type: "button", onclick: () => request(viewer.label) }, "Another");
+  const cancel = h("button", { type: "button", onclick: () => request(viewer.label, "cancel") }, "Cancel");
   const state = h("p.state", { role: "status" });
   const refresh = (now) => {
-    looking.label = now;
+    viewer.label = now;
     const e = now.exemplar;
-    const waits = UNDER_WAY.includes(e.state);
-    text(state, errors.get(`${store.selectedId}.${now.id}`) ?? (waits ? `${WORDS[e.state]}${e.state === "coming" ? ` ${percent(e.progress)}` : ""}` : ""));
-    show(cancel, waits);
-    const key = e.pictures.map((p) => `${p.url}${p.at_s}`).join() + waits;
+    const pending = PENDING.includes(e.state);
+    text(state, errors.get(`${store.selectedId}.${now.id}`) ?? (pending ? `${NAMES[e.state]}${e.state === "receiving" ? ` ${percent(e.progress)}` : ""}` : ""));
+    show(cancel, pending);
+    const key = e.images.map((i) => `${i.url}${i.at_s}`).join() + pending;
     if (shown.dataset.key === key) return;
     shown.dataset.key = key;
-    shown.replaceChildren(...[...e.pictures].reverse().map((p) => figure(now, p, waits)));
+    shown.replaceChildren(...[...e.images].reverse().map((i) => figure(now, i, pending)));
   };
-  looking = { id: label.id, label, refresh };
+  viewer = { id: label.id, label, refresh };
   dialog.replaceChildren(h("h2", { id: "dialog-title" }, nameOf(label.id)), shown, state,
     h("div.buttons", {}, another, cancel, h("button.primary", { type: "button", onclick: close }, "Close")));
-  dialog.addEventListener("close", () => (looking = null), { once: true });
+  dialog.addEventListener("close", () => (viewer = null), { once: true });
   refresh(label);
   dialog.showModal();
 }
 
-/** One picture with where it comes from, and the way to a larger one. */
-function figure(label, p, waits) {
-  const unasked = p.asked ? "" : ", unasked";
-  const larger = h("button", { type: "button", onclick: () => request(label, "larger", p.picture) }, "Larger");
-  show(larger, p.can_grow && !waits);
-  larger.setAttribute("aria-label", `Larger: picture ${p.picture} of ${nameOf(label.id)}`);
+/** One image with its size and age, and the button that requests a larger one. */
+function figure(label, image, pending) {
+  const unrequested = image.requested ? "" : ", not requested";
+  const larger = h("button", { type: "button", onclick: () => request(label, "larger", image.number) }, "Larger");
+  show(larger, image.can_enlarge && !pending);
+  larger.setAttribute("aria-label", `Larger: image ${image.number} of ${nameOf(label.id)}`);
   return h("figure", {},
-    h("img.large", { src: `${p.url}?at=${p.at_s}`, alt: `Representative picture of ${nameOf(label.id)}` }),
-    h("figcaption", {}, `${p.edge_px} px, ${bytes(p.bytes)}${unasked}, received ${ago(ageOf(p.at_s))}. `, larger));
+    h("img.large", { src: `${image.url}?at=${image.at_s}`, alt: `Representative image of ${nameOf(label.id)}` }),
+    h("figcaption", {}, `${image.edge_px} px, ${bytes(image.bytes)}${unrequested}, received ${ago(ageOf(image.at_s))}. `, larger));
 }

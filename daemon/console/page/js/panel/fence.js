@@ -1,12 +1,12 @@
-// The fence in the panel: its outlines with their corners as numbers, what is wrong with them, sending.
+// The fence in the panel: its outlines, their corners as numbers, their faults, sending.
 
 import { $, announce, h, keyed, show, text } from "../dom.js";
-import { addCorner, begin, fenceOrder, finish, middle, pen, plan, put, removeCorner, removeOutline, setCorner, setHome } from "../fence/edit.js";
+import { addCorner, begin, fenceOrder, finish, middle, pen, pickTool, plan, removeCorner, removeOutline, setCorner, setReturnPoint } from "../fence/edit.js";
 import { faults, fromServer, isSound, nameOutline } from "../fence/plan.js";
 import { metres } from "../format.js";
+import { orderFoot } from "../order/foot.js";
+import { slotOf } from "../order/status.js";
 import { store } from "../store.js";
-import { slotOf } from "./lifeline.js";
-import { orderFoot } from "./order.js";
 
 const list = h("ul.outlines");
 const hint = h("p.hint", { role: "status" });
@@ -15,34 +15,34 @@ const frame = h("p.note");
 const tools = {
   fence: h("button", { type: "button", onclick: () => onMap(() => begin("fence")) }, "Draw fence"),
   keepOut: h("button", { type: "button", onclick: () => onMap(() => begin("keep_out")) }, "Add keep-out"),
-  home: h("button", { type: "button", onclick: () => onMap(() => put(pen.tool === "home" ? null : "home")) }, "Place return point"),
+  returnPoint: h("button", { type: "button", onclick: () => onMap(() => pickTool(pen.tool === "return_point" ? null : "return_point")) }, "Place return point"),
   done: h("button.primary", { type: "button", onclick: finish }, "Done drawing"),
 };
-const takeForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(store.vehicle.fence_in_force.order)) }, "Edit the one in force");
-const homePlace = place("Return point", (p) => setHome(p));
-const clearHome = h("button.undo", { type: "button", onclick: () => setHome(null) }, "Remove");
-clearHome.setAttribute("aria-label", "Remove the return point");
-const homeFault = h("p.error", { role: "alert" });
-const homeBox = h("div.outline", {}, h("div.head", {}, h("b", {}, "Return point"), clearHome), homePlace.node, homeFault);
+const editInForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(store.vehicle.fence_in_force.order)) }, "Edit the one in force");
+const returnFields = place("Return point", (p) => setReturnPoint(p));
+const clearReturn = h("button.undo", { type: "button", onclick: () => setReturnPoint(null) }, "Remove");
+clearReturn.setAttribute("aria-label", "Remove the return point");
+const returnFault = h("p.error", { role: "alert" });
+const returnBox = h("div.outline", {}, h("div.head", {}, h("b", {}, "Return point"), clearReturn), returnFields.node, returnFault);
 const foot = orderFoot(fenceOrder, "Fence", "send-fence");
 const latest = new WeakMap();
 const open = new Set();
 
 export const fencePart = h("section.part", { "aria-labelledby": "fence-title" },
-  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, takeForce, frame,
-  h("div.buttons", {}, tools.fence, tools.keepOut, tools.home, tools.done), hint, list, homeBox, foot.node);
+  h("h3", { id: "fence-title" }, "Fence, keep-outs, return point"), state, editInForce, frame,
+  h("div.buttons", {}, tools.fence, tools.keepOut, tools.returnPoint, tools.done), hint, list, returnBox, foot.node);
 
-/** Takes up a tool and goes on to the map, where it is used. */
-function onMap(take) {
-  take();
+/** Selects a tool and moves the focus to the map, where it is used. */
+function onMap(select) {
+  select();
   $("chart").focus({ preventScroll: true });
 }
 
 /** Two number fields for a place in metres; `set([x, y])` when both are numbers. */
 function place(name, set) {
-  const field = (axis) => h("input", { type: "number", step: 0.1, "aria-label": `${name}, metres ${axis}`, oninput: said });
+  const field = (axis) => h("input", { type: "number", step: 0.1, "aria-label": `${name}, metres ${axis}`, oninput: change });
   const [east, north] = [field("east"), field("north")];
-  function said() {
+  function change() {
     const p = [east.valueAsNumber, north.valueAsNumber];
     if (p.every(Number.isFinite)) set(p);
   }
@@ -59,7 +59,7 @@ function makeOutline() {
   const corners = h("ol.corners");
   const more = h("button.quiet", { type: "button", onclick: () => flip(at()) });
   const title = h("b");
-  const draw = h("button.undo", { type: "button", onclick: () => onMap(() => put("corner", at())) }, "Add corners");
+  const draw = h("button.undo", { type: "button", onclick: () => onMap(() => pickTool("corner", at())) }, "Add corners");
   const drop = h("button.undo", { type: "button", onclick: () => removeOutline(at()) }, "Delete");
   const fault = h("p.error", { role: "alert" });
   node.append(h("div.head", {}, title, more, draw, drop), corners, fault);
@@ -74,7 +74,7 @@ function flip(i) {
 
 function refreshOutline(node, { outline, i, name, fault }) {
   latest.set(node, i);
-  const { corners, more, title, draw, drop, fault: problem } = node.parts;
+  const { corners, more, title, draw, drop, fault: faultLine } = node.parts;
   const n = outline.points.length;
   text(title, name);
   text(more, `${n} ${n === 1 ? "corner" : "corners"}`);
@@ -82,8 +82,8 @@ function refreshOutline(node, { outline, i, name, fault }) {
   more.setAttribute("aria-label", `${name}: ${n} ${n === 1 ? "corner" : "corners"}, as numbers`);
   draw.setAttribute("aria-label", `Add corners to ${name} on the map`);
   drop.setAttribute("aria-label", `Delete ${name}`);
-  show(problem, fault !== null);
-  text(problem, fault ?? "");
+  show(faultLine, fault !== null);
+  text(faultLine, fault ?? "");
   show(corners, open.has(i));
   const rows = open.has(i) ? outline.points.map((p, k) => ({ p, k })) : [];
   keyed(corners, rows, (r) => `${i}.${r.k}`, (r) => makeCorner(i, r.k, name), refreshCorner);
@@ -110,42 +110,42 @@ function refreshCorner(node, { p, k }) {
 
 const HINTS = {
   corner: "Click the map for each corner; click the first one again, or Done, to close. By keys: Enter sets one at the cross, Escape ends.",
-  home: "Click the map where the vehicle shall return to. By keys: Enter sets it at the cross.",
+  return_point: "Click the map where the vehicle shall return to. By keys: Enter sets it at the cross.",
 };
 
 export function update() {
   const vehicle = store.vehicle;
   if (!vehicle) return;
-  const { outlines, home } = plan();
-  if (pen.tool === "corner" && !outlines[pen.outline]) put(null);
+  const { outlines, returnPoint } = plan();
+  if (pen.tool === "corner" && !outlines[pen.outline]) pickTool(null);
   const wrong = faults(plan());
   foot.update(vehicle, !isSound(plan()));
   text(tools.fence, outlines[0]?.kind === "fence" ? "Extend fence" : "Draw fence");
-  tools.home.setAttribute("aria-pressed", String(pen.tool === "home"));
+  tools.returnPoint.setAttribute("aria-pressed", String(pen.tool === "return_point"));
   for (const [name, node] of Object.entries(tools)) show(node, (name === "done") === (pen.tool === "corner"));
   text(hint, HINTS[pen.tool] ?? (outlines.length > 0 ? "Drag corners on the map; the small dots between add one. Keys: N and P choose, Shift with arrows moves, Delete removes." : ""));
   keyed(list, outlines.map((outline, i) => ({ outline, i, name: nameOutline(plan(), i), fault: wrong.outlines[i] })), (o) => o.i, makeOutline, refreshOutline);
-  show(homeBox, home !== null);
-  if (home) homeFaultShown(home, wrong.home);
-  text(state, describe(vehicle));
+  show(returnBox, returnPoint !== null);
+  if (returnPoint) refreshReturnPoint(returnPoint, wrong.returnPoint);
+  text(state, describeInForce(vehicle));
   const by = vehicle.map.placement;
   show(frame, Boolean(by));
-  if (by) text(frame, `In metres of the world. Fixes have moved its map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
-  show(takeForce, slotOf(vehicle, "fence")?.state === "refused" && Boolean(vehicle.fence_in_force));
+  if (by) text(frame, `In metres of the world frame. Fixes have moved the map by ${metres(by.east_m)} east and ${metres(by.north_m)} north; outlines stay.`);
+  show(editInForce, slotOf(vehicle, "fence")?.state === "refused" && Boolean(vehicle.fence_in_force));
 }
 
-function homeFaultShown(at, fault) {
-  homePlace.update(at);
-  show(homeFault, fault !== null);
-  text(homeFault, fault ?? "");
+function refreshReturnPoint(at, fault) {
+  returnFields.update(at);
+  show(returnFault, fault !== null);
+  text(returnFault, fault ?? "");
 }
 
-/** What holds now, as far as the surface knows. */
-function describe(vehicle) {
+/** The fence in force, as far as the surface knows. */
+function describeInForce(vehicle) {
   const slot = slotOf(vehicle, "fence");
-  if (!slot) return "None was sent since the surface started; the vehicle keeps what it has.";
-  if (slot.state === "applied") return "In force as drawn with solid lines.";
+  if (!slot) return "None sent since the surface started; the vehicle keeps the one that it has.";
+  if (slot.state === "applied") return "In force: the solid lines on the map.";
   const before = vehicle.fence_in_force;
   if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
-  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "Which one is in force meanwhile is not known here.";
+  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "The fence in force meanwhile is unknown to this surface.";
 }

@@ -1,7 +1,7 @@
 // Rates over time with the budget line, on a small canvas.
 
 import { missionTime, nice, rate } from "../format.js";
-import { FONT } from "../map/overlays.js";
+import { FONT } from "../canvas.js";
 import { colour } from "../theme.js";
 
 const LEFT = 4;

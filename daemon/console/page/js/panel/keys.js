@@ -1,4 +1,4 @@
-// What the keys do, in a dialog.
+// The dialog that explains the keys.
 
 import { $, h } from "../dom.js";
 
@@ -6,7 +6,7 @@ const KEYS = [
   ["Arrows", "pan the map"], ["+ and \u2212", "zoom"], ["0", "show everything"], ["F", "follow the vehicle"],
   ["N, P", "constraints: next, previous corner; Shift with arrows moves it, Delete removes it"],
   ["Enter", "set a corner, a point to measure, the return point at the cross; Escape ends"],
-  ["M", "measure"], ["Tab", "go on to the next control"],
+  ["M", "measure"], ["Tab", "move to the next control"],
   ["Wheel, drag, pinch", "zoom and pan with mouse or fingers"],
 ];
 
@@ -15,7 +15,7 @@ export function startKeys() {
     const dialog = $("dialog");
     dialog.replaceChildren(
       h("h2", { id: "dialog-title" }, "Keys"),
-      h("p", {}, "On the map, once it has the focus:"),
+      h("p", {}, "On the map, while it has the focus:"),
       h("dl.keys", {}, ...KEYS.map(([k, does]) => h("div", {}, h("dt", {}, k), h("dd", {}, does)))),
       h("div.buttons", {}, h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close")),
     );

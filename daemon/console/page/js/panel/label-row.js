@@ -1,13 +1,13 @@
-// One label: colour, name, area, weight, picture.
+// The row of one label: colour, name, area, weight, exemplar.
 
 import { h, show, text } from "../dom.js";
 import { area, signed } from "../format.js";
 import { nameOf, tintOf } from "../book.js";
 import { layer } from "../map/layers.js";
 import { store } from "../store.js";
-import { changedElsewhere, draft, setWeight, weight } from "./draft.js";
 import { exemplar, refreshExemplar } from "./exemplar.js";
 import { editLabel } from "./label-dialog.js";
+import { weightsOrder } from "./weights.js";
 
 const latest = new WeakMap();
 
@@ -16,9 +16,9 @@ export function makeRow(label) {
   const chip = h("button.chip", { type: "button", onclick: () => highlight(label.id) });
   const name = h("button.name", { type: "button", title: "Name, colour, merge", onclick: () => editLabel(of()) });
   const size = h("span.area");
-  const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, oninput: () => setWeight(of(), Number(slider.value)) });
+  const slider = h("input", { type: "range", min: -1, max: 1, step: 0.05, oninput: () => weightsOrder.set(store.vehicle, slider.valueAsNumber, label.id) });
   const value = h("output.value");
-  const undo = h("button.undo", { type: "button", onclick: () => setWeight(of(), draft().weights.get(label.id).base) }, "Undo");
+  const undo = h("button.undo", { type: "button", onclick: () => weightsOrder.undo(store.vehicle, label.id) }, "Undo");
   const note = h("p.note");
   const node = h("li.label", {}, chip,
     h("div.head", {}, name, size),
@@ -31,15 +31,15 @@ export function makeRow(label) {
 
 function highlight(id) {
   layer.highlight = layer.highlight === id ? null : id;
-  store.tell("highlight");
+  store.emit("highlight");
 }
 
 export function refreshRow(node, label) {
   latest.set(node, label);
   const { parts } = node;
   const name = nameOf(label.id);
-  const w = weight(label);
-  const mine = draft().weights.get(label.id);
+  const w = weightsOrder.value(store.vehicle, label.id);
+  const isChanged = weightsOrder.isChanged(store.vehicle, label.id);
   const extra = label.members.length > 1 ? ` +${label.members.length - 1}` : "";
   parts.chip.style.backgroundColor = `rgb(${tintOf(label.id).join(" ")})`;
   parts.chip.setAttribute("aria-label", `Show only ${name} on the map`);
@@ -50,11 +50,11 @@ export function refreshRow(node, label) {
   parts.slider.setAttribute("aria-label", `Weight of ${name}`);
   parts.slider.setAttribute("aria-valuetext", signed(w));
   text(parts.value, signed(w));
-  node.classList.toggle("moved", Boolean(mine && !mine.sent));
-  show(parts.undo, Boolean(mine && !mine.sent));
+  node.classList.toggle("moved", isChanged);
+  show(parts.undo, isChanged);
   parts.undo.setAttribute("aria-label", `Undo the weight of ${name}`);
-  const other = changedElsewhere(label);
-  show(parts.note, other !== null);
-  if (other !== null) text(parts.note, `Set to ${signed(other)} elsewhere meanwhile; sending replaces it.`);
+  const isConflicting = weightsOrder.isConflicting(store.vehicle, label.id);
+  show(parts.note, isConflicting);
+  if (isConflicting) text(parts.note, `Another console set it to ${signed(label.weight)} meanwhile; Send replaces that.`);
   refreshExemplar(node.querySelector(".exemplar"), label, name);
 }

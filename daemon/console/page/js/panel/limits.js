@@ -1,42 +1,43 @@
-// Bands of depth and altitude, limits of distance, time and silence, and what the vehicle does at them.
+// Bands of depth and altitude, limits of distance, time and silence, and the reactions of the vehicle.
 
 import { sendLimits } from "../api.js";
 import { h, show, text } from "../dom.js";
+import { orderFoot } from "../order/foot.js";
+import { Order } from "../order/order.js";
+import { slotOf } from "../order/status.js";
 import { store } from "../store.js";
-import { slotOf } from "./lifeline.js";
-import { Order, orderFoot } from "./order.js";
 
-const MOST = 0xffffff;
-const MOST_DEPTH_M = 6553.5;
+const MAX_AMOUNT = 0xffffff;
+const MAX_DEPTH_M = 6553.5;
 const BANDS = [
   ["depth_m", "Depth, m", "Depth below the surface"],
   ["altitude_m", "Altitude, m", "Height above the sea floor"],
 ];
 const AMOUNTS = [
-  ["distance_m", "Distance, m", "Way over ground, the way back included", MOST],
-  ["time_s", "Time, s", "Length of the survey, the way back included", MOST],
-  ["silence_s", "Silence, s", "Without a frame of the surface", 65535],
+  ["distance_m", "Distance, m", "Distance over ground, including the return path", MAX_AMOUNT],
+  ["time_s", "Time, s", "Duration of the survey, including the return path", MAX_AMOUNT],
+  ["silence_s", "Silence, s", "Longest time without a frame of the surface", 65535],
 ];
 const REACTIONS = [["on_silence", "On silence"], ["on_breach", "On a breach"], ["on_abort", "On abort"]];
 
-const WORDS = Object.fromEntries([...BANDS, ...AMOUNTS, ...REACTIONS].map(([key, name]) => [key, name.toLowerCase()]));
+const NAMES = Object.fromEntries([...BANDS, ...AMOUNTS, ...REACTIONS].map(([key, name]) => [key, name.toLowerCase()]));
 const KEYS = [...BANDS, ...AMOUNTS, ...REACTIONS].map(([key]) => key);
 const read = (v) => Object.fromEntries(KEYS.map((k) => [k, v.limits?.[k] ?? null]));
 const stated = (limits) => Object.fromEntries(Object.entries(limits).filter(([, value]) => value !== null));
-export const limitsOrder = new Order("limits", read, (v, limits) => sendLimits(v.id, stated(limits)));
+export const limitsOrder = new Order("limits", read, (v, value) => sendLimits(v.id, stated(value())));
 
-/** What is wrong with a band [low, high]; null if nothing. */
+/** The fault of a band [low, high], or null. */
 export function bandFault(band) {
   if (band === null) return null;
   const [low, high] = band;
   if (low === null || high === null) return "Give both ends, or neither";
-  if (![low, high].every((m) => m >= 0 && m <= MOST_DEPTH_M)) return `It takes 0 to ${MOST_DEPTH_M} m`;
+  if (![low, high].every((m) => m >= 0 && m <= MAX_DEPTH_M)) return `The range is 0 to ${MAX_DEPTH_M} m`;
   return Math.round(low * 10) < Math.round(high * 10) ? null : "The lowest must be below the highest";
 }
 
-export function amountFault(value, most) {
+export function amountFault(value, max) {
   if (value === null) return null;
-  return Number.isInteger(value) && value >= 1 && value <= most ? null : `It takes whole numbers from 1 to ${most}`;
+  return Number.isInteger(value) && value >= 1 && value <= max ? null : `The range is 1 to ${max}, whole numbers`;
 }
 
 const state = h("p.note");
@@ -56,7 +57,7 @@ const number = (input) => (input.validity.badInput ? "?" : input.value === "" ? 
 
 function line(key, name, hint, inputs, faultOf) {
   const fault = h("p.error", { id: `${key}-fault`, role: "alert" });
-  const node = h("div.limit", inputs.length > 1 ? { title: hint, role: "group", "aria-label": name } : { title: hint }, h("span.way", {}, name), h("span.inputs", {}, ...inputs), fault);
+  const node = h("div.limit", inputs.length > 1 ? { title: hint, role: "group", "aria-label": name } : { title: hint }, h("span.caption", {}, name), h("span.inputs", {}, ...inputs), fault);
   const update = (value) => {
     const wrong = faultOf(value);
     show(fault, wrong !== null);
@@ -75,8 +76,8 @@ const fill = (input, value) => {
 };
 
 function bandLine([key, name, hint]) {
-  const ends = ["lowest", "highest"].map((end) => h("input", { type: "number", min: 0, step: 0.1, "aria-label": `${name}, ${end}`, oninput: said }));
-  function said() {
+  const ends = ["lowest", "highest"].map((end) => h("input", { type: "number", min: 0, step: 0.1, "aria-label": `${name}, ${end}`, oninput: readEnds }));
+  function readEnds() {
     const band = ends.map(number);
     set(key, band.every((v) => v === null) ? null : band);
   }
@@ -87,9 +88,9 @@ function bandLine([key, name, hint]) {
   } };
 }
 
-function amountLine([key, name, hint, most]) {
-  const input = h("input", { type: "number", min: 1, max: most, step: 1, "aria-label": name, oninput: () => set(key, number(input)) });
-  const l = line(key, name, hint, [input], (v) => amountFault(v, most));
+function amountLine([key, name, hint, max]) {
+  const input = h("input", { type: "number", min: 1, max, step: 1, "aria-label": name, oninput: () => set(key, number(input)) });
+  const l = line(key, name, hint, [input], (v) => amountFault(v, max));
   return { node: l.node, update(limits) {
     fill(input, limits[key]);
     return l.update(limits[key]);
@@ -98,20 +99,20 @@ function amountLine([key, name, hint, most]) {
 
 function reactionLine([key, name]) {
   const pick = h("select", { onchange: () => set(key, pick.value || null) },
-    h("option", { value: "" }, "as configured there"), ...["hold", "return", "surface"].map((r) => h("option", { value: r }, r)));
-  const node = h("label.limit", {}, h("span.way", {}, name), pick);
+    h("option", { value: "" }, "as configured"), ...["hold", "return", "surface"].map((r) => h("option", { value: r }, r)));
+  const node = h("label.limit", {}, h("span.caption", {}, name), pick);
   return { node, update: (limits) => (pick.value = limits[key] ?? "") };
 }
 
-/** What holds now, as far as the surface knows. */
-function describe(vehicle) {
+/** The limits in force, as far as the surface knows. */
+function describeInForce(vehicle) {
   const slot = slotOf(vehicle, "limits");
-  if (!slot) return "None were sent since the surface started; the vehicle keeps what it has.";
-  if (slot.state === "applied") return "In force as sent last.";
+  if (!slot) return "None sent since the surface started; the vehicle keeps those that it has.";
+  if (slot.state === "applied") return "In force as last sent.";
   const before = vehicle.limits_in_force;
-  if (!before) return "Which ones are in force meanwhile is not known here.";
-  const words = Object.entries(stated(before.order)).map(([key, value]) => `${WORDS[key]} ${value.join?.(" to ") ?? value}`);
-  return `In force meanwhile: version ${before.version}: ${words.join("; ") || "no limits"}.`;
+  if (!before) return "The limits in force meanwhile are unknown to this surface.";
+  const items = Object.entries(stated(before.order)).map(([key, value]) => `${NAMES[key]} ${value.join?.(" to ") ?? value}`);
+  return `In force meanwhile: version ${before.version}: ${items.join("; ") || "no limits"}.`;
 }
 
 export function update() {
@@ -120,6 +121,6 @@ export function update() {
   const limits = limitsOrder.value(vehicle);
   const sound = lines.map((l) => l.update(limits)).every(Boolean);
   for (const c of choices) c.update(limits);
-  text(state, describe(vehicle));
+  text(state, describeInForce(vehicle));
   foot.update(vehicle, !sound);
 }

@@ -1,4 +1,4 @@
-// The acoustic link: rates against the budget, bits by class, loss, delay, backlog.
+// The acoustic link: rates and budget, bits by class, loss, delay, backlog.
 
 import { $, h, row, text } from "../dom.js";
 import { ago, bits, count, none, percent, rate, span } from "../format.js";
@@ -10,27 +10,27 @@ const CLASSES = ["map", "confidence", "curiosity", "depth", "status", "directive
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};
-/** Rows of what the chosen vehicle said or what was measured of it: grey while it is silent. */
+/** Rows with reports of the selected vehicle or measurements of it: grey while it is silent. */
 const ofVehicle = [];
 const list = h("dl.values");
 const classes = h("table.classes");
 const age = h("p.age");
 
 function direction(name, title) {
-  const bar = h("span.bar", {}, h("span.now"), h("span.worst", { title: "Highest rate over one window" }));
+  const bar = h("span.bar", {}, h("span.now"), h("span.max", { title: "Highest rate over one window" }));
   const now = h("b.rate");
-  const worst = h("span.worst-text");
-  return { node: h("div.direction", { title }, h("span.way", {}, name), bar, now, worst), bar, now, worst };
+  const max = h("span.max-text");
+  return { node: h("div.direction", { title }, h("span.caption", {}, name), bar, now, max), bar, now, max };
 }
 
 export function startLink() {
-  for (const [key, name, hint] of [["loss", "Frames lost, up / down"], ["lately", "Lost lately, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"],
-    ["backlog", "Backlog", "What the vehicle has still to send: what it said last, less what has come in since. It goes on surveying meanwhile."],
-    ["lag", "Map lags by", "By what the map here is behind the vehicle's: about how old it is, and the bits that are missing"]]) {
+  for (const [key, name, hint] of [["loss", "Frames lost, up / down"], ["recent", "Recent loss, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"],
+    ["backlog", "Backlog", "The bits that the vehicle still has to send: its last report, less the bits received since. The survey continues meanwhile."],
+    ["lag", "Map lag", "How far this map is behind the vehicle's: its approximate age and the missing bits"]]) {
     const [node, set] = row(name, hint);
     values[key] = set;
     node.classList.toggle("whole", key === "backlog" || key === "lag");
-    if (["lately", "own", "backlog", "lag"].includes(key)) ofVehicle.push(node);
+    if (["recent", "own", "backlog", "lag"].includes(key)) ofVehicle.push(node);
     list.append(node);
   }
   classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
@@ -40,7 +40,7 @@ export function startLink() {
   store.on("state feed theme", update);
   store.on("tick", refreshAge);
   store.on("select", update);
-  store.on("draft select", refreshBudget);
+  store.on("edit select", refreshBudget);
   new ResizeObserver(update).observe(history);
 }
 
@@ -62,7 +62,7 @@ function update() {
   refreshDirection(directions.down, link.down, link);
   values.loss(`${percent(link.up.loss, 1)} / ${percent(link.down.loss, 1)}`);
   const own = store.vehicle?.link;
-  values.lately(own ? `${percent(own.up.loss, 1)} / ${percent(own.down.loss, 1)}` : none);
+  values.recent(own ? `${percent(own.up.loss, 1)} / ${percent(own.down.loss, 1)}` : none);
   values.refused(`${store.vehicle?.status?.refused_frames ?? 0} / ${own?.dropped.unauthenticated ?? 0}`);
   const ownBudget = store.vehicle?.status?.budget_bps;
   values.own(ownBudget ? rate(ownBudget) : none);
@@ -74,33 +74,33 @@ function update() {
   refreshAge();
 }
 
-/** What the chosen vehicle has still to send; null before it has said so. */
-const waiting = () => store.vehicle?.link?.backlog ?? null;
+/** The backlog of the selected vehicle; null before its first report. */
+const reported = () => store.vehicle?.link?.backlog ?? null;
 
 function backlog() {
-  const w = waiting();
-  if (w === null) return none;
-  const said = `said ${ago(ageOf(w.at_s))}`;
-  if (w.bits === 0) return `empty, ${said}`;
-  const empty = w.empty_s === null ? "nothing comes in" : `empty in ${span(w.empty_s - store.nowS)}`;
-  return `${bits(w.bits)}, ${empty}, ${said}`;
+  const r = reported();
+  if (r === null) return none;
+  const report = `reported ${ago(ageOf(r.at_s))}`;
+  if (r.bits === 0) return `empty, ${report}`;
+  const end = r.empty_s === null ? "no data received" : `empty in ${span(r.empty_s - store.nowS)}`;
+  return `${bits(r.bits)}, ${end}, ${report}`;
 }
 
 function lag() {
-  const w = waiting();
-  if (w === null) return none;
-  const old = w.map_lag_s === null ? `more than ${span(ageOf(w.at_s))}` : span(w.map_lag_s + ageOf(store.snapshot.now_s));
-  return `${old}, ${bits(w.map_bits)}`;
+  const r = reported();
+  if (r === null) return none;
+  const old = r.map_lag_s === null ? `more than ${span(ageOf(r.at_s))}` : span(r.map_lag_s + ageOf(store.snapshot.now_s));
+  return `${old}, ${bits(r.map_bits)}`;
 }
 
 /** The bar runs to the budget line at 80 % of its length, so that a breach would show. */
 function refreshDirection(d, side, link) {
   const place = (bps) => `${Math.min(100, (80 * bps) / link.budget_bps)}%`;
   d.bar.children[0].style.width = place(side.bps_1min);
-  d.bar.children[1].style.left = place(side.worst_window_bps);
-  d.bar.classList.toggle("over", side.worst_window_bps > link.budget_bps);
+  d.bar.children[1].style.left = place(side.max_window_bps);
+  d.bar.classList.toggle("over", side.max_window_bps > link.budget_bps);
   text(d.now, rate(side.bps_1min));
-  text(d.worst, `worst ${link.budget_window_s} s: ${percent(side.worst_window_bps / link.budget_bps)} of budget`);
+  text(d.max, `max. in ${link.budget_window_s} s: ${percent(side.max_window_bps / link.budget_bps)} of budget`);
   d.node.title = `${count(side.frames)} frames, ${count(side.lost)} lost`;
 }
 

@@ -1,5 +1,4 @@
-// The panels share one place; these are their tabs. On wide screens labels have a place of their own, and vehicle and
-// link stand together.
+// The tabs of the panels that share one place. On wide screens the labels have their own place, and vehicle and link share a tab.
 
 import { $, h } from "../dom.js";
 import { store } from "../store.js";
@@ -33,5 +32,5 @@ function choose(chosen) {
     tab.setAttribute("aria-selected", String(id === chosen));
     tab.tabIndex = id === chosen ? 0 : -1;
   }
-  store.tell("tab");
+  store.emit("tab");
 }

@@ -1,29 +1,29 @@
-// The chosen vehicle: where it says it is, what it does, the slots of its directive.
+// The selected vehicle: its position and activity as it reports them, and the slots of its directive.
 
 import { $, h, keyed, row, show, text } from "../dom.js";
 import { ago, count, degrees, metres, missionTime, none, span } from "../format.js";
 import { inWorld } from "../map/frames.js";
 import { bearing } from "../map/measure.js";
-import { lengthOf, wayOf } from "../map/way.js";
+import { lengthOf, pathOf } from "../map/path.js";
+import { describe, nameOfStatus } from "../order/status.js";
 import { ageOf, isStale, store } from "../store.js";
-import { describe, word } from "./lifeline.js";
 import { refreshStop, stopParts } from "./stop.js";
 
-const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Pictures", fix: "Position fix" };
+const NAMES = { utility: "Weights", constraints: "Hold, abort", limits: "Limits", fence: "Fence", settings: "Settings", budget: "Budget", requests: "Images", fix: "Position fix" };
 const title = h("h2", { id: "vehicle-title" });
 const mode = h("span.mode");
 const age = h("p.age");
 const values = {};
 const list = h("dl.values");
 const slots = h("ul.slots");
-const nothing = h("p.note", {}, "Nothing sent yet.");
+const noOrders = h("p.note", {}, "No order sent yet.");
 
 export function startVehicle() {
   for (const [key, name, hint] of [
     ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
     ["sigma", "Position \u03c3", "Standard deviation of its position; the ring on the map is twice this"],
-    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "What it plans, from where it was over the waypoint to the last place that it tells; dashed on the map"], ["cells", "Its own map"], ["contact", "Next contact"],
-    ["gps", "Surface GPS", "Where the surface knows itself to be, and fixes that it sent to vehicles"],
+    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "Its plan from the reported position over the waypoint to the last reported place; dashed on the map"], ["cells", "Its own map"], ["contact", "Next contact"],
+    ["gps", "Surface GPS", "The position of the surface by GPS, and the fixes that it sent to vehicles"],
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;
@@ -31,8 +31,8 @@ export function startVehicle() {
     list.append(node);
   }
   $("vehicle").append(h("header", {}, title, mode), age, list,
-    h("h3", {}, "Directive"), slots, nothing, ...stopParts);
-  store.on("state select tick feed draft", update);
+    h("h3", {}, "Directive"), slots, noOrders, ...stopParts);
+  store.on("state select tick feed edit", update);
 }
 
 function update() {
@@ -40,23 +40,23 @@ function update() {
   if (!v) return;
   const s = v.status;
   text(title, v.name);
-  const doing = s?.doing ?? s?.mode ?? "unknown";
-  text(mode, s?.autopilot_silent ? `${doing}, autopilot silent` : doing);
+  const activity = s?.activity ?? "unknown";
+  text(mode, s?.autopilot_silent ? `${activity}, autopilot silent` : activity);
   mode.dataset.mode = s?.mode ?? "none";
   $("vehicle").classList.toggle("stale", isStale(v));
-  text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 heard ${ago(ageOf(v.heard_s))}, due every ${span(v.expected_interval_s)}` : "No status heard yet.");
+  text(age, s ? `Status ${span(ageOf(s.at_s))} old \u00b7 received ${ago(ageOf(v.last_received_s))}, due every ${span(v.expected_interval_s)}` : "No status received yet.");
   values.position(s ? inWorld(v, s.x_m, s.y_m).map((m) => metres(m)).join(", ") : none);
   values.depth(s ? metres(-s.z_m) : none);
   values.heading(s ? degrees(s.heading_deg) : none);
   values.sigma(s ? metres(s.sigma_m) : none);
   values.fix(s?.fix_age_s === null || !s ? "none" : `${span(s.fix_age_s + ageOf(s.at_s))} ago`);
   values.waypoint(s?.waypoint ? leg(s) : none);
-  values.path(s?.waypoint ? ahead(s) : none);
+  values.path(s?.waypoint ? plannedPath(s) : none);
   values.cells(s ? `${count(s.cells)} cells, ${s.labels} labels` : none);
   values.contact(v.next_contact_s === null ? "unknown" : `${missionTime(v.next_contact_s)}, ${due(v)}`);
   values.gps(gps(store.snapshot.position));
   keyed(slots, v.directive.slots, (x) => x.slot, makeSlot, refreshSlot);
-  show(nothing, v.directive.slots.length === 0);
+  show(noOrders, v.directive.slots.length === 0);
   refreshStop(v);
 }
 
@@ -64,9 +64,9 @@ const total = (counts) => Object.values(counts).reduce((sum, n) => sum + n, 0);
 
 function gps(p) {
   if (!p) return "none";
-  const unused = total(p.sightings_unused);
-  const state = p.is_good ? `\u00b1 ${metres(p.sigma_m)}` : "no position";
-  return `${state}, ${count(p.fixes)} fixes${unused ? `, ${count(unused)} sightings unused` : ""}`;
+  const rejected = total(p.usbl_rejected);
+  const state = p.is_valid ? `\u00b1 ${metres(p.sigma_m)}` : "no position";
+  return `${state}, ${count(p.fixes_sent)} fixes${rejected ? `, ${count(rejected)} USBL measurements rejected` : ""}`;
 }
 
 const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s - store.nowS)}` : "overdue");
@@ -76,19 +76,19 @@ function leg(s) {
   return `${metres(Math.hypot(to[0] - s.x_m, to[1] - s.y_m))} at ${degrees(bearing([s.x_m, s.y_m], to))}`;
 }
 
-function ahead(s) {
-  const way = wayOf(s);
-  const n = way.length - 1;
-  return `${n} waypoint${n === 1 ? "" : "s"}, ${metres(lengthOf(way))}${s.path_goes_on ? ", goes on" : ""}`;
+function plannedPath(s) {
+  const places = pathOf(s);
+  const n = places.length - 1;
+  return `${n} waypoint${n === 1 ? "" : "s"}, ${metres(lengthOf(places))}${s.path_continues ? ", continues" : ""}`;
 }
 
-const makeSlot = () => h("li.slot", {}, h("span.what"), h("span.version"), h("span.state"), h("span.since"));
+const makeSlot = () => h("li.slot", {}, h("span.name"), h("span.version"), h("span.state"), h("span.since"));
 
 function refreshSlot(node, slot) {
-  const [what, version, state, since] = node.children;
-  text(what, NAMES[slot.slot] ?? slot.slot);
+  const [name, version, state, since] = node.children;
+  text(name, NAMES[slot.slot] ?? slot.slot);
   text(version, `v${slot.version}`);
-  text(state, word(slot.state));
+  text(state, nameOfStatus(slot.state));
   text(since, span(ageOf(slot.changed_s)));
   node.dataset.state = slot.state;
   node.title = describe(slot);

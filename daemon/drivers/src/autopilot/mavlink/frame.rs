@@ -18,24 +18,20 @@ const SIGNED: u8 = 1;
 /// A frame with a right check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    /// Who sent it.
     pub system: u8,
-    /// Which part of it.
     pub component: u8,
-    /// Number of the message.
     pub id: u32,
     /// Its fields; trailing zeros may be missing.
     pub payload: Vec<u8>,
 }
 
-/// What was not taken, by reason.
+/// Refused bytes, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Refused {
     /// Frames of a known message with a wrong check.
     pub checksum: u64,
     /// Frames with a feature that is not understood.
     pub incompatible: u64,
-    /// Bytes between frames.
     pub garbage: u64,
 }
 
@@ -46,9 +42,8 @@ pub struct Deframer {
     refused: Refused,
 }
 
-/// What stands at the front of the bytes held.
+/// The frame at the front of the collected bytes.
 enum Front {
-    /// More bytes are needed.
     Incomplete,
     /// A frame of so many bytes, `None` if its message is not known.
     Whole(usize, Option<Frame>),
@@ -57,12 +52,11 @@ enum Front {
 }
 
 impl Deframer {
-    /// What was not taken so far.
+    /// Refused bytes so far, by reason.
     pub fn refused(&self) -> Refused {
         self.refused
     }
 
-    /// The stream begins anew.
     pub fn clear(&mut self) {
         self.held.clear();
     }
@@ -183,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn version_one_signatures_and_unknown_messages_are_passed_over_whole() {
+    fn version_one_signed_and_unknown_messages_are_skipped() {
         let mut v1 = vec![V1, 9, 7, 1, 1, 0, 0, 0, 0, 0, 6, 8, 0, 4, 3];
         v1.extend(check(&v1[1..], 50).to_le_bytes());
         let mut signed = bytes(HEARTBEAT);

@@ -7,7 +7,6 @@
 /// A message that is read.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heard {
-    /// HEARTBEAT, once a second.
     Heartbeat {
         /// Mode, in the numbers of the autopilot.
         custom_mode: u32,
@@ -15,50 +14,37 @@ pub enum Heard {
         kind: u8,
         /// MAV_AUTOPILOT: 8 is none, as of a ground station.
         autopilot: u8,
-        /// MAV_MODE_FLAG: 128 armed.
         base_mode: u8,
     },
     /// ATTITUDE: yaw clockwise from north, radians.
-    Attitude {
-        /// Radians.
-        yaw: f32,
-    },
+    Attitude { yaw: f32 },
     /// LOCAL_POSITION_NED: metres and metres a second; north, east, down.
     Local {
         /// Milliseconds since the autopilot started.
         time_boot_ms: u32,
         /// From the autopilot's own origin.
         place: [f32; 3],
-        /// Way.
         velocity: [f32; 3],
     },
-    /// GLOBAL_POSITION_INT.
     Global {
         /// Milliseconds since the autopilot started.
         time_boot_ms: u32,
-        /// Degrees times ten million.
         lat: i32,
-        /// Degrees times ten million.
         lon: i32,
-        /// Millimetres above home.
         relative_alt: i32,
         /// North, east, down in centimetres a second.
         velocity: [i16; 3],
         /// Hundredths of a degree; 65535 = not known.
         heading: u16,
     },
-    /// COMMAND_ACK.
     Ack {
-        /// Which command.
         command: u16,
         /// MAV_RESULT: 0 accepted, 5 in progress; the rest is a refusal.
         result: u8,
     },
-    /// STATUSTEXT.
     Text {
         /// MAV_SEVERITY: 0 emergency to 7 debug.
         severity: u8,
-        /// At most 50 bytes.
         text: String,
     },
 }
@@ -68,9 +54,7 @@ pub enum Heard {
 pub enum Said {
     /// HEARTBEAT of an onboard controller.
     Heartbeat,
-    /// COMMAND_LONG.
     Command {
-        /// MAV_CMD.
         command: u16,
         /// Its parameters; the last four are 0.
         params: [f32; 3],
@@ -79,13 +63,9 @@ pub enum Said {
     Local([f32; 3]),
     /// SET_POSITION_TARGET_GLOBAL_INT: degrees times ten million, metres above home.
     Global(i32, i32, f32),
-    /// GPS_INPUT.
     Gps {
-        /// Degrees times ten million.
         lat: i32,
-        /// Degrees times ten million.
         lon: i32,
-        /// Standard deviation, metres.
         sigma_m: f32,
     },
 }
@@ -103,7 +83,7 @@ pub fn heard_extra(id: u32) -> Option<u8> {
     })
 }
 
-/// Fields of a payload, in order; what is missing at its end is zero.
+/// Fields of a payload, in order; fields missing at its end are zero.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -141,7 +121,7 @@ impl Fields<'_> {
 }
 
 impl Heard {
-    /// Reads a message; `None` if it is of no use, or says numbers that are none.
+    /// Parses a message; `None` if it is not used here, or has numbers that are not finite.
     pub fn read(id: u32, payload: &[u8]) -> Option<Self> {
         let mut f = Fields(payload);
         let read = match id {
@@ -188,9 +168,7 @@ impl Heard {
 
 /// Every field of a position target but the position is to be ignored.
 const POSITION_ONLY: u16 = 0x0DF8;
-/// MAV_FRAME_LOCAL_NED.
 const LOCAL_NED: u8 = 1;
-/// MAV_FRAME_GLOBAL_RELATIVE_ALT_INT.
 const GLOBAL_RELATIVE: u8 = 6;
 /// GPS_INPUT fields that are not known: altitude, VDOP, velocities and their accuracy, vertical accuracy.
 const GPS_IGNORED: u16 = 1 | 4 | 8 | 16 | 32 | 128;

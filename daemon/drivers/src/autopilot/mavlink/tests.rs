@@ -119,7 +119,7 @@ fn a_pilot_who_takes_over_is_obeyed() {
 }
 
 #[test]
-fn silence_is_counted_once_and_said_and_it_goes_on_when_the_autopilot_is_back() {
+fn silence_is_reported_once_and_ends_when_the_autopilot_returns() {
     let mut pilot = pilot(false);
     assert_eq!(pilot.health(at(0.0)), Health::Awaited);
     pilot.handle_bytes(&heartbeat(4, true), at(0.0));
@@ -153,7 +153,7 @@ fn places_go_out_as_gps_input_and_move_on_with_the_vehicle() {
 }
 
 #[test]
-fn an_autopilot_that_tells_only_where_on_the_earth_it_is_is_steered_there() {
+fn an_autopilot_with_global_positions_only_is_steered() {
     let mut pilot = pilot(false);
     pilot.set_goal(Some(Goal { east_m: 0.0, north_m: 100.0, depth_m: None, place: None }), at(0.0));
     pilot.handle_bytes(&heartbeat(4, true), at(0.0));

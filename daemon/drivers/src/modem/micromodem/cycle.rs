@@ -1,4 +1,4 @@
-//! Cycles: who fills the next packet, and what became of it.
+//! Cycles: who fills the next packet, and its outcome.
 
 use super::{EVERYBODY, Micromodem, Sentence, from_hex, to_hex};
 use crate::modem::driver::{Event, Reception, Token};
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// Farthest that an answer is waited for, one way.
 const TRAVEL: Duration = Duration::from_secs(2);
-/// What modems take to decode and to turn round, and hosts to answer.
+/// Time for modems to decode and turn around, and for hosts to answer.
 const SLACK: Duration = Duration::from_secs(2);
 /// A vehicle is never so fast that the way to it and back grows by more than a hundredth of the time (7.5 m/s).
 const RECEDES: u32 = 100;
@@ -25,13 +25,12 @@ pub(super) struct Given {
     pub bytes: Vec<u8>,
 }
 
-/// A cycle that our modem was told to begin.
+/// A cycle that our modem was ordered to begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Begun {
     from: ModemAddress,
     to: ModemAddress,
     frames: u8,
-    /// Whether we fill it.
     ours: bool,
     /// When it was begun, and when it is over at the latest.
     at: Instant,
@@ -47,19 +46,17 @@ struct Request {
     dst: ModemAddress,
 }
 
-/// What is under way.
 #[derive(Debug, Default)]
 pub(super) struct Cycles {
     begun: Option<Begun>,
-    /// What the modem did not do, to be begun again.
+    /// The cycle to begin again, after the modem refused it.
     again: Option<Begun>,
     paused: Option<Instant>,
     request: Option<Request>,
-    /// Frames that the link has to give, as the modem said; told once a cycle.
+    /// Frames that the modem requests of the link; reported once for each cycle.
     polled: bool,
     /// Given by the link, not yet asked for.
     pub offered: VecDeque<Given>,
-    /// In the modem.
     taken: Vec<Token>,
     /// When the packet with `taken` has left at the latest.
     leaves: Option<Instant>,
@@ -95,13 +92,12 @@ impl Cycles {
 }
 
 impl Micromodem {
-    /// `$CCCYC,0,<src>,<dst>,<rate>,<ack>,<nframes>`
     pub(super) fn start_cycle(&mut self, from: ModemAddress, to: ModemAddress, frames: u32, now: Instant) {
         const TRIES: u8 = 30;
         self.start(from, to, frames.clamp(1, u32::from(self.config.rate.frames)) as u8, TRIES, now);
     }
 
-    /// What the modem refused, or forgot in a restart, is begun again.
+    /// Begins a cycle again that the modem refused, or lost in a restart.
     pub(super) fn start_again(&mut self, now: Instant) {
         if let Some(b) = self.cycles.again.take() {
             self.start(b.from, b.to, b.frames, b.tries - 1, now);
@@ -157,7 +153,6 @@ impl Micromodem {
         }
     }
 
-    /// `$CADRQ,<HHMMSS>,<src>,<dst>,<ack>,<max bytes>,<frame>`
     fn handle_request(&mut self, s: &Sentence) {
         let (Some(src), Some(dst)) = (s.number(1), s.number(2)) else { return };
         self.cycles.request = Some(Request { src, dst });
@@ -185,7 +180,6 @@ impl Micromodem {
         }
     }
 
-    /// `$CARXD,<src>,<dst>,<ack>,<frame>,<hex>`
     fn handle_frame(&mut self, s: &Sentence) {
         let (Some(src), Some(dst)) = (s.number::<u8>(0), s.number::<u8>(1)) else { return };
         if src == self.config.address {
@@ -198,7 +192,6 @@ impl Micromodem {
         self.events.push_back(Event::Received(reception));
     }
 
-    /// The packet has left.
     fn handle_left(&mut self) {
         let taken = std::mem::take(&mut self.cycles.taken);
         self.events.extend(taken.into_iter().map(Event::Sent));
@@ -210,7 +203,7 @@ impl Micromodem {
         }
     }
 
-    /// What the modem did not ask for is not on air.
+    /// A frame that the modem never requested is not on air.
     fn drop_offered(&mut self) {
         let left = std::mem::take(&mut self.cycles.offered);
         self.events.extend(left.into_iter().map(|given| Event::Failed(given.token)));
@@ -238,7 +231,7 @@ impl Micromodem {
         }
     }
 
-    /// The modem complains: what it was told is not done.
+    /// The modem reports an error: the last command failed.
     pub(super) fn handle_cycle_refused(&mut self, now: Instant) {
         self.cycles.paused = Some(now + PAUSE);
         if self.cycles.taken.is_empty() {

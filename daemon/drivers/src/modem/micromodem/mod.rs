@@ -21,26 +21,22 @@ use std::time::Duration;
 /// Quiet before the modem is spoken to, and after its banner.
 const SETTLE: Duration = Duration::from_millis(300);
 /// Longest wait for the echo of a sentence.
-const PATIENCE: Duration = Duration::from_secs(3);
-/// Longest wait however much else the modem has to say: it may never have heard the question.
-const LONGEST_WAIT: Duration = Duration::from_secs(9);
+const REPLY_TIMEOUT: Duration = Duration::from_secs(3);
+/// Longest wait for a reply while other sentences arrive: the modem may have missed the command.
+const MAX_WAIT: Duration = Duration::from_secs(9);
 /// Between two questions to a modem at work.
 const BEAT: Duration = Duration::from_secs(5);
-/// After a wrong address.
 const AFTER_REFUSAL: Duration = Duration::from_secs(10);
-/// Silence after which the port is opened anew.
+/// Silence after which the port is opened again.
 const DEAF: Duration = Duration::from_secs(20);
-/// Highest address.
 const HIGHEST: ModemAddress = 127;
-/// Address of everybody.
 const EVERYBODY: ModemAddress = 0;
 
-/// What a Micromodem is to be.
+/// The configuration of a Micromodem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MicromodemConfig {
     /// The address that the modem must have.
     pub address: ModemAddress,
-    /// Of its packets.
     pub rate: MicromodemRate,
     /// Speed of the serial line, bit/s.
     pub baud: Option<u32>,
@@ -110,7 +106,7 @@ impl Micromodem {
         self.output.clear();
     }
 
-    /// What was given to the modem is gone.
+    /// All frames in the modem are lost.
     fn forget_frames(&mut self) {
         let given = self.cycles.clear();
         self.events.extend(given.into_iter().map(Event::Unknown));
@@ -147,10 +143,9 @@ impl Micromodem {
 
     fn ask(&mut self, body: &str, now: Instant) {
         self.say(body);
-        (self.asked, self.asked_at) = (Some(now + PATIENCE), now);
+        (self.asked, self.asked_at) = (Some(now + REPLY_TIMEOUT), now);
     }
 
-    /// `CACFG,<name>,<value>`
     fn handle_setting(&mut self, name: &str, value: &str, now: Instant) {
         let ours = self.config.address;
         if name == "SRC" {
@@ -212,8 +207,8 @@ impl Micromodem {
     fn handle_sentence(&mut self, sentence: &Sentence, now: Instant) {
         self.heard = now;
         // An answer waits behind what else the modem has to say, which may take seconds on a slow line.
-        let latest = self.asked_at + LONGEST_WAIT;
-        self.asked = self.asked.map(|deadline| deadline.max((now + PATIENCE).min(latest)));
+        let latest = self.asked_at + MAX_WAIT;
+        self.asked = self.asked.map(|deadline| deadline.max((now + REPLY_TIMEOUT).min(latest)));
         match sentence.name.as_str() {
             "CACFG" => self.handle_setting(sentence.text(0), sentence.text(1), now),
             "CAREV" if sentence.text(1) == "INIT" => self.start_over(SETTLE, now),

@@ -1,6 +1,5 @@
 //! NMEA sentences of a Micromodem.
 
-/// The longest sentence.
 const LIMIT: usize = 6 * 1024;
 
 /// A sentence of the modem, checksum verified.
@@ -8,7 +7,6 @@ const LIMIT: usize = 6 * 1024;
 pub struct Sentence {
     /// Talker and type, as in `CARXD`.
     pub name: String,
-    /// What follows.
     pub fields: Vec<String>,
 }
 
@@ -33,7 +31,6 @@ pub fn format_sentence(body: &str) -> Vec<u8> {
     format!("${body}*{:02X}\r\n", checksum(body.as_bytes())).into_bytes()
 }
 
-/// Upper-case hex digits.
 pub fn to_hex(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
     let digit = |n: u8| char::from(DIGITS[usize::from(n & 15)]);
@@ -60,7 +57,6 @@ pub struct SentenceParser {
 }
 
 impl SentenceParser {
-    /// Bytes that are kept.
     pub fn kept(&self) -> usize {
         self.collected.len()
     }

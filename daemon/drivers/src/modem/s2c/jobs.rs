@@ -1,4 +1,4 @@
-//! What waits for an S2C modem, and what it holds.
+//! The queues in front of an S2C modem, and its contents.
 
 use crate::modem::driver::{Class, Token};
 use scenecast_core::ModemAddress;
@@ -9,7 +9,6 @@ use std::collections::{BTreeMap, VecDeque};
 #[derive(Debug, Clone)]
 pub(super) struct Job {
     pub token: Token,
-    /// 255: everybody.
     pub dst: ModemAddress,
     pub bytes: Vec<u8>,
     pub class: Class,
@@ -29,20 +28,28 @@ pub(super) struct Message {
     pub until: Instant,
 }
 
-/// What waits and what is under way.
+/// Queued transmissions, and those in the modem.
 #[derive(Debug, Default)]
 pub(super) struct Jobs {
     pub commands: VecDeque<Job>,
-    /// The newest acknowledgement; older ones have nothing to say beside it.
+    /// The newest acknowledgement, which replaces older ones.
     pub services: VecDeque<Job>,
     pub bulk: VecDeque<Job>,
     pub message: Option<Message>,
     /// Records in the modem's pool by packet counter, and since when.
     pub pool: BTreeMap<u32, (Token, Instant)>,
+    /// No message is tried before this time.
+    pub message_pause: Instant,
+    /// No record is tried before this time.
+    pub record_pause: Instant,
 }
 
 impl Jobs {
-    /// Whether nothing of the bulk is in the modem.
+    pub(super) fn resume(&mut self, now: Instant) {
+        (self.message_pause, self.record_pause) = (now, now);
+    }
+
+    /// Whether the modem holds no bulk.
     pub(super) fn is_pool_empty(&self) -> bool {
         self.pool.is_empty()
     }

@@ -1,50 +1,46 @@
-//! EvoLogics S2C: bulk as bursts, commands as instant messages, acknowledgements with what the modem sends anyway.
+//! EvoLogics S2C: bulk as bursts, commands as instant messages, acknowledgements as piggybacks.
 //!
 //! The NET interpreter is preferred; a port of the AT interpreter is found out and spoken to by `+++AT`. Records of a burst
 //! are pieces of a framed stream ([`super::framing`]), so both interpreters understand each other and no payload holds a
 //! command.
 
+mod bursts;
 mod config;
+mod dialogue;
 mod jobs;
 mod line;
 mod notice;
 mod receive;
 mod send;
 mod setup;
+mod supervision;
 
 pub use config::{BURST_FRAME_BYTES, INSTANT_BYTES, S2cConfig, S2cMode, instant_airtime};
 pub use line::{Line, LineParser};
 
 use super::driver::{Class, Destination, Driver, Event, Refusal, Token, check_length};
-use super::framing::Deframer;
+use bursts::{BurstAirtime, BurstStreams};
+use dialogue::{Dialogue, Pending};
 use jobs::{Job, Jobs};
 use scenecast_core::ModemAddress;
 use scenecast_protocol::mac::{Access, ModemProfile};
 use scenecast_protocol::time::Instant;
 use setup::{Step, Verdict};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
+use supervision::Supervision;
 
 /// Quiet before the modem is spoken to: half a line may be under way.
 const SETTLE: Duration = Duration::from_millis(300);
-/// Longest wait for a reply, beside what the line takes.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// Longest wait however much else the modem has to say: the reply may have been lost on the line.
-const LONGEST_WAIT: Duration = Duration::from_secs(9);
-/// From `ATO` to data.
+/// Longest wait for a reply, beyond the transfer time of the line.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
+/// Longest wait for a reply while notices arrive: the reply may have been lost on the line.
+const MAX_REPLY_WAIT: Duration = Duration::from_secs(9);
 const DATA_MODE: Duration = Duration::from_millis(1500);
-/// Between two questions to a modem at work.
-const BEAT: Duration = Duration::from_secs(2);
 /// After a wrong address, or a setting that was not taken.
 const AFTER_REFUSAL: Duration = Duration::from_secs(10);
-/// Silence after which the port is opened anew.
-const DEAF: Duration = Duration::from_secs(15);
-/// No command has more bytes to count.
-const LONGEST_RECORD: usize = 1030;
-/// Address of everybody.
 const EVERYBODY: ModemAddress = 255;
 
-/// Where the driver stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// The port is not open.
@@ -53,28 +49,8 @@ enum Phase {
     Settling(Instant),
     /// Asks which interpreter there is.
     Discovering,
-    /// Works through the start-up.
     SettingUp(usize),
-    /// At work.
     Ready,
-}
-
-/// What a reply is waited for.
-#[derive(Debug, Clone)]
-enum Asked {
-    /// `+++AT?MODE`, which not every port understands.
-    Interpreter,
-    /// `AT?MODE`
-    Mode,
-    Setup(Step),
-    Beat(Step),
-    Message(Job, bool),
-    Piggyback(Job),
-    /// A copy of the command that goes as a message next.
-    Copy(Job),
-    Record(Job),
-    /// The packet counter of the record just taken.
-    Count(Token),
 }
 
 /// A driver for an S2C modem.
@@ -82,39 +58,13 @@ enum Asked {
 pub struct S2c {
     config: S2cConfig,
     phase: Phase,
-    parser: LineParser,
-    /// Whether commands go as `+++AT`.
-    ties: bool,
-    asked: Option<(Asked, Instant)>,
-    asked_at: Instant,
-    output: VecDeque<Vec<u8>>,
+    dialogue: Dialogue,
+    supervision: Supervision,
+    jobs: Jobs,
+    streams: BurstStreams,
+    airtime: BurstAirtime,
     events: VecDeque<Event>,
     tokens: Token,
-    jobs: Jobs,
-    /// Neither messages nor records are tried before.
-    message_pause: Instant,
-    record_pause: Instant,
-    beat_at: Instant,
-    beats: usize,
-    /// The packet counter, once it was read.
-    counter: Option<u32>,
-    /// When anything sensible was last heard of the modem.
-    heard: Instant,
-    opened: Instant,
-    streams: BTreeMap<ModemAddress, Deframer>,
-    /// When burst data of a modem was last heard: it will want an acknowledgement soon.
-    burst_heard: BTreeMap<ModemAddress, Instant>,
-    /// Bits of bursts that were given and that were on air.
-    given_bits: u64,
-    aired_bits: u64,
-    local_rate: u32,
-    /// Questions in a row without an answer.
-    silences: u32,
-    /// Whether it ever was at work.
-    was_ready: bool,
-    /// The step of the start-up that failed last.
-    failed: Option<Step>,
-    refusal: Option<String>,
 }
 
 impl S2c {
@@ -123,72 +73,41 @@ impl S2c {
         Self {
             config,
             phase: Phase::Closed,
-            parser: LineParser::default(),
-            ties: false,
-            asked: None,
-            asked_at: Instant::ZERO,
-            output: VecDeque::new(),
+            dialogue: Dialogue::default(),
+            supervision: Supervision::default(),
+            jobs: Jobs::default(),
+            streams: BurstStreams::default(),
+            airtime: BurstAirtime::default(),
             events: VecDeque::new(),
             tokens: 0,
-            jobs: Jobs::default(),
-            message_pause: Instant::ZERO,
-            record_pause: Instant::ZERO,
-            beat_at: Instant::ZERO,
-            beats: 0,
-            counter: None,
-            heard: Instant::ZERO,
-            opened: Instant::ZERO,
-            streams: BTreeMap::new(),
-            burst_heard: BTreeMap::new(),
-            given_bits: 0,
-            aired_bits: 0,
-            local_rate: 0,
-            silences: 0,
-            was_ready: false,
-            failed: None,
-            refusal: None,
         }
     }
 
-    /// What the modem held is gone, or nobody knows: from the beginning, after `pause`.
+    /// Starts over after `pause`: the modem's contents are lost or unknown.
     fn start_over(&mut self, pause: Duration, now: Instant) {
         let tokens = self.jobs.clear();
-        let asked = self.asked.take().and_then(|(asked, _)| asked.token());
-        self.events.extend(tokens.into_iter().chain(asked).map(Event::Unknown));
+        let pending = self.dialogue.clear();
+        self.events.extend(tokens.into_iter().chain(pending).map(Event::Unknown));
         if self.phase == Phase::Ready {
             self.events.push_back(Event::Reset);
         }
-        self.output.clear();
-        self.parser.clear();
         self.streams.clear();
-        self.counter = None;
+        self.supervision.set_counter(None);
         self.phase = Phase::Settling(now + pause);
     }
 
-    /// Tells a person, once for each thing.
+    /// Reports a fault to a person, once for each text.
     fn refuse(&mut self, what: String) {
-        if self.refusal.as_ref() != Some(&what) {
-            self.refusal = Some(what.clone());
-            self.events.push_back(Event::Refused(what));
-        }
+        self.events.extend(self.supervision.refuse(what).map(Event::Refused));
     }
 
-    fn end_of_line(&self) -> &'static [u8] {
-        if self.config.ethernet { b"\n" } else { b"\r" }
+    fn request(&mut self, command: &[u8], pending: Pending, now: Instant) {
+        self.dialogue.request(command, pending, &self.config, now);
     }
 
-    /// Writes a command and waits for its reply.
-    fn ask(&mut self, command: &[u8], asked: Asked, now: Instant) {
-        let prefix: &[u8] = if self.ties { b"+++AT" } else { b"AT" };
-        let bytes = [prefix, command, self.end_of_line()].concat();
-        let deadline = now + PATIENCE + self.config.line_time(bytes.len());
-        (self.asked, self.asked_at) = (Some((asked, deadline)), now);
-        self.output.push_back(bytes);
-    }
-
-    /// Asks what is next, if the modem is not busy with a question.
+    /// Sends the next command, unless a reply is outstanding.
     fn proceed(&mut self, now: Instant) {
-        if self.asked.is_some() {
+        if !self.dialogue.is_idle() {
             return;
         }
         match self.phase {
@@ -196,22 +115,16 @@ impl S2c {
             Phase::Settling(until) if now < until => {}
             Phase::Settling(_) => {
                 self.phase = Phase::Discovering;
-                self.parser.clear();
-                self.ties = true;
-                self.parser.set_ties(true);
-                if self.silences > 1 {
-                    // It may still count the bytes of a record that was cut off on its way.
-                    self.output.push_back(self.end_of_line().repeat(LONGEST_RECORD));
-                }
-                self.ask(b"?MODE", Asked::Interpreter, now);
+                self.dialogue.discover(&self.config, now);
             }
             Phase::Discovering => {}
-            Phase::SettingUp(index) => match setup::start_up(&self.config, !self.was_ready).into_iter().nth(index) {
-                Some(step) => self.ask(step.command.clone().as_bytes(), Asked::Setup(step), now),
+            Phase::SettingUp(index) => match self.supervision.start_up(&self.config, index) {
+                Some(step) => self.request(step.command.clone().as_bytes(), Pending::Setup(step), now),
                 None => {
-                    (self.phase, self.was_ready) = (Phase::Ready, true);
-                    (self.refusal, self.failed, self.silences) = (None, None, 0);
-                    (self.message_pause, self.record_pause, self.beat_at) = (now, now, now + BEAT);
+                    self.phase = Phase::Ready;
+                    self.supervision.set_ready(now);
+                    self.dialogue.forget_silences();
+                    self.jobs.resume(now);
                     self.events.push_back(Event::Ready);
                     self.proceed_at_work(now);
                 }
@@ -221,13 +134,12 @@ impl S2c {
     }
 
     fn proceed_at_work(&mut self, now: Instant) {
-        if self.send_next(now) || now < self.beat_at {
+        if self.send_next(now) {
             return;
         }
-        self.beat_at = now + BEAT;
-        self.beats += 1;
-        let step = setup::beat(&self.config, self.beats);
-        self.ask(step.command.clone().as_bytes(), Asked::Beat(step), now);
+        if let Some(step) = self.supervision.next_beat(&self.config, now) {
+            self.request(step.command.clone().as_bytes(), Pending::Beat(step), now);
+        }
     }
 
     /// The reply to a step of the start-up, or to a question at work.
@@ -235,10 +147,12 @@ impl S2c {
         match step.judge(reply, &self.config) {
             Verdict::Good => {}
             // Less than it was: the modem has restarted, and what it held is gone.
-            Verdict::Counter(count) if self.phase == Phase::Ready && self.counter.is_some_and(|c| count != c) => {
+            Verdict::Counter(count)
+                if self.phase == Phase::Ready && self.supervision.counter().is_some_and(|c| count != c) =>
+            {
                 return self.start_over(SETTLE, now);
             }
-            Verdict::Counter(count) => self.counter = Some(count),
+            Verdict::Counter(count) => self.supervision.set_counter(Some(count)),
             Verdict::WrongAddress(found) => {
                 let ours = self.config.address;
                 self.refuse(format!(
@@ -249,11 +163,10 @@ impl S2c {
             }
             Verdict::Bad if self.phase == Phase::Ready => return self.start_over(SETTLE, now),
             Verdict::Bad => {
-                // Once may be the answer to something else.
-                if self.failed.replace(step.clone()).as_ref() == Some(step) {
+                if self.supervision.fails_again(step) {
                     self.refuse(format!("the modem answers AT{} with {reply:?}", step.command));
                 }
-                return self.start_over(PATIENCE, now);
+                return self.start_over(REPLY_TIMEOUT, now);
             }
         }
         if let Phase::SettingUp(index) = self.phase {
@@ -261,24 +174,23 @@ impl S2c {
         }
     }
 
-    /// What is there: NET, AT in command mode, AT in data mode.
-    fn handle_interpreter(&mut self, asked: &Asked, reply: &str, now: Instant) {
-        match (asked, reply) {
-            (Asked::Interpreter, "AT") => self.phase = Phase::SettingUp(0),
+    /// Handles the reply that names the interpreter: NET, AT in command mode, AT in data mode.
+    fn handle_interpreter(&mut self, pending: &Pending, reply: &str, now: Instant) {
+        match (pending, reply) {
+            (Pending::Interpreter, "AT") => self.phase = Phase::SettingUp(0),
             // The line end, or the escape, was not understood: there is no data mode now.
-            (Asked::Interpreter, _) => {
-                self.ties = false;
-                self.parser.set_ties(false);
-                self.ask(b"?MODE", Asked::Mode, now);
+            (Pending::Interpreter, _) => {
+                self.dialogue.set_escaped(false);
+                self.request(b"?MODE", Pending::Mode, now);
             }
             (_, "NET") => self.phase = Phase::SettingUp(0),
             (_, "AT") => {
                 // Command mode hides burst data: to data mode, which nothing answers.
-                self.output.push_back([b"ATO", self.end_of_line()].concat());
+                self.dialogue.enter_data_mode(&self.config);
                 self.phase = Phase::Settling(now + DATA_MODE);
             }
             // A reply to something else.
-            _ => self.asked = Some((Asked::Mode, now + PATIENCE)),
+            _ => self.dialogue.await_again(Pending::Mode, now),
         }
     }
 }
@@ -345,7 +257,7 @@ impl Driver for S2c {
     }
 
     fn handle_open(&mut self, now: Instant) {
-        (self.opened, self.heard) = (now, now);
+        self.supervision.open(now);
         self.start_over(SETTLE, now);
     }
 
@@ -358,17 +270,17 @@ impl Driver for S2c {
         if self.phase == Phase::Closed {
             return;
         }
-        self.parser.push(bytes);
-        while let Some(line) = self.parser.next_line() {
+        self.dialogue.push(bytes);
+        while let Some(line) = self.dialogue.next_line() {
             self.handle_line(line, now);
         }
         self.proceed(now);
     }
 
     fn handle_timeout(&mut self, now: Instant) {
-        if self.asked.as_ref().is_some_and(|(_, deadline)| *deadline <= now) {
+        if self.dialogue.deadline().is_some_and(|deadline| deadline <= now) {
             // Half a line may hide the reply, or the modem restarts: quiet first.
-            self.silences += 1;
+            self.dialogue.count_silence();
             self.start_over(SETTLE, now);
         }
         self.give_up_late(now);
@@ -376,11 +288,11 @@ impl Driver for S2c {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let next = match (&self.asked, self.phase) {
+        let next = match (self.dialogue.deadline(), self.phase) {
             (_, Phase::Closed) => return None,
-            (Some((_, deadline)), _) => Some(*deadline),
+            (Some(deadline), _) => Some(deadline),
             (None, Phase::Settling(until)) => Some(until),
-            (None, _) => Some(self.beat_at),
+            (None, _) => Some(self.supervision.beat_at()),
         };
         let message = self.jobs.message.as_ref().map(|m| m.until);
         let pauses = self.next_try();
@@ -388,7 +300,7 @@ impl Driver for S2c {
     }
 
     fn poll_output(&mut self, _now: Instant) -> Option<Vec<u8>> {
-        self.output.pop_front()
+        self.dialogue.poll_output()
     }
 
     fn poll_event(&mut self) -> Option<Event> {
@@ -396,6 +308,6 @@ impl Driver for S2c {
     }
 
     fn wants_reopening(&self, now: Instant) -> bool {
-        self.phase != Phase::Closed && now.since(self.heard.max(self.opened)) >= DEAF
+        self.phase != Phase::Closed && self.supervision.is_deaf(now)
     }
 }

@@ -1,20 +1,15 @@
-//! What an S2C modem says without being asked.
+//! Unsolicited notices of an S2C modem.
 
-/// A notification.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Notice {
-    /// Bytes came in.
     Heard(Heard),
     /// An acknowledged instant message arrived, or did not.
     InstantDone {
-        /// Whether it arrived.
         delivered: bool,
-        /// To whom.
         dst: u8,
     },
     /// Burst data arrived, or did not.
     BurstDone {
-        /// Whether it arrived.
         delivered: bool,
         /// The packet counter of the record.
         count: u32,
@@ -29,59 +24,46 @@ pub enum Notice {
     LocalRate(u32),
     /// A position or a direction of another modem.
     Usbl(Position),
-    /// Whatever else it may say.
+    /// Any other notice.
     Other,
 }
 
-/// How bytes came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Service {
     /// As a record of a connection.
     Burst,
-    /// As a message.
     Message,
 }
 
-/// Bytes that came in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heard {
-    /// How.
     pub service: Service,
-    /// From whom.
     pub src: u8,
     /// For whom: 255 for everybody.
     pub dst: u8,
-    /// Above 100 is good.
     pub integrity: i32,
-    /// One-way travel, microseconds.
     pub travel_us: Option<u32>,
-    /// The bytes.
     pub data: Vec<u8>,
 }
 
 /// A line of a USBL head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
-    /// Of whom.
     pub remote: u8,
     /// East, north, up in metres, with the one-way travel in microseconds; or only bearing and elevation in rad.
     pub place: Place,
-    /// Metres; of angles rad.
     pub accuracy: f64,
     /// Seconds between measuring and telling.
     pub age_s: f64,
 }
 
-/// What a head found out.
+/// A position measured by the USBL head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Place {
-    /// `USBLLONG`
     Enu([f64; 3], u32),
-    /// `USBLANGLES`
     Angles(f64, f64),
 }
 
-/// A service with payload.
 struct Row {
     keyword: &'static [u8],
     service: Service,
@@ -102,8 +84,7 @@ const RECEPTIONS: [Row; 4] = [
     row(b"RECVPBM,", Service::Message, 7, 5, None),
     row(b"RECV,", Service::Burst, 8, 5, Some(6)),
 ];
-/// The longest payload.
-const MOST: usize = 1024;
+const MAX: usize = 1024;
 
 /// The fields in front of the payload.
 struct Head<'a> {
@@ -115,7 +96,7 @@ struct Head<'a> {
 /// For a line that carries payload: bytes before it, and its length. `None` also while the fields are incomplete.
 pub(super) fn payload_length(line: &[u8]) -> Option<(usize, usize)> {
     let head = head(line)?;
-    let length = head.fields.first()?.parse().ok().filter(|n| (1..=MOST).contains(n))?;
+    let length = head.fields.first()?.parse().ok().filter(|n| (1..=MAX).contains(n))?;
     Some((head.bytes, length))
 }
 
@@ -143,7 +124,7 @@ fn head(line: &[u8]) -> Option<Head<'_>> {
     Some(Head { row, fields, bytes: at })
 }
 
-/// A notification without its line end; `None` for what may be a reply.
+/// Parses a notification without its line end; `None` for a possible reply.
 pub(super) fn parse_notice(line: &[u8]) -> Option<Notice> {
     if let Some((bytes, length)) = payload_length(line) {
         let data = line.get(bytes..bytes + length)?.to_vec();
@@ -194,7 +175,7 @@ fn heard(head: &Head<'_>, data: Vec<u8>) -> Option<Heard> {
     })
 }
 
-/// Numbers that are none are refused: a head that says `nan` says nothing.
+/// Numbers that are not finite are refused: a head without a solution writes `nan`.
 fn finite(fields: &[&str], i: usize) -> Option<f64> {
     fields.get(i)?.parse().ok().filter(|x: &f64| x.is_finite())
 }

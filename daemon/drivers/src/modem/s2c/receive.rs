@@ -1,19 +1,15 @@
-//! What an S2C modem says, and what it means.
+//! Handling of the lines of an S2C modem.
 
+use super::dialogue::Pending;
 use super::notice::{Heard, Notice, Place, Position, Service};
-use super::{Asked, BURST_FRAME_BYTES, EVERYBODY, LONGEST_WAIT, Line, PATIENCE, Phase, S2c};
-use crate::modem::driver::{Event, Reception, Token};
-use crate::modem::framing::Deframer;
+use super::{EVERYBODY, Line, Phase, S2c};
+use crate::modem::driver::{Event, Reception};
 use bytes::Bytes;
 use scenecast_core::{ModemAddress, UsblLine};
 use scenecast_protocol::time::Instant;
 
-/// Metres that sound makes in a second, where only its time is told.
+/// Speed of sound in m/s, for positions that carry only a travel time.
 const SOUND_SPEED_M_S: f64 = 1500.0;
-/// Modems whose streams are kept.
-const MOST_STREAMS: usize = 16;
-/// Of the raw bits of a burst so many carry data.
-const DATA_SHARE: f64 = 0.9;
 /// An accuracy of so much of the range means that only the range is good.
 const RANGE_ONLY: f64 = 0.8;
 
@@ -26,12 +22,8 @@ impl S2c {
         match line {
             Line::Reply(name, text) => self.handle_reply(name.as_deref(), &text, now),
             Line::Notice(notice) => {
-                self.heard = now;
-                // A reply waits behind what else the modem has to say, which may take seconds on a slow line.
-                let latest = self.asked_at + LONGEST_WAIT;
-                if let Some((_, deadline)) = &mut self.asked {
-                    *deadline = (*deadline).max((now + PATIENCE).min(latest));
-                }
+                self.supervision.note_reply(now);
+                self.dialogue.extend(now);
                 self.handle_notice(notice, now);
             }
             // A port of the AT interpreter does not say whose data it is.
@@ -41,16 +33,12 @@ impl S2c {
 
     fn handle_reply(&mut self, name: Option<&str>, text: &str, now: Instant) {
         // A reply that nobody waits for is one that came too late.
-        let Some((asked, deadline)) = self.asked.take() else { return };
-        if name.is_some_and(|name| !asked.is_answered_by(name)) {
-            self.asked = Some((asked, deadline));
-            return;
-        }
-        self.heard = now;
-        match &asked {
-            Asked::Interpreter | Asked::Mode => self.handle_interpreter(&asked, text, now),
-            Asked::Setup(step) | Asked::Beat(step) => self.handle_step(step, text, now),
-            _ => self.handle_send_reply(asked, text, now),
+        let Some(pending) = self.dialogue.take_answered_by(name) else { return };
+        self.supervision.note_reply(now);
+        match &pending {
+            Pending::Interpreter | Pending::Mode => self.handle_interpreter(&pending, text, now),
+            Pending::Setup(step) | Pending::Beat(step) => self.handle_step(step, text, now),
+            _ => self.handle_send_reply(pending, text, now),
         }
     }
 
@@ -69,20 +57,15 @@ impl S2c {
                 "data" => self.handle_aired(us),
                 _ => {}
             },
-            Notice::LocalRate(bps) => self.local_rate = bps,
+            Notice::LocalRate(bps) => self.airtime.set_local_rate(bps),
             Notice::Usbl(position) => self.handle_position(&position),
             Notice::Dropped | Notice::Other => {}
         }
     }
 
-    /// Data was on air for so long: what exceeds what was given is the modem's own repeats.
+    /// Data was on air for `us` microseconds; bits beyond those given are the modem's own repeats.
     fn handle_aired(&mut self, us: u32) {
-        let rate = if self.local_rate > 0 { f64::from(self.local_rate) * DATA_SHARE } else { self.config.burst_bps };
-        self.aired_bits += (f64::from(us) * rate / 1e6) as u64;
-        if let Some(more) = self.aired_bits.checked_sub(self.given_bits).filter(|&more| more > 0) {
-            self.given_bits = self.aired_bits;
-            self.events.push_back(Event::Repeated(more));
-        }
+        self.events.extend(self.airtime.air(us, self.config.burst_bps).map(Event::Repeated));
     }
 
     fn handle_heard(&mut self, heard: Heard, now: Instant) {
@@ -97,7 +80,7 @@ impl S2c {
         let quality = Some(heard.integrity);
         match heard.service {
             Service::Burst => {
-                self.burst_heard.insert(heard.src, now);
+                self.streams.note(heard.src, now);
                 self.handle_stream(Some(heard.src), &heard.data, quality, range_m, now);
             }
             Service::Message => self.receive(Some(heard.src), heard.data, quality, range_m),
@@ -118,14 +101,9 @@ impl S2c {
         range_m: Option<f64>,
         _now: Instant,
     ) {
-        let key = src.unwrap_or(0);
-        if !self.streams.contains_key(&key) && self.streams.len() >= MOST_STREAMS {
-            self.streams.clear();
+        for frame in self.streams.push(src, bytes) {
+            self.receive(src, frame, quality, range_m);
         }
-        let deframer = self.streams.entry(key).or_insert_with(|| Deframer::new(BURST_FRAME_BYTES));
-        let mut frames = Vec::new();
-        deframer.push(bytes, |frame| frames.push(frame));
-        frames.into_iter().for_each(|frame| self.receive(src, frame, quality, range_m));
     }
 
     fn handle_position(&mut self, position: &Position) {
@@ -144,31 +122,5 @@ impl S2c {
         let line =
             UsblLine { remote: position.remote, range_m, direction_rad, accuracy, age_s: position.age_s.max(0.0) };
         self.events.push_back(Event::Usbl(line));
-    }
-}
-
-impl Asked {
-    /// The transmission that it is about.
-    pub(super) fn token(&self) -> Option<Token> {
-        match self {
-            Self::Message(job, _) | Self::Piggyback(job) | Self::Copy(job) | Self::Record(job) => Some(job.token),
-            Self::Count(token) => Some(*token),
-            Self::Interpreter | Self::Mode | Self::Setup(_) | Self::Beat(_) => None,
-        }
-    }
-
-    /// Whether a reply that repeats this command's name is the one that is waited for.
-    fn is_answered_by(&self, name: &str) -> bool {
-        match self {
-            Self::Interpreter | Self::Mode => name == "?MODE",
-            Self::Setup(step) | Self::Beat(step) => {
-                let plain = step.command.trim_end_matches(|c: char| c.is_ascii_digit());
-                name == plain || name == step.command
-            }
-            Self::Message(..) => name == "*SENDIM",
-            Self::Piggyback(_) | Self::Copy(_) => name == "*SENDPBM",
-            Self::Record(_) => name == "*SEND",
-            Self::Count(_) => name == "?PC",
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! `scenecast ctl fence`, `return-point`, `limits`, `hold`, `resume`, `abort`
 
 use clap::{Args, Subcommand};
-use scenecast_console::client::Ctl;
+use scenecast_console::client::{self, Session};
 use scenecast_console::orders::ConstraintsOrder;
 use scenecast_core::UserError;
 use scenecast_surface::LimitsOrder;
@@ -10,13 +10,13 @@ use std::path::PathBuf;
 const FILE: &str = "\
 Example: scenecast ctl fence set fence.geojson --wait 120
 
-A feature's property `role` says what it is: fence (a Polygon; the one without a role), keep_out (Polygons), return_point
+The property `role` of a feature is one of: fence (a Polygon; the default), keep_out (Polygons), return_point
 (a Point). Coordinates are longitude and latitude, WGS 84, where the mission has an origin, else metres east and north
 of it.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FenceCommand {
-    /// Send fence, keep-outs and return point from a GeoJSON file, in place of the last.
+    /// Replace fence, keep-outs and return point by those of a GeoJSON file.
     #[command(after_help = FILE)]
     Set {
         /// GeoJSON file
@@ -25,14 +25,14 @@ pub(super) enum FenceCommand {
         #[arg(long)]
         metres: bool,
     },
-    /// Send that there is neither fence nor keep-out nor return point.
+    /// Remove fence, keep-outs and return point.
     #[command(after_help = "Example: scenecast ctl fence clear --wait 120")]
     Clear,
 }
 
 #[derive(Debug, Subcommand)]
 pub(super) enum ReturnPointCommand {
-    /// Move it; fence and keep-outs stay as sent last.
+    /// Move the return point. Fence and keep-outs stay as last sent.
     #[command(after_help = "Example: scenecast ctl return-point set 12.5 -40 --wait 120")]
     Set {
         /// Metres east of the origin
@@ -42,14 +42,14 @@ pub(super) enum ReturnPointCommand {
         #[arg(allow_negative_numbers = true)]
         north_m: f64,
     },
-    /// Return to where the vehicle's run began.
+    /// Remove the return point: the vehicle returns to its start.
     #[command(after_help = "Example: scenecast ctl return-point clear")]
     Clear,
 }
 
 #[derive(Debug, Subcommand)]
 pub(super) enum LimitsCommand {
-    /// Send limits in place of the last; what is not named is not limited, reactions then are as configured on the vehicle.
+    /// Replace the limits. A limit that is not given is removed; a reaction that is not given is as configured on the vehicle.
     #[command(
         after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
     )]
@@ -58,57 +58,57 @@ pub(super) enum LimitsCommand {
 
 #[derive(Debug, Args)]
 pub(super) struct Limits {
-    /// Least and greatest depth, metres
+    /// Minimum and maximum depth, metres
     #[arg(long, value_name = "LOW..HIGH", value_parser = band)]
     depth: Option<[f64; 2]>,
-    /// Least and greatest altitude, metres
+    /// Minimum and maximum altitude, metres
     #[arg(long, value_name = "LOW..HIGH", value_parser = band)]
     altitude: Option<[f64; 2]>,
-    /// Way over ground, the way back included
+    /// Maximum distance over ground, including the return path
     #[arg(long, value_name = "METRES")]
     distance: Option<f64>,
-    /// Length of the survey, the way back included
+    /// Maximum duration of the survey, including the return path
     #[arg(long, value_name = "SECONDS")]
     time: Option<f64>,
     /// Longest silence of the surface
     #[arg(long, value_name = "SECONDS")]
     silence: Option<f64>,
-    /// What it does then: hold, return or surface
+    /// Reaction to that silence: hold, return or surface
     #[arg(long, value_name = "REACTION")]
     on_silence: Option<String>,
-    /// What it does outside of the fence, in a keep-out or out of a band
+    /// Reaction outside of the fence, in a keep-out or out of a band
     #[arg(long, value_name = "REACTION")]
     on_breach: Option<String>,
-    /// What it does on an abort
+    /// Reaction to an abort
     #[arg(long, value_name = "REACTION")]
     on_abort: Option<String>,
-    /// Keep what is not named as it was sent last
+    /// Keep the last limits that are not given
     #[arg(long)]
     keep: bool,
 }
 
 fn band(text: &str) -> Result<[f64; 2], String> {
     let ends = text.split_once("..").and_then(|(low, high)| Some([low.parse().ok()?, high.parse().ok()?]));
-    ends.ok_or_else(|| "it takes LOW..HIGH in metres, as in 5..30".to_owned())
+    ends.ok_or_else(|| "expected LOW..HIGH in metres, as in 5..30".to_owned())
 }
 
-pub(super) async fn fence(ctl: &Ctl, change: Option<FenceCommand>) -> Result<(), UserError> {
+pub(super) async fn fence(session: &Session, change: Option<FenceCommand>) -> Result<(), UserError> {
     match change {
-        None => ctl.fence().await,
-        Some(FenceCommand::Set { file, metres }) => ctl.set_fence(&file, metres).await,
-        Some(FenceCommand::Clear) => ctl.clear_fence().await,
+        None => client::show_fence(session).await,
+        Some(FenceCommand::Set { file, metres }) => client::set_fence(session, &file, metres).await,
+        Some(FenceCommand::Clear) => client::clear_fence(session).await,
     }
 }
 
-pub(super) async fn return_point(ctl: &Ctl, change: ReturnPointCommand) -> Result<(), UserError> {
+pub(super) async fn return_point(session: &Session, change: ReturnPointCommand) -> Result<(), UserError> {
     match change {
-        ReturnPointCommand::Set { east_m, north_m } => ctl.set_return_point(Some([east_m, north_m])).await,
-        ReturnPointCommand::Clear => ctl.set_return_point(None).await,
+        ReturnPointCommand::Set { east_m, north_m } => client::set_return_point(session, Some([east_m, north_m])).await,
+        ReturnPointCommand::Clear => client::set_return_point(session, None).await,
     }
 }
 
-pub(super) async fn limits(ctl: &Ctl, change: Option<LimitsCommand>) -> Result<(), UserError> {
-    let Some(LimitsCommand::Set(l)) = change else { return ctl.limits().await };
+pub(super) async fn limits(session: &Session, change: Option<LimitsCommand>) -> Result<(), UserError> {
+    let Some(LimitsCommand::Set(l)) = change else { return client::show_limits(session).await };
     let order = LimitsOrder {
         depth_m: l.depth,
         altitude_m: l.altitude,
@@ -119,17 +119,17 @@ pub(super) async fn limits(ctl: &Ctl, change: Option<LimitsCommand>) -> Result<(
         on_breach: l.on_breach,
         on_abort: l.on_abort,
     };
-    ctl.set_limits(order, l.keep).await
+    client::set_limits(session, order, l.keep).await
 }
 
-/// Hold, or go on.
-pub(super) async fn hold(ctl: &Ctl, hold: bool) -> Result<(), UserError> {
-    ctl.constrain(ConstraintsOrder { hold, abort: false }).await
+/// Orders the vehicle to hold or to resume.
+pub(super) async fn hold(session: &Session, hold: bool) -> Result<(), UserError> {
+    client::send_constraints(session, ConstraintsOrder { hold, abort: false }).await
 }
 
-pub(super) async fn abort(ctl: &Ctl, yes: bool) -> Result<(), UserError> {
+pub(super) async fn abort(session: &Session, yes: bool) -> Result<(), UserError> {
     if !yes {
         return Err(UserError::Input("an abort ends the survey of the vehicle: --yes confirms it".to_owned()));
     }
-    ctl.constrain(ConstraintsOrder { hold: false, abort: true }).await
+    client::send_constraints(session, ConstraintsOrder { hold: false, abort: true }).await
 }

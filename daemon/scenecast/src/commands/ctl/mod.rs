@@ -4,8 +4,8 @@ mod constraints;
 
 use clap::{Args, Subcommand};
 use constraints::{FenceCommand, LimitsCommand, ReturnPointCommand};
-use scenecast_console::client::{self as ctl, BudgetChange, Client, SettingsChange};
-use scenecast_console::orders::ExemplarWish;
+use scenecast_console::client::{self, BudgetChange, Client, Session, SettingsChange};
+use scenecast_console::orders::ExemplarAction;
 use scenecast_core::UserError;
 use scenecast_surface::SettingsOrder;
 use std::collections::BTreeMap;
@@ -25,30 +25,30 @@ Example: scenecast ctl status
          scenecast ctl hold --wait 60
          scenecast ctl watch --json --url http://192.168.1.7:8460 --token-file console.token
 
-Exit codes: 0 done; 1 refused, not applied in time, or nobody answers; 2 wrong usage";
+Exit codes: 0 success; 1 refused, not applied in time, or no answer; 2 wrong usage";
 
 const EXEMPLAR_EXAMPLES: &str = "\
 Example: scenecast ctl exemplar 3 --out label-3.webp --wait 300
          scenecast ctl exemplar 3 --out label-3-large.webp --larger
          scenecast ctl exemplar 3 --cancel";
 
-/// Speak with a running surface: see what it has, give orders.
+/// Show the state of a running surface and give orders.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Ctl {
-    /// Where the surface serves its page
+    /// Address of the surface's page
     #[arg(long, global = true, value_name = "URL", default_value = "http://127.0.0.1:8460")]
     url: String,
-    /// File of the surface's token, if it has one
+    /// File with the token of the surface, if it requires one
     #[arg(long, global = true, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// Print JSON for programs
+    /// Print JSON
     #[arg(long, global = true)]
     json: bool,
     /// Address of the vehicle, if there are several
     #[arg(long, global = true, value_name = "N")]
     vehicle: Option<u8>,
-    /// Wait so long for an order to be applied; for an image 600 unless it is given
+    /// Maximum wait for an order to be applied [default: 0; for an image 600]
     #[arg(long, global = true, value_name = "SECONDS", allow_negative_numbers = true)]
     wait: Option<f64>,
     #[command(subcommand)]
@@ -57,10 +57,10 @@ pub(super) struct Ctl {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Print how mission, link and vehicles are, with the age of each value.
+    /// Print the state of mission, link and vehicles, with the age of each value.
     #[command(after_help = "Example: scenecast ctl status")]
     Status,
-    /// Write the operator's map; the name's end says the format: .png (with world file and projection), .geojson, .ply,
+    /// Write the operator's map in the format of the file's extension: .png (with world file and projection), .geojson, .ply,
     /// .csv, .json.
     #[command(after_help = "Example: scenecast ctl map --out reef.png")]
     Map {
@@ -71,7 +71,7 @@ enum Command {
     /// Print the labels on the map.
     #[command(after_help = "Example: scenecast ctl labels --json")]
     Labels,
-    /// Print the weights that were sent last, or send others.
+    /// Print the last weights sent, or send others.
     #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2 --wait 120")]
     Utility {
         #[command(subcommand)]
@@ -79,16 +79,16 @@ enum Command {
     },
     /// Print the bit budget and the shares of the classes, or change them.
     #[command(
-        after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --spend exemplars,depth"
+        after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --background exemplars,depth"
     )]
     Budget {
         #[command(subcommand)]
         change: Option<BudgetCommand>,
     },
-    /// Print the settings of the vehicle, asked for and in force, or send others; what is not named stays as it is there.
+    /// Print the settings of the vehicle, requested and in force, or send others. Settings that are not given stay unchanged.
     #[command(after_help = SETTINGS_EXAMPLES)]
     Settings(SettingsArgs),
-    /// Write the image of a label, which the vehicle is asked for if it is not here.
+    /// Write an image of a label, and request it from the vehicle if the surface has none.
     #[command(after_help = EXEMPLAR_EXAMPLES)]
     Exemplar {
         /// Label
@@ -96,17 +96,17 @@ enum Command {
         /// File to write, WebP
         #[arg(long, value_name = "FILE", required_unless_present = "cancel")]
         out: Option<PathBuf>,
-        /// Ask for another image, although there is one
+        /// Request another image even if there is one
         #[arg(long)]
         again: bool,
-        /// Ask for the newest image with twice its edge
+        /// Request the latest image with twice its width
         #[arg(long, conflicts_with = "again")]
         larger: bool,
-        /// Ask for none any more: what is on its way is not sent to its end
+        /// Cancel the request: the vehicle stops sending the image
         #[arg(long, conflicts_with_all = ["again", "larger", "out"])]
         cancel: bool,
     },
-    /// Print the fence with its keep-outs and return point, as sent last and as in force, or send another.
+    /// Print the fence with its keep-outs and return point, last sent and in force, or send another.
     #[command(after_help = "Example: scenecast ctl fence set fence.geojson --wait 120")]
     Fence {
         #[command(subcommand)]
@@ -118,7 +118,7 @@ enum Command {
         #[command(subcommand)]
         change: ReturnPointCommand,
     },
-    /// Print the limits, as sent last and as in force, or send others.
+    /// Print the limits, last sent and in force, or send others.
     #[command(
         after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
     )]
@@ -126,30 +126,30 @@ enum Command {
         #[command(subcommand)]
         change: Option<LimitsCommand>,
     },
-    /// Tell the vehicle to stay where it is.
+    /// Order the vehicle to hold its position.
     #[command(after_help = "Example: scenecast ctl hold --wait 60")]
     Hold,
-    /// Tell the vehicle to go on, after a hold, an abort or a breach.
+    /// Order the vehicle to resume its survey after a hold, an abort or a breach.
     #[command(after_help = "Example: scenecast ctl resume --wait 60")]
     Resume,
-    /// Tell the vehicle to end its survey and to do what its limits say of an abort.
+    /// Order the vehicle to abort: it ends its survey and carries out the reaction of its limits.
     #[command(after_help = "Example: scenecast ctl abort --yes --wait 60")]
     Abort {
-        /// Yes, end it
+        /// Confirm the abort
         #[arg(long)]
         yes: bool,
     },
-    /// Print changes as they come, until Ctrl-C.
+    /// Print changes as they happen, until Ctrl-C.
     #[command(after_help = "Example: scenecast ctl watch --json")]
     Watch,
 }
 
 const SETTINGS_EXAMPLES: &str = "\
 Example: scenecast ctl settings
-         scenecast ctl settings --gamma 1e-5 --frames 0.2 --planes none --wait 120
-         scenecast ctl settings --alpha 0 --cells \"\"     both as the vehicle is configured
-         scenecast ctl settings --fit                    what fits the map's share of the budget
-         scenecast ctl settings --fit 800 --dry-run      what would fit 800 bit/s";
+         scenecast ctl settings --gamma 1e-5 --frames 0.2 --layers none --wait 120
+         scenecast ctl settings --alpha 0 --cells \"\"     both as configured on the vehicle
+         scenecast ctl settings --fit                    fitted to the map's share of the budget
+         scenecast ctl settings --fit 800 --dry-run      show settings that fit 800 bit/s";
 
 #[derive(Debug, Args)]
 struct SettingsArgs {
@@ -168,20 +168,20 @@ struct SettingsArgs {
     /// Camera frames a second that the scene model sees at most, 0.01 to 30; 0: as configured
     #[arg(long, value_name = "1/S", allow_negative_numbers = true)]
     frames: Option<f64>,
-    /// Cells that are told: fine, coarse-to-fine, coarse (every fourth both ways); "": as configured
+    /// Cells to send: fine, coarse-to-fine, coarse (every fourth in both directions); "": as configured
     #[arg(long, value_name = "BAND")]
     cells: Option<String>,
-    /// Planes that are told: none, or different ones of confidence, depth, curiosity with commas between; "": as configured
-    #[arg(long, value_name = "PLANES")]
-    planes: Option<String>,
+    /// Layers to send: none, or different ones of confidence, depth, curiosity, separated by commas; "": as configured
+    #[arg(long, value_name = "LAYERS")]
+    layers: Option<String>,
     /// lawnmower, greedy, horizon; "": as configured
     #[arg(long, value_name = "NAME")]
     planner: Option<String>,
-    /// Take the settings that tell most of those whose stream fits so many bits a second [default: the map's share of the
-    /// vehicle's budget]; the options above go before them
+    /// Use the most informative settings whose stream fits a budget [default: the map's share of the vehicle's budget]. The options
+    /// above have precedence
     #[arg(long, value_name = "BIT/S", num_args = 0..=1, allow_negative_numbers = true)]
     fit: Option<Option<f64>>,
-    /// Say what would be sent, and send nothing
+    /// Print the order instead of sending it
     #[arg(long)]
     dry_run: bool,
 }
@@ -191,7 +191,7 @@ impl SettingsArgs {
         let order = SettingsOrder {
             planner: self.planner,
             cells: self.cells,
-            planes: self.planes,
+            layers: self.layers,
             alpha: self.alpha,
             beta: self.beta,
             gamma: self.gamma,
@@ -204,16 +204,16 @@ impl SettingsArgs {
 
 #[derive(Debug, Subcommand)]
 enum UtilityCommand {
-    /// Send weights; labels that are not named weigh 0.
+    /// Send weights. Labels that are not listed get 0.
     #[command(after_help = "Example: scenecast ctl utility set 3=0.8 5=-1 --exploration 0.2")]
     Set {
         /// Label and weight, -1 to 1
         #[arg(value_name = "LABEL=WEIGHT", value_parser = label_weight)]
         weights: Vec<(u8, f64)>,
-        /// Weight of unseen cells, -1 to 1
+        /// Weight of unexplored cells, -1 to 1
         #[arg(long, value_name = "WEIGHT", value_parser = weight, allow_hyphen_values = true)]
         exploration: Option<f64>,
-        /// Keep the weights that are not named as they were sent last
+        /// Keep the last weights of labels that are not listed
         #[arg(long)]
         keep: bool,
     },
@@ -224,32 +224,32 @@ enum BudgetCommand {
     /// Change the budget of the surface and of all vehicles.
     #[command(after_help = "Example: scenecast ctl budget set 2000 --shares map=60,exemplar=10 --wait 60")]
     Set {
-        /// Bits on air a second, 10 to 10000000; left out: as it is
+        /// Bits on air a second, 10 to 10000000 [default: unchanged]
         #[arg(value_name = "BIT/S", value_parser = clap::value_parser!(u32).range(10..=10_000_000))]
         bits_per_s: Option<u32>,
-        /// Least shares in percent by class, together at most 100; those that are not named stay
+        /// Minimum shares in percent by class, in total at most 100; other classes stay unchanged
         #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
         shares: Vec<(String, u8)>,
-        /// What left-over bits are spent on, in this order: different ones of finer, depth, exemplars, confidence,
+        /// Background streams that use spare capacity, in this order: different ones of finer, depth, exemplars, confidence,
         /// curiosity, or none
-        #[arg(long, value_name = "WHAT,..", value_delimiter = ',')]
-        spend: Option<Vec<String>>,
+        #[arg(long, value_name = "STREAM,..", value_delimiter = ',')]
+        background: Option<Vec<String>>,
     },
 }
 
 fn weight(text: &str) -> Result<f64, String> {
     let weight = text.parse().ok().filter(|w| (-1.0..=1.0).contains(w));
-    weight.ok_or_else(|| "it takes a number from -1 to 1".to_owned())
+    weight.ok_or_else(|| "expected a number from -1 to 1".to_owned())
 }
 
 fn label_weight(text: &str) -> Result<(u8, f64), String> {
-    let (label, w) = text.split_once('=').ok_or("it takes LABEL=WEIGHT, as in 3=0.8")?;
+    let (label, w) = text.split_once('=').ok_or("expected LABEL=WEIGHT, as in 3=0.8")?;
     let label = label.parse().ok().filter(|l| (1..=254).contains(l)).ok_or("a label is a number from 1 to 254")?;
     Ok((label, weight(w)?))
 }
 
 fn class_percent(text: &str) -> Result<(String, u8), String> {
-    let (class, percent) = text.split_once('=').ok_or("it takes CLASS=PERCENT, as in map=60")?;
+    let (class, percent) = text.split_once('=').ok_or("expected CLASS=PERCENT, as in map=60")?;
     let percent = percent.parse().ok().filter(|p| *p <= 100).ok_or("a share is a number from 0 to 100")?;
     Ok((class.trim().to_owned(), percent))
 }
@@ -258,41 +258,46 @@ impl Ctl {
     pub(super) fn run(self) -> Result<(), UserError> {
         let wait = match self.wait {
             Some(s) if !(0.0..=1e6).contains(&s) => {
-                return Err(UserError::Input(format!("--wait {s}: it takes 0 to 1000000 seconds")));
+                return Err(UserError::Input(format!("--wait {s}: the range is 0 to 1000000 seconds")));
             }
             wait => wait.map(Duration::from_secs_f64),
         };
         let token = self.token_file.as_deref().map(scenecast_config::read_token).transpose()?;
         let client = Client::new(&self.url, token)?;
-        let ctl = ctl::Ctl { client, json: self.json, vehicle: self.vehicle, wait };
-        ctl::block_on(async move {
-            match self.command {
-                Command::Status => ctl.status().await,
-                Command::Map { out } => ctl.map(&out).await,
-                Command::Labels => ctl.labels().await,
-                Command::Utility { change: None } => ctl.utility().await,
-                Command::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
-                    ctl.set_utility(BTreeMap::from_iter(weights), exploration, keep).await
-                }
-                Command::Budget { change: None } => ctl.budget().await,
-                Command::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares, spend }) } => {
-                    let spend = spend.map(|words| words.into_iter().filter(|w| w != "none").collect());
-                    ctl.set_budget(BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares), spend }).await
-                }
-                Command::Settings(settings) => ctl.settings(settings.change()).await,
-                Command::Exemplar { label, out: Some(out), again, larger, .. } => {
-                    let wish = larger.then_some(ExemplarWish::Larger).or(again.then_some(ExemplarWish::Another));
-                    ctl.exemplar(label, &out, wish).await
-                }
-                Command::Exemplar { label, out: None, .. } => ctl.cancel_exemplar(label).await,
-                Command::Fence { change } => constraints::fence(&ctl, change).await,
-                Command::ReturnPoint { change } => constraints::return_point(&ctl, change).await,
-                Command::Limits { change } => constraints::limits(&ctl, change).await,
-                Command::Hold => constraints::hold(&ctl, true).await,
-                Command::Resume => constraints::hold(&ctl, false).await,
-                Command::Abort { yes } => constraints::abort(&ctl, yes).await,
-                Command::Watch => ctl.watch().await,
+        let session = Session { client, json: self.json, vehicle: self.vehicle, wait };
+        client::block_on(self.command.run(&session))
+    }
+}
+
+impl Command {
+    async fn run(self, session: &Session) -> Result<(), UserError> {
+        match self {
+            Self::Status => client::show_status(session).await,
+            Self::Map { out } => client::save_map(session, &out).await,
+            Self::Labels => client::show_labels(session).await,
+            Self::Utility { change: None } => client::show_utility(session).await,
+            Self::Utility { change: Some(UtilityCommand::Set { weights, exploration, keep }) } => {
+                client::set_utility(session, BTreeMap::from_iter(weights), exploration, keep).await
             }
-        })
+            Self::Budget { change: None } => client::show_budget(session).await,
+            Self::Budget { change: Some(BudgetCommand::Set { bits_per_s, shares, background }) } => {
+                let background = background.map(|names| names.into_iter().filter(|n| n != "none").collect());
+                let change = BudgetChange { bits_per_s, shares: BTreeMap::from_iter(shares), background };
+                client::set_budget(session, change).await
+            }
+            Self::Settings(settings) => client::change_settings(session, settings.change()).await,
+            Self::Exemplar { label, out: Some(out), again, larger, .. } => {
+                let action = larger.then_some(ExemplarAction::Larger).or(again.then_some(ExemplarAction::Another));
+                client::save_exemplar(session, label, &out, action).await
+            }
+            Self::Exemplar { label, out: None, .. } => client::cancel_exemplar(session, label).await,
+            Self::Fence { change } => constraints::fence(session, change).await,
+            Self::ReturnPoint { change } => constraints::return_point(session, change).await,
+            Self::Limits { change } => constraints::limits(session, change).await,
+            Self::Hold => constraints::hold(session, true).await,
+            Self::Resume => constraints::hold(session, false).await,
+            Self::Abort { yes } => constraints::abort(session, yes).await,
+            Self::Watch => client::watch(session).await,
+        }
     }
 }

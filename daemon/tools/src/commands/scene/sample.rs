@@ -1,10 +1,10 @@
 //! `scenecast scene sample`
 
 use clap::Args;
-use scene_model::generate::{LabelWorld, sample};
 use scenecast_core::UserError;
 use scenecast_core::palette::colour;
 use scenecast_files::write_whole;
+use scenecast_worlds::{LabelWorld, sample};
 use std::path::PathBuf;
 
 /// Words in each cell of a world; the cell shows the label that most of them have.
@@ -12,29 +12,29 @@ const CUSTOMERS: u32 = 16;
 /// Edge of the picture aimed at, pixels.
 const PICTURE_PX: u32 = 960;
 /// Most pixels of a picture.
-const MOST_PIXELS: u64 = 1 << 24;
+const MAX_PIXELS: u64 = 1 << 24;
 /// Palette index of the space between worlds; labels have 1 to 254.
 const PAPER: u8 = 255;
 
-/// Draw random worlds of the model's prior, to see what maps alpha and gamma expect
+/// Draw random worlds from the model's prior, to show the maps that alpha and gamma favour
 ///
-/// Each world has a seed of its own. A colour is a label; the oldest label of each world has the first colour. With more
-/// than 254 labels in a world colours repeat.
+/// Each world has a seed of its own. Each colour is a label, and the oldest label of each world has the first colour. Colours
+/// repeat in worlds with more than 254 labels.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast scene sample --alpha 0.001 --gamma 0.3 --size 64x64 --grid 3x3 --seed 1 --out worlds.png"
 )]
 pub struct Sample {
-    /// Weight of each label that exists, anywhere: 0 or above
+    /// Weight of each existing label in each cell: 0 or more
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: f64,
-    /// Weight of a new label: 0 or above
+    /// Weight of a new label: 0 or more
     #[arg(long, value_name = "G", allow_negative_numbers = true)]
     gamma: f64,
-    /// Cells of a world, across x down
+    /// Columns x rows of a world, in cells
     #[arg(long, value_name = "WxH", default_value = "64x64", value_parser = pair)]
     size: (u32, u32),
-    /// Worlds in the picture, across x down
+    /// Columns x rows of worlds in the image
     #[arg(long, value_name = "WxH", default_value = "3x3", value_parser = pair)]
     grid: (u32, u32),
     /// Seed of the first world; the others follow from it
@@ -90,8 +90,8 @@ impl Sheet {
         let gap = (PICTURE_PX / 80).max(1);
         let length = |cells: u32, worlds: u32| worlds * (cells * scale + gap) + gap;
         let (width, height) = (length(size.0, grid.0), length(size.1, grid.1));
-        if u64::from(width) * u64::from(height) > MOST_PIXELS {
-            let what = format!("--size and --grid make {width} x {height} pixels, more than the {MOST_PIXELS} allowed");
+        if u64::from(width) * u64::from(height) > MAX_PIXELS {
+            let what = format!("--size and --grid make {width} x {height} pixels, more than the {MAX_PIXELS} allowed");
             return Err(UserError::Input(what));
         }
         Ok(Self { across: grid.0, size, scale, gap, width, height })

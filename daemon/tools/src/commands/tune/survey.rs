@@ -2,20 +2,20 @@
 
 use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
-use scene_model::score::{Annotations, mosaic_classes};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
-use scenecast_config::Config;
+use scenecast_config::{BirthRule, Config};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};
+use scenecast_scoring::{Annotations, mosaic_classes};
 use std::path::Path;
 
 /// Part of a frame by which neighbouring lines, and frames along a line, overlap at least.
 const OVERLAP: f64 = 0.1;
 /// Most words of a survey: 1.5 GB of them.
-const MOST_WORDS: f64 = 1e8;
-const LEAST_PX: u32 = 64;
+const MAX_WORDS: f64 = 1e8;
+const MIN_PX: u32 = 64;
 /// Width and height of a sea floor that is drawn, and about the size of its patches, pixels.
 const REEF_PX: (u32, u32, u32) = (2600, 1800, 100);
 
@@ -32,7 +32,7 @@ impl<'a> Site<'a> {
     pub fn load(mosaic: &Path, annotations: &Path, ignore: &'a [u8], config: &'a Config) -> Result<Self, UserError> {
         let image = read_image(mosaic)?.to_rgb8();
         let (width, height) = image.dimensions();
-        if width.min(height) < LEAST_PX {
+        if width.min(height) < MIN_PX {
             let what = format!("the image has {width} x {height} pixels; a mosaic needs at least 64 x 64");
             return Err(UserError::file(mosaic, what));
         }
@@ -51,7 +51,7 @@ impl<'a> Site<'a> {
 
     /// A sea floor that is drawn, with every pixel annotated.
     pub fn procedural(seed: u64, config: &'a Config) -> Self {
-        let reef = scene_model::generate::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
+        let reef = scenecast_worlds::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
         let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(reef.image.as_raw());
         Self { image: reef.image, classes, ignore: &[], config, crc }
@@ -112,7 +112,7 @@ impl<'a> Survey<'a> {
         let words = WordConfig::default();
         let per_cell = f64::from(words.colour + words.context + words.spread + words.texture + words.binary);
         let per_frame = f64::from(size.0) * f64::from(size.1) / f64::from(cell_px).powi(2) * per_cell;
-        if per_frame * corners.len() as f64 > MOST_WORDS {
+        if per_frame * corners.len() as f64 > MAX_WORDS {
             let what = format!("a survey of {} frames with {per_frame:.0} words each is too long", corners.len());
             return Err(UserError::Input(format!(
                 "{what}; raise survey.speed_m_s, lower camera.rate_hz or take larger cells"
@@ -151,10 +151,10 @@ impl<'a> Survey<'a> {
     /// The scene model with a setting.
     pub fn scene(&self, setting: &Setting, seed: u64) -> SceneConfig {
         let scene = &self.config.scene;
-        let birth = match scene.birth.as_str() {
-            "collapsed" => Birth::Collapsed,
-            "rost" => Birth::Rost,
-            _ => Birth::Literal,
+        let birth = match scene.birth {
+            BirthRule::Literal => Birth::Literal,
+            BirthRule::Collapsed => Birth::Collapsed,
+            BirthRule::Rost => Birth::Rost,
         };
         SceneConfig {
             cell_m: [setting.cell_m, setting.cell_m, 1e4],

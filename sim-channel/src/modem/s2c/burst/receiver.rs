@@ -1,29 +1,29 @@
 //! Puts numbered packets in order and records together again.
 
-use super::sender::WINDOW;
+use super::sender::MAX_WINDOW_PACKETS;
 use std::collections::BTreeMap;
 
-/// A record longer than this is not one of ours: a corrupted piece slipped past.
-const RECORD_LIMIT: usize = 4096;
+/// A longer record contains a corrupted piece that no check has found.
+const MAX_RECEIVED_BYTES: usize = 4096;
 
 /// One direction of a connection, at its receiver.
 #[derive(Debug, Default)]
-pub(in super::super) struct Receiver {
+pub(super) struct Receiver {
     next: u32,
     held: BTreeMap<u32, Vec<u8>>,
     partial: Vec<u8>,
 }
 
 impl Receiver {
-    /// First packet missing, and a bit for each packet held beyond it.
-    pub(in super::super) fn state(&self) -> (u32, u64) {
+    /// The first missing packet, and a bit for each packet held behind it.
+    pub(super) fn state(&self) -> (u32, u64) {
         let bit = |seq: &u32| u64::from(*seq) - u64::from(self.next) - 1;
         (self.next, self.held.keys().map(bit).filter(|bit| *bit < 64).fold(0, |map, bit| map | 1 << bit))
     }
 
-    /// Takes a packet; returns the records complete by it, each with its protocol id, in order.
-    pub(in super::super) fn accept(&mut self, seq: u32, bytes: Vec<u8>) -> Vec<(u8, Vec<u8>)> {
-        if (self.next..self.next.saturating_add(WINDOW)).contains(&seq) {
+    /// Takes a packet; returns the records that it completes, in order, each with its protocol id.
+    pub(super) fn accept(&mut self, seq: u32, bytes: Vec<u8>) -> Vec<(u8, Vec<u8>)> {
+        if (self.next..self.next.saturating_add(MAX_WINDOW_PACKETS)).contains(&seq) {
             self.held.insert(seq, bytes);
         }
         let mut records = Vec::new();
@@ -42,7 +42,7 @@ impl Receiver {
             if flags & 1 == 1 {
                 records.push((*pid, std::mem::take(&mut self.partial)));
             }
-            if self.partial.len() > RECORD_LIMIT {
+            if self.partial.len() > MAX_RECEIVED_BYTES {
                 self.partial.clear();
             }
             bytes = rest;
@@ -52,13 +52,13 @@ impl Receiver {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Record;
+    use super::super::pool::BurstRecord;
     use super::super::sender::Sender;
     use super::*;
     use std::collections::VecDeque;
 
-    fn records() -> VecDeque<Record> {
-        let record = |count: u16| Record {
+    fn records() -> VecDeque<BurstRecord> {
+        let record = |count: u16| BurstRecord {
             count,
             dst: 2,
             pid: 0,
@@ -89,16 +89,16 @@ mod tests {
     }
 
     #[test]
-    fn packets_are_full_and_keep_to_their_peer() {
+    fn packets_are_full_and_hold_one_peer_only() {
         let mut queue = records();
-        queue.push_front(Record { count: 0, dst: 9, pid: 0, raw: false, data: vec![0; 10] });
+        queue.push_front(BurstRecord { count: 0, dst: 9, pid: 0, raw: false, data: vec![0; 10] });
         let train = Sender::default().train(&mut queue, 2, 700, 3);
         assert!(train.iter().all(|(_, bytes)| bytes.len() > 690 && bytes.len() <= 700));
         assert_eq!(queue.front().map(|record| record.dst), Some(9));
     }
 
     #[test]
-    fn nonsense_is_survived() {
+    fn malformed_packets_are_ignored() {
         let mut receiver = Receiver::default();
         assert!(receiver.accept(0, vec![1, 0, 255, 255, 1]).is_empty());
         assert!(receiver.accept(u32::MAX, vec![1, 0, 0, 1, 1]).is_empty());

@@ -1,47 +1,47 @@
 //! Cuts burst records into numbered packets and keeps them until they are acknowledged.
 
-use super::Record;
+use super::pool::BurstRecord;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Packets beyond the first unacknowledged one that may be under way.
-pub(in super::super) const WINDOW: u32 = 64;
+/// Packets from the first unacknowledged one on that may be under way.
+pub(super) const MAX_WINDOW_PACKETS: u32 = 64;
 /// Flags (bit 0: last piece of its record), protocol id, length of the piece.
 const PIECE_HEADER: usize = 4;
 
 /// One direction of a connection, at its sender.
 #[derive(Debug, Default)]
-pub(in super::super) struct Sender {
+pub(super) struct Sender {
     base: u32,
     next: u32,
     unacked: BTreeMap<u32, Vec<u8>>,
-    /// Records begun, with the number of the packet that ends each, once it is known.
-    begun: VecDeque<(Record, Option<u32>)>,
-    /// How much of the last record begun is in packets.
+    /// Records that have begun, each with the number of its last packet once that is known.
+    begun: VecDeque<(BurstRecord, Option<u32>)>,
+    /// Bytes of the last record that are in packets.
     offset: usize,
 }
 
 impl Sender {
-    pub(in super::super) fn has_unacked(&self) -> bool {
+    pub(super) fn has_unacked(&self) -> bool {
         !self.unacked.is_empty()
     }
 
-    /// At most `count` packets of at most `capacity` bytes: first what was lost, then new ones with records to `peer`.
-    pub(in super::super) fn train(
+    /// At most `count` packets of at most `capacity` bytes: the unacknowledged ones, then new ones with records to `peer`.
+    pub(super) fn train(
         &mut self,
-        queue: &mut VecDeque<Record>,
+        queue: &mut VecDeque<BurstRecord>,
         peer: u8,
         capacity: usize,
         count: usize,
     ) -> Vec<(u32, Vec<u8>)> {
         let mut train: Vec<_> = self.unacked.iter().take(count).map(|(seq, bytes)| (*seq, bytes.clone())).collect();
-        while train.len() < count && self.next - self.base < WINDOW {
+        while train.len() < count && self.next - self.base < MAX_WINDOW_PACKETS {
             let Some(bytes) = self.new_packet(queue, peer, capacity) else { break };
             train.push((self.next - 1, bytes));
         }
         train
     }
 
-    fn new_packet(&mut self, queue: &mut VecDeque<Record>, peer: u8, capacity: usize) -> Option<Vec<u8>> {
+    fn new_packet(&mut self, queue: &mut VecDeque<BurstRecord>, peer: u8, capacity: usize) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         while bytes.len() + PIECE_HEADER < capacity.max(PIECE_HEADER + 1) && self.open_record(queue, peer) {
             let room = capacity.max(PIECE_HEADER + 1) - bytes.len() - PIECE_HEADER;
@@ -65,8 +65,8 @@ impl Sender {
         Some(bytes)
     }
 
-    /// Whether there is a record to cut from; begins the next one to `peer` if need be.
-    fn open_record(&mut self, queue: &mut VecDeque<Record>, peer: u8) -> bool {
+    /// Whether there is a record to cut from; begins the next record to `peer` if necessary.
+    fn open_record(&mut self, queue: &mut VecDeque<BurstRecord>, peer: u8) -> bool {
         if self.begun.back().is_some_and(|(_, end)| end.is_none()) {
             return true;
         }
@@ -75,9 +75,10 @@ impl Sender {
         record.map(|record| self.begun.push_back((record, None))).is_some()
     }
 
-    /// Everything before `base` has arrived, and of what follows whatever `held` has a bit for. Returns the records that
-    /// are thereby delivered.
-    pub(in super::super) fn acknowledge(&mut self, base: u32, held: u64) -> Vec<Record> {
+    /// All packets before `base` have arrived, and those behind it that have a bit in `held`.
+    ///
+    /// Returns the records that are complete at the peer.
+    pub(super) fn acknowledge(&mut self, base: u32, held: u64) -> Vec<BurstRecord> {
         if base > self.next || base < self.base {
             return Vec::new();
         }
@@ -93,13 +94,13 @@ impl Sender {
         delivered
     }
 
-    /// All records that are not known to have arrived, in order.
-    pub(in super::super) fn into_records(self) -> Vec<Record> {
+    /// The records that are not known to have arrived, in order.
+    pub(super) fn into_records(self) -> Vec<BurstRecord> {
         self.begun.into_iter().map(|(record, _)| record).collect()
     }
 
     /// Bytes of records not known to have arrived.
-    pub(in super::super) fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.begun.iter().map(|(record, _)| record.data.len()).sum()
     }
 }

@@ -1,205 +1,209 @@
-//! Turns within a connection: acknowledgement, waiting message, train of packets; then the peer's turn.
+//! Turns of a connection: an acknowledgement, a waiting message, a train of packets; then it is the peer's turn.
 
-use super::connection::{Connection, Turn};
-use crate::Duration;
-use crate::modem::s2c::air::After;
-use crate::modem::s2c::frame::{Frame, Kind};
-use crate::modem::s2c::reception::Signal;
-use crate::modem::s2c::{Event, S2c, timing};
+use super::BurstService;
+use super::connection::TurnState;
+use crate::modem::s2c::base::{AfterSending, FrameKind, ReceivedSignal, S2cBase, S2cFrame, S2cTask, timing};
+use crate::modem::s2c::messages::Messages;
+use crate::modem::s2c::receiver::notices;
+use std::time::Duration;
 
-/// What an answer to a train may take beyond two ways of travel: turn-round, an instant message, the answer, a margin.
-const ANSWER_ALLOWANCE: Duration = Duration::from_millis(1600);
+/// Time for an acknowledgement beyond two ways of travel: turn-around, an instant message, the acknowledgement, a margin.
+const ACK_ALLOWANCE: Duration = Duration::from_millis(1600);
+/// How much longer the modem that did not request an idle connection keeps it open.
+const ACCEPTOR_ALLOWANCE: Duration = Duration::from_secs(10);
 
-impl S2c {
-    /// Plans this modem's turn; `owes` an acknowledgement if the peer has sent packets.
-    pub(in super::super) fn begin_turn_after(&mut self, delay: Duration, owes: bool, now: Duration) {
-        if let Some(connection) = self.burst.link.connection_mut() {
-            connection.turn = Turn::Talking;
-            connection.number += 1;
-            self.board.plan(now + delay, Event::Turn { number: connection.number, owes });
+impl BurstService {
+    /// Plans this modem's turn; it owes an acknowledgement if the peer has sent packets.
+    pub(super) fn begin_turn_after(&mut self, base: &mut S2cBase, delay: Duration, owes_ack: bool, now: Duration) {
+        if let Some(connection) = self.link.connection_mut() {
+            let number = connection.enter(TurnState::Sending);
+            base.board.schedule(now + delay, S2cTask::Turn { number, owes_ack });
         }
     }
 
-    /// It is this modem's turn.
-    pub(in super::super) fn on_turn(&mut self, number: u64, owes: bool, now: Duration) {
-        let trains = self.settings.get("ZC") as usize;
-        if self.burst.link.connection().is_some_and(|connection| connection.number == number) {
-            self.take_turn(owes, trains, now);
+    /// Listens to the peer for at most `timeout`; then it is this modem's turn, even if frames were lost.
+    pub(crate) fn listen_at_most(&mut self, base: &mut S2cBase, timeout: Duration, now: Duration) {
+        if let Some(connection) = self.link.connection_mut() {
+            let number = connection.enter(TurnState::Receiving);
+            base.board.schedule(now + timeout, S2cTask::Turn { number, owes_ack: true });
         }
     }
 
-    fn take_turn(&mut self, owes: bool, packets: usize, now: Duration) {
-        let packet_ms = self.settings.get("ZP");
-        let capacity = timing::packet_capacity(self.config.bit_rate, packet_ms);
-        let Some(connection) = self.burst.link.connection_mut() else { return };
-        let train = connection.sender.train(&mut self.burst.queue, connection.peer, capacity, packets);
-        let (peer, session, number) = (connection.peer, connection.session, connection.number);
+    pub(crate) fn on_turn(
+        &mut self,
+        base: &mut S2cBase,
+        messages: &mut Messages,
+        number: u64,
+        owes_ack: bool,
+        now: Duration,
+    ) {
+        let packets = base.settings.get("ZC") as usize;
+        if self.link.connection_in_turn(number).is_some() {
+            self.take_turn(base, messages, owes_ack, packets, now);
+        }
+    }
+
+    /// Sends the frames that are due in this turn, or rests if there are none.
+    fn take_turn(
+        &mut self,
+        base: &mut S2cBase,
+        messages: &mut Messages,
+        owes_ack: bool,
+        packets: usize,
+        now: Duration,
+    ) {
+        let packet_ms = base.settings.get("ZP");
+        let capacity = timing::packet_capacity(base.config.bit_rate, packet_ms);
+        let Some(connection) = self.link.connection_mut() else { return };
+        let train = connection.sender.train(&mut self.pool.queue, connection.peer, capacity, packets);
+        let (peer, session, number) = (connection.peer, connection.session, connection.number());
         let (next, held) = connection.receiver.state();
         let deferred = std::mem::take(&mut connection.deferred);
         let (follow, last) = (train.len() as u8, train.len().checked_sub(1));
-        let opens_with_message = self.message_waits_for(peer);
-        let speaks = owes || opens_with_message || !deferred.is_empty();
-        self.air.queue.extend(deferred);
+        let opens_with_message = messages.instant.waits_for_turn_to(peer);
+        let sends_ack = owes_ack || opens_with_message || !deferred.is_empty();
+        deferred.into_iter().for_each(|out| base.transmitter.push(out));
         if opens_with_message {
-            self.put_instant(true, follow);
+            messages.instant.transmit(base, true, follow);
         }
-        if speaks {
-            let mut frame = self.frame(Kind::Turn, peer);
+        if sends_ack {
+            let mut frame = base.frame(FrameKind::Turn, peer);
             (frame.tag, frame.follow, frame.seq, frame.held) = (session, follow, next, held);
-            let frame = self.with_piggyback(frame);
+            let frame = messages.piggyback.attach(frame);
             let then = match last {
-                Some(_) => After::Nothing,
-                None if opens_with_message => After::Train(number),
-                None => After::Acknowledged(number),
+                Some(_) => AfterSending::Done,
+                None if opens_with_message => AfterSending::Train(number),
+                None => AfterSending::Acknowledged(number),
             };
-            self.send(frame, timing::ACK, "ack", then);
+            base.send(frame, timing::ACK, "ack", then);
         }
         for (index, (seq, payload)) in train.into_iter().enumerate() {
-            let mut frame = self.frame(Kind::Packet, peer);
+            let mut frame = base.frame(FrameKind::Packet, peer);
             (frame.tag, frame.follow, frame.seq, frame.held) =
                 (session, follow - 1 - index as u8, seq, u64::from(next));
             let airtime = timing::packet(payload.len(), capacity, packet_ms);
             frame.payload = payload;
-            self.send(frame, airtime, "data", if Some(index) == last { After::Train(number) } else { After::Nothing });
+            let then = if Some(index) == last { AfterSending::Train(number) } else { AfterSending::Done };
+            base.send(frame, airtime, "data", then);
         }
-        if last.is_none() && !speaks {
-            self.rest(now);
-        }
-    }
-
-    /// Our acknowledgement has been sent, with nothing after it: the peer may go on, else both rest.
-    pub(in super::super) fn on_acknowledgement_sent(&mut self, number: u64, now: Duration) {
-        if let Some(connection) = self.burst.link.connection_mut().filter(|connection| connection.number == number) {
-            connection.turn = Turn::Listening;
-            connection.number += 1;
-            let patience = 2 * connection.travel + Duration::from_secs(1);
-            self.board.plan(now + patience, Event::Rest { number: connection.number });
+        if last.is_none() && !sends_ack {
+            self.rest(base, now);
         }
     }
 
-    /// The peer did not go on.
-    pub(in super::super) fn on_rest(&mut self, number: u64, now: Duration) {
-        if self.burst.link.connection().is_some_and(|connection| connection.number == number) {
-            self.rest(now);
+    /// Our acknowledgement has been sent without a train: the peer may continue, otherwise both rest.
+    pub(crate) fn on_acknowledgement_sent(&mut self, base: &mut S2cBase, number: u64, now: Duration) {
+        if let Some(connection) = self.link.connection_in_turn(number) {
+            let number = connection.enter(TurnState::Receiving);
+            let timeout = 2 * connection.travel() + Duration::from_secs(1);
+            base.board.schedule(now + timeout, S2cTask::Rest { number });
         }
     }
 
-    fn message_waits_for(&self, peer: u8) -> bool {
-        self.instant.waits_for_turn && self.instant.pending.as_ref().is_some_and(|pending| pending.dst == peer)
+    /// The peer did not continue.
+    pub(crate) fn on_rest(&mut self, base: &mut S2cBase, number: u64, now: Duration) {
+        if self.link.connection_in_turn(number).is_some() {
+            self.rest(base, now);
+        }
     }
 
-    /// Nobody owes anything: wait for data, or for the idle time to pass.
-    fn rest(&mut self, now: Duration) {
-        let idle = Duration::from_secs(u64::from(self.settings.get("ZI")));
-        if let Some(connection) = self.burst.link.connection_mut() {
-            connection.turn = Turn::Idle;
-            connection.number += 1;
-            let patience = if connection.initiator { Duration::ZERO } else { Duration::from_secs(10) };
-            self.board.plan(now + idle + patience, Event::Idle { number: connection.number });
+    /// Neither modem owes an acknowledgement: waits for data, or for the idle time to pass.
+    fn rest(&mut self, base: &mut S2cBase, now: Duration) {
+        let idle = Duration::from_secs(u64::from(base.settings.get("ZI")));
+        if let Some(connection) = self.link.connection_mut() {
+            let number = connection.enter(TurnState::Idle);
+            let allowance = if connection.initiator { Duration::ZERO } else { ACCEPTOR_ALLOWANCE };
+            base.board.schedule(now + idle + allowance, S2cTask::Idle { number });
         }
-        self.board.plan(now, Event::Kick);
+        base.board.schedule(now, S2cTask::ServePool);
     }
 
     /// The idle time has passed without a turn.
-    pub(in super::super) fn on_idle(&mut self, number: u64) {
-        let idle = |connection: &&Connection| connection.number == number && connection.turn == Turn::Idle;
-        if self.burst.link.connection().filter(idle).is_some() {
-            self.say_goodbye();
+    pub(crate) fn on_idle(&mut self, base: &mut S2cBase, number: u64) {
+        if self.link.connection_in_turn(number).is_some_and(|connection| connection.turn() == TurnState::Idle) {
+            self.send_disconnect(base);
         }
     }
 
     /// The train, or a probe, has been sent: the peer owes an acknowledgement.
-    pub(in super::super) fn on_train_sent(&mut self, number: u64, now: Duration) {
-        let Some(connection) = self.burst.link.connection_mut().filter(|connection| connection.number == number) else {
-            return;
-        };
-        connection.turn = Turn::Waiting;
-        connection.number += 1;
-        let deadline = now + 2 * connection.travel + ANSWER_ALLOWANCE;
-        self.board.plan(deadline, Event::AnswerTimeout { number: connection.number });
+    pub(crate) fn on_train_sent(&mut self, base: &mut S2cBase, number: u64, now: Duration) {
+        if let Some(connection) = self.link.connection_in_turn(number) {
+            let number = connection.enter(TurnState::AwaitingAck);
+            let deadline = now + 2 * connection.travel() + ACK_ALLOWANCE;
+            base.board.schedule(deadline, S2cTask::AckTimeout { number });
+        }
     }
 
-    /// The peer did not acknowledge: probe with one packet, or give the connection up.
-    pub(in super::super) fn on_answer_timeout(&mut self, number: u64, now: Duration) {
-        let patience = self.settings.get("RC").max(1);
-        let Some(connection) = self.burst.link.connection_mut().filter(|connection| connection.number == number) else {
-            return;
-        };
-        connection.silent += 1;
-        if connection.silent > patience {
-            self.lose_connection(now);
+    /// The peer did not acknowledge: probes it with one packet, or gives the connection up.
+    pub(crate) fn on_ack_timeout(&mut self, base: &mut S2cBase, messages: &mut Messages, number: u64, now: Duration) {
+        let max_probes = base.settings.get("RC").max(1);
+        let Some(connection) = self.link.connection_in_turn(number) else { return };
+        if connection.on_unanswered() > max_probes {
+            self.lose_connection(base, messages, now);
         } else {
-            connection.turn = Turn::Talking;
-            connection.number += 1;
-            self.take_turn(false, 1, now);
+            connection.enter(TurnState::Sending);
+            self.take_turn(base, messages, false, 1, now);
         }
     }
 
-    /// The peer's turn: its acknowledgement, and how many packets it announces.
-    pub(in super::super) fn on_peer_turn(&mut self, frame: &Frame, signal: &Signal, now: Duration) {
-        if !self.hear_peer(frame, signal) {
+    /// The peer opens its turn: its acknowledgement, and how many packets it announces.
+    pub(crate) fn on_peer_turn(
+        &mut self,
+        base: &mut S2cBase,
+        messages: &Messages,
+        frame: &S2cFrame,
+        signal: &ReceivedSignal,
+        now: Duration,
+    ) {
+        if !self.on_peer_frame(frame, signal) {
             return;
         }
-        self.on_acknowledged(frame.seq, frame.held, now);
+        self.on_acknowledged(base, frame.seq, frame.held, now);
         if frame.follow > 0 {
-            self.guard_turn(self.packet_time(frame.follow) + Duration::from_millis(500), now);
+            self.listen_at_most(base, base.packet_time(frame.follow) + Duration::from_millis(500), now);
             return;
         }
-        let waiting = |connection: &Connection| connection.sender.has_unacked() || !connection.deferred.is_empty();
-        let peer_data = self.burst.queue.iter().any(|record| record.dst == frame.src);
-        if peer_data || self.burst.link.connection().is_some_and(waiting) || self.message_waits_for(frame.src) {
-            self.begin_turn_after(timing::TURN_ROUND.saturating_sub(timing::PROCESSING), false, now);
+        let connection = self.link.connection();
+        let owes =
+            connection.is_some_and(|connection| connection.sender.has_unacked() || !connection.deferred.is_empty());
+        if self.pool.holds_record_to(frame.src) || owes || messages.instant.waits_for_turn_to(frame.src) {
+            self.begin_turn_after(base, timing::TURN_AROUND.saturating_sub(timing::PROCESSING), false, now);
         } else {
-            self.rest(now);
+            self.rest(base, now);
         }
     }
 
     /// A packet of the peer's train.
-    pub(in super::super) fn on_packet(&mut self, frame: &Frame, signal: &Signal, now: Duration) {
-        if !self.hear_peer(frame, signal) {
+    pub(crate) fn on_packet(&mut self, base: &mut S2cBase, frame: &S2cFrame, signal: &ReceivedSignal, now: Duration) {
+        if !self.on_peer_frame(frame, signal) {
             return;
         }
-        self.on_acknowledged(u32::try_from(frame.held).unwrap_or_default(), 0, now);
-        let Some(connection) = self.burst.link.connection_mut() else { return };
+        self.on_acknowledged(base, u32::try_from(frame.held).unwrap_or_default(), 0, now);
+        let Some(connection) = self.link.connection_mut() else { return };
         for (pid, data) in connection.receiver.accept(frame.seq, frame.payload.clone()) {
-            self.deliver_record(frame.src, pid, &data, signal, now);
+            notices::record(base, frame.src, pid, &data, signal, now);
         }
         if frame.follow == 0 {
-            self.begin_turn_after(timing::TURN_ROUND.saturating_sub(timing::PROCESSING), true, now);
+            self.begin_turn_after(base, timing::TURN_AROUND.saturating_sub(timing::PROCESSING), true, now);
         } else {
-            self.guard_turn(self.packet_time(frame.follow) + Duration::from_millis(100), now);
+            self.listen_at_most(base, base.packet_time(frame.follow) + Duration::from_millis(100), now);
         }
     }
 
-    /// Whether a frame belongs to the present connection; notes that the peer is there.
-    fn hear_peer(&mut self, frame: &Frame, signal: &Signal) -> bool {
-        let ours = |connection: &&mut Connection| connection.peer == frame.src && connection.session == frame.tag;
-        let Some(connection) = self.burst.link.connection_mut().filter(ours) else { return false };
-        connection.silent = 0;
-        connection.travel = signal.travel;
-        connection.heard_at = signal.heard_at;
+    /// Whether a frame belongs to the present connection, which notes that the peer is there.
+    fn on_peer_frame(&mut self, frame: &S2cFrame, signal: &ReceivedSignal) -> bool {
+        let Some(connection) = self.link.connection_mut().filter(|connection| connection.owns(frame)) else {
+            return false;
+        };
+        connection.on_peer_frame(signal);
         true
     }
 
-    fn on_acknowledged(&mut self, base: u32, held: u64, now: Duration) {
-        let Some(connection) = self.burst.link.connection_mut() else { return };
-        for record in connection.sender.acknowledge(base, held) {
-            self.burst.delivered += record.data.len() as u64;
-            self.notify(format!("DELIVERED,{},{}", record.count, record.dst), now);
+    fn on_acknowledged(&mut self, base: &mut S2cBase, next: u32, held: u64, now: Duration) {
+        let Some(connection) = self.link.connection_mut() else { return };
+        for record in connection.sender.acknowledge(next, held) {
+            self.pool.count_delivered(record.data.len());
+            base.notify(format!("DELIVERED,{},{}", record.count, record.dst), now);
         }
-    }
-
-    /// Listens to the peer for so long at most; then it is this modem's turn, whatever was lost.
-    pub(in super::super) fn guard_turn(&mut self, patience: Duration, now: Duration) {
-        if let Some(connection) = self.burst.link.connection_mut() {
-            connection.turn = Turn::Listening;
-            connection.number += 1;
-            self.board.plan(now + patience, Event::Turn { number: connection.number, owes: true });
-        }
-    }
-
-    /// Time that so many full packets take.
-    pub(in super::super) fn packet_time(&self, packets: u8) -> Duration {
-        Duration::from_millis(u64::from(self.settings.get("ZP"))) * u32::from(packets)
     }
 }

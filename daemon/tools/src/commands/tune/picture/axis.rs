@@ -10,7 +10,6 @@ pub struct Axis {
     to: f64,
 }
 
-/// Ticks aimed at.
 const TICKS: f64 = 5.0;
 
 impl Axis {

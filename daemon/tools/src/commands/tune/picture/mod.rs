@@ -42,7 +42,6 @@ pub(super) trait Canvas {
     fn text(&mut self, at: (f64, f64), anchor: Anchor, colour: Colour, text: &str);
 }
 
-/// Everything that is shown.
 pub struct Figure<'a> {
     rows: &'a [Row],
     best: Option<&'a Row>,

@@ -10,7 +10,6 @@ use image::{ImageFormat, Rgb, RgbImage};
 use std::convert::Infallible;
 use std::io::Cursor;
 
-/// Pixels in the making.
 #[derive(Debug)]
 pub struct Raster {
     image: RgbImage,

@@ -1,0 +1,49 @@
+// The background streams that use spare capacity, in an order that the operator changes.
+
+import { h, show, text } from "../dom.js";
+
+const NAMES = {
+  finer: "finer cells, while the map is coarse",
+  depth: "depth",
+  exemplars: "images of new labels",
+  confidence: "confidence",
+  curiosity: "curiosity",
+};
+const KINDS = Object.keys(NAMES);
+
+/** `value()` returns the streams in order, `change(streams)` sets them. */
+export function backgroundBox(value, change) {
+  const list = h("ol", {});
+  const none = h("p.note", {}, "None: spare capacity stays unused.");
+  const node = h("div.background", { role: "group", "aria-label": "Use of spare capacity" },
+    h("h3", {}, "Spare capacity, first to last"), list, none);
+  return { node, refresh };
+
+  function refresh(order) {
+    show(none, order.length === 0);
+    const key = order.join();
+    if (list.dataset.key === key) return;
+    const held = document.activeElement?.dataset.act;
+    list.dataset.key = key;
+    const out = KINDS.filter((kind) => !order.includes(kind));
+    list.replaceChildren(...order.map((kind, i) => line(kind, i)), ...out.map((kind) => line(kind, null)));
+    if (held) list.querySelector(`[data-act="${held}"]:not(:disabled)`)?.focus();
+  }
+
+  function line(kind, place) {
+    const move = (by) => {
+      const order = [...value()];
+      [order[place], order[place + by]] = [order[place + by], order[place]];
+      change(order);
+    };
+    const toggle = () => change(place === null ? [...value(), kind] : value().filter((k) => k !== kind));
+    const button = (act, name, sign, onclick, off) => h("button", { type: "button", title: name, "aria-label": `${name}: ${NAMES[kind]}`, data: { act: `${act}-${kind}` }, disabled: off, onclick }, sign);
+    const box = h("input", { type: "checkbox", checked: place !== null, "aria-label": NAMES[kind], data: { act: `use-${kind}` }, onchange: toggle });
+    const name = h("span", {});
+    text(name, NAMES[kind]);
+    const last = value().length - 1;
+    return h("li", { data: { stream: kind } }, h("label", {}, box, name),
+      button("up", "Earlier", "\u2191", () => move(-1), place === null || place === 0),
+      button("down", "Later", "\u2193", () => move(1), place === null || place === last));
+  }
+}

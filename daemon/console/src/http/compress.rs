@@ -1,0 +1,109 @@
+//! Responses in fewer bytes: gzip for clients that accept it, and status 304 for those that have the same content.
+
+use axum::body::{Body, Bytes, to_bytes};
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use std::io::Write;
+
+/// Shorter responses are sent as they are.
+const MIN_BYTES: usize = 512;
+/// Longer than any response.
+const MAX_BYTES: usize = 1 << 28;
+
+/// Bytes in gzip (RFC 1952); `None` if there is no memory for them.
+pub(super) fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).ok()?;
+    encoder.finish().ok()
+}
+
+/// Whether the client accepts gzip.
+pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
+    let offered = headers.get_all(header::ACCEPT_ENCODING).iter().filter_map(|v| v.to_str().ok());
+    offered.flat_map(|list| list.split(',')).any(|one| {
+        let (name, weight) = one.split_once(';').unwrap_or((one, ""));
+        name.trim().eq_ignore_ascii_case("gzip") && !matches!(weight.trim(), "q=0" | "q=0.0" | "q=0.00" | "q=0.000")
+    })
+}
+
+/// Compresses responses of text.
+pub(super) async fn compress(request: Request, next: Next) -> Response {
+    let wanted = accepts_gzip(request.headers());
+    let mut response = next.run(request).await;
+    if !is_text(response.headers()) {
+        return response;
+    }
+    response.headers_mut().insert(header::VARY, HeaderValue::from_static("accept-encoding"));
+    if !wanted || response.headers().contains_key(header::CONTENT_ENCODING) {
+        return response;
+    }
+    let (mut parts, body) = response.into_parts();
+    let Ok(bytes) = to_bytes(body, MAX_BYTES).await else { return StatusCode::INTERNAL_SERVER_ERROR.into_response() };
+    let Some(packed) = (bytes.len() >= MIN_BYTES).then(|| gzip(&bytes)).flatten() else {
+        return Response::from_parts(parts, Body::from(bytes));
+    };
+    parts.headers.remove(header::CONTENT_LENGTH);
+    parts.headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    Response::from_parts(parts, Body::from(packed))
+}
+
+fn is_text(headers: &HeaderMap) -> bool {
+    let kind = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
+    let text = kind.starts_with("text/") || kind.contains("json") || kind.contains("xml") || kind.contains("ply");
+    text && !kind.starts_with("text/event-stream")
+}
+
+/// A response that the client may keep while `tag` is the same; status 304 if it has the response.
+pub(super) fn tagged(headers: &HeaderMap, tag: &str, response: impl FnOnce() -> Response) -> Response {
+    // The same content in another encoding has the same tag, so it is a weak one (RFC 9110, section 8.8.1).
+    let tag = format!("W/\"{tag}\"");
+    let held = headers.get_all(header::IF_NONE_MATCH).iter().filter_map(|v| v.to_str().ok());
+    let is_held = held.flat_map(|list| list.split(',')).any(|one| one.trim() == tag);
+    let mut response = if is_held { StatusCode::NOT_MODIFIED.into_response() } else { response() };
+    if response.status().is_success() || is_held {
+        let headers = response.headers_mut();
+        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+        if let Ok(tag) = HeaderValue::from_str(&tag) {
+            headers.insert(header::ETAG, tag);
+        }
+    }
+    response
+}
+
+/// A text of which both forms exist: in gzip if the client accepts it.
+pub(super) fn either(headers: &HeaderMap, kind: &'static str, plain: &Bytes, packed: &Bytes) -> Response {
+    let kind = (header::CONTENT_TYPE, kind);
+    if accepts_gzip(headers) {
+        return ([kind, (header::CONTENT_ENCODING, "gzip")], packed.clone()).into_response();
+    }
+    ([kind], plain.clone()).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gzip_is_sent_only_to_clients_that_accept_it() {
+        let accepts = |value: &'static str| {
+            accepts_gzip(&HeaderMap::from_iter([(header::ACCEPT_ENCODING, HeaderValue::from_static(value))]))
+        };
+        assert!(accepts("gzip, deflate, br") && accepts("br;q=1, GZIP;q=0.5"));
+        assert!(!accepts("identity") && !accepts("gzip;q=0, br") && !accepts("x-gzip-like"));
+        assert!(!accepts_gzip(&HeaderMap::new()));
+    }
+
+    #[test]
+    fn a_client_with_the_same_tag_receives_status_304() {
+        let held =
+            |value: &'static str| HeaderMap::from_iter([(header::IF_NONE_MATCH, HeaderValue::from_static(value))]);
+        let status = |headers| tagged(&headers, "a1", || "text".into_response()).status();
+        assert_eq!(status(HeaderMap::new()), StatusCode::OK);
+        assert_eq!(status(held("W/\"a0\"")), StatusCode::OK);
+        assert_eq!(status(held("W/\"a0\", W/\"a1\"")), StatusCode::NOT_MODIFIED);
+    }
+}

@@ -1,0 +1,212 @@
+//! Connections, with bounds on their number, time and memory.
+
+use axum::Router;
+use axum::body::Body;
+use axum::http::header::CONTENT_TYPE;
+use http_body_util::BodyExt;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::pin::Pin;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::task::AbortHandle;
+use tokio::time::Sleep;
+use tower_service::Service;
+
+/// Connections at a time. A further one replaces the oldest idle connection, or else the oldest that is not a stream of events; the
+/// number of streams has a lower bound.
+const MAX_CONNECTIONS: usize = 256;
+/// For the head of a request, also for the next one on a connection.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(10);
+const MAX_HEAD_BYTES: usize = 16 * 1024;
+const MAX_HEADERS: usize = 64;
+/// The type of a stream of events.
+pub(super) const EVENT_STREAM: &str = "text/event-stream";
+/// For a client to read sent data.
+const READ_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// Serves `router` on `listener` until the runtime ends.
+pub(super) async fn serve(listener: TcpListener, router: Router) {
+    let connections = Connections::default();
+    for number in 0u64.. {
+        let stream = match listener.accept().await {
+            Ok((stream, _)) => stream,
+            Err(e) => {
+                // Out of file descriptors, or the client has left: a later connection may succeed.
+                tracing::warn!("the operator's page cannot take a connection: {e}");
+                tokio::time::sleep(Duration::from_millis(100)).await;
+                continue;
+            }
+        };
+        let activity = connections.make_room(number);
+        let (all, router) = (connections.clone(), router.clone());
+        let task = tokio::spawn(async move {
+            // An error here is the fault of the client.
+            let _ = serve_one(stream, router, activity).await;
+            all.remove(number);
+        });
+        connections.add(number, task.abort_handle());
+    }
+}
+
+async fn serve_one(stream: TcpStream, router: Router, activity: Arc<Activity>) -> Result<(), hyper::Error> {
+    let _ = stream.set_nodelay(true);
+    let service = hyper::service::service_fn(move |request: hyper::Request<hyper::body::Incoming>| {
+        let active = ActiveRequest::new(&activity);
+        let mut router = router.clone();
+        async move {
+            let response = router.call(request.map(Body::new)).await?;
+            if response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == EVENT_STREAM) {
+                active.0.is_stream.store(true, Ordering::Relaxed);
+            }
+            // The request is active until the last byte is sent.
+            Ok::<_, Infallible>(response.map(move |body| {
+                Body::new(body.map_frame(move |frame| {
+                    let _active = &active;
+                    frame
+                }))
+            }))
+        }
+    });
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new())
+        .header_read_timeout(HEAD_TIMEOUT)
+        .max_buf_size(MAX_HEAD_BYTES)
+        .max_headers(MAX_HEADERS);
+    http.serve_connection(TokioIo::new(TimeoutStream { stream, timeout: None }), service).await
+}
+
+/// The use of a connection.
+#[derive(Debug, Default)]
+struct Activity {
+    /// Requests whose response is not complete.
+    requests: AtomicUsize,
+    is_stream: AtomicBool,
+}
+
+/// A request whose response is not complete.
+struct ActiveRequest(Arc<Activity>);
+
+impl ActiveRequest {
+    fn new(activity: &Arc<Activity>) -> Self {
+        activity.requests.fetch_add(1, Ordering::Relaxed);
+        Self(activity.clone())
+    }
+}
+
+impl Drop for ActiveRequest {
+    fn drop(&mut self) {
+        self.0.requests.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// All connections by their number.
+#[derive(Clone, Default)]
+struct Connections(Arc<Mutex<BTreeMap<u64, Connection>>>);
+
+struct Connection {
+    activity: Arc<Activity>,
+    /// Ends the connection; `None` until its task has started.
+    end: Option<AbortHandle>,
+}
+
+impl Connection {
+    /// The number of its active requests; `None` if it must not be ended.
+    fn active_requests(&self) -> Option<usize> {
+        let may_end = self.end.is_some() && !self.activity.is_stream.load(Ordering::Relaxed);
+        may_end.then(|| self.activity.requests.load(Ordering::Relaxed))
+    }
+}
+
+impl Connections {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Connection>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Registers a connection, and ends another one if there are too many.
+    fn make_room(&self, number: u64) -> Arc<Activity> {
+        let mut all = self.lock();
+        if all.len() >= MAX_CONNECTIONS {
+            let replaced = all.iter().filter_map(|(&n, c)| Some((c.active_requests()?, n))).min();
+            if let Some(end) = replaced.and_then(|(_, n)| all.remove(&n)).and_then(|c| c.end) {
+                end.abort();
+            }
+        }
+        let activity = Arc::<Activity>::default();
+        all.insert(number, Connection { activity: activity.clone(), end: None });
+        activity
+    }
+
+    fn add(&self, number: u64, end: AbortHandle) {
+        // The connection may have ended meanwhile.
+        if let Some(connection) = self.lock().get_mut(&number) {
+            connection.end = Some(end);
+        }
+    }
+
+    fn remove(&self, number: u64) {
+        self.lock().remove(&number);
+    }
+}
+
+/// A stream that fails when the client does not read.
+struct TimeoutStream {
+    stream: TcpStream,
+    timeout: Option<Pin<Box<Sleep>>>,
+}
+
+impl TimeoutStream {
+    fn wait(&mut self, cx: &mut Context<'_>) -> Poll<std::io::Error> {
+        let timeout = self.timeout.get_or_insert_with(|| Box::pin(tokio::time::sleep(READ_TIMEOUT)));
+        ready!(timeout.as_mut().poll(cx));
+        Poll::Ready(std::io::ErrorKind::TimedOut.into())
+    }
+
+    fn or_wait(&mut self, written: Poll<std::io::Result<usize>>, cx: &mut Context<'_>) -> Poll<std::io::Result<usize>> {
+        if written.is_ready() {
+            self.timeout = None;
+            return written;
+        }
+        self.wait(cx).map(Err)
+    }
+}
+
+impl AsyncRead for TimeoutStream {
+    fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &mut ReadBuf<'_>) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.stream).poll_read(cx, buf)
+    }
+}
+
+impl AsyncWrite for TimeoutStream {
+    fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, buf: &[u8]) -> Poll<std::io::Result<usize>> {
+        let written = Pin::new(&mut self.stream).poll_write(cx, buf);
+        self.or_wait(written, cx)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bufs: &[std::io::IoSlice<'_>],
+    ) -> Poll<std::io::Result<usize>> {
+        let written = Pin::new(&mut self.stream).poll_write_vectored(cx, bufs);
+        self.or_wait(written, cx)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}

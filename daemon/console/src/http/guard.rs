@@ -1,0 +1,126 @@
+//! Admits requests.
+
+use super::access::{Access, HostNames};
+use super::response::error;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Redirect, Response};
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
+                      connect-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
+/// From the head of a request to the head of its response.
+const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
+
+/// Refuses requests that the page of another site could have made and those without a token, and adds the headers that isolate
+/// our page.
+pub(super) async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
+    let mut response = match check(request.method(), request.uri().path(), request.headers(), &access.names) {
+        Err(reason) => error(StatusCode::FORBIDDEN, reason),
+        Ok(()) if !access.admits(request.uri().path(), request.headers()) => unauthorized(request.uri().path()),
+        Ok(()) => match tokio::time::timeout(RESPONSE_TIMEOUT, next.run(request)).await {
+            Ok(response) => response,
+            Err(_) => error(StatusCode::REQUEST_TIMEOUT, "the request took too long"),
+        },
+    };
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("same-origin"));
+    headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    response
+}
+
+fn unauthorized(path: &str) -> Response {
+    if path == "/" {
+        return Redirect::to("/login").into_response();
+    }
+    let line = "this requires the token of console.token_file, as in Authorization: Bearer TOKEN";
+    let mut response = error(StatusCode::UNAUTHORIZED, line);
+    response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+    response
+}
+
+/// Refuses a host name that the DNS of another site points here, and requests of pages from another origin.
+fn check(method: &Method, path: &str, headers: &HeaderMap, names: &HostNames) -> Result<(), &'static str> {
+    let text = |name| headers.get(name).and_then(|v: &HeaderValue| v.to_str().ok());
+    let host = text(header::HOST).ok_or("the request has no Host")?;
+    if !is_ours(host, names) {
+        return Err(match names {
+            HostNames::Loopback => "this page is served to this machine only",
+            HostNames::Network(_) => "the request must name this page by an address, or by the name in console.host",
+        });
+    }
+    if let Some(origin) = text(header::ORIGIN)
+        && !origin.strip_prefix("http://").is_some_and(|o| o.eq_ignore_ascii_case(host))
+    {
+        return Err("the request comes from the page of another site");
+    }
+    // A form cannot send the header; our login form has the token instead.
+    let is_read = matches!(*method, Method::GET | Method::HEAD);
+    if !is_read && path != "/login" && text(HeaderName::from_static("x-scenecast")) != Some("1") {
+        return Err("a POST needs the header X-Scenecast: 1");
+    }
+    Ok(())
+}
+
+fn is_ours(host: &str, names: &HostNames) -> bool {
+    let name = match host.strip_prefix('[') {
+        Some(rest) => rest.split(']').next().unwrap_or_default(),
+        None => host.rsplit_once(':').map_or(host, |(name, _)| name),
+    };
+    let address: Option<IpAddr> = name.parse().ok();
+    let is_loopback = name.eq_ignore_ascii_case("localhost") || address.is_some_and(|ip| ip.is_loopback());
+    is_loopback
+        || match names {
+            HostNames::Loopback => false,
+            HostNames::Network(own) => address.is_some() || (!own.is_empty() && name.eq_ignore_ascii_case(own)),
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked_with(
+        names: &HostNames,
+        method: Method,
+        pairs: &[(&'static str, &'static str)],
+    ) -> Result<(), &'static str> {
+        let headers = pairs.iter().map(|(k, v)| (HeaderName::from_static(k), HeaderValue::from_static(v)));
+        check(&method, "/api/v2/budget", &headers.collect(), names)
+    }
+
+    fn checked(method: Method, pairs: &[(&'static str, &'static str)]) -> Result<(), &'static str> {
+        checked_with(&HostNames::Loopback, method, pairs)
+    }
+
+    #[test]
+    fn only_our_page_on_this_machine_is_admitted() {
+        assert!(checked(Method::GET, &[("host", "127.0.0.1:8460")]).is_ok());
+        assert!(checked(Method::GET, &[("host", "[::1]:8460")]).is_ok());
+        assert!(checked(Method::GET, &[("host", "evil.example")]).is_err());
+        assert!(checked(Method::GET, &[("host", "192.168.1.7:8460")]).is_err());
+        assert!(checked(Method::GET, &[("host", "localhost:1"), ("origin", "http://evil.example")]).is_err());
+        assert!(checked(Method::POST, &[("host", "localhost:1"), ("x-scenecast", "1"), ("origin", "null")]).is_err());
+        assert!(checked(Method::POST, &[("host", "localhost:1")]).is_err());
+        assert!(checked(Method::PUT, &[("host", "localhost:1")]).is_err());
+        assert!(
+            checked(Method::POST, &[("host", "localhost:1"), ("x-scenecast", "1"), ("origin", "http://localhost:1")])
+                .is_ok()
+        );
+    }
+
+    #[test]
+    fn on_a_network_a_request_names_an_address_or_our_name() {
+        let admits =
+            |own: &str, host| checked_with(&HostNames::Network(own.to_owned()), Method::GET, &[("host", host)]).is_ok();
+        assert!(admits("", "192.168.1.7:8460") && admits("", "[fe80::1]:8460") && admits("", "localhost"));
+        assert!(!admits("", "evil.example") && !admits("", ":8460"));
+        assert!(admits("surface.ship", "Surface.Ship:8460") && !admits("surface.ship", "evil.example"));
+    }
+}

@@ -1,0 +1,49 @@
+//! The login form, which exchanges the token for a cookie.
+
+use crate::http::access::COOKIE;
+use crate::http::assets;
+use crate::http::response::error;
+use crate::http::shared::Shared;
+use axum::Form;
+use axum::extract::State;
+use axum::extract::rejection::FormRejection;
+use axum::http::{StatusCode, header};
+use axum::response::{Html, IntoResponse, Redirect, Response};
+use serde::Deserialize;
+use zeroize::Zeroizing;
+
+fn form(message: &str) -> Html<String> {
+    let (_, page) = assets::find("login.html").unwrap_or_default();
+    Html(String::from_utf8_lossy(page).replace("<!-- message -->", message))
+}
+
+/// The form that requests the token.
+pub(in crate::http) async fn login_form() -> Response {
+    form("").into_response()
+}
+
+/// The fields of the form.
+#[derive(Deserialize)]
+pub(in crate::http) struct LoginForm {
+    token: String,
+}
+
+/// Sets a cookie in exchange for the token.
+pub(in crate::http) async fn login(
+    State(shared): State<Shared>,
+    login: Result<Form<LoginForm>, FormRejection>,
+) -> Response {
+    let token = match login {
+        Ok(Form(login)) => Zeroizing::new(login.token),
+        Err(e) => return error(e.status(), &e.body_text()),
+    };
+    if !shared.access.admits_login(token.trim()) {
+        let message = "<p class=\"warn\" role=\"alert\">This is not the token.</p>";
+        return (StatusCode::UNAUTHORIZED, form(message)).into_response();
+    }
+    let Some(session) = shared.access.begin_session() else {
+        return StatusCode::INTERNAL_SERVER_ERROR.into_response();
+    };
+    let cookie = format!("{COOKIE}={session}; HttpOnly; SameSite=Strict; Path=/");
+    ([(header::SET_COOKIE, cookie)], Redirect::to("/")).into_response()
+}

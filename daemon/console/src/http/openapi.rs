@@ -1,0 +1,138 @@
+//! The OpenAPI document, made from the table of operations and the types of their requests and responses.
+
+use super::operations::{Content, Operation, SchemaOf, operations};
+use crate::state::{ErrorBody, MapEvent, MissionState};
+use schemars::SchemaGenerator;
+use schemars::generate::SchemaSettings;
+use serde_json::{Map, Value, json};
+
+const DESCRIPTION: &str = "The interface of the operator's page, for programs as well. A member that ends in `_s` is a mission \
+time in seconds, `now_s` being the present, unless it is called a duration. Metres are east (x), north (y) and up (z). A request \
+needs a `Host` of this machine and, if it has an `Origin`, that of the page; a POST needs the header `X-Scenecast: 1`. If the \
+surface has a `console.token_file`, a request needs its token, in `Authorization: Bearer TOKEN` or as the cookie of `/login`. \
+Text is compressed for clients that accept gzip; maps and files carry an `ETag`. `/api/v1` answers 410.";
+
+/// The document.
+pub(super) fn document() -> Vec<u8> {
+    serde_json::to_vec_pretty(&describe()).unwrap_or_default()
+}
+
+/// A response has every member, but a request may omit some, so each has its own generator.
+struct Schemas {
+    response: SchemaGenerator,
+    request: SchemaGenerator,
+}
+
+fn describe() -> Value {
+    let settings = || {
+        SchemaSettings::draft2020_12().with(|s| {
+            s.definitions_path = "/components/schemas".into();
+            s.meta_schema = None;
+        })
+    };
+    let mut schemas = Schemas {
+        response: settings().for_serialize().into_generator(),
+        request: settings().for_deserialize().into_generator(),
+    };
+    let mut paths: Map<String, Value> = Map::new();
+    for operation in operations() {
+        let described = describe_operation(&operation, &mut schemas);
+        let path = paths.entry(operation.path).or_insert_with(|| json!({}));
+        path[operation.method.as_str().to_lowercase()] = described;
+    }
+    let error = schemas.response.subschema_for::<ErrorBody>();
+    let mut types = schemas.response.take_definitions(true);
+    // A type of both, such as a fence, has all members in a response but may omit some in a request.
+    types.extend(schemas.request.take_definitions(true));
+    json!({
+        "openapi": "3.1.0",
+        "info": { "title": "scenecast", "version": env!("CARGO_PKG_VERSION"), "description": DESCRIPTION },
+        "security": [{}, { "token": [] }, { "session": [] }],
+        "paths": paths,
+        "components": {
+            "schemas": types,
+            "responses": { "Error": { "description": "The request failed", "content": as_json(error.into()) } },
+            "securitySchemes": {
+                "token": { "type": "http", "scheme": "bearer" },
+                "session": { "type": "apiKey", "in": "cookie", "name": "scenecast-session" },
+            },
+        },
+    })
+}
+
+fn as_json(schema: Value) -> Value {
+    json!({ "application/json": { "schema": schema } })
+}
+
+fn describe_operation(operation: &Operation, schemas: &mut Schemas) -> Value {
+    let (status, content) = &operation.success;
+    let mut responses = json!({ "default": { "$ref": "#/components/responses/Error" } });
+    responses[status.to_string()] = describe_response(content, &mut schemas.response);
+    let mut described = json!({ "operationId": operation.id, "summary": operation.summary, "responses": responses });
+    let parameters = parameters(operation);
+    if !parameters.is_empty() {
+        described["parameters"] = parameters.into();
+    }
+    if let Some(body) = operation.body {
+        described["requestBody"] =
+            json!({ "required": true, "content": as_json(resolved(body, &mut schemas.request)) });
+    } else if operation.id == "login" {
+        let form = json!({ "type": "object", "required": ["token"], "properties": { "token": { "type": "string" } } });
+        let content = json!({ "application/x-www-form-urlencoded": { "schema": form } });
+        described["requestBody"] = json!({ "required": true, "content": content });
+    }
+    if operation.path == "/login" {
+        described["security"] = json!([{}]);
+    }
+    described
+}
+
+fn resolved(schema: SchemaOf, generator: &mut SchemaGenerator) -> Value {
+    schema(generator).into()
+}
+
+fn describe_response(content: &Content, generator: &mut SchemaGenerator) -> Value {
+    match content {
+        Content::Json(schema) => json!({ "description": "Success", "content": as_json(resolved(*schema, generator)) }),
+        Content::File(kind) => json!({ "description": "Success", "content": { *kind: {} } }),
+        Content::Events => json!({
+            "description": "A stream of events (WHATWG HTML, section 9.2), `data` being JSON",
+            "content": { "text/event-stream": {
+                "schema": { "type": "string" },
+                "x-events": {
+                    "state": generator.subschema_for::<MissionState>(),
+                    "map": generator.subschema_for::<MapEvent>(),
+                },
+            } },
+        }),
+        Content::Headers => json!({ "description": "Success; `Location` is the next page" }),
+    }
+}
+
+fn parameters(operation: &Operation) -> Vec<Value> {
+    let mut parameters = Vec::new();
+    if operation.path.contains("{id}") {
+        let schema = json!({ "type": "integer", "minimum": 1, "maximum": 14 });
+        let text = "Address of the vehicle";
+        parameters.push(json!({ "name": "id", "in": "path", "required": true, "description": text, "schema": schema }));
+    }
+    if operation.path.contains("{file}") {
+        let schema = json!({ "type": "string", "pattern": "^[0-9]+(-[0-9]+)?\\.webp$" });
+        let text = "Label and .webp, or label, number of the image and .webp";
+        parameters
+            .push(json!({ "name": "file", "in": "path", "required": true, "description": text, "schema": schema }));
+    }
+    if operation.id == "fit_settings" {
+        let schema = json!({ "type": "number", "minimum": 1, "maximum": 10_000_000 });
+        let text = "Budget of the stream of the map, bit/s; by default the map's share of the vehicle's budget";
+        parameters.push(json!({ "name": "bits_per_s", "in": "query", "description": text, "schema": schema }));
+    }
+    if operation.body.is_some() {
+        let schema = json!({ "type": "string", "const": "1" });
+        let text = "The page of another site cannot send it";
+        parameters.push(
+            json!({ "name": "X-Scenecast", "in": "header", "required": true, "description": text, "schema": schema }),
+        );
+    }
+    parameters
+}

@@ -1,0 +1,260 @@
+//! Every path and method of the server, in one table from which the router and the OpenAPI document are made.
+
+use super::handlers::{events, login, maps, metrics, orders, readings};
+use super::shared::{Shared, VehicleId};
+use crate::fit::Fit;
+use crate::orders::{BudgetOrder, ConstraintsOrder, ExemplarOrder, UtilityOrder};
+use crate::state::{AcceptedOrder, MapBody, MissionState};
+use axum::extract::State;
+use axum::http::{HeaderMap, Method};
+use axum::routing::{MethodRouter, get, post};
+use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+
+/// Adds the schema of a type to a generator.
+pub(super) type SchemaOf = fn(&mut SchemaGenerator) -> Schema;
+
+fn schema<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+    generator.subschema_for::<T>()
+}
+
+/// The content of a successful response.
+pub(super) enum Content {
+    /// JSON with this schema.
+    Json(SchemaOf),
+    /// A file or a text with this content type.
+    File(&'static str),
+    /// Server-sent events.
+    Events,
+    /// Headers only.
+    Headers,
+}
+
+/// A path and a method.
+pub(super) struct Operation {
+    pub(super) method: Method,
+    pub(super) path: &'static str,
+    /// The name for generated clients.
+    pub(super) id: &'static str,
+    /// One line for people.
+    pub(super) summary: &'static str,
+    /// The schema of the request's body.
+    pub(super) body: Option<SchemaOf>,
+    /// Status and content of a successful response.
+    pub(super) success: (u16, Content),
+    pub(super) route: fn() -> MethodRouter<Shared>,
+}
+
+fn read(
+    path: &'static str,
+    id: &'static str,
+    summary: &'static str,
+    content: Content,
+    route: fn() -> MethodRouter<Shared>,
+) -> Operation {
+    Operation { method: Method::GET, path, id, summary, body: None, success: (200, content), route }
+}
+
+fn order(
+    path: &'static str,
+    id: &'static str,
+    summary: &'static str,
+    body: SchemaOf,
+    route: fn() -> MethodRouter<Shared>,
+) -> Operation {
+    let success = (202, Content::Json(schema::<AcceptedOrder>));
+    Operation { method: Method::POST, path, id, summary, body: Some(body), success, route }
+}
+
+/// A file format of the map of a vehicle.
+macro_rules! map_file {
+    ($path:literal, $id:literal, $summary:literal, $format:expr) => {{
+        const FORMAT: maps::FileFormat = $format;
+        read($path, $id, $summary, Content::File(FORMAT.content_type), || {
+            get(|State(shared): State<Shared>, VehicleId(id): VehicleId, headers: HeaderMap| {
+                maps::file(shared, id, headers, FORMAT)
+            })
+        })
+    }};
+}
+
+/// All operations.
+pub(super) fn operations() -> Vec<Operation> {
+    let mut all = readings();
+    all.extend(map_files());
+    all.extend(orders());
+    all.extend(logins());
+    all
+}
+
+fn readings() -> Vec<Operation> {
+    vec![
+        read("/api/v2/state", "state", "The state", Content::Json(schema::<MissionState>), || get(readings::state)),
+        read(
+            "/api/v2/events",
+            "events",
+            "Changes: `state` with the whole state after each change and at least once a second; `map` after a change of a \
+             map. A slow reader misses states, but never the last one.",
+            Content::Events,
+            || get(events::events),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/map",
+            "map",
+            "The map with the age of its cells",
+            Content::Json(schema::<MapBody>),
+            || get(maps::map),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/exemplars/{file}",
+            "exemplar",
+            "A received image of a label: the latest as in 3.webp, or the one with a number as in 3-17.webp",
+            Content::File("image/webp"),
+            || get(readings::exemplar),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/fit",
+            "fit_settings",
+            "The most informative settings of the scene model whose stream fits a budget, and the trade-off",
+            Content::Json(schema::<Fit>),
+            || get(readings::fit),
+        ),
+        read("/api/openapi.json", "openapi", "This document", Content::File("application/json"), || {
+            get(readings::document)
+        }),
+        read(
+            "/metrics",
+            "metrics",
+            "Metrics for Prometheus, text format 0.0.4",
+            Content::File(metrics::CONTENT_TYPE),
+            || get(metrics::metrics),
+        ),
+    ]
+}
+
+fn map_files() -> Vec<Operation> {
+    vec![
+        map_file!(
+            "/api/v2/vehicles/{id}/map.png",
+            "map_png",
+            "The map as an indexed PNG, north up, pixel value = label",
+            maps::PNG
+        ),
+        map_file!("/api/v2/vehicles/{id}/map.pgw", "map_world_file", "The world file of that PNG", maps::WORLD),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.png.aux.xml",
+            "map_projection",
+            "The projection of that PNG, in the file that GDAL and QGIS read",
+            maps::PROJECTION
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.geojson",
+            "map_geojson",
+            "Regions of equal label; in WGS 84 if the mission has an origin, else in metres east and north of it",
+            maps::GEOJSON
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.ply",
+            "map_ply",
+            "The cells as a coloured point cloud, metres east, north, up",
+            maps::PLY
+        ),
+        map_file!("/api/v2/vehicles/{id}/map.csv", "map_csv", "One line for each explored cell", maps::CSV),
+    ]
+}
+
+fn orders() -> Vec<Operation> {
+    vec![
+        order(
+            "/api/v2/vehicles/{id}/utility",
+            "set_utility",
+            "Sends the weights of labels, of unexplored cells and of curiosity",
+            schema::<UtilityOrder>,
+            || post(orders::utility),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/exemplars",
+            "request_exemplar",
+            "Requests an image of a label: first the best, then another or a larger one; or cancels the request. At most 8 \
+             requests are pending at a time.",
+            schema::<ExemplarOrder>,
+            || post(orders::exemplar),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/constraints",
+            "set_constraints",
+            "Orders the vehicle to hold, to abort, or to resume its survey",
+            schema::<ConstraintsOrder>,
+            || post(orders::constraints),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/fence",
+            "set_fence",
+            "Replaces the fence. Vertices are in metres east and north in the world frame and stay there when a fix moves the \
+             vehicle's map; 3 to 34 for each outline, at most 15 keep-outs. Refused: edges that cross or touch, no area, a \
+             keep-out around the whole fence, a return point where the vehicle must not be, more than fits a frame. The \
+             vehicle refuses a fence that it is outside of.",
+            schema::<FenceOrder>,
+            || post(orders::fence),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/limits",
+            "set_limits",
+            "Replaces the limits. Reactions are hold, return or surface. The vehicle refuses a band that it is outside of.",
+            schema::<LimitsOrder>,
+            || post(orders::limits),
+        ),
+        order(
+            "/api/v2/vehicles/{id}/settings",
+            "set_settings",
+            "Changes how the vehicle builds its map, the cells and layers that it sends, and its planner. A member that is \
+             missing or null leaves the setting unchanged; 0 or an empty text sets it as configured on the vehicle. Labels \
+             keep their meaning.",
+            schema::<SettingsOrder>,
+            || post(orders::settings),
+        ),
+        order(
+            "/api/v2/budget",
+            "set_budget",
+            "Changes the budget of the surface, at once, and of each vehicle, with the directive, and the use of spare \
+             capacity",
+            schema::<BudgetOrder>,
+            || post(orders::budget),
+        ),
+    ]
+}
+
+fn logins() -> Vec<Operation> {
+    vec![
+        read(
+            "/login",
+            "login_form",
+            "The form that requests the token",
+            Content::File("text/html; charset=utf-8"),
+            || get(login::login_form),
+        ),
+        Operation {
+            method: Method::POST,
+            path: "/login",
+            id: "login",
+            summary: "Sets a cookie in exchange for the token",
+            body: None,
+            success: (303, Content::Headers),
+            route: || post(login::login),
+        },
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_operation_has_its_own_name_and_path() {
+        let all = operations();
+        let names: BTreeSet<&str> = all.iter().map(|o| o.id).collect();
+        let paths: BTreeSet<(&str, &str)> = all.iter().map(|o| (o.path, o.method.as_str())).collect();
+        assert_eq!((names.len(), paths.len()), (all.len(), all.len()));
+    }
+}

@@ -1,0 +1,28 @@
+//! Replies as HTTP responses.
+
+use crate::request::Reply;
+use crate::state::ErrorBody;
+use axum::Json;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+
+/// The response to a handled request.
+pub(super) fn respond(reply: Reply) -> Response {
+    match reply {
+        Reply::Map(cells) => Json(cells.body()).into_response(),
+        Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
+        Reply::Fit(fit) => Json(*fit).into_response(),
+        Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
+        Reply::NotFound => not_found(),
+        Reply::Refused(reason) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
+    }
+}
+
+/// An error with one line for people.
+pub(super) fn error(status: StatusCode, line: &str) -> Response {
+    (status, Json(ErrorBody { error: line.to_owned() })).into_response()
+}
+
+pub(super) fn not_found() -> Response {
+    error(StatusCode::NOT_FOUND, "there is no such page, vehicle, label or image")
+}

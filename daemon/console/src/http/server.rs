@@ -1,0 +1,95 @@
+//! Listens, and joins the parts of the server.
+
+use super::access::{Access, HostNames};
+use super::response::error;
+use super::shared::{PendingRequest, Shared};
+use super::{assets, compress, connections, guard, handlers, openapi, operations};
+use crate::snapshot::Snapshot;
+use axum::Router;
+use axum::extract::DefaultBodyLimit;
+use axum::http::{StatusCode, Uri};
+use axum::response::Response;
+use axum::routing::any;
+use scenecast_core::UserError;
+use std::sync::Arc;
+use tokio::net::TcpListener;
+use tokio::sync::{mpsc, watch};
+use zeroize::Zeroizing;
+
+const MAX_BODY_BYTES: usize = 16 * 1024;
+/// Requests that may wait for the surface.
+const MAX_PENDING: usize = 64;
+
+/// The host's end of the console.
+#[derive(Debug)]
+pub struct Console {
+    /// Requests of clients, to be handled between two steps.
+    pub requests: mpsc::Receiver<PendingRequest>,
+    /// The state that all pages show.
+    pub snapshots: watch::Sender<Arc<Snapshot>>,
+}
+
+/// A socket that listens, and the rules of access to it.
+#[derive(Debug)]
+pub struct ConsoleListener {
+    listener: TcpListener,
+    access: Access,
+}
+
+/// Listens on an address. `option` is the setting or the argument that changes it, for error messages; `name` is the name of
+/// this machine in the network, or empty.
+///
+/// # Errors
+///
+/// An address that is in use, or one that other machines reach while there is no token.
+pub async fn bind(
+    address: &str,
+    option: &str,
+    token: Option<Zeroizing<String>>,
+    name: &str,
+) -> Result<ConsoleListener, UserError> {
+    let addresses: Vec<_> = tokio::net::lookup_host(address)
+        .await
+        .map_err(|e| UserError::Input(format!("{option}: {address} is not an ADDRESS:PORT to listen on: {e}")))?
+        .collect();
+    let is_loopback = addresses.iter().all(|a| a.ip().is_loopback());
+    if !is_loopback && token.is_none() {
+        return Err(UserError::Input(format!(
+            "{option} = {address}: other machines could give orders to the vehicle; set console.token_file to a file \
+             written by scenecast key token, or listen on a loopback address such as 127.0.0.1:8460"
+        )));
+    }
+    let names = if is_loopback { HostNames::Loopback } else { HostNames::Network(name.to_owned()) };
+    let listener = TcpListener::bind(address)
+        .await
+        .map_err(|e| UserError::Input(format!("cannot listen on {address}: {e}; choose another port with {option}")))?;
+    Ok(ConsoleListener { listener, access: Access::new(names, token) })
+}
+
+/// Serves the page until the runtime ends.
+pub fn start(listener: ConsoleListener) -> Console {
+    let (sender, requests) = mpsc::channel(MAX_PENDING);
+    let (snapshots, receiver) = watch::channel(Arc::new(Snapshot::default()));
+    let shared =
+        Shared::new(sender, receiver, listener.access, handlers::events::MAX_STREAMS, openapi::document().into());
+    tokio::spawn(connections::serve(listener.listener, router(shared)));
+    Console { requests, snapshots }
+}
+
+fn router(shared: Shared) -> Router {
+    let routes = operations::operations().into_iter().fold(Router::new(), |r, o| r.route(o.path, (o.route)()));
+    routes
+        .route("/api/v1/{*rest}", any(version_1))
+        .fallback(assets::page)
+        .layer(axum::middleware::from_fn(compress::compress))
+        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
+        .layer(axum::middleware::from_fn_with_state(shared.access.clone(), guard::guard))
+        .with_state(shared)
+}
+
+/// The reply to a client of version 1, whose members and paths have other names.
+async fn version_1(uri: Uri) -> Response {
+    let path = uri.path().replacen("/api/v1/", "/api/v2/", 1);
+    let line = format!("version 1 of the API has ended: use {path}, described in /api/openapi.json");
+    error(StatusCode::GONE, &line)
+}

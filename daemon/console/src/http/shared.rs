@@ -1,0 +1,93 @@
+//! The state that all handlers share.
+
+use super::access::Access;
+use super::response::{error, not_found, respond};
+use crate::export::MapCells;
+use crate::request::{Reply, SurfaceRequest};
+use crate::snapshot::Snapshot;
+use axum::body::Bytes;
+use axum::extract::{FromRequestParts, Path};
+use axum::http::StatusCode;
+use axum::http::request::Parts;
+use axum::response::Response;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use tokio::sync::{Mutex, Semaphore, mpsc, oneshot, watch};
+
+/// A request that waits for the reply of the surface.
+pub type PendingRequest = (SurfaceRequest, oneshot::Sender<Reply>);
+
+#[derive(Debug, Clone)]
+pub(super) struct Shared {
+    requests: mpsc::Sender<PendingRequest>,
+    pub(super) snapshots: watch::Receiver<Arc<Snapshot>>,
+    pub(super) maps: Arc<MapCache>,
+    pub(super) access: Arc<Access>,
+    /// A permit for each open stream of events.
+    pub(super) streams: Arc<Semaphore>,
+    /// The OpenAPI document.
+    pub(super) document: Bytes,
+}
+
+/// The latest map of each vehicle that a client has requested.
+#[derive(Debug)]
+pub(super) struct MapCache {
+    pub(super) maps: Mutex<BTreeMap<u8, Arc<CachedMap>>>,
+    /// One file is made at a time, so that the link keeps the rest of the machine.
+    pub(super) makers: Semaphore,
+}
+
+#[derive(Debug)]
+pub(super) struct CachedMap {
+    pub(super) cells: MapCells,
+    /// Mission time at which the vehicle confirmed the map last.
+    pub(super) updated_s: Option<f64>,
+    pub(super) json: Bytes,
+    /// The same in gzip.
+    pub(super) packed: Bytes,
+}
+
+impl Shared {
+    pub(super) fn new(
+        requests: mpsc::Sender<PendingRequest>,
+        snapshots: watch::Receiver<Arc<Snapshot>>,
+        access: Access,
+        max_streams: usize,
+        document: Bytes,
+    ) -> Self {
+        Self {
+            requests,
+            snapshots,
+            maps: Arc::new(MapCache { maps: Mutex::default(), makers: Semaphore::new(1) }),
+            access: Arc::new(access),
+            streams: Arc::new(Semaphore::new(max_streams)),
+            document,
+        }
+    }
+
+    /// The reply of the surface; the error is a response with status 503.
+    pub(super) async fn request(&self, request: SurfaceRequest) -> Result<Reply, Response> {
+        let busy = || error(StatusCode::SERVICE_UNAVAILABLE, "too many requests at once");
+        let (sender, reply) = oneshot::channel();
+        self.requests.try_send((request, sender)).map_err(|_| busy())?;
+        reply.await.map_err(|_| busy())
+    }
+
+    /// The reply of the surface as a response.
+    pub(super) async fn respond(&self, request: SurfaceRequest) -> Response {
+        self.request(request).await.map_or_else(|busy| busy, respond)
+    }
+}
+
+/// The address of the vehicle in a path.
+pub(super) struct VehicleId(pub(super) u8);
+
+impl<S: Send + Sync> FromRequestParts<S> for VehicleId {
+    type Rejection = Response;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Response> {
+        let found = Path::<BTreeMap<String, String>>::from_request_parts(parts, state).await;
+        let id = found.ok().and_then(|Path(names)| names.get("id")?.parse().ok());
+        id.map(Self).ok_or_else(not_found)
+    }
+}

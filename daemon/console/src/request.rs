@@ -1,0 +1,155 @@
+//! Requests of clients that only the surface can handle.
+
+use crate::export::MapCells;
+use crate::fit::{self, Fit};
+use crate::layers;
+use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder};
+use crate::snapshot::seconds;
+use crate::state::AcceptedOrder;
+use scenecast_core::label_picture::MAX_CELLS;
+use scenecast_protocol::directive::{Constraints, SlotId};
+use scenecast_protocol::map::Rect;
+use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::Address;
+use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
+use std::collections::BTreeMap;
+
+/// A reading or an order. The first number is the address of the vehicle.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SurfaceRequest {
+    /// Read the map with the age of its cells.
+    Map(u8),
+    /// Read an image of a label: the one with this number, or the latest.
+    Exemplar(u8, u8, Option<u8>),
+    /// Read the settings that fit a budget in bit/s, by default the share of the map.
+    Fit(u8, Option<f64>),
+    /// Send the weights of labels, and those of unexplored cells and of curiosity.
+    Utility(u8, BTreeMap<u8, f64>, (f64, f64)),
+    /// Request an image of a label, or cancel the request.
+    ExemplarOrder(u8, ExemplarOrder),
+    /// Hold, abort or resume.
+    Constraints(u8, Constraints),
+    /// Send a fence.
+    Fence(u8, FenceOrder),
+    /// Send limits.
+    Limits(u8, LimitsOrder),
+    /// Change settings.
+    Settings(u8, SettingsOrder),
+    /// Change the bit budget, the shares and the background streams.
+    Budget(BudgetOrder),
+}
+
+/// The reply of the surface.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reply {
+    /// The cells of a map.
+    Map(MapCells),
+    /// The content type and the bytes of a file.
+    File(&'static str, Vec<u8>),
+    /// Settings that fit a budget.
+    Fit(Box<Fit>),
+    /// The order was accepted and waits for its turn.
+    Accepted(AcceptedOrder),
+    /// There is no such vehicle, label or image.
+    NotFound,
+    /// The order is not allowed: the reason in one line.
+    Refused(String),
+}
+
+/// Handles a request between two steps of the surface.
+pub fn handle_request(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Reply {
+    handle(surface, request, cell_m, now).unwrap_or(Reply::NotFound)
+}
+
+fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Option<Reply> {
+    let known = |surface: &Surface, id: u8| Address::vehicle(id).filter(|&a| surface.desk(a).is_some());
+    Some(match request {
+        SurfaceRequest::Map(id) => map(surface, known(surface, id)?, cell_m, now)?,
+        SurfaceRequest::Exemplar(id, label, number) => {
+            let desk = surface.desk(known(surface, id)?)?;
+            Reply::File("image/webp", desk.album.page(label)?.picture(number)?.webp.clone())
+        }
+        SurfaceRequest::Fit(id, bits_per_s) => match fit::fit(surface, known(surface, id)?, cell_m, bits_per_s) {
+            Ok(fit) => Reply::Fit(Box::new(fit)),
+            Err(reason) => Reply::Refused(reason),
+        },
+        SurfaceRequest::Utility(id, weights, terms) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Utility, surface.set_utility(vehicle, &weights, terms, now))
+        }
+        SurfaceRequest::ExemplarOrder(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Requests, order_exemplar(surface, vehicle, &order, now))
+        }
+        SurfaceRequest::Constraints(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Constraints, surface.set_order(vehicle, order, now))
+        }
+        SurfaceRequest::Fence(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Fence, surface.set_fence(vehicle, &order, now))
+        }
+        SurfaceRequest::Limits(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Limits, surface.set_limits(vehicle, &order, now))
+        }
+        SurfaceRequest::Settings(id, order) => {
+            let vehicle = known(surface, id)?;
+            accepted(vehicle, SlotId::Settings, surface.set_settings(vehicle, &order, now))
+        }
+        SurfaceRequest::Budget(order) => budget(surface, order, now),
+    })
+}
+
+fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Reply {
+    match issued {
+        Ok(version) => Reply::Accepted(AcceptedOrder {
+            slot: slot.name().to_owned(),
+            version: Some(version),
+            versions: BTreeMap::from([(vehicle.number(), version)]),
+        }),
+        Err(reason) => Reply::Refused(reason),
+    }
+}
+
+fn order_exemplar(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder, now: Instant) -> Result<u16, String> {
+    let ExemplarOrder { label, action, image } = *order;
+    match action {
+        ExemplarAction::Another => surface.request_exemplar(vehicle, label, Wish::Another, now),
+        ExemplarAction::Larger => surface.request_exemplar(vehicle, label, Wish::Larger(image), now),
+        ExemplarAction::Cancel => surface.cancel_exemplar(vehicle, label, now),
+    }
+}
+
+fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
+    let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
+    let background = order.background.as_deref().map(SpendOrder::from_names).transpose();
+    let changed = background.and_then(|background| surface.set_budget(order.budget_bps, shares, background, now));
+    if let Err(reason) = changed {
+        return Reply::Refused(reason);
+    }
+    let issued = |a: Address| surface.view(a)?.slots().find(|s| s.id == SlotId::Budget).map(|s| s.version);
+    let versions = surface.vehicles().filter_map(|(a, _)| Some((a.number(), issued(a)?))).collect();
+    Reply::Accepted(AcceptedOrder { slot: SlotId::Budget.name().to_owned(), version: None, versions })
+}
+
+fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option<Reply> {
+    let grid = surface.map(vehicle)?;
+    let view = surface.view(vehicle)?;
+    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
+    if bounds.area() > MAX_CELLS {
+        let Rect { width, height, .. } = bounds;
+        return Some(Reply::Refused(format!("the map spans {width} x {height} cells: at most {MAX_CELLS} are sent")));
+    }
+    Some(Reply::Map(MapCells {
+        version: surface.map_version(vehicle),
+        at_s: seconds(now),
+        bounds,
+        cell_m,
+        moved_m: (0.0, 0.0),
+        labels: bounds.cells().map(|cell| grid.get(cell)).collect(),
+        age_s: layers::ages(view.replica(), bounds, now),
+        layers: layers::layers(&view, bounds, now),
+    }))
+}

@@ -1,0 +1,55 @@
+//! The exemplars of a label, and the request for another one.
+
+use super::facts::seconds;
+use crate::state::{ExemplarImage, ExemplarProgress, ExemplarStage};
+use scenecast_protocol::directive::{OrderStatus, SlotId};
+use scenecast_protocol::exemplar::edge_px;
+use scenecast_protocol::link::PeerView;
+use scenecast_protocol::wire::Address;
+use scenecast_surface::{Album, AskState, Desk, Picture};
+
+pub(super) fn progress(label: u8, desk: &Desk, view: &PeerView<'_>, address: Address) -> ExemplarProgress {
+    let page = desk.album.page(label);
+    let request = page.and_then(|page| page.asked);
+    let base = format!("/api/v2/vehicles/{}/exemplars/{label}", address.number());
+    let images: Vec<ExemplarImage> =
+        page.into_iter().flat_map(|page| &page.pictures).map(|p| image(p, &base)).collect();
+    let latest = images.last();
+    let (state, progress, bytes) = match request.map(|r| r.state) {
+        None if latest.is_some() => (ExemplarStage::Received, 1.0, None),
+        None => (ExemplarStage::None, 0.0, None),
+        Some(AskState::Asked) if is_queued(view) => (ExemplarStage::Queued, 0.0, None),
+        Some(AskState::Asked) => (ExemplarStage::OnAir, 0.0, None),
+        Some(AskState::NoneYet) => (ExemplarStage::NotAvailable, 0.0, None),
+        Some(AskState::Refused) => (ExemplarStage::Refused, 0.0, None),
+        Some(AskState::Coming(held, total)) => {
+            (ExemplarStage::Receiving, held as f64 / total.max(1) as f64, Some(total))
+        }
+    };
+    ExemplarProgress {
+        state,
+        progress,
+        bytes: bytes.or(latest.map(|i| i.bytes)),
+        url: latest.map(|_| format!("{base}.webp")),
+        at_s: request.map(|r| seconds(r.changed)).or(latest.map(|i| i.at_s)),
+        images,
+    }
+}
+
+fn image(p: &Picture, base: &str) -> ExemplarImage {
+    ExemplarImage {
+        number: p.number,
+        edge_px: edge_px(p.size),
+        can_enlarge: p.size < Album::MAX_SIZE,
+        bytes: p.sent_bytes,
+        url: format!("{base}-{}.webp", p.number),
+        at_s: seconds(p.came),
+        requested: p.asked,
+    }
+}
+
+/// Whether the requests for images have not been sent yet.
+fn is_queued(view: &PeerView<'_>) -> bool {
+    let requests = view.slots().find(|s| s.id == SlotId::Requests).map(|s| s.status);
+    matches!(requests, Some(OrderStatus::Queued) | None)
+}

@@ -1,0 +1,58 @@
+//! Facts of the mission that the surface does not have, and mission time in the API.
+
+use crate::state::Origin;
+use scenecast_config::{self as config, Config};
+use scenecast_core::LatLon;
+use scenecast_protocol::mac::ModemProfile;
+use scenecast_protocol::time::Instant;
+
+/// Facts of the mission that the surface does not have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MissionFacts {
+    /// The name that people use.
+    pub name: String,
+    /// A random name of this run. A browser keeps names of labels under it, so that they are not shown on other labels.
+    pub run: String,
+    /// Seconds of mission time for each second of the clock.
+    pub speed: f64,
+    /// Whether the survey has ended.
+    pub ended: bool,
+    /// Width of a cell, metres.
+    pub cell_m: f64,
+    /// Longest pause between two turns of an idle link, seconds.
+    pub idle_s: f64,
+    /// Interval between two contacts to expect before one was measured, seconds.
+    pub first_interval_s: f64,
+    /// Bits on air of a full frame.
+    pub frame_bits: u64,
+    /// The configured place of x = y = 0 on the Earth.
+    pub origin: Option<Origin>,
+}
+
+impl MissionFacts {
+    /// A mission that begins; `run` is a random number for each run.
+    pub fn new(config: &Config, modem: &ModemProfile, run: u64, speed: f64) -> Self {
+        Self {
+            name: config.mission.name.clone(),
+            run: format!("{:08x}", run as u32),
+            speed,
+            ended: false,
+            cell_m: config::cell_m(config),
+            idle_s: config.link.max_idle_s,
+            first_interval_s: config.link.max_idle_s + config.link.max_turn_s,
+            frame_bits: modem.bits_on_air(modem.frame_bytes),
+            origin: configured_origin(config),
+        }
+    }
+}
+
+fn configured_origin(config: &Config) -> Option<Origin> {
+    // At a pole there is no east.
+    let LatLon { lat_deg, lon_deg } = config.mission.origin_deg.filter(|o| o.lat_deg.abs() < 90.0)?;
+    Some(Origin { lat_deg, lon_deg })
+}
+
+/// Mission time in the API, rounded to a hundredth of a second.
+pub(crate) fn seconds(at: Instant) -> f64 {
+    (at.as_secs_f64() * 100.0).round() / 100.0
+}

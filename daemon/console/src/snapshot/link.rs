@@ -1,0 +1,96 @@
+//! The acoustic link: budget, rates, losses, backlogs.
+
+use super::facts::seconds;
+use crate::link_meter::LinkMeter;
+use crate::state::{ChannelQuality, LinkDirection, LinkSummary, ReportedBacklog, VehicleChannel};
+use scenecast_core::drop_counts::dropped;
+use scenecast_protocol::link::{Goodput, LinkStats, Loss, PeerView};
+use scenecast_protocol::mac::ClockMap;
+use scenecast_protocol::schedule::Class;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Backlog, Stamp};
+use scenecast_surface::Surface;
+use std::collections::BTreeMap;
+
+/// The link to all vehicles together.
+pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> LinkSummary {
+    let views: Vec<PeerView<'_>> = surface.vehicles().filter_map(|(a, _)| surface.view(a)).collect();
+    let sum = |of: &dyn Fn(&LinkStats) -> u64| views.iter().map(|v| of(v.stats())).sum::<u64>();
+    let received = sum(&|s| s.frames_received);
+    let numbered = sum(&|s| s.frames_numbered);
+    let (lost, delivered) = (sum(&|s| s.frames_lost), sum(&|s| s.frames_delivered));
+    let elapsed = now.as_secs_f64().max(1.0);
+    let direction = |i: usize, frames: u64, lost: u64, class: &dyn Fn(&LinkStats, Class) -> u64| {
+        let bytes = |c: Class| sum(&|s| class(s, c));
+        let useful: u64 = Class::ALL.into_iter().filter(|&c| c != Class::Overhead).map(bytes).sum();
+        LinkDirection {
+            bps_1min: meter.bps_1min(i, now).round(),
+            max_window_bps: meter.max_window_bps(i),
+            loss: if frames > 0 { lost as f64 / frames as f64 } else { 0.0 },
+            frames,
+            lost,
+            goodput_bps: (useful as f64 * 8.0 / elapsed).round(),
+            bytes_by_class: Class::ALL.into_iter().map(|c| (c.name().to_owned(), bytes(c))).collect(),
+        }
+    };
+    LinkSummary {
+        budget_bps: surface.budget_bps(),
+        budget_window_s: meter.window_s(),
+        shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
+        background: surface.spend().names(),
+        unknown_senders: surface.strangers(),
+        up: direction(0, numbered, numbered.saturating_sub(received), &|s, c| of_class(&s.received_by_class, c)),
+        down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),
+        round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),
+        backlog_bits: total_bits(views.iter().filter_map(PeerView::backlog)),
+        history: meter.history(),
+    }
+}
+
+/// The bits of all backlogs; `None` before the first report.
+fn total_bits(backlogs: impl Iterator<Item = (Backlog, Instant)>) -> Option<u64> {
+    backlogs.map(|(b, _)| (u64::from(b.map_bytes) + u64::from(b.other_bytes)) * 8).reduce(|a, b| a + b)
+}
+
+fn of_class(bytes: &BTreeMap<Class, u64>, class: Class) -> u64 {
+    bytes.get(&class).copied().unwrap_or(0)
+}
+
+/// Measurements of the channel to one vehicle.
+pub(super) fn channel(view: &PeerView<'_>, now: Instant) -> VehicleChannel {
+    let stats = view.stats();
+    let quality = |loss: &Loss, goodput: &Goodput| ChannelQuality {
+        loss: loss.share(),
+        goodput_bps: goodput.bits_per_s(now).round(),
+    };
+    VehicleChannel {
+        up: quality(&stats.loss_in, &stats.goodput_in),
+        down: quality(&stats.loss_out, &stats.goodput_out),
+        round_trip_s: view.round_trip().map(|d| d.as_secs_f64()),
+        one_way_s: view.round_trip().map(|d| d.as_secs_f64() / 2.0),
+        clock_offset_s: view.clock().map(|c| clock_offset_s(c, now)),
+        dropped: dropped(stats).into_iter().map(|(reason, n)| (reason.to_owned(), n)).collect(),
+        backlog: view.backlog().map(|(b, at)| backlog(b, at, stats.goodput_in.bits_per_s(now), now)),
+    }
+}
+
+/// A backlog that was reported at `at`, and when it will be empty at a goodput in bit/s.
+fn backlog(backlog: Backlog, at: Instant, goodput: f64, now: Instant) -> ReportedBacklog {
+    let map_bits = u64::from(backlog.map_bytes) * 8;
+    let bits = map_bits + u64::from(backlog.other_bytes) * 8;
+    // Less than 1 bit/s is the decaying rest of earlier frames.
+    let duration_s = |bits: u64| (bits == 0 || goodput >= 1.0).then(|| bits as f64 / goodput.max(1.0));
+    ReportedBacklog {
+        at_s: seconds(at),
+        bits,
+        empty_s: duration_s(bits).map(|s| seconds(now) + s),
+        map_bits,
+        map_lag_s: duration_s(map_bits).map(|s| now.since(at).as_secs_f64() + s),
+    }
+}
+
+/// The clock of the vehicle minus ours. Clocks on the wire wrap around after 4 h 39 min.
+fn clock_offset_s(clock: &ClockMap, now: Instant) -> f64 {
+    let offset_ms = clock.to_theirs(now).wrapping_sub(Stamp::clock(now)) << 8;
+    f64::from(offset_ms as i32 >> 8) / 1000.0
+}

@@ -1,0 +1,55 @@
+//! The state of the surface at one moment, as all pages show it.
+
+mod exemplar;
+mod facts;
+mod link;
+mod position;
+mod vehicle;
+
+pub use facts::MissionFacts;
+pub(crate) use facts::seconds;
+
+use crate::link_meter::LinkMeter;
+use crate::state::{MissionInfo, MissionState, VehicleState};
+use axum::body::Bytes;
+use scenecast_protocol::time::Instant;
+use scenecast_surface::Surface;
+
+/// The state at one moment.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Snapshot {
+    /// The state.
+    pub state: MissionState,
+    /// The same state as JSON; empty before the first.
+    pub json: Bytes,
+}
+
+impl Snapshot {
+    fn new(state: MissionState) -> Self {
+        // All keys of maps in these types are strings or numbers, so this cannot fail.
+        let json = serde_json::to_vec(&state).unwrap_or_default().into();
+        Self { state, json }
+    }
+
+    /// A vehicle by its address.
+    pub fn vehicle(&self, id: u8) -> Option<&VehicleState> {
+        self.state.vehicles.iter().find(|v| v.id == id)
+    }
+}
+
+/// The state of the surface.
+pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now: Instant) -> Snapshot {
+    Snapshot::new(MissionState {
+        now_s: seconds(now),
+        mission: MissionInfo {
+            name: facts.name.clone(),
+            id: facts.run.clone(),
+            speed: facts.speed,
+            ended: facts.ended,
+            origin: position::measured_origin(surface).or(facts.origin),
+        },
+        vehicles: vehicle::vehicles(surface, facts, now),
+        position: position::surface_position(surface, now),
+        link: link::summary(surface, meter, now),
+    })
+}

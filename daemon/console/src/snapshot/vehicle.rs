@@ -1,0 +1,185 @@
+//! Vehicles as the surface knows them.
+
+use super::facts::{MissionFacts, seconds};
+use super::{exemplar, link, position};
+use crate::state::{
+    AppliedOrder, DirectiveSlots, MapLabel, MapSummary, OrderProgress, OrderStatus, PlannedPath, ReportedMode,
+    ReportedPose, StatusReport, UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState,
+};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};
+use scenecast_protocol::link::PeerView;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
+use scenecast_surface::{Desk, Surface};
+
+pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
+    let all = surface.vehicles();
+    all.filter_map(|(address, desk)| vehicle(surface, address, desk, facts, now)).collect()
+}
+
+fn vehicle(
+    surface: &Surface,
+    address: Address,
+    desk: &Desk,
+    facts: &MissionFacts,
+    now: Instant,
+) -> Option<VehicleState> {
+    let view = surface.view(address)?;
+    let labels = surface.labels(address).unwrap_or_default();
+    Some(VehicleState {
+        id: address.number(),
+        name: desk.name.clone(),
+        last_received_s: view.last_received().map(seconds),
+        expected_interval_s: expected_interval_s(surface, &view, desk, facts),
+        next_contact_s: view.next_contact(now).map(seconds),
+        status: view.status().map(|(s, at)| status(s, *at)),
+        track: desk.track.iter().map(|&(at, x, y)| (seconds(at), x, y)).collect(),
+        map: map(surface, address, desk, &view, labels.values().sum(), facts),
+        labels: labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect(),
+        link: link::channel(&view, now),
+        usbl: desk.found.as_ref().map(|(line, at)| UsblMeasurement {
+            at_s: seconds(*at) - line.age_s,
+            range_m: line.range_m,
+            bearing_rad: line.direction_rad.map(|(bearing, _)| bearing),
+            elevation_rad: line.direction_rad.map(|(_, elevation)| elevation),
+            accuracy: line.accuracy,
+        }),
+        orders: orders(desk, &view),
+    })
+}
+
+fn orders(desk: &Desk, view: &PeerView<'_>) -> VehicleOrders {
+    VehicleOrders {
+        utility: UtilityTerms {
+            exploration: f64::from(desk.utility.exploration) / 100.0,
+            curiosity: f64::from(desk.utility.curiosity) / 100.0,
+        },
+        fence: desk.fence.as_ref().map(Into::into),
+        limits: desk.limits.as_ref().map(Into::into),
+        fence_in_force: in_force(&desk.fence_in_force),
+        limits_in_force: in_force(&desk.limits_in_force),
+        planner: desk.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
+        settings: VehicleSettings {
+            requested: desk.settings.asked().into(),
+            in_force: desk.settings.in_force().map(Into::into),
+        },
+        directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
+    }
+}
+
+fn map(
+    surface: &Surface,
+    address: Address,
+    desk: &Desk,
+    view: &PeerView<'_>,
+    explored_cells: u32,
+    facts: &MissionFacts,
+) -> MapSummary {
+    let bounds = surface.map(address).and_then(|m| m.bounds());
+    MapSummary {
+        version: surface.map_version(address),
+        cell_m: facts.cell_m,
+        x0: bounds.map_or(0, |b| b.x),
+        y0: bounds.map_or(0, |b| b.y),
+        width: bounds.map_or(0, |b| b.width),
+        height: bounds.map_or(0, |b| b.height),
+        explored_cells,
+        updated_s: view.replica().updated().map(seconds),
+        epoch: desk.epoch,
+        placement: view.status().and_then(|(s, _)| s.placement).map(position::placement),
+    }
+}
+
+/// The longest usual pause between two frames. An idle link or the smaller of both budgets can make it longer than the
+/// measured pauses.
+fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, desk: &Desk, facts: &MissionFacts) -> f64 {
+    let vehicle_bps = view.status().map_or(u32::MAX, |(s, _)| s.budget_bps);
+    let budget_bps = surface.budget_bps().min(vehicle_bps).max(1);
+    let idle_s = facts.idle_s + facts.frame_bits as f64 / f64::from(budget_bps);
+    desk.pauses.expected().map_or(facts.first_interval_s, |d| d.as_secs_f64()).max(idle_s)
+}
+
+fn in_force<T, O: for<'a> From<&'a T>>(applied: &Option<(u16, T)>) -> Option<AppliedOrder<O>> {
+    let (version, order) = applied.as_ref()?;
+    Some(AppliedOrder { version: *version, order: order.into() })
+}
+
+fn status(s: &VehicleStatus, at: Instant) -> StatusReport {
+    StatusReport {
+        at_s: seconds(at),
+        pose: ReportedPose {
+            x_m: s.position.x_m,
+            y_m: s.position.y_m,
+            z_m: -s.depth_m,
+            heading_deg: s.heading_deg,
+            sigma_m: s.sigma_m,
+            fix_age_s: s.fix_age_s,
+        },
+        mode: mode(s.mode),
+        autopilot_silent: s.autopilot_silent,
+        reason: s.reason.name().map(str::to_owned),
+        activity: activity(s),
+        plan: PlannedPath {
+            waypoint: s.waypoint.map(MapPoint::xy),
+            path: s.path.points.iter().copied().map(MapPoint::xy).collect(),
+            path_continues: s.path.continues,
+        },
+        cells: s.explored_cells,
+        labels: u32::from(s.labels),
+        budget_bps: s.budget_bps,
+        refused_frames: u32::from(s.refused_frames),
+    }
+}
+
+fn mode(mode: VehicleMode) -> ReportedMode {
+    match mode {
+        VehicleMode::Survey => ReportedMode::Survey,
+        VehicleMode::Hold => ReportedMode::Hold,
+        VehicleMode::Return => ReportedMode::Return,
+        VehicleMode::Surface => ReportedMode::Surface,
+        VehicleMode::Abort => ReportedMode::Abort,
+        VehicleMode::Done => ReportedMode::Done,
+    }
+}
+
+/// Mode and reason as a text.
+fn activity(s: &VehicleStatus) -> String {
+    let mode = match s.mode {
+        VehicleMode::Survey => "surveying",
+        VehicleMode::Hold => "holding",
+        VehicleMode::Return => "returning",
+        VehicleMode::Surface => "surfacing",
+        VehicleMode::Abort => "aborted",
+        VehicleMode::Done => "done",
+    };
+    s.reason.name().map_or(mode.to_owned(), |reason| format!("{mode}: {reason}"))
+}
+
+fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address, facts: &MissionFacts) -> MapLabel {
+    MapLabel {
+        id,
+        cells,
+        area_m2: f64::from(cells) * facts.cell_m * facts.cell_m,
+        weight: desk.utility.weight(id),
+        exemplar: exemplar::progress(id, desk, view, address),
+    }
+}
+
+fn order_progress(s: &SlotProgress) -> OrderProgress {
+    let (state, reason) = match s.status {
+        directive::OrderStatus::Queued => (OrderStatus::Queued, None),
+        directive::OrderStatus::OnAir => (OrderStatus::OnAir, None),
+        directive::OrderStatus::Received => (OrderStatus::Received, None),
+        directive::OrderStatus::Applied => (OrderStatus::Applied, None),
+        directive::OrderStatus::Refused(reason) => (OrderStatus::Refused, Some(reason.explain().to_owned())),
+    };
+    OrderProgress {
+        slot: s.id.name().to_owned(),
+        version: s.version,
+        state,
+        reason,
+        issued_s: seconds(s.issued),
+        changed_s: seconds(s.changed),
+    }
+}

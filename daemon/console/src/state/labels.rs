@@ -1,0 +1,77 @@
+//! The labels of a map and their exemplars.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A label on the map.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MapLabel {
+    /// The number of the label.
+    #[schemars(range(min = 1, max = 254))]
+    pub id: u8,
+    /// The number of its cells.
+    pub cells: u32,
+    /// The area of its cells, square metres.
+    pub area_m2: f64,
+    /// The last weight sent, -1 to 1.
+    pub weight: f64,
+    /// Its exemplars.
+    pub exemplar: ExemplarProgress,
+}
+
+/// The exemplars of a label, and the request for another one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ExemplarProgress {
+    /// The stage of the request; without a request, whether there is an image.
+    pub state: ExemplarStage,
+    /// The received part of the requested image, 0 to 1.
+    pub progress: f64,
+    /// Bytes of the image that is being received, or else of the latest one.
+    pub bytes: Option<usize>,
+    /// The address of the latest image.
+    pub url: Option<String>,
+    /// When `state` changed last.
+    pub at_s: Option<f64>,
+    /// The received images, the latest one last; at most 8.
+    pub images: Vec<ExemplarImage>,
+}
+
+/// A received image of a label.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ExemplarImage {
+    /// The number of the image among those of the label.
+    #[schemars(range(min = 1, max = 63))]
+    pub number: u8,
+    /// Width and height, pixels.
+    pub edge_px: u32,
+    /// Whether a larger version can be requested.
+    pub can_enlarge: bool,
+    /// Bytes sent over the link.
+    pub bytes: usize,
+    /// Its address.
+    pub url: String,
+    /// When it was received.
+    pub at_s: f64,
+    /// Whether it was requested; otherwise the vehicle sent it with spare capacity.
+    pub requested: bool,
+}
+
+/// The stage of a request for an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ExemplarStage {
+    /// There is no request and no image.
+    None,
+    /// The request waits for its turn.
+    Queued,
+    /// The request was sent.
+    OnAir,
+    /// The vehicle has no such image yet and sends it once it has one.
+    NotAvailable,
+    /// A part of the image has been received.
+    Receiving,
+    /// The image has been received.
+    Received,
+    /// The vehicle refused the request.
+    Refused,
+}

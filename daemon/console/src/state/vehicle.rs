@@ -1,0 +1,219 @@
+//! A vehicle as the surface knows it.
+
+use super::labels::MapLabel;
+use super::link::VehicleChannel;
+use super::map::MapSummary;
+use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A vehicle as the surface knows it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleState {
+    /// Acoustic address.
+    #[schemars(range(min = 1, max = 14))]
+    pub id: u8,
+    /// The name that people use.
+    pub name: String,
+    /// When the last valid frame was received; null before the first.
+    pub last_received_s: Option<f64>,
+    /// The longest usual pause between two frames, a duration. A vehicle is silent after three times this pause.
+    pub expected_interval_s: f64,
+    /// When the surface grants the next turn at the latest.
+    pub next_contact_s: Option<f64>,
+    /// The last report of the vehicle; null before the first.
+    pub status: Option<StatusReport>,
+    /// Mission time, metres east and metres north on the vehicle's map of the last 500 reports.
+    pub track: Vec<(f64, f64, f64)>,
+    /// The map without its cells.
+    pub map: MapSummary,
+    /// The labels on the map.
+    pub labels: Vec<MapLabel>,
+    /// Measurements of the channel to this vehicle.
+    pub link: VehicleChannel,
+    /// The last USBL measurement of the vehicle; null before the first.
+    pub usbl: Option<UsblMeasurement>,
+    /// The orders to the vehicle.
+    #[serde(flatten)]
+    pub orders: VehicleOrders,
+}
+
+/// The orders to a vehicle: last sent, in force, and on their way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleOrders {
+    /// The last utility sent, without the weights of the labels.
+    pub utility: UtilityTerms,
+    /// The last fence sent; null before the first.
+    pub fence: Option<FenceOrder>,
+    /// The last limits sent; null before the first.
+    pub limits: Option<LimitsOrder>,
+    /// The fence that the vehicle reported last as applied, of those that this surface sent; null before the first.
+    pub fence_in_force: Option<AppliedOrder<FenceOrder>>,
+    /// The limits that the vehicle reported last as applied, of those that this surface sent; null before the first.
+    pub limits_in_force: Option<AppliedOrder<LimitsOrder>>,
+    /// The last planner sent; null means as configured on the vehicle.
+    pub planner: Option<String>,
+    /// Settings requested and in force.
+    pub settings: VehicleSettings,
+    /// The status of each order.
+    pub directive: DirectiveSlots,
+}
+
+/// Settings of a vehicle. A null member is one that this surface has not set; 0 or an empty text means as configured on the
+/// vehicle.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct VehicleSettings {
+    /// All that this surface has requested.
+    pub requested: SettingsOrder,
+    /// The part that the vehicle has applied; null while it is unknown, since an order was replaced on its way.
+    pub in_force: Option<SettingsOrder>,
+}
+
+/// A measurement of a vehicle by the modem of the surface.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct UsblMeasurement {
+    /// Mission time of the measurement.
+    pub at_s: f64,
+    /// Slant range; null if only the direction was measured.
+    pub range_m: Option<f64>,
+    /// Clockwise from north; null if only the range is valid.
+    pub bearing_rad: Option<f64>,
+    /// Above the horizontal; null if only the range is valid.
+    pub elevation_rad: Option<f64>,
+    /// Metres; radians if only the direction was measured.
+    pub accuracy: f64,
+}
+
+/// A report of a vehicle. Places are on its own map; the map's placement moves them into the world.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StatusReport {
+    /// When the report was received.
+    pub at_s: f64,
+    /// Its position and heading.
+    #[serde(flatten)]
+    pub pose: ReportedPose,
+    /// The mode of the vehicle.
+    pub mode: ReportedMode,
+    /// Whether its autopilot does not answer, so that the mode is not carried out.
+    pub autopilot_silent: bool,
+    /// The reason for the mode, unless it is the survey: order, fence, distance, time, silence, depth or altitude, no path.
+    pub reason: Option<String>,
+    /// Mode and reason as a text, such as "holding: fence".
+    pub activity: String,
+    /// Its plan.
+    #[serde(flatten)]
+    pub plan: PlannedPath,
+    /// Cells that it has explored.
+    pub cells: u32,
+    /// Labels that it has found.
+    pub labels: u32,
+    /// Its own budget in force, bit/s, with 12 bits of precision.
+    pub budget_bps: u32,
+    /// Frames that it rejected since they were not authentic; 255 stands for 255 or more.
+    pub refused_frames: u32,
+}
+
+/// The position and the heading of a vehicle by its own estimate, on its own map.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct ReportedPose {
+    /// Metres east.
+    pub x_m: f64,
+    /// Metres north.
+    pub y_m: f64,
+    /// Metres up, so the depth is negative.
+    pub z_m: f64,
+    /// Degrees clockwise from north.
+    pub heading_deg: f64,
+    /// Standard deviation of the position, metres.
+    pub sigma_m: f64,
+    /// Seconds since its last position fix, a duration.
+    pub fix_age_s: Option<f64>,
+}
+
+/// The waypoints that a vehicle plans, on its own map.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct PlannedPath {
+    /// The next waypoint, metres east and north.
+    pub waypoint: Option<(f64, f64)>,
+    /// The waypoints that it plans after the next one, at most 7, with straight legs between them, metres east and north. Empty
+    /// if the plan ends or the report has no room.
+    pub path: Vec<(f64, f64)>,
+    /// Whether the plan has more waypoints than these.
+    pub path_continues: bool,
+}
+
+/// The mode of a vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReportedMode {
+    /// It surveys.
+    Survey,
+    /// It holds its position.
+    Hold,
+    /// It returns to the return point.
+    Return,
+    /// It surfaces.
+    Surface,
+    /// It has aborted the mission.
+    Abort,
+    /// Its survey is complete.
+    Done,
+}
+
+/// The utility without the weights of labels.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct UtilityTerms {
+    /// Weight of unexplored cells, -1 to 1.
+    pub exploration: f64,
+    /// Weight of cells that the scene model explains badly, -1 to 1.
+    pub curiosity: f64,
+}
+
+/// The orders of a vehicle.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+pub struct DirectiveSlots {
+    /// The latest version of each slot with an order.
+    pub slots: Vec<OrderProgress>,
+}
+
+/// An order that the vehicle has applied. It stays in force while a newer one is on its way, and after a newer one was refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct AppliedOrder<T> {
+    /// Its version.
+    pub version: u16,
+    /// The order.
+    pub order: T,
+}
+
+/// The progress of the latest order in a slot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OrderProgress {
+    /// The slot: utility, requests, constraints, fix, budget and others.
+    pub slot: String,
+    /// A number that grows with each order.
+    pub version: u16,
+    /// The status of the order.
+    pub state: OrderStatus,
+    /// Why the vehicle refused it.
+    pub reason: Option<String>,
+    /// When it was given.
+    pub issued_s: f64,
+    /// When `state` changed last.
+    pub changed_s: f64,
+}
+
+/// How far an order has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OrderStatus {
+    /// It waits for its turn on the link.
+    Queued,
+    /// It was sent.
+    OnAir,
+    /// The vehicle has received it.
+    Received,
+    /// The vehicle reports that it is in force.
+    Applied,
+    /// The vehicle refused it.
+    Refused,
+}

@@ -1,0 +1,36 @@
+//! Scores label maps against expert annotations, and trains vocabularies. Offline work: no vehicle needs it, and it
+//! does no IO.
+//!
+//! On a small scene, plain mutual information misleads: any map made of patches shares some with any annotation made of
+//! patches. [`score`] therefore also computes a spatial null model, and the excess over it.
+//!
+//! ```
+//! use image::GrayImage;
+//! use scenecast_scoring::{AnnotatedScene, Method, Trial};
+//!
+//! let reef = scenecast_worlds::reef(3, 240, 180, 40, 4);
+//! let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).ok_or("wrong size")?;
+//! let trial = Trial { labels: 8, cells_across: 30, sweeps: 5, seeds: 1 };
+//! let scene = AnnotatedScene::new(trial, &reef.image, &classes, &[255])?;
+//!
+//! let score = scene.mean_score(Method::SceneModel)?;
+//! assert!(score.excess_nats > 0.3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod annotations;
+mod baselines;
+mod k_means;
+mod label_grid;
+mod mutual_information;
+mod null;
+mod training;
+mod trial;
+
+pub use annotations::{AnnotationError, Annotations};
+pub use baselines::mosaic_classes;
+pub use label_grid::LabelGrid;
+pub use mutual_information::{MutualInformation, mutual_information_nats};
+pub use null::{SceneScore, score};
+pub use training::train_vocabulary;
+pub use trial::{AnnotatedScene, MeanScore, Method, Trial, TrialError};

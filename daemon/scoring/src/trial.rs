@@ -1,0 +1,247 @@
+//! A trial: the scene model against the baselines on an annotated image.
+
+use image::{GrayImage, RgbImage};
+use scene_model::project::{DownCamera, Pose};
+use scene_model::topics::{ConfigError, SceneConfig, SceneModel};
+use scene_model::words::{Word, WordConfig, WordExtractor};
+use serde::Serialize;
+
+use crate::annotations::{AnnotationError, Annotations};
+use crate::baselines::{mean_lab_labels, pooled_word_labels};
+use crate::label_grid::LabelGrid;
+use crate::null::{SceneScore, score};
+
+/// A method that labels the cells of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// k-means on the mean Lab colour of each cell.
+    MeanLab,
+    /// k-means on the word shares of each cell and its eight neighbours.
+    PooledWords,
+    /// The scene model with [`SceneConfig::for_images`].
+    SceneModel,
+}
+
+impl Method {
+    /// All methods; the scene model is the last.
+    pub const ALL: [Self; 3] = [Self::MeanLab, Self::PooledWords, Self::SceneModel];
+
+    /// The name in reports: `kmeans_lab`, `kmeans_pooled_words` or `scene_model`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MeanLab => "kmeans_lab",
+            Self::PooledWords => "kmeans_pooled_words",
+            Self::SceneModel => "scene_model",
+        }
+    }
+}
+
+/// The settings that all methods and scenes of a comparison share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Trial {
+    /// The maximum number of labels (K): 2 to 254.
+    pub labels: u32,
+    /// The number of cells in a row of the image, at least 1. Cells are square, with an edge of at least 4 pixels.
+    pub cells_across: u32,
+    /// The number of sweeps of the scene model over all words.
+    pub sweeps: u32,
+    /// The number of seeds, from 1 on; 0 counts as 1.
+    pub seeds: u64,
+}
+
+impl Default for Trial {
+    fn default() -> Self {
+        Self { labels: 16, cells_across: 100, sweeps: 30, seeds: 3 }
+    }
+}
+
+/// The score of a method on a scene: means over the seeds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MeanScore {
+    /// Mutual information of map labels and annotated classes, nats.
+    pub mutual_information_nats: f64,
+    /// Mutual information over the geometric mean of both entropies, 0 to 1.
+    pub normalised_mutual_information: f64,
+    /// The mean mutual information of the flipped and shifted maps, nats.
+    pub null_mutual_information_nats: f64,
+    /// Mutual information minus that of the null model, nats.
+    pub excess_nats: f64,
+    /// The number of different labels in the map.
+    pub labels_used: f64,
+}
+
+/// A scene cannot be scored.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrialError {
+    /// The image has too few pixels for several cells.
+    #[error("the image has {0} x {1} pixels; a scene needs at least {MIN_IMAGE_PX} x {MIN_IMAGE_PX}")]
+    Tiny(u32, u32),
+    /// The annotations and the image differ in size.
+    #[error(transparent)]
+    Annotations(#[from] AnnotationError),
+    /// No pixel has a class that is not ignored.
+    #[error("no pixel is annotated")]
+    NoClasses,
+    /// A parameter is out of its range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+/// The minimum width and height of an image, pixels.
+const MIN_IMAGE_PX: u32 = 16;
+/// The minimum edge of a cell, pixels.
+const MIN_CELL_PX: f32 = 4.0;
+
+/// An image with its annotations, and the words that the methods share.
+pub struct AnnotatedScene<'a> {
+    trial: Trial,
+    image: &'a RgbImage,
+    cell_px: f32,
+    annotations: Annotations,
+    words: Vec<Word>,
+    vocabulary: u32,
+}
+
+impl<'a> AnnotatedScene<'a> {
+    /// Extracts the words of an image. `classes` has the class of each pixel; pixels with a class in
+    /// `ignore` count as not annotated.
+    pub fn new(trial: Trial, image: &'a RgbImage, classes: &GrayImage, ignore: &[u8]) -> Result<Self, TrialError> {
+        let size = image.dimensions();
+        if size.0.min(size.1) < MIN_IMAGE_PX {
+            return Err(TrialError::Tiny(size.0, size.1));
+        }
+        let cell_px = (size.0 as f32 / trial.cells_across.max(1) as f32).max(MIN_CELL_PX);
+        let annotations = Annotations::new(classes, size, cell_px, ignore)?;
+        if annotations.cells().is_none() {
+            return Err(TrialError::NoClasses);
+        }
+        let config = WordConfig::default();
+        let words = WordExtractor::new(&config).extract(image, cell_px);
+        Ok(Self { trial, image, cell_px, annotations, words, vocabulary: config.vocabulary_size() })
+    }
+
+    /// Returns the edge of a cell, pixels.
+    #[must_use]
+    pub fn cell_px(&self) -> f32 {
+        self.cell_px
+    }
+
+    /// Returns the annotations of the cells.
+    #[must_use]
+    pub fn annotations(&self) -> &Annotations {
+        &self.annotations
+    }
+
+    /// Returns the score of a method, mean over the seeds.
+    pub fn mean_score(&self, method: Method) -> Result<MeanScore, TrialError> {
+        let seeds = self.trial.seeds.max(1);
+        let mut mean = MeanScore::default();
+        for seed in 1..=seeds {
+            mean.add(&score(&self.labels(method, seed)?, &self.annotations), 1.0 / seeds as f64);
+        }
+        Ok(mean)
+    }
+
+    /// Returns the label map of a method.
+    pub fn labels(&self, method: Method, seed: u64) -> Result<LabelGrid, TrialError> {
+        let (k, size) = (self.trial.labels as usize, self.image.dimensions());
+        match method {
+            Method::MeanLab => Ok(mean_lab_labels(self.image, self.cell_px, k, seed)),
+            Method::PooledWords => Ok(pooled_word_labels(&self.words, self.vocabulary, size, self.cell_px, k, seed)),
+            Method::SceneModel => self.scene_model_labels(seed),
+        }
+    }
+
+    fn scene_model_labels(&self, seed: u64) -> Result<LabelGrid, TrialError> {
+        let (width, height) = self.image.dimensions();
+        let cells = |px: u32| f64::from(px) / f64::from(self.cell_px);
+        let camera = DownCamera { metres_per_pixel: 1.0 / f64::from(self.cell_px), altitude_m: 0.0 };
+        let middle = Pose { x: cells(width) / 2.0, y: -cells(height) / 2.0, z: 0.0, yaw_rad: 0.0 };
+        let config = SceneConfig {
+            cell_m: [1.0, 1.0, 1e4],
+            vocabulary: self.vocabulary,
+            max_labels: self.trial.labels,
+            seed,
+            ..SceneConfig::for_images()
+        };
+        let mut model = SceneModel::new(config)?;
+        model.insert(0.0, &camera.project(width, height, &middle, &self.words));
+        model.sweep(self.trial.sweeps);
+        let (columns, rows) = self.annotations.size();
+        Ok(LabelGrid::from_map(&model.label_map(), 0, -1, columns, rows))
+    }
+}
+
+impl MeanScore {
+    fn add(&mut self, score: &SceneScore, share: f64) {
+        self.mutual_information_nats += share * score.mutual_information.nats;
+        self.normalised_mutual_information += share * score.mutual_information.normalised;
+        self.null_mutual_information_nats += share * score.null_nats;
+        self.excess_nats += share * score.excess_nats;
+        self.labels_used += share * score.labels as f64;
+    }
+
+    /// Returns the median over scenes, each number on its own; zeros for an empty slice.
+    #[must_use]
+    pub fn median(scores: &[Self]) -> Self {
+        let median = |pick: fn(&Self) -> f64| {
+            let mut values: Vec<f64> = scores.iter().map(pick).collect();
+            values.sort_by(f64::total_cmp);
+            match (values.len() / 2, values.len() % 2) {
+                (0, 0) => 0.0,
+                (middle, 1) => values[middle],
+                (middle, _) => 0.5 * (values[middle - 1] + values[middle]),
+            }
+        };
+        Self {
+            mutual_information_nats: median(|s| s.mutual_information_nats),
+            normalised_mutual_information: median(|s| s.normalised_mutual_information),
+            null_mutual_information_nats: median(|s| s.null_mutual_information_nats),
+            excess_nats: median(|s| s.excess_nats),
+            labels_used: median(|s| s.labels_used),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_worlds::reef;
+
+    #[test]
+    fn scene_model_finds_more_of_a_reef_than_the_baselines() {
+        let reef = reef(3, 480, 360, 60, 5);
+        let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap();
+        let trial = Trial { labels: 8, cells_across: 40, sweeps: 10, seeds: 1 };
+        let scene = AnnotatedScene::new(trial, &reef.image, &classes, &[255]).unwrap();
+        let scores = Method::ALL.map(|method| scene.mean_score(method).unwrap());
+        assert!(scores.iter().all(|score| score.excess_nats > 0.5 && score.labels_used <= 8.0), "{scores:?}");
+        assert!(scores[2].excess_nats > scores[1].excess_nats, "{scores:?}");
+    }
+
+    #[test]
+    fn unusable_scenes_are_refused_by_name() {
+        let refused = |image: (u32, u32), classes: (u32, u32), class| {
+            let classes = GrayImage::from_pixel(classes.0, classes.1, image::Luma([class]));
+            let image = RgbImage::new(image.0, image.1);
+            AnnotatedScene::new(Trial::default(), &image, &classes, &[255]).map(|_| ()).unwrap_err()
+        };
+        assert_eq!(refused((1, 1), (1, 1), 0), TrialError::Tiny(1, 1));
+        assert_eq!(refused((40, 30), (40, 30), 255), TrialError::NoClasses);
+        assert!(matches!(refused((40, 30), (30, 40), 0), TrialError::Annotations(_)));
+    }
+
+    #[test]
+    fn medians_are_taken_of_each_number() {
+        let of = |mutual_information_nats, excess_nats| MeanScore {
+            mutual_information_nats,
+            excess_nats,
+            ..MeanScore::default()
+        };
+        let median = MeanScore::median(&[of(1.0, 9.0), of(3.0, 7.0), of(8.0, 8.0), of(5.0, 1.0)]);
+        assert_eq!((median.mutual_information_nats, median.excess_nats), (4.0, 7.5));
+        assert_eq!(MeanScore::median(&[]), MeanScore::default());
+    }
+}

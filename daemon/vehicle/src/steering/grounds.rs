@@ -1,0 +1,108 @@
+//! Where the vehicle may go: the survey area within the fence, and the return path from each place of it.
+
+use crate::planning::{Bounds, Lattice, Node, Point, Ways, distance};
+use scenecast_core::Area;
+use scenecast_protocol::directive::Fence;
+
+/// Steps between two places of the lattice, in reaches of the camera: looks overlap by a tenth.
+const STEP: f64 = 0.9;
+/// The lattice of places within area and fence, in the world frame.
+#[derive(Debug)]
+pub(super) struct Grounds {
+    area: Area,
+    /// Metres from the middle of a frame that are seen at any heading.
+    reach_m: f64,
+    clearance_m: f64,
+    bounds: Bounds,
+    /// The first place of the survey, where a vehicle without a return point returns to.
+    start: Point,
+    return_point: Option<Point>,
+    lattice: Lattice,
+    return_paths: Option<Ways>,
+    /// Metres from the end of those paths to the return point itself.
+    last_leg_m: f64,
+}
+
+impl Grounds {
+    pub(super) fn new(area: Area, reach_m: f64, clearance_m: f64) -> Self {
+        let bounds = Bounds::default();
+        let lattice = Lattice::new(area.shrunk(reach_m), &[], STEP * reach_m, &bounds);
+        let start = lattice.place(0);
+        let (return_point, return_paths, last_leg_m) = (None, None, 0.0);
+        let mut grounds =
+            Self { area, reach_m, clearance_m, bounds, start, return_point, lattice, return_paths, last_leg_m };
+        grounds.lay_out();
+        grounds
+    }
+
+    pub(super) fn area(&self) -> Area {
+        self.area
+    }
+
+    pub(super) fn reach_m(&self) -> f64 {
+        self.reach_m
+    }
+
+    pub(super) fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    pub(super) fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    pub(super) fn return_paths(&self) -> Option<&Ways> {
+        self.return_paths.as_ref()
+    }
+
+    pub(super) fn last_leg_m(&self) -> f64 {
+        self.last_leg_m
+    }
+
+    /// The end of every return path.
+    pub(super) fn home(&self) -> Point {
+        self.return_point.unwrap_or(self.start)
+    }
+
+    pub(super) fn set_fence(&mut self, fence: &Fence) {
+        self.bounds = Bounds::new(fence, self.clearance_m);
+        self.return_point = fence.return_point.map(|p| p.to_world().xy());
+        self.lay_out();
+    }
+
+    fn lay_out(&mut self) {
+        let inner = self.area.shrunk(self.reach_m);
+        self.lattice = Lattice::new(inner, &[self.home()], STEP * self.reach_m, &self.bounds);
+        let end = self.entry(self.home());
+        self.return_paths = end.map(|n| self.lattice.ways(n));
+        self.last_leg_m = end.map_or(0.0, |n| distance(self.home(), self.lattice.place(n)));
+    }
+
+    /// The place at which a path from `from` enters the lattice.
+    pub(super) fn entry(&self, from: Point) -> Option<Node> {
+        self.lattice.entry(from, &self.bounds)
+    }
+
+    /// Whether the return path from a place fits into what is left after `gone_m` metres.
+    pub(super) fn leaves_return(&self, node: Node, gone_m: f64, left_m: f64) -> bool {
+        !left_m.is_finite() || self.return_paths.as_ref().is_some_and(|w| gone_m + w.metres[node] <= left_m)
+    }
+
+    /// The place where a return path enters the lattice, the place where it leaves it, and the places after the first.
+    pub(super) fn return_path(&self, from: Point) -> Option<(Node, Node, Vec<Node>)> {
+        let (at, end) = (self.entry(from)?, self.entry(self.home())?);
+        Some((at, end, self.lattice.ways(at).to(end)))
+    }
+
+    /// Metres of the return path from a place, infinite if there is none.
+    pub(super) fn return_path_m(&self, from: Point) -> f64 {
+        let Some(at) = self.entry(from) else { return f64::INFINITY };
+        let along = self.return_paths.as_ref().map_or(f64::INFINITY, |w| w.metres[at]);
+        distance(from, self.lattice.place(at)) + along + self.last_leg_m
+    }
+
+    /// Metres from a waypoint at which it counts as reached.
+    pub(super) fn arrival_m(&self) -> f64 {
+        0.5f64.min(self.clearance_m.max(0.1) / 2.0)
+    }
+}

@@ -1,0 +1,30 @@
+//! Settings of the surface's end.
+
+use crate::link::Authenticity;
+use crate::mac::{MasterConfig, ModemProfile};
+use crate::schedule::Shares;
+use crate::wire::{Address, MissionId};
+use std::time::Duration;
+
+/// Settings of the surface's end.
+#[derive(Debug, Clone)]
+pub struct SurfaceConfig {
+    /// The mission; frames of another one fail their integrity check.
+    pub mission: MissionId,
+    /// Frame size, bit rate and access scheme of the modem.
+    pub modem: ModemProfile,
+    /// Bit budget on air in bit/s.
+    pub budget_bps: u32,
+    /// LinkWindow over which the budget holds.
+    pub budget_window: Duration,
+    /// Least share of each class while it has something to send.
+    pub shares: Shares,
+    /// Limits of turns and pauses in medium access.
+    pub master: MasterConfig,
+    /// The vehicles that are contacted from the beginning.
+    pub vehicles: Vec<Address>,
+    /// Longest time between two discovery calls; `None` disables them.
+    pub discovery_period: Option<Duration>,
+    /// Key and scope of authentication; `None` sends frames with a CRC only.
+    pub authenticity: Option<Authenticity>,
+}

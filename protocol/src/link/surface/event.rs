@@ -1,0 +1,53 @@
+//! Events and errors for the surface's host.
+
+use crate::directive::SlotId;
+use crate::wire::Address;
+
+/// An event of [`super::SurfaceLink`] for its host.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SurfaceEvent {
+    /// An unknown vehicle answered a discovery call.
+    VehicleFound(Address),
+    /// The operator's map of a vehicle has changed.
+    MapChanged(Address),
+    /// A pose or a report came in, and both are known.
+    Status(Address),
+    /// A vehicle has applied or refused a slot.
+    SlotDecided(Address, SlotId),
+    /// The last part of an object came in.
+    Object(Address, Vec<u8>),
+    /// A part of an object came in.
+    ObjectProgress {
+        /// The vehicle that sends it.
+        vehicle: Address,
+        /// Its first [`Self::OBJECT_HEAD`] bytes, once they are held.
+        head: Option<Vec<u8>>,
+        /// Bytes of it that the surface holds.
+        held: usize,
+        /// Bytes of the whole object.
+        total: usize,
+    },
+    /// A vehicle began a new run; its map starts empty.
+    VehicleRestarted(Address),
+}
+
+impl SurfaceEvent {
+    /// Bytes of an object that [`Self::ObjectProgress`] shows.
+    pub const OBJECT_HEAD: usize = 4;
+}
+
+/// Why a slot cannot be issued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum IssueError {
+    /// No vehicle with this address is known.
+    #[error("no such vehicle")]
+    NoVehicle,
+    /// It does not fit into a frame.
+    #[error("it takes {bytes} bytes, and a frame has room for {room}: set a larger link.frame_bytes or say less")]
+    TooLarge {
+        /// Length of the encoded slot in bytes.
+        bytes: usize,
+        /// Room for a slot in a frame, in bytes.
+        room: usize,
+    },
+}

@@ -1,0 +1,138 @@
+//! The surface's copy of what a vehicle has sent.
+
+use super::backlog::ReportedBacklog;
+use super::status::StatusParts;
+use crate::link::surface::planes::{Heard, Planes};
+use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
+use crate::map::{PlaneChunk, StateReplica};
+use crate::object::{ObjectReceiver, Part, Received};
+use crate::schedule::Class;
+use crate::time::Instant;
+use crate::wire::{Address, Chunk, ChunkKind};
+use std::collections::VecDeque;
+
+/// The result of handling a chunk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ChunkOutcome {
+    Accepted,
+    /// Accepted, and it shows that the two ends hold different states.
+    Diverged,
+    /// It makes no sense and is dropped.
+    Malformed,
+    /// It is dropped because it makes no sense with our state, so the two ends hold different ones.
+    Contradictory,
+}
+
+impl ChunkOutcome {
+    pub(super) fn is_accepted(self) -> bool {
+        matches!(self, Self::Accepted | Self::Diverged)
+    }
+
+    pub(super) fn is_out_of_step(self) -> bool {
+        matches!(self, Self::Diverged | Self::Contradictory)
+    }
+}
+
+/// Replica, planes, objects and status of one vehicle in its current run.
+#[derive(Debug)]
+pub(super) struct PeerContent<R> {
+    pub(super) replica: R,
+    pub(super) planes: Planes,
+    pub(super) status: StatusParts,
+    pub(super) backlog: Option<ReportedBacklog>,
+    objects: ObjectReceiver,
+}
+
+impl<R: StateReplica> PeerContent<R> {
+    pub(super) fn new() -> Self {
+        Self {
+            replica: R::default(),
+            planes: Planes::default(),
+            status: StatusParts::default(),
+            backlog: None,
+            objects: ObjectReceiver::default(),
+        }
+    }
+
+    /// The vehicle has begun a new run.
+    pub(super) fn clear(&mut self) {
+        self.replica.clear();
+        self.planes.clear();
+        self.objects.clear();
+        self.status = StatusParts::default();
+        self.backlog = None;
+    }
+
+    /// Counts changes of the map and its planes.
+    pub(super) fn map_version(&self) -> u64 {
+        self.replica.version() + self.planes.version()
+    }
+
+    /// The vehicle bases its chunks on every frame up to `horizon`.
+    pub(super) fn advance_base(&mut self, horizon: FrameNumber) {
+        self.replica.advance_base(horizon);
+        self.planes.advance_base(horizon);
+    }
+
+    /// Applies a chunk of frame `number`, which `stats` has counted.
+    pub(super) fn handle_chunk(
+        &mut self,
+        vehicle: Address,
+        number: FrameNumber,
+        chunk: &Chunk<'_>,
+        stats: &LinkStats,
+        now: Instant,
+        events: &mut VecDeque<SurfaceEvent>,
+    ) -> ChunkOutcome {
+        let accepted_if = |sound| if sound { ChunkOutcome::Accepted } else { ChunkOutcome::Malformed };
+        match chunk.kind {
+            ChunkKind::Map if self.replica.apply(number, chunk.payload, now) => ChunkOutcome::Accepted,
+            ChunkKind::Map => ChunkOutcome::Contradictory,
+            ChunkKind::Pose => accepted_if(self.status.read_pose(chunk.payload, number, now)),
+            ChunkKind::Report => self.handle_report(chunk.payload, stats, now),
+            ChunkKind::Object => accepted_if(self.handle_object(vehicle, chunk.payload, events)),
+            ChunkKind::Plane => match self.planes.handle_chunk(number, chunk.payload, now) {
+                Heard::Taken => ChunkOutcome::Accepted,
+                Heard::Unknown => ChunkOutcome::Malformed,
+                Heard::OutOfStep => ChunkOutcome::Contradictory,
+            },
+            ChunkKind::Slot => ChunkOutcome::Malformed,
+        }
+    }
+
+    fn handle_report(&mut self, payload: &[u8], stats: &LinkStats, now: Instant) -> ChunkOutcome {
+        if !self.status.read_report(payload) {
+            return ChunkOutcome::Malformed;
+        }
+        let status = self.status.latest();
+        self.backlog = Some(ReportedBacklog::new(status.backlog, stats, now));
+        match status.base_digest == self.replica.base_digest() {
+            true => ChunkOutcome::Accepted,
+            false => ChunkOutcome::Diverged,
+        }
+    }
+
+    fn handle_object(&mut self, vehicle: Address, payload: &[u8], events: &mut VecDeque<SurfaceEvent>) -> bool {
+        let Ok(part) = Part::decode(payload) else { return false };
+        match self.objects.handle_part(&part) {
+            Received::Nothing => {}
+            Received::Complete(_, bytes) => events.push_back(SurfaceEvent::Object(vehicle, bytes)),
+            Received::Progress(id, held, total) => {
+                let head = self.objects.head(id, SurfaceEvent::OBJECT_HEAD).map(<[u8]>::to_vec);
+                events.push_back(SurfaceEvent::ObjectProgress { vehicle, head, held, total });
+            }
+        }
+        true
+    }
+}
+
+/// The class that the bytes of a chunk count as.
+pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
+    match chunk.kind {
+        ChunkKind::Map => Class::Map,
+        ChunkKind::Pose | ChunkKind::Report => Class::Status,
+        ChunkKind::Slot => Class::Directive,
+        ChunkKind::Object => Class::Exemplar,
+        ChunkKind::Plane => PlaneChunk::decode(chunk.payload).map_or(Class::Overhead, |c| c.kind().into()),
+    }
+}

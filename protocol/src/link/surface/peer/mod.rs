@@ -1,0 +1,265 @@
+//! One vehicle as the surface knows it.
+//!
+//! [`VehiclePeer`] joins parts that own their state: `content` (what the vehicle has sent), `timing` (its clock),
+//! [`Contact`] (when it was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
+
+mod backlog;
+mod content;
+mod pool;
+mod status;
+mod timing;
+mod turn;
+mod view;
+
+pub(super) use turn::{Ready, room_for_slot};
+pub use view::PeerView;
+
+use crate::directive::{Slot, SlotId, SlotOutbox};
+use crate::link::{Authenticity, DropReason, FrameNumber, Inbound, LinkPair, LinkStats, SurfaceEvent};
+use crate::mac::{Access, Master, MasterConfig, ModemProfile};
+use crate::map::StateReplica;
+use crate::schedule::Class;
+use crate::time::Instant;
+use crate::wire::{Address, Chunk, ChunkKind, Envelope, FrameKind, Header, MissionId, Stamp};
+use content::{PeerContent, class_of};
+use std::collections::VecDeque;
+use std::time::Duration;
+use timing::VehicleTiming;
+
+/// The slots that a frame to a vehicle carried: versions, each with its bytes.
+type Carried = Vec<(SlotId, u16, usize)>;
+
+/// The last turn that was written.
+#[derive(Debug, Clone, Copy)]
+struct LastTurn {
+    /// Number of its first frame: an answer has judged it.
+    began: FrameNumber,
+    /// A hello has no number that an answer could name.
+    kind: FrameKind,
+}
+
+/// When the vehicle was last in contact, and when it must be contacted without a turn.
+#[derive(Debug)]
+struct Contact {
+    last_received: Option<Instant>,
+    /// Where the modem decides when to transmit: when an acknowledgement or a hello is due.
+    answer_due: Option<Instant>,
+    hello_due: Instant,
+    /// Hellos since the last answer.
+    hellos: u32,
+}
+
+impl Contact {
+    fn last_received(&self) -> Option<Instant> {
+        self.last_received
+    }
+}
+
+/// A vehicle as the surface knows it.
+#[derive(Debug)]
+pub(super) struct VehiclePeer<R> {
+    /// Grants turns to the vehicle.
+    pub(super) master: Master,
+    pair: LinkPair<Carried>,
+    outbox: SlotOutbox,
+    content: PeerContent<R>,
+    timing: VehicleTiming,
+    contact: Contact,
+    last_turn: LastTurn,
+    /// The two ends were found to differ: a new run must begin.
+    is_out_of_step: bool,
+}
+
+impl<R: StateReplica> VehiclePeer<R> {
+    pub(super) fn new(
+        mission: MissionId,
+        vehicle: Address,
+        authenticity: Option<Authenticity>,
+        seed: u64,
+        series: u16,
+        config: MasterConfig,
+        now: Instant,
+    ) -> Self {
+        Self {
+            master: Master::new(config, now),
+            pair: LinkPair::new(mission, Address::SURFACE, vehicle, authenticity, seed),
+            outbox: SlotOutbox::new(series),
+            content: PeerContent::new(),
+            timing: VehicleTiming::default(),
+            contact: Contact { last_received: None, answer_due: None, hello_due: now, hellos: 0 },
+            last_turn: LastTurn { began: 0, kind: FrameKind::Numbered },
+            is_out_of_step: false,
+        }
+    }
+
+    pub(super) fn address(&self) -> Address {
+        self.pair.peer()
+    }
+
+    pub(super) fn stats(&self) -> &LinkStats {
+        &self.pair.stats
+    }
+
+    /// Counts a frame that was dropped.
+    pub(super) fn drop_frame(&mut self, reason: DropReason) {
+        self.pair.stats.drop(reason);
+    }
+
+    /// Whether frames of unknown fate fill the window.
+    pub(super) fn is_full(&self) -> bool {
+        self.pair.is_full()
+    }
+
+    pub(super) fn has_slots_to_send(&self) -> bool {
+        self.outbox.has_backlog()
+    }
+
+    /// Issues a new version of a slot; returns the version.
+    pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
+        self.outbox.issue(slot, now)
+    }
+
+    /// Handles a frame of this vehicle; `bytes` is its length.
+    pub(super) fn handle_frame(
+        &mut self,
+        envelope: &Envelope<'_>,
+        bytes: usize,
+        modem: &ModemProfile,
+        now: Instant,
+        events: &mut VecDeque<SurfaceEvent>,
+    ) {
+        let inbound = match self.pair.handle_frame(envelope) {
+            Ok(inbound) => inbound,
+            Err(reason) => {
+                // The vehicle builds on frames that we never acknowledged, or means another run of ours.
+                let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
+                let strays = self.pair.has_lost_touch() && silent;
+                self.is_out_of_step |= reason == DropReason::NoBase || strays;
+                return;
+            }
+        };
+        if inbound.restarted {
+            self.forget_peer(now);
+            events.push_back(SurfaceEvent::VehicleRestarted(self.address()));
+        }
+        self.handle_fates(&inbound.fates, now);
+        self.is_out_of_step |= inbound.lacks_base;
+        let header = inbound.header().clone();
+        if header.kind.is_hello() {
+            self.contact.last_received = Some(now);
+            self.handle_turn(&header, bytes, modem, now);
+            return;
+        }
+        let Some(number) = inbound.number else { return };
+        self.contact.last_received = Some(now);
+        if inbound.is_latest {
+            self.handle_stamp(&header, modem.airtime(bytes), now);
+            self.handle_turn(&header, bytes, modem, now);
+        }
+        self.handle_content(&inbound, number, bytes, now, events);
+    }
+
+    fn handle_fates(&mut self, fates: &[(Carried, bool)], now: Instant) {
+        for (carried, _) in fates.iter().filter(|(_, delivered)| *delivered) {
+            for &(id, version, bytes) in carried {
+                self.pair.stats.deliver(id.class(), bytes, now);
+                self.outbox.mark_received(id, version, now);
+            }
+        }
+    }
+
+    fn handle_content(
+        &mut self,
+        inbound: &Inbound<'_, Carried>,
+        number: FrameNumber,
+        bytes: usize,
+        now: Instant,
+        events: &mut VecDeque<SurfaceEvent>,
+    ) {
+        self.content.advance_base(inbound.base);
+        let version = self.content.map_version();
+        let mut overhead = bytes;
+        for chunk in inbound.chunks() {
+            overhead = overhead.saturating_sub(chunk.payload.len());
+            self.handle_chunk(&chunk, number, now, events);
+        }
+        self.pair.stats.receive(Class::Overhead, overhead, now);
+        if self.content.map_version() != version {
+            events.push_back(SurfaceEvent::MapChanged(self.address()));
+        }
+    }
+
+    fn handle_chunk(
+        &mut self,
+        chunk: &Chunk<'_>,
+        number: FrameNumber,
+        now: Instant,
+        events: &mut VecDeque<SurfaceEvent>,
+    ) {
+        let vehicle = self.address();
+        self.pair.stats.receive(class_of(chunk), chunk.payload.len(), now);
+        let outcome = self.content.handle_chunk(vehicle, number, chunk, &self.pair.stats, now, events);
+        self.is_out_of_step |= outcome.is_out_of_step();
+        if !outcome.is_accepted() {
+            return self.pair.stats.drop(DropReason::Malformed);
+        }
+        if chunk.kind == ChunkKind::Report {
+            let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
+            events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotDecided(vehicle, id)));
+        }
+        if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {
+            events.push_back(SurfaceEvent::Status(vehicle));
+        }
+    }
+
+    fn handle_turn(&mut self, header: &Header, bytes: usize, modem: &ModemProfile, now: Instant) {
+        if self.last_turn.kind.is_hello() || self.pair.horizon() >= self.last_turn.began {
+            self.master.handle_answer(bytes, header.remaining, header.turn, modem, now);
+            self.contact.hellos = 0;
+        }
+    }
+
+    fn handle_stamp(&mut self, header: &Header, airtime: Duration, now: Instant) {
+        let Some(Stamp::Vehicle { clock_ms, heard, held }) = header.stamp else { return };
+        if let Some(measured) = self.timing.round_trip(heard, held, now - airtime) {
+            self.master.handle_round_trip(measured);
+        }
+        let one_way = self.master.round_trip().unwrap_or_default() / 2;
+        self.timing.measure(clock_ms, airtime + one_way, now);
+    }
+
+    /// A frame to the vehicle has left the modem; hellos have no number.
+    pub(super) fn handle_sent(&mut self, number: Option<FrameNumber>, now: Instant) {
+        if let Some(number) = number {
+            self.timing.handle_sent(number, now);
+        }
+    }
+
+    /// Makes an acknowledgement due, if one is owed.
+    pub(super) fn owe_answer(&mut self, now: Instant) {
+        let is_proven = self.pair.is_proven();
+        let wait = if is_proven { Duration::from_secs(2) } else { Duration::ZERO };
+        if self.pair.unstated() > 0 || (self.pair.is_met() && !is_proven) {
+            self.contact.answer_due.get_or_insert(now + wait);
+        }
+    }
+
+    /// Begins a new run toward the vehicle if the two ends were found to differ; returns whether they were.
+    pub(super) fn resync_if_out_of_step(&mut self, now: Instant) -> bool {
+        if !std::mem::take(&mut self.is_out_of_step) {
+            return false;
+        }
+        self.pair.renew();
+        self.forget_peer(now);
+        true
+    }
+
+    /// The state of the vehicle is unknown: one of the two ends has begun a new run.
+    fn forget_peer(&mut self, now: Instant) {
+        self.content.clear();
+        self.timing = VehicleTiming::default();
+        self.last_turn.began = 0;
+        self.outbox.handle_peer_restart(now);
+        self.contact.hello_due = now;
+    }
+}

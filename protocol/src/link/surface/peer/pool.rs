@@ -1,0 +1,93 @@
+//! Frames that go out without a turn, through a modem that does half duplex by itself.
+
+use super::turn::Ready;
+use super::{Contact, VehiclePeer};
+use crate::mac::ModemProfile;
+use crate::map::StateReplica;
+use crate::schedule::{BitBudget, ClassShares};
+use crate::time::Instant;
+use crate::wire::FrameKind;
+use std::time::Duration;
+
+/// Received frames after which an acknowledgement does not wait any longer.
+const MAX_UNACKNOWLEDGED: u64 = 16;
+/// Silence after which a vehicle is sent a hello, because it may have restarted.
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(60);
+
+impl Contact {
+    fn is_silent(&self, now: Instant) -> bool {
+        self.last_received.is_none_or(|at| now.since(at) >= SILENCE_TIMEOUT)
+    }
+
+    fn is_answer_due(&self, now: Instant) -> bool {
+        self.answer_due.is_some_and(|at| now >= at)
+    }
+
+    /// When a hello becomes due if the vehicle stays silent.
+    fn next_hello(&self) -> Instant {
+        self.last_received.map_or(self.hello_due, |at| (at + SILENCE_TIMEOUT).max(self.hello_due))
+    }
+
+    /// A hello went out; the next ones follow at growing intervals.
+    fn note_hello(&mut self, now: Instant) {
+        self.hello_due = now + Duration::from_secs(5 << self.hellos.min(4));
+        self.hellos += 1;
+    }
+}
+
+impl<R: StateReplica> VehiclePeer<R> {
+    fn must_greet(&self, now: Instant) -> bool {
+        let is_doubtful = !self.pair.is_met() || self.contact.is_silent(now) || self.pair.is_full();
+        is_doubtful && now >= self.contact.hello_due
+    }
+
+    /// Whether a frame should go out at `now`: a hello, an acknowledgement, or a slot.
+    pub(in crate::link::surface) fn has_reason_to_transmit(&self, now: Instant) -> bool {
+        if self.must_greet(now) {
+            return true;
+        }
+        let answer = self.contact.is_answer_due(now);
+        let unstated = self.pair.unstated();
+        let owes = (!self.pair.is_proven() && answer) || (unstated > 0 && (unstated >= MAX_UNACKNOWLEDGED || answer));
+        self.pair.is_met() && (owes || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+    }
+
+    /// When there will be a reason to transmit, if no frame comes in.
+    pub(in crate::link::surface) fn next_reason(&self) -> Option<Instant> {
+        let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
+        let again = again.filter(|_| self.outbox.has_backlog());
+        [Some(self.contact.next_hello()), self.contact.answer_due, again].into_iter().flatten().min()
+    }
+
+    /// Writes a frame, or postpones it if the budget does not allow it yet.
+    pub(in crate::link::surface) fn write_without_turn(
+        &mut self,
+        modem: &ModemProfile,
+        shares: &ClassShares,
+        budget: &BitBudget,
+        now: Instant,
+    ) -> Option<Ready> {
+        let kind = FrameKind::hello_if(self.must_greet(now));
+        let plan = self.plan_turn(modem, kind, 1, shares, now - self.slot_timeout());
+        let slots = plan.into_iter().next()?;
+        let allowed = budget.earliest(self.bits(&slots, modem), now);
+        if allowed > now {
+            self.contact.answer_due = Some(allowed);
+            return None;
+        }
+        let ready = self.write_turn(&[slots], modem, None, kind, now).pop()?;
+        self.master.note_begun(now);
+        // A run that was met must be proven by a numbered frame, or the vehicle will not transmit.
+        let must_prove = self.pair.is_met() && !self.pair.is_proven();
+        self.contact.answer_due = must_prove.then(|| now + self.slot_timeout());
+        if kind.is_hello() {
+            self.contact.note_hello(now);
+        }
+        Some(ready)
+    }
+
+    /// Time after which a slot that was not acknowledged goes out again.
+    fn slot_timeout(&self) -> Duration {
+        self.master.round_trip().unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4)
+    }
+}

@@ -1,0 +1,62 @@
+//! The status of a vehicle, joined from its two chunks.
+
+use crate::directive::{SlotId, SlotReport, SlotState};
+use crate::link::FrameNumber;
+use crate::time::Instant;
+use crate::wire::{PlannedPath, VehicleStatus};
+
+/// The pose and the report of a vehicle, of which one may come in before the other.
+#[derive(Debug, Default)]
+pub(super) struct StatusParts {
+    latest: VehicleStatus,
+    /// When the pose came in, and in which frame.
+    pose: Option<(Instant, FrameNumber)>,
+    has_report: bool,
+    whole: Option<(VehicleStatus, Instant)>,
+}
+
+impl StatusParts {
+    /// The newest values of all fields; those of a chunk that has not come in are defaults.
+    pub(super) fn latest(&self) -> &VehicleStatus {
+        &self.latest
+    }
+
+    /// The status and when its pose came in, once both chunks are here.
+    pub(super) fn whole(&self) -> Option<&(VehicleStatus, Instant)> {
+        self.whole.as_ref()
+    }
+
+    /// Reads a pose, which is ignored if a newer one came in before; returns whether it makes sense.
+    pub(super) fn read_pose(&mut self, payload: &[u8], number: FrameNumber, now: Instant) -> bool {
+        let mut read = self.latest.clone();
+        let is_read = read.read_pose(payload).is_ok();
+        if is_read && self.pose.is_none_or(|(_, before)| before < number) {
+            (self.latest, self.pose) = (read, Some((now, number)));
+        }
+        self.join();
+        is_read
+    }
+
+    /// Reads a report; returns whether it makes sense.
+    pub(super) fn read_report(&mut self, payload: &[u8]) -> bool {
+        let before = self.latest.slots;
+        let is_read = self.latest.read_report(payload).is_ok();
+        self.has_report |= is_read;
+        let newly = |(id, before): (SlotId, SlotReport)| {
+            let slot = self.latest.slot(id);
+            id.steers() && slot != before && slot.state == SlotState::Applied
+        };
+        if SlotId::ALL.into_iter().zip(before).any(newly) {
+            // The path was planned before the slot was applied; a pose with the new path is still to come.
+            (self.latest.waypoint, self.latest.path) = (None, PlannedPath::default());
+        }
+        self.join();
+        is_read
+    }
+
+    fn join(&mut self) {
+        if let Some((pose, _)) = self.pose.filter(|_| self.has_report) {
+            self.whole = Some((self.latest.clone(), pose));
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The surface's view of a vehicle, for its host.
+
+use super::VehiclePeer;
+use crate::directive::SlotProgress;
+use crate::link::LinkStats;
+use crate::mac::ClockMap;
+use crate::map::{PlaneKind, PlaneReplica, Replica, StateReplica};
+use crate::time::Instant;
+use crate::wire::{Backlog, VehicleStatus};
+use std::time::Duration;
+
+/// A read-only view of a vehicle for the host.
+#[derive(Debug)]
+pub struct PeerView<'a, R: StateReplica = Replica>(pub(in crate::link::surface) &'a VehiclePeer<R>);
+
+impl<R: StateReplica> Clone for PeerView<'_, R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R: StateReplica> Copy for PeerView<'_, R> {}
+
+impl<'a, R: StateReplica> PeerView<'a, R> {
+    /// The operator's copy of the replicated state.
+    pub fn replica(&self) -> &'a R {
+        &self.0.content.replica
+    }
+
+    /// The operator's copy of a plane of the map; `None` before its first chunk.
+    pub fn plane(&self, kind: PlaneKind) -> Option<&'a PlaneReplica> {
+        self.0.content.planes.get(kind)
+    }
+
+    /// Counts changes of the replicated state and its planes.
+    pub fn map_version(&self) -> u64 {
+        self.0.content.map_version()
+    }
+
+    /// The last status, and when its pose came in.
+    pub fn status(&self) -> Option<&'a (VehicleStatus, Instant)> {
+        self.0.content.status.whole()
+    }
+
+    /// The backlog of the last report less the bytes received since, and when that report came in.
+    pub fn backlog(&self) -> Option<(Backlog, Instant)> {
+        self.0.content.backlog.map(|reported| reported.left(self.stats()))
+    }
+
+    /// When a frame was last accepted.
+    pub fn last_received(&self) -> Option<Instant> {
+        self.0.contact.last_received()
+    }
+
+    /// When the next turn is granted at the latest; `now` if it is due.
+    pub fn next_contact(&self, now: Instant) -> Option<Instant> {
+        self.0.master.next_wakeup(false).map(|at| at.max(now))
+    }
+
+    /// Two-way propagation time, once it was measured.
+    pub fn round_trip(&self) -> Option<Duration> {
+        self.0.master.round_trip()
+    }
+
+    /// The vehicle's clock, once a stamp came in.
+    pub fn clock(&self) -> Option<&'a ClockMap> {
+        self.0.timing.clock()
+    }
+
+    /// The latest version of each issued slot, and how far it has come.
+    pub fn slots(&self) -> impl Iterator<Item = &'a SlotProgress> + use<'a, R> {
+        self.0.outbox.progress()
+    }
+
+    /// Counters and estimates of the link to this vehicle.
+    pub fn stats(&self) -> &'a LinkStats {
+        &self.0.pair.stats
+    }
+}

@@ -1,0 +1,112 @@
+//! When the surface transmits, and to whom.
+
+use super::SurfaceLink;
+use super::discovery::Discovery;
+use super::peer::Ready;
+use crate::link::{Transmit, Wakeup};
+use crate::mac::{Access, ModemProfile};
+use crate::map::StateReplica;
+use crate::time::Instant;
+use crate::wire::{Address, FrameKind};
+
+/// Probability that a turn of the surface may be lost with all its copies.
+const TURN_LOSS_RISK: f64 = 0.04;
+
+impl<R: StateReplica> SurfaceLink<R> {
+    /// The next frame, if there is one and the budget allows it. The host calls this after every event and at
+    /// [`Self::poll_timeout`] until it returns `None`.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        match self.config.modem.access {
+            Access::Shared => self.poll_shared(now),
+            Access::ModemOwned { pool_frames } => self.poll_pool(pool_frames, now),
+            Access::Polled => self.poll_polled(now),
+        }
+    }
+
+    /// When [`Self::poll_transmit`] may next have a frame, unless the link waits for the modem.
+    pub fn poll_timeout(&self, now: Instant) -> Option<(Instant, Wakeup)> {
+        let next = match self.config.modem.access {
+            Access::ModemOwned { .. } => self.fleet.next_without_turn(),
+            _ if !self.in_modem.is_empty() => None,
+            Access::Polled if !self.turn.is_empty() => self.cycle_gives_up_at(),
+            _ => self.discovery.listens_until(now).or_else(|| self.fleet.next_turn(self.discovery.next_wakeup(now))),
+        };
+        next.map(|at| (at, Wakeup::Grant))
+    }
+
+    fn poll_shared(&mut self, now: Instant) -> Option<Transmit> {
+        if !self.in_modem.is_empty() || self.discovery.listens_until(now).is_some() {
+            return None;
+        }
+        if self.turn.is_empty() && !self.begin_turn(now) {
+            return None;
+        }
+        let ready = self.turn.pop_front()?;
+        let last = self.turn.is_empty() && ready.transmit.to != Address::EVERYBODY;
+        Some(self.send(ready, last, now))
+    }
+
+    /// Writes the next turn for the vehicle that is due; returns whether there is one.
+    pub(super) fn begin_turn(&mut self, now: Instant) -> bool {
+        // A discovery call goes first: vehicles that always have a backlog would never leave time for it.
+        if self.begin_call(now) {
+            return true;
+        }
+        let Some(vehicle) = self.fleet.choose(now) else { return false };
+        let active = self.fleet.active();
+        let is_plentiful = self.budget.is_plentiful(now);
+        let Some(peer) = self.fleet.get_mut(vehicle) else { return false };
+        let modem = self.config.modem;
+        let kind = FrameKind::hello_if(is_hello_due(peer.master.unanswered()) || peer.is_full());
+        let copies = if is_plentiful { peer.stats().loss_out.copies(TURN_LOSS_RISK, 6) } else { 1 };
+        let mut plan = peer.plan_turn(&modem, kind, copies, &self.shares, now);
+        let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem), now)));
+        if affordable == 0 {
+            let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem));
+            peer.master.postpone(self.budget.earliest(bits, now));
+            return false;
+        }
+        plan.truncate(affordable);
+        let grant = peer.master.grant(&modem, active);
+        self.turn = peer.write_turn(&plan, &modem, Some(grant), kind, now).into();
+        peer.master.begin(grant, now);
+        self.fleet.set_current(vehicle);
+        true
+    }
+
+    /// Queues a discovery call if one is due.
+    fn begin_call(&mut self, now: Instant) -> bool {
+        if self.fleet.is_medium_taken(now) || !self.discovery.is_due(now) || !self.fleet.has_room() {
+            return false;
+        }
+        let modem: ModemProfile = self.config.modem;
+        let authenticity = self.config.authenticity.as_ref();
+        let bytes = Discovery::bytes(authenticity.is_some());
+        let allowed = self.budget.earliest(modem.bits_on_air(bytes), now);
+        if allowed > now {
+            self.discovery.postpone(allowed);
+            return false;
+        }
+        let transmit = self.discovery.write(self.config.mission, &modem, authenticity, &mut self.random, now);
+        self.turn.push_back(Ready { transmit, number: None });
+        true
+    }
+
+    /// The next frame for a modem that does half duplex by itself: one goes out whenever there is a reason
+    /// and its pool has room.
+    fn poll_pool(&mut self, pool_frames: u32, now: Instant) -> Option<Transmit> {
+        if self.in_modem.len() >= pool_frames as usize {
+            return None;
+        }
+        let vehicle = self.fleet.choose_without_turn(now)?;
+        let peer = self.fleet.get_mut(vehicle)?;
+        let ready = peer.write_without_turn(&self.config.modem, &self.shares, &self.budget, now)?;
+        Some(self.send(ready, false, now))
+    }
+}
+
+/// A vehicle that does not answer may have restarted and not know us: every second grant is a hello, and after a while
+/// every one, so that the numbers of unacknowledged frames do not run out.
+fn is_hello_due(unanswered: u32) -> bool {
+    unanswered >= 2 && (unanswered.is_multiple_of(2) || unanswered >= 16)
+}

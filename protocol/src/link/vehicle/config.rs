@@ -1,0 +1,28 @@
+//! Settings of the vehicle's end.
+
+use crate::link::Authenticity;
+use crate::mac::ModemProfile;
+use crate::schedule::Shares;
+use crate::wire::{Address, MissionId};
+use std::time::Duration;
+
+/// Settings of the vehicle's end.
+#[derive(Debug, Clone)]
+pub struct VehicleConfig {
+    /// Own address; frames to other vehicles are dropped.
+    pub address: Address,
+    /// The mission; frames of another one fail their integrity check.
+    pub mission: MissionId,
+    /// Frame size, bit rate and access scheme of the modem.
+    pub modem: ModemProfile,
+    /// Bit budget on air in bit/s.
+    pub budget_bps: u32,
+    /// LinkWindow over which the budget holds.
+    pub budget_window: Duration,
+    /// Least share of each class while it has something to send.
+    pub shares: Shares,
+    /// Time between two statuses; longer where the budget is small, so that they take at most a tenth of it.
+    pub status_period: Duration,
+    /// Key and scope of authentication; `None` sends frames with a CRC only.
+    pub authenticity: Option<Authenticity>,
+}

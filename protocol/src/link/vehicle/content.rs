@@ -1,0 +1,243 @@
+//! The content of the vehicle's frames: chosen and encoded when a frame is written.
+
+use super::planes::PlaneOut;
+use super::status::StatusSender;
+use crate::directive::{SLOTS, SlotReport};
+use crate::map::{Cell, PlaneKind, StateSource};
+use crate::object::{ObjectId, ObjectSender, SymbolRun};
+use crate::schedule::{BitBudget, Class, ClassShares, Extra, Shares, SpendOrder};
+use crate::time::Instant;
+use crate::wire::{Backlog, ChunkKind, FrameBuilder, room_for_payload};
+use std::time::Duration;
+
+/// A chunk of a frame, by what its fate means to the sender.
+#[derive(Debug)]
+pub(super) enum Part<C> {
+    Map(C),
+    Plane(PlaneKind, Vec<(Cell, u8)>),
+    PlaneDigest(PlaneKind),
+    Object(ObjectId, SymbolRun),
+    Pose,
+    Report,
+}
+
+impl<C> Part<C> {
+    pub(super) fn class(&self) -> Class {
+        match self {
+            Self::Map(_) => Class::Map,
+            Self::Plane(kind, _) | Self::PlaneDigest(kind) => (*kind).into(),
+            Self::Object(..) => Class::Exemplar,
+            Self::Pose | Self::Report => Class::Status,
+        }
+    }
+}
+
+/// The chunks of a frame, each with the bytes of its payload.
+pub(super) type Carried<C> = Vec<(Part<C>, usize)>;
+
+/// The state of the link that a frame reports or depends on.
+pub(super) struct FillContext<'a> {
+    pub(super) budget: &'a BitBudget,
+    /// Decisions about the slots of the directive.
+    pub(super) slots: [SlotReport; SLOTS],
+    /// Frames that were refused because they were not authentic.
+    pub(super) refused_frames: u64,
+    pub(super) now: Instant,
+}
+
+/// Everything that the vehicle sends, and the shares by which it is chosen.
+#[derive(Debug)]
+pub(super) struct VehicleContent<S> {
+    pub(super) source: S,
+    pub(super) planes: Vec<PlaneOut>,
+    pub(super) objects: ObjectSender,
+    pub(super) shares: ClassShares,
+    pub(super) spend: SpendOrder,
+    pub(super) status: StatusSender,
+}
+
+impl<S: StateSource> VehicleContent<S> {
+    pub(super) fn new(source: S, shares: Shares, status_period: Duration, now: Instant) -> Self {
+        Self {
+            source,
+            planes: Vec::new(),
+            objects: ObjectSender::default(),
+            shares: ClassShares::new(shares),
+            spend: SpendOrder::default(),
+            status: StatusSender::new(status_period, now),
+        }
+    }
+
+    /// Releases changes that were held back and are due; returns whether there were any.
+    pub(super) fn handle_timeout(&mut self, now: Instant) -> bool {
+        let mut released = self.source.handle_timeout(now);
+        self.planes.iter_mut().for_each(|p| released |= p.source.handle_timeout(now));
+        released
+    }
+
+    /// The surface holds none of our state any more.
+    pub(super) fn handle_peer_restart(&mut self, now: Instant) {
+        self.source.handle_peer_restart(now);
+        self.planes.iter_mut().for_each(|p| p.source.handle_peer_restart(now));
+        self.objects.handle_peer_restart();
+        self.status.owe_pose(now);
+        self.status.owe_report(now);
+    }
+
+    /// Whether the surface is known to hold the replicated state, its planes, and every object.
+    pub(super) fn is_converged(&self) -> bool {
+        self.source.is_converged() && self.planes().all(StateSource::is_converged) && self.objects.is_empty()
+    }
+
+    /// Whether no content waits that could be sent now.
+    pub(super) fn is_idle(&self, budget: &BitBudget, now: Instant) -> bool {
+        self.source.is_quiet() && self.extras_are_quiet(budget, now) && self.objects.has_only_extra()
+    }
+
+    /// When a change that is held back becomes due.
+    pub(super) fn next_due(&self) -> Option<Instant> {
+        let planes = self.planes().filter_map(StateSource::next_due);
+        self.source.next_due().into_iter().chain(planes).min()
+    }
+
+    /// The expected backlog, for the operator.
+    fn backlog(&self, budget: &BitBudget, now: Instant) -> Backlog {
+        let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let others = self.shared_plane_backlog() + self.objects.backlog_bytes() + self.extra_backlog(budget, now);
+        Backlog { map_bytes: bytes(self.source.expected_backlog_bytes()), other_bytes: bytes(others) }
+    }
+
+    /// About how many bytes wait and may be sent.
+    pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
+        let own = self.source.backlog_bytes() + self.shared_plane_backlog() + self.objects.backlog_bytes();
+        own + self.extra_backlog(budget, now)
+    }
+
+    /// The fate of a chunk is known; returns the object that is complete with it.
+    pub(super) fn handle_fate(&mut self, part: Part<S::Carried>, delivered: bool, now: Instant) -> Option<ObjectId> {
+        match part {
+            Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
+            Part::Plane(kind, carried) => {
+                if let Some(plane) = self.plane_mut(kind) {
+                    plane.source.handle_fate(carried, delivered, now);
+                }
+            }
+            Part::Object(id, run) => return self.objects.handle_fate(id, &run, delivered).then_some(id),
+            Part::Pose if !delivered => self.status.owe_pose(now),
+            Part::Report if !delivered => self.status.owe_report(now),
+            Part::Pose | Part::Report | Part::PlaneDigest(_) => {}
+        }
+        None
+    }
+
+    /// Fills a frame as far as possible: the shares choose the class, and within a class the
+    /// most valuable chunk goes first.
+    pub(super) fn fill(&mut self, builder: &mut FrameBuilder, context: &FillContext<'_>) -> Carried<S::Carried> {
+        let mut carried = Carried::new();
+        let mut unfit: Vec<Class> = Vec::new();
+        loop {
+            let waiting = self.waiting(context.now);
+            let candidates: Vec<Class> = waiting.iter().copied().filter(|c| !unfit.contains(c)).collect();
+            let Some(class) = self.shares.next(&candidates) else { break };
+            let bytes = self.fill_class(class, false, builder, &mut carried, context);
+            if bytes == 0 {
+                unfit.push(class);
+            }
+            self.shares.spend(class, bytes, &waiting);
+        }
+        self.fill_extras(builder, &mut carried, context);
+        self.fill_digests(builder, &mut carried);
+        carried
+    }
+
+    /// Fills the rest of a frame with background streams.
+    fn fill_extras(
+        &mut self,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        context: &FillContext<'_>,
+    ) {
+        let mut unfit: Vec<Extra> = Vec::new();
+        loop {
+            let next = self.extras(context.budget, context.now).find(|e| !unfit.contains(e));
+            let Some(extra) = next else { return };
+            if self.fill_class(extra.class(), true, builder, carried, context) == 0 {
+                unfit.push(extra);
+            }
+        }
+    }
+
+    /// Puts a chunk of a class into a frame; returns its bytes, 0 if none fits.
+    fn fill_class(
+        &mut self,
+        class: Class,
+        is_extra: bool,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        context: &FillContext<'_>,
+    ) -> usize {
+        let before = carried.len();
+        match class {
+            Class::Status => self.fill_status(builder, carried, context),
+            Class::Exemplar => self.fill_object(is_extra, builder, carried),
+            Class::Confidence | Class::Depth | Class::Curiosity => {
+                self.fill_plane(class, builder, carried, context.now);
+            }
+            _ => self.fill_map(builder, carried, context.now),
+        }
+        carried.iter().skip(before).map(|(_, n)| n).sum()
+    }
+
+    fn waiting(&self, now: Instant) -> Vec<Class> {
+        [
+            (self.status.is_waiting(now), Class::Status),
+            (self.source.backlog_bytes() > 0 && !self.is_refining(), Class::Map),
+            (self.objects.backlog_bytes() > 0, Class::Exemplar),
+        ]
+        .into_iter()
+        .filter_map(|(waits, class)| waits.then_some(class))
+        .chain(self.waiting_planes())
+        .collect()
+    }
+
+    fn fill_status(
+        &mut self,
+        builder: &mut FrameBuilder,
+        carried: &mut Carried<S::Carried>,
+        context: &FillContext<'_>,
+    ) {
+        let backlog = self.backlog(context.budget, context.now);
+        let base_digest = self.source.digest();
+        let Some(status) = self.status.status_mut() else { return };
+        status.backlog = backlog;
+        status.base_digest = base_digest;
+        status.slots = context.slots;
+        status.budget_bps = context.budget.bits_per_s();
+        status.refused_frames = context.refused_frames.min(255) as u8;
+        if let Some(bytes) = self.status.fill_report(builder, context.now) {
+            carried.push((Part::Report, bytes));
+            self.planes.iter_mut().for_each(|p| p.owes_digest = p.source.is_begun());
+        }
+        if let Some(bytes) = self.status.fill_pose(builder, context.now) {
+            carried.push((Part::Pose, bytes));
+        }
+    }
+
+    fn fill_object(&mut self, is_extra: bool, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
+        let room = room_for_payload(builder.room());
+        let part = if is_extra { self.objects.next_extra_part(room) } else { self.objects.next_part(room) };
+        let Some((id, run, bytes)) = part else { return };
+        if builder.push(ChunkKind::Object, &bytes) {
+            self.objects.mark_in_flight(id, &run);
+            carried.push((Part::Object(id, run), bytes.len()));
+        }
+    }
+
+    fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
+        let room = room_for_payload(builder.room());
+        let Some((bytes, content)) = self.source.next_chunk(room, now) else { return };
+        let fits = builder.push(ChunkKind::Map, &bytes);
+        assert!(fits, "a chunk of {} bytes was made for {room}", bytes.len());
+        carried.push((Part::Map(content), bytes.len()));
+    }
+}

@@ -1,0 +1,73 @@
+//! The answer to a discovery call: a surface that looks for vehicles invites all to answer, each at a random time.
+
+use super::VehicleConfig;
+use crate::mac::Grant;
+use crate::time::Instant;
+use crate::wire::{Address, Envelope, FrameBuilder, FrameKind, Header, Seal, SessionId};
+use std::time::Duration;
+
+/// The answer that is owed to a discovery call.
+#[derive(Debug)]
+pub(super) struct CallReply {
+    /// Session and nonce of the call.
+    pending: Option<(SessionId, u64)>,
+    /// State of the generator that draws the time of the answer.
+    random: u64,
+}
+
+impl CallReply {
+    pub(super) fn new(seed: u64) -> Self {
+        Self { pending: None, random: seed ^ 0x0CA1_15EA }
+    }
+
+    /// Whether a frame to everybody is a discovery call of this mission.
+    pub(super) fn is_call(config: &VehicleConfig, envelope: &Envelope<'_>) -> bool {
+        let is_sound = match &config.authenticity {
+            Some(a) => envelope.open(&Seal::Hello(&a.key, config.mission, 0, 0)).is_some(),
+            None => envelope.open(&Seal::Crc(config.mission, 0)).is_some(),
+        };
+        is_sound && envelope.header.kind.is_hello()
+    }
+
+    /// Takes a call; returns the turn in which it is answered, at a random time in the window that the call names.
+    pub(super) fn handle_call(&mut self, config: &VehicleConfig, call: &Header, now: Instant) -> Grant {
+        self.pending = Some((call.session, call.nonce.unwrap_or_default()));
+        let window = Duration::from_millis(250) * u32::from(call.turn.unwrap_or_default());
+        let share = (crate::random::next(&mut self.random) >> 40) as f64 / (1u64 << 24) as f64;
+        let begins = now + config.modem.turn_around + window.mul_f64(share);
+        Grant { begins, ends: begins + config.modem.frame_airtime() * 2 }
+    }
+
+    pub(super) fn is_pending(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    pub(super) fn cancel(&mut self) {
+        self.pending = None;
+    }
+
+    /// The frame that answers the pending call, if there is one.
+    pub(super) fn take(&mut self, config: &VehicleConfig) -> Option<Vec<u8>> {
+        let (session, nonce) = self.pending.take()?;
+        let header = Header {
+            from: config.address,
+            to: Address::SURFACE,
+            session,
+            number: 0,
+            base: 1,
+            remaining: 0,
+            turn: None,
+            stamp: None,
+            nonce: config.authenticity.as_ref().map(|_| nonce),
+            ack: None,
+            kind: FrameKind::Hello,
+            keyed: config.authenticity.is_some(),
+        };
+        let builder = FrameBuilder::new(&header, config.modem.frame_bytes);
+        let mission = config.mission;
+        Some(match &config.authenticity {
+            Some(a) => builder.finish(&Seal::Hello(&a.key, mission, session.get(), nonce), true),
+            None => builder.finish(&Seal::Crc(mission, session.get()), true),
+        })
+    }
+}

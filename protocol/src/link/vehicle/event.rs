@@ -1,0 +1,23 @@
+//! Events for the vehicle's host.
+
+use crate::directive::{Slot, SlotId};
+use crate::object::ObjectId;
+
+/// An event of [`super::VehicleLink`] for its host.
+#[derive(Debug, Clone, PartialEq)]
+pub enum VehicleEvent {
+    /// A new version of a slot came in. The host decides about it ([`super::VehicleLink::decide`]), makes the decision
+    /// durable, and confirms that with [`super::VehicleLink::handle_persisted`]; only then is it acknowledged.
+    Slot {
+        /// The slot, also where its content is unreadable.
+        id: SlotId,
+        /// Its version in the surface's series.
+        version: u16,
+        /// The content; `None` if it is unreadable and can only be refused.
+        content: Option<Slot>,
+    },
+    /// The surface has acknowledged every part of an object.
+    ObjectDelivered(ObjectId),
+    /// The surface began a new run; everything is sent to it again.
+    SurfaceRestarted,
+}

@@ -1,0 +1,93 @@
+//! The vehicle's status: when its two chunks, pose and report, are due, and how much of a frame they take.
+
+use crate::time::Instant;
+use crate::wire::{ChunkKind, FrameBuilder, VehicleStatus, room_for_payload};
+use std::time::Duration;
+
+/// Sends the latest status at most once a period, and with at most a tenth of the bit budget.
+#[derive(Debug)]
+pub(super) struct StatusSender {
+    period: Duration,
+    status: Option<VehicleStatus>,
+    pose_due: Instant,
+    report_due: Instant,
+    /// Slot with which the next report begins: a report that does not fit into a frame continues in the next.
+    report_from: usize,
+}
+
+impl StatusSender {
+    pub(super) fn new(period: Duration, now: Instant) -> Self {
+        Self { period, status: None, pose_due: now, report_due: now, report_from: 0 }
+    }
+
+    pub(super) fn set(&mut self, status: VehicleStatus) {
+        self.status = Some(status);
+    }
+
+    pub(super) fn status_mut(&mut self) -> Option<&mut VehicleStatus> {
+        self.status.as_mut()
+    }
+
+    /// Whether a pose or a report is due.
+    pub(super) fn is_due(&self, now: Instant) -> bool {
+        now >= self.pose_due.min(self.report_due)
+    }
+
+    /// Whether a status is known and due.
+    pub(super) fn is_waiting(&self, now: Instant) -> bool {
+        self.status.is_some() && self.is_due(now)
+    }
+
+    /// When the next chunk is due, if a status is known.
+    pub(super) fn next_due(&self) -> Option<Instant> {
+        self.status.as_ref().map(|_| self.pose_due.min(self.report_due))
+    }
+
+    pub(super) fn owe_pose(&mut self, now: Instant) {
+        self.pose_due = now;
+    }
+
+    /// Makes a report due at once, from its first slot.
+    pub(super) fn owe_report(&mut self, now: Instant) {
+        (self.report_due, self.report_from) = (now, 0);
+    }
+
+    /// Makes a report due at `at`, unless it is due before.
+    pub(super) fn owe_report_by(&mut self, at: Instant) {
+        self.report_due = self.report_due.min(at);
+    }
+
+    /// Puts a report into a frame if one is due; returns its bytes.
+    pub(super) fn fill_report(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
+        let status = self.status.as_ref().filter(|_| now >= self.report_due)?;
+        let (bytes, next) = status.encode_report(room_for_payload(builder.room()), self.report_from)?;
+        if !builder.push(ChunkKind::Report, &bytes) {
+            return None;
+        }
+        self.report_from = next;
+        if next == 0 {
+            self.report_due = now + self.period.max(ten_times_airtime(status, bytes.len()));
+        }
+        Some(bytes.len())
+    }
+
+    /// Puts a pose into a frame if one is due; returns its bytes.
+    pub(super) fn fill_pose(&mut self, builder: &mut FrameBuilder, now: Instant) -> Option<usize> {
+        let status = self.status.as_ref().filter(|_| now >= self.pose_due)?;
+        let period = self.period.max(ten_times_airtime(status, VehicleStatus::POSE));
+        // The path may take a hundredth of the budget.
+        let path = (period.as_secs_f64() * f64::from(status.budget_bps) / 800.0) as usize;
+        let room = room_for_payload(builder.room()).min(VehicleStatus::POSE.saturating_add(path));
+        let bytes = status.encode_pose(room);
+        if !builder.push(ChunkKind::Pose, &bytes) {
+            return None;
+        }
+        self.pose_due = now + self.period.max(ten_times_airtime(status, bytes.len().min(VehicleStatus::POSE)));
+        Some(bytes.len())
+    }
+}
+
+/// The period in which `bytes`, sent twice, take a tenth of the budget.
+fn ten_times_airtime(status: &VehicleStatus, bytes: usize) -> Duration {
+    Duration::from_secs_f64(bytes as f64 * 160.0 / f64::from(status.budget_bps.max(1)))
+}

@@ -1,0 +1,65 @@
+//! The transducer and the frames that wait for it, one at a time.
+
+use super::{FrameKind, S2cFrame};
+use std::collections::VecDeque;
+use std::time::Duration;
+
+#[derive(Clone, Debug)]
+pub(crate) struct QueuedFrame {
+    pub frame: S2cFrame,
+    pub airtime: Duration,
+    /// The type in `SENDSTART` and `SENDEND`.
+    pub label: &'static str,
+    pub then: AfterSending,
+}
+
+/// The step that follows the end of a transmission.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum AfterSending {
+    Done,
+    /// The instant message of that number waits for its acknowledgement.
+    Instant(u8),
+    /// The train or probe of that turn waits for its acknowledgement.
+    Train(u64),
+    /// The acknowledgement ended that turn.
+    Acknowledged(u64),
+    /// The connection request of that epoch waits for its grant.
+    Request(u32),
+    Closed,
+}
+
+#[derive(Debug, Default)]
+pub(crate) struct Transmitter {
+    queue: VecDeque<QueuedFrame>,
+    busy_until: Duration,
+}
+
+impl Transmitter {
+    pub(crate) fn is_busy(&self, now: Duration) -> bool {
+        now < self.busy_until
+    }
+
+    pub(crate) fn push(&mut self, out: QueuedFrame) {
+        self.queue.push_back(out);
+    }
+
+    /// Queues a frame before all others.
+    pub(crate) fn push_first(&mut self, out: QueuedFrame) {
+        self.queue.push_front(out);
+    }
+
+    /// Drops the waiting frames of some kinds.
+    pub(crate) fn discard(&mut self, kinds: &[FrameKind]) {
+        self.queue.retain(|out| !kinds.contains(&out.frame.kind));
+    }
+
+    /// Takes the next frame and occupies the transducer for its airtime; `None` while it is occupied.
+    pub(crate) fn begin(&mut self, now: Duration) -> Option<QueuedFrame> {
+        if self.is_busy(now) {
+            return None;
+        }
+        let out = self.queue.pop_front()?;
+        self.busy_until = now + out.airtime;
+        Some(out)
+    }
+}
