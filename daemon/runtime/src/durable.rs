@@ -5,29 +5,29 @@ use scenecast_core::UserError;
 use scenecast_vehicle::{Durable, LastPlace};
 use std::path::Path;
 
-/// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.
+/// The journal's file. Its records hold a [`Durable`] in postcard; another layout needs another version of the file.
 const JOURNAL: &str = "vehicle.journal";
-/// The file of builds before there was a journal.
+/// The state file of builds without a journal.
 const EARLIER_FILE: &str = "vehicle.state";
 /// Length at which the journal is rewritten: 64 records of a block.
 const MAX_BYTES: usize = 64 * 4096;
 
-/// Keeps the durable state of a run.
+/// Writes the durable state of a run to the journal.
 pub(super) struct Keeper<S: Storage> {
     journal: Journal<S>,
 }
 
-/// A run that has begun.
+/// A run whose state is on disk, so that it may transmit.
 pub(super) struct StartedRun<S: Storage> {
     pub(super) keeper: Keeper<S>,
     pub(super) durable: Durable,
-    /// Whether there was a run before it.
+    /// Whether an earlier run left a state.
     pub(super) is_again: bool,
 }
 
 impl<S: Storage> Keeper<S> {
-    /// Begins a run with the state that survived the last one. `checkpoint` is the lineage and the epoch of a scene model that continues;
-    /// if they are those of the last run the epoch goes on too, otherwise it is one that no run before has used.
+    /// Begins a run with the state that survived the last one. `checkpoint` has the lineage and the epoch of a restored
+    /// scene model: if the last run had the same, its epoch continues; otherwise a new epoch begins.
     ///
     /// The first run of a mission has the given `lineage`, which is random.
     pub(super) fn begin_run(
@@ -57,12 +57,12 @@ impl<S: Storage> Keeper<S> {
             }
         };
         let mut keeper = Self { journal };
-        // Label ids of another model mean something else: an epoch is on disk before it is published.
+        // Label ids of another model have other meanings, so a new epoch is on disk before it is published.
         keeper.save(&durable)?;
         Ok(StartedRun { keeper, durable, is_again })
     }
 
-    /// Makes the state durable: a power cut before this has returned leaves the last one or this one.
+    /// Makes the state durable. A power cut before the return leaves either the previous state or this one.
     pub(super) fn save(&mut self, durable: &Durable) -> Result<(), UserError> {
         let place = self.journal.storage().path(JOURNAL);
         let state = postcard::to_allocvec(durable).map_err(|e| UserError::Failed(e.to_string()))?;

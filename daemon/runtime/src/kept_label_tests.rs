@@ -41,7 +41,7 @@ impl TopicScene {
         }
     }
 
-    /// A topic is born, one in three times another one dies; then the map.
+    /// A topic is born and, one time in three, another one dies; returns the map.
     fn see(&mut self, rng: &mut DiskRng, born: &mut u64) -> MapUpdate {
         if self.topics.len() < 4 {
             *born += 1;
@@ -97,7 +97,7 @@ impl LabelTrial {
         Self { config, disk: Disk::default(), rng: DiskRng::new(seed), born: 0, published, epochs }
     }
 
-    /// One run of the vehicle; none if the power was cut.
+    /// One run of the vehicle; `None` if the power was cut.
     fn run(&mut self) -> Option<()> {
         let mut file = CheckpointFile::new(self.disk.clone());
         let kept: Option<TopicScene> = file.read().ok()?.and_then(|bytes| postcard::from_bytes(&bytes).ok());
@@ -129,7 +129,7 @@ impl LabelTrial {
         for frame in 1..=FRAMES {
             self.disk.step(DiskStep::Host).ok()?;
             let update = scene.see(&mut self.rng, &mut self.born);
-            // The model's thread keeps a checkpoint before or after the link's thread has heard of the frame.
+            // The model's thread keeps a checkpoint before or after the link's thread receives the map of the frame.
             let first = self.rng.below(2) == 0;
             if first && frame % CHECKPOINT_INTERVAL == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;

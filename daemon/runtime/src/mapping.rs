@@ -22,7 +22,7 @@ pub(super) enum ToMapper {
 
 /// A report of the mapper's thread.
 pub(super) enum FromMapper {
-    /// The map, after a camera frame or at the start.
+    /// The map after a camera frame, or at the start of the run.
     Mapped(Mapped),
     /// A camera frame that could not be read.
     Missed(UserError),
@@ -30,7 +30,7 @@ pub(super) enum FromMapper {
 
 /// The mapper's results after a camera frame.
 pub(super) struct Mapped {
-    /// None at the start, when the map is that of a checkpoint.
+    /// `None` at the start, when the map is that of a checkpoint.
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
@@ -57,23 +57,23 @@ impl MapperThread {
     pub(super) fn finish(self) {
         drop((self.orders, self.mapped));
         if self.thread.join().is_err() {
-            tracing::error!("the scene model's thread has panicked: what it knew since the last checkpoint is lost");
+            tracing::error!("the scene model's thread has panicked: its changes since the last checkpoint are lost");
         }
     }
 }
 
-/// When and where checkpoints are kept.
+/// Schedule and file of the checkpoints.
 pub(super) struct Keep {
     pub(super) file: CheckpointFile<Folder>,
     pub(super) lineage: u64,
-    /// Seconds of mission time from one to the next; 0: none.
+    /// Seconds of mission time between two checkpoints; 0 for none.
     pub(super) every_s: f64,
-    /// Mission time of the last one, or of the first frame.
+    /// Mission time of the last checkpoint, or of the first frame.
     pub(super) last_s: Option<f64>,
 }
 
 impl Keep {
-    /// Keeps a checkpoint if one is due. A disk that refuses does not end the mission: the one before it stays.
+    /// Keeps a checkpoint if one is due. A failing disk does not end the mission: the previous checkpoint stays.
     fn keep(&mut self, mapper: &Mapper, is_due: impl Fn(f64) -> bool) {
         let Some(now_s) = mapper.last_s().filter(|_| self.every_s > 0.0) else { return };
         if !is_due(self.last_s.map_or(f64::INFINITY, |last_s| (now_s - last_s).abs())) {
@@ -87,7 +87,7 @@ impl Keep {
 
     fn keep_if_due(&mut self, mapper: &Mapper) {
         let every_s = self.every_s;
-        // From the first frame on, for there is little to keep of that one.
+        // The interval begins at the first frame, whose map is not worth a checkpoint of its own.
         self.last_s = self.last_s.or(mapper.last_s());
         self.keep(mapper, |since_s| since_s >= every_s);
     }
@@ -104,33 +104,33 @@ struct Work {
 }
 
 impl Work {
-    /// Works until the host is gone, then keeps a last checkpoint.
+    /// Handles requests until the host is gone, then keeps a last checkpoint.
     fn run(mut self, mut incoming: mpsc::UnboundedReceiver<ToMapper>) {
-        let mut is_heard = true;
+        let mut is_host_alive = true;
         if self.mapper.last_s().is_some() {
-            is_heard = self.tell(FromMapper::Mapped(self.mapped(None)));
+            is_host_alive = self.report(FromMapper::Mapped(self.mapped(None)));
         }
-        while is_heard && let Some(order) = incoming.blocking_recv() {
+        while is_host_alive && let Some(order) = incoming.blocking_recv() {
             match order {
                 ToMapper::Tune(settings) => self.mapper.tune(&settings),
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
-                // A frame that the frame rate leaves out only changes the vehicle's pose.
+                // A frame beyond the frame rate only changes the vehicle's pose.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_heard = self.tell(FromMapper::Mapped(self.mapped(Some(*frame))));
+                    is_host_alive = self.report(FromMapper::Mapped(self.mapped(Some(*frame))));
                 }
                 ToMapper::Frame(frame) => {
-                    let told = self.see(*frame);
-                    // First the checkpoint: then it has every label that the surface hears of.
+                    let report = self.see(*frame);
+                    // The checkpoint comes first, so that it contains every label that the surface receives.
                     self.keep.keep_if_due(&self.mapper);
-                    is_heard = self.tell(told);
+                    is_host_alive = self.report(report);
                 }
             }
         }
         self.keep.keep_now(&self.mapper);
     }
 
-    fn tell(&self, what: FromMapper) -> bool {
-        self.outgoing.blocking_send(what).is_ok()
+    fn report(&self, report: FromMapper) -> bool {
+        self.outgoing.blocking_send(report).is_ok()
     }
 
     fn see(&mut self, frame: RecordedFrame) -> FromMapper {
@@ -149,7 +149,7 @@ impl Work {
     }
 }
 
-/// The frames of the camera, in order, each at its time; none without a camera.
+/// The frames of the camera in order, each at its time; no frames without a camera.
 pub(super) struct Camera {
     frames: std::iter::Peekable<std::vec::IntoIter<RecordedFrame>>,
     clock: Clock,
@@ -158,8 +158,8 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// A camera that plays a recording, if there is one. Playback resumes after the frame of `seen_s`, the last one in the
-    /// checkpoint.
+    /// A camera that plays a recording, if there is one. Playback resumes after the frame of `seen_s`, the
+    /// last one in the checkpoint.
     pub(super) fn new(recording: Option<Recording>, clock: Clock, seen_s: Option<f64>) -> Self {
         let mut frames = recording.map(|r| r.frames).unwrap_or_default();
         let mapped = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
@@ -170,12 +170,12 @@ impl Camera {
         Self { frames: frames.into_iter().peekable(), clock, began_s }
     }
 
-    /// Whether all frames were taken.
+    /// Whether the recording has ended.
     pub(super) fn is_over(&mut self) -> bool {
         self.frames.peek().is_none()
     }
 
-    /// The next frame, at its time; waits for ever when there is none.
+    /// Waits until the next frame is due and returns it; never returns after the last one.
     pub(super) async fn next(&mut self) -> RecordedFrame {
         match self.frames.peek() {
             Some(frame) => {

@@ -1,4 +1,4 @@
-//! A vehicle whose power is cut at any step, and the surface that speaks to it.
+//! A vehicle whose power is cut at any step, and a surface that sends orders to it.
 
 use super::durable::{Keeper, StartedRun};
 use super::journal::disk::{Disk, DiskRng, DiskStep};
@@ -20,12 +20,12 @@ use std::time::Duration;
 
 const TICK: Duration = Duration::from_millis(100);
 const PROPAGATION: Duration = Duration::from_millis(200);
-/// Ticks within which everything must have settled, whatever was cut.
+/// Maximum number of ticks until all orders are decided, for any sequence of cuts.
 const MAX_TICKS: u32 = 9000;
 const LABELS: u8 = 200;
 const WINDOW: Duration = Duration::from_secs(10);
 
-/// A frame on its way.
+/// A frame on its way through the channel.
 struct Arrival {
     at_vehicle: bool,
     bytes: Vec<u8>,
@@ -40,7 +40,7 @@ struct Onboard {
     book_epoch: u8,
 }
 
-/// Why the vehicle's program has ended.
+/// The reason that the vehicle's program ended.
 #[derive(Debug)]
 enum RunEnd {
     PowerCut,
@@ -64,7 +64,7 @@ struct PowerCutTrial {
     /// Slots that the vehicle has acted on.
     acted: BTreeSet<(SlotId, u16)>,
     /// Epochs that the surface received, and the start of the vehicle in which each was first sent.
-    told: BTreeMap<u8, u32>,
+    published_epochs: BTreeMap<u8, u32>,
     /// Errors other than power cuts that ended a run of the vehicle; the disk is mended after each.
     problems: Vec<UserError>,
 }
@@ -82,7 +82,7 @@ impl PowerCutTrial {
         let surface = SurfaceHost::new(surface, station, None);
         cuts.reverse();
         let onboard = start(&config, &disk, &mut rng, &mut cuts, 0, Instant::ZERO);
-        let (on_air, acted, told) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
+        let (on_air, acted, published_epochs) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
         let problems = Vec::new();
         Self {
             problems,
@@ -98,7 +98,7 @@ impl PowerCutTrial {
             serial: 0,
             starts: 0,
             acted,
-            told,
+            published_epochs,
         }
     }
 
@@ -112,8 +112,8 @@ impl PowerCutTrial {
 
     /// Runs until every order has been applied or refused.
     fn run(&mut self) {
-        while self.ticks < 250 || !self.is_settled() {
-            assert!(self.ticks < MAX_TICKS, "it never settles");
+        while self.ticks < 250 || !self.is_converged() {
+            assert!(self.ticks < MAX_TICKS, "it never converges");
             self.tick();
         }
         let last = [(SlotId::Constraints, 2), (SlotId::Budget, 2), (SlotId::Fix, 1), (SlotId::Utility, 1)];
@@ -124,7 +124,7 @@ impl PowerCutTrial {
         assert_eq!(self.onboard.saved.budget_bps, Some(9000));
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         let mut slots = self.surface.surface().view(self.auv()).unwrap().slots();
         slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
     }
@@ -209,8 +209,8 @@ impl PowerCutTrial {
         let Some(bytes) = self.onboard.host.poll_output(now) else { return Ok(None) };
         self.host_step()?;
         assert_eq!(&self.onboard.saved, self.onboard.host.vehicle().durable(), "sent before it was safe");
-        let told_in = *self.told.entry(self.onboard.saved.epoch).or_insert(self.starts);
-        assert_eq!(told_in, self.starts, "an epoch comes twice");
+        let published_in = *self.published_epochs.entry(self.onboard.saved.epoch).or_insert(self.starts);
+        assert_eq!(published_in, self.starts, "an epoch comes twice");
         Ok(Some(bytes))
     }
 
@@ -267,7 +267,7 @@ fn profile(config: &Config) -> ModemProfile {
     scenecast_config::modem_profile(config, config.modem.bit_rate)
 }
 
-/// Starts the vehicle's program, again and again while the power goes.
+/// Starts the vehicle's program until it starts without a power cut.
 fn start(config: &Config, disk: &Disk, rng: &mut DiskRng, cuts: &mut Vec<usize>, starts: u32, now: Instant) -> Onboard {
     loop {
         if disk.is_off() || starts > 0 {
@@ -326,7 +326,7 @@ fn a_failing_disk_ends_the_run_and_the_next_run_catches_up() {
         trial.disk.fail(Some(failing));
         trial.run();
         let doing = if failing == DiskStep::Sync { "syncing" } else { "writing" };
-        let told = format!("vehicle.journal: {doing}: input/output error; check the disk, then start again");
-        assert_eq!(trial.problems, [UserError::Failed(told)]);
+        let message = format!("vehicle.journal: {doing}: input/output error; check the disk, then start again");
+        assert_eq!(trial.problems, [UserError::Failed(message)]);
     }
 }

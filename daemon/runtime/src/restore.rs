@@ -1,4 +1,4 @@
-//! The scene model at the start of a run: that of the last checkpoint, or a new one.
+//! The scene model at the start of a run: restored from the last checkpoint, or new.
 
 use super::checkpoint::CheckpointFile;
 use super::durable::{Keeper, StartedRun};
@@ -19,7 +19,7 @@ pub(super) struct Start {
 
 /// Begins a run in the folder of its state.
 ///
-/// An unusable checkpoint loses the map that was learnt but breaks no promise, for labels then begin a new epoch. So it is
+/// An unusable checkpoint loses the learnt map, but no label changes its meaning, because a new epoch begins. It is
 /// logged as an error, and the mission starts.
 pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     let refused = |e: std::io::Error| UserError::file(dir, e);
@@ -34,14 +34,14 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
             mapper.resume(durable.epoch, durable.labels);
             let (cells, at) = (mapper.cells(), mapper.last_s().unwrap_or(0.0));
             tracing::info!(
-                "the scene model goes on from its checkpoint at {at} s: {cells} cells, epoch {}",
+                "the scene model resumes from its checkpoint at {at} s: {cells} cells, epoch {}",
                 durable.epoch
             );
             mapper
         }
         other => {
             if other.is_some() {
-                tracing::warn!("the checkpoint of the scene model is of another mission: it begins anew");
+                tracing::warn!("the checkpoint of the scene model is of another mission: it starts from scratch");
             }
             Mapper::new(
                 config,
@@ -63,7 +63,7 @@ fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Rest
         Err(NoCheckpoint::Config(problem)) => Err(problem),
         Err(why) => {
             let place = file.path();
-            tracing::error!("{}: {why}; the scene model begins anew, with new labels", place.display());
+            tracing::error!("{}: {why}; the scene model starts from scratch, with new labels", place.display());
             Ok(None)
         }
     }

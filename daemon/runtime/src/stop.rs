@@ -1,8 +1,8 @@
-//! Who asks a process to end: a person or the system.
+//! Requests of a person or the system that the process end.
 
 use scenecast_core::UserError;
 
-/// Hears Ctrl-C and SIGTERM from its making on: one that comes while the process is at other work is not lost.
+/// Catches Ctrl-C and SIGTERM from its creation on, so that none is lost while the process does other work.
 pub struct Stop {
     #[cfg(unix)]
     interrupt: tokio::signal::unix::Signal,
@@ -29,7 +29,7 @@ impl Stop {
         Ok(Self { interrupt: interrupt.map_err(|e| UserError::Failed(format!("Ctrl-C: {e}")))? })
     }
 
-    /// Returns when the process is to end; safe to abandon.
+    /// Returns when the process is to end. Cancel-safe.
     pub async fn asked(&mut self) {
         #[cfg(unix)]
         tokio::select! {

@@ -18,10 +18,10 @@ use scenecast_host::{CameraPose, FrameEvent, VehicleHost, VehicleHostEvent, Vehi
 use scenecast_protocol::directive::Budget;
 use std::time::Duration;
 
-/// The host is asked again at least this often.
+/// Maximum time between two calls of the host.
 const MAX_SLEEP: Duration = Duration::from_secs(1);
 
-/// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
+/// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
@@ -81,7 +81,7 @@ struct Ports {
     pilot: PilotPort,
 }
 
-/// Moves bytes, reads the clock and syncs files; every decision is the host's.
+/// Moves bytes, reads the clock and syncs files; the host makes all decisions.
 struct VehicleShell {
     host: VehicleHost,
     camera: Camera,
@@ -133,7 +133,7 @@ impl VehicleShell {
         }
     }
 
-    /// Budget and shares of the configuration take the place of those that the surface ordered.
+    /// Replaces the budget and the shares that the surface ordered by those of the configuration.
     fn follow(&mut self, config: &Config) {
         let link = &config.link;
         let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, spend: link.background };
@@ -157,10 +157,10 @@ impl VehicleShell {
         self.host.handle_mapped(mapped.frame.as_ref().map(pose_of), &mapped.update, mapped.exemplars, now);
     }
 
-    /// One bad frame does not end a mission.
+    /// Logs an unreadable frame; it does not end the mission.
     fn handle_missed(&mut self, problem: &UserError) {
         self.missed += 1;
-        tracing::error!("a camera frame was passed over, {} so far: {problem}", self.missed);
+        tracing::error!("a camera frame was skipped, {} so far: {problem}", self.missed);
         self.host.handle_missed();
     }
 

@@ -6,14 +6,14 @@ use super::{Damage, Journal, JournalError, Storage};
 use proptest::prelude::*;
 
 const NAME: &str = "test.journal";
-/// Few records a file, so that new files are begun often.
+/// A file of few records, so that new files begin often.
 const MAX_BYTES: usize = 4 * BLOCK;
 
 fn open(disk: &Disk) -> (Journal<Disk>, Option<Vec<u8>>) {
-    Journal::open(disk.clone(), NAME, MAX_BYTES).expect("a power cut leaves a journal to go on from")
+    Journal::open(disk.clone(), NAME, MAX_BYTES).expect("a power cut leaves a readable journal")
 }
 
-/// A state of its own: no mixture of two is a third.
+/// Random bytes that depend on the number and the length, so that a mixture of two states is never a third one.
 fn state(number: u32, length: usize) -> Vec<u8> {
     let mut rng = DiskRng::new(u64::from(number) << 20 | length as u64);
     let noise = (0..length).map(|_| rng.below(256) as u8);
@@ -42,9 +42,9 @@ impl Expected {
 #[derive(Debug, Clone)]
 enum Action {
     Persist(usize),
-    /// The process ends, the machine goes on.
+    /// The process ends, the machine keeps running.
     Kill,
-    /// Power is cut after so many further steps.
+    /// Power is cut after this many further steps.
     CutAfter(usize),
     Fail(DiskStep, usize),
 }
@@ -118,7 +118,7 @@ fn a_record_torn_at_any_byte_leaves_the_one_before() {
                 let disk = Disk::default();
                 disk.put(NAME, &[&old[..], &new[..torn], &vec![0; zeros]].concat());
                 let found = open(&disk).1.unwrap();
-                // The last bytes of a checksum may be zeros themselves.
+                // The last bytes of a checksum may be zeros by chance.
                 let complete = torn >= whole || zeros > 0 && new[torn..whole].iter().all(|&b| b == 0);
                 assert_eq!(found, state(if complete { 2 } else { 1 }, length), "{torn} bytes and {zeros} zeros");
             }
@@ -142,7 +142,7 @@ fn a_write_cut_at_any_step_leaves_the_old_or_the_new_state() {
             let (mut journal, found) = open(&disk);
             assert!(expected.possible.contains(&found), "cut before step {steps}");
             outcomes.push((steps, found == Some(state(5, 100))));
-            assert!(expected.persist(&mut journal, 100), "the journal goes on");
+            assert!(expected.persist(&mut journal, 100), "the journal continues");
             assert_eq!(open(&disk).1, Some(state(6, 100)));
         }
         if confirmed {
@@ -185,10 +185,10 @@ fn after_a_failed_step_nothing_is_confirmed_or_written() {
             let steps = disk.steps().len();
             let again = journal.persist(b"later");
             assert!(matches!(again, Err(JournalError::Broken)), "{failing:?}");
-            assert_eq!(disk.steps().len(), steps, "nothing is written behind a failure");
+            assert_eq!(disk.steps().len(), steps, "no record is written behind a failure");
             let (mut journal, found) = open(&disk);
             assert!(expected.possible.contains(&found));
-            assert!(expected.persist(&mut journal, 10), "a new run goes on");
+            assert!(expected.persist(&mut journal, 10), "a new run continues");
         }
     }
 }

@@ -7,10 +7,11 @@ use std::io::{Error, Result};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// Bytes that the disk writes whole or not at all; smaller than a block, so that parts of a record may come in any order.
+/// Bytes that the disk writes atomically; smaller than a block, so that the parts of a record may
+/// be written in any order.
 const SECTOR: usize = 512;
 
-/// Chooses one of so many possibilities.
+/// Random choices of the simulated disk.
 pub(crate) struct DiskRng(u64);
 
 impl DiskRng {
@@ -32,7 +33,7 @@ pub(crate) enum DiskStep {
     Sync,
     Rename,
     SyncFolder,
-    /// Something that the host does.
+    /// An action of the host outside the disk.
     Host,
 }
 
@@ -45,25 +46,25 @@ struct Content {
 #[derive(Debug, Default)]
 struct Platter {
     contents: Vec<Content>,
-    /// Names, as they were after each change since the folder was last synced.
+    /// The names after each change since the folder was last synced.
     names: Vec<BTreeMap<String, usize>>,
     steps: Vec<DiskStep>,
     cut_at: Option<usize>,
     failing: Option<DiskStep>,
 }
 
-/// The disk; clones are the same one.
+/// A simulated disk; clones share it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Disk(Rc<RefCell<Platter>>);
 
 impl Disk {
-    /// Cuts the power before so many further steps are done.
+    /// Cuts the power after this many further steps.
     pub(crate) fn cut_after(&self, steps: usize) {
         let mut platter = self.0.borrow_mut();
         platter.cut_at = Some(platter.steps.len() + steps);
     }
 
-    /// Whether the power is gone.
+    /// Whether the power is cut.
     pub(crate) fn is_off(&self) -> bool {
         let platter = self.0.borrow();
         platter.cut_at == Some(platter.steps.len())
@@ -78,7 +79,7 @@ impl Disk {
         self.0.borrow_mut().failing = step;
     }
 
-    /// Takes a step, unless the power is gone.
+    /// Counts a step; an error if the power is cut.
     pub(crate) fn step(&self, step: DiskStep) -> Result<()> {
         if self.is_off() {
             return Err(Error::other("the power is gone"));
@@ -104,7 +105,7 @@ impl Disk {
         }
     }
 
-    /// Writes a file behind the journal's back.
+    /// Writes a file directly, without the journal.
     pub(crate) fn put(&self, name: &str, bytes: &[u8]) {
         let mut platter = self.0.borrow_mut();
         platter.contents.push(Content { safe: bytes.len(), bytes: bytes.to_vec() });
@@ -116,7 +117,7 @@ impl Disk {
 }
 
 impl Content {
-    /// Each sector that was not synced is there, or half there, or holds zeros or bytes of an older file.
+    /// Each unsynced sector is written, half written, zero, or holds bytes of an older file.
     fn survive(&mut self, older: &[u8], rng: &mut DiskRng) {
         let unsynced = self.bytes.len() - self.safe;
         self.bytes.truncate(self.safe + [0, rng.below(unsynced + 1), unsynced][rng.below(3)]);
@@ -161,7 +162,7 @@ impl Storage for Disk {
     }
 
     fn append(&mut self, file: &mut usize, bytes: &[u8]) -> Result<()> {
-        // A write that fails, or that the power cut meets, may have written something.
+        // A write that fails or is cut off may have written some bytes.
         self.0.borrow_mut().contents[*file].bytes.extend_from_slice(bytes);
         self.step(DiskStep::Append)
     }

@@ -15,35 +15,35 @@ pub(crate) use storage::{Folder, Storage};
 
 use std::io;
 
-/// Why a state could not be read, or not be made safe.
+/// The reason that a state could not be read or made durable.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum JournalError {
-    /// The file is no journal to go on from.
+    /// The file is no valid journal.
     #[error(transparent)]
     Damage(#[from] Damage),
     #[error("{doing}: {cause}; check the disk, then start again")]
     Io { doing: &'static str, cause: io::Error },
-    /// A write failed before; the content of the disk behind it is unknown.
+    /// An earlier write failed, so the content of the file is unknown.
     #[error("a write has failed before; check the disk, then start again")]
     Broken,
 }
 
-/// Names the operation in an error message.
+/// Adds the operation to an error of the file system.
 fn doing(doing: &'static str) -> impl FnOnce(io::Error) -> JournalError {
     move |cause| JournalError::Io { doing, cause }
 }
 
-/// Where the next record goes.
+/// The destination of the next record.
 enum JournalEnd<F> {
-    /// To the beginning of a new file.
+    /// The beginning of a new file.
     New,
-    /// To the end of this file, which has so many bytes.
+    /// The end of this file, whose length is `bytes`.
     Open { file: F, bytes: usize },
-    /// Nowhere: a failed write or sync leaves the content of the disk open, whatever a later one returns.
+    /// None: after a failed write or sync the content of the disk is unknown, even if a later one succeeds.
     Broken,
 }
 
-/// A file of records, each a whole state; the last one counts.
+/// A file of records, each a complete state; the last one is valid.
 ///
 /// The first record of a run, and one for which the file has no room left, begins a new file: written beside the old
 /// one, synced, renamed, and the folder synced. So no run ever writes behind the remains of an earlier one.
@@ -57,7 +57,7 @@ pub(super) struct Journal<S: Storage> {
 }
 
 impl<S: Storage> Journal<S> {
-    /// The journal of this name, and its state; no state before the first.
+    /// Opens the journal of this name; its state is `None` before the first record.
     pub(super) fn open(
         storage: S,
         name: &'static str,
@@ -79,7 +79,7 @@ impl<S: Storage> Journal<S> {
         &self.storage
     }
 
-    /// Makes a state safe. Before this has returned `Ok` a power cut leaves this state or the last confirmed one.
+    /// Makes a state durable. A power cut before the return of `Ok` leaves this state or the last confirmed one.
     pub(super) fn persist(&mut self, state: &[u8]) -> Result<(), JournalError> {
         let record = record::encode(self.sequence + 1, state);
         self.end = match std::mem::replace(&mut self.end, JournalEnd::Broken) {

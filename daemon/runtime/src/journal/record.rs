@@ -13,7 +13,7 @@ pub(super) const BLOCK: usize = 4096;
 
 static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 
-/// Why a file is no journal to go on from.
+/// The reason that a file is no valid journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Damage {
     #[error("the file is of another version of scenecast; use that one, or move the file away to begin a new mission")]
@@ -21,12 +21,12 @@ pub(crate) enum Damage {
     /// Damage that no power cut causes.
     #[error("damaged at byte {offset}; restore the file, or move it away to begin a new mission")]
     At {
-        /// Where the first unreadable record begins.
+        /// Start of the first unreadable record, a byte offset.
         offset: usize,
     },
 }
 
-/// A record that was read.
+/// A record as it was read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Record<'a> {
     /// One more than that of the record before it, across files.
@@ -38,7 +38,7 @@ pub(super) struct Record<'a> {
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Scan<'a> {
     pub(super) last: Record<'a>,
-    /// Where a record begins that was being written when the power was cut.
+    /// Start of a record that a power cut interrupted, a byte offset.
     pub(super) torn: Option<usize>,
 }
 

@@ -6,11 +6,11 @@ use std::io;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 
-/// After the system refused to accept one.
-const PAUSE: Duration = Duration::from_millis(200);
+/// Pause after the system refused to accept a connection.
+const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Serves one connection at a time, until the host is gone. A new one replaces the old, which may be the remains of a peer
-/// that lost power.
+/// Serves one connection at a time until the host is gone. A new connection replaces the old one, whose peer
+/// may have lost its power.
 pub(super) async fn accept(
     name: &'static str,
     listener: TcpListener,
@@ -30,7 +30,7 @@ pub(super) async fn accept(
             Ok(accepted) => accepted,
             Err(e) => {
                 tracing::warn!("{name}: {e}");
-                tokio::time::sleep(PAUSE).await;
+                tokio::time::sleep(RETRY_INTERVAL).await;
                 continue;
             }
         };
@@ -49,7 +49,7 @@ async fn serve(name: &'static str, stream: TcpStream, quiet: Option<Duration>, e
         Ok(()) => true,
         Err(e) => {
             tracing::warn!("{name}: the connection ended: {e}");
-            !ends.tell(FromPort::Closed).await
+            !ends.report(FromPort::Closed).await
         }
     }
 }
