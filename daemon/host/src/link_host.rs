@@ -28,7 +28,7 @@ pub enum FrameEvent {
     /// The bits on air exceed the budget of a window for the first time.
     OverBudget {
         /// Mean bit rate of the fullest window, bit/s.
-        worst_window_bps: f64,
+        max_window_bps: f64,
     },
     /// The modem is set up and takes frames.
     ModemReady,
@@ -195,7 +195,7 @@ impl BudgetWatch {
     fn check(&mut self, audit: &Audit) -> Option<FrameEvent> {
         let is_exceeded = audit.worst_window_bits() as f64 > self.window_bits + audit.largest_bits() as f64;
         let is_news = is_exceeded && !std::mem::replace(&mut self.is_exceeded, true);
-        is_news.then(|| FrameEvent::OverBudget { worst_window_bps: audit.worst_window_bps() })
+        is_news.then(|| FrameEvent::OverBudget { max_window_bps: audit.worst_window_bps() })
     }
 }
 

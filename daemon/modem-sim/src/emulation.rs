@@ -16,8 +16,8 @@ use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 
 /// Noise is sent in pieces at this interval, so that it lasts as long on a line without pacing.
-const NOISE_PIECE: Duration = Duration::from_millis(100);
-/// Bytes of noise in a piece: the capacity of a line of 19200 baud in [`NOISE_PIECE`].
+const NOISE_INTERVAL: Duration = Duration::from_millis(100);
+/// Bytes of noise in a piece: the capacity of a line of 19200 baud in [`NOISE_INTERVAL`].
 const NOISE_BYTES: u16 = 192;
 
 /// The emulated basin and the tasks at its ports.
@@ -193,8 +193,8 @@ impl Emulation {
             }
             Act::Noise(index, until) => {
                 self.basin.inject(node(index), Fault::Garbage(NOISE_BYTES), now);
-                if now + NOISE_PIECE < until {
-                    self.plan(now + NOISE_PIECE, Act::Noise(index, until));
+                if now + NOISE_INTERVAL < until {
+                    self.plan(now + NOISE_INTERVAL, Act::Noise(index, until));
                 }
                 Ok(())
             }

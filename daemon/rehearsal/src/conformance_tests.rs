@@ -16,11 +16,11 @@ use std::time::Duration;
 
 const SECOND: Duration = Duration::from_secs(1);
 
-/// After a fault, traffic goes on within so long.
-const RESUMES: Duration = Duration::from_secs(10);
+/// Maximum time until traffic resumes after a fault.
+const RESUME_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Time that modems need by themselves: a Micromodem for a cycle of each end, for no packet is received before its end;
-/// an S2C that speaks to one that has forgotten their connection, for a train and for its patience.
+/// Time that modems need in addition: a Micromodem for a cycle of each end, because a packet is received at its end; an
+/// S2C whose peer has lost the connection, for a packet train and a connection timeout.
 fn cycle(name: &str) -> Duration {
     match name {
         "s2c burst" => 6 * SECOND,
@@ -29,7 +29,7 @@ fn cycle(name: &str) -> Duration {
     }
 }
 
-/// Every kind with an emulator.
+/// Every modem kind that has an emulator.
 const KINDS: [(&str, &[&str]); 6] = [
     ("s2c burst", &["modem.kind=s2c"]),
     ("s2c im", &["modem.kind=s2c", "modem.s2c_mode=im"]),
@@ -55,12 +55,12 @@ fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
     modem::driver(&config, end, profile).unwrap()
 }
 
-/// Two ends that speak with each other.
-fn speaking(sets: &[&str], loss: f64) -> ModemBench {
+/// Two ends after their handshake, with map data on the link.
+fn connected(sets: &[&str], loss: f64) -> ModemBench {
     let mut bench = ModemBench::new(&setting(sets, loss), 5).unwrap();
     bench.load = Some(2000);
     let met = bench.run_until(Instant::from_secs_f64(900.0), |d| useful(d) > 10.0);
-    assert!(met, "{sets:?}: nothing got through");
+    assert!(met, "{sets:?}: no data got through");
     bench
 }
 
@@ -68,11 +68,11 @@ fn useful(bench: &ModemBench) -> f64 {
     bench.view().map_or(0.0, |v| v.replica().useful_bytes())
 }
 
-/// Whether the surface hears something new of the vehicle within `most`.
+/// Whether the surface receives a frame of the vehicle within `most`.
 fn resumes_within(bench: &mut ModemBench, most: Duration) -> bool {
-    let heard = bench.heard[1];
+    let last_received = bench.last_received[1];
     let until = bench.now + most;
-    bench.run_until(until, |d| d.heard[1] > heard)
+    bench.run_until(until, |d| d.last_received[1] > last_received)
 }
 
 fn nothing_applied_twice(bench: &ModemBench) {
@@ -82,9 +82,9 @@ fn nothing_applied_twice(bench: &ModemBench) {
 }
 
 #[test]
-fn ends_meet_and_what_is_said_and_commanded_arrives() {
+fn ends_connect_and_their_data_and_directives_arrive() {
     for (name, sets) in KINDS {
-        let mut bench = speaking(sets, 0.1);
+        let mut bench = connected(sets, 0.1);
         let version = bench.issue().unwrap();
         let until = bench.now + 200 * SECOND;
         let applied = bench.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
@@ -95,7 +95,7 @@ fn ends_meet_and_what_is_said_and_commanded_arrives() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_to_the_caller() {
+fn frames_that_do_not_fit_are_refused() {
     for (name, sets) in KINDS {
         let mut driver = driver(&config(sets), Address::SURFACE);
         let most = driver.profile().frame_bytes;
@@ -125,23 +125,24 @@ fn a_modem_with_another_address_is_refused_and_stays_silent() {
         let mut bench = ModemBench::new(&setting(sets, 0.0), 5).unwrap();
         bench.inject(0, Fault::WrongAddress(7));
         bench.run(60 * SECOND);
-        let said = bench.refusals.join(" ");
-        assert!(said.contains("is 7 and ours is 1"), "{name}: {said:?}");
+        let refusals = bench.refusals.join(" ");
+        assert!(refusals.contains("is 7 and ours is 1"), "{name}: {refusals:?}");
         assert_eq!(bench.vehicle.audit().transmissions(), 0, "{name}");
     }
 }
 
-/// Traffic resumes by itself within ten seconds and the time that a modem needs to begin a cycle or a connection, after a fault.
+/// Traffic resumes by itself within ten seconds and the time that a modem needs to begin a cycle or
+/// a connection, after a fault.
 fn survives(fault: impl Fn(&mut ModemBench), lasts: Duration) {
     for (name, sets) in KINDS {
         for end in [0, 1] {
-            let mut bench = speaking(sets, 0.0);
+            let mut bench = connected(sets, 0.0);
             bench.issue().unwrap();
             bench.run(Duration::from_millis(3700));
             bench.issue().unwrap();
             FaultAt(&mut bench, end).apply(&fault);
             bench.run(lasts);
-            assert!(resumes_within(&mut bench, RESUMES + cycle(name)), "{name}: end {end} does not come back");
+            assert!(resumes_within(&mut bench, RESUME_TIMEOUT + cycle(name)), "{name}: end {end} does not resume");
             let version = bench.issue().unwrap();
             let until = bench.now + 120 * SECOND;
             let applied = bench.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
@@ -156,27 +157,27 @@ struct FaultAt<'a>(&'a mut ModemBench, usize);
 
 impl FaultAt<'_> {
     fn apply(self, fault: &impl Fn(&mut ModemBench)) {
-        self.0.struck = self.1;
+        self.0.faulty_end = self.1;
         fault(self.0);
     }
 }
 
 #[test]
 fn a_modem_that_restarts_in_its_turn_is_set_up_again() {
-    // Three seconds are its own.
-    survives(|d| d.inject(d.struck, Fault::Reboot), 3 * SECOND);
+    // The modem itself needs three seconds.
+    survives(|d| d.inject(d.faulty_end, Fault::Reboot), 3 * SECOND);
 }
 
 #[test]
-fn a_supply_that_fails_while_transmitting_is_survived() {
-    survives(|d| d.inject(d.struck, Fault::BrownOut), 3 * SECOND);
+fn a_brown_out_while_transmitting_is_survived() {
+    survives(|d| d.inject(d.faulty_end, Fault::BrownOut), 3 * SECOND);
 }
 
 #[test]
-fn a_cable_that_was_out_for_half_a_minute_is_used_again() {
+fn a_cable_unplugged_for_half_a_minute_is_used_again() {
     survives(
         |d| {
-            let end = d.struck;
+            let end = d.faulty_end;
             d.plug(end, false);
             d.run(30 * SECOND);
             d.plug(end, true);
@@ -187,7 +188,7 @@ fn a_cable_that_was_out_for_half_a_minute_is_used_again() {
 
 #[test]
 fn a_port_that_was_frozen_for_a_minute_is_used_again() {
-    survives(|d| d.inject(d.struck, Fault::Freeze(60 * SECOND)), 60 * SECOND);
+    survives(|d| d.inject(d.faulty_end, Fault::Freeze(60 * SECOND)), 60 * SECOND);
 }
 
 #[test]
@@ -195,8 +196,8 @@ fn ten_seconds_of_garbage_are_survived() {
     survives(
         |d| {
             for _ in 0..20 {
-                d.inject(d.struck, Fault::Garbage(500));
-                d.inject(d.struck, Fault::HalfLine);
+                d.inject(d.faulty_end, Fault::Garbage(500));
+                d.inject(d.faulty_end, Fault::HalfLine);
                 d.run(Duration::from_millis(500));
             }
         },
@@ -205,12 +206,12 @@ fn ten_seconds_of_garbage_are_survived() {
 }
 
 #[test]
-fn a_busy_modem_is_asked_again() {
-    survives(|d| d.inject(d.struck, Fault::Busy(10 * SECOND)), 10 * SECOND);
+fn a_busy_modem_gets_the_frame_again() {
+    survives(|d| d.inject(d.faulty_end, Fault::Busy(10 * SECOND)), 10 * SECOND);
 }
 
 #[test]
-fn ports_of_both_interpreters_understand_each_other() {
+fn ports_of_both_interpreters_interoperate() {
     use sim_channel::modem::s2c::Interpreter::{At, Net};
     let modem = |address, interpreter| -> Box<dyn Emulator> {
         Box::new(S2cEmulator::new(EmulatorConfig { interpreter, ..EmulatorConfig::new(address) }))
@@ -223,23 +224,23 @@ fn ports_of_both_interpreters_understand_each_other() {
             bench.run(120 * SECOND);
             let version = bench.issue().unwrap();
             bench.run(60 * SECOND);
-            let what = format!("{sets:?} {vehicle:?} {surface:?}");
-            assert!(useful(&bench) > 2000.0, "{what}: {} bytes got through", useful(&bench));
-            assert!(bench.applied.contains_key(&(SlotId::Utility, version)), "{what}: the directive was not applied");
+            let case = format!("{sets:?} {vehicle:?} {surface:?}");
+            assert!(useful(&bench) > 2000.0, "{case}: {} bytes got through", useful(&bench));
+            assert!(bench.applied.contains_key(&(SlotId::Utility, version)), "{case}: the directive was not applied");
         }
     }
 }
 
-/// Every token that is accepted is settled once.
+/// Every accepted token ends with exactly one event.
 #[test]
-fn every_transmission_has_one_end() {
+fn every_transmission_ends_with_one_event() {
     for (name, sets) in KINDS {
         let mut driver = driver(&config(sets), Address::SURFACE);
         let (mut now, mut tokens) = (Instant::ZERO, Vec::<Token>::new());
         driver.handle_open(now);
-        let mut settled = Vec::new();
+        let mut ended = Vec::new();
         for step in 0..2000u32 {
-            answer_as_a_willing_modem(driver.as_mut(), now, step);
+            reply_as_a_modem(driver.as_mut(), now, step);
             let access = driver.profile().access;
             if driver.is_ready() && step % 50 == 0 && access != Access::Polled {
                 tokens.extend(driver.send(Destination::Modem(1), vec![9; 20], Class::Bulk, now));
@@ -255,7 +256,7 @@ fn every_transmission_has_one_end() {
             }
             while let Some(event) = driver.poll_event() {
                 if let Event::Sent(t) | Event::Delivered(t) | Event::Failed(t) | Event::Unknown(t) = event {
-                    settled.push(t);
+                    ended.push(t);
                 }
             }
             now = now + Duration::from_millis(200);
@@ -264,20 +265,20 @@ fn every_transmission_has_one_end() {
         driver.handle_closed(now);
         while let Some(event) = driver.poll_event() {
             if let Event::Sent(t) | Event::Delivered(t) | Event::Failed(t) | Event::Unknown(t) = event {
-                settled.push(t);
+                ended.push(t);
             }
         }
-        settled.sort_unstable();
-        assert!(tokens.len() > 5, "{name}: {} transmissions were taken", tokens.len());
-        assert_eq!(settled, tokens, "{name}");
+        ended.sort_unstable();
+        assert!(tokens.len() > 5, "{name}: {} transmissions were accepted", tokens.len());
+        assert_eq!(ended, tokens, "{name}");
     }
 }
 
-/// Replies of a modem that takes everything and never reports an outcome.
-fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
+/// Replies of a modem that accepts all commands and never reports an outcome.
+fn reply_as_a_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
     while let Some(bytes) = driver.poll_output(now) {
         let text = String::from_utf8_lossy(&bytes).into_owned();
-        let said = match text.trim() {
+        let reply = match text.trim() {
             "+++AT?MODE" => "ERROR WRONG FORMAT\r\n".to_owned(),
             "AT?MODE" => "NET\r\n".to_owned(),
             "AT?AL" => "10\r\n".to_owned(),
@@ -295,8 +296,9 @@ fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
             }
             _ => continue,
         };
-        let said = if said.starts_with("$CA") && !said.starts_with("$CACFG,SRC") { relined(&said) } else { said };
-        driver.handle_bytes(said.as_bytes(), now);
+        let reply =
+            if reply.starts_with("$CA") && !reply.starts_with("$CACFG,SRC") { with_checksum(&reply) } else { reply };
+        driver.handle_bytes(reply.as_bytes(), now);
     }
 }
 
@@ -304,8 +306,8 @@ fn line(body: &str) -> String {
     String::from_utf8(modem::micromodem::format_sentence(body)).unwrap()
 }
 
-/// The same sentence with a right checksum.
-fn relined(said: &str) -> String {
-    let body = said.trim_start_matches('$').split('*').next().unwrap_or_default().to_owned();
+/// The same sentence with a valid checksum.
+fn with_checksum(reply: &str) -> String {
+    let body = reply.trim_start_matches('$').split('*').next().unwrap_or_default().to_owned();
     line(&body)
 }

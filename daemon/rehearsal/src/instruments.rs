@@ -1,4 +1,4 @@
-//! GPS receiver and compass of a rehearsed surface vehicle: their NMEA sentences.
+//! NMEA sentences of a simulated GPS receiver and a simulated compass.
 
 use scenecast_core::{LatLon, TangentPlane, nmea};
 use sim_channel::RandomStream;
@@ -8,11 +8,11 @@ const COMPASS_SIGMA_DEG: f64 = 0.5;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Receiver {
-    /// Where x = y = 0 of the world is.
+    /// Origin of the world frame.
     pub(super) origin: LatLon,
-    /// White noise, metres; beside it an error of as much that changes over minutes.
+    /// Standard deviation of the white noise, and of an error that changes over minutes, metres.
     pub(super) sigma_m: f64,
-    /// The quality that it reports: dilution of precision, and whether it has corrections.
+    /// Reported quality: dilution of precision, and whether the receiver uses corrections.
     pub(super) hdop: f64,
     pub(super) is_corrected: bool,
 }
@@ -32,7 +32,7 @@ impl Instruments {
         Self { receiver, plane, rng: RandomStream::new(seed, &[9]), slow_error: (0.0, 0.0) }
     }
 
-    /// Position and heading as NMEA 0183, once a second; `astray` is by how much the receiver is led astray.
+    /// Position and heading as NMEA 0183, once a second; `astray` is an additional error of the receiver, metres.
     pub(super) fn report(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
         let [a, b, c, d, e] = [(); 5].map(|()| self.rng.normal());
         let Receiver { sigma_m, hdop, is_corrected, .. } = self.receiver;

@@ -1,10 +1,10 @@
-//! How well the operator's map follows the vehicle's.
+//! Agreement and delay of the operator's map against the vehicle's.
 
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 
-/// Seconds from the moment that a cell of the two maps began to differ until it no longer did.
+/// Seconds for which a cell of the two maps differed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Delays(Vec<f32>);
 
@@ -13,7 +13,7 @@ impl Delays {
         self.0.push(seconds as f32);
     }
 
-    /// Median, 95th percentile and maximum; zeros if there was none.
+    /// Median, 95th percentile and maximum; zeros without any delay.
     pub fn summary(&self) -> [f64; 3] {
         let mut sorted = self.0.clone();
         sorted.sort_by(f32::total_cmp);
@@ -39,7 +39,7 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Looks at both maps; unequal `versions` mean that either has changed since the last look.
+    /// Integrates the agreement up to `now`, and compares the maps again if `versions` differ from the last ones.
     pub fn look(&mut self, vehicle: &LabelGrid, operator: &LabelGrid, versions: (u64, u64), now: Instant) {
         if let Some(last) = self.last.replace(now) {
             // Agreement is undefined before the vehicle has a map.
@@ -66,17 +66,17 @@ impl Meter {
         }
     }
 
-    /// Share of explored cells on which the maps agree, at the last look.
+    /// Share of explored cells on which the maps agree, at the last comparison.
     pub fn agreement(&self) -> f64 {
         self.agreement
     }
 
-    /// The same, mean over time.
+    /// Mean over time of [`Self::agreement`].
     pub fn agreement_mean(&self) -> f64 {
         if self.seconds > 0.0 { self.integral / self.seconds } else { 0.0 }
     }
 
-    /// The survey is over: later changes do not count for the mean.
+    /// Ends the survey: later changes do not count for the mean.
     pub fn end_survey(&mut self) {
         self.survey_mean = Some(self.agreement_mean());
     }

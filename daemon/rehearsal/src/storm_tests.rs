@@ -1,4 +1,4 @@
-//! Drivers under random and mutated lines: none panics, memory is bounded, and they still come back to work.
+//! Drivers under random and mutated lines: none panics, memory is bounded, and all become ready again.
 
 use scenecast_core::MicromodemRate;
 use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser, format_sentence};
@@ -8,7 +8,7 @@ use scenecast_protocol::time::Instant;
 use sim_channel::RandomStream;
 use std::time::Duration;
 
-/// Lines of an ordinary run; the long one is `SCENECAST_STORM_LINES=10000000`.
+/// Number of lines of an ordinary run; a long run has `SCENECAST_STORM_LINES=10000000`.
 const LINES: usize = 400_000;
 
 const SEEDS: [&[u8]; 22] = [
@@ -43,7 +43,7 @@ impl LineRng {
         self.0.below(n)
     }
 
-    /// A line of the seeds, changed a little or much; most sentences have a right checksum, or none would be read.
+    /// A mutated line of the seeds. Most sentences have a valid checksum, or the drivers would read none.
     fn line(&mut self) -> Vec<u8> {
         let mut line = SEEDS[self.below(SEEDS.len())].to_vec();
         for _ in 0..self.below(4) {
@@ -94,13 +94,13 @@ fn drivers() -> [Box<dyn Driver>; 3] {
     ]
 }
 
-/// Feeds a driver like a host that keeps to the rules; returns how often it was ready.
+/// Feeds a driver as a correct host does; returns the number of times that it was ready.
 fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
     driver.handle_bytes(line, now);
-    let mut told = 0;
+    let mut events = 0;
     while driver.poll_event().is_some() {
-        told += 1;
-        assert!(told < 10_000, "events without end");
+        events += 1;
+        assert!(events < 10_000, "events without end");
     }
     let _ = driver.send(Destination::Modem(1), vec![1; 30], Class::Bulk, now);
     let _ = driver.send(Destination::Modem(1), vec![1; 30], Class::Service, now);
@@ -114,7 +114,7 @@ fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
 }
 
 #[test]
-fn any_lines_are_survived_by_drivers() {
+fn drivers_survive_any_lines() {
     let mut rng = LineRng(RandomStream::new(1, &[1]));
     let mut drivers = drivers();
     let mut now = Instant::from_secs_f64(1.0);
@@ -129,7 +129,7 @@ fn any_lines_are_survived_by_drivers() {
 }
 
 #[test]
-fn any_lines_are_survived_by_parsers_in_bounded_memory() {
+fn parsers_survive_any_lines_in_bounded_memory() {
     let mut rng = LineRng(RandomStream::new(2, &[1]));
     let (mut plain, mut wrapped, mut sentences) =
         (LineParser::default(), LineParser::default(), SentenceParser::default());

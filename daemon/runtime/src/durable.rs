@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_gone_on_from_is_refused_in_one_line() {
+    fn an_unusable_state_is_refused_in_one_line() {
         let refused = |name: &str, content: &[u8]| {
             let disk = Disk::default();
             disk.put(name, content);

@@ -173,7 +173,7 @@ impl LabelTrial {
 }
 
 #[test]
-fn a_label_keeps_its_meaning_wherever_the_power_is_cut() {
+fn a_label_keeps_its_meaning_at_any_power_cut() {
     let mut whole = LabelTrial::new(1);
     whole.run().unwrap();
     let steps = whole.disk.steps().len();
@@ -201,7 +201,7 @@ fn labels_continue_with_a_checkpoint_and_begin_again_without() {
 }
 
 #[test]
-fn a_checkpoint_of_another_mission_is_not_gone_on_from() {
+fn a_checkpoint_of_another_mission_is_not_resumed() {
     let mut trial = LabelTrial::new(6);
     trial.run().unwrap();
     let checkpoint = CheckpointFile::new(trial.disk.clone()).read().unwrap().unwrap();

@@ -81,7 +81,7 @@ impl Keep {
         }
         match self.file.keep(&mapper.save(self.lineage)) {
             Ok(()) => self.last_s = Some(now_s),
-            Err(problem) => tracing::error!("no checkpoint of the scene model at {now_s} s: {problem}"),
+            Err(error) => tracing::error!("no checkpoint of the scene model at {now_s} s: {error}"),
         }
     }
 
@@ -140,7 +140,7 @@ impl Work {
                 self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
                 FromMapper::Mapped(self.mapped(Some(frame)))
             }
-            Err(problem) => FromMapper::Missed(problem),
+            Err(error) => FromMapper::Missed(error),
         }
     }
 

@@ -68,8 +68,8 @@ pub(super) fn log(event: &FrameEvent) -> Result<(), UserError> {
         }
         FrameEvent::ModemRefused { reason, .. } => tracing::error!("modem: {reason}"),
         FrameEvent::NotSent(refusal) => tracing::error!("modem: a frame is not sent: {refusal}"),
-        FrameEvent::OverBudget { worst_window_bps } => {
-            tracing::error!("the bit budget was exceeded: {worst_window_bps:.0} bit/s in the worst window");
+        FrameEvent::OverBudget { max_window_bps } => {
+            tracing::error!("the bit budget was exceeded: {max_window_bps:.0} bit/s in the fullest window");
         }
         FrameEvent::Sent { .. } | FrameEvent::Received { .. } => {}
     }
@@ -81,7 +81,7 @@ pub(super) fn log_audit<E: LinkEnd>(link: &LinkHost<E>) {
     let a = link.audit();
     let (frames, bits, worst) = (a.transmissions(), a.total_bits(), a.worst_window_bps());
     let repeated = link.repeated_bits();
-    tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the worst window");
+    tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the fullest window");
     if repeated > 0 {
         tracing::info!("{repeated} bits more were repeats of the modem, and charged to the budget");
     }

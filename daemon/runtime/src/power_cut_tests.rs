@@ -66,7 +66,7 @@ struct PowerCutTrial {
     /// Epochs that the surface received, and the start of the vehicle in which each was first sent.
     published_epochs: BTreeMap<u8, u32>,
     /// Errors other than power cuts that ended a run of the vehicle; the disk is mended after each.
-    problems: Vec<UserError>,
+    errors: Vec<UserError>,
 }
 
 impl PowerCutTrial {
@@ -83,9 +83,9 @@ impl PowerCutTrial {
         cuts.reverse();
         let onboard = start(&config, &disk, &mut rng, &mut cuts, 0, Instant::ZERO);
         let (on_air, acted, published_epochs) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
-        let problems = Vec::new();
+        let errors = Vec::new();
         Self {
-            problems,
+            errors,
             config,
             surface,
             onboard,
@@ -180,8 +180,8 @@ impl PowerCutTrial {
             Ok(None) => {}
             Ok(Some(bytes)) => self.transmit(bytes, true),
             Err(RunEnd::PowerCut) => self.restart(),
-            Err(RunEnd::UserError(problem)) => {
-                self.problems.push(problem);
+            Err(RunEnd::UserError(error)) => {
+                self.errors.push(error);
                 self.disk.fail(None);
                 self.restart();
             }
@@ -217,7 +217,7 @@ impl PowerCutTrial {
     fn carry_out(&mut self, event: VehicleHostEvent) -> Result<(), RunEnd> {
         let Onboard { keeper, host, saved, .. } = &mut self.onboard;
         if event == VehicleHostEvent::Persist {
-            let off = |problem| if self.disk.is_off() { RunEnd::PowerCut } else { RunEnd::UserError(problem) };
+            let off = |error| if self.disk.is_off() { RunEnd::PowerCut } else { RunEnd::UserError(error) };
             keeper.save(host.vehicle().durable()).map_err(off)?;
             *saved = host.vehicle().durable().clone();
             host.handle_persisted();
@@ -287,7 +287,7 @@ fn start(config: &Config, disk: &Disk, rng: &mut DiskRng, cuts: &mut Vec<usize>,
                 let book_epoch = durable.epoch;
                 return Onboard { keeper, host, saved: durable, book_epoch };
             }
-            Err(problem) => assert!(disk.is_off(), "{problem}"),
+            Err(error) => assert!(disk.is_off(), "{error}"),
         }
     }
 }
@@ -327,6 +327,6 @@ fn a_failing_disk_ends_the_run_and_the_next_run_catches_up() {
         trial.run();
         let doing = if failing == DiskStep::Sync { "syncing" } else { "writing" };
         let message = format!("vehicle.journal: {doing}: input/output error; check the disk, then start again");
-        assert_eq!(trial.problems, [UserError::Failed(message)]);
+        assert_eq!(trial.errors, [UserError::Failed(message)]);
     }
 }

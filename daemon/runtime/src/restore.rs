@@ -60,7 +60,7 @@ fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Rest
     let Some(bytes) = file.read()? else { return Ok(None) };
     match Mapper::restore(config, configured_vocabulary(config.scene.vocabulary.as_deref())?, &bytes) {
         Ok(restored) => Ok(Some(restored)),
-        Err(NoCheckpoint::Config(problem)) => Err(problem),
+        Err(NoCheckpoint::Config(error)) => Err(error),
         Err(why) => {
             let place = file.path();
             tracing::error!("{}: {why}; the scene model starts from scratch, with new labels", place.display());

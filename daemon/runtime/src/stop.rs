@@ -16,10 +16,10 @@ impl Stop {
     #[cfg(unix)]
     pub fn new() -> Result<Self, UserError> {
         use tokio::signal::unix::{SignalKind, signal};
-        let problem = |e| UserError::Failed(format!("the signals to end: {e}"));
+        let error = |e| UserError::Failed(format!("the signals to end: {e}"));
         Ok(Self {
-            interrupt: signal(SignalKind::interrupt()).map_err(problem)?,
-            terminate: signal(SignalKind::terminate()).map_err(problem)?,
+            interrupt: signal(SignalKind::interrupt()).map_err(error)?,
+            terminate: signal(SignalKind::terminate()).map_err(error)?,
         })
     }
 

@@ -116,7 +116,7 @@ impl VehicleShell {
                 frame = self.camera.next() => self.handle_camera(frame),
                 mapped = self.mapper.mapped.recv() => match mapped {
                     Some(FromMapper::Mapped(mapped)) => self.handle_seen(mapped),
-                    Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
+                    Some(FromMapper::Missed(error)) => self.handle_missed(&error),
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
             }
@@ -158,9 +158,9 @@ impl VehicleShell {
     }
 
     /// Logs an unreadable frame; it does not end the mission.
-    fn handle_missed(&mut self, problem: &UserError) {
+    fn handle_missed(&mut self, error: &UserError) {
         self.missed += 1;
-        tracing::error!("a camera frame was skipped, {} so far: {problem}", self.missed);
+        tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
         self.host.handle_missed();
     }
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 /// Wall time between two steps.
 const TICK: Duration = Duration::from_millis(50);
 /// Maximum wall time of a step: after it the page is served, even if the mission is late.
-const STEP_LIMIT: Duration = Duration::from_millis(200);
+const MAX_STEP: Duration = Duration::from_millis(200);
 /// Mission time that passes between two readings of the wall clock.
 const STRIDE: Duration = Duration::from_millis(250);
 /// Wall time between two snapshots for the page while the mission has no events.
@@ -60,7 +60,7 @@ impl Demo {
             }
             // A machine that is too slow for the speed must not try to catch up, or each step
             // takes longer than the last.
-            let passed = before.elapsed().min(STEP_LIMIT + TICK);
+            let passed = before.elapsed().min(MAX_STEP + TICK);
             before = std::time::Instant::now();
             self.fly(self.mission.now() + passed.mul_f64(self.facts.speed))?;
             self.count();
@@ -73,11 +73,11 @@ impl Demo {
         }
     }
 
-    /// Advances the mission to `until`, or as far as [`STEP_LIMIT`] allows.
+    /// Advances the mission to `until`, or as far as [`MAX_STEP`] allows.
     fn fly(&mut self, until: Instant) -> Result<(), UserError> {
         let end = Instant::from_secs_f64(self.mission.config().survey.duration_s);
         let began = std::time::Instant::now();
-        while self.mission.now() < until && began.elapsed() < STEP_LIMIT {
+        while self.mission.now() < until && began.elapsed() < MAX_STEP {
             let next = until.min(self.mission.now() + STRIDE);
             if next >= end && !self.facts.ended {
                 self.mission.advance(end)?;

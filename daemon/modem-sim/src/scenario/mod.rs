@@ -44,7 +44,7 @@ impl Scenario {
 
     fn read(source: ScenarioSource<'_>) -> Result<Self, UserError> {
         let table = DeTable::parse(source.text)
-            .map_err(|e| source.problem(e.span().map_or(0, |span| span.start), e.message()))?;
+            .map_err(|e| source.error(e.span().map_or(0, |span| span.start), e.message()))?;
         let file = TableReader::new(source, String::new(), 0, table.get_ref());
         let seed = file.whole("seed", 0..=u64::MAX >> 1, "")?.unwrap_or(1);
         let tables = file.tables("modem")?;
@@ -66,7 +66,7 @@ impl Scenario {
         let faults = faults.collect::<Result<Vec<_>, _>>()?;
         file.finish()?;
         if modems.len() + strangers.len() > MAX_NODES {
-            return Err(source.problem(0, format!("more than {MAX_NODES} modems and strangers are not allowed")));
+            return Err(source.error(0, format!("more than {MAX_NODES} modems and strangers are not allowed")));
         }
         Ok(Self { seed, channel, links, modems, strangers, faults })
     }
@@ -79,17 +79,15 @@ pub fn node(index: usize) -> NodeId {
 
 fn check_modems(source: &ScenarioSource<'_>, modems: &[ScenarioModem]) -> Result<(), UserError> {
     if modems.is_empty() {
-        return Err(source.problem(0, "there is no [[modem]]: at least one is needed"));
+        return Err(source.error(0, "there is no [[modem]]: at least one is needed"));
     }
     for (index, modem) in modems.iter().enumerate() {
         if modems.iter().take(index).any(|other| other.name == modem.name) {
-            return Err(
-                source.problem(modem.at, format!("modem.name = \"{}\" is given twice: names differ", modem.name))
-            );
+            return Err(source.error(modem.at, format!("modem.name = \"{}\" is given twice: names differ", modem.name)));
         }
         let same = |other: &ScenarioModem| other.port == modem.port && modem.port.is_fixed();
         if modems.iter().take(index).any(same) {
-            return Err(source.problem(modem.at, format!("modem {}: its TCP address is given twice", modem.name)));
+            return Err(source.error(modem.at, format!("modem {}: its TCP address is given twice", modem.name)));
         }
     }
     Ok(())

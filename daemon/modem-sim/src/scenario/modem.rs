@@ -132,11 +132,11 @@ fn read_track(table: &TableReader<'_>) -> Result<Track, UserError> {
     Ok(Track::new(rows.into_iter().map(|[t, x, y, z]| (seconds(t), place([x, y, z]))).collect()))
 }
 
-fn address(table: &TableReader<'_>, least: u64, most: u64) -> Result<u8, UserError> {
-    let given = table.whole("address", least..=most, "")?;
+fn address(table: &TableReader<'_>, min: u64, max: u64) -> Result<u8, UserError> {
+    let given = table.whole("address", min..=max, "")?;
     given
         .map(|address| address as u8)
-        .ok_or_else(|| table.missing("address", format!("a whole number from {least} to {most}")))
+        .ok_or_else(|| table.missing("address", format!("a whole number from {min} to {max}")))
 }
 
 fn s2c(table: &TableReader<'_>, baud: Option<u32>) -> Result<ModemMake, UserError> {

@@ -17,7 +17,7 @@ pub struct ScenarioSource<'a> {
 
 impl ScenarioSource<'_> {
     /// An error at a byte of the text, as `FILE:LINE: cause`.
-    pub fn problem(&self, at: usize, cause: impl Display) -> UserError {
+    pub fn error(&self, at: usize, cause: impl Display) -> UserError {
         let line = self.text.get(..at).map_or(1, |before| before.matches('\n').count() + 1);
         UserError::Input(format!("{}:{line}: {cause}", self.path.display()))
     }
@@ -65,12 +65,12 @@ impl<'a> TableReader<'a> {
         let at = self.value(key).map_or(self.at, |(_, at)| at);
         let given = self.value(key).map(|(value, _)| value.span());
         let given = given.and_then(|span| self.source.text.get(span)).unwrap_or("nothing");
-        self.source.problem(at, format!("{} = {given} is not allowed: it takes {takes}", self.full(key)))
+        self.source.error(at, format!("{} = {given} is not allowed: it takes {takes}", self.full(key)))
     }
 
     /// Refuses the table because a key is missing.
     pub fn missing(&self, key: &'static str, takes: impl Display) -> UserError {
-        self.source.problem(self.at, format!("{} is missing: it takes {takes}", self.full(key)))
+        self.source.error(self.at, format!("{} is missing: it takes {takes}", self.full(key)))
     }
 
     /// A number within a range.
@@ -183,7 +183,7 @@ impl<'a> TableReader<'a> {
                 known.dedup();
                 let cause =
                     format!("there is no key {} here; allowed are {}", self.full(name.get_ref()), known.join(", "));
-                Err(self.source.problem(name.span().start, cause))
+                Err(self.source.error(name.span().start, cause))
             }
         }
     }

@@ -1,4 +1,4 @@
-//! How long an image takes from the order to the last bit, while the map takes all that it can get.
+//! The time from the order of an exemplar to its last bit, while the map uses all spare capacity.
 
 use super::Spread;
 use crate::virtual_time::VirtualTime;
@@ -25,14 +25,14 @@ use std::time::Duration;
 
 const SURFACE: NodeId = NodeId(0);
 const VEHICLE: NodeId = NodeId(1);
-/// Time until both ends know each other and their estimates have settled.
+/// Time for the handshake and for the estimates of both ends to converge, seconds.
 const WARM_UP_S: f64 = 120.0;
-/// Time after which an image is given up.
+/// Time after which a request counts as lost.
 const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(600);
 pub(super) const LABELS: u8 = 12;
-/// Edge of the part of the map that is always changing, cells.
+/// Edge of the part of the map that keeps changing, cells.
 const EDGE: i32 = 112;
-/// Seconds between two changes of it and between two fixes.
+/// Time between two changes of that part, and between two fixes, seconds.
 const CHANGE_S: f64 = 2.0;
 const FIX_S: f64 = 10.0;
 
@@ -40,11 +40,11 @@ const FIX_S: f64 = 10.0;
 #[derive(Debug, Clone, Copy)]
 pub struct ArrivalSetting {
     pub requests: usize,
-    /// Share of frames that is lost.
+    /// Share of frames that are lost.
     pub loss: f64,
-    /// Whether the map takes all that it can get.
+    /// Whether the map uses all spare capacity.
     pub loaded: bool,
-    /// Ask for twice the edge.
+    /// Whether each image is requested again with twice the edge.
     pub larger: bool,
 }
 
@@ -52,19 +52,19 @@ pub struct ArrivalSetting {
 pub struct Arrivals {
     pub requested: usize,
     pub arrived: usize,
-    /// Seconds from the order to the image.
+    /// Time from the order to the whole image, seconds.
     pub seconds: Option<Spread>,
-    /// Share of them within 30 s.
+    /// Share of the images that arrived within 30 s.
     pub within_30_s: f64,
-    /// Bytes of an image on the link.
+    /// Bytes of an image as it was sent.
     pub bytes: Option<Spread>,
-    /// Bits a second that the vehicle put on air.
+    /// Rate of all bits that the vehicle put on air, bit/s.
     pub sent_bps: f64,
     /// Share of the vehicle's frames that were lost.
     pub loss: f64,
 }
 
-/// Asks for images of random labels one after the other, each a random while after the last one is there.
+/// Requests images of random labels one after the other, each a random time after the last one arrived.
 pub fn arrivals(
     setting: ArrivalSetting,
     patches: &[RgbImage],
@@ -95,7 +95,7 @@ pub fn arrivals(
     })
 }
 
-/// Both roles and the water between them.
+/// Both roles and the channel between them.
 pub(super) struct ExemplarBench {
     setting: ArrivalSetting,
     pub(super) now: Instant,
@@ -167,12 +167,12 @@ impl ExemplarBench {
         self.vehicle.link().audit().total_bits()
     }
 
-    /// A label of the map.
+    /// A random label of the map.
     fn any_label(&mut self) -> u8 {
         1 + (self.rng.uniform() * f64::from(LABELS)) as u8
     }
 
-    /// Asks for an image; seconds and bytes that it took, if it came.
+    /// Requests an image; its seconds and bytes, or `None` if it did not arrive.
     pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, UserError> {
         let asked = self.now;
         self.surface.surface_mut().request_exemplar(self.address, label, wish, asked).map_err(UserError::Failed)?;
@@ -192,7 +192,7 @@ impl ExemplarBench {
         self.page(label).is_some_and(|page| page.asked.is_none())
     }
 
-    /// Labels as they come, in places that change faster than the link can follow; without load the map stays as it is.
+    /// A map of random labels that change faster than the link can follow; without load the map stays constant.
     fn change_map(&mut self) {
         let cells = (0..EDGE * EDGE).map(|i| {
             let label = match self.setting.loaded {
@@ -242,7 +242,7 @@ impl VirtualTime for ExemplarBench {
         if now >= self.next_fix {
             self.next_fix = now + Duration::from_secs_f64(FIX_S);
             let fix = Fix { position: WorldPoint::new(8.0, 8.0), sigma_m: 1.0, age_s: 0.5 };
-            // Before the vehicle is known there is no slot for it.
+            // An unknown vehicle has no slot yet.
             let _ = self.surface.surface_mut().send_fix(self.address, fix, now);
         }
         if now >= self.next_change {
@@ -270,7 +270,7 @@ impl VirtualTime for ExemplarBench {
     }
 }
 
-/// The patches dealt out to the labels, again and again, so that there is always another one.
+/// Assigns the patches to the labels in turn, so that each label always has another image.
 fn gallery(patches: &[RgbImage]) -> BTreeMap<u8, Vec<Picture>> {
     const EACH: usize = 40;
     let large = edge_px(1);

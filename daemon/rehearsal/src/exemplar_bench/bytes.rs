@@ -1,4 +1,4 @@
-//! How many bytes an image needs to look like its patch, and how many the vehicle sends.
+//! The bytes that an image needs for its similarity with the patch, and the bytes that the vehicle sends.
 
 use super::Spread;
 use crate::world::World;
@@ -14,10 +14,10 @@ use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Frames across and along an image.
+/// Number of camera frames across and along a source.
 const FRAMES: (u32, u32) = (4, 3);
 
-/// The best patches of each label that are measured.
+/// Number of patches of each label that are measured, the best first.
 const EACH: usize = 2;
 
 #[derive(Debug, Clone)]
@@ -32,7 +32,8 @@ pub enum PatchSource {
 pub struct Sizes {
     pub edge_px: u32,
     pub patches: usize,
-    /// The fewest bytes with a structural similarity of at least 0.9, by trying every quality; only of the smallest images.
+    /// Minimum number of bytes with a structural similarity of at least 0.9, over all qualities;
+    /// of the smallest images only.
     pub fewest: Option<Spread>,
     /// Bytes of the exemplar that the vehicle sends.
     pub sent: Option<Spread>,
@@ -45,15 +46,15 @@ pub struct Sizes {
 /// Measurements of the patches of several sources.
 #[derive(Debug, Clone, Serialize)]
 pub struct Bytes {
-    /// Photos or procedural reefs that were flown over.
+    /// Number of photos or procedural reefs.
     pub sources: usize,
-    /// The first image of a label, and the larger one.
+    /// Results for the first image of a label, and for the larger one.
     pub sizes: Vec<Sizes>,
-    /// Tenths of the bytes of the first images as they are sent, from the least to the greatest.
+    /// Deciles of the bytes of the first images as they are sent, minimum and maximum included.
     pub tenths: Vec<f64>,
 }
 
-/// The photos in a folder, sorted by name; pictures of labels are passed over.
+/// The photos in a folder, sorted by name; images of annotated classes are skipped.
 pub fn photos(dir: &Path) -> Result<Vec<PatchSource>, UserError> {
     let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
     let is_photo = |path: &PathBuf| {
@@ -92,7 +93,7 @@ pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserErr
     Ok(mapper.gallery().into_values().flat_map(of_label).collect())
 }
 
-/// Measures the patches of all sources; the patches too.
+/// Measures the patches of all sources; returns the patches as well.
 pub fn sizes(
     sources: &[PatchSource],
     seed: u64,

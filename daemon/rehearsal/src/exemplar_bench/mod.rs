@@ -1,4 +1,4 @@
-//! Images of labels: how long they take under full load, and how many bytes they need.
+//! Exemplars: their arrival times under full load, and their bytes.
 
 mod arrival;
 mod bytes;
@@ -8,7 +8,7 @@ mod tests;
 pub use arrival::{ArrivalSetting, Arrivals, arrivals};
 pub use bytes::{Bytes, PatchSource, Sizes, photos, sizes};
 
-/// The middle of the values, one of them that is exceeded by a twentieth, and the greatest.
+/// Median, 95th percentile and maximum of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Spread {
     pub median: f64,
@@ -17,7 +17,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of values; `None` of none.
+    /// The spread of values; `None` for an empty sample.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! Images of labels between a vehicle and a surface on a lossy link.
+//! Exemplars between a vehicle and a surface on a lossy link.
 
 use super::arrival::{ArrivalSetting, ExemplarBench, LABELS};
 use crate::virtual_time::VirtualTime;
@@ -18,7 +18,7 @@ fn patch(i: u32) -> RgbImage {
     })
 }
 
-/// Ends that know each other, with all background streams off.
+/// Ends after their handshake, with all background streams off.
 fn bench(setting: ArrivalSetting, seed: u64) -> ExemplarBench {
     let patches: Vec<RgbImage> = (0..30).map(patch).collect();
     let mut bench = ExemplarBench::new(setting, &patches, seed).unwrap();
@@ -64,7 +64,7 @@ fn a_small_image_grows_and_another_follows_after_the_survey() {
 }
 
 #[test]
-fn what_is_cancelled_costs_no_more_bits() {
+fn a_cancelled_image_costs_no_more_bits() {
     let loaded = ArrivalSetting { loaded: true, ..IDLE };
     let mut bench = bench(loaded, 2);
     bench.get(4, Wish::Another).unwrap().unwrap();
@@ -72,8 +72,8 @@ fn what_is_cancelled_costs_no_more_bits() {
     let until = bench.now + std::time::Duration::from_secs(120);
     assert!(bench.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
     let version = bench.surface.surface_mut().cancel_exemplar(bench.address, 4, bench.now).unwrap();
-    let heard = |w: &ExemplarBench| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
-    assert!(bench.run_until(until, heard), "the vehicle hears of it");
+    let received = |w: &ExemplarBench| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
+    assert!(bench.run_until(until, received), "the vehicle receives the order");
     let then = exemplar_bytes(&bench);
     wait(&mut bench, 120.0);
     assert_eq!(exemplar_bytes(&bench), then);

@@ -18,25 +18,25 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 const SURFACE: NodeId = NodeId(0);
-/// Bits a second on air.
+/// Bit rate of the channel, bit/s.
 pub const BIT_RATE_BPS: u32 = 10_000;
 pub const WINDOW: Duration = Duration::from_secs(10);
-/// Speed of sound in every row.
+/// Speed of sound of every row, m/s.
 const SOUND_SPEED_M_S: f64 = 1500.0;
 
 /// Properties of the ends and of the channel between them.
 #[derive(Debug, Clone)]
 pub struct LinkSetting {
-    /// Slant range of every vehicle.
+    /// Slant range of every vehicle, metres.
     pub range_m: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// How frames are lost, each way.
+    /// Pattern of losses in each direction.
     pub loss: LossModel,
     pub vehicles: u8,
-    /// Whether the surface knows none of them at the start and calls so often.
+    /// Period of discovery calls if all vehicles are unknown at the start.
     pub discovery_period: Option<Duration>,
-    /// Bit budget of each end.
+    /// Bit budget of each end, bit/s.
     pub budget_bps: u32,
 }
 
@@ -62,15 +62,15 @@ impl LinkSetting {
     }
 }
 
-/// A vehicle and the bench's record of it.
+/// A vehicle and its measurements.
 #[derive(Debug)]
 pub struct BenchVehicle {
     pub address: Address,
-    /// Its end of the link at its modem.
+    /// The vehicle's end of the link at its modem.
     pub host: LinkHost<VehicleLink<OpaqueSource>>,
-    /// Bytes that always wait, while it is under load.
+    /// Bytes that always wait while the vehicle is under load.
     pub load: Option<usize>,
-    /// When a slot was last applied, by slot and version.
+    /// Time at which a slot was last applied, by slot and version.
     pub applied: BTreeMap<(SlotId, u16), Instant>,
 }
 
@@ -81,15 +81,15 @@ pub struct LinkBench {
     pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     /// The vehicles, in the order of their addresses.
     pub vehicles: Vec<BenchVehicle>,
-    /// Where airtime and frames went.
+    /// Account of airtime and frames.
     pub tally: Tally,
-    /// Turns that were granted, and the time that they add up to.
+    /// Number of granted turns and their total time.
     pub grants: (u64, Duration),
     setting: LinkSetting,
     modem: ModemProfile,
     channel: Channel,
-    /// When each end last took in a frame that was meant for it.
-    heard: BTreeMap<NodeId, Instant>,
+    /// Time at which each end last received a frame addressed to it.
+    last_received: BTreeMap<NodeId, Instant>,
 }
 
 /// The vehicle of every row that has only one.
@@ -97,13 +97,13 @@ pub fn auv() -> Address {
     address(1)
 }
 
-/// The address of the vehicle with this number.
+/// Address of the vehicle with an index.
 fn address(number: u8) -> Address {
     Address::vehicle(number).unwrap_or(Address::EVERYBODY)
 }
 
 impl LinkBench {
-    /// Ends that have not met, all chance drawn from `seed`.
+    /// Ends before their handshake; all random numbers are drawn from `seed`.
     pub fn new(setting: &LinkSetting, seed: u64) -> Self {
         let now = Instant::from_secs_f64(1000.0);
         let config = ChannelConfig {
@@ -132,11 +132,11 @@ impl LinkBench {
             setting: setting.clone(),
             modem: setting.modem(),
             channel,
-            heard: BTreeMap::new(),
+            last_received: BTreeMap::new(),
         }
     }
 
-    /// The setting that it was made with.
+    /// The setting of the bench.
     pub fn setting(&self) -> &LinkSetting {
         &self.setting
     }
@@ -145,7 +145,7 @@ impl LinkBench {
         &mut self.vehicles[0]
     }
 
-    /// The only vehicle as the surface knows it.
+    /// The surface's view of the only vehicle.
     pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
         self.surface.end().vehicle(auv())
     }
@@ -161,7 +161,7 @@ impl LinkBench {
     fn transmit(&mut self, from: NodeId, bytes: Vec<u8>, kind: &'static str) {
         assert!(bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
         let airtime = self.modem.airtime(bytes.len());
-        let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
+        let busy_until = self.last_received.get(&from).map(|&at| at + self.modem.turn_around);
         self.tally.early_frames += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
         *self.tally.airtime.entry((who, kind)).or_default() += airtime;
@@ -178,7 +178,7 @@ impl VirtualTime for LinkBench {
         self.now = now;
     }
 
-    /// The next moment at which something happens, at most a while away.
+    /// The time of the next event, a bounded time ahead.
     fn next_event(&self) -> Instant {
         let hosts = self.vehicles.iter().filter_map(|v| v.host.poll_timeout(self.now));
         let arrival = self.channel.poll_timeout().map(Instant::from);
@@ -197,7 +197,7 @@ impl VirtualTime for LinkBench {
             }
             let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
-                self.heard.insert(arrival.to, self.now);
+                self.last_received.insert(arrival.to, self.now);
             }
             match arrival.to {
                 SURFACE => self.surface.handle_bytes(&bytes, self.now),
@@ -239,7 +239,7 @@ fn poll_frame<E: LinkEnd>(host: &mut LinkHost<E>, now: Instant) -> Option<(Vec<u
 }
 
 impl BenchVehicle {
-    /// A vehicle that has met nobody.
+    /// A vehicle before its handshake.
     pub(super) fn new(setting: &LinkSetting, address: Address, seed: u64, now: Instant) -> Self {
         let config = VehicleConfig {
             address,
@@ -256,7 +256,7 @@ impl BenchVehicle {
         Self { address, host, load: None, applied: BTreeMap::new() }
     }
 
-    /// Applies the slots that came in, and fills the source while it is under load.
+    /// Applies received slots, and fills the source while the vehicle is under load.
     pub(super) fn handle_news(&mut self, now: Instant) {
         let link = self.host.end_mut();
         while let Some(event) = link.poll_event() {

@@ -1,4 +1,4 @@
-//! A binding budget: the link's efficiency within it, and whether the link keeps it.
+//! The link's efficiency under a budget below the channel's capacity, and its use of that budget.
 
 use super::bench::{LinkBench, LinkSetting};
 use super::table::{budget_use, round};
@@ -7,23 +7,23 @@ use serde::Serialize;
 use sim_channel::LossModel;
 use std::time::Duration;
 
-/// Half duplex at 10 kbit/s on air, of which each end may use a part.
+/// One row: half duplex at 10 kbit/s on air, of which each end may use its budget.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BudgetRow {
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way.
+    /// Share of frames lost in each direction.
     pub loss: f64,
-    /// Bit budget of each end.
+    /// Bit budget of each end, bit/s.
     pub budget_bps: u32,
     /// Useful payload over the payload that the vehicle's budget could carry.
     pub efficiency: f64,
-    /// Worst window of any transmitter over the budget plus one transmission.
+    /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
 }
 
-/// Measures each row over `time`.
+/// Measures each row over `time` of virtual time.
 pub fn measure_budgets(time: Duration, seed: u64) -> Result<Vec<BudgetRow>, IssueError> {
     let mut rows = Vec::new();
     for budget_bps in [250, 1000] {

@@ -1,4 +1,4 @@
-//! Fourteen vehicles on one medium, none of them known at the start.
+//! Fourteen vehicles that share one medium and are all unknown at the start.
 
 use super::bench::{LinkBench, LinkSetting};
 use super::table::{budget_use, round};
@@ -11,26 +11,26 @@ use std::time::Duration;
 const VEHICLES: u8 = 14;
 const LOAD: usize = 20_000;
 
-/// How many vehicles share the medium.
+/// Number of vehicles that share the medium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FleetRow {
     pub vehicles: u8,
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way, collisions not counted.
+    /// Share of frames lost in each direction, without collisions.
     pub loss: f64,
-    /// Seconds until all were known.
+    /// Time until the surface knew all vehicles, seconds.
     pub discovered_s: f64,
-    /// Time that a turn of each takes with changing hands.
+    /// Time of one turn of each vehicle with its turn-around, seconds.
     pub fair_share_s: f64,
-    /// Greatest age of any vehicle's map, once each was heard.
+    /// Maximum age of any vehicle's map after each was received once, seconds.
     pub max_age_s: f64,
-    /// `max_age_s` over `fair_share_s`.
+    /// Ratio of `max_age_s` to `fair_share_s`.
     pub max_age_shares: f64,
-    /// Useful payload of all over the channel's capacity for it.
+    /// Ratio of all useful payload to the channel's capacity for it.
     pub efficiency: f64,
-    /// Worst window of any transmitter over the budget plus one transmission.
+    /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
 }
 
@@ -40,18 +40,18 @@ struct Ages {
 }
 
 impl Ages {
-    /// Time since a frame of its state was taken or the state was known to be equal.
+    /// Time since the last frame of a vehicle's state, or since the state was known to be equal.
     fn sample(&mut self, bench: &LinkBench) {
         for vehicle in &bench.vehicles {
             let taken = bench.surface.end().vehicle(vehicle.address).and_then(|v| v.replica().taken());
-            let settled = bench.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
+            let converged = bench.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
             let age = bench.now.since(taken.unwrap_or(Instant::ZERO));
-            self.oldest = self.oldest.max(if settled { Duration::ZERO } else { age });
+            self.oldest = self.oldest.max(if converged { Duration::ZERO } else { age });
         }
     }
 }
 
-/// Measures the row over `time`; all chance is drawn from `seed`.
+/// Measures the row over `time`; all random numbers are drawn from `seed`.
 pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     let loss = 0.1;
     let mut setting = LinkSetting::new(1000.0, 256, LossModel::Independent { probability: loss });
@@ -92,7 +92,7 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     }
 }
 
-/// The mean turn that was granted and the cost of changing hands, for each vehicle.
+/// Mean granted turn with its propagation, turn-around and grant, summed over the vehicles.
 fn fair_share(bench: &LinkBench) -> Duration {
     let (grants, granted) = bench.grants;
     let setting = bench.setting();

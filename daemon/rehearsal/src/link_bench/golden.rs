@@ -1,4 +1,4 @@
-//! All that is measured of the link in virtual time.
+//! All measurements of the link in virtual time.
 
 use super::budgets::{BudgetRow, measure_budgets};
 use super::fleet::{FleetRow, measure_fleet};
@@ -14,18 +14,18 @@ const HOUR: Duration = Duration::from_secs(3600);
 /// The golden table and the measurements beside it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinkTable {
-    /// Everything random was drawn from it.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// One row a range, frame size and loss.
+    /// One row for each range, frame size and loss.
     pub rows: Vec<LinkRow>,
-    /// The same link where the budget is less than the channel carries.
+    /// The same link with a budget below the channel's capacity.
     pub budgets: Vec<BudgetRow>,
-    /// Many vehicles on one medium.
+    /// Many vehicles that share one medium.
     pub fleet: FleetRow,
     pub ranging: Vec<RangingRow>,
 }
 
-/// Measures everything; `progress` gets the share that is done.
+/// Measures all tables; `progress` is called with the share that is done, 0..=1.
 pub fn link_table(seed: u64, progress: &mut dyn FnMut(f64)) -> Result<LinkTable, IssueError> {
     let link_cases = link_cases();
     let steps = link_cases.len() as f64 + 3.0;

@@ -9,7 +9,7 @@ pub(super) const CELLS: usize = 1 << 16;
 /// Bytes in front of each run of a chunk: address of its first byte, number of bytes.
 const RUN_HEAD: usize = 4;
 
-/// Neighbouring bytes with their values.
+/// Consecutive bytes with their values.
 ///
 /// ```text
 /// byte  field
@@ -53,20 +53,21 @@ impl ByteRun {
     }
 }
 
-/// Where a byte is on its way to the peer.
+/// Progress of a byte toward the peer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ByteState {
-    /// The peer is known to hold it.
+    /// The peer is known to have it.
     Held,
     /// It waits for a transmission.
     Waiting,
-    /// It is in a frame of unknown fate.
+    /// It is in a frame whose outcome is unknown.
     Flying,
 }
 
-/// The sending side: rewrites byte after byte, round and round, as fast as it is read.
+/// The sending side: rewrites all bytes in a cycle, as fast as it is read.
 ///
-/// Invariants: a byte that differs from the peer's known copy waits or flies; one that waits is in `queue` once.
+/// Invariants: a byte that differs from the peer's known copy waits or flies; one that waits
+/// is in `queue` exactly once.
 #[derive(Debug)]
 pub struct OpaqueSource {
     target: Vec<u8>,
@@ -77,7 +78,7 @@ pub struct OpaqueSource {
     queue: VecDeque<(usize, usize)>,
     pub(super) waiting: usize,
     pub(super) flying: usize,
-    /// The byte to be rewritten next.
+    /// Address of the byte that is rewritten next.
     pen: usize,
 }
 
@@ -97,12 +98,12 @@ impl Default for OpaqueSource {
 }
 
 impl OpaqueSource {
-    /// The state that the peer ought to hold.
+    /// The state that the peer should reach.
     pub fn target(&self) -> &[u8] {
         &self.target
     }
 
-    /// Rewrites as many bytes as it takes for `bytes` to wait, or for all that are not in frames of unknown fate.
+    /// Rewrites bytes until `bytes` of them wait, or all that are not in frames whose outcome is unknown.
     pub fn fill(&mut self, bytes: usize) {
         while self.waiting < bytes.min(CELLS - self.flying) {
             let cell = self.pen;
@@ -114,7 +115,7 @@ impl OpaqueSource {
         }
     }
 
-    /// Takes back all but the `keep` oldest of the changes that wait.
+    /// Reverts all waiting changes except the `keep` oldest.
     pub fn take_back(&mut self, keep: usize) {
         while self.waiting > keep {
             let Some((start, end)) = self.queue.pop_back() else { return };
@@ -139,7 +140,7 @@ impl OpaqueSource {
         }
     }
 
-    /// Puts lost bytes before everything else that waits.
+    /// Puts lost bytes in front of all others that wait.
     fn wait_first(&mut self, start: usize, end: usize) {
         self.waiting += end - start;
         self.places[start..end].fill(ByteState::Waiting);
@@ -231,7 +232,7 @@ pub struct OpaqueReplica {
     digest: u64,
     log: BTreeMap<u64, Vec<ByteRun>>,
     shown: Vec<u8>,
-    /// Number of the last frame that spoke of each byte.
+    /// Number of the last frame with a value of each byte.
     spoken: Vec<u64>,
     version: u64,
     useful_bytes: f64,
@@ -258,17 +259,17 @@ impl OpaqueReplica {
         &self.shown
     }
 
-    /// Bytes of chunks that changed the replica; of a chunk that partly did, its share.
+    /// Bytes of chunks that changed the replica; of a chunk that changed part of its bytes, that share.
     pub fn useful_bytes(&self) -> f64 {
         self.useful_bytes
     }
 
-    /// When a chunk was last taken.
+    /// Time of the last chunk that was applied.
     pub fn taken(&self) -> Option<Instant> {
         self.taken
     }
 
-    /// Bytes that differ from the source's state.
+    /// Number of bytes that differ from the source's state.
     pub fn missing(&self, target: &[u8]) -> usize {
         self.shown.iter().zip(target).filter(|(a, b)| a != b).count()
     }
@@ -316,7 +317,7 @@ impl StateReplica for OpaqueReplica {
     }
 }
 
-/// Mixes a byte and its address; 0 for the value at the beginning.
+/// Hash of a byte and its address; 0 for the initial value.
 fn term(cell: usize, value: u8) -> u64 {
     if value == 0 {
         return 0;

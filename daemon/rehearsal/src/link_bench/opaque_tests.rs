@@ -1,4 +1,4 @@
-//! The opaque source and its replica through losses.
+//! The opaque source and its replica under losses.
 
 use super::opaque::{CELLS, OpaqueReplica, OpaqueSource};
 use scenecast_protocol::map::{StateReplica, StateSource};
@@ -6,7 +6,7 @@ use scenecast_protocol::time::Instant;
 
 const NOW: Instant = Instant::ZERO;
 
-/// Passes chunks over, of which every third is lost, until none waits.
+/// Transfers chunks until none waits; every third is lost.
 fn pass(source: &mut OpaqueSource, replica: &mut OpaqueReplica, number: &mut u64) {
     while let Some((chunk, carried)) = source.next_chunk(100, NOW) {
         *number += 1;
@@ -30,7 +30,7 @@ fn the_replica_is_equal_once_every_byte_got_through() {
 }
 
 #[test]
-fn a_chunk_fills_its_room_while_more_waits() {
+fn a_chunk_fills_its_room_while_bytes_wait() {
     let mut source = OpaqueSource::default();
     source.fill(300);
     let (first, carried) = source.next_chunk(100, NOW).unwrap();
@@ -41,7 +41,7 @@ fn a_chunk_fills_its_room_while_more_waits() {
 }
 
 #[test]
-fn changes_that_are_taken_back_are_not_sent() {
+fn reverted_changes_are_not_sent() {
     let (mut source, mut replica, mut number) = (OpaqueSource::default(), OpaqueReplica::default(), 0);
     source.fill(5000);
     source.take_back(7);
@@ -51,7 +51,7 @@ fn changes_that_are_taken_back_are_not_sent() {
 }
 
 #[test]
-fn a_source_whose_bytes_are_all_under_way_is_as_full_as_it_gets() {
+fn a_source_fills_only_bytes_that_are_not_in_flight() {
     let mut source = OpaqueSource::default();
     source.fill(2 * CELLS);
     assert_eq!(source.waiting, CELLS);
@@ -67,7 +67,7 @@ fn a_source_whose_bytes_are_all_under_way_is_as_full_as_it_gets() {
 }
 
 #[test]
-fn only_news_is_useful() {
+fn only_changed_bytes_are_useful() {
     let (mut source, mut replica) = (OpaqueSource::default(), OpaqueReplica::default());
     source.fill(96);
     let (chunk, _) = source.next_chunk(100, NOW).unwrap();

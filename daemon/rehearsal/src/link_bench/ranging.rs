@@ -1,4 +1,4 @@
-//! The cost of ranging, and how well the link knows the range.
+//! The cost of ranging, and the accuracy of the measured range.
 
 use super::bench::{BIT_RATE_BPS, LinkBench, LinkSetting};
 use super::table::round;
@@ -10,25 +10,25 @@ use std::time::Duration;
 
 const FIX_INTERVAL: Duration = Duration::from_secs(10);
 
-/// A fix each ten seconds against none.
+/// One row: a fix every ten seconds, compared with no fixes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RangingRow {
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way.
+    /// Share of frames lost in each direction.
     pub loss: f64,
     pub efficiency: f64,
     pub efficiency_with_fixes: f64,
-    /// Share of the efficiency that they cost.
+    /// Share of the efficiency that the fixes cost.
     pub cost: f64,
-    /// Two-way propagation as the surface has measured it, less the true one.
+    /// Error of the two-way propagation time that the surface measured, ms.
     pub round_trip_error_ms: f64,
-    /// One-way propagation as the vehicle knows it, less the true one.
+    /// Error of the one-way propagation time that the vehicle knows, ms.
     pub one_way_error_ms: f64,
 }
 
-/// Measures both rows over `time` each.
+/// Measures both rows, each over `time` of virtual time.
 pub fn measure_ranging(time: Duration, seed: u64) -> Result<Vec<RangingRow>, IssueError> {
     [0.0, 0.1].into_iter().map(|loss| measure(loss, time, seed)).collect()
 }

@@ -1,4 +1,4 @@
-//! How fast the link runs on one core of this machine.
+//! The speed of the link's code on one core of this machine.
 
 use super::bench::{BenchVehicle, LinkBench, LinkSetting, auv, surface};
 use super::opaque::OpaqueReplica;
@@ -11,10 +11,10 @@ use sim_channel::LossModel;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Bytes that always wait at the vehicle.
+/// Bytes that always wait at the vehicle under load.
 const LOAD: usize = 20_000;
 
-/// Figures of one run on this machine; another run gives others.
+/// Measurements of one run on this machine; they differ from run to run.
 #[derive(Debug, Clone, Copy)]
 pub struct Speed {
     /// Frames sent and received a second, both ends on one core, 64 bytes each.
@@ -24,7 +24,7 @@ pub struct Speed {
     pub hour_s: f64,
 }
 
-/// Takes some seconds.
+/// Measures this machine for some seconds.
 pub fn measure_speed() -> Speed {
     let setting = LinkSetting::new(1000.0, 64, LossModel::Independent { probability: 0.1 });
     let mut bench = LinkBench::under_load(&setting, 1);
@@ -44,13 +44,13 @@ fn frames_per_s(frame_bytes: usize) -> f64 {
     (wire.frames - frames) as f64 / began.elapsed().as_secs_f64()
 }
 
-/// Two ends under load, and a frame arrives when its airtime has passed.
+/// Two ends under load; a frame arrives at the end of its airtime.
 struct Wire {
     now: Instant,
     surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     vehicle: BenchVehicle,
     modem: ModemProfile,
-    /// Frames on air by when they end and whether the surface sent them.
+    /// Frames on air, by their end and whether the surface sent them.
     on_air: BTreeMap<(Instant, bool), Vec<u8>>,
     frames: u64,
 }
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ends_on_a_wire_use_nearly_all_of_it() {
+    fn ends_on_a_wire_use_nearly_all_of_its_capacity() {
         let mut wire = Wire::new(256);
         wire.run(Duration::from_secs(600));
         let share = wire.frames as f64 * 256.0 * 8.0 / 10_000.0 / 600.0;

@@ -1,4 +1,4 @@
-//! The golden table: one row a setting.
+//! The golden table, with one row for each setting.
 
 use super::bench::{BIT_RATE_BPS, LinkBench, LinkSetting, WINDOW};
 use super::trial::{Flow, LinkEffort};
@@ -11,7 +11,7 @@ use sim_channel::{LossModel, RandomStream, presets};
 #[serde(rename_all = "lowercase")]
 pub enum Pattern {
     Independent,
-    /// In bursts, as in a shallow harbour.
+    /// Losses in bursts, as in a shallow harbour.
     Harbour,
 }
 
@@ -24,44 +24,44 @@ impl Pattern {
     }
 }
 
-/// One line of the table.
+/// One row of the golden table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinkRow {
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way; for a harbour the share that was.
+    /// Share of frames lost in each direction; for a harbour the measured share.
     pub loss: f64,
     pub pattern: Pattern,
-    /// Useful payload over the channel's capacity for it.
+    /// Ratio of useful payload to the channel's capacity for it.
     pub efficiency: f64,
     pub directive_median_s: f64,
-    /// Issue to applied: 95th percentile.
+    /// Time from issue to application of a directive: 95th percentile, seconds.
     pub directive_p95_s: f64,
-    /// Issue to known at the surface: 95th percentile.
+    /// Time from issue until the surface knows of the application: 95th percentile, seconds.
     pub directive_known_p95_s: f64,
-    /// Last change to equality: 95th percentile.
+    /// Time from the last change to equal maps: 95th percentile, seconds.
     pub converge_p95_s: f64,
-    /// Share of stops that kept the bound of convergence.
+    /// Share of stops after which the maps were equal within the bound.
     pub converge_within: f64,
-    /// Worst window of any transmitter over the budget plus one transmission.
+    /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
-    /// Times that the two ends were found to differ.
+    /// Number of resynchronisations.
     pub resyncs: u64,
-    /// Frames that began sooner than the modem turns around.
+    /// Number of frames that began before the end of the turn-around.
     pub early_frames: u64,
 }
 
-/// Where and how a row is measured.
+/// Channel and frame size of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkCase {
     range_km: f64,
     frame_bytes: usize,
-    /// `None`: a harbour.
+    /// Share of independent losses; `None` for a harbour.
     loss: Option<f64>,
 }
 
-/// Every place of the table.
+/// The cases of the table, in order.
 pub fn link_cases() -> Vec<LinkCase> {
     let mut link_cases = Vec::new();
     for range_km in [0.1, 1.0, 3.0] {
@@ -83,7 +83,7 @@ impl LinkCase {
         LinkSetting::new(self.range_km * 1000.0, self.frame_bytes, loss)
     }
 
-    /// Measures the row; all chance is drawn from `seed`.
+    /// Measures the row; all random numbers are drawn from `seed`.
     pub fn measure(&self, effort: &LinkEffort, seed: u64) -> Result<LinkRow, IssueError> {
         let setting = self.setting();
         let mut rng = RandomStream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
@@ -114,7 +114,7 @@ impl LinkCase {
     }
 }
 
-/// Worst window of any transmitter, over the budget of a window and one transmission.
+/// Ratio of the fullest window of any transmitter to the budget of a window plus one transmission.
 pub fn budget_use(bench: &LinkBench) -> f64 {
     let budget = f64::from(bench.setting().budget_bps) * WINDOW.as_secs_f64();
     let of = |audit: &Audit| audit.worst_window_bits() as f64 / (budget + audit.largest_bits() as f64);
@@ -126,7 +126,7 @@ fn resyncs(bench: &LinkBench) -> u64 {
     at_surface + bench.vehicles.iter().map(|v| v.host.end().stats().resyncs).sum::<u64>()
 }
 
-/// To a thousandth, the precision of the measurements.
+/// Rounds to a thousandth, the precision of the measurements.
 pub fn round(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0
 }

@@ -1,17 +1,17 @@
-//! Account of the airtime and of the frames on the medium.
+//! Account of the airtime and of the frames in the channel.
 
 use sim_channel::{LossReason, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Frames of one direction, counted at the end that they were meant for.
+/// Frames of one direction, counted at their destination.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct FrameCount {
-    /// Frames that arrived or were lost.
+    /// Number of frames that arrived or were lost.
     pub sent: u64,
-    /// Lost by the water.
+    /// Number of frames that the channel lost.
     pub lost: u64,
-    /// Lost because two spoke at a time, or to one that spoke itself.
+    /// Number of frames lost by a collision or to a destination that was transmitting.
     pub talked_over: u64,
 }
 
@@ -28,7 +28,7 @@ impl FrameCount {
         }
     }
 
-    /// Share that the water lost of those that nobody talked over.
+    /// Share that the channel lost of the frames without collision.
     pub fn loss(&self) -> f64 {
         self.lost as f64 / (self.sent - self.talked_over).max(1) as f64
     }
@@ -39,12 +39,12 @@ impl FrameCount {
 pub struct Tally {
     /// Time on air by sender (`surface`, `vehicle`) and kind of frame.
     pub airtime: BTreeMap<(&'static str, &'static str), Duration>,
-    /// Frames that began sooner after a frame for the same end had come in than its modem turns around.
+    /// Number of frames that an end began within its turn-around after receiving a frame.
     pub early_frames: u64,
-    /// From the surface.
+    /// Frames that the surface sent.
     pub down: FrameCount,
-    /// Times that the surface forgot the state of a vehicle, or met one.
+    /// Number of times that the surface reset the state of a vehicle, or completed a handshake.
     pub restarts: u64,
-    /// From the vehicles.
+    /// Frames that the vehicles sent.
     pub up: FrameCount,
 }

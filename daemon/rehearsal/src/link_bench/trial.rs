@@ -11,20 +11,20 @@ use scenecast_protocol::time::Instant;
 use sim_channel::RandomStream;
 use std::time::Duration;
 
-/// Bytes that wait at a vehicle under load: more than the longest turn takes.
+/// Bytes that wait at a vehicle under load: more than the longest turn carries.
 const LOAD: usize = 20_000;
-/// Time until both ends know each other and their estimates have settled.
+/// Time for the handshake and for the estimates of both ends to converge.
 const WARM_UP: Duration = Duration::from_secs(120);
-/// Time after which a trial is given up.
+/// Time after which a trial is ended without a result.
 const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(900);
 
-/// How long and how often each thing is measured.
+/// Durations and counts of the measurements.
 #[derive(Debug, Clone, Copy)]
 pub struct LinkEffort {
-    /// Time over which the efficiency is measured.
+    /// Virtual time over which the efficiency is measured.
     pub saturated: Duration,
     pub directives: usize,
-    /// Times that the source stops changing.
+    /// Number of times that the source stops changing.
     pub stops: usize,
 }
 
@@ -32,32 +32,32 @@ impl LinkEffort {
     pub const TABLE: Self = Self { saturated: Duration::from_secs(1200), directives: 60, stops: 40 };
 }
 
-/// How a saturated link did.
+/// Result of a saturated link.
 #[derive(Debug, Clone, Copy)]
 pub struct Flow {
     pub useful_bps: f64,
-    /// Share of the vehicle's frames that the water lost.
+    /// Share of the vehicle's frames that the channel lost.
     pub loss: f64,
 }
 
 #[derive(Debug, Clone)]
 pub struct Directives {
     pub applied: Summary,
-    /// From issue to known at the surface.
+    /// Times from issue until the surface knows of the application, seconds.
     pub known: Summary,
 }
 
-/// How the replica caught up.
+/// Convergence of the replica after the source stopped.
 #[derive(Debug, Clone)]
 pub struct Convergence {
-    /// From the last change to equality, seconds.
+    /// Times from the last change to equality, seconds.
     pub time: Summary,
-    /// Share of stops after which that was within the bound.
+    /// Share of stops with equality within the bound.
     pub within: f64,
 }
 
 impl LinkBench {
-    /// Ends under load that know each other.
+    /// Ends under load after their handshake.
     pub fn under_load(setting: &LinkSetting, seed: u64) -> Self {
         let mut bench = Self::new(setting, seed);
         bench.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
@@ -65,12 +65,12 @@ impl LinkBench {
         bench
     }
 
-    /// Useful bytes at the replica so far.
+    /// Number of useful bytes at the replica so far.
     fn useful_bytes(&self) -> f64 {
         self.view().map_or(0.0, |v| v.replica().useful_bytes())
     }
 
-    /// Useful bits a second over `time`; with a fix each `fix_every`, if wanted.
+    /// Useful bit/s over `time`, with a fix each `fix_every` if it is given.
     pub fn measure_flow(&mut self, time: Duration, fix_every: Option<Duration>) -> Result<Flow, IssueError> {
         let (began, before, until) = (self.now, self.useful_bytes(), self.now + time);
         self.tally = Default::default();
@@ -85,7 +85,7 @@ impl LinkBench {
         Ok(Flow { useful_bps, loss: self.tally.up.loss() })
     }
 
-    /// Issues `count` directives, each a random while after the last one is known to be applied.
+    /// Issues `count` directives, each a random time after the surface knows that the last one was applied.
     pub fn measure_directives(&mut self, count: usize, rng: &mut RandomStream) -> Result<Directives, IssueError> {
         let (mut applied, mut known) = (Vec::new(), Vec::new());
         for _ in 0..count {
@@ -120,7 +120,8 @@ impl LinkBench {
         Convergence { time: Summary::of(times), within: within as f64 / count as f64 }
     }
 
-    /// Stops the source with `keep` bytes waiting: seconds until the replica is equal, and bytes that it lacked.
+    /// Stops the source with `keep` bytes waiting; returns the seconds until the replica is equal, and
+    /// the bytes that it lacked.
     fn stop_and_converge(&mut self, keep: usize) -> (f64, usize) {
         let stopped: Instant = self.now;
         let vehicle = self.vehicle();
@@ -135,7 +136,7 @@ impl LinkBench {
         (self.now.since(stopped).as_secs_f64(), bytes)
     }
 
-    /// Bytes that the replica lacks.
+    /// Number of bytes that the replica lacks.
     fn missing(&self) -> usize {
         let target = self.vehicles[0].host.end().source().target();
         self.view().map_or(usize::MAX, |v| v.replica().missing(target))

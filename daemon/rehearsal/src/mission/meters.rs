@@ -1,4 +1,4 @@
-//! How well the operator's map follows the vehicle's, layer by layer.
+//! Agreement and delay of the operator's map, layer by layer.
 
 use crate::meter::Meter;
 use scenecast_protocol::map::{LabelGrid, PlaneKind, PlaneReplica};

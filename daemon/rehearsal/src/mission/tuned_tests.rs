@@ -107,7 +107,7 @@ fn priors_frame_rate_and_layers_change_during_a_mission() {
 }
 
 #[test]
-fn only_coarse_cells_are_told_until_all_are_wanted_again() {
+fn only_coarse_cells_are_sent_until_all_are_requested_again() {
     let mut mission = mission(&["survey.speed_m_s=1"]);
     mission.fly_to(60.0);
     mission.tune(r#"{"cells": "coarse"}"#);

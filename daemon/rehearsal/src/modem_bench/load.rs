@@ -21,7 +21,7 @@ use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream}
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Bytes that wait at the vehicle under load: more than its modem ever holds.
+/// Bytes that wait at the vehicle under load: more than its modem can hold.
 const LOAD: usize = 25_000;
 /// Time after which a directive counts as lost.
 const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(600);
@@ -31,7 +31,7 @@ const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(600);
 pub struct ModemSetting {
     pub config: Config,
     pub range_m: f64,
-    /// Share of frames that the channel loses, each way.
+    /// Share of frames that the channel loses in each direction.
     pub loss: f64,
 }
 
@@ -51,14 +51,14 @@ pub struct ModemBench {
     pub vehicle: LinkHost<VehicleLink<OpaqueSource>>,
     /// The surface's link at its modem.
     pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
-    /// Bytes that always wait at the vehicle.
+    /// Bytes that always wait at the vehicle; `None` without load.
     pub load: Option<usize>,
-    /// When each slot was applied, each time.
+    /// Times at which each slot was applied.
     pub applied: BTreeMap<(SlotId, u16), Vec<Instant>>,
-    /// When a frame last came to each end.
-    pub heard: [Instant; 2],
-    /// The end that a fault strikes.
-    pub struck: usize,
+    /// Time at which each end last received a frame.
+    pub last_received: [Instant; 2],
+    /// The end at which faults are injected.
+    pub faulty_end: usize,
     /// Refusals of the modems that a person must act on.
     pub refusals: Vec<String>,
     address: Address,
@@ -66,14 +66,14 @@ pub struct ModemBench {
 }
 
 impl ModemBench {
-    /// Ends that have not met.
+    /// Ends before their handshake.
     pub fn new(setting: &ModemSetting, seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let rig = ModemRig::new(&setting.config, Channel::new(setting.channel(), seed), seed, now)?;
         Self::at(setting, rig, seed, now)
     }
 
-    /// The same at these modems.
+    /// Ends before their handshake at the given modems.
     pub fn with_modems(setting: &ModemSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let rig = ModemRig::with_modems(&setting.config, Channel::new(setting.channel(), seed), modems, now)?;
@@ -123,15 +123,15 @@ impl ModemBench {
             rig,
             load: None,
             applied: BTreeMap::new(),
-            heard: [now; 2],
-            struck: VEHICLE,
+            last_received: [now; 2],
+            faulty_end: VEHICLE,
             refusals: Vec::new(),
             address,
             budget_bits: f64::from(config.link.budget_bps) * config.link.budget_window_s,
         })
     }
 
-    /// Ends under load that know each other.
+    /// Ends under load after their handshake.
     pub fn under_load(setting: &ModemSetting, seed: u64) -> Result<Self, UserError> {
         let mut bench = Self::new(setting, seed)?;
         bench.load = Some(LOAD);
@@ -139,20 +139,20 @@ impl ModemBench {
         Ok(bench)
     }
 
-    /// The vehicle as the surface knows it.
+    /// The surface's view of the vehicle.
     pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
         self.surface.end().vehicle(self.address)
     }
 
     fn note(&mut self, end: usize, event: FrameEvent) {
         match event {
-            FrameEvent::Received { .. } => self.heard[end] = self.now,
+            FrameEvent::Received { .. } => self.last_received[end] = self.now,
             FrameEvent::ModemRefused { reason, .. } => self.refusals.push(reason),
             _ => {}
         }
     }
 
-    /// Useful bits a second at the replica over `time`.
+    /// Useful bit/s at the replica over `time`.
     pub fn measure_flow(&mut self, time: Duration) -> f64 {
         let useful = |bench: &Self| bench.view().map_or(0.0, |v| v.replica().useful_bytes());
         let before = useful(self);
@@ -160,7 +160,7 @@ impl ModemBench {
         (useful(self) - before) * 8.0 / time.as_secs_f64()
     }
 
-    /// Issues directives at random moments: from issue to applied, seconds.
+    /// Issues directives at random times; returns the times from issue to application, seconds.
     pub fn measure_directives(&mut self, count: usize, seed: u64) -> Summary {
         let mut rng = RandomStream::new(seed, &[7]);
         let mut latencies = Vec::new();
@@ -174,19 +174,19 @@ impl ModemBench {
         Summary::of(latencies)
     }
 
-    /// Issues a directive; its version.
+    /// Issues a directive and returns its version.
     pub fn issue(&mut self) -> Option<u16> {
         let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
         let slot = Slot::Utility(Utility { weights, ..Utility::default() });
         self.surface.end_mut().issue(self.address, slot, self.now).ok()
     }
 
-    /// Breaks something of a modem.
+    /// Injects a fault into a modem.
     pub fn inject(&mut self, end: usize, fault: Fault) {
         self.rig.inject(end, fault, self.now);
     }
 
-    /// Pulls a cable, or puts it back.
+    /// Unplugs a cable, or plugs it in again.
     pub fn plug(&mut self, end: usize, plugged: bool) {
         match end {
             VEHICLE => self.rig.plug(end, &mut self.vehicle, plugged, self.now),
@@ -194,7 +194,7 @@ impl ModemBench {
         }
     }
 
-    /// Most of the vehicle's bits in any window, over the budget.
+    /// Ratio of the vehicle's bits in the fullest window to the budget.
     pub fn budget_use(&mut self) -> f64 {
         self.vehicle.audit().worst_window_bits() as f64 / self.budget_bits
     }

@@ -1,4 +1,4 @@
-//! Label maps to drive over.
+//! The label maps of the planning bench.
 
 use crate::world::World;
 use image::RgbImage;
@@ -14,20 +14,20 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Edge of a cell, metres: a scene stands for a site of about a hundred cells.
+/// Edge of a cell, metres; a scene is about a hundred cells wide.
 pub(crate) const CELL_M: f64 = 0.25;
 const CELLS: f64 = 100.0;
-/// Times that each word is drawn again.
+/// Number of sweeps over all words.
 const SWEEPS: u64 = 25;
 const EXPLORATION: i8 = 5;
-/// Smallest share of the annotated cells that makes a class worth a survey.
+/// Minimum share of the annotated cells for the class that the operator favours.
 const MIN_SHARE: f64 = 0.05;
 
-/// A label map as the scene model gives it, and the operator's utility on it.
+/// A label map of the scene model, and the operator's utility on it.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     pub name: String,
-    /// Its south-west corner is the origin.
+    /// Bounds of the scene, metres; the south-west corner is the origin.
     pub labels: LabelGrid,
     pub area: Area,
     pub utility: Utility,
@@ -69,7 +69,7 @@ impl Scene {
     }
 }
 
-/// The labels of a whole image, seen at once.
+/// The labels of a whole image that is seen at once.
 fn label(image: &RgbImage, px: f64, seed: u64) -> LabelGrid {
     let (words, scene) = (WordConfig::default(), Config::default().scene);
     let camera = DownCamera { metres_per_pixel: CELL_M / px, altitude_m: 4.0 };
@@ -94,13 +94,14 @@ fn label(image: &RgbImage, px: f64, seed: u64) -> LabelGrid {
     model.refine(seen.len() as u64 * SWEEPS);
     let flat = model.label_map();
     let mut book = LabelBook::new(0);
-    // A label gets its number when it has lasted for two maps.
+    // A topic gets a label when it has lasted for two maps.
     book.publish(&flat);
     book.publish(&flat).iter().map(|c| (Cell::new(c.x, c.y), c.label)).collect()
 }
 
-/// The operator is after the rarest class that covers a twentieth of the scene. He weighs each label by how much of it is that
-/// class, the best one with 1, those that have it no more often than the scene with 0.
+/// The utility of an operator who looks for the rarest class that covers at least a twentieth of the scene.
+/// The weight of a label grows with the share of that class in it: 1 for the best label, 0 at or below the
+/// share in the whole scene.
 fn favour(labels: &LabelGrid, world: &World) -> Utility {
     let mut counts: BTreeMap<u8, BTreeMap<u8, f64>> = BTreeMap::new();
     let mut classes: BTreeMap<u8, f64> = BTreeMap::new();

@@ -70,7 +70,7 @@ fn actions() -> impl Strategy<Value = Vec<Action>> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
-    fn what_is_found_is_what_was_confirmed_or_was_being_written(actions in actions(), seed: u64) {
+    fn a_journal_holds_the_confirmed_or_the_interrupted_state(actions in actions(), seed: u64) {
         let disk = Disk::default();
         let (mut journal, found) = open(&disk);
         prop_assert_eq!(found, None);
@@ -158,7 +158,7 @@ fn a_write_cut_at_any_step_leaves_the_old_or_the_new_state() {
 }
 
 #[test]
-fn the_first_state_is_there_or_nothing_is() {
+fn the_first_state_is_whole_or_absent() {
     for (steps, seed) in (0..=5).flat_map(|steps| (0..100).map(move |seed| (steps, seed))) {
         let disk = Disk::default();
         disk.cut_after(steps);
@@ -170,7 +170,7 @@ fn the_first_state_is_there_or_nothing_is() {
 }
 
 #[test]
-fn after_a_failed_step_nothing_is_confirmed_or_written() {
+fn after_a_failed_step_no_state_is_confirmed_or_written() {
     for records in [0, 1, 4] {
         for failing in [DiskStep::Create, DiskStep::Append, DiskStep::Sync, DiskStep::Rename, DiskStep::SyncFolder] {
             let disk = Disk::default();
@@ -194,7 +194,7 @@ fn after_a_failed_step_nothing_is_confirmed_or_written() {
 }
 
 #[test]
-fn a_state_that_is_safe_already_is_not_written_again() {
+fn a_durable_state_is_not_written_again() {
     let disk = Disk::default();
     let (mut journal, _) = open(&disk);
     journal.persist(b"same").unwrap();
@@ -216,7 +216,7 @@ fn the_file_stays_within_its_limit() {
 }
 
 #[test]
-fn damage_is_an_error_that_says_where() {
+fn damage_is_an_error_with_its_position() {
     let disk = Disk::default();
     let mut records: Vec<u8> = (1..4).flat_map(|n| record::encode(n, b"state")).collect();
     records[BLOCK + 21] ^= 1;

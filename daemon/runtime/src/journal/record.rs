@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_before_a_whole_record_is_told_with_its_place() {
+    fn damage_before_a_whole_record_is_reported_with_its_position() {
         let records: Vec<Vec<u8>> = (5..8).map(|n| encode(n, &[n as u8; 5000])).collect();
         let file = records.concat();
         let length = HEAD + 5000 + TAIL;

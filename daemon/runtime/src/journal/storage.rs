@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_journal_in_a_new_folder_comes_back_without_its_torn_end() {
+    fn a_journal_in_a_new_folder_is_read_without_its_torn_end() {
         let path = scratch("journal").join("a/b");
         let (mut journal, found) = open(&path);
         assert_eq!(found, None);

@@ -3,7 +3,7 @@
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_rehearsal::{Localisation, fly_with_outliers, localisation, picture};
+use scenecast_rehearsal::{Localisation, localisation, localisation_plot, run_with_outliers};
 use scenecast_tools::Progress;
 use std::path::PathBuf;
 
@@ -34,12 +34,12 @@ impl LocalisationBench {
         drop(progress);
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
-            let (tracks, _) = fly_with_outliers(self.seed, 0.1);
+            let (tracks, _) = run_with_outliers(self.seed, 0.1);
             let title = format!(
                 "3 km, drift 1 % of the distance, a fix each 10 s, 10 % lost, 10 % outliers; seed {}",
                 self.seed
             );
-            write_whole(&dir.join("localisation.svg"), picture(&tracks, &title).as_bytes())?;
+            write_whole(&dir.join("localisation.svg"), localisation_plot(&tracks, &title).as_bytes())?;
         }
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(|e| UserError::Failed(e.to_string()))?;

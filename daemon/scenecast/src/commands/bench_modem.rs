@@ -43,7 +43,7 @@ fn print_table(table: &ModemTable) {
         "  directive       {:>7.1} s median, {:.1} s p95, issue to applied, bulk queue full",
         b.directive_median_s, b.directive_p95_s
     );
-    println!("  budget used     {:>7.3} in the worst window", b.budget_use);
+    println!("  budget used     {:>7.3} in the fullest window", b.budget_use);
     println!();
     println!("survey through                 agreement mean   final  drain s");
     for row in &table.surveys {

@@ -3,7 +3,7 @@
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_rehearsal::planning_bench::{Trial, annotated_images, drive_all, picture};
+use scenecast_rehearsal::planning_bench::{Trial, annotated_images, plot, run_all};
 use scenecast_tools::Progress;
 use std::path::PathBuf;
 
@@ -47,7 +47,7 @@ impl PlanningBench {
             );
         }
         let mut progress = Progress::new("planning");
-        let table = drive_all(self.seed, &images, &mut |share, trial| {
+        let table = run_all(self.seed, &images, &mut |share, trial| {
             progress.show(share);
             if !self.json {
                 print_trial(trial);
@@ -73,7 +73,7 @@ impl PlanningBench {
 
     fn paint(&self, trial: &Trial) -> Result<(), UserError> {
         let Some(dir) = &self.out else { return Ok(()) };
-        let png = picture(trial).map_err(|e| UserError::Failed(e.to_string()))?;
+        let png = plot(trial).map_err(|e| UserError::Failed(e.to_string()))?;
         write_whole(&dir.join(format!("{}.png", trial.name)), &png)
     }
 }

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_key_is_its_owners_alone_and_is_read_again() {
+    fn a_new_key_is_readable_by_its_owner_only() {
         let (path, key) = (fresh("new"), random_key().unwrap());
         write_new(&path, &key.to_text()).unwrap();
         let (read, warning) = scenecast_config::read_key(&path).unwrap();

@@ -103,12 +103,12 @@ impl Sim {
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;
         write_outputs(&mission, &report, json!({ "seconds": seconds, "speedup": speedup }), &self.out)?;
-        let map = &report.figures["map"];
+        let map = &report.json["map"];
         println!(
             "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {seconds:.1} s",
             self.out.join("report.json").display(),
-            report.figures["scene"]["cells"],
-            report.figures["scene"]["labels"],
+            report.json["scene"]["cells"],
+            report.json["scene"]["labels"],
             map["agreement_final"],
             map["agreement_mean"],
         );

@@ -51,20 +51,20 @@ impl Train {
             return Err(UserError::Input(format!("--cell-px {}: it takes 4 to 1000 pixels", self.cell_px)));
         }
         let files = images_of(&self.images)?;
-        let problem = RefCell::new(None);
+        let error = RefCell::new(None);
         let progress = RefCell::new((Progress::new("vocabulary"), 0));
         let read = |file: &PathBuf| {
             let (shown, count) = &mut *progress.borrow_mut();
             *count += 1;
             shown.show(f64::from(*count) / (2 * files.len()) as f64);
             let image = read_usable(file, self.cell_px);
-            image.map_err(|e| *problem.borrow_mut() = Some(e)).ok().map(|image| (image, self.cell_px))
+            image.map_err(|e| *error.borrow_mut() = Some(e)).ok().map(|image| (image, self.cell_px))
         };
         // The first unreadable image ends the training.
         let measures = train_vocabulary(&WordConfig::default(), || files.iter().map_while(read));
         drop(progress);
-        if let Some(problem) = problem.into_inner() {
-            return Err(problem);
+        if let Some(error) = error.into_inner() {
+            return Err(error);
         }
         let bytes = scene_model::vocabulary::save(&measures);
         write_whole(&self.out, &bytes)?;

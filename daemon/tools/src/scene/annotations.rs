@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_line_is_named() {
+    fn a_wrong_line_is_refused_with_its_number() {
         let refusal = |text: &str| read("bad", text).unwrap_err().to_string();
         assert!(refusal("1,2,3,1\n1,2,3\n").contains(":2: class is missing"));
         assert!(refusal("1,nan,3,1\n").contains(":1: y = nan"));

@@ -13,10 +13,10 @@ use scenecast_files::read_image;
 use std::path::{Path, PathBuf};
 
 /// Maximum time between an image and the depth image or the pose that is matched with it, seconds.
-const APART_S: f64 = 0.02;
+const MAX_APART_S: f64 = 0.02;
 /// Image width of the benchmark's intrinsics, pixels.
-const USUAL_WIDTH: f64 = 640.0;
-const USUAL: Intrinsics = Intrinsics([525.0, 525.0, 319.5, 239.5]);
+const DEFAULT_WIDTH_PX: f64 = 640.0;
+const DEFAULT_INTRINSICS: Intrinsics = Intrinsics([525.0, 525.0, 319.5, 239.5]);
 /// Minimum and maximum edge of a cell in which words are extracted, pixels.
 const CELL_PX: (f32, f32) = (4.0, 200.0);
 
@@ -76,7 +76,8 @@ impl Tum {
         }
         let without_partner = images.len() - frames.len();
         if frames.is_empty() {
-            let cause = format!("none of its {} images has a depth image and a pose within {APART_S} s", images.len());
+            let cause =
+                format!("none of its {} images has a depth image and a pose within {MAX_APART_S} s", images.len());
             return Err(UserError::file(&dir.join("rgb.txt"), cause));
         }
         Ok(Self {
@@ -106,8 +107,9 @@ impl Tum {
     }
 
     fn camera(&self, image: &RgbImage) -> PinholeCamera {
-        let scale = f64::from(image.width()) / USUAL_WIDTH;
-        let Intrinsics([fx, fy, cx, cy]) = self.intrinsics.unwrap_or(Intrinsics(USUAL.0.map(|pixels| pixels * scale)));
+        let scale = f64::from(image.width()) / DEFAULT_WIDTH_PX;
+        let Intrinsics([fx, fy, cx, cy]) =
+            self.intrinsics.unwrap_or(Intrinsics(DEFAULT_INTRINSICS.0.map(|pixels| pixels * scale)));
         PinholeCamera { fx, fy, cx, cy }
     }
 }
@@ -130,7 +132,7 @@ impl WordSource for Tum {
         let mut notes = Vec::new();
         if self.without_partner > 0 {
             let (few, all) = (self.without_partner, self.all);
-            notes.push(format!("{few} of {all} images have no depth image or no pose within {APART_S} s"));
+            notes.push(format!("{few} of {all} images have no depth image or no pose within {MAX_APART_S} s"));
         }
         if let Some(first) = self.unreadable.first() {
             notes.push(format!("{} frames skipped, the first: {first}", self.unreadable.len()));
@@ -179,7 +181,7 @@ fn nearest<T>(list: &[(f64, T)], t_s: f64) -> Option<&T> {
     let near = list[after.saturating_sub(1)..(after + 1).min(list.len())].iter();
     let best = near.min_by(|a, b| (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs()))?;
     // Times have microseconds; as floating-point numbers they may differ a little more than the limit.
-    ((best.0 - t_s).abs() <= APART_S + 1e-6).then_some(&best.1)
+    ((best.0 - t_s).abs() <= MAX_APART_S + 1e-6).then_some(&best.1)
 }
 
 fn read_depth(path: &Path, scale: f64) -> Result<DepthImage, String> {

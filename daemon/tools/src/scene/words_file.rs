@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn words_come_in_order_of_time_whatever_the_order_of_the_lines() {
+    fn words_are_returned_in_order_of_time() {
         let text = "# words\nt,x,y,z,w1\n# later\n2,0,0,0,5,6\n\n1,0,0,0,7\r\n2,1,0,-3,8\n1,5,5,5\n";
         let mut file = open("order", text, None, true).unwrap();
         assert_eq!(sightings(&mut file), [(1.0, vec![7]), (2.0, vec![5, 6, 8])]);

@@ -8,7 +8,7 @@ use scenecast_worlds::{LabelWorld, sample};
 use std::path::PathBuf;
 
 /// Words in each cell of a world; the cell shows their most frequent label.
-const CUSTOMERS: u32 = 16;
+const WORDS_PER_CELL: u32 = 16;
 /// Approximate edge of the image, pixels.
 const IMAGE_PX: u32 = 960;
 /// Maximum number of pixels of the image.
@@ -64,7 +64,7 @@ impl Sample {
         let mut pixels = vec![PAPER; sheet.width as usize * sheet.height as usize];
         for index in 0..worlds {
             let (columns, rows) = (self.size.0 as usize, self.size.1 as usize);
-            let world = sample(self.seed.wrapping_add(index), columns, rows, self.alpha, self.gamma, CUSTOMERS);
+            let world = sample(self.seed.wrapping_add(index), columns, rows, self.alpha, self.gamma, WORDS_PER_CELL);
             sheet.draw(&world, index as u32, &mut pixels);
         }
         let png = encode(sheet.width, sheet.height, &pixels).map_err(|e| UserError::Failed(e.to_string()))?;

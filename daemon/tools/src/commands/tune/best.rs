@@ -34,7 +34,7 @@ mod tests {
     use scenecast_protocol::directive::CellBand;
 
     #[test]
-    fn it_can_be_loaded_as_a_configuration() {
+    fn the_best_setting_can_be_loaded_as_a_configuration() {
         let path = std::env::temp_dir().join(format!("scenecast-{}-best.toml", std::process::id()));
         let shipped = TuningTable::shipped();
         let row = shipped.rows().find(|row| row.setting.cells == CellBand::Coarse).unwrap();

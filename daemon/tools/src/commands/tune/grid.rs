@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_file_it_is_the_grid_of_the_paper() {
+    fn the_default_grid_is_that_of_the_paper() {
         let settings = Grid::load(None, &Config::default()).unwrap().settings();
         assert_eq!(settings.len(), 36);
         let first = settings[0];

@@ -12,7 +12,7 @@ use scenecast_scoring::{Annotations, mosaic_classes};
 use std::path::Path;
 
 /// Minimum overlap of neighbouring frames and lines, as a share of a frame's edge.
-const OVERLAP: f64 = 0.1;
+const MIN_OVERLAP: f64 = 0.1;
 /// Maximum number of words of a survey: 1.5 GB of memory.
 const MAX_WORDS: f64 = 1e8;
 const MIN_PX: u32 = 64;
@@ -178,7 +178,7 @@ fn corners(mosaic: (u32, u32), size: (u32, u32), step: f64) -> (Vec<(u32, u32)>,
         let steps = (free / step).ceil().max(if free > 0.0 { 1.0 } else { 0.0 }) as u32;
         (0..=steps).map(|i| (free * f64::from(i) / f64::from(steps.max(1))).round() as u32).collect()
     };
-    let most = |frame: u32| f64::from(frame) * (1.0 - OVERLAP);
+    let most = |frame: u32| f64::from(frame) * (1.0 - MIN_OVERLAP);
     let across = places(mosaic.0, size.0, step.clamp(1.0, most(size.0)));
     let mut corners = Vec::new();
     for (line, &top) in places(mosaic.1, size.1, most(size.1)).iter().enumerate() {

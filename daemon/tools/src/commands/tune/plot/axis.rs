@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_reach_over_all_values() {
+    fn ticks_are_round_and_cover_all_values() {
         let axis = Axis::over([0.12, 0.29].into_iter(), 0.0, 100.0);
         let texts: Vec<String> = axis.ticks().into_iter().map(|tick| tick.1).collect();
         assert_eq!(texts, ["0.0", "0.1", "0.2", "0.3"]);

@@ -1,4 +1,4 @@
-//! One planner on one scene.
+//! The run of one planner on one scene.
 
 use super::scene::{CELL_M, Scene};
 use scenecast_core::Area;
@@ -11,34 +11,34 @@ use sim_channel::RandomStream;
 
 /// Edge of the camera's footprint, metres: eight cells.
 const SIGHT_M: f64 = 2.0;
-/// Metres that the vehicle keeps from outlines.
+/// Minimum distance between the vehicle and an outline, metres.
 const CLEARANCE_M: f64 = 0.5;
-/// Share of a full coverage that may be gone.
+/// Distance limit as a share of the path of full coverage.
 const SHARE: f64 = 0.4;
-/// More legs than any drive has.
+/// Maximum number of legs, more than any run needs.
 const MAX_LEGS: usize = 20_000;
 
-/// A vehicle's orders before it starts.
+/// The vehicle's orders at the start of a run.
 #[derive(Debug, Clone)]
 pub(crate) struct Task {
     pub fence: Fence,
     pub start: (f64, f64),
-    /// Metres that may be gone, the way back to the start included.
+    /// Distance limit, metres, with the return path to the start.
     pub limit_m: f64,
-    /// Utility of a metre on which everything in sight is new, on the mean of the scene.
+    /// Mean utility in the scene of a metre on which every cell in view is new.
     pub mean_per_m: f64,
 }
 
-/// The result of a run.
+/// Track and utility of a run.
 #[derive(Debug)]
-pub(crate) struct Drive {
+pub(crate) struct PlannerRun {
     pub track: Vec<(f64, f64)>,
-    /// Weight of every cell that was seen.
+    /// Sum of the weights of all cells that were seen.
     pub utility: f64,
 }
 
 impl Task {
-    /// A fence with cut corners, one or two keep-outs, and a start inside.
+    /// Draws a fence with cut corners, one or two keep-outs, and a start inside.
     pub fn draw(scene: &Scene, seed: u64) -> Self {
         let mut rng = RandomStream::new(seed, &[0x91A7]);
         let Area { east, north, .. } = scene.area;
@@ -81,7 +81,7 @@ impl Task {
     }
 }
 
-impl Drive {
+impl PlannerRun {
     pub fn metres(&self) -> f64 {
         length_m(&self.track)
     }
@@ -97,23 +97,23 @@ impl Drive {
 /// The part of the sea floor that the planner knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum MapKnowledge {
-    /// Cells that the vehicle has seen.
+    /// The cells that the vehicle has seen so far.
     Seen,
-    /// All of it from the start: no vehicle can, so it bounds the utility within the limit.
+    /// The whole map from the start, which gives an upper bound of the utility.
     All,
 }
 
 /// Runs a planner until the rest of the limit is needed for the return path, then returns.
-pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, knowledge: MapKnowledge) -> Drive {
+pub(crate) fn run_planner(scene: &Scene, task: &Task, kind: PlannerKind, knowledge: MapKnowledge) -> PlannerRun {
     let sight = Footprint { across: SIGHT_M, along: SIGHT_M };
     let mut steering = Steering::new(scene.area, sight, CELL_M, kind, CLEARANCE_M);
     steering.set_fence(&task.fence);
     let mut map = LabelGrid::default();
-    let mut drive = Drive { track: vec![task.start], utility: 0.0 };
+    let mut run = PlannerRun { track: vec![task.start], utility: 0.0 };
     let (mut at, mut version, mut is_back) = (task.start, 1, false);
-    drive.utility += look(scene, at, &mut map);
+    run.utility += look(scene, at, &mut map);
     for _ in 0..MAX_LEGS {
-        let left_m = task.limit_m - drive.metres();
+        let left_m = task.limit_m - run.metres();
         let known = if knowledge == MapKnowledge::All { &scene.labels } else { &map };
         let course = match is_back {
             true => steering.next_home(at),
@@ -121,18 +121,18 @@ pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, knowledge: Ma
         };
         match course {
             Course::Go(to) => {
-                drive.utility += go(scene, &mut steering, at, to, &mut map);
-                drive.track.push(to);
+                run.utility += go(scene, &mut steering, at, to, &mut map);
+                run.track.push(to);
                 (at, version) = (to, version + 1);
             }
             Course::UsedUp if !is_back => is_back = true,
             _ => break,
         }
     }
-    drive
+    run
 }
 
-/// Goes straight and looks every half sight; returns the utility of the cells seen for the first time.
+/// Moves straight and takes a view each half footprint; returns the utility of the cells seen for the first time.
 fn go(scene: &Scene, steering: &mut Steering, from: (f64, f64), to: (f64, f64), map: &mut LabelGrid) -> f64 {
     let looks = ((to.0 - from.0).hypot(to.1 - from.1) / (SIGHT_M / 2.0)).ceil().max(1.0) as u32;
     let place = |i: u32| {
