@@ -2,13 +2,13 @@
 
 mod pair;
 
-use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
+use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, layer, patchy, utility};
 use proptest::prelude::*;
 use scenecast_protocol::directive::{OrderStatus, Slot, Utility};
 use scenecast_protocol::mac::Access;
-use scenecast_protocol::map::{Cell, PlaneKind, PlaneScale, PlaneSource};
+use scenecast_protocol::map::{Cell, LayerDescriptor, LayerId, LayerSource, Steps};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{Class, Extra, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class};
 use std::time::Duration;
 
 fn channel() -> impl Strategy<Value = LossyChannel> {
@@ -34,10 +34,10 @@ fn setup() -> impl Strategy<Value = Setup> {
     let budget = prop_oneof![Just(1000u32), Just(10_000)];
     let codec = prop_oneof![Just(Codec::Png), Just(Codec::Context)];
     let settle = prop_oneof![Just(0), Just(2), Just(30)].prop_map(Duration::from_secs);
-    let planes = prop_oneof![Just(None), Just(Some([0, 0])), Just(Some([10, 5]))];
-    (frame, budget, codec, access, 0u8..6, settle, planes).prop_map(
-        |(frame_bytes, budget_bps, codec, access, keyed, settle, planes)| {
-            let setup = Setup { access, settle, planes, ..Setup::new(frame_bytes, budget_bps, codec) };
+    let layers = prop_oneof![Just(None), Just(Some([0, 0])), Just(Some([10, 5]))];
+    (frame, budget, codec, access, 0u8..6, settle, layers).prop_map(
+        |(frame_bytes, budget_bps, codec, access, keyed, settle, layers)| {
+            let setup = Setup { access, settle, layers, ..Setup::new(frame_bytes, budget_bps, codec) };
             match keyed {
                 1 if frame_bytes >= 48 => setup.keyed(false, false),
                 2 if frame_bytes >= 48 => setup.keyed(true, false),
@@ -72,7 +72,7 @@ proptest! {
             // From time to time one direction is interrupted, or both.
             pair.mute = [outage & 5 == 1, outage == 2 || outage == 1];
             pair.vehicle.set_map(map.iter(), pair.now);
-            pair.set_planes(24, step as u64);
+            pair.set_layers(24, step as u64);
             pair.surface.issue(auv(), utility(step as i8), pair.now).unwrap();
             pair.run(pair.now + Duration::from_secs(40), false);
             match what {
@@ -128,17 +128,17 @@ const CALM: LossyChannel = LossyChannel {
 };
 
 #[test]
-fn planes_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() {
-    let sent = |planes: [u8; 2]| {
-        let setup = Setup { planes: Some(planes), ..Setup::new(256, 4_000, Codec::Png) };
+fn layers_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() {
+    let sent = |layers: [u8; 2]| {
+        let setup = Setup { layers: Some(layers), ..Setup::new(256, 4_000, Codec::Png) };
         let mut pair = LinkedEnds::new(1, setup, LossyChannel { loss: 0.0, ..CALM });
         for phase in 0..20 {
             pair.vehicle.set_map(speckled(120, phase), pair.now);
-            pair.set_planes(120, phase);
+            pair.set_layers(120, phase);
             pair.run(pair.now + Duration::from_secs(10), false);
         }
         assert_budget(&pair, 4_000);
-        [Class::Map, Class::Confidence, Class::Depth]
+        [Class::Map, Class::Layer(LayerId::CONFIDENCE), Class::Layer(LayerId::DEPTH)]
             .map(|c| *pair.vehicle.stats().bytes_by_class.get(&c).unwrap_or(&0))
     };
     let [labels, confidence, depth] = sent([0, 0]);
@@ -156,48 +156,80 @@ fn sent(pair: &LinkedEnds, class: Class) -> u64 {
 
 #[test]
 fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_not_name() {
-    let setup = Setup { planes: Some([0, 0]), ..Setup::new(256, 4_000, Codec::Context) };
+    let setup = Setup { layers: Some([0, 0]), ..Setup::new(256, 4_000, Codec::Context) };
     let mut pair = LinkedEnds::new(3, setup, LossyChannel { loss: 0.1, ..CALM });
-    pair.vehicle.set_spend(SpendOrder::new(&[Extra::Exemplars, Extra::Depth]).unwrap());
+    pair.vehicle.set_background(
+        BackgroundOrder::new(&[BackgroundStream::Exemplars, BackgroundStream::Layer(LayerId::DEPTH)]).unwrap(),
+    );
     pair.vehicle.set_map(speckled(20, 1), pair.now);
-    pair.set_planes(100, 1);
-    pair.vehicle.push_extra_object((0..9_000u32).map(|i| ((i * i) >> 3) as u8).collect());
+    pair.set_layers(100, 1);
+    pair.vehicle.push_background_object((0..9_000u32).map(|i| ((i * i) >> 3) as u8).collect());
     for _ in 0..400 {
         pair.run(pair.now + Duration::from_secs(1), false);
-        let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Depth));
+        let (object, depth) = (sent(&pair, Class::Exemplar), sent(&pair, Class::Layer(LayerId::DEPTH)));
         // Spare capacity includes ends of frames too short for a part of the object, and waits for verdicts.
         assert!(object >= 9_000 || depth <= object / 20, "{depth} bytes of depth after {object} of the object");
     }
-    assert!(sent(&pair, Class::Depth) > 500, "then it is its turn");
-    assert_eq!(sent(&pair, Class::Confidence) / 100, 0, "but for what says that nothing was sent");
+    assert!(sent(&pair, Class::Layer(LayerId::DEPTH)) > 500, "then it is its turn");
+    assert_eq!(sent(&pair, Class::Layer(LayerId::CONFIDENCE)) / 100, 0, "but for what says that nothing was sent");
     assert_budget(&pair, 4_000);
 }
 
 #[test]
 fn curiosity_is_told_where_the_operator_asks_for_it_and_nowhere_else() {
     let mut pair = LinkedEnds::new(4, Setup::new(256, 4_000, Codec::Context), LossyChannel { loss: 0.2, ..CALM });
-    pair.vehicle.set_planes([(PlaneSource::new(PlaneScale::Curiosity, Codec::Context, Duration::ZERO), 0)]);
+    pair.vehicle.add_layer(layer(LayerId::CURIOSITY, 0, Codec::Context, Duration::ZERO));
     pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
     let bits = (0..400).map(|i| (Cell::new(i % 20, i / 20), f64::from(i % 7) + f64::from(i / 80)));
-    pair.vehicle.set_plane(PlaneKind::Curiosity, bits, pair.now);
+    pair.vehicle.set_layer(LayerId::CURIOSITY, bits, pair.now);
     pair.run(pair.now + Duration::from_secs(200), true);
     assert!(pair.is_converged(), "nobody waits for it");
-    assert_eq!(sent(&pair, Class::Curiosity), 0);
-    pair.vehicle.set_spend(SpendOrder::new(&[Extra::Curiosity]).unwrap());
+    assert_eq!(sent(&pair, Class::Layer(LayerId::CURIOSITY)), 0);
+    pair.vehicle.set_background(BackgroundOrder::new(&[BackgroundStream::Layer(LayerId::CURIOSITY)]).unwrap());
     assert!(!pair.is_converged());
     pair.run(pair.now + Duration::from_secs(200), true);
-    assert!(pair.is_converged() && sent(&pair, Class::Curiosity) > 50);
+    assert!(pair.is_converged() && sent(&pair, Class::Layer(LayerId::CURIOSITY)) > 50);
     assert_budget(&pair, 4_000);
 }
 
 #[test]
+fn a_layer_made_under_way_arrives_in_small_frames_over_restarts() {
+    let setup = Setup { layers: Some([10, 0]), ..Setup::new(32, 2_000, Codec::Context) };
+    let mut pair = LinkedEnds::new(6, setup, LossyChannel { loss: 0.3, reordering: 0.1, ..CALM });
+    pair.vehicle.set_map(patchy(8, 0).iter(), pair.now);
+    pair.set_layers(8, 1);
+    pair.run(pair.now + Duration::from_secs(30), false);
+    let id = LayerId::new(15).unwrap();
+    let descriptor = LayerDescriptor {
+        name: "chlorophyll".into(),
+        unit: "mg/m³".into(),
+        steps: Steps::Doubling,
+        share: 10,
+        ..layer(LayerId::CURIOSITY, 0, Codec::Png, Duration::ZERO).descriptor().clone()
+    };
+    let made = || LayerSource::new(id, descriptor.clone(), Codec::Context, Duration::ZERO);
+    assert!(pair.vehicle.add_layer(made()) && !pair.vehicle.add_layer(made()), "an index has one layer");
+    pair.vehicle.set_layer(id, (0..64).map(|i| (Cell::new(i % 8, i / 8), f64::from(i))), pair.now);
+    for _ in 0..3 {
+        pair.run(pair.now + Duration::from_secs(60), false);
+        pair.restart_surface();
+    }
+    pair.run(pair.now + Duration::from_secs(4_000), true);
+    assert!(pair.is_converged());
+    let view = pair.surface.vehicle(auv()).unwrap();
+    assert_eq!((view.layers().id("chlorophyll"), view.layers().get(id)), (Some(id), Some(&descriptor)));
+    assert_eq!(view.layer(id).unwrap().levels().shown().explored(), 64);
+    assert_eq!(view.stats().resyncs, 0);
+}
+
+#[test]
 fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_agree_in_the_end() {
-    let after_a_minute = |order: [Extra; 2]| {
+    let after_a_minute = |order: [BackgroundStream; 2]| {
         let mut pair = LinkedEnds::new(5, Setup::new(256, 4_000, Codec::Context), LossyChannel { loss: 0.1, ..CALM });
-        pair.vehicle.set_spend(SpendOrder::new(&order).unwrap());
+        pair.vehicle.set_background(BackgroundOrder::new(&order).unwrap());
         pair.vehicle.source_mut().set_coarse_limit(Some(500));
         pair.vehicle.set_map(speckled(200, 1), pair.now);
-        pair.vehicle.push_extra_object((0..5_000u32).map(|i| ((i * i) >> 3) as u8).collect());
+        pair.vehicle.push_background_object((0..5_000u32).map(|i| ((i * i) >> 3) as u8).collect());
         pair.run(pair.now + Duration::from_secs(60), false);
         let early = sent(&pair, Class::Exemplar);
         pair.run(pair.now + Duration::from_secs(600), true);
@@ -205,21 +237,21 @@ fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_a
         assert_budget(&pair, 4_000);
         early
     };
-    assert!(after_a_minute([Extra::Exemplars, Extra::Finer]) >= 5_000);
-    let at_ends_of_frames = after_a_minute([Extra::Finer, Extra::Exemplars]);
+    assert!(after_a_minute([BackgroundStream::Exemplars, BackgroundStream::Finer]) >= 5_000);
+    let at_ends_of_frames = after_a_minute([BackgroundStream::Finer, BackgroundStream::Exemplars]);
     assert!(at_ends_of_frames < 1_500, "{at_ends_of_frames}");
 }
 
 #[test]
-fn a_new_epoch_clears_the_planes_before_new_labels() {
-    let setup = Setup { planes: Some([0, 0]), ..Setup::new(256, 10_000, Codec::Context) };
+fn a_new_epoch_clears_the_layers_before_new_labels() {
+    let setup = Setup { layers: Some([0, 0]), ..Setup::new(256, 10_000, Codec::Context) };
     let mut pair = LinkedEnds::new(2, setup, LossyChannel { loss: 0.2, ..CALM });
     pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
-    pair.set_planes(20, 0);
+    pair.set_layers(20, 0);
     pair.run(pair.now + Duration::from_secs(200), true);
     let level = |pair: &LinkedEnds, cell: Cell| {
-        let plane = pair.surface.vehicle(auv()).unwrap().plane(PlaneKind::Confidence);
-        plane.map_or(0, |p| p.levels().shown().get(cell))
+        let layer = pair.surface.vehicle(auv()).unwrap().layer(LayerId::CONFIDENCE);
+        layer.map_or(0, |p| p.levels().shown().get(cell))
     };
     assert!(pair.is_converged() && level(&pair, Cell::new(0, 0)) > 0);
     pair.vehicle.begin_epoch(pair.now);

@@ -80,12 +80,12 @@ fn vary(name: &str, target: Target, count: u64) {
 #[test]
 fn changed_bytes_are_taken_or_refused_by_every_decoder() {
     for (name, target) in
-        ALL.into_iter().filter(|(name, _)| !name.ends_with("_link") && !["map_chunk", "plane_chunk"].contains(name))
+        ALL.into_iter().filter(|(name, _)| !name.ends_with("_link") && !["map_chunk", "layer_chunk"].contains(name))
     {
         vary(name, target, 20_000);
     }
     vary("map_chunk", targets::map_chunk, 400);
-    vary("plane_chunk", targets::plane_chunk, 2000);
+    vary("layer_chunk", targets::layer_chunk, 2000);
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! Map coding on procedural surveys.
 
 use scenecast_protocol::map::{Cell, MapSource, Replica, StateReplica, StateSource};
-use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, Codec, Plane, decode, encode_all};
+use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, Codec, LabelRaster, decode, encode_all};
 use scenecast_protocol::time::Instant;
 use scenecast_training::{Flips, MapRng, MapScene, Survey, sampler_noise};
 use std::time::Duration;
 
 /// Maps of a small survey, one for each step.
-fn survey(scene: MapScene) -> Vec<Plane> {
+fn survey(scene: MapScene) -> Vec<LabelRaster> {
     let scene = scene.draw(&mut MapRng::new(42), 96, 96, 8);
     let mut survey = Survey::new(7, scene, Flips { border: 10_000, anywhere: 2000, settling: 0 }, 12);
     let mut maps = vec![survey.map().clone()];
@@ -18,7 +18,7 @@ fn survey(scene: MapScene) -> Vec<Plane> {
     maps
 }
 
-fn bytes(codec: Codec, maps: &[Plane], room: usize) -> usize {
+fn bytes(codec: Codec, maps: &[LabelRaster], room: usize) -> usize {
     let mut bytes = 0;
     for pair in maps.windows(2) {
         let (base, target) = (pair[0].to_grid(), pair[1].to_grid());
@@ -46,7 +46,7 @@ fn a_survey_takes_far_fewer_bytes_than_with_png_chunks() {
     }
 }
 
-fn maps() -> (Plane, Plane) {
+fn maps() -> (LabelRaster, LabelRaster) {
     let mut rng = MapRng::new(3);
     let before = MapScene::Colonies.draw(&mut rng, 60, 40, 6);
     let mut after = before.clone();
@@ -62,7 +62,7 @@ fn a_file_of_any_codec_turns_base_into_target() {
         assert!(changed > 0 && file.chunks.len() > 1);
         let file = ChunkFile::from_bytes(&file.to_bytes()).unwrap();
         assert_eq!(file.apply(Some(&before)).unwrap(), after);
-        let (still, _) = ChunkFile::encode(codec, &Plane::uniform(60, 40, 0), &after, 200).unwrap();
+        let (still, _) = ChunkFile::encode(codec, &LabelRaster::uniform(60, 40, 0), &after, 200).unwrap();
         assert_eq!(still.apply(None).unwrap(), after);
     }
 }
@@ -77,8 +77,8 @@ fn files_cut_off_or_for_another_base_are_refused() {
     let longer: Vec<u8> = bytes.iter().copied().chain([0]).collect();
     assert_eq!(ChunkFile::from_bytes(&longer), Err(ChunkFileError::Length));
     let file = ChunkFile::from_bytes(&bytes).unwrap();
-    assert!(matches!(file.apply(Some(&Plane::uniform(9, 9, 1))), Err(ChunkFileError::Size { .. })));
-    assert_eq!(file.apply(Some(&Plane::uniform(60, 40, 1))), Err(ChunkFileError::OtherBase));
+    assert!(matches!(file.apply(Some(&LabelRaster::uniform(9, 9, 1))), Err(ChunkFileError::Size { .. })));
+    assert_eq!(file.apply(Some(&LabelRaster::uniform(60, 40, 1))), Err(ChunkFileError::OtherBase));
     assert_eq!(file.apply(None), Err(ChunkFileError::OtherBase));
     for i in 0..bytes.len() * 8 {
         let mut damaged = bytes.clone();
@@ -91,11 +91,11 @@ fn files_cut_off_or_for_another_base_are_refused() {
 
 /// Bytes until the replica's painted map agrees with `share` of the target, and until it is equal.
 fn bytes_until(share: f64, side: i32, coarse_after: Option<usize>, room: usize, scene: usize) -> (usize, usize) {
-    let plane = MapScene::ALL[scene].draw(&mut MapRng::new(5), side as usize, side as usize, 8);
+    let raster = MapScene::ALL[scene].draw(&mut MapRng::new(5), side as usize, side as usize, 8);
     let (mut source, mut replica, mut number) = (MapSource::new(Codec::Context), Replica::default(), 0);
     source.set_debounce(Duration::ZERO);
     source.set_coarse_limit(coarse_after);
-    let label = |i: i32| plane.get((i % side) as usize, (i / side) as usize).max(1);
+    let label = |i: i32| raster.get((i % side) as usize, (i / side) as usize).max(1);
     source.set((0..side * side).map(|i| (Cell::new(i % side - 20, i / side), label(i))), Instant::ZERO);
     let (mut bytes, mut early) = (0, None);
     while let Some((chunk, carried)) = source.next_chunk(room, Instant::from_secs_f64(bytes as f64 / 125.0)) {

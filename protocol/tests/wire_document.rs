@@ -3,12 +3,14 @@
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
     Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Figure, Fix, Limits,
-    PlaneSet, PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState,
-    Utility, VersionedSlot,
+    PlannerKind, Polygon, Reaction, RefusalReason, SLOTS, Settings, Slot, SlotId, SlotReport, SlotState, Utility,
+    VersionedSlot,
 };
-use scenecast_protocol::map::{Cell, LabelGrid, PlaneChunk, PlaneKind, PlaneScale};
+use scenecast_protocol::map::{
+    Cell, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
+};
 use scenecast_protocol::map_codec;
-use scenecast_protocol::schedule::{Extra, Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
 use scenecast_protocol::seal::{Direction, MissionKey, SessionKey};
 use scenecast_protocol::wire::{
     AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, ModeReason,
@@ -284,9 +286,17 @@ fn parts_of_a_frame_are_those_of_the_document() {
     };
     let utility =
         Utility { epoch: 1, exploration: 20, curiosity: 0, weights: [(3, 80), (5, -20)].into_iter().collect() };
-    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), spend: SpendOrder::default() };
-    let curious = SpendOrder::new(&[Extra::Curiosity, Extra::Finer, Extra::Depth, Extra::Exemplars, Extra::Confidence]);
-    let curious = Budget { spend: curious.unwrap(), ..budget };
+    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), background: BackgroundOrder::default() };
+    let curious = BackgroundOrder::new(&[
+        BackgroundStream::Layer(LayerId::CURIOSITY),
+        BackgroundStream::Finer,
+        BackgroundStream::Layer(LayerId::DEPTH),
+        BackgroundStream::Exemplars,
+        BackgroundStream::Layer(LayerId::CONFIDENCE),
+    ]);
+    let curious = Budget { background: curious.unwrap(), ..budget };
+    let last = BackgroundStream::Layer(LayerId::new(15).unwrap());
+    let long = Budget { background: BackgroundOrder::new(&[BackgroundStream::Finer, last]).unwrap(), ..budget };
     let fix = Fix { position: WorldPoint::new(-12.3, 400.0), sigma_m: 1.5, age_s: 0.82 };
     let requests = ExemplarRequests {
         epoch: 1,
@@ -295,17 +305,31 @@ fn parts_of_a_frame_are_those_of_the_document() {
             ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 },
         ],
     };
-    let plane = |chunk: PlaneChunk<'_>| {
+    let layer = |chunk: LayerChunk<'_>| {
         let bytes = chunk.encode();
-        assert_eq!(PlaneChunk::decode(&bytes), Some(chunk));
+        assert_eq!(LayerChunk::decode(&bytes), Some(chunk));
         bytes
     };
-    let depth = PlaneScale::Depth { step_dm: 5, first: 24 };
-    assert_eq!((depth.bounds(1), PlaneScale::Confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
+    let built_in = LayerSet::default();
+    let [confidence, curiosity] = [LayerId::CONFIDENCE, LayerId::CURIOSITY].map(|id| built_in.get(id).unwrap());
+    let depth = LayerDescriptor::depth_around(75.5, 0.5);
+    assert_eq!((depth.bounds(1), confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
+    let part = |descriptor: &LayerDescriptor, from: usize, to: usize| {
+        let bytes = descriptor.to_bytes();
+        let part = DescriptorPart {
+            digest: descriptor.digest(),
+            first: from as u8,
+            is_last: to == bytes.len(),
+            bytes: &bytes[from..to],
+        };
+        layer(LayerChunk::Descriptor(built_in.id(&descriptor.name).unwrap(), part))
+    };
+    let whole = |descriptor: &LayerDescriptor| part(descriptor, 0, descriptor.to_bytes().len());
+    let digest = 0x27A6 ^ confidence.digest();
     let settings = Settings {
         planner: Change::To(PlannerKind::Horizon),
         cells: Change::To(CellBand::Coarse),
-        planes: Change::To(PlaneSet { depth: true, ..PlaneSet::default() }),
+        layers: Change::To(LayerMask::from_iter([LayerId::DEPTH])),
         alpha: Change::To(Figure::new(0.01).unwrap()),
         gamma: Change::Configured,
         frames_per_s: Change::To(Figure::new(0.25).unwrap()),
@@ -350,13 +374,16 @@ fn parts_of_a_frame_are_those_of_the_document() {
         ("head of a map chunk of 26 bytes", head(26, 1, false)),
         ("head of a map chunk of 27 bytes", head(27, 2, false)),
         ("head of a map chunk of 300 bytes", head(300, 2, false)),
-        ("head of a plane chunk: a patch of confidence", plane(PlaneChunk::Patch(PlaneScale::Confidence, &[]))),
+        ("layer chunk: confidence announced, quarters of 0 to 1", whole(confidence)),
+        ("layer chunk: depth announced, steps of 0.5 m, level 1 from 12 m on", whole(&depth)),
+        ("the same in two chunks, the first", part(&depth, 0, 10)),
+        ("the second", part(&depth, 10, 19)),
+        ("layer chunk: curiosity announced, whole bits", whole(curiosity)),
+        ("head of a layer chunk: a patch of confidence", layer(LayerChunk::Patch(LayerId::CONFIDENCE, &[]))),
         (
-            "head of a plane chunk: a patch of depth, steps of 0.5 m, level 1 from 12 m on",
-            plane(PlaneChunk::Patch(depth, &[])),
+            "layer chunk: the digest of confidence, of levels with the digest 27A6",
+            layer(LayerChunk::Digest(LayerId::CONFIDENCE, digest)),
         ),
-        ("head of a plane chunk: a patch of curiosity", plane(PlaneChunk::Patch(PlaneScale::Curiosity, &[]))),
-        ("plane chunk: the digest of confidence is 27A6", plane(PlaneChunk::Digest(PlaneKind::Confidence, 0x27A6))),
         (
             "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
             pose(None, &[], false),
@@ -410,14 +437,22 @@ fn parts_of_a_frame_are_those_of_the_document() {
             slot(7, Slot::Fence(fence)),
         ),
         (
-            "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, left-over bits to finer cells, depth, \
+            "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, spare capacity to finer cells, depth, \
              exemplars, confidence",
             slot(3, Slot::Budget(budget)),
         ),
         (
-            "slot: series ABCD, version 3, the same budget, left-over bits to curiosity, finer cells, depth, exemplars, \
+            "slot: series ABCD, version 3, the same budget, spare capacity to curiosity, finer cells, depth, exemplars, \
              confidence",
             slot(3, Slot::Budget(curious)),
+        ),
+        (
+            "slot: series ABCD, version 3, the same budget, spare capacity to finer cells and layer 15",
+            slot(3, Slot::Budget(long)),
+        ),
+        (
+            "slot: series ABCD, version 2, settings: layers 2 and 15 alone",
+            slot(2, Slot::Settings(Settings { layers: Change::To(LayerMask(0x8004)), ..Settings::default() })),
         ),
         (
             "slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, picture 9 with an edge of \

@@ -126,7 +126,7 @@ impl Bench {
 }
 
 #[test]
-fn ardusub_is_armed_guided_to_a_waypoint_and_told_where_it_is() {
+fn ardusub_is_armed_guided_and_given_its_position() {
     let Some(python) = python() else { return };
     let mut bench = Bench::new();
     let port = bench.socket.local_addr().unwrap().port();
@@ -171,7 +171,7 @@ fn a_vehicle_surveys_on_ardusub_and_reports_its_silence() {
         "auv.toml",
         format!(
             "[modem]\nconnect = \"127.0.0.1:{modem}\"\n[survey]\narea_m = [0, 0, 30, 20]\n[link]\nstatus_period_s = 1\n\
-             [autopilot]\nkind = \"mavlink\"\nport = \"udp:127.0.0.1:{mavlink}\"\narm = true\nsilence_s = 2\n\
+             [autopilot]\nkind = \"mavlink\"\nport = \"udp:127.0.0.1:{mavlink}\"\narm = true\ntimeout_s = 2\n\
              [runtime]\nstate_dir = \"{}\"\n",
             state("auv")
         ),

@@ -1,13 +1,13 @@
 //! `scenecast map` as its user meets it.
 
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 use scenecast_tests::{assert_refused, run, scratch};
 use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The first maps of a small survey as `1.png`, `2.png`, ...
-fn series(dir: &Path, steps: usize) -> Vec<Plane> {
+fn series(dir: &Path, steps: usize) -> Vec<LabelRaster> {
     let scene = MapScene::Colonies.draw(&mut MapRng::new(3), 60, 40, 6);
     let mut survey = Survey::new(1, scene, Flips { border: 20_000, anywhere: 0, settling: 0 }, steps);
     let maps = (1..=steps).map(|step| {
@@ -50,10 +50,10 @@ fn a_map_comes_back_exactly_from_its_chunks_with_every_codec() {
         let delta = json(&[&["map", "encode", "--target", text(&target), "--base", text(&base)][..], &common].concat());
         let decode = ["map", "decode", "--base", text(&base), "--in", text(&chunks), "--out", text(&back)];
         assert!(run(&decode).status.success());
-        assert_eq!(Plane::from_png(&std::fs::read(&back).unwrap()).unwrap(), maps[11], "{codec}");
+        assert_eq!(LabelRaster::from_png(&std::fs::read(&back).unwrap()).unwrap(), maps[11], "{codec}");
         let still = json(&[&["map", "encode", "--target", text(&target)][..], &common].concat());
         assert!(run(&["map", "decode", "--in", text(&chunks), "--out", text(&back)]).status.success());
-        assert_eq!(Plane::from_png(&std::fs::read(&back).unwrap()).unwrap(), maps[11], "{codec}");
+        assert_eq!(LabelRaster::from_png(&std::fs::read(&back).unwrap()).unwrap(), maps[11], "{codec}");
         let of = |figures: &Value, name: &str| figures[name].as_u64().unwrap();
         let changed = maps[10].labels.iter().zip(&maps[11].labels).filter(|(old, new)| old != new).count();
         assert_eq!(of(&delta, "cells_changed"), changed as u64);
@@ -82,8 +82,8 @@ fn bad_maps_and_chunk_files_are_refused_in_one_line() {
     series(&dir, 2);
     let (map, rgb, high, small) = (dir.join("2.png"), dir.join("rgb.png"), dir.join("high.png"), dir.join("small.png"));
     rgb_png(&rgb);
-    std::fs::write(&high, Plane::uniform(60, 40, 255).to_png()).unwrap();
-    std::fs::write(&small, Plane::uniform(9, 7, 1).to_png()).unwrap();
+    std::fs::write(&high, LabelRaster::uniform(60, 40, 255).to_png()).unwrap();
+    std::fs::write(&small, LabelRaster::uniform(9, 7, 1).to_png()).unwrap();
     let (chunks, cut, bent) = (dir.join("good.scmc"), dir.join("cut.scmc"), dir.join("bent.scmc"));
     json(&["map", "encode", "--target", text(&map), "--base", text(&dir.join("1.png")), "--out", text(&chunks)]);
     let bytes = std::fs::read(&chunks).unwrap();

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use scenecast_config::Config;
-use scenecast_protocol::map::PlaneScale;
+use scenecast_protocol::map::LayerId;
 use scenecast_protocol::time::Instant;
 use scenecast_rehearsal::{Mission, MissionOptions, World, report};
 use serde_json::Value;
@@ -43,7 +43,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 18, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_maps_are_equal_once_the_channel_has_drained(
+    fn the_operators_map_equals_the_vehicles_once_the_channel_has_drained(
         seed in 0u64..1000,
         loss in prop_oneof![Just("0"), Just("0.1"), Just("0.3")],
         frame in prop_oneof![Just("64"), Just("256"), Just("1000")],
@@ -72,20 +72,20 @@ fn whole_missions_pass_with_either_codec() {
 }
 
 #[test]
-fn planes_arrive_and_labels_do_not_wait_for_them() {
+fn layers_arrive_and_labels_do_not_wait_for_them() {
     let without = fly(&["map.layers=[]"], 8);
     assert_eq!(without["map"]["layers"], serde_json::json!({}));
     for sets in [&["map.layer_shares={}"], &["map.layer_shares={ confidence = 10, depth = 5 }"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
-        for plane in ["confidence", "depth"] {
-            let plane = &with["map"]["layers"][plane];
-            assert_eq!(plane["agreement_final"], 1.0, "{plane}");
-            assert!(plane["agreement_mean"].as_f64().unwrap() > 0.8, "{plane}");
-            assert_eq!(plane["cells"], with["survey"]["explored_cells"]);
+        for layer in ["confidence", "depth"] {
+            let layer = &with["map"]["layers"][layer];
+            assert_eq!(layer["agreement_final"], 1.0, "{layer}");
+            assert!(layer["agreement_mean"].as_f64().unwrap() > 0.8, "{layer}");
+            assert_eq!(layer["cells"], with["survey"]["explored_cells"]);
         }
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
-        assert!(mean(&with) > mean(&without) - 0.02, "{} with planes, {} without", mean(&with), mean(&without));
+        assert!(mean(&with) > mean(&without) - 0.02, "{} with layers, {} without", mean(&with), mean(&without));
     }
 }
 
@@ -100,8 +100,8 @@ fn curiosity_is_sent_only_with_a_share_or_as_background() {
     ] {
         let with = fly(&[sets], 8);
         assert_sound(&with);
-        let plane = &with["map"]["layers"]["curiosity"];
-        assert_eq!((&plane["agreement_final"], &plane["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
+        let layer = &with["map"]["layers"]["curiosity"];
+        assert_eq!((&layer["agreement_final"], &layer["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
         let mean = |figures: &Value| figures["map"]["agreement_mean"].as_f64().unwrap();
         assert!(mean(&with) > mean(&without) - 0.02, "{} with curiosity, {} without", mean(&with), mean(&without));
     }
@@ -113,10 +113,10 @@ fn levels_of_curiosity_tell_the_cells_of_a_reef_apart() {
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 8, record: None }).unwrap();
     mission.advance(Instant::from_secs_f64(119.0)).unwrap();
     let vehicle = mission.vehicle();
-    let plane = vehicle.planes().find(|p| p.scale() == PlaneScale::Curiosity).unwrap();
+    let layer = vehicle.layers().find(|p| p.id() == LayerId::CURIOSITY).unwrap();
     let mut cells = [0; 17];
-    plane.target().iter().for_each(|(_, level)| cells[usize::from(level)] += 1);
-    let common = cells.iter().filter(|&&n| n * 20 > plane.target().explored()).count();
+    layer.target().iter().for_each(|(_, level)| cells[usize::from(level)] += 1);
+    let common = cells.iter().filter(|&&n| n * 20 > layer.target().explored()).count();
     assert!((3..=6).contains(&common), "{cells:?}");
 }
 
@@ -128,7 +128,7 @@ fn the_same_seed_gives_the_same_report() {
 }
 
 #[test]
-fn directives_images_and_fixes_make_the_round_trip() {
+fn directives_images_and_fixes_reach_the_vehicle_and_what_it_answers_comes_back() {
     let figures = fly(&["survey.duration_s=400"], 4);
     assert_sound(&figures);
     assert_eq!(figures["directives"]["issued"], figures["directives"]["applied"], "{figures}");

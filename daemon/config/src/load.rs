@@ -112,12 +112,12 @@ fn apply(config: &mut Config, given: &Given) -> Result<(), UserError> {
         let takes = format!("{} has {}", key.name, members.join(", "));
         return Err(UserError::Input(format!("{place}: {} has no member {member}; {takes}", key.name)));
     }
-    (key.operations.set)(config, member, value, &key.rule).ok_or_else(|| refused(key, given, &members))
+    (key.operations.set)(config, member, value, &key.rule).ok_or_else(|| refused(key, given))
 }
 
-fn refused(key: &Key, given: &Given, members: &[&str]) -> UserError {
+fn refused(key: &Key, given: &Given) -> UserError {
     let Given { key: name, value, place } = given;
-    let new_form = value.as_array().filter(|_| !members.is_empty()).and_then(|list| as_table(list, members));
+    let new_form = value.as_array().and_then(|list| as_table(list, key.name));
     UserError::Input(match new_form {
         Some(table) => format!("{place}: {name} = {value} is the old form; write {} = {table}", key.leaf()),
         None => format!("{place}: {name} = {value} is not allowed; allowed: {}", key.allowed()),
@@ -261,7 +261,8 @@ mod tests {
     #[test]
     fn layers_are_named_each_once_and_their_shares_leave_something_to_labels() {
         let said = message(&["map.layers=[\"colour\"]"]);
-        assert!(said.ends_with("a list of different words of confidence, depth, curiosity"), "{said}");
+        let names: Vec<&str> = LayerName::all().map(LayerName::as_str).collect();
+        assert!(said.ends_with(&format!("a list of different words of {}", names.join(", "))), "{said}");
         assert!(message(&["map.layers=[\"depth\", \"depth\"]"]).contains("different words"));
         assert!(message(&["map.layers=depth"]).contains("a list"));
         let said = message(&["map.layer_shares={ confidence = 60, curiosity = 50 }"]);

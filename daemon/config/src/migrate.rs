@@ -65,11 +65,10 @@ pub fn migrate(path: &Path, text: &str) -> Result<Migration, UserError> {
 
 /// The table for a list by position; `None` for a value that has the present form.
 fn new_form(key: &Key, value: &Spanned<DeValue<'_>>) -> Result<Option<String>, String> {
-    let members = (key.operations.members)();
-    if members.is_empty() || !matches!(value.get_ref(), DeValue::Array(_)) {
+    if !key.is_table() || !matches!(value.get_ref(), DeValue::Array(_)) {
         return Ok(None);
     }
-    let list = plain(value).and_then(|value| as_table(value.as_array()?, &members));
+    let list = plain(value).and_then(|value| as_table(value.as_array()?, key.name));
     list.map(Some).ok_or_else(|| format!("{} takes {}", key.name, key.allowed()))
 }
 

@@ -33,10 +33,17 @@ impl OldKey {
     }
 }
 
-/// A list of numbers by position, as keys with members once took it, as an inline table.
+/// Keys that once took a list of numbers, with the member of each position.
+const OLD_LISTS: [(&str, &[&str]); 2] = [
+    ("link.shares", &["directive", "status", "fix", "map", "exemplar"]),
+    ("map.layer_shares", &["confidence", "depth", "curiosity"]),
+];
+
+/// The inline table of a list of numbers by position, the old form of the key of this name.
 ///
-/// `None` if it is no list of as many whole numbers as there are members.
-pub(crate) fn as_table(list: &[Value], members: &[&str]) -> Option<String> {
+/// `None` if the key has no old form, or if it is no list of as many whole numbers.
+pub(crate) fn as_table(list: &[Value], key: &str) -> Option<String> {
+    let (_, members) = OLD_LISTS.into_iter().find(|(name, _)| *name == key)?;
     let numbers: Vec<i64> = list.iter().map(Value::as_integer).collect::<Option<_>>()?;
     let pairs: Vec<String> = members.iter().zip(&numbers).map(|(name, number)| format!("{name} = {number}")).collect();
     (numbers.len() == members.len()).then(|| format!("{{ {} }}", pairs.join(", ")))

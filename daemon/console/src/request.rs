@@ -9,7 +9,7 @@ use crate::state::AcceptedOrder;
 use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
@@ -63,12 +63,12 @@ pub fn handle_request(surface: &mut Surface, request: SurfaceRequest, cell_m: f6
 }
 
 fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Option<Reply> {
-    let known = |surface: &Surface, id: u8| Address::vehicle(id).filter(|&a| surface.desk(a).is_some());
+    let known = |surface: &Surface, id: u8| Address::vehicle(id).filter(|&a| surface.record(a).is_some());
     Some(match request {
         SurfaceRequest::Map(id) => map(surface, known(surface, id)?, cell_m, now)?,
         SurfaceRequest::Exemplar(id, label, number) => {
-            let desk = surface.desk(known(surface, id)?)?;
-            Reply::File("image/webp", desk.album.page(label)?.picture(number)?.webp.clone())
+            let record = surface.record(known(surface, id)?)?;
+            Reply::File("image/webp", record.exemplars.page(label)?.picture(number)?.webp.clone())
         }
         SurfaceRequest::Fit(id, bits_per_s) => match fit::fit(surface, known(surface, id)?, cell_m, bits_per_s) {
             Ok(fit) => Reply::Fit(Box::new(fit)),
@@ -124,7 +124,8 @@ fn order_exemplar(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder
 
 fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     let shares = order.shares.map(|s| Shares([s.directive, s.status, s.fix, s.map, s.exemplar]));
-    let background = order.background.as_deref().map(SpendOrder::from_names).transpose();
+    let background =
+        order.background.as_deref().map(|names| BackgroundOrder::from_names(names, &surface.layers())).transpose();
     let changed = background.and_then(|background| surface.set_budget(order.budget_bps, shares, background, now));
     if let Err(reason) = changed {
         return Reply::Refused(reason);

@@ -31,6 +31,20 @@ pub struct MissionState {
     pub position: Option<SurfacePosition>,
     /// The link to all vehicles together.
     pub link: LinkSummary,
+    /// The layers that an operator can name in settings and in the order of the background streams.
+    #[serde(default)]
+    pub layers: Vec<LayerInfo>,
+}
+
+/// A layer of the map that vehicles can send in addition to the labels.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LayerInfo {
+    /// Its name.
+    pub name: String,
+    /// The unit of its values; empty if they have none.
+    pub unit: String,
+    /// One sentence on its meaning; empty for a layer that only a vehicle knows.
+    pub summary: String,
 }
 
 /// The position of the surface by GPS, and counts of GPS and USBL measurements.

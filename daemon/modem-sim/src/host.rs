@@ -17,7 +17,7 @@ pub enum FromHost {
         line: u32,
         bytes: Vec<u8>,
     },
-    /// A TCP client connected.
+    /// A TCP client connected to the port.
     Joined {
         modem: usize,
         stream: TcpStream,

@@ -33,7 +33,7 @@ pub struct Options {
     pub link_dir: Option<PathBuf>,
     /// Emulated seconds per second of wall time.
     pub time_scale: f64,
-    /// Replaces the scenario's seed.
+    /// Seed that replaces the scenario's.
     pub seed: Option<u64>,
 }
 

@@ -4,7 +4,7 @@ use super::mission::Mission;
 use scenecast_core::drop_counts::dropped;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
-use scenecast_protocol::map::{LabelGrid, PlaneSource};
+use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::schedule::Class;
 use scenecast_scoring::mutual_information_nats;
 use serde_json::{Value, json};
@@ -95,28 +95,29 @@ fn map(m: &Mission) -> Value {
         "agreement_final": round(m.meters.labels.agreement()),
         "agreement_mean": round(m.meters.labels.agreement_mean_of_survey()),
         "age_s": summary(m.meters.labels.delays(m.now()).summary()),
-        "layers": m.vehicle().planes().map(|p| plane(m, p)).collect::<BTreeMap<_, _>>(),
+        "layers": m.vehicle().layers().map(|p| layer(m, p)).collect::<BTreeMap<_, _>>(),
     })
 }
 
 /// A layer by its name: cells with a level, agreement and delay of the operator's copy, and its bytes.
-fn plane(m: &Mission, plane: &PlaneSource) -> (&'static str, Value) {
-    let kind = plane.scale().kind();
-    let bytes = m.vehicle().stats().bytes_by_class.get(&kind.into()).copied().unwrap_or(0);
-    let mut layer = json!({ "payload_bytes": bytes, "cells": plane.target().explored() });
-    if let (Some(meter), Some(layer)) = (m.meters.layers.get(&kind), layer.as_object_mut()) {
+fn layer(m: &Mission, layer: &LayerSource) -> (String, Value) {
+    let id = layer.id();
+    let bytes = m.vehicle().stats().bytes_by_class.get(&Class::Layer(id)).copied().unwrap_or(0);
+    let mut layer = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
+    if let (Some(meter), Some(layer)) = (m.meters.layers.get(&id), layer.as_object_mut()) {
         layer.insert("agreement_final".into(), round(meter.agreement()).into());
         layer.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
         layer.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
     }
-    (kind.name(), layer)
+    (layer.descriptor().name.clone().into_owned(), layer)
 }
 
-fn by_class(m: &Mission) -> BTreeMap<&'static str, u64> {
-    let mut sums: BTreeMap<&'static str, u64> = Class::ALL.into_iter().map(|c| (c.name(), 0)).collect();
+fn by_class(m: &Mission) -> BTreeMap<String, u64> {
+    let layers = m.surface().view(m.address()).map(|v| v.layers().clone()).unwrap_or_default();
+    let mut sums: BTreeMap<String, u64> = Class::all(&layers).map(|class| (class.name_in(&layers), 0)).collect();
     let surface = m.surface().view(m.address()).map(|v| v.stats().bytes_by_class.clone()).unwrap_or_default();
     for (class, bytes) in m.vehicle().stats().bytes_by_class.iter().chain(&surface) {
-        *sums.entry(class.name()).or_default() += bytes;
+        *sums.entry(class.name_in(&layers)).or_default() += bytes;
     }
     sums
 }
@@ -184,7 +185,7 @@ fn directives(m: &Mission) -> Value {
 }
 
 fn exemplars(m: &Mission) -> Value {
-    let pages = || m.surface().desk(m.address()).into_iter().flat_map(|d| d.album.pages()).map(|(_, page)| page);
+    let pages = || m.surface().record(m.address()).into_iter().flat_map(|d| d.exemplars.pages()).map(|(_, page)| page);
     let pictures = || pages().flat_map(|page| &page.pictures);
     let delivered = pictures().filter(|p| p.asked).count();
     json!({
@@ -209,15 +210,15 @@ fn survey(m: &Mission) -> Value {
 impl Mission {
     /// The newest image of each label that has one at the surface, as WebP files.
     pub fn exemplars(&self) -> impl Iterator<Item = (u8, &[u8])> {
-        let desk = self.surface().desk(self.address());
-        let pages = desk.into_iter().flat_map(|d| d.album.pages());
+        let record = self.surface().record(self.address());
+        let pages = record.into_iter().flat_map(|d| d.exemplars.pages());
         pages.filter_map(|(label, page)| Some((label, page.picture(None)?.webp.as_slice())))
     }
 
     /// Number of legs chosen after the fence took effect that leave it, cross a keep-out, or do not lead back inside
     /// after a fix has placed the vehicle outside.
     pub fn legs_outside_fence(&self) -> usize {
-        let Some(fence) = self.surface().desk(self.address()).and_then(|d| d.fence.as_ref()) else { return 0 };
+        let Some(fence) = self.surface().record(self.address()).and_then(|d| d.fence.as_ref()) else { return 0 };
         let outside = |from, to| scenecast_motion::stretches_outside(&[from, to], fence) > 0;
         let is_out = |&&(from, to): &&super::mission::Leg| {
             if outside(from, from) { outside(to, to) } else { outside(from, to) }

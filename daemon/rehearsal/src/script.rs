@@ -57,7 +57,7 @@ impl Script {
         script
     }
 
-    /// An operator without acts.
+    /// The script of an operator without acts.
     pub fn none() -> Self {
         Self { acts: VecDeque::new() }
     }

@@ -64,12 +64,12 @@ impl TopicScene {
         let flat: Vec<FlatCell> = self.topics.iter().enumerate().map(cell).collect();
         let published = self.book.publish(&flat);
         let cells = published.iter().map(|c| (Cell::new(c.x, c.y), c.label)).collect();
-        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
+        let (layers, perplexity) = (BTreeMap::new(), Vec::new());
         MapUpdate {
             t_s: 0.0,
             epoch: self.book.epoch(),
             cells,
-            planes,
+            layers,
             perplexity,
             labels: self.book.labels().count() as u8,
         }

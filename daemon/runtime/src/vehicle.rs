@@ -16,6 +16,7 @@ use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_host::{CameraPose, FrameEvent, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_protocol::directive::Budget;
+use scenecast_protocol::map::LayerSet;
 use std::time::Duration;
 
 /// Maximum time between two calls of the host.
@@ -136,9 +137,9 @@ impl VehicleShell {
     /// Replaces the budget and the shares that the surface ordered by those of the configuration.
     fn follow(&mut self, config: &Config) {
         let link = &config.link;
-        let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, spend: link.background };
-        let extras = budget.spend.names().join(", ");
-        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {extras}", budget.bits_per_s, budget.shares.0);
+        let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background };
+        let streams = budget.background.names(&LayerSet::default()).join(", ");
+        tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {streams}", budget.bits_per_s, budget.shares.0);
         self.host.handle_budget(budget, self.clock.now());
     }
 

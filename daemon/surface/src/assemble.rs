@@ -38,6 +38,6 @@ pub fn assemble(
     };
     let link = SurfaceLink::new(link, seed, now);
     let mut surface = Surface::new(link, vehicles).with_tuning_table(table);
-    surface.set_spend(config.link.background);
+    surface.set_background(config.link.background);
     Ok(surface)
 }

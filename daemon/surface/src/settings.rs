@@ -1,7 +1,7 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlaneSet, PlannerKind, Settings};
-use scenecast_protocol::map::PlaneKind;
+use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlannerKind, Settings};
+use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct SettingsOrder {
     /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
     /// first where there is much to say. The cells of its model stay.
     pub cells: Option<String>,
-    /// The layers that it sends in addition to the labels: none, or different ones of confidence, depth, curiosity, separated by commas.
+    /// The layers that it sends in addition to the labels: none, or names of layers in any order, separated by commas.
     pub layers: Option<String>,
     /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
     pub alpha: Option<f64>,
@@ -29,29 +29,29 @@ pub struct SettingsOrder {
     pub frames_per_s: Option<f64>,
 }
 
-/// The planes of these names, with commas between.
-fn plane_set(names: &str) -> Option<PlaneSet> {
+/// The layers of these names, with commas between; `None` if one is unknown or named twice.
+fn layer_mask(names: &str, layers: &LayerSet) -> Option<LayerMask> {
     let names: Vec<&str> = if names == "none" { Vec::new() } else { names.split(',').map(str::trim).collect() };
-    let set = PlaneSet::of(|kind| names.contains(&kind.name()));
-    (set.kinds().count() == names.len()).then_some(set)
+    layers.mask(names.iter().copied()).ok().filter(|mask| mask.iter().count() == names.len())
 }
 
-fn plane_names(set: PlaneSet) -> String {
-    let names: Vec<&str> = set.kinds().map(PlaneKind::name).collect();
+fn layer_names(mask: LayerMask, layers: &LayerSet) -> String {
+    let names: Vec<String> = mask.iter().map(|id| layers.name(id)).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(",") }
 }
 
 impl SettingsOrder {
     /// The slot's content.
-    pub fn read(&self) -> Result<Settings, String> {
+    pub fn read(&self, layers: &LayerSet) -> Result<Settings, String> {
+        let names: Vec<&str> = layers.iter().map(|(_, layer)| &*layer.name).collect();
         let mut settings = Settings {
             planner: choice("planner", &self.planner, PlannerKind::from_name, "lawnmower, greedy or horizon")?,
             cells: choice("cells", &self.cells, CellBand::from_name, "fine, coarse-to-fine or coarse")?,
-            planes: choice(
+            layers: choice(
                 "layers",
                 &self.layers,
-                plane_set,
-                "none, or different ones of confidence, depth, curiosity",
+                |names| layer_mask(names, layers),
+                &format!("none, or different ones of {}", names.join(", ")),
             )?,
             ..Settings::default()
         };
@@ -90,8 +90,9 @@ fn choice<T>(
     }
 }
 
-impl From<&Settings> for SettingsOrder {
-    fn from(settings: &Settings) -> Self {
+impl SettingsOrder {
+    /// Settings as they would be typed, with the names of these layers.
+    pub fn of(settings: &Settings, layers: &LayerSet) -> Self {
         fn told<T, U>(change: Change<T>, configured: U, tell: impl FnOnce(T) -> U) -> Option<U> {
             match change {
                 Change::Keep => None,
@@ -104,7 +105,7 @@ impl From<&Settings> for SettingsOrder {
         Self {
             planner: told(settings.planner, String::new(), |p| text(p.name())),
             cells: told(settings.cells, String::new(), |c| text(c.name())),
-            layers: told(settings.planes, String::new(), plane_names),
+            layers: told(settings.layers, String::new(), |mask| layer_names(mask, layers)),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -117,14 +118,14 @@ impl From<&Settings> for SettingsOrder {
 /// The operator's papers about the settings of a vehicle. Each order that goes out holds all that this surface has asked for,
 /// so a newer one may take the place of one that the vehicle never heard.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SettingsDesk {
+pub struct SettingsRecord {
     asked: Settings,
     in_force: Settings,
     /// An order was superseded of which nobody knows whether the vehicle follows it.
     is_unsure: bool,
 }
 
-impl SettingsDesk {
+impl SettingsRecord {
     /// All that this surface has asked for.
     pub fn asked(&self) -> &Settings {
         &self.asked
@@ -159,9 +160,10 @@ impl SettingsDesk {
 mod tests {
     use super::*;
     use scenecast_protocol::directive::RefusalReason;
+    use scenecast_protocol::map::BUILT_IN_LAYERS;
 
     fn read(json: &str) -> Result<Settings, String> {
-        serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read()
+        serde_json::from_str::<SettingsOrder>(json).map_err(|e| e.to_string())?.read(&LayerSet::default())
     }
 
     #[test]
@@ -181,9 +183,11 @@ mod tests {
             refused(r#"{"cells": "huge"}"#),
             "cells \"huge\": it takes fine, coarse-to-fine or coarse, or \"\" as configured"
         );
-        for planes in ["perplexity", "depth,depth", "depth,", "none,depth"] {
-            let said = refused(&format!(r#"{{"layers": "{planes}"}}"#));
-            assert!(said.contains("none, or different ones of confidence, depth, curiosity"), "{said}");
+        let names: Vec<&str> = BUILT_IN_LAYERS.iter().map(|layer| &*layer.descriptor.name).collect();
+        let allowed = format!("none, or different ones of {}", names.join(", "));
+        for layers in ["perplexity", "depth,depth", "depth,", "none,depth"] {
+            let said = refused(&format!(r#"{{"layers": "{layers}"}}"#));
+            assert!(said.contains(&allowed), "{said}");
         }
         assert!(refused(r#"{"planner": "random"}"#).contains("lawnmower, greedy or horizon"));
         assert!(refused(r#"{"delta": 1}"#).contains("unknown field `delta`"));
@@ -193,9 +197,9 @@ mod tests {
     fn an_order_is_told_as_it_was_typed() {
         let typed = r#"{"planner":"","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
-        assert_eq!(SettingsOrder::from(&order.read().unwrap()), order);
-        let planes = |names: &str| read(&format!(r#"{{"layers": "{names}"}}"#)).unwrap();
-        let told = |names: &str| SettingsOrder::from(&planes(names)).layers.unwrap();
+        assert_eq!(SettingsOrder::of(&order.read(&LayerSet::default()).unwrap(), &LayerSet::default()), order);
+        let layers = |names: &str| read(&format!(r#"{{"layers": "{names}"}}"#)).unwrap();
+        let told = |names: &str| SettingsOrder::of(&layers(names), &LayerSet::default()).layers.unwrap();
         assert_eq!(["none", "curiosity, depth"].map(told), ["none", "depth,curiosity"]);
         assert_eq!(read("{}").unwrap(), Settings::default());
     }
@@ -215,24 +219,28 @@ mod tests {
     #[test]
     fn what_is_in_force_is_what_the_vehicle_said_last() {
         let order = |json: &str| read(json).unwrap();
-        let mut desk = SettingsDesk::default();
-        let send = |desk: &mut SettingsDesk, json: &str, last| {
-            let settings = desk.next_order(&order(json), last);
-            desk.handle_sent(settings, last);
+        let mut record = SettingsRecord::default();
+        let send = |record: &mut SettingsRecord, json: &str, last| {
+            let settings = record.next_order(&order(json), last);
+            record.handle_sent(settings, last);
         };
-        send(&mut desk, r#"{"alpha": 0.5}"#, None);
-        assert_eq!(desk.in_force(), Some(&Settings::default()));
-        send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
-        desk.handle_settled(OrderStatus::Applied);
-        assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
-        send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
-        assert_eq!(desk.in_force(), None, "the vehicle may follow the planes already");
+        send(&mut record, r#"{"alpha": 0.5}"#, None);
+        assert_eq!(record.in_force(), Some(&Settings::default()));
+        send(&mut record, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
+        record.handle_settled(OrderStatus::Applied);
+        assert_eq!(
+            record.in_force(),
+            Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)),
+            "the first was never sent alone"
+        );
+        send(&mut record, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
+        send(&mut record, r#"{"beta": 1}"#, Some(OrderStatus::Received));
+        assert_eq!(record.in_force(), None, "the vehicle may follow the layers already");
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
-        desk.handle_settled(refused);
-        send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
-        assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        desk.handle_settled(OrderStatus::Applied);
-        assert_eq!(desk.in_force(), Some(desk.asked()));
+        record.handle_settled(refused);
+        send(&mut record, r#"{"alpha": 0}"#, Some(refused));
+        assert_eq!(record.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
+        record.handle_settled(OrderStatus::Applied);
+        assert_eq!(record.in_force(), Some(record.asked()));
     }
 }

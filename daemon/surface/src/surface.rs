@@ -1,17 +1,17 @@
 //! The surface's role: link and operator in one sans-IO whole.
 
-use super::desk::Desk;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use super::settings::SettingsOrder;
+use super::vehicle_record::VehicleRecord;
 use scenecast_core::UsblLine;
 use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::map::{LabelGrid, LayerSet};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement};
 use std::collections::{BTreeMap, VecDeque};
@@ -33,9 +33,9 @@ pub enum SurfaceOutput {
 
 pub struct Surface {
     pub(super) link: SurfaceLink,
-    pub(super) desks: BTreeMap<Address, Desk>,
+    pub(super) records: BTreeMap<Address, VehicleRecord>,
     outputs: VecDeque<SurfaceOutput>,
-    spend: SpendOrder,
+    background: BackgroundOrder,
     /// Where the surface is and where it sees the vehicles, if it has a GPS.
     relay: Option<Relay>,
     tuning: TuningTable,
@@ -44,9 +44,9 @@ pub struct Surface {
 impl Surface {
     /// A surface that speaks with these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
-        let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
-        let (tuning, spend) = (TuningTable::default(), SpendOrder::default());
-        Self { link, desks, outputs: VecDeque::new(), spend, relay: None, tuning }
+        let records = vehicles.into_iter().map(|(address, name)| (address, VehicleRecord::new(name))).collect();
+        let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
+        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning }
     }
 
     /// Knows what settings of the scene model reach.
@@ -60,13 +60,13 @@ impl Surface {
         format!("vehicle {}", vehicle.number())
     }
 
-    pub fn vehicles(&self) -> impl Iterator<Item = (Address, &Desk)> {
-        self.desks.iter().map(|(&a, d)| (a, d))
+    pub fn vehicles(&self) -> impl Iterator<Item = (Address, &VehicleRecord)> {
+        self.records.iter().map(|(&a, d)| (a, d))
     }
 
     /// The operator's papers about a vehicle.
-    pub fn desk(&self, vehicle: Address) -> Option<&Desk> {
-        self.desks.get(&vehicle)
+    pub fn record(&self, vehicle: Address) -> Option<&VehicleRecord> {
+        self.records.get(&vehicle)
     }
 
     /// The link's view of a vehicle.
@@ -76,13 +76,13 @@ impl Surface {
 
     /// The operator's map of a vehicle.
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let whole = self.desks.get(&vehicle).and_then(|d| d.whole.as_ref());
+        let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
-    /// Counts up whenever the operator's map of a vehicle or a plane of it changes.
+    /// Counts up whenever the operator's map of a vehicle or a layer of it changes.
     pub fn map_version(&self, vehicle: Address) -> u64 {
-        let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
+        let wholes = self.records.get(&vehicle).map_or(0, |d| d.wholes);
         wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
     }
 
@@ -138,9 +138,9 @@ impl Surface {
                 utility.weights.insert(label, weight);
             }
         }
-        let desk = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?;
-        utility.epoch = desk.epoch;
-        desk.utility = utility.clone();
+        let record = self.records.get_mut(&vehicle).ok_or("no such vehicle")?;
+        utility.epoch = record.epoch;
+        record.utility = utility.clone();
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 
@@ -158,7 +158,7 @@ impl Surface {
     pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
         let fence = order.read()?;
         let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
         Ok(version)
     }
 
@@ -166,17 +166,18 @@ impl Surface {
     pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
         Ok(version)
     }
 
     /// Changes settings of a vehicle; what the order does not name stays as it is there.
     pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
-        let order = order.read()?;
+        let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
+        let order = order.read(view.layers())?;
         let last = self.life_of(vehicle, SlotId::Settings);
-        let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
+        let settings = self.records.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
         Ok(version)
     }
 
@@ -192,28 +193,40 @@ impl Surface {
         self.tuning.fit(cell_m, bits_per_s)
     }
 
+    /// The built-in layers and those that vehicles have announced, by the index of the first vehicle with such a layer.
+    pub fn layers(&self) -> LayerSet {
+        let mut all = LayerSet::default();
+        let views = self.link.vehicles().filter_map(|vehicle| self.link.vehicle(vehicle));
+        for (id, layer) in views.flat_map(|view| view.layers().iter()) {
+            if all.id(&layer.name).is_none() {
+                all.insert(id, layer.clone());
+            }
+        }
+        all
+    }
+
     /// How far the last order of a slot has come.
     fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
         self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
-    /// What the vehicles spend left-over bits on, as it was configured or sent last.
-    pub fn spend(&self) -> SpendOrder {
-        self.spend
+    /// The order of the background streams of the vehicles, as it was configured or sent last.
+    pub fn background(&self) -> BackgroundOrder {
+        self.background
     }
 
-    /// What the next budget that is sent says of left-over bits, unless it is given.
-    pub fn set_spend(&mut self, spend: SpendOrder) {
-        self.spend = spend;
+    /// The order of the background streams in the next budget, unless that gives another.
+    pub fn set_background(&mut self, background: BackgroundOrder) {
+        self.background = background;
     }
 
     /// Changes the bit budget of the surface and of every vehicle, and if they are given the least shares of the classes and
-    /// what left-over bits are spent on.
+    /// the order of the background streams.
     pub fn set_budget(
         &mut self,
         bits_per_s: u32,
         shares: Option<Shares>,
-        spend: Option<SpendOrder>,
+        background: Option<BackgroundOrder>,
         now: Instant,
     ) -> Result<(), String> {
         if !(10..=10_000_000).contains(&bits_per_s) {
@@ -224,13 +237,13 @@ impl Surface {
             let sum: u32 = shares.0.iter().map(|&s| u32::from(s)).sum();
             return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
         }
-        let vehicles: Vec<Address> = self.desks.keys().copied().collect();
-        let spend = spend.unwrap_or(self.spend);
-        let slot = Slot::Budget(Budget { bits_per_s, shares, spend });
+        let vehicles: Vec<Address> = self.records.keys().copied().collect();
+        let background = background.unwrap_or(self.background);
+        let slot = Slot::Budget(Budget { bits_per_s, shares, background });
         vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
         self.link.set_budget(bits_per_s, now);
         self.link.set_shares(shares);
-        self.spend = spend;
+        self.background = background;
         Ok(())
     }
 
@@ -301,13 +314,13 @@ impl Surface {
         }
         let link = &self.link;
         let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
-        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.hear(now));
+        self.records.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, record)| record.pauses.hear(now));
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
         match event {
             SurfaceEvent::VehicleFound(vehicle) => {
-                self.desks.entry(vehicle).or_insert_with(|| Desk::new(Self::name_of(vehicle)));
+                self.records.entry(vehicle).or_insert_with(|| VehicleRecord::new(Self::name_of(vehicle)));
                 Some(SurfaceOutput::VehicleFound(vehicle))
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
@@ -318,35 +331,35 @@ impl Surface {
             SurfaceEvent::SlotDecided(vehicle, slot) => {
                 let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
                 let (life, version) = (settled.status, settled.version);
-                let desk = self.desks.get_mut(&vehicle)?;
+                let record = self.records.get_mut(&vehicle)?;
                 if slot == SlotId::Settings {
-                    desk.settings.handle_settled(life);
+                    record.settings.handle_settled(life);
                 }
                 if life == OrderStatus::Applied {
-                    desk.handle_applied(slot, version);
+                    record.handle_applied(slot, version);
                 }
                 self.handle_settled(vehicle, slot, now);
                 Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
-                self.desks.get_mut(&vehicle)?.handle_status(status, now);
+                self.records.get_mut(&vehicle)?.handle_status(status, now);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::ObjectProgress { vehicle, head, held, total } => {
-                self.desks.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
+                self.records.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::Object(vehicle, bytes) => {
-                let desk = self.desks.get_mut(&vehicle)?;
+                let record = self.records.get_mut(&vehicle)?;
                 if let Some(whole) = label_picture::read_whole(&bytes) {
-                    desk.whole = Some(whole);
-                    desk.wholes += 1;
+                    record.whole = Some(whole);
+                    record.wholes += 1;
                     return Some(SurfaceOutput::MapChanged(vehicle));
                 }
                 let exemplar = Exemplar::decode(&bytes)?;
-                let is_new = desk.handle_exemplar(&exemplar, now);
+                let is_new = record.handle_exemplar(&exemplar, now);
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
         }
@@ -374,8 +387,8 @@ impl Surface {
 
     /// The modem's head has found a vehicle.
     pub fn handle_range(&mut self, vehicle: Address, line: &UsblLine, now: Instant) {
-        if let Some(desk) = self.desks.get_mut(&vehicle) {
-            desk.found = Some((*line, now));
+        if let Some(record) = self.records.get_mut(&vehicle) {
+            record.found = Some((*line, now));
             self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         }
         if let (Some(range_m), Some((bearing_rad, elevation_rad))) = (line.range_m, line.direction_rad) {

@@ -2,15 +2,15 @@
 
 use crate::{Flips, MapRng, MapScene, Survey, sampler_noise};
 use scenecast_protocol::map::{Cell, Rect};
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 
 /// A change of a part of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Lesson {
     /// The map that both ends hold.
-    pub base: Plane,
+    pub base: LabelRaster,
     /// The map after the change; equal to the base outside `rect`.
-    pub target: Plane,
+    pub target: LabelRaster,
     /// The patch that the coder codes.
     pub rect: Rect,
 }
@@ -28,15 +28,15 @@ pub fn lessons(seed: u64) -> Vec<Lesson> {
         MapScene::Colonies,
         MapScene::Colonies,
     ]);
-    let mut plane = scene.draw(&mut rng, width, height, labels);
+    let mut raster = scene.draw(&mut rng, width, height, labels);
     let (border, anywhere) = (rng.pick(&[0, 0, 20_000, 100_000]), rng.pick(&[0, 0, 1000, 10_000]));
-    sampler_noise(&mut rng, &mut plane, border, anywhere);
-    if rng.happens(300_000) { stills(&mut rng, &plane) } else { surveys(&mut rng, plane) }
+    sampler_noise(&mut rng, &mut raster, border, anywhere);
+    if rng.happens(300_000) { stills(&mut rng, &raster) } else { surveys(&mut rng, raster) }
 }
 
 /// Parts of a scene on an unexplored base.
-fn stills(rng: &mut MapRng, plane: &Plane) -> Vec<Lesson> {
-    let mut target = plane.clone();
+fn stills(rng: &mut MapRng, raster: &LabelRaster) -> Vec<Lesson> {
+    let mut target = raster.clone();
     if rng.happens(400_000) {
         let mut survey = Survey::new(0, target, STEADY, 20);
         (0..rng.within(3, 20)).for_each(|_| survey.advance());
@@ -46,21 +46,21 @@ fn stills(rng: &mut MapRng, plane: &Plane) -> Vec<Lesson> {
         let ground = rng.pick(&target.labels);
         target.labels.iter_mut().filter(|label| **label == ground).for_each(|label| *label = 0);
     }
-    let base = Plane::uniform(target.width, target.height, 0);
+    let base = LabelRaster::uniform(target.width, target.height, 0);
     (0..3).filter_map(|_| part(rng, &base, &target)).collect()
 }
 
 const STEADY: Flips = Flips { border: 0, anywhere: 0, settling: 0 };
 
 /// One step or several steps of a survey.
-fn surveys(rng: &mut MapRng, plane: Plane) -> Vec<Lesson> {
+fn surveys(rng: &mut MapRng, raster: LabelRaster) -> Vec<Lesson> {
     let flips = Flips {
         border: rng.pick(&[0, 1000, 5000, 5000, 10_000, 30_000, 30_000, 60_000]),
         anywhere: rng.pick(&[0, 0, 0, 300, 2000, 10_000, 10_000]),
         settling: rng.pick(&[0, 0, 0, 5000, 50_000]),
     };
     let steps = rng.pick(&[10, 20, 40, 80]);
-    let mut survey = Survey::new(rng.below(1 << 30) as u64, plane, flips, steps);
+    let mut survey = Survey::new(rng.below(1 << 30) as u64, raster, flips, steps);
     let mut lessons = Vec::new();
     let mut base = survey.map().clone();
     let mut due = 0;
@@ -80,7 +80,7 @@ fn surveys(rng: &mut MapRng, plane: Plane) -> Vec<Lesson> {
 }
 
 /// A patch of random size around some change, cut down to its changes.
-fn part(rng: &mut MapRng, base: &Plane, target: &Plane) -> Option<Lesson> {
+fn part(rng: &mut MapRng, base: &LabelRaster, target: &LabelRaster) -> Option<Lesson> {
     let changed: Vec<usize> = (0..base.labels.len()).filter(|&i| base.labels[i] != target.labels[i]).collect();
     if changed.is_empty() {
         return None;

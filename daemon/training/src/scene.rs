@@ -1,7 +1,7 @@
 //! Procedural scenes: spatial CRP samples, Potts fields, fractal fields, colonies; with sampler noise.
 
 use crate::MapRng;
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 
 /// The random process that draws a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,16 +21,16 @@ impl MapScene {
     pub const ALL: [Self; 4] = [Self::SpatialCrp, Self::Potts, Self::Fractal, Self::Colonies];
 
     /// A fully explored map with up to `labels` labels, at least 2.
-    pub fn draw(self, rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Plane {
+    pub fn draw(self, rng: &mut MapRng, width: usize, height: usize, labels: usize) -> LabelRaster {
         let names = names(rng, labels);
-        let mut plane = match self {
+        let mut raster = match self {
             Self::SpatialCrp => crp(rng, width, height, labels),
             Self::Potts => potts(rng, width, height, labels),
             Self::Fractal => fractal(rng, width, height, labels),
             Self::Colonies => colonies(rng, width, height, labels),
         };
-        plane.labels.iter_mut().for_each(|label| *label = names[usize::from(*label)]);
-        plane
+        raster.labels.iter_mut().for_each(|label| *label = names[usize::from(*label)]);
+        raster
     }
 }
 
@@ -42,16 +42,16 @@ fn names(rng: &mut MapRng, labels: usize) -> Vec<u8> {
 }
 
 /// Each cell takes the label of a neighbour, in `sweeps` sweeps.
-fn settle(rng: &mut MapRng, plane: &mut Plane, sweeps: usize, heat: usize, labels: usize) {
-    for _ in 0..sweeps * plane.labels.len() {
-        let i = rng.below(plane.labels.len());
+fn settle(rng: &mut MapRng, raster: &mut LabelRaster, sweeps: usize, heat: usize, labels: usize) {
+    for _ in 0..sweeps * raster.labels.len() {
+        let i = rng.below(raster.labels.len());
         let mut votes = [0u8; 256];
-        neighbours(plane, i).for_each(|label| votes[usize::from(label)] += 1);
+        neighbours(raster, i).for_each(|label| votes[usize::from(label)] += 1);
         let label = if rng.happens(heat) {
-            let around: Vec<u8> = neighbours(plane, i).collect();
+            let around: Vec<u8> = neighbours(raster, i).collect();
             if rng.happens(950_000) { rng.pick(&around) } else { rng.below(labels) as u8 }
         } else {
-            let held = plane.labels[i];
+            let held = raster.labels[i];
             let most = votes.iter().copied().max().unwrap_or(0);
             if votes[usize::from(held)] == most {
                 held
@@ -59,49 +59,49 @@ fn settle(rng: &mut MapRng, plane: &mut Plane, sweeps: usize, heat: usize, label
                 votes.iter().position(|&v| v == most).map_or(held, |l| l as u8)
             }
         };
-        plane.labels[i] = label;
+        raster.labels[i] = label;
     }
 }
 
-fn potts(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Plane {
-    let mut plane = Plane::uniform(width, height, 0);
+fn potts(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> LabelRaster {
+    let mut raster = LabelRaster::uniform(width, height, 0);
     let grain = rng.pick(&[1, 1, 2, 3, 5, 8]);
     for row in 0..height {
         for column in 0..width {
             let first = (column % grain, row % grain) == (0, 0);
             let label = match first {
                 true => rng.below(labels) as u8,
-                false => plane.get(column - column % grain, row - row % grain),
+                false => raster.get(column - column % grain, row - row % grain),
             };
-            plane.set(column, row, label);
+            raster.set(column, row, label);
         }
     }
     let heat = rng.pick(&[20_000, 100_000, 300_000]);
     let sweeps = rng.within(3, 14);
-    settle(rng, &mut plane, sweeps, heat, labels);
-    plane
+    settle(rng, &mut raster, sweeps, heat, labels);
+    raster
 }
 
-fn crp(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Plane {
-    let mut plane = Plane::uniform(width, height, 0);
+fn crp(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> LabelRaster {
+    let mut raster = LabelRaster::uniform(width, height, 0);
     let (mut tables, newness) = (1, rng.pick(&[300, 1500, 6000]));
-    for i in 0..plane.labels.len() {
+    for i in 0..raster.labels.len() {
         let (column, row) = (i % width, i / width);
-        plane.labels[i] = if rng.happens(newness) {
+        raster.labels[i] = if rng.happens(newness) {
             tables = (tables + 1).min(labels);
             rng.below(tables) as u8
         } else {
             match (column, row) {
                 (0, 0) => 0,
-                (_, 0) => plane.labels[i - 1],
-                (0, _) => plane.labels[i - width],
-                _ => plane.labels[rng.pick(&[i - 1, i - width, i - 1, i - width, i - width - 1])],
+                (_, 0) => raster.labels[i - 1],
+                (0, _) => raster.labels[i - width],
+                _ => raster.labels[rng.pick(&[i - 1, i - width, i - 1, i - width, i - width - 1])],
             }
         };
     }
     let sweeps = rng.within(1, 8);
-    settle(rng, &mut plane, sweeps, 150_000, labels);
-    plane
+    settle(rng, &mut raster, sweeps, 150_000, labels);
+    raster
 }
 
 /// Smooth random heights: octaves of bilinear lattices.
@@ -127,31 +127,31 @@ fn heights(rng: &mut MapRng, width: usize, height: usize, coarsest: usize) -> Ve
     field
 }
 
-fn fractal(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Plane {
+fn fractal(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> LabelRaster {
     let coarsest = rng.pick(&[8, 16, 32, 64]);
-    let mut plane = Plane::uniform(width, height, 0);
+    let mut raster = LabelRaster::uniform(width, height, 0);
     if rng.happens(300_000) {
         let field = heights(rng, width, height, coarsest);
         let band = 2400 / labels as i64 + 1;
-        for (label, value) in plane.labels.iter_mut().zip(field) {
+        for (label, value) in raster.labels.iter_mut().zip(field) {
             *label = ((value + 1200) / band).clamp(0, labels as i64 - 1) as u8;
         }
-        return plane;
+        return raster;
     }
     let mut best = vec![i64::MIN; width * height];
     for name in 0..labels {
         let favour = rng.below(600) as i64;
         for (i, value) in heights(rng, width, height, coarsest).into_iter().enumerate() {
             if value + favour > best[i] {
-                (best[i], plane.labels[i]) = (value + favour, name as u8);
+                (best[i], raster.labels[i]) = (value + favour, name as u8);
             }
         }
     }
-    plane
+    raster
 }
 
-fn colonies(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Plane {
-    let mut plane = Plane::uniform(width, height, 0);
+fn colonies(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> LabelRaster {
+    let mut raster = LabelRaster::uniform(width, height, 0);
     let rough = heights(rng, width, height, 8);
     let count = width * height / rng.pick(&[60, 200, 600, 2000]) + 1;
     let largest = rng.pick(&[6, 12, 30]);
@@ -169,22 +169,22 @@ fn colonies(rng: &mut MapRng, width: usize, height: usize, labels: usize) -> Pla
                 let i = row as usize * width + column as usize;
                 let edge = 1024 + rough[i] / 2;
                 if u * u * 1024 / (across * across) + v * v * 1024 / (along * along) < edge {
-                    plane.labels[i] = label;
+                    raster.labels[i] = label;
                 }
             }
         }
     }
-    plane
+    raster
 }
 
 /// Changes a map as a sampler does: of a million border cells, `border` take a neighbour's label; of a million cells,
 /// `anywhere` take any label of the map. Unexplored cells stay unexplored.
-pub fn sampler_noise(rng: &mut MapRng, plane: &mut Plane, border: usize, anywhere: usize) {
-    let before = plane.clone();
+pub fn sampler_noise(rng: &mut MapRng, raster: &mut LabelRaster, border: usize, anywhere: usize) {
+    let before = raster.clone();
     let mut known: Vec<u8> = before.labels.iter().copied().filter(|&label| label != 0).collect();
     known.sort_unstable();
     known.dedup();
-    for (i, label) in plane.labels.iter_mut().enumerate().filter(|(_, label)| **label != 0) {
+    for (i, label) in raster.labels.iter_mut().enumerate().filter(|(_, label)| **label != 0) {
         if border > 0 && is_on_border(&before, i) && rng.happens(border) {
             let others: Vec<u8> = neighbours(&before, i).filter(|&l| l != 0 && l != *label).collect();
             if !others.is_empty() {
@@ -198,21 +198,21 @@ pub fn sampler_noise(rng: &mut MapRng, plane: &mut Plane, border: usize, anywher
 }
 
 /// Labels of the up to eight cells around cell `i`.
-pub(crate) fn neighbours(plane: &Plane, i: usize) -> impl Iterator<Item = u8> + '_ {
-    let (column, row) = (i % plane.width, i / plane.width);
-    let columns = column.saturating_sub(1)..(column + 2).min(plane.width);
-    (row.saturating_sub(1)..(row + 2).min(plane.height))
+pub(crate) fn neighbours(raster: &LabelRaster, i: usize) -> impl Iterator<Item = u8> + '_ {
+    let (column, row) = (i % raster.width, i / raster.width);
+    let columns = column.saturating_sub(1)..(column + 2).min(raster.width);
+    (row.saturating_sub(1)..(row + 2).min(raster.height))
         .flat_map(move |r| columns.clone().map(move |c| (c, r)))
         .filter(move |&place| place != (column, row))
-        .map(|(c, r)| plane.get(c, r))
+        .map(|(c, r)| raster.get(c, r))
 }
 
 /// Whether cell `i` shares a side with a cell that has another label and is explored.
-fn is_on_border(plane: &Plane, i: usize) -> bool {
-    let (column, row) = (i % plane.width, i / plane.width);
-    let other = |label: u8| label != 0 && label != plane.labels[i];
-    (column > 0 && other(plane.labels[i - 1]))
-        || (column + 1 < plane.width && other(plane.labels[i + 1]))
-        || (row > 0 && other(plane.labels[i - plane.width]))
-        || (row + 1 < plane.height && other(plane.labels[i + plane.width]))
+fn is_on_border(raster: &LabelRaster, i: usize) -> bool {
+    let (column, row) = (i % raster.width, i / raster.width);
+    let other = |label: u8| label != 0 && label != raster.labels[i];
+    (column > 0 && other(raster.labels[i - 1]))
+        || (column + 1 < raster.width && other(raster.labels[i + 1]))
+        || (row > 0 && other(raster.labels[i - raster.width]))
+        || (row + 1 < raster.height && other(raster.labels[i + raster.width]))
 }

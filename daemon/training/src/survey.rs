@@ -2,7 +2,7 @@
 
 use crate::MapRng;
 use crate::scene::{neighbours, sampler_noise};
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 
 /// The changes of explored cells in each step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,8 +18,8 @@ pub struct Flips {
 /// A lawnmower survey over a scene.
 #[derive(Debug, Clone)]
 pub struct Survey {
-    scene: Plane,
-    seen: Plane,
+    scene: LabelRaster,
+    seen: LabelRaster,
     rng: MapRng,
     flips: Flips,
     /// Height of a leg and length of a step in cells.
@@ -30,7 +30,7 @@ pub struct Survey {
 
 impl Survey {
     /// A survey with an unexplored map, which is complete after about `steps` steps.
-    pub fn new(seed: u64, scene: Plane, flips: Flips, steps: usize) -> Self {
+    pub fn new(seed: u64, scene: LabelRaster, flips: Flips, steps: usize) -> Self {
         let (width, height) = (scene.width, scene.height);
         let legs = (1..=steps).min_by_key(|&legs| {
             let (swath, stride) = (height.div_ceil(legs), width.div_ceil((steps / legs).max(1)));
@@ -38,12 +38,12 @@ impl Survey {
         });
         let legs = legs.unwrap_or(1);
         let (swath, stride) = (height.div_ceil(legs), width.div_ceil((steps / legs).max(1)));
-        let seen = Plane::uniform(width, height, 0);
+        let seen = LabelRaster::uniform(width, height, 0);
         Self { scene, seen, rng: MapRng::new(seed), flips, swath, stride, step: 0 }
     }
 
     /// The map as the vehicle sees it.
-    pub fn map(&self) -> &Plane {
+    pub fn map(&self) -> &LabelRaster {
         &self.seen
     }
 
@@ -65,16 +65,16 @@ impl Survey {
     }
 }
 
-fn settle(rng: &mut MapRng, plane: &mut Plane, settling: usize) {
-    for i in (0..plane.labels.len()).filter(|_| settling > 0) {
-        if plane.labels[i] == 0 || !rng.happens(settling) {
+fn settle(rng: &mut MapRng, raster: &mut LabelRaster, settling: usize) {
+    for i in (0..raster.labels.len()).filter(|_| settling > 0) {
+        if raster.labels[i] == 0 || !rng.happens(settling) {
             continue;
         }
         let mut votes = [0u8; 256];
-        neighbours(plane, i).filter(|&label| label != 0).for_each(|label| votes[usize::from(label)] += 1);
+        neighbours(raster, i).filter(|&label| label != 0).for_each(|label| votes[usize::from(label)] += 1);
         let most = votes.iter().copied().max().unwrap_or(0);
-        if votes[usize::from(plane.labels[i])] < most {
-            plane.labels[i] = votes.iter().position(|&v| v == most).map_or(plane.labels[i], |label| label as u8);
+        if votes[usize::from(raster.labels[i])] < most {
+            raster.labels[i] = votes.iter().position(|&v| v == most).map_or(raster.labels[i], |label| label as u8);
         }
     }
 }

@@ -3,12 +3,11 @@
 use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
-use scenecast_protocol::directive::PlaneSet;
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::map::{PlaneKind, PlaneScale, PlaneSource};
+use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerId, LayerMask, LayerSource};
 use scenecast_protocol::map_codec::Codec;
-use scenecast_protocol::schedule::{Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::MissionId;
 use std::time::Duration;
@@ -35,7 +34,9 @@ pub fn assemble(
     };
     let codec = config.map.codec;
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
-    link.set_planes(planes(config, codec));
+    for layer in layers(config, codec) {
+        link.add_layer(layer);
+    }
     link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
     let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
@@ -46,9 +47,9 @@ pub fn assemble(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
-    link.set_spend(durable.spend.and_then(SpendOrder::from_code).unwrap_or(config.link.background));
+    link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_telling(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, told_planes(config));
+    vehicle.configure_telling(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, selected_layers(config));
     if config.map.stream == MapStream::WholePng {
         vehicle.send_whole_png();
     }
@@ -73,22 +74,22 @@ fn habits(config: &Config) -> Habits {
     }
 }
 
-/// The planes of the map that are told.
-fn told_planes(config: &Config) -> PlaneSet {
-    PlaneSet::of(|kind| config.map.layers.iter().any(|layer| layer.as_str() == kind.name()))
+/// The layers that are sent unless the operator selects others.
+fn selected_layers(config: &Config) -> LayerMask {
+    config.map.layers.iter().map(|layer| layer.id()).collect()
 }
 
-/// Every plane that the operator could ask for, and its part of the map's share in percent.
-fn planes(config: &Config, codec: Codec) -> impl Iterator<Item = (PlaneSource, u8)> {
+/// Every layer that the operator could request, with its part of the map's share.
+fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
-    let settle = Duration::from_secs_f64(map.debounce_s);
-    let scale = |kind| match kind {
-        PlaneKind::Confidence => PlaneScale::Confidence,
-        PlaneKind::Depth => PlaneScale::depth_around(config.survey.depth_m, map.depth_step_m),
-        PlaneKind::Curiosity => PlaneScale::Curiosity,
-    };
-    let share = |kind: PlaneKind| LayerName::new(kind.name()).and_then(|layer| map.layer_shares.get(&layer).copied());
-    let planes = PlaneKind::ALL.into_iter().map(move |kind| (kind, share(kind).unwrap_or(0)));
-    let possible = planes.filter(|_| map.stream == MapStream::Delta);
-    possible.map(move |(kind, share)| (PlaneSource::new(scale(kind), codec, settle), share))
+    let debounce = Duration::from_secs_f64(map.debounce_s);
+    let possible = BUILT_IN_LAYERS.iter().zip(LayerName::all()).filter(|_| map.stream == MapStream::Delta);
+    possible.map(move |(layer, name)| {
+        let built_in = match layer.id {
+            LayerId::DEPTH => LayerDescriptor::depth_around(config.survey.depth_m, map.depth_step_m),
+            _ => layer.descriptor.clone(),
+        };
+        let share = map.layer_shares.get(&name).copied().unwrap_or(0);
+        LayerSource::new(layer.id, LayerDescriptor { share, ..built_in }, codec, debounce)
+    })
 }

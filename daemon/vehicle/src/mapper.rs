@@ -11,7 +11,7 @@ use scene_model::words::{Measures, WordConfig, WordExtractor};
 use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Figure, Settings};
-use scenecast_protocol::map::{Cell, PlaneKind};
+use scenecast_protocol::map::{Cell, LayerId};
 use std::collections::BTreeMap;
 
 /// Representative images kept a label.
@@ -27,7 +27,7 @@ pub struct MapUpdate {
     /// Labels of every explored cell.
     pub cells: Vec<(Cell, u8)>,
     /// How sure the model is of these labels, 0 to 1, depths of the sea floor there, metres, and mean surprise of a word, bits.
-    pub planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
+    pub layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     pub labels: u8,
     /// How badly the model explains each cell.
     pub perplexity: Vec<(Cell, f32)>,
@@ -164,13 +164,12 @@ impl Mapper {
         let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
         let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
         let curiosity = published.iter().map(|c| (place(c), f64::from(c.perplexity.max(1.0)).log2())).collect();
-        let planes =
-            [(PlaneKind::Confidence, confidence), (PlaneKind::Depth, depth), (PlaneKind::Curiosity, curiosity)];
+        let layers = [(LayerId::CONFIDENCE, confidence), (LayerId::DEPTH, depth), (LayerId::CURIOSITY, curiosity)];
         MapUpdate {
             t_s: self.last_s.unwrap_or(0.0),
             epoch: self.book.epoch(),
             cells: published.iter().map(|c| (place(c), c.label)).collect(),
-            planes: BTreeMap::from(planes),
+            layers: BTreeMap::from(layers),
             perplexity: published.iter().map(|c| (place(c), c.perplexity)).collect(),
             labels: self.book.labels().count() as u8,
         }

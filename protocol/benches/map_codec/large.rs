@@ -1,7 +1,7 @@
 //! A large map with a few changes everywhere: time to the first chunk, and memory.
 
 use scenecast_protocol::map::{Cell, MapSource, StateSource};
-use scenecast_protocol::map_codec::{Codec, Plane};
+use scenecast_protocol::map_codec::{Codec, LabelRaster};
 use scenecast_protocol::time::Instant;
 use scenecast_training::{MapRng, MapScene, sampler_noise};
 
@@ -21,7 +21,7 @@ pub(crate) fn measure() {
     println!("settled: {}", memory());
     for row in (0..SIDE).step_by(64) {
         let labels = (0..64 * SIDE).map(|i| patch.get(i % SIDE % 256, (row + i / SIDE) % 256)).collect();
-        let mut strip = Plane { width: SIDE, height: 64, labels };
+        let mut strip = LabelRaster { width: SIDE, height: 64, labels };
         sampler_noise(&mut rng, &mut strip, 0, 11_500);
         let cells = strip.labels.iter().enumerate().map(|(i, &label)| (at(i % SIDE, row + i / SIDE), label));
         source.set(cells, Instant::from_secs_f64(1.0));

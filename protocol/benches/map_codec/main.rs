@@ -10,7 +10,7 @@ mod zopfli_bytes;
 
 use cpu_time::ThreadTime;
 use scenecast_protocol::map::LabelGrid;
-use scenecast_protocol::map_codec::{Codec, Plane, decode, encode_all};
+use scenecast_protocol::map_codec::{Codec, LabelRaster, decode, encode_all};
 use scenecast_training::{Flips, MapRng, MapScene, Survey};
 use std::time::Duration;
 use zopfli_bytes::zopfli_bytes;
@@ -46,7 +46,7 @@ fn real_stills(most: usize) {
         let Some(map) = real::map(name, step, shift) else { continue };
         let mut totals = Totals::default();
         for crop in real::crops(&map, SIDE, 3).into_iter().take(2 * most) {
-            totals.add(&series(&[Plane::uniform(SIDE, SIDE, 0), crop]));
+            totals.add(&series(&[LabelRaster::uniform(SIDE, SIDE, 0), crop]));
         }
         totals.print(&format!("{} / {step}", name.split('/').next().unwrap_or(name)));
     }
@@ -81,7 +81,7 @@ fn regimes() -> [(&'static str, Flips); 3] {
     ]
 }
 
-fn survey(seed: u64, scene: Plane, flips: Flips) -> Vec<Plane> {
+fn survey(seed: u64, scene: LabelRaster, flips: Flips) -> Vec<LabelRaster> {
     let mut survey = Survey::new(seed, scene, flips, STEPS);
     let mut maps = vec![survey.map().clone()];
     for _ in 0..STEPS {
@@ -109,8 +109,8 @@ fn procedural(seeds: u64) {
     for (i, scene) in MapScene::ALL.into_iter().enumerate() {
         let mut totals = Totals::default();
         for seed in 0..seeds {
-            let plane = scene.draw(&mut MapRng::new(700 + i as u64 * 10 + seed), SIDE, SIDE, 8);
-            totals.add(&series(&[Plane::uniform(SIDE, SIDE, 0), plane]));
+            let raster = scene.draw(&mut MapRng::new(700 + i as u64 * 10 + seed), SIDE, SIDE, 8);
+            totals.add(&series(&[LabelRaster::uniform(SIDE, SIDE, 0), raster]));
         }
         totals.print(&format!("{scene:?}"));
     }
@@ -160,7 +160,7 @@ impl Totals {
     }
 }
 
-fn series(maps: &[Plane]) -> Totals {
+fn series(maps: &[LabelRaster]) -> Totals {
     let mut totals = Totals::default();
     for pair in maps.windows(2) {
         let [before, after] = pair else { continue };

@@ -21,7 +21,7 @@ pub use outbox::{OrderStatus, PendingSlot, SlotOutbox, SlotProgress};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
 pub use settings::{Budget, Constraints, PlannerKind};
-pub use tuning::{CellBand, Change, PlaneSet, Settings, SettingsFault};
+pub use tuning::{CellBand, Change, Settings, SettingsFault};
 pub use utility::Utility;
 
 use crate::bytes::{Reader, Truncated};
@@ -259,6 +259,7 @@ impl VersionedSlot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::LayerMask;
     use proptest::prelude::*;
 
     proptest! {
@@ -292,7 +293,7 @@ mod tests {
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),
             cells: Change::To(CellBand::CoarseToFine),
-            planes: Change::To(PlaneSet::default()),
+            layers: Change::To(LayerMask(u16::MAX)),
             alpha: figure,
             beta: figure,
             gamma: figure,
@@ -300,7 +301,7 @@ mod tests {
             frames_per_s: figure,
         };
         let bytes = VersionedSlot::encode(1, 1, &Slot::Settings(settings));
-        assert_eq!(bytes.len(), 17);
+        assert_eq!(bytes.len(), 19);
         let back = VersionedSlot::decode(&bytes).map(|slot| slot.content);
         assert_eq!(back, Ok(Some(Slot::Settings(settings))));
     }

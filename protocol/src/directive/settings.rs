@@ -1,7 +1,7 @@
 //! Short slots that set how a vehicle behaves.
 
 use crate::bytes::{Reader, Truncated};
-use crate::schedule::{Shares, SpendOrder};
+use crate::schedule::{BackgroundOrder, Shares};
 
 /// Orders that never wait for anything longer.
 ///
@@ -62,8 +62,7 @@ impl PlannerKind {
 /// ```text
 /// bytes 0-2: budget in bits a second, 1..=16 777 215
 /// bytes 3-7: least shares in percent of directive, status, fix, map, exemplar; together at most 100
-/// bytes 8-9: a 0, then what is left over goes to, in this order, three bits each: 1 finer cells, 2 depth, 3 exemplars,
-///            4 confidence, 5 curiosity, 0 nothing more
+/// bytes 8...: order of the background streams, see [`BackgroundOrder`]
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {
@@ -71,15 +70,15 @@ pub struct Budget {
     pub bits_per_s: u32,
     /// Least share of each class while it has something to send.
     pub shares: Shares,
-    /// What bits that nobody else needs are spent on.
-    pub spend: SpendOrder,
+    /// Order of the background streams.
+    pub background: BackgroundOrder,
 }
 
 impl Budget {
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         out.extend_from_slice(self.bits_per_s.min(0xFF_FFFF).to_be_bytes().get(1..).unwrap_or_default());
         out.extend_from_slice(&self.shares.0);
-        out.extend_from_slice(&self.spend.code().to_be_bytes());
+        out.extend(self.background.to_bytes());
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
@@ -88,7 +87,7 @@ impl Budget {
         for share in &mut shares {
             *share = r.u8()?;
         }
-        let spend = SpendOrder::from_code(r.u16()?).ok_or(Truncated)?;
-        Ok(Self { bits_per_s, shares: Shares(shares), spend })
+        let background = BackgroundOrder::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?;
+        Ok(Self { bits_per_s, shares: Shares(shares), background })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Figure, PlannerKind};
 use crate::bytes::{Reader, Truncated};
-use crate::map::PlaneKind;
+use crate::map::{LayerId, LayerMask};
 use std::ops::RangeInclusive;
 
 /// What an order says of one setting.
@@ -78,42 +78,6 @@ impl CellBand {
     }
 }
 
-/// Planes that are told beside the labels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PlaneSet {
-    /// How sure the model is of a label.
-    pub confidence: bool,
-    /// Depth of the sea floor.
-    pub depth: bool,
-    /// How badly the model explains what it sees.
-    pub curiosity: bool,
-}
-
-impl PlaneSet {
-    /// The planes for which it holds.
-    pub fn of(has: impl Fn(PlaneKind) -> bool) -> Self {
-        Self {
-            confidence: has(PlaneKind::Confidence),
-            depth: has(PlaneKind::Depth),
-            curiosity: has(PlaneKind::Curiosity),
-        }
-    }
-
-    /// The planes among them, in wire order.
-    pub fn kinds(self) -> impl Iterator<Item = PlaneKind> {
-        PlaneKind::ALL.into_iter().filter(move |&kind| self.has(kind))
-    }
-
-    /// Whether a plane is among them.
-    pub fn has(self, kind: PlaneKind) -> bool {
-        match kind {
-            PlaneKind::Confidence => self.confidence,
-            PlaneKind::Depth => self.depth,
-            PlaneKind::Curiosity => self.curiosity,
-        }
-    }
-}
-
 /// A setting that no vehicle could obey.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{name} {value}: it takes {} to {}", range.start(), range.end())]
@@ -131,15 +95,17 @@ pub struct SettingsFault {
 /// ```text
 ///         7   6   5   4   3   2   1   0
 ///       +-----------+-----------+-------+
-/// byte 0| planner   | cells     | planes|
+/// byte 0| planner   | cells     | layers|
 ///       +---+---+---+---+---+---+---+---+
 /// byte 1| C | D | Q | a | b | g | r | f |
 ///       +---+---+---+---+---+---+---+---+
+/// then 2 bytes, a mask of layers, if layers is 3
 /// then 2 bytes, a figure, for each of a, b, g, r, f that is 1
 /// ```
 /// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
 /// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
-/// * planes: 0 stay, 1 as configured, 2 those of C (confidence), D (depth) and Q (curiosity).
+/// * layers: 0 stay, 1 as configured, 2 those of C (layer 1), D (layer 0) and Q (layer 2), 3 those of the mask, whose bit 0
+///   is layer 0; 3 only if the mask has other layers than these three.
 /// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
 ///   second that the scene model sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -148,8 +114,8 @@ pub struct Settings {
     pub planner: Change<PlannerKind>,
     /// Which cells it tells.
     pub cells: Change<CellBand>,
-    /// Which planes it tells.
-    pub planes: Change<PlaneSet>,
+    /// Which layers it sends.
+    pub layers: Change<LayerMask>,
     /// Preference for labels that are used elsewhere.
     pub alpha: Change<Figure>,
     /// Prior weight of each word in a label.
@@ -172,7 +138,10 @@ impl Settings {
     /// Frames a second that the scene model may see.
     pub const FRAMES_PER_S: RangeInclusive<f64> = 0.01..=30.0;
     /// Most bytes of the payload.
-    pub const MAX_BYTES: usize = 12;
+    pub const MAX_BYTES: usize = 14;
+    /// The layers that have a bit in byte 1.
+    const SHORT_LAYERS: [(u8, LayerId); 3] =
+        [(0x80, LayerId::CONFIDENCE), (0x40, LayerId::DEPTH), (0x20, LayerId::CURIOSITY)];
 
     /// What both together say, this one first.
     #[must_use]
@@ -180,7 +149,7 @@ impl Settings {
         Self {
             planner: self.planner.then(later.planner),
             cells: self.cells.then(later.cells),
-            planes: self.planes.then(later.planes),
+            layers: self.layers.then(later.layers),
             alpha: self.alpha.then(later.alpha),
             beta: self.beta.then(later.beta),
             gamma: self.gamma.then(later.gamma),
@@ -215,9 +184,11 @@ impl Settings {
     pub fn to_bytes(&self) -> Vec<u8> {
         let planner = self.planner.code(|p| p as u8);
         let cells = self.cells.code(|c| c as u8);
-        let planes = self.planes.code(|_| 0);
-        let set = self.planes.value().unwrap_or_default();
-        let mut given = u8::from(set.confidence) << 7 | u8::from(set.depth) << 6 | u8::from(set.curiosity) << 5;
+        let mask = self.layers.value().unwrap_or_default();
+        let is_short = Self::is_short(mask);
+        let layers = self.layers.code(|_| u8::from(!is_short));
+        let bits = Self::SHORT_LAYERS.into_iter().filter(|&(_, id)| is_short && mask.has(id));
+        let mut given = bits.fold(0, |given, (bit, _)| given | bit);
         let mut numbers = Vec::new();
         for (index, (_, change, _)) in self.figures().into_iter().enumerate() {
             if !matches!(change, Change::Keep) {
@@ -225,18 +196,31 @@ impl Settings {
             }
             Figure::encode(change, &mut numbers);
         }
-        let mut out = vec![planner << 5 | cells << 2 | planes, given];
+        let mut out = vec![planner << 5 | cells << 2 | layers, given];
+        if !is_short {
+            out.extend_from_slice(&mask.0.to_be_bytes());
+        }
         out.append(&mut numbers);
         out
     }
 
+    fn is_short(mask: LayerMask) -> bool {
+        mask.iter().all(|layer| Self::SHORT_LAYERS.iter().any(|&(_, id)| id == layer))
+    }
+
+    fn decode_layers(code: u8, given: u8, r: &mut Reader<'_>) -> Result<Change<LayerMask>, Truncated> {
+        let short = Self::SHORT_LAYERS.into_iter().filter(|&(bit, _)| given & bit != 0).map(|(_, id)| id).collect();
+        match code {
+            2 => Ok(Change::To(short)),
+            _ if short != LayerMask::default() => Err(Truncated),
+            3 => Some(LayerMask(r.u16()?)).filter(|&mask| !Self::is_short(mask)).map(Change::To).ok_or(Truncated),
+            _ => Change::from_code(code, |_| None),
+        }
+    }
+
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
         let (choices, given) = (r.u8()?, r.u8()?);
-        let set = PlaneSet { confidence: given & 0x80 != 0, depth: given & 0x40 != 0, curiosity: given & 0x20 != 0 };
-        let planes = Change::from_code(choices & 3, |code| (code == 0).then_some(set))?;
-        if planes.value().is_none() && set != PlaneSet::default() {
-            return Err(Truncated);
-        }
+        let layers = Self::decode_layers(choices & 3, given, r)?;
         let mut figure = |bit: u8| if given & bit != 0 { Figure::decode(r) } else { Ok(Change::Keep) };
         Ok(Self {
             alpha: figure(0x10)?,
@@ -246,7 +230,7 @@ impl Settings {
             frames_per_s: figure(0x01)?,
             planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
             cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
-            planes,
+            layers,
         })
     }
 
@@ -279,17 +263,13 @@ mod tests {
         let choices = (
             change(proptest::sample::select(PlannerKind::ALL.to_vec())),
             change(proptest::sample::select(CellBand::ALL.to_vec())),
-            change(any::<[bool; 3]>().prop_map(|[confidence, depth, curiosity]| PlaneSet {
-                confidence,
-                depth,
-                curiosity,
-            })),
+            change(prop_oneof![0u16..8, any::<u16>()].prop_map(LayerMask)),
         );
         let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
-        (choices, figures).prop_map(|((planner, cells, planes), (alpha, beta, gamma, refine, frames))| Settings {
+        (choices, figures).prop_map(|((planner, cells, layers), (alpha, beta, gamma, refine, frames))| Settings {
             planner,
             cells,
-            planes,
+            layers,
             alpha,
             beta,
             gamma,
@@ -303,7 +283,7 @@ mod tests {
         let settings = Settings {
             planner: Change::To(PlannerKind::Horizon),
             cells: Change::To(CellBand::Coarse),
-            planes: Change::To(PlaneSet { depth: true, ..PlaneSet::default() }),
+            layers: Change::To(LayerMask::from_iter([LayerId::DEPTH])),
             alpha: to(0.01),
             gamma: Change::Configured,
             frames_per_s: to(0.25),
@@ -313,8 +293,12 @@ mod tests {
         assert_eq!(settings.to_bytes(), bytes);
         assert_eq!(Settings::from_bytes(&bytes), Some(settings));
         assert_eq!(Settings::default().to_bytes(), [0, 0]);
-        let curious = PlaneSet::of(|kind| kind == PlaneKind::Curiosity);
-        assert_eq!(Settings { planes: Change::To(curious), ..Settings::default() }.to_bytes(), [2, 0x20]);
+        let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
+        assert_eq!(of_layers(0b100), [2, 0x20]);
+        assert_eq!(
+            (of_layers(0b010), of_layers(0), of_layers(0x8004)),
+            (vec![2, 0x80], vec![2, 0], vec![3, 0, 0x80, 4])
+        );
     }
 
     #[test]
@@ -340,9 +324,17 @@ mod tests {
 
     #[test]
     fn reserved_bits_and_codes_are_refused() {
-        for bytes in
-            [&[0xA0, 0][..], &[0x14, 0], &[3, 0], &[0, 0x20], &[0, 0x80], &[0, 0x10, 0, 99], &[0, 0x10, 0x80, 100]]
-        {
+        for bytes in [
+            &[0xA0, 0][..],
+            &[0x14, 0],
+            &[3, 0],
+            &[0, 0x20],
+            &[0, 0x80],
+            &[3, 0, 0, 7],
+            &[3, 0x20, 0x80, 0],
+            &[0, 0x10, 0, 99],
+            &[0, 0x10, 0x80, 100],
+        ] {
             assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
         }
         assert_eq!(Settings::from_bytes(&[0, 0, 0]), None);

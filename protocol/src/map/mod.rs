@@ -9,9 +9,8 @@ mod debounce;
 mod digest;
 #[allow(clippy::indexing_slicing)] // A place in a tile is less than its size.
 mod dirty;
-mod plane;
+mod layer;
 mod replica;
-mod scale;
 mod source;
 mod stream;
 mod value;
@@ -19,8 +18,10 @@ mod value;
 pub use crate::grid::{Cell, LabelGrid, MAX_LABEL, Rect, TILE, UNEXPLORED};
 pub use debounce::MAX_CONFIDENCE;
 pub use digest::MapDigest;
-pub use plane::{PlaneChunk, PlaneReplica, PlaneSource};
+pub use layer::{
+    Assembly, BUILT_IN_LAYERS, BuiltInLayer, Decimal, DescriptorPart, LayerCarried, LayerChunk, LayerDescriptor,
+    LayerId, LayerMask, LayerReplica, LayerSet, LayerSource, Palette, Quantity, Spread, Steps, UpperEnd,
+};
 pub use replica::Replica;
-pub use scale::{PlaneKind, PlaneScale};
 pub use source::MapSource;
 pub use stream::{StateReplica, StateSource};

@@ -52,6 +52,11 @@ impl Replica {
         self.updated
     }
 
+    /// Cells that the vehicle has sent anything of.
+    pub fn received_cells(&self) -> usize {
+        self.heard.len()
+    }
+
     /// When a chunk last covered a cell.
     pub fn heard(&self, cell: Cell) -> Option<Instant> {
         self.heard.get(&cell).map(|h| h.at)

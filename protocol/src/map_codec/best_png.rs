@@ -1,12 +1,12 @@
 //! The smallest PNG files of a label map, to compare the stream with.
 
-use super::Plane;
+use super::LabelRaster;
 use std::collections::BTreeMap;
 
 /// Length of the shortest raw deflate stream of some bytes.
 pub type Deflated<'a> = &'a mut dyn FnMut(&[u8]) -> usize;
 
-impl Plane {
+impl LabelRaster {
     /// Bytes of the map as an indexed PNG: filter None, and the best of every depth and palette order that may win.
     ///
     /// The palette holds the values in use only, by value or by frequency; filter None wins on label maps.
@@ -34,16 +34,16 @@ impl Plane {
     }
 }
 
-fn with_palette(map: &Plane, order: &[u8], deflated: Deflated<'_>) -> usize {
+fn with_palette(map: &LabelRaster, order: &[u8], deflated: Deflated<'_>) -> usize {
     let place = |value: &u8| order.iter().position(|o| o == value).unwrap_or_default() as u8;
-    let map = Plane { labels: map.labels.iter().map(place).collect(), ..*map };
+    let map = LabelRaster { labels: map.labels.iter().map(place).collect(), ..*map };
     let depths = [1, 2, 4, 8].into_iter().filter(|&depth| order.len() <= 1 << depth);
     let data = depths.map(|depth| deflated(&scanlines(&map, depth))).min().unwrap_or(0);
     // Signature, IHDR, PLTE, IDAT with zlib head and Adler-32, IEND.
     8 + 25 + (12 + 3 * order.len()) + (12 + 6 + data) + 12
 }
 
-fn scanlines(map: &Plane, depth: usize) -> Vec<u8> {
+fn scanlines(map: &LabelRaster, depth: usize) -> Vec<u8> {
     let mut out = Vec::new();
     for row in map.labels.chunks(map.width.max(1)) {
         out.push(0);
@@ -66,14 +66,14 @@ mod tests {
 
     #[test]
     fn the_shallowest_depth_is_found_and_the_container_counted() {
-        let map = Plane { width: 8, height: 2, labels: [[0u8, 9]; 8].concat() };
+        let map = LabelRaster { width: 8, height: 2, labels: [[0u8, 9]; 8].concat() };
         // Two rows of a filter byte and eight pixels of a bit; two colours.
         assert_eq!(map.smallest_png(&mut stored), 8 + 25 + 12 + 6 + 12 + 6 + 4 + 12);
     }
 
     #[test]
     fn the_smaller_of_box_and_delta_counts() {
-        let before = Plane::uniform(40, 40, 1);
+        let before = LabelRaster::uniform(40, 40, 1);
         let mut after = before.clone();
         assert_eq!(after.smallest_delta_png(&before, &mut stored), 0);
         after.set(7, 9, 2);

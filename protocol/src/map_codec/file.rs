@@ -1,6 +1,6 @@
 //! A file of chunks that turn one map into another.
 
-use super::{Codec, DecodeError, Plane, decode, encode_all};
+use super::{Codec, DecodeError, LabelRaster, decode, encode_all};
 use crate::grid::Rect;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
@@ -83,7 +83,12 @@ const MAX_CELLS: u64 = 1 << 26;
 
 impl ChunkFile {
     /// The chunks of at most `room` bytes that turn `base` into `target`, and the number of cells that they change.
-    pub fn encode(codec: Codec, base: &Plane, target: &Plane, room: usize) -> Result<(Self, usize), ChunkFileError> {
+    pub fn encode(
+        codec: Codec,
+        base: &LabelRaster,
+        target: &LabelRaster,
+        room: usize,
+    ) -> Result<(Self, usize), ChunkFileError> {
         same_size(base, target.width, target.height)?;
         let size = allowed_size(target.width as u32, target.height as u32)?;
         let chunks = encode_all(codec, &base.to_grid(), &target.to_grid(), room.min(usize::from(u16::MAX)));
@@ -94,12 +99,12 @@ impl ChunkFile {
     }
 
     /// Applies the chunks to `base`; without one, to an unexplored map.
-    pub fn apply(&self, base: Option<&Plane>) -> Result<Plane, ChunkFileError> {
+    pub fn apply(&self, base: Option<&LabelRaster>) -> Result<LabelRaster, ChunkFileError> {
         let (width, height) = (self.width as usize, self.height as usize);
         if let Some(base) = base {
             same_size(base, width, height)?;
         }
-        let nothing = Plane::uniform(width, height, 0);
+        let nothing = LabelRaster::uniform(width, height, 0);
         let base = base.unwrap_or(&nothing);
         if CRC.checksum(&base.labels) != self.base {
             return Err(ChunkFileError::OtherBase);
@@ -116,7 +121,7 @@ impl ChunkFile {
                 map.set(cell, label);
             }
         }
-        Ok(Plane::from_grid(&map, width, height))
+        Ok(LabelRaster::from_grid(&map, width, height))
     }
 
     /// Encodes the file with its checksum at the end.
@@ -184,7 +189,7 @@ fn allowed_size(width: u32, height: u32) -> Result<(u32, u32), ChunkFileError> {
     if (1..=MAX_CELLS).contains(&cells) { Ok((width, height)) } else { Err(ChunkFileError::CellCount(width, height)) }
 }
 
-fn same_size(base: &Plane, width: usize, height: usize) -> Result<(), ChunkFileError> {
+fn same_size(base: &LabelRaster, width: usize, height: usize) -> Result<(), ChunkFileError> {
     let (base_width, base_height) = (base.width, base.height);
     if (base_width, base_height) == (width, height) {
         Ok(())

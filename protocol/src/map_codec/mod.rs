@@ -14,10 +14,10 @@ mod golden;
 mod grow;
 mod header;
 mod lattice;
-#[allow(clippy::indexing_slicing)]
-mod plane;
-mod plane_png;
 mod png;
+#[allow(clippy::indexing_slicing)]
+mod raster;
+mod raster_png;
 #[allow(clippy::indexing_slicing)]
 mod series;
 #[cfg(test)]
@@ -30,9 +30,9 @@ pub use codec::Codec;
 pub use context::training;
 pub use file::{ChunkFile, ChunkFileError};
 pub use lattice::Stride;
-pub use plane::Plane;
-pub use plane_png::MapPngError;
 pub use png::restored_png;
+pub use raster::LabelRaster;
+pub use raster_png::RasterPngError;
 pub use series::encode_all;
 
 /// The most cells of a patch; bounds the allocation in decoding a chunk.

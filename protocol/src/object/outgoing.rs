@@ -63,7 +63,7 @@ struct SymbolProgress {
 pub(super) struct OutgoingObject {
     pub(super) serial: u64,
     /// Whether it may use only spare capacity.
-    pub(super) is_extra: bool,
+    pub(super) is_background: bool,
     attempt: u32,
     /// The object; once the layout is fixed, the bytes of all source symbols.
     bytes: Vec<u8>,
@@ -71,8 +71,8 @@ pub(super) struct OutgoingObject {
 }
 
 impl OutgoingObject {
-    pub(super) fn new(serial: u64, bytes: Vec<u8>, is_extra: bool) -> Self {
-        Self { serial, is_extra, attempt: 0, bytes, progress: None }
+    pub(super) fn new(serial: u64, bytes: Vec<u8>, is_background: bool) -> Self {
+        Self { serial, is_background, attempt: 0, bytes, progress: None }
     }
 
     /// Bytes of the symbols that wait for transmission.

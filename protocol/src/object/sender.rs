@@ -29,11 +29,11 @@ impl ObjectSender {
     }
 
     /// Queues an object that may use only spare capacity.
-    pub fn push_extra(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+    pub fn push_background(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
         self.add(bytes, true)
     }
 
-    fn add(&mut self, bytes: Vec<u8>, is_extra: bool) -> Option<ObjectId> {
+    fn add(&mut self, bytes: Vec<u8>, is_background: bool) -> Option<ObjectId> {
         if bytes.is_empty() || bytes.len() > MAX_OBJECT {
             return None;
         }
@@ -43,7 +43,7 @@ impl ObjectSender {
         if self.objects.len() >= Self::MAX_OBJECTS || self.objects.front().is_some_and(too_old) {
             self.objects.pop_front();
         }
-        self.objects.push_back(OutgoingObject::new(serial, bytes, is_extra));
+        self.objects.push_back(OutgoingObject::new(serial, bytes, is_background));
         Some(ObjectId::of(serial))
     }
 
@@ -63,23 +63,23 @@ impl ObjectSender {
     }
 
     /// Whether the peer is known to have every object that has a share.
-    pub fn has_only_extra(&self) -> bool {
-        self.objects.iter().all(|o| o.is_extra)
+    pub fn has_only_background(&self) -> bool {
+        self.objects.iter().all(|o| o.is_background)
     }
 
     /// Whether the peer is known to have every background object.
-    pub fn has_no_extra(&self) -> bool {
-        self.objects.iter().all(|o| !o.is_extra)
+    pub fn has_no_background(&self) -> bool {
+        self.objects.iter().all(|o| !o.is_background)
     }
 
     /// Bytes that wait for transmission, repair symbols included, without background objects.
     pub fn backlog_bytes(&self) -> usize {
-        self.objects.iter().filter(|o| !o.is_extra).map(OutgoingObject::backlog_bytes).sum()
+        self.objects.iter().filter(|o| !o.is_background).map(OutgoingObject::backlog_bytes).sum()
     }
 
     /// Bytes of background objects that wait for transmission.
-    pub fn extra_backlog_bytes(&self) -> usize {
-        self.objects.iter().filter(|o| o.is_extra).map(OutgoingObject::backlog_bytes).sum()
+    pub fn background_backlog_bytes(&self) -> usize {
+        self.objects.iter().filter(|o| o.is_background).map(OutgoingObject::backlog_bytes).sum()
     }
 
     /// Sets the expected share of lost frames, 0..=0.95; the number of repair symbols follows it, none at 0.
@@ -98,16 +98,16 @@ impl ObjectSender {
     }
 
     /// The next part of a background object.
-    pub fn next_extra_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
+    pub fn next_background_part(&mut self, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
         self.next_part_of(true, room)
     }
 
-    fn next_part_of(&mut self, is_extra: bool, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
+    fn next_part_of(&mut self, is_background: bool, room: usize) -> Option<(ObjectId, SymbolRun, Vec<u8>)> {
         // The room at the end of a frame is small; an object that begins there is still cut for whole frames.
         self.usual_room = room.max(self.usual_room - self.usual_room.div_ceil(128));
         let (usual, loss) = (self.usual_room, self.loss);
         let (run, part) = {
-            let mut of_kind = self.objects.iter_mut().filter(|o| o.is_extra == is_extra);
+            let mut of_kind = self.objects.iter_mut().filter(|o| o.is_background == is_background);
             of_kind.find_map(|o| o.next_part(room, usual, loss))?
         };
         Some((ObjectId::of(run.serial), run, part))

@@ -1,8 +1,8 @@
 //! Shares of the classes in what is sent.
 
-use crate::map::PlaneKind;
+use crate::map::{LayerId, LayerSet};
 
-/// What bits are spent on.
+/// The use of transmitted bits, for shares and counters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Class {
     /// Slots of the directive but for the fix.
@@ -15,35 +15,23 @@ pub enum Class {
     Map,
     /// Representative images.
     Exemplar,
-    /// Depths of the sea floor; they change seldom, and so go before confidences.
-    Depth,
-    /// How sure the model is of the labels.
-    Confidence,
-    /// How badly the model explains what it sees.
-    Curiosity,
+    /// A layer of the map.
+    Layer(LayerId),
     /// Headers, acknowledgements, checks, padding.
     Overhead,
 }
 
 impl Class {
-    /// Every class; what comes first goes first where no share says otherwise.
-    pub const ALL: [Self; 9] = [
-        Self::Directive,
-        Self::Status,
-        Self::Fix,
-        Self::Map,
-        Self::Exemplar,
-        Self::Depth,
-        Self::Confidence,
-        Self::Curiosity,
-        Self::Overhead,
-    ];
-    /// The classes that have a share of what is sent.
+    /// The classes that have a share of the traffic. The first goes first where no share decides.
     pub const SHARED: [Self; 5] = [Self::Directive, Self::Status, Self::Fix, Self::Map, Self::Exemplar];
-    /// The classes that have a share of the map's share: its planes.
-    pub const PLANES: [Self; 3] = [Self::Confidence, Self::Depth, Self::Curiosity];
 
-    /// Name for people and reports.
+    /// Every class, layers as far as they are in `layers`; the first goes first where no share decides.
+    pub fn all(layers: &LayerSet) -> impl Iterator<Item = Self> {
+        let layers = layers.iter().map(|(id, _)| Self::Layer(id));
+        Self::SHARED.into_iter().chain(layers).chain([Self::Overhead])
+    }
+
+    /// Name for people and reports; of any layer it is "layer".
     pub fn name(self) -> &'static str {
         match self {
             Self::Directive => "directive",
@@ -51,20 +39,16 @@ impl Class {
             Self::Fix => "fix",
             Self::Map => "map",
             Self::Exemplar => "exemplar",
-            Self::Confidence => "confidence",
-            Self::Depth => "depth",
-            Self::Curiosity => "curiosity",
+            Self::Layer(_) => "layer",
             Self::Overhead => "overhead",
         }
     }
-}
 
-impl From<PlaneKind> for Class {
-    fn from(plane: PlaneKind) -> Self {
-        match plane {
-            PlaneKind::Confidence => Self::Confidence,
-            PlaneKind::Depth => Self::Depth,
-            PlaneKind::Curiosity => Self::Curiosity,
+    /// The same, with the layer's own name.
+    pub fn name_in(self, layers: &LayerSet) -> String {
+        match self {
+            Self::Layer(id) => layers.name(id),
+            _ => self.name().to_owned(),
         }
     }
 }
@@ -97,10 +81,10 @@ impl Shares {
 #[derive(Debug, Clone, Default)]
 pub struct ClassShares {
     shares: Shares,
-    /// Percent of the map's share for each of [`Class::PLANES`].
-    planes: [u8; Class::PLANES.len()],
+    /// Percent of the map's share, by layer.
+    layers: [u8; LayerId::COUNT],
     /// Bytes that a class was owed and did not get while it waited.
-    owed: [f64; Class::SHARED.len() + Class::PLANES.len()],
+    owed: [f64; Class::SHARED.len() + LayerId::COUNT],
 }
 
 impl ClassShares {
@@ -112,20 +96,22 @@ impl ClassShares {
         Self { shares, ..Self::default() }
     }
 
-    /// Gives planes of the map a part of its share, percent; together 100 at most. A plane without one takes what
-    /// nobody else needs.
-    pub fn set_planes(&mut self, planes: [u8; Class::PLANES.len()]) {
-        self.planes = planes;
+    /// Gives a layer of the map a part of its share, percent; all layers together have 100 at most. A layer without a part is
+    /// sent with spare capacity only.
+    pub fn set_layer(&mut self, id: LayerId, percent: u8) {
+        if let Some(share) = self.layers.get_mut(id.index()) {
+            *share = percent;
+        }
     }
 
-    /// The share of a class in 0..=1, planes taken from the map.
+    /// The share of a class in 0..=1, layers taken from the map.
     fn of(&self, class: Class) -> f64 {
         let map = self.shares.of(Class::Map);
         let part = |percent: &u8| map * f64::from(*percent) / 100.0;
-        match Class::PLANES.iter().position(|&c| c == class) {
-            Some(plane) => self.planes.get(plane).map_or(0.0, part),
-            None if class == Class::Map => map - self.planes.iter().map(part).sum::<f64>(),
-            None => self.shares.of(class),
+        match class {
+            Class::Layer(id) => self.layers.get(id.index()).map_or(0.0, part),
+            Class::Map => map - self.layers.iter().map(part).sum::<f64>(),
+            _ => self.shares.of(class),
         }
     }
 
@@ -161,7 +147,10 @@ impl ClassShares {
     }
 
     fn slot(&self, class: Class) -> Option<usize> {
-        Class::SHARED.iter().chain(&Class::PLANES).position(|&c| c == class)
+        match class {
+            Class::Layer(id) => Some(Class::SHARED.len() + id.index()),
+            _ => Class::SHARED.iter().position(|&c| c == class),
+        }
     }
 }
 
@@ -193,20 +182,21 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
-        let waiting = [Class::Map, Class::Confidence, Class::Depth];
+    fn a_layer_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
+        let [confidence, depth] = [LayerId::CONFIDENCE, LayerId::DEPTH].map(Class::Layer);
+        let waiting = [Class::Map, confidence, depth];
         let mut keeper = ClassShares::new(Shares::default());
-        keeper.set_planes([0, 10, 0]);
+        keeper.set_layer(LayerId::DEPTH, 10);
         let mut sent = BTreeMap::<Class, usize>::new();
         for _ in 0..1000 {
             let class = keeper.next(&waiting).unwrap();
             keeper.spend(class, 50, &waiting);
             *sent.entry(class).or_default() += 1;
         }
-        assert_eq!(sent.get(&Class::Confidence), None);
-        assert!((45..=55).contains(&sent[&Class::Depth]), "{sent:?}");
-        assert_eq!(keeper.next(&[Class::Confidence]), Some(Class::Confidence));
-        assert_eq!(ClassShares::default().next(&[Class::Confidence, Class::Depth]), Some(Class::Depth));
+        assert_eq!(sent.get(&confidence), None);
+        assert!((45..=55).contains(&sent[&depth]), "{sent:?}");
+        assert_eq!(keeper.next(&[confidence]), Some(confidence));
+        assert_eq!(ClassShares::default().next(&[confidence, depth]), Some(depth));
     }
 
     #[test]

@@ -8,13 +8,13 @@ use crate::bytes::{Reader, Truncated};
 /// byte  bits  field                 unit, range
 ///  0    4     labels of the map     value v
 ///  0    4                           shift s: v x 2^s bytes, rounded up, at most 491 520
-///  1    8     all else              planes and images, in the same way
+///  1    8     all else              layers and images, in the same way
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Backlog {
     /// Bytes of labels of the map.
     pub map_bytes: u32,
-    /// Bytes of planes and images.
+    /// Bytes of layers and images.
     pub other_bytes: u32,
 }
 

@@ -16,8 +16,8 @@ pub enum ChunkKind {
     Object,
     /// The vehicle's report on its map and on the directive.
     Report,
-    /// A patch of a plane of the map, or a digest of the surface's copy of one.
-    Plane,
+    /// A patch of a layer of the map, or a digest of the surface's copy of one.
+    Layer,
 }
 
 impl ChunkKind {
@@ -28,12 +28,12 @@ impl ChunkKind {
             Self::Slot => 3,
             Self::Object => 4,
             Self::Report => 5,
-            Self::Plane => 6,
+            Self::Layer => 6,
         }
     }
 
     fn from_code(code: u8) -> Option<Self> {
-        let all = [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report, Self::Plane];
+        let all = [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report, Self::Layer];
         all.into_iter().find(|k| k.code() == code)
     }
 }
@@ -45,7 +45,7 @@ impl ChunkKind {
 /// +-----+---------+----------------+-----------+
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
-/// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 plane; 7 reserved: the frame is refused
+/// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer; 7 reserved: the frame is refused
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

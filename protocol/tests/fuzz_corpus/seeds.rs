@@ -1,7 +1,7 @@
 //! The initial corpora: the traffic of two ends, and chunks of three maps.
 
 use super::targets::base;
-use super::targets::link::{FuzzEnd, Setup, Surface, planes};
+use super::targets::link::{FuzzEnd, Setup, Surface, layers};
 use super::targets::raw;
 use scenecast_protocol::map::{Cell, LabelGrid, MapSource};
 use scenecast_protocol::map_codec::{Codec, encode};
@@ -31,7 +31,7 @@ fn traffic(setup: u8) -> Vec<(&'static str, Vec<u8>)> {
     let setup = Setup::new(setup);
     let mut vehicle = setup.vehicle(MapSource::new(Codec::Png), now);
     let mut surface: Surface = setup.surface(now);
-    vehicle.set_planes(planes());
+    layers().into_iter().for_each(|layer| assert!(vehicle.add_layer(layer)));
     (1..3).for_each(|what| vehicle.act(what, 3, now));
     let mut said = Vec::new();
     for round in 0..12 {
@@ -87,7 +87,7 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Pose => seeds.push(("status", format!("pose-{i}"), payload)),
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
-                ChunkKind::Plane => seeds.push(("plane_chunk", format!("talk-{i}"), payload)),
+                ChunkKind::Layer => seeds.push(("layer_chunk", format!("talk-{i}"), payload)),
                 ChunkKind::Map | ChunkKind::Object => {}
             }
         }
@@ -199,11 +199,12 @@ fn golden() -> Vec<Seed> {
         seed("stamp", "not-known", vec![0, 0, 1, 0xFF, 0xFF, 0]),
         seed("stamp", "vehicle", vec![0xFF, 0xFF, 0xFF, 9, 1, 2, 0, 0, 1, 1, 0, 0, 2, 2]),
         seed("stamp", "late", [0xFF; 18].to_vec()),
-        seed("plane_chunk", "digest", vec![0x81, 0x27, 0xA6]),
-        seed("plane_chunk", "depth-without-a-patch", vec![2, 5, 0, 24]),
-        seed("plane_chunk", "depth-without-a-step", vec![2, 0, 0, 24, 0x07, 0xF0]),
-        seed("plane_chunk", "curiosity", vec![3, 0x07, 0xF0, 0x40]),
-        seed("plane_chunk", "unknown", vec![4, 0x07, 0xF0, 0x40]),
+        seed("layer_chunk", "digest", vec![0x41, 0x27, 0xA6]),
+        seed("layer_chunk", "without-a-patch", vec![1]),
+        seed("layer_chunk", "curiosity", vec![2, 0x07, 0xF0, 0x40]),
+        seed("layer_chunk", "unknown", vec![14, 0x07, 0xF0, 0x40]),
+        seed("layer_chunk", "first-part", vec![0x80, 0xBE, 0xEF, 0, 0x44, 0, 0xFE, 0, 0, 0, 5, 0xFF]),
+        seed("layer_chunk", "last-part", vec![0x80, 0xBE, 0xEF, 0x8E, b'e', b'p', b't', b'h', b'm']),
         seed("status", "golden-pose", vec![0x20, 0, 0, 15, 0xFF, 0xFF, 0xFF, 0, 180, 64, 5, 8, 0, 0x0F, 0xA0]),
         seed(
             "status",

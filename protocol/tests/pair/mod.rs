@@ -8,7 +8,7 @@ use scenecast_protocol::link::{
     Authenticity, SlotInboxState, SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink,
 };
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, LabelGrid, PlaneKind, PlaneScale, PlaneSource};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerDescriptor, LayerId, LayerSet, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
@@ -41,8 +41,8 @@ pub(crate) struct Setup {
     pub(crate) authenticity: Option<Authenticity>,
     /// How long a new label must be stable.
     pub(crate) settle: Duration,
-    /// The share of each plane in percent of the map's; `None`: no planes are sent.
-    pub(crate) planes: Option<[u8; 2]>,
+    /// The share of each layer in percent of the map's; `None`: no layers are sent.
+    pub(crate) layers: Option<[u8; 2]>,
 }
 
 impl Setup {
@@ -55,7 +55,7 @@ impl Setup {
             access: Access::Shared,
             authenticity: None,
             settle: Duration::ZERO,
-            planes: None,
+            layers: None,
         }
     }
 
@@ -96,8 +96,8 @@ pub(crate) struct LinkedEnds {
     pub(crate) overheard: VecDeque<Vec<u8>>,
     serial: u64,
     durable: SlotInboxState,
-    /// The last quantities of the planes.
-    quantities: Vec<(PlaneKind, Vec<(Cell, f64)>)>,
+    /// The last quantities of the layers.
+    quantities: Vec<(LayerId, Vec<(Cell, f64)>)>,
 }
 
 enum PairEvent {
@@ -144,27 +144,27 @@ impl LinkedEnds {
         self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
         self.vehicle.set_map(map.iter(), self.now);
-        self.tell_planes();
+        self.tell_layers();
         self.forget_modem(true);
     }
 
     /// Sets confidences and depths of a `side` x `side` map that differ with `phase`.
-    pub(crate) fn set_planes(&mut self, side: i32, phase: u64) {
+    pub(crate) fn set_layers(&mut self, side: i32, phase: u64) {
         let cells = |of: fn(f64, f64, f64) -> f64| {
             let cell = |i: i32| Cell::new(i % side - side / 2, i / side - 3);
             let quantity = |at: Cell| (at, of(f64::from(at.x), f64::from(at.y), phase as f64));
             (0..side * side).map(cell).map(quantity).collect::<Vec<_>>()
         };
         self.quantities = vec![
-            (PlaneKind::Confidence, cells(|x, y, p| ((x * 0.7 + y * 1.3 + p).sin() + 1.0) / 2.0)),
-            (PlaneKind::Depth, cells(|x, y, p| 20.0 + (x * 0.11 + p).sin() * 4.0 + y * 0.2)),
+            (LayerId::CONFIDENCE, cells(|x, y, p| ((x * 0.7 + y * 1.3 + p).sin() + 1.0) / 2.0)),
+            (LayerId::DEPTH, cells(|x, y, p| 20.0 + (x * 0.11 + p).sin() * 4.0 + y * 0.2)),
         ];
-        self.tell_planes();
+        self.tell_layers();
     }
 
-    fn tell_planes(&mut self) {
-        for (kind, cells) in &self.quantities {
-            self.vehicle.set_plane(*kind, cells.iter().copied(), self.now);
+    fn tell_layers(&mut self) {
+        for (id, cells) in &self.quantities {
+            self.vehicle.set_layer(*id, cells.iter().copied(), self.now);
         }
     }
 
@@ -185,14 +185,14 @@ impl LinkedEnds {
     }
 
     pub(crate) fn is_converged(&self) -> bool {
-        self.shown() == self.vehicle.map() && self.planes_agree() && self.vehicle.is_converged()
+        self.shown() == self.vehicle.map() && self.layers_agree() && self.vehicle.is_converged()
     }
 
-    fn planes_agree(&self) -> bool {
+    fn layers_agree(&self) -> bool {
         let view = self.surface.vehicle(auv()).unwrap();
-        self.vehicle.planes().all(|plane| match view.plane(plane.scale().kind()) {
-            Some(heard) => heard.levels().shown() == plane.target(),
-            None => plane.target().is_empty(),
+        self.vehicle.layers().all(|layer| match view.layer(layer.id()) {
+            Some(heard) => heard.levels().shown() == layer.target(),
+            None => layer.target().is_empty(),
         })
     }
 
@@ -353,10 +353,19 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
     link.source_mut().set_debounce(setup.settle);
-    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5)];
-    let source = |scale| PlaneSource::new(scale, setup.codec, setup.settle);
-    link.set_planes(setup.planes.into_iter().flat_map(|shares| scales.map(source).into_iter().zip(shares)));
+    for (id, share) in [LayerId::CONFIDENCE, LayerId::DEPTH].into_iter().zip(setup.layers.into_iter().flatten()) {
+        assert!(link.add_layer(layer(id, share, setup.codec, setup.settle)));
+    }
     link
+}
+
+/// A built-in layer; depths about 20 m.
+pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, settle: Duration) -> LayerSource {
+    let descriptor = match id {
+        LayerId::DEPTH => LayerDescriptor::depth_around(20.0, 0.5),
+        _ => LayerSet::default().get(id).unwrap().clone(),
+    };
+    LayerSource::new(id, LayerDescriptor { share, ..descriptor }, codec, settle)
 }
 
 fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {

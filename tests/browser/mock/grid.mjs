@@ -34,21 +34,22 @@ export class Grid {
     const { x0, y0, width, height } = this.bounds();
     const labels = Buffer.alloc(width * height);
     const ages = Buffer.alloc(width * height * 2, 0xff);
-    const extra = layers.map((p) => ({ ...p, bytes: Buffer.alloc(width * height, 255) }));
+    const extra = layers.map((p) => ({ ...p, bytes: Buffer.alloc(width * height) }));
     for (const c of this.cells.values()) {
       const at = (c.y - y0) * width + (c.x - x0);
       labels[at] = c.label;
       ages.writeUInt16LE(Math.min(65534, Math.max(0, Math.round(nowS - c.atS))), at * 2);
       for (const p of extra) {
         const value = p.at((c.x + 0.5) * this.cellM, (c.y + 0.5) * this.cellM);
-        p.bytes[at] = Math.min(254, Math.max(0, Math.round(((value - p.min) / (p.max - p.min)) * 254)));
+        p.bytes[at] = Math.max(1, p.edges.slice(0, -1).findLastIndex((edge) => edge <= value) + 1);
       }
     }
     const map = { version: this.version, x0, y0, width, height, cell_m: this.cellM };
     map.labels = labels.toString("base64");
     map.age_s = ages.toString("base64");
     map.layers = extra.map((p) => ({
-      name: p.name, unit: p.unit, min: p.min, max: p.max, step: p.step ?? 0,
+      name: p.name, unit: p.unit, palette: p.palette, spread: p.spread, is_depth: p.is_depth,
+      lowest: 1, edges: p.edges,
       data: p.bytes.toString("base64"), age_s: map.age_s,
     }));
     return map;

@@ -1,6 +1,6 @@
 // The whole synthetic mission: vehicles, the surface's turns, budget and the state document.
 
-import { Vehicle } from "./vehicle.mjs";
+import { LAYERS, Vehicle } from "./vehicle.mjs";
 import { Direction } from "./link.mjs";
 
 export const SCENARIOS = {
@@ -100,6 +100,7 @@ export class Mission {
       mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
+      layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),
       link: {
         budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,
         down: this.down.json(this.nowS), up: this.vehicles[0].up.json(this.nowS),

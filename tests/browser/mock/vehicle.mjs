@@ -6,10 +6,13 @@ import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
 import { Settings } from "./settings.mjs";
 
-const LAYERS = [
-  { name: "confidence", unit: "", min: 0.125, max: 0.875, step: 0.25, at: confidence },
-  { name: "depth", unit: "m", min: 10, max: 25, at: floorDepth },
-  { name: "curiosity", unit: "bit", min: 2.5, max: 10.5, step: 1, at: surprise },
+/** The bounds of levels of equal width. */
+const equal = (low, step, levels) => Array.from({ length: levels + 1 }, (_, i) => low + i * step);
+
+export const LAYERS = [
+  { name: "depth", unit: "m", edges: equal(10, 0.5, 30), palette: "cividis", spread: "scale", is_depth: true, at: floorDepth },
+  { name: "confidence", unit: "", edges: equal(0, 0.25, 4), palette: "cividis", spread: "scale", is_depth: false, at: confidence },
+  { name: "curiosity", unit: "bit", edges: equal(2, 1, 9), palette: "inferno", spread: "common", is_depth: false, at: surprise },
 ];
 
 export class Vehicle {

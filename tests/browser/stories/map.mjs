@@ -1,5 +1,6 @@
 import assert from "node:assert/strict";
 import { PHONE } from "../stage.mjs";
+import { LAYERS } from "../mock/vehicle.mjs";
 
 const view = (s) => s.inPage(({ view: v }) => ({ east: v.east, north: v.north, scale: v.scale, mode: v.mode, width: v.width, height: v.height }));
 
@@ -281,6 +282,21 @@ export default [
     },
   },
   {
+    name: "every layer of the server is painted on a scale in its unit",
+    scenario: "start",
+    async run(s) {
+      await s.steer({ layers: true, advance: 30 });
+      const streams = s.page.getByRole("group", { name: "Use of spare capacity" });
+      const names = () => s.page.locator("#layer option").allInnerTexts();
+      for (const { name, unit } of LAYERS) {
+        await streams.getByRole("checkbox", { name }).check();
+        await s.until(`the layer ${name}`, async () => (await names()).includes(name), { advance: 2 });
+        await s.page.selectOption("#layer", name);
+        await s.shows("#legend", new RegExp(`${name}.*\\d.?${unit || "%"}`, "s"));
+      }
+    },
+  },
+  {
     name: "hovering shows the bounds and the age of a level",
     scenario: "start",
     async run(s) {
@@ -304,11 +320,11 @@ export default [
       await s.page.selectOption("#layer", "curiosity");
       await s.shows("#legend", /curiosity\s*up to \d bit\s*\d+ bit and more/);
       const tone = () => s.inPage(async ({ store }, { x, y }) => {
-        const { lookOf } = await import("/js/map/planes.js");
+        const { lookOf } = await import("/js/map/layer-look.js");
         const { cellAt } = await import("/js/map/readout.js");
         const level = cellAt(store.map, x, y).layers.find((p) => p.name === "curiosity");
         const of = store.map.layers.find((p) => p.name === "curiosity");
-        return lookOf(of).tone(Math.round(((level.value - of.min) / (of.max - of.min)) * 254), false);
+        return lookOf(of).tone(level.level, false);
       }, cell);
       const fresh = await s.until("its colour", async () => {
         const seen = await pixel(s, cell.px, cell.py);

@@ -3,35 +3,43 @@
 use super::{Setting, different, one_of, read_different};
 use crate::key::Rule;
 use crate::setting::tables;
-use scenecast_protocol::map::PlaneKind;
+use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerId};
 use std::collections::BTreeMap;
 use std::fmt;
 use toml::Value;
 
-/// The name of a layer that vehicles have.
+/// The name of a built-in layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct LayerName(&'static str);
+pub struct LayerName {
+    id: LayerId,
+    name: &'static str,
+}
 
 impl LayerName {
-    /// The layer of this name, if vehicles have it.
+    /// The layer of this name, if it is built in.
     pub fn new(name: &str) -> Option<Self> {
-        Self::all().find(|layer| layer.0 == name)
+        Self::all().find(|layer| layer.name == name)
     }
 
-    /// Every layer, in the order of the files.
+    /// Every built-in layer, in the order of the files.
     pub fn all() -> impl Iterator<Item = Self> {
-        PlaneKind::ALL.into_iter().map(|kind| Self(kind.name()))
+        BUILT_IN_LAYERS.iter().map(|layer| Self { id: layer.id, name: &layer.descriptor.name })
+    }
+
+    /// The index, the same on every vehicle.
+    pub fn id(self) -> LayerId {
+        self.id
     }
 
     /// The name, as in files and reports.
     pub fn as_str(self) -> &'static str {
-        self.0
+        self.name
     }
 }
 
 impl fmt::Display for LayerName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.0)
+        f.write_str(self.name)
     }
 }
 
@@ -45,7 +53,7 @@ impl Setting for Vec<LayerName> {
     }
 
     fn write(&self) -> Value {
-        Value::Array(self.iter().map(|layer| Value::String(layer.0.to_owned())).collect())
+        Value::Array(self.iter().map(|layer| Value::String(layer.name.to_owned())).collect())
     }
 
     fn allowed(_: &Rule) -> String {
@@ -66,7 +74,7 @@ impl Setting for BTreeMap<LayerName, u8> {
 
     fn write(&self) -> Value {
         let percent = |layer: LayerName| self.get(&layer).copied().unwrap_or(0);
-        tables::write(LayerName::all().map(|layer| (layer.0, percent(layer))))
+        tables::write(LayerName::all().map(|layer| (layer.name, percent(layer))))
     }
 
     fn allowed(rule: &Rule) -> String {

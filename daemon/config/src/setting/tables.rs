@@ -1,8 +1,9 @@
 //! Shares by class, and the order of the background streams.
 
-use super::{Setting, different, one_of, read_different, unit};
+use super::{Setting, different, read_different, unit};
 use crate::key::Rule;
-use scenecast_protocol::schedule::{Class, Extra, Shares, SpendOrder};
+use scenecast_protocol::map::LayerSet;
+use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class, Shares};
 use serde_json::json;
 use toml::{Table, Value};
 
@@ -59,21 +60,36 @@ impl Setting for Shares {
     }
 }
 
-impl Setting for SpendOrder {
+/// The streams that vehicles have, by their names.
+fn streams() -> Vec<(BackgroundStream, String)> {
+    let layers = LayerSet::default();
+    BackgroundStream::all(&layers).map(|stream| (stream, stream.name_in(&layers))).collect()
+}
+
+fn stream_names() -> Vec<String> {
+    streams().into_iter().map(|(_, name)| name).collect()
+}
+
+impl Setting for BackgroundOrder {
     fn read(value: &Value, _: &Rule) -> Option<Self> {
-        let stream = |v: &Value| Extra::ALL.into_iter().find(|stream| Some(stream.name()) == v.as_str());
+        let streams = streams();
+        let stream = |v: &Value| streams.iter().find(|(_, name)| Some(name.as_str()) == v.as_str()).map(|&(s, _)| s);
         Self::new(&read_different(value, stream)?)
     }
 
     fn write(&self) -> Value {
-        Value::Array(self.iter().map(|stream| Value::String(stream.name().to_owned())).collect())
+        Value::Array(self.names(&LayerSet::default()).into_iter().map(Value::String).collect())
     }
 
     fn allowed(_: &Rule) -> String {
-        format!("a list of different words of {}", Extra::ALL.map(Extra::name).join(", "))
+        let layers = LayerSet::default();
+        let is_layer = |stream: &BackgroundStream| matches!(stream, BackgroundStream::Layer(_));
+        let others = BackgroundStream::all(&layers).filter(|stream| !is_layer(stream));
+        let names: Vec<String> = others.map(|stream| stream.name_in(&layers)).collect();
+        format!("a list of different words of {} and the layers of map.layers", names.join(", "))
     }
 
     fn schema(_: &Rule) -> serde_json::Value {
-        different(one_of(&Extra::ALL.map(Extra::name)))
+        different(json!({ "enum": stream_names() }))
     }
 }

@@ -25,6 +25,9 @@ export const INFERNO = [
   [33, 12, 74], [86, 16, 110], [137, 34, 106], [187, 55, 84], [227, 89, 50], [249, 140, 10], [249, 201, 50],
 ];
 
+/** The sequential scales, by the names that layers give them. */
+export const PALETTES = { cividis: CIVIDIS, inferno: INFERNO };
+
 /** Shades of red for the red theme: neighbouring ids get shades far apart (van der Corput). */
 export function redShade(id) {
   let [level, part] = [0, 0.5];

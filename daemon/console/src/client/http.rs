@@ -35,7 +35,11 @@ impl Client {
         let is_plain =
             parsed.scheme_str() == Some("http") && matches!(parsed.path(), "" | "/") && parsed.query().is_none();
         let authority = parsed.authority().filter(|a| is_plain && !a.as_str().contains('@')).ok_or_else(error)?;
-        let port = authority.port_u16().unwrap_or(80);
+        let port = match authority.port_u16() {
+            Some(port) => port,
+            None if authority.as_str() == authority.host() => 80,
+            None => return Err(error()),
+        };
         let authority = format!("{}:{port}", authority.host());
         Ok(Self { url: format!("http://{authority}"), authority, token })
     }
@@ -156,7 +160,16 @@ mod tests {
         assert_eq!(authority("http://127.0.0.1:8460").unwrap(), "127.0.0.1:8460");
         assert_eq!(authority("http://surface.ship/").unwrap(), "surface.ship:80");
         assert_eq!(authority("http://[::1]:8460").unwrap(), "[::1]:8460");
-        for wrong in ["127.0.0.1:8460", "https://127.0.0.1", "http://a@b", "http://h/path", "", "http://h?q"] {
+        for wrong in [
+            "127.0.0.1:8460",
+            "https://127.0.0.1",
+            "http://a@b",
+            "http://h/path",
+            "",
+            "http://h?q",
+            "http://h:99999",
+            "http://h:",
+        ] {
             assert_eq!(authority(wrong), Err(2), "{wrong}");
         }
     }

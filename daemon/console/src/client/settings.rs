@@ -4,8 +4,9 @@ use super::follow::follow;
 use super::session::Session;
 use super::text;
 use crate::fit::{Fit, FittedSettings};
-use crate::state::VehicleState;
+use crate::state::{MissionState, VehicleState};
 use scenecast_core::UserError;
+use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerSet};
 use scenecast_surface::SettingsOrder;
 
 /// A change of settings.
@@ -27,7 +28,7 @@ pub async fn change_settings(session: &Session, change: SettingsChange) -> Resul
         return session.print(&vehicle.orders.settings, || table(vehicle));
     }
     // An order that no vehicle can obey is refused before a fit is requested.
-    change.order.read().map_err(UserError::Input)?;
+    change.order.read(&layers_of(&state)).map_err(UserError::Input)?;
     let order = match change.fit {
         None => change.order,
         Some(bits_per_s) => {
@@ -41,6 +42,16 @@ pub async fn change_settings(session: &Session, change: SettingsChange) -> Resul
     }
     let accepted = session.client.post(&format!("/api/v2/vehicles/{}/settings", vehicle.id), &order).await?;
     follow(session, accepted).await
+}
+
+/// The layers that the surface knows by name; their meaning is of no use here.
+fn layers_of(state: &MissionState) -> LayerSet {
+    let mut layers = LayerSet::default();
+    for layer in &state.layers {
+        let any = BUILT_IN_LAYERS[0].descriptor.clone();
+        layers.add(LayerDescriptor { name: layer.name.clone().into(), ..any });
+    }
+    layers
 }
 
 async fn fit(session: &Session, vehicle: u8, bits_per_s: Option<f64>) -> Result<(Fit, FittedSettings), UserError> {

@@ -3,7 +3,7 @@
 use crate::state::{LayerBody, MapBody};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use scenecast_protocol::map::Rect;
+use scenecast_protocol::map::{LayerDescriptor, Quantity, Rect};
 
 /// A map cell by cell, row by row from the south-west.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,37 +29,35 @@ pub struct MapCells {
 /// A quantity of each cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellLayer {
-    /// Its name, such as `depth`.
-    pub name: &'static str,
-    /// Its unit, empty if it has none.
-    pub unit: &'static str,
-    /// Value of shade 0.
-    pub min: f64,
-    /// Value of shade 254.
-    pub max: f64,
-    /// Width of a level.
-    pub step: f64,
-    /// 0 to 254 from `min` to `max`, 255 = unknown.
-    pub shades: Vec<u8>,
+    /// Its name, unit and colours, and the use of its values.
+    pub descriptor: LayerDescriptor,
+    /// The level whose bounds are the first two of `edges`.
+    pub lowest: u8,
+    /// The bounds of this level and of those above it, one after the other, in units.
+    pub edges: Vec<f64>,
+    /// The level of each cell, 0 = unknown.
+    pub levels: Vec<u8>,
     /// Seconds since each cell was received, 65535 = never.
     pub age_s: Vec<u16>,
 }
 
 impl CellLayer {
-    /// The value of a cell, if it is known.
+    /// The value of a cell: the middle of its level, if that is known.
     pub(crate) fn value(&self, at: usize) -> Option<f64> {
-        let shade = self.shades.get(at).filter(|shade| **shade < 255)?;
-        Some(self.min + (self.max - self.min) * f64::from(*shade) / 254.0)
+        self.descriptor.middle(*self.levels.get(at)?)
     }
 
     fn body(&self) -> LayerBody {
+        let layer = &self.descriptor;
         LayerBody {
-            name: self.name.to_owned(),
-            unit: self.unit.to_owned(),
-            min: self.min,
-            max: self.max,
-            step: self.step,
-            data: STANDARD.encode(&self.shades),
+            name: layer.name.clone().into_owned(),
+            unit: layer.unit.clone().into_owned(),
+            is_depth: layer.quantity == Quantity::Depth,
+            palette: layer.palette.name().to_owned(),
+            spread: layer.spread.name().to_owned(),
+            lowest: self.lowest,
+            edges: self.edges.clone(),
+            data: STANDARD.encode(&self.levels),
             age_s: ages(&self.age_s),
         }
     }

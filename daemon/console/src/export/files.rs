@@ -5,7 +5,7 @@ use super::projection::{lon_lat, well_known_text};
 use super::regions::{Polygon, regions};
 use crate::state::Origin;
 use scenecast_core::label_picture;
-use scenecast_protocol::map::{LabelGrid, PlaneKind};
+use scenecast_protocol::map::{LabelGrid, Quantity};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -69,7 +69,7 @@ pub(crate) fn ply(cells: &MapCells) -> String {
          property double x\nproperty double y\nproperty double z\nproperty uchar red\nproperty uchar green\n\
          property uchar blue\nproperty uchar label\nend_header\n"
     );
-    let depth = cells.layers.iter().find(|l| l.name == PlaneKind::Depth.name());
+    let depth = cells.layers.iter().find(|l| l.descriptor.quantity == Quantity::Depth);
     for ExploredCell { at, x, y, label, .. } in cells.explored() {
         let [red, green, blue] = scenecast_core::palette::colour(label);
         let up = depth.and_then(|layer| layer.value(at)).map_or(0.0, |depth| -depth);
@@ -81,7 +81,7 @@ pub(crate) fn ply(cells: &MapCells) -> String {
 /// One line for each explored cell: the centre in metres, the label, its age in seconds, the value of each layer if known.
 pub(crate) fn csv(cells: &MapCells) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
-    cells.layers.iter().for_each(|layer| out.extend([",", layer.name]));
+    cells.layers.iter().for_each(|layer| out.extend([",", &layer.descriptor.name]));
     for ExploredCell { at, x, y, label, age_s } in cells.explored() {
         let age = if age_s == u16::MAX { String::new() } else { age_s.to_string() };
         let _ = write!(out, "\n{x:.3},{y:.3},{label},{age}");

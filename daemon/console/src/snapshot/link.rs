@@ -20,9 +20,16 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
     let numbered = sum(&|s| s.frames_numbered);
     let (lost, delivered) = (sum(&|s| s.frames_lost), sum(&|s| s.frames_delivered));
     let elapsed = now.as_secs_f64().max(1.0);
-    let direction = |i: usize, frames: u64, lost: u64, class: &dyn Fn(&LinkStats, Class) -> u64| {
-        let bytes = |c: Class| sum(&|s| class(s, c));
-        let useful: u64 = Class::ALL.into_iter().filter(|&c| c != Class::Overhead).map(bytes).sum();
+    let none: BTreeMap<String, u64> =
+        Class::all(&surface.layers()).map(|c| (c.name_in(&surface.layers()), 0)).collect();
+    let direction = |i: usize, frames: u64, lost: u64, by_class: fn(&LinkStats) -> &BTreeMap<Class, u64>| {
+        let (mut bytes_by_class, mut useful) = (none.clone(), 0);
+        for view in &views {
+            for (&class, &bytes) in by_class(view.stats()) {
+                *bytes_by_class.entry(class.name_in(view.layers())).or_default() += bytes;
+                useful += if class == Class::Overhead { 0 } else { bytes };
+            }
+        }
         LinkDirection {
             bps_1min: meter.bps_1min(i, now).round(),
             max_window_bps: meter.max_window_bps(i),
@@ -30,17 +37,17 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
             frames,
             lost,
             goodput_bps: (useful as f64 * 8.0 / elapsed).round(),
-            bytes_by_class: Class::ALL.into_iter().map(|c| (c.name().to_owned(), bytes(c))).collect(),
+            bytes_by_class,
         }
     };
     LinkSummary {
         budget_bps: surface.budget_bps(),
         budget_window_s: meter.window_s(),
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
-        background: surface.spend().names(),
+        background: surface.background().names(&surface.layers()),
         unknown_senders: surface.strangers(),
-        up: direction(0, numbered, numbered.saturating_sub(received), &|s, c| of_class(&s.received_by_class, c)),
-        down: direction(1, lost + delivered, lost, &|s, c| of_class(&s.bytes_by_class, c)),
+        up: direction(0, numbered, numbered.saturating_sub(received), |s| &s.received_by_class),
+        down: direction(1, lost + delivered, lost, |s| &s.bytes_by_class),
         round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),
         backlog_bits: total_bits(views.iter().filter_map(PeerView::backlog)),
         history: meter.history(),
@@ -50,10 +57,6 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
 /// The bits of all backlogs; `None` before the first report.
 fn total_bits(backlogs: impl Iterator<Item = (Backlog, Instant)>) -> Option<u64> {
     backlogs.map(|(b, _)| (u64::from(b.map_bytes) + u64::from(b.other_bytes)) * 8).reduce(|a, b| a + b)
-}
-
-fn of_class(bytes: &BTreeMap<Class, u64>, class: Class) -> u64 {
-    bytes.get(&class).copied().unwrap_or(0)
 }
 
 /// Measurements of the channel to one vehicle.

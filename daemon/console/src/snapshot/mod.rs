@@ -10,8 +10,9 @@ pub use facts::MissionFacts;
 pub(crate) use facts::seconds;
 
 use crate::link_meter::LinkMeter;
-use crate::state::{MissionInfo, MissionState, VehicleState};
+use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};
 use axum::body::Bytes;
+use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::Surface;
 
@@ -51,5 +52,15 @@ pub fn snapshot(surface: &Surface, facts: &MissionFacts, meter: &LinkMeter, now:
         vehicles: vehicle::vehicles(surface, facts, now),
         position: position::surface_position(surface, now),
         link: link::summary(surface, meter, now),
+        layers: surface.layers().iter().map(|(_, layer)| layer_info(layer)).collect(),
     })
+}
+
+fn layer_info(layer: &LayerDescriptor) -> LayerInfo {
+    let built_in = BUILT_IN_LAYERS.iter().find(|b| b.descriptor.name == layer.name);
+    LayerInfo {
+        name: layer.name.clone().into_owned(),
+        unit: layer.unit.clone().into_owned(),
+        summary: built_in.map_or("", |b| b.summary).to_owned(),
+    }
 }

@@ -13,7 +13,7 @@ pub struct LinkSummary {
     pub budget_window_s: f64,
     /// The minimum share of each class, percent.
     pub shares: BTreeMap<String, u8>,
-    /// The background streams that use spare capacity, in this order: finer, depth, exemplars, confidence, curiosity.
+    /// The background streams that use spare capacity, in this order: finer, exemplars and names of layers.
     #[serde(default)]
     pub background: Vec<String>,
     /// Frames that could not be read or came from an unknown vehicle.
@@ -45,7 +45,7 @@ pub struct LinkDirection {
     pub lost: u64,
     /// The mean rate of useful payload, bit/s.
     pub goodput_bps: f64,
-    /// Bytes by class: directive, status, fix, map, exemplar, confidence, depth, curiosity, overhead.
+    /// Bytes by class: directive, status, fix, map, exemplar, overhead, and each layer by its name.
     pub bytes_by_class: BTreeMap<String, u64>,
 }
 

@@ -68,19 +68,23 @@ pub struct MapBody {
 /// then refers to an earlier label. The value of a cell without a label has no meaning.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LayerBody {
-    /// `confidence`: the share of the words of the cell that carry its label, 0 to 1; `depth`: of the sea floor; `curiosity`: the
-    /// mean surprise of the cell's words in bits (the binary logarithm of the perplexity).
+    /// Its name, as in the list of layers of the state.
     pub name: String,
-    /// `m`, `bit`, or empty.
+    /// The unit of its values; empty if they have none.
     pub unit: String,
-    /// The middle of the lowest level.
-    pub min: f64,
-    /// The middle of the highest level.
-    pub max: f64,
-    /// The width of a level: the true value differs by at most half of it from the value in `data`, and by a fifth of it more
-    /// where a cell stays in its level at the edge.
-    pub step: f64,
-    /// Base64: one byte a cell in the order of `labels`, 0 to 254 linearly from `min` to `max`; 255 = unknown.
+    /// Whether the values are depths of the sea floor below the surface of the water, metres.
+    pub is_depth: bool,
+    /// The colours: cividis or inferno.
+    pub palette: String,
+    /// The colours are spread over: scale, all of `edges`; present, likewise; common, those without the fiftieth of the cells
+    /// at either end.
+    pub spread: String,
+    /// The level whose bounds are the first two of `edges`.
+    pub lowest: u8,
+    /// The bounds of levels in units: level n lies from `edges[n - lowest]` to the next one. A cell may stay in its level while its
+    /// value lies outside by a fifth of the level's width.
+    pub edges: Vec<f64>,
+    /// Base64: one byte a cell in the order of `labels`: its level; 0 = unknown.
     pub data: String,
     /// Base64, as for the labels: seconds since the value of the cell was received.
     pub age_s: String,

@@ -13,7 +13,6 @@ use std::time::Duration;
 pub struct Stranger {
     pub position: NodePosition,
     pub bytes: usize,
-    /// Duration of one transmission.
     pub airtime: Duration,
     pub mean_gap: Duration,
 }

@@ -92,7 +92,7 @@ fn the_channel_is_read_with_presets_links_and_outages() {
 
 #[test]
 fn the_scenarios_that_come_with_the_program_are_read() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../config/scenarios");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/scenarios");
     let mut read = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -185,7 +185,7 @@ impl ExemplarBench {
     }
 
     pub(super) fn page(&self, label: u8) -> Option<&Page> {
-        self.surface.surface().desk(self.address)?.album.page(label)
+        self.surface.surface().record(self.address)?.exemplars.page(label)
     }
 
     fn is_met(&self, label: u8) -> bool {
@@ -201,8 +201,8 @@ impl ExemplarBench {
             };
             (Cell::new(i % EDGE, i / EDGE), label)
         });
-        let (cells, planes, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
-        let update = MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, planes, perplexity, labels: LABELS };
+        let (cells, layers, perplexity) = (cells.collect(), BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: self.now.as_secs_f64(), epoch: 0, cells, layers, perplexity, labels: LABELS };
         self.vehicle.handle_map(&update, self.now);
     }
 }

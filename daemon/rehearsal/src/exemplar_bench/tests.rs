@@ -4,7 +4,7 @@ use super::arrival::{ArrivalSetting, ExemplarBench, LABELS};
 use crate::virtual_time::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
-use scenecast_protocol::schedule::{Class, Shares, SpendOrder};
+use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{AskState, Wish};
 
@@ -22,7 +22,8 @@ fn patch(i: u32) -> RgbImage {
 fn bench(setting: ArrivalSetting, seed: u64) -> ExemplarBench {
     let patches: Vec<RgbImage> = (0..30).map(patch).collect();
     let mut bench = ExemplarBench::new(setting, &patches, seed).unwrap();
-    let budget = Budget { bits_per_s: 10_000, shares: Shares::default(), spend: SpendOrder::new(&[]).unwrap() };
+    let budget =
+        Budget { bits_per_s: 10_000, shares: Shares::default(), background: BackgroundOrder::new(&[]).unwrap() };
     bench.vehicle.handle_budget(budget, bench.now);
     bench.run_until(Instant::from_secs_f64(120.0), |_| false);
     assert_eq!(exemplar_bytes(&bench), 0);
@@ -30,9 +31,9 @@ fn bench(setting: ArrivalSetting, seed: u64) -> ExemplarBench {
 }
 
 /// The operator orders background streams.
-fn spend(bench: &mut ExemplarBench, names: &[&str]) {
-    let spend = SpendOrder::from_names(names).unwrap();
-    bench.surface.surface_mut().set_budget(10_000, None, Some(spend), bench.now).unwrap();
+fn background(bench: &mut ExemplarBench, names: &[&str]) {
+    let background = BackgroundOrder::from_names(names, &scenecast_protocol::map::LayerSet::default()).unwrap();
+    bench.surface.surface_mut().set_budget(10_000, None, Some(background), bench.now).unwrap();
 }
 
 fn wait(bench: &mut ExemplarBench, seconds: f64) {
@@ -99,7 +100,7 @@ fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
 #[test]
 fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut bench = bench(IDLE, 4);
-    spend(&mut bench, &["exemplars"]);
+    background(&mut bench, &["exemplars"]);
     let until = bench.now + std::time::Duration::from_secs(120);
     assert!(bench.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
     let (seconds, _) = bench.get(LABELS, Wish::Another).unwrap().unwrap();
@@ -118,7 +119,7 @@ fn while_the_map_waits_background_images_get_only_frame_ends() {
     let loaded = ArrivalSetting { loaded: true, ..IDLE };
     let map_bytes = |names: &[&str]| {
         let mut bench = bench(loaded, 5);
-        spend(&mut bench, names);
+        background(&mut bench, names);
         wait(&mut bench, 120.0);
         let map = bench.vehicle.vehicle().stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
         assert!(exemplar_bytes(&bench) < map / 100, "{} beside {map}", exemplar_bytes(&bench));

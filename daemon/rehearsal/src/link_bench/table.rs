@@ -46,7 +46,7 @@ pub struct LinkRow {
     pub converge_within: f64,
     /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
-    /// Number of resynchronisations.
+    /// Number of resynchronisations of the link.
     pub resyncs: u64,
     /// Number of frames that began before the end of the turn-around.
     pub early_frames: u64,

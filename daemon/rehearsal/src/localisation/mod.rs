@@ -40,9 +40,9 @@ const SOUND_M_S: f64 = 1500.0;
 pub struct Tracks {
     /// True position of the vehicle, each second.
     pub truth: Vec<(f64, f64)>,
-    /// Estimated position without fixes.
+    /// Estimated position without fixes, each second.
     pub reckoned: Vec<(f64, f64)>,
-    /// Estimated position with fixes.
+    /// Estimated position with fixes, each second.
     pub relayed: Vec<(f64, f64)>,
     /// Fixes that were sent, and whether the vehicle used each.
     pub fixes: Vec<((f64, f64), bool)>,

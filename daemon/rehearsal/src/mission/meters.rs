@@ -1,7 +1,7 @@
 //! Agreement and delay of the operator's map, layer by layer.
 
 use crate::meter::Meter;
-use scenecast_protocol::map::{LabelGrid, PlaneKind, PlaneReplica};
+use scenecast_protocol::map::{LabelGrid, LayerId, LayerReplica};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::Surface;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 #[derive(Default)]
 pub(crate) struct Meters {
     pub(crate) labels: Meter,
-    pub(crate) layers: BTreeMap<PlaneKind, Meter>,
+    pub(crate) layers: BTreeMap<LayerId, Meter>,
     /// Changes of the operator's map so far.
     operator_version: u64,
 }
@@ -28,11 +28,11 @@ impl Meters {
         let versions = (vehicle.map_version(), self.operator_version);
         self.labels.look(vehicle.map(), operator, versions, now);
         let (view, empty) = (surface.view(address), LabelGrid::default());
-        for layer in vehicle.planes() {
-            let kind = layer.scale().kind();
-            let replica = view.and_then(|v| v.plane(kind));
-            let versions = (layer.version(), replica.map_or(0, PlaneReplica::version));
-            let meter = self.layers.entry(kind).or_default();
+        for layer in vehicle.layers() {
+            let id = layer.id();
+            let replica = view.and_then(|v| v.layer(id));
+            let versions = (layer.version(), replica.map_or(0, LayerReplica::version));
+            let meter = self.layers.entry(id).or_default();
             meter.look(layer.target(), replica.map_or(&empty, |r| r.levels().shown()), versions, now);
         }
     }

@@ -4,7 +4,7 @@ use super::{Mission, MissionOptions};
 use crate::world::World;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
-use scenecast_protocol::map::{LabelGrid, PlaneKind};
+use scenecast_protocol::map::{LabelGrid, LayerId};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
 use scenecast_surface::SettingsOrder;
@@ -38,14 +38,14 @@ impl Mission {
         self.surface_mut().set_settings(address, &order, now).unwrap();
         let give_up = now + Duration::from_secs(120);
         let is_in_force = |m: &Self| {
-            let desk = &m.surface().desk(address).unwrap().settings;
-            desk.in_force() == Some(desk.asked())
+            let record = &m.surface().record(address).unwrap().settings;
+            record.in_force() == Some(record.asked())
         };
         while !is_in_force(self) {
             assert!(self.now() < give_up, "not in force after two minutes");
             self.advance(self.now() + Duration::from_secs(1)).unwrap();
         }
-        assert_eq!(self.vehicle().settings(), self.surface().desk(address).unwrap().settings.asked());
+        assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().settings.asked());
     }
 
     /// Ends the survey and drains the link.
@@ -62,8 +62,8 @@ impl Mission {
         self.surface().map(self.address).unwrap()
     }
 
-    fn heard_of(&self, kind: PlaneKind) -> u64 {
-        self.surface().view(self.address).and_then(|v| v.plane(kind)).map_or(0, |p| p.version())
+    fn received_version(&self, kind: LayerId) -> u64 {
+        self.surface().view(self.address).and_then(|v| v.layer(kind)).map_or(0, |p| p.version())
     }
 
     fn settings_applied(&self) -> usize {
@@ -78,30 +78,30 @@ fn same(a: &LabelGrid, b: &LabelGrid) -> bool {
 }
 
 #[test]
-fn priors_frame_rate_and_layers_change_during_a_mission() {
+fn priors_frame_rate_and_layers_change_under_way_and_the_maps_agree() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
-    assert!(frames >= 50 && labels > 1 && mission.heard_of(PlaneKind::Confidence) > 0);
+    assert!(frames >= 50 && labels > 1 && mission.received_version(LayerId::CONFIDENCE) > 0);
     mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
     // Frames that were on their way when the settings changed have arrived.
     mission.fly_to(mission.now().as_secs_f64() + 30.0);
     let (since, frames, confidence) =
-        (mission.now(), mission.logbook.track.len(), mission.heard_of(PlaneKind::Confidence));
-    let depth = mission.heard_of(PlaneKind::Depth);
+        (mission.now(), mission.logbook.track.len(), mission.received_version(LayerId::CONFIDENCE));
+    let depth = mission.received_version(LayerId::DEPTH);
     mission.fly_to(since.as_secs_f64() + 100.0);
     assert!((9..=11).contains(&(mission.logbook.track.len() - frames)), "one frame in ten seconds is seen");
-    assert_eq!(mission.heard_of(PlaneKind::Confidence), confidence, "a plane that is not told costs nothing");
-    assert!(mission.heard_of(PlaneKind::Depth) > depth);
+    assert_eq!(mission.received_version(LayerId::CONFIDENCE), confidence, "a layer that is not sent costs no bytes");
+    assert!(mission.received_version(LayerId::DEPTH) > depth);
     mission.tune(r#"{"frames_per_s": 0, "layers": "", "gamma": 0}"#);
-    assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "what an order does not name stays");
+    assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "settings that an order does not name stay");
     mission.fly_to(mission.now().as_secs_f64() + 60.0);
-    assert!(mission.heard_of(PlaneKind::Confidence) > confidence);
+    assert!(mission.received_version(LayerId::CONFIDENCE) > confidence);
     mission.drain();
-    let told = mission.vehicle().planes().find(|p| p.scale().kind() == PlaneKind::Confidence).unwrap().target().clone();
-    let heard = mission.surface().view(mission.address).unwrap().plane(PlaneKind::Confidence).unwrap();
-    assert!(same(&told, heard.levels().shown()), "a plane goes on from where it rested");
+    let sent = mission.vehicle().layers().find(|p| p.id() == LayerId::CONFIDENCE).unwrap().target().clone();
+    let received = mission.surface().view(mission.address).unwrap().layer(LayerId::CONFIDENCE).unwrap();
+    assert!(same(&sent, received.levels().shown()), "a layer resumes from its last state");
     assert_eq!((mission.mapper.epoch(), mission.settings_applied()), (0, 2), "labels keep their meaning");
     assert!(mission.mapper.current().labels >= labels);
 }
@@ -114,11 +114,11 @@ fn only_coarse_cells_are_sent_until_all_are_requested_again() {
     let known = mission.vehicle().map().clone();
     mission.fly_to(200.0);
     let seen = mission.mapper.current().cells.len();
-    let told = mission.vehicle().map();
-    assert!(told.explored() < seen * 2 / 3, "{} of {seen} cells are told", told.explored());
+    let sent = mission.vehicle().map();
+    assert!(sent.explored() < seen * 2 / 3, "{} of {seen} cells are sent", sent.explored());
     for (cell, label) in mission.mapper.current().cells {
-        let is_told = Stride::Four.on_lattice(cell).is_some() || known.get(cell) != 0;
-        assert_eq!(told.get(cell), if is_told { label } else { 0 }, "{cell:?}");
+        let is_sent = Stride::Four.on_lattice(cell).is_some() || known.get(cell) != 0;
+        assert_eq!(sent.get(cell), if is_sent { label } else { 0 }, "{cell:?}");
     }
     mission.drain();
     mission.tune(r#"{"cells": "fine"}"#);

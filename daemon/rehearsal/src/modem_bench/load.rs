@@ -66,7 +66,7 @@ pub struct ModemBench {
 }
 
 impl ModemBench {
-    /// Ends before their handshake.
+    /// Ends before their handshake, at emulated modems.
     pub fn new(setting: &ModemSetting, seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let rig = ModemRig::new(&setting.config, Channel::new(setting.channel(), seed), seed, now)?;

@@ -34,13 +34,13 @@ impl Vehicle {
     /// Puts in force what survived.
     pub(super) fn restore_course(&mut self) {
         let durable = &self.durable;
-        self.guard.order = Constraints { hold: durable.hold, abort: durable.abort };
+        self.failsafe.order = Constraints { hold: durable.hold, abort: durable.abort };
         if let Some(limits) = Limits::from_bytes(&durable.limits) {
-            self.guard.set_limits(limits);
-            (self.guard.used_m, self.guard.used_s) = (f64::from(durable.used.0), f64::from(durable.used.1));
+            self.failsafe.set_limits(limits);
+            (self.failsafe.used_m, self.failsafe.used_s) = (f64::from(durable.used.0), f64::from(durable.used.1));
         }
         if let Some(reason) = ModeReason::from_code(durable.breach) {
-            self.guard.handle_breach(reason);
+            self.failsafe.handle_breach(reason);
         }
         self.steering.set_planner(self.telling.settings.planner.value());
         if let Some(fence) = Fence::from_bytes(&durable.fence).filter(|f| f.check().is_ok()) {
@@ -50,15 +50,15 @@ impl Vehicle {
 
     /// Chooses a waypoint if there is none or the last one is reached, or does what is to be done instead of the survey.
     pub fn steer(&mut self, now: Instant) {
-        self.guard.handle_time(now);
+        self.failsafe.handle_time(now);
         if self.done {
             return;
         }
         let at = self.placed();
         self.watch(at);
-        let is_limited = self.guard.left_m().is_finite();
+        let is_limited = self.failsafe.left_m().is_finite();
         let home_m = if is_limited { self.steering.way_home_m(at) } else { 0.0 };
-        match self.guard.stop(home_m) {
+        match self.failsafe.stop(home_m) {
             None => self.survey(at),
             Some((Reaction::Hold, why)) => self.stay(VehicleMode::Hold, why),
             Some((Reaction::Surface, why)) => self.come_up(why),
@@ -87,22 +87,22 @@ impl Vehicle {
 
     fn watch(&mut self, at: Point) {
         if !self.steering.bounds().holds(at) {
-            self.guard.handle_breach(ModeReason::Fence);
+            self.failsafe.handle_breach(ModeReason::Fence);
         }
-        let is_broken = self.guard.is_band_broken(self.navigator.depth_m());
+        let is_broken = self.failsafe.is_band_broken(self.navigator.depth_m());
         if is_broken && self.course.was_in_band && self.course.motion != Motion::Rising {
-            self.guard.handle_breach(ModeReason::Band);
+            self.failsafe.handle_breach(ModeReason::Band);
         }
         self.course.was_in_band = (self.course.was_in_band || !is_broken) && self.course.motion != Motion::Rising;
     }
 
     /// What must survive has changed since it was last recorded.
     fn record(&mut self) {
-        let (used_m, used_s) = (self.guard.used_m, self.guard.used_s);
+        let (used_m, used_s) = (self.failsafe.used_m, self.failsafe.used_s);
         let (noted_m, noted_s) = (f64::from(self.durable.used.0), f64::from(self.durable.used.1));
         let is_far = used_m - noted_m > RECORD_EVERY.0 || used_s - noted_s > RECORD_EVERY.1;
-        let breach = self.guard.latched as u8;
-        if (is_far && self.guard.left_m().is_finite()) || breach != self.durable.breach {
+        let breach = self.failsafe.latched as u8;
+        if (is_far && self.failsafe.left_m().is_finite()) || breach != self.durable.breach {
             self.durable.used = (used_m as u32, used_s as u32);
             self.durable.breach = breach;
             self.outputs.push_back(VehicleOutput::Persist);
@@ -114,14 +114,14 @@ impl Vehicle {
         if !is_back && self.waypoint.is_some_and(|w| !self.is_reached(w)) {
             return;
         }
-        let left_m = self.guard.left_m();
+        let left_m = self.failsafe.left_m();
         let (map, version) = (&self.telling.seen, self.telling.version);
         match self.steering.next(at, (map, version), self.utility.as_ref(), left_m) {
             Course::Go(to) => {
                 let path = self.steering.ahead(to, left_m - distance(at, to));
                 self.go((to, path), VehicleMode::Survey, ModeReason::Survey);
             }
-            Course::UsedUp => self.go_home(at, self.guard.tighter()),
+            Course::UsedUp => self.go_home(at, self.failsafe.tighter()),
             Course::There => self.stay(VehicleMode::Hold, ModeReason::NoPath),
             Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
         }
@@ -150,7 +150,7 @@ impl Vehicle {
     }
 
     fn stay(&mut self, mode: VehicleMode, reason: ModeReason) {
-        let mode = if self.guard.order.abort { VehicleMode::Abort } else { mode };
+        let mode = if self.failsafe.order.abort { VehicleMode::Abort } else { mode };
         if self.course.motion != Motion::Still {
             self.outputs.push_back(VehicleOutput::Hold);
         }

@@ -7,7 +7,7 @@ use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
-use scenecast_protocol::schedule::Extra;
+use scenecast_protocol::schedule::BackgroundStream;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -115,7 +115,7 @@ impl Gallery {
         for request in self.requests.wanted.clone() {
             self.answer(request, epoch, link);
         }
-        if self.unasked.is_none() && !self.is_asked() && link.spend().has(Extra::Exemplars) {
+        if self.unasked.is_none() && !self.is_asked() && link.background().has(BackgroundStream::Exemplars) {
             self.show_unasked(epoch, weight, link);
         }
     }
@@ -152,7 +152,7 @@ impl Gallery {
         let head = Exemplar { epoch, label, serial: 0, size: 0, picture: 0, bytes: Vec::new() };
         let Some(exemplar) = fill(head, number, &picture.patch, 0) else { return };
         self.note_shown(label, number, picture);
-        let object = link.push_extra_object(exemplar.encode());
+        let object = link.push_background_object(exemplar.encode());
         self.unasked = object.map(|object| Unasked { label, number, object });
     }
 

@@ -9,7 +9,7 @@ mod place;
 mod tuning;
 mod whole_png;
 
-use super::guard::{Guard, Habits};
+use super::failsafe::{Failsafe, Habits};
 use super::mapper::MapUpdate;
 use super::navigator::Navigator;
 use super::steering::Steering;
@@ -19,7 +19,7 @@ use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::{LabelGrid, PlaneSource};
+use scenecast_protocol::map::{LabelGrid, LayerSource};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::PlannedPath;
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,7 @@ pub struct Durable {
     /// Least shares in force in percent, if somebody has changed them.
     pub shares: Option<[u8; 5]>,
     /// What left-over bits are spent on, as on the wire, if somebody has changed it.
-    pub spend: Option<u16>,
+    pub background: Option<u128>,
     /// Settings in force, as on the wire; empty: all as configured.
     pub settings: Vec<u8>,
     /// Limits in force, as on the wire; empty: none.
@@ -102,7 +102,7 @@ pub struct Vehicle {
     gallery: Gallery,
     labels: u8,
     explored: u32,
-    guard: Guard,
+    failsafe: Failsafe,
     course: Doing,
     waypoint: Option<MapPoint>,
     /// What is planned after the waypoint.
@@ -145,7 +145,7 @@ impl Vehicle {
             gallery: Gallery::default(),
             labels: 0,
             explored: 0,
-            guard: Guard::new(habits, now),
+            failsafe: Failsafe::new(habits, now),
             course: Doing::default(),
             waypoint: None,
             path: PlannedPath::default(),
@@ -183,9 +183,9 @@ impl Vehicle {
         self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
     }
 
-    /// The planes of the map that are told.
-    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
-        self.link.planes()
+    /// The layers of the map that are told.
+    pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
+        self.link.layers()
     }
 
     /// Versions of that map so far.
@@ -229,7 +229,7 @@ impl Vehicle {
     /// The vehicle's own sensors say that it moved.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
-        self.guard.handle_way(dx_m.hypot(dy_m));
+        self.failsafe.handle_way(dx_m.hypot(dy_m));
     }
 
     /// The scene model has a new map.
@@ -286,7 +286,7 @@ impl Vehicle {
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
         if let Some(at) = self.link.last_received() {
-            self.guard.handle_surface_heard(at);
+            self.failsafe.handle_surface_heard(at);
         }
         while let Some(event) = self.link.poll_event() {
             match event {

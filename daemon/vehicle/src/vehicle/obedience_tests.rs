@@ -66,8 +66,8 @@ impl Sea {
         let cells = (-6..6).flat_map(|dy| (-6..6).map(move |dx| (x + dx, y + dy)));
         let mut known: Vec<(Cell, u8)> = self.vehicle.cells().collect();
         known.extend(cells.map(|(x, y)| (Cell::new(x, y), patch(x, y))));
-        let (planes, perplexity) = (BTreeMap::new(), Vec::new());
-        let update = MapUpdate { t_s: 0.0, epoch: 0, cells: known, planes, perplexity, labels: 4 };
+        let (layers, perplexity) = (BTreeMap::new(), Vec::new());
+        let update = MapUpdate { t_s: 0.0, epoch: 0, cells: known, layers, perplexity, labels: 4 };
         self.vehicle.handle_map(&update, self.now);
     }
 

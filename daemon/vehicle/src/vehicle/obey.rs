@@ -53,7 +53,7 @@ impl Vehicle {
 
     fn follow_order(&mut self, order: Constraints) {
         (self.durable.hold, self.durable.abort) = (order.hold, order.abort);
-        self.guard.order = order;
+        self.failsafe.order = order;
         self.forgive();
     }
 
@@ -62,12 +62,12 @@ impl Vehicle {
             LimitsFault::EmptyBand(_) => RefusalReason::Contradiction,
             LimitsFault::OutOfRange(..) => RefusalReason::OutOfRange,
         })?;
-        if !self.guard.is_able(&limits, self.navigator.depth_m()) {
+        if !self.failsafe.is_able(&limits, self.navigator.depth_m()) {
             return Err(RefusalReason::Unable);
         }
         self.durable.limits = limits.to_bytes();
         self.durable.used = (0, 0);
-        self.guard.set_limits(limits);
+        self.failsafe.set_limits(limits);
         self.reconsider();
         Ok(())
     }
@@ -89,7 +89,7 @@ impl Vehicle {
 
     /// The operator has answered a breach.
     fn forgive(&mut self) {
-        self.guard.forgive();
+        self.failsafe.forgive();
         self.durable.breach = 0;
         self.reconsider();
     }
@@ -127,11 +127,11 @@ impl Vehicle {
         self.link.set_budget(budget.bits_per_s, now);
         self.follow_telling();
         self.link.set_shares(budget.shares);
-        self.link.set_spend(budget.spend);
+        self.link.set_background(budget.background);
         self.tend_gallery();
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
-        self.durable.spend = Some(budget.spend.code());
+        self.durable.background = Some(budget.background.code());
     }
 }
 

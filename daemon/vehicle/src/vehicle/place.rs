@@ -58,14 +58,14 @@ impl Vehicle {
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         let before = self.navigator.position();
         self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
-        self.guard.handle_way(before.distance_m(MapPoint { x_m, y_m }));
+        self.failsafe.handle_way(before.distance_m(MapPoint { x_m, y_m }));
     }
 
     /// For so long nobody measured the way: it may be anywhere that it could have gone to, and counts as gone there.
     pub fn handle_unseen(&mut self, time: Duration) {
-        let metres = time.as_secs_f64() * self.guard.speed_m_s();
+        let metres = time.as_secs_f64() * self.failsafe.speed_m_s();
         self.navigator.handle_unseen_way(metres);
-        self.guard.handle_way(metres);
+        self.failsafe.handle_way(metres);
     }
 
     /// Labels of cells as the vehicle sees them.

@@ -1,9 +1,9 @@
-//! What the operator's settings change on the vehicle: which cells and planes it tells, and how it chooses its way.
+//! What the operator's settings change on the vehicle: which cells and layers it tells, and how it chooses its way.
 
 use super::{Vehicle, VehicleOutput};
 use crate::MapUpdate;
-use scenecast_protocol::directive::{CellBand, PlaneSet, RefusalReason, Settings};
-use scenecast_protocol::map::{Cell, LabelGrid, PlaneKind, UNEXPLORED};
+use scenecast_protocol::directive::{CellBand, RefusalReason, Settings};
+use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerMask, UNEXPLORED};
 use scenecast_protocol::map_codec::Stride;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
@@ -20,11 +20,11 @@ pub(super) struct Telling {
     pub(super) seen: LabelGrid,
     /// Versions of that so far.
     pub(super) version: u64,
-    planes: BTreeMap<PlaneKind, Vec<(Cell, f64)>>,
+    layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     /// As configured: seconds of the budget, 0: never coarse.
     coarse_after_s: f64,
     is_coarse: bool,
-    told_planes: PlaneSet,
+    told_layers: LayerMask,
 }
 
 impl Telling {
@@ -55,24 +55,24 @@ impl Telling {
     pub(super) fn see(&mut self, update: &MapUpdate) {
         let changed = update.cells.iter().filter(|&&(cell, label)| self.seen.set(cell, label) != label).count();
         self.version += u64::from(changed > 0);
-        self.planes.clone_from(&update.planes);
+        self.layers.clone_from(&update.layers);
     }
 
     /// Labels mean something else from now on.
     pub(super) fn forget(&mut self) {
         self.seen.clear();
-        self.planes.clear();
+        self.layers.clear();
         self.version += 1;
     }
 }
 
 impl Vehicle {
     /// What is told unless the operator says otherwise: only coarse cells or all, a backlog that the budget needs longer for
-    /// than `coarse_after_s` seconds (0: none) coarse to fine, and these planes.
-    pub fn configure_telling(&mut self, is_coarse: bool, coarse_after_s: f64, planes: PlaneSet) {
+    /// than `coarse_after_s` seconds (0: none) coarse to fine, and these layers.
+    pub fn configure_telling(&mut self, is_coarse: bool, coarse_after_s: f64, layers: LayerMask) {
         self.telling.is_coarse = is_coarse;
         self.telling.coarse_after_s = coarse_after_s;
-        self.telling.told_planes = planes;
+        self.telling.told_layers = layers;
         self.follow_telling();
     }
 
@@ -83,7 +83,7 @@ impl Vehicle {
 
     pub(super) fn apply_settings(&mut self, settings: &Settings, now: Instant) -> Result<(), RefusalReason> {
         settings.check().map_err(|_| RefusalReason::OutOfRange)?;
-        let tells_parts = settings.cells.value().is_some() || settings.planes.value().is_some();
+        let tells_parts = settings.cells.value().is_some() || settings.layers.value().is_some();
         if self.whole_png.is_some() && tells_parts {
             return Err(RefusalReason::OutOfRange);
         }
@@ -100,14 +100,14 @@ impl Vehicle {
         Ok(())
     }
 
-    /// Which cells and planes are told follows settings, configuration and budget.
+    /// Which cells and layers are told follows settings, configuration and budget.
     pub(super) fn follow_telling(&mut self) {
         let limit = self.telling.coarse_limit(self.link.budget_bps());
         let is_coarse = self.telling.band() == CellBand::Coarse;
-        let planes = self.telling.settings.planes.value().unwrap_or(self.telling.told_planes);
+        let layers = self.telling.settings.layers.value().unwrap_or(self.telling.told_layers);
         self.link.source_mut().set_coarse_limit(limit);
-        self.link.set_coarse_planes(is_coarse.then_some(0));
-        self.link.set_told_planes(|kind| planes.has(kind));
+        self.link.set_coarse_layers(is_coarse.then_some(0));
+        self.link.select_layers(layers);
     }
 
     /// Hands the link what is to be told of what was seen.
@@ -122,10 +122,10 @@ impl Vehicle {
         };
         let cells: Vec<(Cell, u8)> = telling.seen.iter().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
         link.set_map(cells, now);
-        for (&kind, cells) in &telling.planes {
+        for (&id, cells) in &telling.layers {
             let cells: Vec<(Cell, f64)> =
                 cells.iter().copied().filter(|&(cell, _)| is_told(link.map(), cell)).collect();
-            link.set_plane(kind, cells, now);
+            link.set_layer(id, cells, now);
         }
     }
 }

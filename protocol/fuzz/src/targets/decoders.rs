@@ -4,7 +4,7 @@ use super::raw::{self, Script};
 use scenecast_protocol::directive::{SlotState, VersionedSlot};
 use scenecast_protocol::link::{Flight, LinkWindow, SlotInbox};
 use scenecast_protocol::mac::ClockMap;
-use scenecast_protocol::map::{PlaneChunk, PlaneReplica};
+use scenecast_protocol::map::{Assembly, LayerChunk, LayerDescriptor, LayerReplica, LayerSet};
 use scenecast_protocol::object::{MAX_OBJECT, ObjectReceiver, Part, Received};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::time::Instant;
@@ -152,15 +152,37 @@ pub fn status(data: &[u8]) {
     }
 }
 
-/// A decoded plane chunk can be encoded and reads the same; it is applied or refused, with levels in range.
-pub fn plane_chunk(data: &[u8]) {
-    let Some(chunk) = PlaneChunk::decode(data) else { return };
+/// A decoded layer chunk can be encoded and reads the same; it is applied or refused, with levels in range.
+pub fn layer_chunk(data: &[u8]) {
+    let Some(chunk) = LayerChunk::decode(data) else { return };
     assert_eq!(chunk.encode(), data);
-    if let PlaneChunk::Patch(scale, patch) = chunk {
-        let mut replica = PlaneReplica::new(scale);
-        let taken = replica.apply(1, scale, patch, Instant::ZERO);
-        assert!(taken || replica.levels().shown().is_empty());
-        assert!(replica.levels().shown().iter().all(|(_, level)| scale.bounds(level).is_some()));
+    let layers = LayerSet::default();
+    match (chunk, layers.get(chunk.id())) {
+        (LayerChunk::Patch(_, patch), Some(layer)) => {
+            let mut replica = LayerReplica::new(layer.clone());
+            let taken = replica.apply(1, patch, Instant::ZERO);
+            assert!(taken || replica.levels().shown().is_empty());
+            assert!(replica.levels().shown().iter().all(|(_, level)| layer.bounds(level).is_some()));
+        }
+        (LayerChunk::Descriptor(_, part), _) => {
+            if let Some(Some(whole)) = Assembly::default().take(&part) {
+                assert_eq!((whole.to_bytes().as_slice(), whole.digest()), (part.bytes, part.digest));
+                announced(&whole);
+            }
+            // A digest rarely fits by chance: the bytes may be a descriptor without it.
+            LayerDescriptor::from_bytes(part.bytes).iter().for_each(announced);
+        }
+        _ => {}
+    }
+}
+
+/// The levels of a layer follow each other, and each holds its middle.
+fn announced(layer: &LayerDescriptor) {
+    assert!(layer.is_sound());
+    for level in 1..=layer.levels {
+        let (low, high) = layer.bounds(level).expect("a level");
+        assert!(low <= high && low.is_finite() && high.is_finite());
+        assert!(layer.level((low + high) / 2.0, 0) <= layer.levels);
     }
 }
 

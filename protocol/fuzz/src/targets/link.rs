@@ -4,7 +4,9 @@ use super::peer::{FuzzPeer, MISSION, authenticity, vehicle};
 use super::raw::Script;
 use scenecast_protocol::link::{SlotInboxState, SurfaceConfig, SurfaceLink, Transmit, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
-use scenecast_protocol::map::{Cell, MapSource, PlaneScale, PlaneSource, Replica, StateReplica, StateSource};
+use scenecast_protocol::map::{
+    Cell, LayerDescriptor, LayerId, LayerSet, LayerSource, MapSource, Replica, StateReplica, StateSource,
+};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
@@ -112,10 +114,12 @@ impl Grow for MapSource {
     }
 }
 
-/// The planes of a vehicle that has any.
-pub fn planes() -> impl Iterator<Item = (PlaneSource, u8)> {
-    let scales = [PlaneScale::Confidence, PlaneScale::depth_around(20.0, 0.5), PlaneScale::Curiosity];
-    scales.into_iter().map(|scale| (PlaneSource::new(scale, Codec::Png, Duration::from_secs(2)), 20))
+/// The layers of a vehicle that has any.
+pub fn layers() -> Vec<LayerSource> {
+    let (settle, share) = (Duration::from_secs(2), 100 / LayerId::COUNT as u8);
+    let source =
+        |layer: LayerDescriptor, id| LayerSource::new(id, LayerDescriptor { share, ..layer }, Codec::Png, settle);
+    LayerSet::default().iter().map(|(id, layer)| source(layer.clone(), id)).collect()
 }
 
 pub type Vehicle<S = Pile> = VehicleLink<S>;

@@ -10,7 +10,7 @@ pub mod raw;
 mod surface;
 mod vehicle;
 
-pub use decoders::{ack, chunks, frame, key_text, object, plane_chunk, slot, stamp, status};
+pub use decoders::{ack, chunks, frame, key_text, layer_chunk, object, slot, stamp, status};
 pub use map_chunk::{base, map_chunk};
 pub use surface::{surface_events, surface_link};
 pub use vehicle::{vehicle_events, vehicle_link};
@@ -28,7 +28,7 @@ pub const ALL: [(&str, Target); 12] = [
     ("slot", slot),
     ("object", object),
     ("map_chunk", map_chunk),
-    ("plane_chunk", plane_chunk),
+    ("layer_chunk", layer_chunk),
     ("key_text", key_text),
     ("vehicle_link", vehicle_link),
     ("surface_link", surface_link),

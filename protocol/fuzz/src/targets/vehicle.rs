@@ -1,11 +1,11 @@
 //! A script against the vehicle's end.
 
-use super::link::{FuzzEnd, Grow, Pile, Setup, Surface, Vehicle, planes, run};
+use super::link::{FuzzEnd, Grow, Pile, Setup, Surface, Vehicle, layers, run};
 use super::peer::vehicle;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{RefusalReason, SlotId, SlotState};
 use scenecast_protocol::link::{Transmit, VehicleEvent};
-use scenecast_protocol::map::{Cell, PlaneKind};
+use scenecast_protocol::map::{Cell, LayerId};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, PlannedPath, VehicleStatus};
@@ -21,7 +21,7 @@ pub fn vehicle_events(data: &[u8]) -> usize {
     let (setup, begin) = (Setup::new(choice), Instant::from_secs_f64(1000.0));
     let peer = setup.peer(Address::SURFACE, vehicle());
     let mut vehicle = setup.vehicle(Pile::default(), begin);
-    vehicle.set_planes(planes());
+    layers().into_iter().for_each(|layer| assert!(vehicle.add_layer(layer)));
     (0..3).for_each(|what| vehicle.act(what, 30, begin));
     let surface: Surface<Pile> = setup.surface(begin);
     run(setup, vehicle, surface, peer, script)
@@ -75,9 +75,9 @@ impl<S: Grow> FuzzEnd for Vehicle<S> {
             4 => self.renew(now),
             6 => {
                 let cells = (0..i32::from(with)).map(|i| (Cell::new(i % 9, i / 9), f64::from(i * 7 % 100) / 100.0));
-                self.set_plane(PlaneKind::Confidence, cells.clone(), now);
-                self.set_plane(PlaneKind::Curiosity, cells.clone().map(|(cell, x)| (cell, 20.0 * x)), now);
-                self.set_plane(PlaneKind::Depth, cells.map(|(cell, x)| (cell, 20.0 + 5.0 * x)), now);
+                self.set_layer(LayerId::CONFIDENCE, cells.clone(), now);
+                self.set_layer(LayerId::CURIOSITY, cells.clone().map(|(cell, x)| (cell, 20.0 * x)), now);
+                self.set_layer(LayerId::DEPTH, cells.map(|(cell, x)| (cell, 20.0 + 5.0 * x)), now);
             }
             _ => self.set_shares(Shares([with % 20; 5])),
         }

@@ -7,8 +7,8 @@ mod config;
 mod discovery;
 mod event;
 mod fleet;
+mod layers;
 mod peer;
-mod planes;
 mod polled;
 mod transmit;
 

@@ -1,11 +1,11 @@
 //! The content of the vehicle's frames: chosen and encoded when a frame is written.
 
-use super::planes::PlaneOut;
+use super::layers::LayerOut;
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
-use crate::map::{Cell, PlaneKind, StateSource};
+use crate::map::{LayerCarried, LayerId, StateSource};
 use crate::object::{ObjectId, ObjectSender, SymbolRun};
-use crate::schedule::{BitBudget, Class, ClassShares, Extra, Shares, SpendOrder};
+use crate::schedule::{BackgroundOrder, BackgroundStream, BitBudget, Class, ClassShares, Shares};
 use crate::time::Instant;
 use crate::wire::{Backlog, ChunkKind, FrameBuilder, room_for_payload};
 use std::time::Duration;
@@ -14,8 +14,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) enum Part<C> {
     Map(C),
-    Plane(PlaneKind, Vec<(Cell, u8)>),
-    PlaneDigest(PlaneKind),
+    Layer(LayerId, LayerCarried),
+    LayerDigest(LayerId),
     Object(ObjectId, SymbolRun),
     Pose,
     Report,
@@ -25,7 +25,7 @@ impl<C> Part<C> {
     pub(super) fn class(&self) -> Class {
         match self {
             Self::Map(_) => Class::Map,
-            Self::Plane(kind, _) | Self::PlaneDigest(kind) => (*kind).into(),
+            Self::Layer(id, _) | Self::LayerDigest(id) => Class::Layer(*id),
             Self::Object(..) => Class::Exemplar,
             Self::Pose | Self::Report => Class::Status,
         }
@@ -49,10 +49,10 @@ pub(super) struct FillContext<'a> {
 #[derive(Debug)]
 pub(super) struct VehicleContent<S> {
     pub(super) source: S,
-    pub(super) planes: Vec<PlaneOut>,
+    pub(super) layers: Vec<LayerOut>,
     pub(super) objects: ObjectSender,
     pub(super) shares: ClassShares,
-    pub(super) spend: SpendOrder,
+    pub(super) background: BackgroundOrder,
     pub(super) status: StatusSender,
 }
 
@@ -60,10 +60,10 @@ impl<S: StateSource> VehicleContent<S> {
     pub(super) fn new(source: S, shares: Shares, status_period: Duration, now: Instant) -> Self {
         Self {
             source,
-            planes: Vec::new(),
+            layers: Vec::new(),
             objects: ObjectSender::default(),
             shares: ClassShares::new(shares),
-            spend: SpendOrder::default(),
+            background: BackgroundOrder::default(),
             status: StatusSender::new(status_period, now),
         }
     }
@@ -71,61 +71,61 @@ impl<S: StateSource> VehicleContent<S> {
     /// Releases changes that were held back and are due; returns whether there were any.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> bool {
         let mut released = self.source.handle_timeout(now);
-        self.planes.iter_mut().for_each(|p| released |= p.source.handle_timeout(now));
+        self.layers.iter_mut().for_each(|l| released |= l.source.handle_timeout(now));
         released
     }
 
     /// The surface holds none of our state any more.
     pub(super) fn handle_peer_restart(&mut self, now: Instant) {
         self.source.handle_peer_restart(now);
-        self.planes.iter_mut().for_each(|p| p.source.handle_peer_restart(now));
+        self.layers.iter_mut().for_each(|l| l.source.handle_peer_restart(now));
         self.objects.handle_peer_restart();
         self.status.owe_pose(now);
         self.status.owe_report(now);
     }
 
-    /// Whether the surface is known to hold the replicated state, its planes, and every object.
+    /// Whether the surface is known to hold the replicated state, its layers, and every object.
     pub(super) fn is_converged(&self) -> bool {
-        self.source.is_converged() && self.planes().all(StateSource::is_converged) && self.objects.is_empty()
+        self.source.is_converged() && self.layers().all(StateSource::is_converged) && self.objects.is_empty()
     }
 
     /// Whether no content waits that could be sent now.
     pub(super) fn is_idle(&self, budget: &BitBudget, now: Instant) -> bool {
-        self.source.is_quiet() && self.extras_are_quiet(budget, now) && self.objects.has_only_extra()
+        self.source.is_quiet() && self.background_is_quiet(budget, now) && self.objects.has_only_background()
     }
 
     /// When a change that is held back becomes due.
     pub(super) fn next_due(&self) -> Option<Instant> {
-        let planes = self.planes().filter_map(StateSource::next_due);
-        self.source.next_due().into_iter().chain(planes).min()
+        let layers = self.layers().filter_map(StateSource::next_due);
+        self.source.next_due().into_iter().chain(layers).min()
     }
 
     /// The expected backlog, for the operator.
     fn backlog(&self, budget: &BitBudget, now: Instant) -> Backlog {
         let bytes = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-        let others = self.shared_plane_backlog() + self.objects.backlog_bytes() + self.extra_backlog(budget, now);
+        let others = self.shared_layer_backlog() + self.objects.backlog_bytes() + self.background_backlog(budget, now);
         Backlog { map_bytes: bytes(self.source.expected_backlog_bytes()), other_bytes: bytes(others) }
     }
 
     /// About how many bytes wait and may be sent.
     pub(super) fn backlog_bytes(&self, budget: &BitBudget, now: Instant) -> usize {
-        let own = self.source.backlog_bytes() + self.shared_plane_backlog() + self.objects.backlog_bytes();
-        own + self.extra_backlog(budget, now)
+        let own = self.source.backlog_bytes() + self.shared_layer_backlog() + self.objects.backlog_bytes();
+        own + self.background_backlog(budget, now)
     }
 
     /// The fate of a chunk is known; returns the object that is complete with it.
     pub(super) fn handle_fate(&mut self, part: Part<S::Carried>, delivered: bool, now: Instant) -> Option<ObjectId> {
         match part {
             Part::Map(carried) => self.source.handle_fate(carried, delivered, now),
-            Part::Plane(kind, carried) => {
-                if let Some(plane) = self.plane_mut(kind) {
-                    plane.source.handle_fate(carried, delivered, now);
+            Part::Layer(id, carried) => {
+                if let Some(layer) = self.layer_mut(id) {
+                    layer.source.handle_fate(carried, delivered, now);
                 }
             }
             Part::Object(id, run) => return self.objects.handle_fate(id, &run, delivered).then_some(id),
             Part::Pose if !delivered => self.status.owe_pose(now),
             Part::Report if !delivered => self.status.owe_report(now),
-            Part::Pose | Part::Report | Part::PlaneDigest(_) => {}
+            Part::Pose | Part::Report | Part::LayerDigest(_) => {}
         }
         None
     }
@@ -145,24 +145,24 @@ impl<S: StateSource> VehicleContent<S> {
             }
             self.shares.spend(class, bytes, &waiting);
         }
-        self.fill_extras(builder, &mut carried, context);
+        self.fill_background(builder, &mut carried, context);
         self.fill_digests(builder, &mut carried);
         carried
     }
 
     /// Fills the rest of a frame with background streams.
-    fn fill_extras(
+    fn fill_background(
         &mut self,
         builder: &mut FrameBuilder,
         carried: &mut Carried<S::Carried>,
         context: &FillContext<'_>,
     ) {
-        let mut unfit: Vec<Extra> = Vec::new();
+        let mut unfit: Vec<BackgroundStream> = Vec::new();
         loop {
-            let next = self.extras(context.budget, context.now).find(|e| !unfit.contains(e));
-            let Some(extra) = next else { return };
-            if self.fill_class(extra.class(), true, builder, carried, context) == 0 {
-                unfit.push(extra);
+            let next = self.background_streams(context.budget, context.now).find(|s| !unfit.contains(s));
+            let Some(stream) = next else { return };
+            if self.fill_class(stream.class(), true, builder, carried, context) == 0 {
+                unfit.push(stream);
             }
         }
     }
@@ -171,7 +171,7 @@ impl<S: StateSource> VehicleContent<S> {
     fn fill_class(
         &mut self,
         class: Class,
-        is_extra: bool,
+        is_background: bool,
         builder: &mut FrameBuilder,
         carried: &mut Carried<S::Carried>,
         context: &FillContext<'_>,
@@ -179,10 +179,8 @@ impl<S: StateSource> VehicleContent<S> {
         let before = carried.len();
         match class {
             Class::Status => self.fill_status(builder, carried, context),
-            Class::Exemplar => self.fill_object(is_extra, builder, carried),
-            Class::Confidence | Class::Depth | Class::Curiosity => {
-                self.fill_plane(class, builder, carried, context.now);
-            }
+            Class::Exemplar => self.fill_object(is_background, builder, carried),
+            Class::Layer(id) => self.fill_layer(id, builder, carried, context.now),
             _ => self.fill_map(builder, carried, context.now),
         }
         carried.iter().skip(before).map(|(_, n)| n).sum()
@@ -196,7 +194,7 @@ impl<S: StateSource> VehicleContent<S> {
         ]
         .into_iter()
         .filter_map(|(waits, class)| waits.then_some(class))
-        .chain(self.waiting_planes())
+        .chain(self.waiting_layers().map(Class::Layer))
         .collect()
     }
 
@@ -216,16 +214,16 @@ impl<S: StateSource> VehicleContent<S> {
         status.refused_frames = context.refused_frames.min(255) as u8;
         if let Some(bytes) = self.status.fill_report(builder, context.now) {
             carried.push((Part::Report, bytes));
-            self.planes.iter_mut().for_each(|p| p.owes_digest = p.source.is_begun());
+            self.layers.iter_mut().for_each(|l| l.owes_digest = l.source.is_begun());
         }
         if let Some(bytes) = self.status.fill_pose(builder, context.now) {
             carried.push((Part::Pose, bytes));
         }
     }
 
-    fn fill_object(&mut self, is_extra: bool, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
+    fn fill_object(&mut self, is_background: bool, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>) {
         let room = room_for_payload(builder.room());
-        let part = if is_extra { self.objects.next_extra_part(room) } else { self.objects.next_part(room) };
+        let part = if is_background { self.objects.next_background_part(room) } else { self.objects.next_part(room) };
         let Some((id, run, bytes)) = part else { return };
         if builder.push(ChunkKind::Object, &bytes) {
             self.objects.mark_in_flight(id, &run);

@@ -9,7 +9,7 @@ mod config;
 mod content;
 mod discovery;
 mod event;
-mod planes;
+mod layers;
 mod receive;
 mod repeat;
 mod status;
@@ -22,9 +22,9 @@ pub use event::VehicleEvent;
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{SlotId, SlotState};
 use crate::mac::{Access, ClockMap, Floor};
-use crate::map::{Cell, LabelGrid, MapSource, PlaneKind, PlaneSource, StateSource};
+use crate::map::{Cell, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, StateSource};
 use crate::object::ObjectId;
-use crate::schedule::{BitBudget, Shares, SpendOrder};
+use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
 use crate::wire::{Address, VehicleStatus};
 use content::{Carried, VehicleContent};
@@ -84,36 +84,37 @@ impl<S: StateSource> VehicleLink<S> {
         &mut self.content.source
     }
 
-    /// Replicates these planes beside the state, each with its part of the map's share in percent.
-    pub fn set_planes(&mut self, planes: impl IntoIterator<Item = (PlaneSource, u8)>) {
-        self.content.set_planes(planes);
-    }
-
-    /// The planes that are sent: those that have a share or are a background stream.
-    pub fn planes(&self) -> impl Iterator<Item = &PlaneSource> {
-        self.content.planes()
-    }
-
-    /// Selects the planes that are sent from now on; the others pause, and continue where
-    /// they were when selected again.
-    pub fn set_told_planes(&mut self, is_told: impl Fn(PlaneKind) -> bool) {
+    /// Replicates a layer beside the state, also while the link is under way; `false` if there is one with its index
+    /// already.
+    pub fn add_layer(&mut self, layer: LayerSource) -> bool {
         self.repeater.forget();
-        self.content.set_told_planes(is_told);
+        self.content.add_layer(layer)
     }
 
-    /// As [`PlaneSource::set_coarse_limit`], for each plane.
-    pub fn set_coarse_planes(&mut self, after_bytes: Option<usize>) {
-        self.content.set_coarse_planes(after_bytes);
+    /// The layers that are sent: those that are selected and have a share or are a background stream.
+    pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
+        self.content.layers()
     }
 
-    /// Sets quantities of cells of a plane, if it is replicated.
-    pub fn set_plane(&mut self, kind: PlaneKind, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
-        if self.content.set_plane(kind, cells, now) {
+    /// Selects the layers that are sent from now on; the others pause, and continue where they were when selected again.
+    pub fn select_layers(&mut self, layers: LayerMask) {
+        self.repeater.forget();
+        self.content.select_layers(layers);
+    }
+
+    /// As [`LayerSource::set_coarse_limit`], for each layer.
+    pub fn set_coarse_layers(&mut self, after_bytes: Option<usize>) {
+        self.content.set_coarse_layers(after_bytes);
+    }
+
+    /// Sets quantities of cells of a layer, in its descriptor's unit, if it is replicated.
+    pub fn set_layer(&mut self, id: LayerId, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) {
+        if self.content.set_layer(id, cells, now) {
             self.repeater.forget();
         }
     }
 
-    /// Whether the surface is known to hold the replicated state, its planes, and every object.
+    /// Whether the surface is known to hold the replicated state, its layers, and every object.
     pub fn is_converged(&self) -> bool {
         self.content.is_converged()
     }
@@ -138,9 +139,9 @@ impl<S: StateSource> VehicleLink<S> {
         self.content.objects.push(bytes)
     }
 
-    /// Queues an object that is sent with spare capacity only ([`crate::schedule::Extra::Exemplars`]).
-    pub fn push_extra_object(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
-        self.content.objects.push_extra(bytes)
+    /// Queues an object that is sent with spare capacity only ([`crate::schedule::BackgroundStream::Exemplars`]).
+    pub fn push_background_object(&mut self, bytes: Vec<u8>) -> Option<ObjectId> {
+        self.content.objects.push_background(bytes)
     }
 
     /// Stops sending every object, requested or not.
@@ -180,13 +181,13 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// Changes the background streams and their order.
-    pub fn set_spend(&mut self, order: SpendOrder) {
-        self.content.spend = order;
+    pub fn set_background(&mut self, order: BackgroundOrder) {
+        self.content.background = order;
     }
 
     /// The background streams in their order.
-    pub fn spend(&self) -> SpendOrder {
-        self.content.spend
+    pub fn background(&self) -> BackgroundOrder {
+        self.content.background
     }
 
     /// Takes the host's decision about the latest version of a slot.
@@ -296,7 +297,7 @@ impl VehicleLink {
     /// Empties the map and begins a new run, so that label ids can be assigned again.
     pub fn begin_epoch(&mut self, now: Instant) {
         self.content.source.clear(now);
-        self.content.planes.iter_mut().for_each(|p| p.source.clear(now));
+        self.content.layers.iter_mut().for_each(|l| l.source.clear(now));
         self.renew(now);
         self.cancel_objects();
     }

@@ -10,7 +10,7 @@ use super::prior::{Prior, StagePrior};
 use super::stage::Stage;
 use super::{LastRow, order};
 use crate::grid::{LabelGrid, Rect};
-use crate::map_codec::Plane;
+use crate::map_codec::LabelRaster;
 use crate::map_codec::lattice::Lattice;
 
 pub use super::estimate::BitEstimate;
@@ -93,7 +93,7 @@ impl TrainingCoder {
     }
 
     /// Codes the change from `base` to `target` in `rect`, which must lie inside of `target`.
-    pub fn code(&mut self, base: &LabelGrid, target: &Plane, rect: Rect) {
+    pub fn code(&mut self, base: &LabelGrid, target: &LabelRaster, rect: Rect) {
         let mut canvas = Canvas::new(Lattice::whole(base), rect);
         let (width, height) = (rect.width as usize, rect.height as usize);
         for (column, row) in order(width, height, LastRow(width)) {

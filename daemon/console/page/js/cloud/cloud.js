@@ -7,7 +7,7 @@ import { rgb } from "../palette.js";
 import { isStale, store } from "../store.js";
 import { colour, onTheme } from "../theme.js";
 import { Orbit } from "./orbit.js";
-import { cellPoints, vehicleShape, depthPlane, gridLines, meanHeight } from "./points.js";
+import { cellPoints, vehicleShape, depthLayer, gridLines, meanHeight } from "./points.js";
 import { Renderer } from "./renderer.js";
 
 export const cloud = { on: false };
@@ -72,7 +72,7 @@ function build(map) {
   const cells = cellPoints(map);
   const floor = meanHeight(cells.places);
   const box = extent(map) ?? [-5, -5, 5, 5];
-  const flat = depthPlane(map) === null;
+  const flat = depthLayer(map) === null;
   const low = flat ? floor - 0.05 : Math.min(floor, ...sample(cells.places)) - 0.5;
   const grid = gridLines(box, low, mixHex(colour("map-text"), colour("map-sea")));
   renderer.set("cells", "POINTS", cells.places, cells.tints);

@@ -3,20 +3,22 @@
 import { shownAs, tintOf } from "../book.js";
 import { rgb } from "../palette.js";
 import { nice } from "../format.js";
+import { boundsOf } from "../levels.js";
 
-export const depthPlane = (map) => map.layers.find((p) => p.name === "depth") ?? null;
+export const depthLayer = (map) => map.layers.find((l) => l.is_depth) ?? null;
 
 /** Cells as points {places, tints}; z is minus the depth if the map has depths, else 0. */
 export function cellPoints(map) {
-  const depth = depthPlane(map);
+  const depth = depthLayer(map);
   const places = [];
   const tints = [];
   for (let at = 0; at < map.labels.length; at += 1) {
     const label = map.labels[at];
-    if (label === 0 || depth?.data[at] === 255) continue;
+    if (label === 0 || depth?.data[at] === 0) continue;
     const x = (map.x0 + (at % map.width) + 0.5) * map.cell_m;
     const y = (map.y0 + Math.floor(at / map.width) + 0.5) * map.cell_m;
-    places.push(x, y, depth ? -(depth.min + ((depth.max - depth.min) * depth.data[at]) / 254) : 0);
+    const [from, to] = depth ? boundsOf(depth, depth.data[at]) : [0, 0];
+    places.push(x, y, -(from + to) / 2);
     tints.push(...tintOf(shownAs(label)), 255);
   }
   return { places: new Float32Array(places), tints: new Uint8Array(tints) };

@@ -7,11 +7,10 @@ import { nice, span } from "../format.js";
 import { ramp } from "../palette.js";
 import { current as theme, onTheme } from "../theme.js";
 import { coarseBlocks, paintCoarse } from "./coarse.js";
-import { lookOf } from "./planes.js";
-import { labelTones, paintAge, paintFootprint, paintLabels, paintPlane } from "./raster.js";
+import { lookOf } from "./layer-look.js";
+import { labelTones, paintAge, paintFootprint, paintLabels, paintLayer } from "./raster.js";
 
 const AGE_REPAINT_S = 5;
-const HINTS = { curiosity: "How badly the scene model explains a cell: mean surprise of a word, the binary logarithm of the perplexity" };
 export const layer = { name: "label", highlight: null };
 const painted = new Map();
 let legendKey = "";
@@ -35,7 +34,7 @@ export function setLayer(name) {
 /** The canvas of a vehicle's map, painted again only when its key changes. */
 export function canvasOf(vehicle, map) {
   const chosen = vehicle.id === store.selectedId;
-  const plane = map.layers.find((p) => p.name === layer.name);
+  const shown = map.layers.find((p) => p.name === layer.name);
   const age = layer.name === "age" ? Math.floor((store.nowS - map.fetchedS) / AGE_REPAINT_S) * AGE_REPAINT_S : 0;
   const key = chosen
     ? `${map.epoch}.${map.version}.${layer.name}.${age}.${layer.highlight}.${isStale(vehicle)}.${bookEdits}`
@@ -44,8 +43,8 @@ export function canvasOf(vehicle, map) {
   if (have?.key === key) return have.canvas;
   const canvas = !chosen
     ? paintFootprint(map)
-    : plane
-      ? paintPlane(map, plane, isStale(vehicle))
+    : shown
+      ? paintLayer(map, shown, isStale(vehicle))
       : layer.name === "age"
         ? paintAge(map, age, ageTop(map))
         : paintLabels(map, { tintOf, shownAs, stale: isStale(vehicle), highlight: layer.highlight });
@@ -75,12 +74,14 @@ export function ageTop(map) {
   return Math.ceil(oldest / step) * step;
 }
 
+const summaryOf = (name) => store.snapshot?.layers.find((l) => l.name === name)?.summary ?? "";
+
 export function drawLegend() {
   const map = store.map;
-  const plane = map?.layers.find((p) => p.name === layer.name);
+  const shown = map?.layers.find((p) => p.name === layer.name);
   const top = layer.name === "age" && map ? ageTop(map) : 0;
   const coarse = layer.name === "label" && Boolean(map) && coarseBlocks(map).length > 0;
-  const look = plane ? lookOf(plane) : { at: ramp, low: "now", high: span(top) };
+  const look = shown ? lookOf(shown) : { at: ramp, low: "now", high: span(top) };
   const key = `${layer.name}.${look.low}.${look.high}.${coarse}`;
   if (key === legendKey) return;
   legendKey = key;
@@ -95,8 +96,8 @@ export function drawLegend() {
   const bar = h("canvas", { width: 120, height: 8, "aria-hidden": "true" });
   const c = bar.getContext("2d");
   for (let x = 0; x < 120; x += 1) {
-    c.fillStyle = `rgb(${look.at(plane ? x / 119 : 1 - x / 119, theme() === "red").join(" ")})`;
+    c.fillStyle = `rgb(${look.at(shown ? x / 119 : 1 - x / 119, theme() === "red").join(" ")})`;
     c.fillRect(x, 0, 1, 8);
   }
-  box.replaceChildren(h("b", { title: HINTS[plane?.name] ?? "" }, plane?.name ?? "age of cells"), h("span", {}, look.low.trim()), bar, h("span", {}, look.high.trim()));
+  box.replaceChildren(h("b", { title: summaryOf(shown?.name) }, shown?.name ?? "age of cells"), h("span", {}, look.low.trim()), bar, h("span", {}, look.high.trim()));
 }

@@ -2,7 +2,7 @@
 
 import { ramp } from "../palette.js";
 import { current as theme } from "../theme.js";
-import { lookOf } from "./planes.js";
+import { lookOf } from "./layer-look.js";
 
 const shade = (t) => ramp(t, theme() === "red");
 
@@ -80,13 +80,13 @@ export function paintAge(map, sinceFetchS, top) {
   });
 }
 
-/** A layer of the server: bytes 0..254 from its lowest to its highest value, 255 unknown; faint when stale. */
-export function paintPlane(map, plane, stale) {
-  const look = lookOf(plane);
+/** A layer of the server: one level a cell, 0 unknown; faint when stale. */
+export function paintLayer(map, layer, stale) {
+  const look = lookOf(layer);
   return paint(map, (at) => {
-    const v = plane.data[at];
-    if (v === 255) return [128, 128, 128, 90];
-    const full = look.tone(v, theme() === "red");
+    const level = layer.data[at];
+    if (level === 0) return [128, 128, 128, 90];
+    const full = look.tone(level, theme() === "red");
     return [...(stale ? mix(full, [128, 128, 128], 0.7) : full), 255];
   });
 }

@@ -1,8 +1,9 @@
 // The readout of the cell under the pointer, or under the cross at the centre when the map is used by keys.
 
 import { $, show, text } from "../dom.js";
-import { metres, minus, none, percent, span } from "../format.js";
+import { metres, none, span } from "../format.js";
 import { nameOf, shownAs } from "../book.js";
+import { boundsOf, valueText } from "../levels.js";
 import { ageOf, store } from "../store.js";
 import { blockAt } from "./coarse.js";
 import { onMap } from "./frames.js";
@@ -17,8 +18,8 @@ export function cellAt(map, x, y) {
   const since = ageOf(map.fetchedS) ?? 0;
   const seconds = (ages) => (!ages || ages[at] === 65535 ? null : ages[at] + since);
   const layers = map.layers
-    .filter((p) => p.data[at] !== 255)
-    .map((p) => ({ ...p, value: p.min + ((p.max - p.min) * p.data[at]) / 254, ageS: seconds(p.age) }));
+    .filter((l) => l.data[at] !== 0)
+    .map((l) => ({ ...l, level: l.data[at], ageS: seconds(l.age) }));
   return { label: map.labels[at], ageS: seconds(map.age), layers };
 }
 
@@ -49,15 +50,8 @@ export function showReadout(world) {
   return cell;
 }
 
-/** The value of a layer, or the bounds of its level if the server gives the step. */
-function levelOf(p) {
-  const half = (p.step ?? 0) / 2;
-  const low = planeText(p, p.value - half);
-  return half > 0 ? `${low} to ${planeText(p, p.value + half)}` : low;
-}
-
-/** A value with its unit; a value without a unit is a share. */
-export const planeText = (p, value) => (p.unit === "" ? percent(value) : `${minus(String(Number(value.toFixed(1))))} ${p.unit}`);
+/** The bounds of the level of a cell. */
+const levelOf = (l) => boundsOf(l, l.level).map((value) => valueText(l, value)).join(" to ");
 
 const A = 6378137;
 const E2 = (2 - 1 / 298.257223563) / 298.257223563;

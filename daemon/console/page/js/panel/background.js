@@ -1,15 +1,12 @@
 // The background streams that use spare capacity, in an order that the operator changes.
 
 import { h, show, text } from "../dom.js";
+import { store } from "../store.js";
 
-const NAMES = {
-  finer: "finer cells, while the map is coarse",
-  depth: "depth",
-  exemplars: "images of new labels",
-  confidence: "confidence",
-  curiosity: "curiosity",
-};
-const KINDS = Object.keys(NAMES);
+const NAMES = { finer: "finer cells, while the map is coarse", exemplars: "images of new labels" };
+const nameOf = (stream) => NAMES[stream] ?? stream;
+/** Every stream: two of the page, and the layers that the surface lists. */
+const streams = () => [...Object.keys(NAMES), ...(store.snapshot?.layers.map((l) => l.name) ?? [])];
 
 /** `value()` returns the streams in order, `change(streams)` sets them. */
 export function backgroundBox(value, change) {
@@ -21,11 +18,11 @@ export function backgroundBox(value, change) {
 
   function refresh(order) {
     show(none, order.length === 0);
-    const key = order.join();
+    const key = [...order, "", ...streams()].join();
     if (list.dataset.key === key) return;
     const held = document.activeElement?.dataset.act;
     list.dataset.key = key;
-    const out = KINDS.filter((kind) => !order.includes(kind));
+    const out = streams().filter((kind) => !order.includes(kind));
     list.replaceChildren(...order.map((kind, i) => line(kind, i)), ...out.map((kind) => line(kind, null)));
     if (held) list.querySelector(`[data-act="${held}"]:not(:disabled)`)?.focus();
   }
@@ -37,10 +34,10 @@ export function backgroundBox(value, change) {
       change(order);
     };
     const toggle = () => change(place === null ? [...value(), kind] : value().filter((k) => k !== kind));
-    const button = (act, name, sign, onclick, off) => h("button", { type: "button", title: name, "aria-label": `${name}: ${NAMES[kind]}`, data: { act: `${act}-${kind}` }, disabled: off, onclick }, sign);
-    const box = h("input", { type: "checkbox", checked: place !== null, "aria-label": NAMES[kind], data: { act: `use-${kind}` }, onchange: toggle });
+    const button = (act, name, sign, onclick, off) => h("button", { type: "button", title: name, "aria-label": `${name}: ${nameOf(kind)}`, data: { act: `${act}-${kind}` }, disabled: off, onclick }, sign);
+    const box = h("input", { type: "checkbox", checked: place !== null, "aria-label": nameOf(kind), data: { act: `use-${kind}` }, onchange: toggle });
     const name = h("span", {});
-    text(name, NAMES[kind]);
+    text(name, nameOf(kind));
     const last = value().length - 1;
     return h("li", { data: { stream: kind } }, h("label", {}, box, name),
       button("up", "Earlier", "\u2191", () => move(-1), place === null || place === 0),

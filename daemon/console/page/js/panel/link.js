@@ -6,7 +6,13 @@ import { ageOf, isStale, store } from "../store.js";
 import { budgetParts, refreshBudget } from "./budget.js";
 import { drawHistory } from "./history.js";
 
-const CLASSES = ["map", "confidence", "curiosity", "depth", "status", "directive", "fix", "exemplar", "overhead"];
+const CLASSES = ["status", "directive", "fix", "exemplar", "overhead"];
+/** The map, the layers that the surface lists or has received, and all other classes. */
+function classNames(link) {
+  const layers = [...store.snapshot.layers.map((l) => l.name), ...Object.keys(link.up.bytes_by_class)];
+  return [...new Set(["map", ...layers.filter((c) => c !== "map" && !CLASSES.includes(c)).sort(), ...CLASSES])];
+}
+const classLine = (c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td"));
 const directions = { up: direction("Up", "vehicle to surface"), down: direction("Down", "surface to vehicle") };
 const history = h("canvas", { role: "img" });
 const values = {};
@@ -34,7 +40,7 @@ export function startLink() {
     list.append(node);
   }
   classes.append(h("caption", {}, "Bits by class since the start"), h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Class"), h("th", { scope: "col" }, "Up"), h("th", { scope: "col" }, "Share"), h("th", { scope: "col" }, "Down"))),
-    h("tbody", {}, ...CLASSES.map((c) => h("tr", { data: { class: c } }, h("th", { scope: "row" }, c), h("td"), h("td", {}, h("span.share", {}, h("span"))), h("td")))));
+    h("tbody"));
   $("link").append(h("header", {}, h("h2", { id: "link-title" }, "Link"), age),
     directions.up.node, directions.down.node, history, list, classes, ...budgetParts);
   store.on("state feed theme", update);
@@ -106,6 +112,11 @@ function refreshDirection(d, side, link) {
 
 function refreshClasses(link) {
   const total = Object.values(link.up.bytes_by_class).reduce((a, b) => a + b, 0) || 1;
+  const names = classNames(link);
+  if (classes.dataset.key !== names.join()) {
+    classes.dataset.key = names.join();
+    classes.tBodies[0].replaceChildren(...names.map(classLine));
+  }
   for (const line of classes.tBodies[0].rows) {
     const up = link.up.bytes_by_class[line.dataset.class] ?? 0;
     const down = link.down.bytes_by_class[line.dataset.class] ?? 0;

@@ -17,9 +17,6 @@ const NUMBERS = [
 ];
 const SIDE = 4;
 const CELLS = { fine: (m) => `all, ${m(1)}`, "coarse-to-fine": (m) => `${m(SIDE)} first, then ${m(1)}`, coarse: (m) => `every fourth, ${m(SIDE)}` };
-const KINDS = ["confidence", "depth", "curiosity"];
-const SETS = [...Array(2 ** KINDS.length).keys()].map((bits) => KINDS.filter((_, i) => (bits >> i) & 1)).sort((a, b) => a.length - b.length);
-const LAYERS = Object.fromEntries(SETS.map((set) => [set.join() || "none", [set.slice(0, -1).join(", "), set.at(-1)].filter(Boolean).join(" and ") || "none"]));
 const KEYS = [...NUMBERS.map(([key]) => key), "cells", "layers"];
 const MAX_BPS = 1e7;
 const UNCHANGED = "unchanged";
@@ -63,7 +60,7 @@ function inForce(key) {
   if (!known) return "unknown";
   const value = known[key] ?? null;
   if (value === null) return "not set from here";
-  return value === 0 || value === "" ? CONFIGURED : key === "layers" ? LAYERS[value] : key === "cells" ? value.replaceAll("-", " ") : String(value);
+  return value === 0 || value === "" ? CONFIGURED : key === "layers" ? layersText(value) : key === "cells" ? value.replaceAll("-", " ") : String(value);
 }
 
 /** Shows the value in force where it differs from the field. */
@@ -98,15 +95,28 @@ function numberLine([key, name, hint, low, high]) {
   return { key, node, update };
 }
 
+/** Text of a set of layers: names with commas between, or none. */
+const layersText = (names) => names.split(",").join(", ").replace(/, ([^,]*)$/, " and $1");
+
+/** Sets of layers to choose from: none, each, each two, all, and the one that is set. */
+function layerSets(value) {
+  const names = store.snapshot?.layers.map((l) => l.name) ?? [];
+  const pairs = names.flatMap((a, i) => names.slice(i + 1).map((b) => `${a},${b}`));
+  return [...new Set(["none", ...names, ...pairs, names.join(), ...(value ? [value] : [])].filter(Boolean))];
+}
+
 function choiceLine(key, name, hint) {
-  const values = Object.keys(key === "cells" ? CELLS : LAYERS);
-  const options = [["-", UNCHANGED], ["", CONFIGURED], ...values.map((v) => [v, v])].map(([value, words]) => h("option", { value }, words));
-  const pick = h("select", { id: `set-${key}`, onchange: () => set(key, pick.value === "-" ? null : pick.value) }, ...options);
+  const pick = h("select", { id: `set-${key}`, onchange: () => set(key, pick.value === "-" ? null : pick.value) });
   const force = h("p.note");
   const node = h("div.limit", { title: hint }, h("label.caption", { for: pick.id }, name), pick, force);
   const update = (value) => {
     const size = (cells) => metres(cells * store.vehicle.map.cell_m, 2);
-    values.forEach((v, i) => text(options[i + 2], key === "cells" ? CELLS[v](size) : LAYERS[v]));
+    const choices = key === "cells" ? Object.entries(CELLS).map(([v, of]) => [v, of(size)]) : layerSets(value).map((v) => [v, layersText(v)]);
+    const options = [["-", UNCHANGED], ["", CONFIGURED], ...choices];
+    if (pick.dataset.key !== options.join()) {
+      pick.dataset.key = options.join();
+      pick.replaceChildren(...options.map(([value, words]) => h("option", { value }, words)));
+    }
     pick.value = value ?? "-";
     refreshForce(force, key, value);
     return true;

@@ -6,7 +6,7 @@ use super::files::{numbered, read_map, same_size};
 use crate::progress::Progress;
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -49,7 +49,7 @@ impl MapBench {
         let mut totals = Totals { frame_bytes: self.coding.frame_bytes, ..Totals::default() };
         totals.sizes.codec = self.coding.codec.to_string();
         let mut progress = Progress::new("maps");
-        let mut before: Option<(&PathBuf, Plane)> = None;
+        let mut before: Option<(&PathBuf, LabelRaster)> = None;
         for (done, path) in files.iter().enumerate() {
             progress.show(done as f64 / files.len() as f64);
             let map = read_map(path)?;
@@ -58,7 +58,7 @@ impl MapBench {
                     same_size((base_path, base), (path, &map))?;
                     base.clone()
                 }
-                None => Plane::uniform(map.width, map.height, 0),
+                None => LabelRaster::uniform(map.width, map.height, 0),
             };
             totals.add(&self.coding, &base, &map)?;
             before = Some((path, map));
@@ -75,7 +75,7 @@ impl MapBench {
 }
 
 impl Totals {
-    fn add(&mut self, coding: &Coding, base: &Plane, target: &Plane) -> Result<(), UserError> {
+    fn add(&mut self, coding: &Coding, base: &LabelRaster, target: &LabelRaster) -> Result<(), UserError> {
         let started = Instant::now();
         let (file, cells_changed) = encode(coding, base, target)?;
         let decoded = file.apply(Some(base)).map_err(refused)?;

@@ -3,7 +3,7 @@
 use super::Coding;
 use super::zopfli_bytes::zopfli_bytes;
 use scenecast_core::UserError;
-use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, Plane};
+use scenecast_protocol::map_codec::{ChunkFile, ChunkFileError, LabelRaster};
 use serde::Serialize;
 
 /// Sizes of one change or of several.
@@ -32,7 +32,7 @@ impl Sizes {
 }
 
 /// The chunks from `base` to `target`, and how many cells they change.
-pub fn encode(coding: &Coding, base: &Plane, target: &Plane) -> Result<(ChunkFile, usize), UserError> {
+pub fn encode(coding: &Coding, base: &LabelRaster, target: &LabelRaster) -> Result<(ChunkFile, usize), UserError> {
     ChunkFile::encode(coding.codec, base, target, coding.frame_bytes.into()).map_err(refused)
 }
 
@@ -42,7 +42,13 @@ pub fn refused(error: ChunkFileError) -> UserError {
 }
 
 /// Sizes of an encoded change, beside those of the PNG files.
-pub fn sizes(coding: &Coding, base: &Plane, target: &Plane, file: &ChunkFile, cells_changed: usize) -> Sizes {
+pub fn sizes(
+    coding: &Coding,
+    base: &LabelRaster,
+    target: &LabelRaster,
+    file: &ChunkFile,
+    cells_changed: usize,
+) -> Sizes {
     Sizes {
         bytes: file.chunks.iter().map(Vec::len).sum(),
         frames: frames(file.chunks.iter().map(Vec::len), coding.frame_bytes.into()),

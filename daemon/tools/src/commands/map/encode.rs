@@ -6,7 +6,7 @@ use super::files::{read_map, same_size};
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 use std::path::PathBuf;
 
 /// Write the chunks that turn one map into another, and print their sizes as JSON.
@@ -39,7 +39,7 @@ impl Encode {
                 same_size((path, &base), (&self.target, &target))?;
                 base
             }
-            None => Plane::uniform(target.width, target.height, 0),
+            None => LabelRaster::uniform(target.width, target.height, 0),
         };
         let (file, cells_changed) = encode(&self.coding, &base, &target)?;
         let sizes = sizes(&self.coding, &base, &target, &file, cells_changed);

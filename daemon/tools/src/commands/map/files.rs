@@ -1,17 +1,17 @@
 //! Label maps in files.
 
 use scenecast_core::UserError;
-use scenecast_protocol::map_codec::Plane;
+use scenecast_protocol::map_codec::LabelRaster;
 use std::path::{Path, PathBuf};
 
 /// Reads a map from an indexed PNG.
-pub fn read_map(path: &Path) -> Result<Plane, UserError> {
+pub fn read_map(path: &Path) -> Result<LabelRaster, UserError> {
     let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
-    Plane::from_png(&bytes).map_err(|e| UserError::file(path, e))
+    LabelRaster::from_png(&bytes).map_err(|e| UserError::file(path, e))
 }
 
 /// Refuses a map of another size than that of `base`.
-pub fn same_size(base: (&Path, &Plane), map: (&Path, &Plane)) -> Result<(), UserError> {
+pub fn same_size(base: (&Path, &LabelRaster), map: (&Path, &LabelRaster)) -> Result<(), UserError> {
     if (base.1.width, base.1.height) == (map.1.width, map.1.height) {
         return Ok(());
     }

@@ -32,14 +32,18 @@ impl ReportedBacklog {
 
 /// Bytes that have come in so far, modulo 4 GiB.
 fn received(stats: &LinkStats) -> Backlog {
-    let of = |class| stats.received_by_class.get(&class).copied().unwrap_or_default();
-    let other: u64 = Class::PLANES.into_iter().chain([Class::Exemplar]).map(of).sum();
-    Backlog { map_bytes: of(Class::Map) as u32, other_bytes: other as u32 }
+    let of = |is_counted: fn(&Class) -> bool| {
+        let counted = stats.received_by_class.iter().filter(|(class, _)| is_counted(class));
+        counted.map(|(_, bytes)| bytes).sum::<u64>() as u32
+    };
+    let other_bytes = of(|class| matches!(class, Class::Layer(_) | Class::Exemplar));
+    Backlog { map_bytes: of(|class| *class == Class::Map), other_bytes }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::LayerId;
 
     #[test]
     fn bytes_received_after_the_report_reduce_the_backlog() {
@@ -47,8 +51,8 @@ mod tests {
         stats.receive(Class::Map, 900, now);
         let reported = ReportedBacklog::new(Backlog { map_bytes: 500, other_bytes: 40 }, &stats, now);
         stats.receive(Class::Map, 200, now);
-        stats.receive(Class::Depth, 30, now);
-        stats.receive(Class::Curiosity, 20, now);
+        stats.receive(Class::Layer(LayerId::DEPTH), 30, now);
+        stats.receive(Class::Layer(LayerId::CURIOSITY), 20, now);
         stats.receive(Class::Status, 50, now);
         assert_eq!(reported.left(&stats), (Backlog { map_bytes: 300, other_bytes: 0 }, now));
     }

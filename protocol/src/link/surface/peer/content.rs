@@ -2,9 +2,9 @@
 
 use super::backlog::ReportedBacklog;
 use super::status::StatusParts;
-use crate::link::surface::planes::{Heard, Planes};
+use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
-use crate::map::{PlaneChunk, StateReplica};
+use crate::map::{LayerChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
@@ -33,11 +33,11 @@ impl ChunkOutcome {
     }
 }
 
-/// Replica, planes, objects and status of one vehicle in its current run.
+/// Replica, layers, objects and status of one vehicle in its current run.
 #[derive(Debug)]
 pub(super) struct PeerContent<R> {
     pub(super) replica: R,
-    pub(super) planes: Planes,
+    pub(super) layers: Layers,
     pub(super) status: StatusParts,
     pub(super) backlog: Option<ReportedBacklog>,
     objects: ObjectReceiver,
@@ -47,7 +47,7 @@ impl<R: StateReplica> PeerContent<R> {
     pub(super) fn new() -> Self {
         Self {
             replica: R::default(),
-            planes: Planes::default(),
+            layers: Layers::default(),
             status: StatusParts::default(),
             backlog: None,
             objects: ObjectReceiver::default(),
@@ -57,21 +57,21 @@ impl<R: StateReplica> PeerContent<R> {
     /// The vehicle has begun a new run.
     pub(super) fn clear(&mut self) {
         self.replica.clear();
-        self.planes.clear();
+        self.layers.clear();
         self.objects.clear();
         self.status = StatusParts::default();
         self.backlog = None;
     }
 
-    /// Counts changes of the map and its planes.
+    /// Counts changes of the map and its layers.
     pub(super) fn map_version(&self) -> u64 {
-        self.replica.version() + self.planes.version()
+        self.replica.version() + self.layers.version()
     }
 
     /// The vehicle bases its chunks on every frame up to `horizon`.
     pub(super) fn advance_base(&mut self, horizon: FrameNumber) {
         self.replica.advance_base(horizon);
-        self.planes.advance_base(horizon);
+        self.layers.advance_base(horizon);
     }
 
     /// Applies a chunk of frame `number`, which `stats` has counted.
@@ -91,10 +91,10 @@ impl<R: StateReplica> PeerContent<R> {
             ChunkKind::Pose => accepted_if(self.status.read_pose(chunk.payload, number, now)),
             ChunkKind::Report => self.handle_report(chunk.payload, stats, now),
             ChunkKind::Object => accepted_if(self.handle_object(vehicle, chunk.payload, events)),
-            ChunkKind::Plane => match self.planes.handle_chunk(number, chunk.payload, now) {
-                Heard::Taken => ChunkOutcome::Accepted,
-                Heard::Unknown => ChunkOutcome::Malformed,
-                Heard::OutOfStep => ChunkOutcome::Contradictory,
+            ChunkKind::Layer => match self.layers.handle_chunk(number, chunk.payload, now) {
+                LayerOutcome::Accepted => ChunkOutcome::Accepted,
+                LayerOutcome::Skipped => ChunkOutcome::Malformed,
+                LayerOutcome::OutOfStep => ChunkOutcome::Contradictory,
             },
             ChunkKind::Slot => ChunkOutcome::Malformed,
         }
@@ -133,6 +133,6 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
         ChunkKind::Pose | ChunkKind::Report => Class::Status,
         ChunkKind::Slot => Class::Directive,
         ChunkKind::Object => Class::Exemplar,
-        ChunkKind::Plane => PlaneChunk::decode(chunk.payload).map_or(Class::Overhead, |c| c.kind().into()),
+        ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| Class::Layer(c.id())),
     }
 }

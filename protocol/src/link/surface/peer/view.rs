@@ -4,7 +4,7 @@ use super::VehiclePeer;
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
-use crate::map::{PlaneKind, PlaneReplica, Replica, StateReplica};
+use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
 use crate::time::Instant;
 use crate::wire::{Backlog, VehicleStatus};
 use std::time::Duration;
@@ -27,12 +27,17 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
         &self.0.content.replica
     }
 
-    /// The operator's copy of a plane of the map; `None` before its first chunk.
-    pub fn plane(&self, kind: PlaneKind) -> Option<&'a PlaneReplica> {
-        self.0.content.planes.get(kind)
+    /// The layers of its map: the built-in ones, and above them those that it has announced in this run.
+    pub fn layers(&self) -> &'a LayerSet {
+        self.0.content.layers.set()
     }
 
-    /// Counts changes of the replicated state and its planes.
+    /// The operator's copy of a layer of the map; `None` until the vehicle has announced it.
+    pub fn layer(&self, id: LayerId) -> Option<&'a LayerReplica> {
+        self.0.content.layers.get(id)
+    }
+
+    /// Counts changes of the replicated state and its layers.
     pub fn map_version(&self) -> u64 {
         self.0.content.map_version()
     }

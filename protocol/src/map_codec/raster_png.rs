@@ -1,12 +1,12 @@
 //! Maps as indexed PNG files.
 
-use super::Plane;
+use super::LabelRaster;
 use crate::grid::MAX_LABEL;
 use std::io::Cursor;
 
 /// Why a file is not taken as a map.
 #[derive(Debug, thiserror::Error)]
-pub enum MapPngError {
+pub enum RasterPngError {
     /// Not a PNG file, or a damaged or too large one.
     #[error("not a readable PNG: {0}")]
     Unreadable(#[from] png::DecodingError),
@@ -21,16 +21,16 @@ pub enum MapPngError {
 /// Bytes that decoding a file may take.
 const MOST_BYTES: usize = 1 << 26;
 
-impl Plane {
+impl LabelRaster {
     /// Reads an indexed PNG whose pixel values are the labels (0 = unexplored), first row first.
-    pub fn from_png(file: &[u8]) -> Result<Self, MapPngError> {
+    pub fn from_png(file: &[u8]) -> Result<Self, RasterPngError> {
         let limits = png::Limits { bytes: MOST_BYTES };
         let mut decoder = png::Decoder::new_with_limits(Cursor::new(file), limits);
         decoder.set_transformations(png::Transformations::IDENTITY);
         let mut reader = decoder.read_info()?;
         let colours = reader.info().color_type;
         if colours != png::ColorType::Indexed {
-            return Err(MapPngError::NotIndexed(colours));
+            return Err(RasterPngError::NotIndexed(colours));
         }
         let size = reader.output_buffer_size().filter(|&size| size <= MOST_BYTES);
         let mut data = vec![0; size.ok_or(png::DecodingError::LimitsExceeded)?];
@@ -43,7 +43,7 @@ impl Plane {
             labels.extend(pixels.take(width));
         }
         match labels.iter().find(|&&label| label > MAX_LABEL) {
-            Some(&label) => Err(MapPngError::NoLabel(label)),
+            Some(&label) => Err(RasterPngError::NoLabel(label)),
             None => Ok(Self { width, height, labels }),
         }
     }
@@ -91,8 +91,8 @@ mod tests {
 
     #[test]
     fn a_map_reads_back_from_its_file() {
-        let plane = Plane { width: 5, height: 3, labels: vec![0, 1, 2, 3, 254, 7, 7, 7, 0, 0, 9, 9, 9, 9, 200] };
-        assert_eq!(Plane::from_png(&plane.to_png()).unwrap(), plane);
+        let raster = LabelRaster { width: 5, height: 3, labels: vec![0, 1, 2, 3, 254, 7, 7, 7, 0, 0, 9, 9, 9, 9, 200] };
+        assert_eq!(LabelRaster::from_png(&raster.to_png()).unwrap(), raster);
     }
 
     #[test]
@@ -101,9 +101,9 @@ mod tests {
         let mut encoder = png::Encoder::new(&mut rgb, 1, 1);
         encoder.set_color(png::ColorType::Rgb);
         encoder.write_header().unwrap().write_image_data(&[1, 2, 3]).unwrap();
-        assert!(matches!(Plane::from_png(&rgb), Err(MapPngError::NotIndexed(png::ColorType::Rgb))));
-        assert!(matches!(Plane::from_png(b"no image"), Err(MapPngError::Unreadable(_))));
-        let too_high = Plane { width: 1, height: 1, labels: vec![255] };
-        assert!(matches!(Plane::from_png(&too_high.to_png()), Err(MapPngError::NoLabel(255))));
+        assert!(matches!(LabelRaster::from_png(&rgb), Err(RasterPngError::NotIndexed(png::ColorType::Rgb))));
+        assert!(matches!(LabelRaster::from_png(b"no image"), Err(RasterPngError::Unreadable(_))));
+        let too_high = LabelRaster { width: 1, height: 1, labels: vec![255] };
+        assert!(matches!(LabelRaster::from_png(&too_high.to_png()), Err(RasterPngError::NoLabel(255))));
     }
 }

@@ -4,7 +4,7 @@ use crate::grid::{Cell, LabelGrid};
 
 /// Labels of a `width` x `height` map, row by row; 0 = unexplored.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Plane {
+pub struct LabelRaster {
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -13,7 +13,7 @@ pub struct Plane {
     pub labels: Vec<u8>,
 }
 
-impl Plane {
+impl LabelRaster {
     /// A map with one label everywhere.
     pub fn uniform(width: usize, height: usize, label: u8) -> Self {
         Self { width, height, labels: vec![label; width * height] }

@@ -1,0 +1,244 @@
+//! Layers: one quantity a cell beside the label, in few levels. A descriptor gives them their meaning; each is replicated by
+//! itself, as the labels are.
+
+mod announcement;
+mod built_in;
+mod chunk;
+mod decimal;
+mod descriptor;
+mod set;
+
+pub use announcement::Assembly;
+pub use built_in::{BUILT_IN_LAYERS, BuiltInLayer};
+pub use chunk::{DescriptorPart, LayerChunk};
+pub use decimal::Decimal;
+pub use descriptor::{LayerDescriptor, Palette, Quantity, Spread, Steps, UpperEnd};
+pub use set::{LayerId, LayerMask, LayerSet};
+
+use super::{Cell, LabelGrid, MapSource, Replica, StateReplica, StateSource};
+use crate::map_codec::Codec;
+use crate::time::Instant;
+use announcement::Announcement;
+use std::fmt;
+use std::time::Duration;
+
+/// The vehicle's side of a layer.
+#[derive(Debug)]
+pub struct LayerSource {
+    id: LayerId,
+    descriptor: LayerDescriptor,
+    announcement: Announcement,
+    levels: MapSource,
+}
+
+/// Content of a layer chunk on the air.
+#[derive(Debug)]
+pub enum LayerCarried {
+    /// So many bytes of the description.
+    Descriptor(usize),
+    /// Levels of cells.
+    Levels(Vec<(Cell, u8)>),
+}
+
+impl LayerSource {
+    /// A layer without levels. A new level of a cell that the surface knows has to stand for `debounce` to be sent.
+    pub fn new(id: LayerId, descriptor: LayerDescriptor, codec: Codec, debounce: Duration) -> Self {
+        let mut levels = MapSource::new(codec);
+        levels.set_debounce(debounce);
+        Self { id, announcement: Announcement::new(&descriptor), descriptor, levels }
+    }
+
+    /// Its index on this vehicle.
+    pub fn id(&self) -> LayerId {
+        self.id
+    }
+
+    /// The meaning of its levels.
+    pub fn descriptor(&self) -> &LayerDescriptor {
+        &self.descriptor
+    }
+
+    /// Sets the quantities of cells, in the descriptor's unit; returns how many cells have another level than before.
+    pub fn set(&mut self, cells: impl IntoIterator<Item = (Cell, f64)>, now: Instant) -> usize {
+        let held = self.levels.target();
+        let level = |(cell, quantity)| (cell, self.descriptor.level(quantity, held.get(cell)));
+        let levels: Vec<(Cell, u8)> = cells.into_iter().map(level).collect();
+        self.levels.set(levels, now)
+    }
+
+    /// As [`MapSource::set_coarse_limit`].
+    pub fn set_coarse_limit(&mut self, after_bytes: Option<usize>) {
+        self.levels.set_coarse_limit(after_bytes);
+    }
+
+    /// Makes every cell's level unknown.
+    pub fn clear(&mut self, now: Instant) {
+        self.levels.clear(now);
+    }
+
+    /// The levels that the surface ought to hold.
+    pub fn target(&self) -> &LabelGrid {
+        self.levels.target()
+    }
+
+    /// Versions of the levels so far.
+    pub fn version(&self) -> u64 {
+        self.levels.version()
+    }
+
+    /// Whether the surface is known to hold any level.
+    pub fn is_begun(&self) -> bool {
+        !self.levels.acked().is_empty()
+    }
+
+    /// The chunk with the digest of the levels that the surface is known to hold.
+    pub fn digest_chunk(&self) -> Vec<u8> {
+        LayerChunk::Digest(self.id, self.digest()).encode()
+    }
+}
+
+impl StateSource for LayerSource {
+    type Carried = LayerCarried;
+
+    fn next_chunk(&mut self, room: usize, now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
+        if !self.announcement.is_complete() {
+            // A layer without levels is not announced.
+            let _ = Some(self.levels.backlog_bytes()).filter(|&waiting| waiting > 0)?;
+            let (chunk, bytes) = self.announcement.next_chunk(self.id, room)?;
+            return Some((chunk, LayerCarried::Descriptor(bytes)));
+        }
+        let (patch, carried) = self.levels.next_chunk(room.checked_sub(LayerChunk::PATCH_HEAD)?, now)?;
+        Some((LayerChunk::Patch(self.id, &patch).encode(), LayerCarried::Levels(carried)))
+    }
+
+    fn handle_fate(&mut self, carried: Self::Carried, delivered: bool, now: Instant) {
+        match carried {
+            LayerCarried::Descriptor(bytes) => self.announcement.handle_fate(bytes, delivered),
+            LayerCarried::Levels(levels) => self.levels.handle_fate(levels, delivered, now),
+        }
+    }
+
+    fn handle_peer_restart(&mut self, now: Instant) {
+        self.announcement.handle_peer_restart();
+        self.levels.handle_peer_restart(now);
+    }
+
+    fn handle_timeout(&mut self, now: Instant) -> bool {
+        self.levels.handle_timeout(now)
+    }
+
+    fn next_due(&self) -> Option<Instant> {
+        self.levels.next_due()
+    }
+
+    /// Until the surface is known to hold the description, that alone can be sent.
+    fn backlog_bytes(&self) -> usize {
+        match self.levels.backlog_bytes() {
+            waiting if waiting > 0 && !self.announcement.is_complete() => self.announcement.backlog_bytes(),
+            waiting => waiting,
+        }
+    }
+
+    fn is_quiet(&self) -> bool {
+        self.levels.is_quiet()
+    }
+
+    fn is_converged(&self) -> bool {
+        self.levels.is_converged()
+    }
+
+    fn digest(&self) -> u16 {
+        self.levels.digest() ^ self.announcement.digest()
+    }
+}
+
+/// The surface's side of a layer.
+pub struct LayerReplica {
+    descriptor: LayerDescriptor,
+    levels: Replica,
+}
+
+/// Without the cells: a peer chooses how many there are.
+impl fmt::Debug for LayerReplica {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LayerReplica").field("descriptor", &self.descriptor).finish_non_exhaustive()
+    }
+}
+
+impl LayerReplica {
+    /// A layer without levels.
+    pub fn new(descriptor: LayerDescriptor) -> Self {
+        Self { descriptor, levels: Replica::default() }
+    }
+
+    /// The meaning of its levels.
+    pub fn descriptor(&self) -> &LayerDescriptor {
+        &self.descriptor
+    }
+
+    /// The levels, and when each was received.
+    pub fn levels(&self) -> &Replica {
+        &self.levels
+    }
+
+    /// Applies a patch of frame `number`; `false` if it makes no sense on the base, or has levels that the layer lacks.
+    pub fn apply(&mut self, number: u64, patch: &[u8], now: Instant) -> bool {
+        self.levels.apply_up_to(self.descriptor.levels, number, patch, now)
+    }
+
+    /// The vehicle now bases its chunks on every frame up to `horizon`.
+    pub fn advance_base(&mut self, horizon: u64) {
+        self.levels.advance_base(horizon);
+    }
+
+    /// Counts changes of the shown levels.
+    pub fn version(&self) -> u64 {
+        self.levels.version()
+    }
+
+    /// Fingerprint of the description and of the levels that the vehicle knows the surface to hold.
+    pub fn base_digest(&self) -> u16 {
+        self.levels.base_digest() ^ self.descriptor.digest()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layer(id: LayerId) -> LayerDescriptor {
+        LayerSet::default().get(id).unwrap().clone()
+    }
+
+    #[test]
+    fn chunks_with_levels_that_a_layer_lacks_are_refused() {
+        let mut labels = MapSource::new(Codec::Png);
+        labels.set([(Cell::new(3, 4), 5), (Cell::new(4, 4), 1)], Instant::ZERO);
+        let (patch, _) = labels.next_chunk(100, Instant::ZERO).unwrap();
+        let mut confidence = LayerReplica::new(layer(LayerId::CONFIDENCE));
+        assert!(!confidence.apply(1, &patch, Instant::ZERO), "there is no level 5");
+        let mut depth = LayerReplica::new(layer(LayerId::DEPTH));
+        assert!(depth.levels().shown().is_empty());
+        assert!(depth.apply(1, &patch, Instant::ZERO));
+        assert_eq!(depth.levels().shown().get(Cell::new(3, 4)), 5);
+    }
+
+    #[test]
+    fn levels_wait_for_the_description() {
+        let id = LayerId::CURIOSITY;
+        let mut source = LayerSource::new(id, layer(id), Codec::Png, Duration::ZERO);
+        assert_eq!(source.backlog_bytes(), 0, "a layer without levels is not announced");
+        source.set([(Cell::new(0, 0), 3.5)], Instant::ZERO);
+        let bytes = source.descriptor().to_bytes().len();
+        assert_eq!(source.backlog_bytes(), bytes + LayerChunk::DESCRIPTOR_HEAD);
+        let (chunk, carried) = source.next_chunk(100, Instant::ZERO).unwrap();
+        assert!(matches!(LayerChunk::decode(&chunk), Some(LayerChunk::Descriptor(..))));
+        assert!(source.next_chunk(100, Instant::ZERO).is_none() && source.backlog_bytes() == 0 && !source.is_quiet());
+        source.handle_fate(carried, true, Instant::ZERO);
+        let (chunk, _) = source.next_chunk(100, Instant::ZERO).unwrap();
+        assert!(matches!(LayerChunk::decode(&chunk), Some(LayerChunk::Patch(..))));
+        source.handle_peer_restart(Instant::ZERO);
+        let (chunk, _) = source.next_chunk(100, Instant::ZERO).unwrap();
+        assert!(matches!(LayerChunk::decode(&chunk), Some(LayerChunk::Descriptor(..))));
+    }
+}
