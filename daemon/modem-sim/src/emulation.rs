@@ -3,7 +3,7 @@
 use super::commands::EmulatorCommand;
 use super::host::{FromHost, PortLine, Speed};
 use super::links::Links;
-use super::scenario::{ModemFault, PortAddress, Scenario, ScenarioModem, node};
+use super::scenario::{EmulatedPort, ModemFault, Scenario, ScenarioModem, node};
 use super::{Pace, tcp};
 use scenecast_core::UserError;
 use sim_channel::modem::{Basin, Fault, HostId};
@@ -116,7 +116,7 @@ impl Emulation {
     fn send_outputs(&mut self) {
         for (index, port) in self.ports.iter().enumerate() {
             let first = self.basin.poll_bytes_for(node(index), HostId::FIRST);
-            if let (Some(listener), PortAddress::Pty, false) =
+            if let (Some(listener), EmulatedPort::Pty, false) =
                 (&port.listener, self.modems[index].port, first.is_empty())
             {
                 listener.send(first);
@@ -252,8 +252,8 @@ impl Emulation {
             return Ok(());
         }
         match self.modems[index].port {
-            PortAddress::Pty => self.plug_pty(index),
-            PortAddress::Tcp(address) => self.plug_tcp(index, address),
+            EmulatedPort::Pty => self.plug_pty(index),
+            EmulatedPort::Tcp(address) => self.plug_tcp(index, address),
         }
     }
 

@@ -103,13 +103,13 @@ fn map(m: &Mission) -> Value {
 fn layer(m: &Mission, layer: &LayerSource) -> (String, Value) {
     let id = layer.id();
     let bytes = m.vehicle().stats().bytes_by_class.get(&Class::Layer(id)).copied().unwrap_or(0);
-    let mut layer = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
-    if let (Some(meter), Some(layer)) = (m.meters.layers.get(&id), layer.as_object_mut()) {
-        layer.insert("agreement_final".into(), round(meter.agreement()).into());
-        layer.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
-        layer.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
+    let mut report = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
+    if let (Some(meter), Some(report)) = (m.meters.layers.get(&id), report.as_object_mut()) {
+        report.insert("agreement_final".into(), round(meter.agreement()).into());
+        report.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
+        report.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
     }
-    (layer.descriptor().name.clone().into_owned(), layer)
+    (layer.descriptor().name.clone().into_owned(), report)
 }
 
 fn by_class(m: &Mission) -> BTreeMap<String, u64> {

@@ -9,7 +9,7 @@ pub use channel::Stranger;
 pub use fault::ModemFault;
 #[cfg(test)]
 use modem::ModemMake;
-pub use modem::{PortAddress, ScenarioModem};
+pub use modem::{EmulatedPort, ScenarioModem};
 
 use reader::{ScenarioSource, TableReader};
 use scenecast_core::UserError;

@@ -19,7 +19,7 @@ pub struct ScenarioModem {
     pub name: String,
     pub make: ModemMake,
     /// The emulated port at which its host reaches it.
-    pub port: PortAddress,
+    pub port: EmulatedPort,
     /// Its positions over emulated time.
     pub track: Track,
     /// Byte offset of its table in the file, for errors.
@@ -35,13 +35,13 @@ pub enum ModemMake {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PortAddress {
+pub enum EmulatedPort {
     Pty,
     /// A TCP port; 0 takes any free one.
     Tcp(SocketAddr),
 }
 
-impl PortAddress {
+impl EmulatedPort {
     /// Whether two modems must not share it.
     pub fn is_fixed(&self) -> bool {
         matches!(self, Self::Tcp(address) if address.port() != 0)
@@ -80,7 +80,7 @@ pub(super) fn read(table: TableReader<'_>, seed: u64) -> Result<ScenarioModem, U
     let kind =
         table.choice("kind", &kinds)?.ok_or_else(|| table.missing("kind", "one of s2c, micromodem, transparent"))?;
     let port = read_port(&table)?;
-    let usual = if port == PortAddress::Pty { Some(19_200) } else { None };
+    let usual = if port == EmulatedPort::Pty { Some(19_200) } else { None };
     let baud = match table.whole("baud", 0..=10_000_000, "bit/s, 0 for no pacing")? {
         Some(baud) => u32::try_from(baud).ok().filter(|baud| *baud > 0),
         None => usual,
@@ -103,13 +103,13 @@ fn seed_with(make: &mut ModemMake, seed: u64, name: &str) {
     }
 }
 
-fn read_port(table: &TableReader<'_>) -> Result<PortAddress, UserError> {
+fn read_port(table: &TableReader<'_>) -> Result<EmulatedPort, UserError> {
     const TAKES: &str = "\"pty\" or \"tcp:ADDRESS:PORT\", as in \"tcp:127.0.0.1:9200\"";
     match table.text("port")?.as_deref() {
-        None | Some("pty") => Ok(PortAddress::Pty),
+        None | Some("pty") => Ok(EmulatedPort::Pty),
         Some(text) => {
             let address = text.strip_prefix("tcp:").and_then(|address| address.parse().ok());
-            address.map(PortAddress::Tcp).ok_or_else(|| table.wrong("port", TAKES))
+            address.map(EmulatedPort::Tcp).ok_or_else(|| table.wrong("port", TAKES))
         }
     }
 }

@@ -12,7 +12,7 @@ fn keys_that_are_not_given_have_defaults() {
     assert_eq!(scenario.channel, ChannelConfig::default());
     let ModemMake::S2c(config) = &scenario.modems[0].make else { panic!("an S2C") };
     assert_eq!((config.address, config.baud), (1, Some(19_200)));
-    assert_eq!(scenario.modems[1].port, PortAddress::Pty);
+    assert_eq!(scenario.modems[1].port, EmulatedPort::Pty);
 }
 
 #[test]
