@@ -30,6 +30,15 @@ pub fn max_bytes(size: u8) -> usize {
 ///  3    bits 7-6 size: an edge of 64 << size pixels; bits 5-0 number of the picture, 0: there is none
 ///  4..  VP8 key frame without start code and size
 /// ```
+///
+/// ```
+/// use scenecast_protocol::exemplar::{Exemplar, edge_px};
+///
+/// let empty = Exemplar { epoch: 0, label: 4, serial: 1, size: 1, picture: 0, bytes: Vec::new() };
+/// assert_eq!(edge_px(empty.size), 128);
+/// assert_eq!(Exemplar::decode(&empty.encode()).as_ref(), Some(&empty));
+/// assert_eq!(empty.webp(), None, "the vehicle has no image of label 4 yet");
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Exemplar {
     /// The epoch of the label ids.

@@ -101,6 +101,15 @@ impl Rect {
 /// Labels by cell; a cell never set reads as [`UNEXPLORED`].
 ///
 /// Memory is one byte a cell in tiles of [`TILE`] x [`TILE`] that hold at least one set cell.
+///
+/// ```
+/// use scenecast_protocol::map::{Cell, LabelGrid, UNEXPLORED};
+///
+/// let mut map = LabelGrid::default();
+/// assert_eq!(map.set(Cell::new(-3, 8), 7), UNEXPLORED, "the label until now");
+/// assert_eq!((map.get(Cell::new(-3, 8)), map.explored()), (7, 1));
+/// assert_eq!(map.bounds().unwrap().area(), 1);
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct LabelGrid {
     tiles: BTreeMap<TileKey, Box<TileLabels>>,
@@ -189,12 +198,18 @@ impl PartialEq for LabelGrid {
 
 impl Eq for LabelGrid {}
 
+impl Extend<(Cell, u8)> for LabelGrid {
+    fn extend<I: IntoIterator<Item = (Cell, u8)>>(&mut self, cells: I) {
+        for (cell, label) in cells {
+            self.set(cell, label);
+        }
+    }
+}
+
 impl FromIterator<(Cell, u8)> for LabelGrid {
     fn from_iter<I: IntoIterator<Item = (Cell, u8)>>(cells: I) -> Self {
         let mut grid = Self::default();
-        for (cell, label) in cells {
-            grid.set(cell, label);
-        }
+        grid.extend(cells);
         grid
     }
 }

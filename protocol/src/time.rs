@@ -4,6 +4,15 @@ use std::ops::{Add, Sub};
 use std::time::Duration;
 
 /// A moment on the host's monotonic clock, in microseconds since any fixed origin of the host's choosing.
+///
+/// ```
+/// use scenecast_protocol::time::Instant;
+/// use std::time::Duration;
+///
+/// let start = Instant::from_secs_f64(1.5);
+/// assert_eq!((start + Duration::from_millis(250)).as_micros(), 1_750_000);
+/// assert_eq!(Instant::ZERO.since(start), Duration::ZERO, "a later moment");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Instant(u64);
 
@@ -32,6 +41,7 @@ impl Instant {
     }
 
     /// Time since `earlier`, zero if it lies in the future.
+    #[must_use]
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_micros(self.0.saturating_sub(earlier.0))
     }

@@ -33,11 +33,11 @@ fn setup() -> impl Strategy<Value = Setup> {
     let frame = prop_oneof![Just(32usize), Just(64), Just(256), Just(1000)];
     let budget = prop_oneof![Just(1000u32), Just(10_000)];
     let codec = prop_oneof![Just(Codec::Png), Just(Codec::Context)];
-    let settle = prop_oneof![Just(0), Just(2), Just(30)].prop_map(Duration::from_secs);
+    let debounce = prop_oneof![Just(0), Just(2), Just(30)].prop_map(Duration::from_secs);
     let layers = prop_oneof![Just(None), Just(Some([0, 0])), Just(Some([10, 5]))];
-    (frame, budget, codec, access, 0u8..6, settle, layers).prop_map(
-        |(frame_bytes, budget_bps, codec, access, keyed, settle, layers)| {
-            let setup = Setup { access, settle, layers, ..Setup::new(frame_bytes, budget_bps, codec) };
+    (frame, budget, codec, access, 0u8..6, debounce, layers).prop_map(
+        |(frame_bytes, budget_bps, codec, access, keyed, debounce, layers)| {
+            let setup = Setup { access, debounce, layers, ..Setup::new(frame_bytes, budget_bps, codec) };
             match keyed {
                 1 if frame_bytes >= 48 => setup.keyed(false, false),
                 2 if frame_bytes >= 48 => setup.keyed(true, false),
@@ -128,7 +128,7 @@ const CALM: LossyChannel = LossyChannel {
 };
 
 #[test]
-fn layers_take_their_part_of_the_maps_share_and_without_one_what_labels_leave() {
+fn a_layer_gets_its_share_of_the_bytes_of_the_map() {
     let sent = |layers: [u8; 2]| {
         let setup = Setup { layers: Some(layers), ..Setup::new(256, 4_000, Codec::Png) };
         let mut pair = LinkedEnds::new(1, setup, LossyChannel { loss: 0.0, ..CALM });
@@ -155,7 +155,7 @@ fn sent(pair: &LinkedEnds, class: Class) -> u64 {
 }
 
 #[test]
-fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_not_name() {
+fn spare_capacity_goes_to_the_named_streams_in_order() {
     let setup = Setup { layers: Some([0, 0]), ..Setup::new(256, 4_000, Codec::Context) };
     let mut pair = LinkedEnds::new(3, setup, LossyChannel { loss: 0.1, ..CALM });
     pair.vehicle.set_background(
@@ -171,19 +171,19 @@ fn left_over_bits_go_to_extras_in_the_operators_order_and_to_none_that_he_does_n
         assert!(object >= 9_000 || depth <= object / 20, "{depth} bytes of depth after {object} of the object");
     }
     assert!(sent(&pair, Class::Layer(LayerId::DEPTH)) > 500, "then it is its turn");
-    assert_eq!(sent(&pair, Class::Layer(LayerId::CONFIDENCE)) / 100, 0, "but for what says that nothing was sent");
+    assert_eq!(sent(&pair, Class::Layer(LayerId::CONFIDENCE)) / 100, 0, "but for the digest of an empty layer");
     assert_budget(&pair, 4_000);
 }
 
 #[test]
-fn curiosity_is_told_where_the_operator_asks_for_it_and_nowhere_else() {
+fn curiosity_is_sent_only_where_the_operator_requests_it() {
     let mut pair = LinkedEnds::new(4, Setup::new(256, 4_000, Codec::Context), LossyChannel { loss: 0.2, ..CALM });
     pair.vehicle.add_layer(layer(LayerId::CURIOSITY, 0, Codec::Context, Duration::ZERO));
     pair.vehicle.set_map(patchy(20, 0).iter(), pair.now);
     let bits = (0..400).map(|i| (Cell::new(i % 20, i / 20), f64::from(i % 7) + f64::from(i / 80)));
     pair.vehicle.set_layer(LayerId::CURIOSITY, bits, pair.now);
     pair.run(pair.now + Duration::from_secs(200), true);
-    assert!(pair.is_converged(), "nobody waits for it");
+    assert!(pair.is_converged(), "no stream waits for it");
     assert_eq!(sent(&pair, Class::Layer(LayerId::CURIOSITY)), 0);
     pair.vehicle.set_background(BackgroundOrder::new(&[BackgroundStream::Layer(LayerId::CURIOSITY)]).unwrap());
     assert!(!pair.is_converged());
@@ -223,7 +223,7 @@ fn a_layer_made_under_way_arrives_in_small_frames_over_restarts() {
 }
 
 #[test]
-fn what_is_put_before_finer_cells_goes_before_them_and_else_after_and_the_maps_agree_in_the_end() {
+fn a_stream_named_before_finer_cells_is_sent_before_them() {
     let after_a_minute = |order: [BackgroundStream; 2]| {
         let mut pair = LinkedEnds::new(5, Setup::new(256, 4_000, Codec::Context), LossyChannel { loss: 0.1, ..CALM });
         pair.vehicle.set_background(BackgroundOrder::new(&order).unwrap());
@@ -286,7 +286,7 @@ fn contact_resumes_after_hours_of_silence() {
 #[test]
 fn held_changes_are_requested_when_due() {
     for access in [Access::Shared, Access::ModemOwned { pool_frames: 8 }, Access::Polled] {
-        let setup = Setup { access, settle: Duration::from_secs(4), ..Setup::new(256, 10_000, Codec::Context) };
+        let setup = Setup { access, debounce: Duration::from_secs(4), ..Setup::new(256, 10_000, Codec::Context) };
         let mut pair = LinkedEnds::new(5, setup, LossyChannel { loss: 0.0, ..CALM });
         let start = patchy(20, 0);
         pair.vehicle.set_map(start.iter(), pair.now);

@@ -27,17 +27,17 @@ fn plan(number: u32, points: usize) -> VehicleStatus {
     VehicleStatus { labels: 3, waypoint: Some(MapPoint::new(x, 0.0)), path, ..VehicleStatus::default() }
 }
 
-fn told(pair: &LinkedEnds) -> Option<&VehicleStatus> {
+fn received(pair: &LinkedEnds) -> Option<&VehicleStatus> {
     pair.surface.vehicle(auv()).unwrap().status().map(|(status, _)| status)
 }
 
 /// Whether the surface has the waypoint and the path of the vehicle's plan, as far as a pose has it.
-fn is_told(pair: &LinkedEnds) -> bool {
+fn is_received(pair: &LinkedEnds) -> bool {
     let plan = &pair.status;
-    told(pair).is_some_and(|told| {
-        let n = told.path.points.len();
+    received(pair).is_some_and(|received| {
+        let n = received.path.points.len();
         let is_whole = n == plan.path.points.len().min(PlannedPath::MAX_POINTS);
-        is_whole && told.waypoint == plan.waypoint && told.path.points[..] == plan.path.points[..n]
+        is_whole && received.waypoint == plan.waypoint && received.path.points[..] == plan.path.points[..n]
     })
 }
 
@@ -54,21 +54,21 @@ proptest! {
         let channel = LossyChannel { loss, duplication: 0.2, reordering: 0.2, corruption: 0.1, ..STILL };
         let mut pair = LinkedEnds::new(seed, Setup::new(frame_bytes, 10_000, Codec::Context), channel);
         let mut latest = 0;
-        for (step, (what, places)) in steps.into_iter().enumerate() {
+        for (step, (action, places)) in steps.into_iter().enumerate() {
             let map = patchy(24, step as u64);
             pair.vehicle.set_map(map.iter(), pair.now);
             for second in 1..=15 {
                 pair.status = plan(step as u32 * 15 + second, places);
-                if what > 2 {
+                if action > 2 {
                     pair.vehicle.owe_pose(pair.now);
                 }
                 pair.run(pair.now + Duration::from_secs(1), false);
-                let Some((told, x)) = told(&pair).and_then(|t| Some((t, t.waypoint?.x_m))) else { continue };
-                prop_assert!(told.path.points.iter().all(|p| p.x_m == x), "{:?} of two plans", told.path);
+                let Some((received, x)) = received(&pair).and_then(|t| Some((t, t.waypoint?.x_m))) else { continue };
+                prop_assert!(received.path.points.iter().all(|p| p.x_m == x), "{:?} of two plans", received.path);
                 prop_assert!(x as u32 >= latest, "plan {} after {}", x, latest);
                 latest = x as u32;
             }
-            match what {
+            match action {
                 0 => pair.restart_vehicle(&map),
                 1 => pair.restart_surface(),
                 _ => {}
@@ -76,7 +76,7 @@ proptest! {
         }
         pair.channel = STILL;
         pair.run(pair.now + Duration::from_secs(60), false);
-        prop_assert!(is_told(&pair), "{:?} is not {:?}", told(&pair).map(|t| &t.path), pair.status.path);
+        prop_assert!(is_received(&pair), "{:?} is not {:?}", received(&pair).map(|t| &t.path), pair.status.path);
     }
 }
 
@@ -85,21 +85,24 @@ fn a_path_from_before_an_applied_order_is_hidden() {
     let mut pair = LinkedEnds::new(3, Setup::new(256, 10_000, Codec::Context), STILL);
     pair.status = plan(1, 5);
     pair.run(pair.now + Duration::from_secs(30), false);
-    assert!(is_told(&pair));
+    assert!(is_received(&pair));
     pair.surface.issue(auv(), utility(5), pair.now).unwrap();
     let mut runs = 0;
-    while is_told(&pair) {
-        assert!(told(&pair).unwrap().slots.iter().all(|s| s.version_low == 0), "applied, and the old path is shown");
+    while is_received(&pair) {
+        assert!(
+            received(&pair).unwrap().slots.iter().all(|s| s.version_low == 0),
+            "applied, and the old path is shown"
+        );
         pair.run(pair.now + Duration::from_millis(100), false);
         runs += 1;
         assert!(runs < 100, "the report never came");
     }
-    let status = told(&pair).unwrap();
+    let status = received(&pair).unwrap();
     assert_eq!((status.waypoint, &status.path), (None, &PlannedPath::default()));
     pair.status = plan(2, 5);
     pair.vehicle.owe_pose(pair.now);
     pair.run(pair.now + Duration::from_secs(5), false);
-    assert!(is_told(&pair), "the new one comes at once");
+    assert!(is_received(&pair), "the new one comes at once");
 }
 
 #[test]
@@ -115,11 +118,11 @@ fn a_path_takes_at_most_a_hundredth_of_the_budget() {
                 pair.vehicle.set_map(patchy(60, minute.into()).iter(), pair.now);
                 pair.run(pair.now + Duration::from_secs(60), false);
             }
-            assert!(told(&pair).is_some_and(|t| t.path.continues == (places > PlannedPath::MAX_POINTS)));
+            assert!(received(&pair).is_some_and(|t| t.path.continues == (places > PlannedPath::MAX_POINTS)));
             pair.vehicle.stats().bytes_by_class[&Class::Status] * 8
         };
         let (without, with) = (hour(0), hour(8));
-        assert!(with > without, "nothing is told");
+        assert!(with > without, "no path is sent");
         let share = (with - without) as f64 / f64::from(budget_bps * 3600);
         assert!(share < 0.01, "{share} of {budget_bps} bit/s");
     }

@@ -1,6 +1,6 @@
 //! What the link achieves: the golden table and the figures it has to reach.
 
-use scenecast_rehearsal::link_bench::{LinkTable, Pattern, Row, link_table};
+use scenecast_rehearsal::link_bench::{LinkRow, LinkTable, Pattern, link_table};
 use std::sync::OnceLock;
 
 /// Rows that miss the bound of convergence, as range, bytes, loss; this list may only get shorter.
@@ -14,7 +14,7 @@ fn table() -> &'static LinkTable {
 }
 
 /// Rows of independent loss.
-fn rows(range_km: f64) -> impl Iterator<Item = &'static Row> {
+fn rows(range_km: f64) -> impl Iterator<Item = &'static LinkRow> {
     let rows = table().rows.iter().filter(|r| matches!(r.pattern, Pattern::Independent));
     rows.filter(move |r| r.range_km == range_km)
 }

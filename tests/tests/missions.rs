@@ -24,7 +24,7 @@ fn reef() -> World {
 fn fly(sets: &[&str], seed: u64) -> Value {
     let mut mission = Mission::new(config(sets), MissionOptions { world: reef(), seed, record: None }).unwrap();
     mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
-    report(&mission, "test").figures
+    report(&mission, "test").json
 }
 
 fn assert_sound(figures: &Value) {
@@ -175,7 +175,7 @@ fn a_real_reef_is_surveyed_into_more_than_one_label() {
     let mut mission =
         Mission::new(config(&["survey.duration_s=300"]), MissionOptions { world, seed: 1, record: None }).unwrap();
     mission.run(Duration::from_secs(7200), &mut |_| {}).unwrap();
-    let figures = report(&mission, "test").figures;
+    let figures = report(&mission, "test").json;
     assert_sound(&figures);
     assert!(figures["scene"]["labels"].as_u64() > Some(1));
     assert!(figures["scene"]["mutual_information_nats"].as_f64() > Some(0.02), "{figures}");
@@ -188,7 +188,7 @@ fn a_fenced_vehicle_stays_inside_keeps_to_its_limit_and_says_so() {
         let sets = ["operator.script=fenced", "survey.duration_s=300", "channel.loss=0.2", &planner];
         let mut mission = Mission::new(config(&sets), MissionOptions { world: reef(), seed: 5, record: None }).unwrap();
         mission.advance(scenecast_protocol::time::Instant::from_secs_f64(299.0)).unwrap();
-        let figures = report(&mission, "test").figures;
+        let figures = report(&mission, "test").json;
         assert_eq!(figures["survey"]["waypoints_outside_fence"], 0, "{figures}");
         assert!(figures["survey"]["waypoints"].as_u64() > Some(4), "{figures}");
         // Half of what it could go, of which the first orders took a little to arrive.

@@ -203,6 +203,6 @@ fn settings_survive_a_restart_of_the_vehicle() {
         told().is_some_and(|v| v["map"]["explored_cells"].as_u64() > Some(0))
     });
     let vehicle = told().unwrap();
-    assert_eq!(vehicle["map"]["epoch"], 0, "labels go on: the checkpoint was not passed over");
+    assert_eq!(vehicle["map"]["epoch"], 0, "labels continue: the checkpoint was not skipped");
     assert_eq!(vehicle["settings"]["in_force"]["alpha"], 0.5);
 }

@@ -247,7 +247,7 @@ fn a_tum_sequence_is_projected_and_gaps_are_counted() {
     let again =
         run(&["scene", "run", "--source", &argument, "--refine-rate", "1000", "--out", &path(dir.join("again"))]);
     assert!(again.status.success());
-    assert!(String::from_utf8_lossy(&again.stderr).contains("1 frames passed over, the first:"), "one bad frame");
+    assert!(String::from_utf8_lossy(&again.stderr).contains("1 frames skipped, the first:"), "one bad frame");
     write(&source, "depth.txt", "500 rgb/d0.png\n");
     refused(&["--source", &argument], &none, &["rgb.txt", "none of its 6 images"]);
     write(&source, "groundtruth.txt", "100 0 0 nan 0 0 0 1\n");
@@ -272,7 +272,7 @@ fn frames_with_poses_are_labelled_and_bad_ones_are_counted() {
     let output = run(&["scene", "run", "--source", &argument, "--refine-rate", "20000", "--out", &path(&out)]);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
-    assert!(said.contains("1 of 6 frames passed over") && said.contains("missing.png"), "{said}");
+    assert!(said.contains("1 of 6 frames skipped") && said.contains("missing.png"), "{said}");
     assert!(labels(&out).iter().all(|([x, y, _], _)| (-0.9..2.6).contains(x) && (-0.8..0.8).contains(y)));
     write(&dir, "poses.csv", "t_s,file,x_m,y_m,depth_m,heading_deg\n0,0.png,0,inf,0,0\n");
     refused(&["--source", &argument], &dir.join("none"), &["poses.csv:2"]);

@@ -13,7 +13,7 @@ pub(crate) fn layers(view: &PeerView<'_>, bounds: Rect, now: Instant) -> Vec<Cel
 /// Seconds since each cell was received, 65535 = never.
 pub(crate) fn ages(replica: &Replica, bounds: Rect, now: Instant) -> Vec<u16> {
     let age = |at: Instant| now.since(at).as_secs().min(65_534) as u16;
-    bounds.cells().map(|cell| replica.heard(cell).map_or(u16::MAX, age)).collect()
+    bounds.cells().map(|cell| replica.received_at(cell).map_or(u16::MAX, age)).collect()
 }
 
 /// A layer with the bounds of the levels over which its colours are spread: those on the map, or all of its scale.

@@ -3,7 +3,8 @@
 use image::RgbImage;
 use scenecast_core::Area;
 use scenecast_core::UserError;
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// A camera frame of a recorded mission.
@@ -30,43 +31,59 @@ impl RecordedFrame {
 
 /// A folder with images and a table of their poses, in order of time: `poses.csv`, or the only `poses*.csv`.
 ///
-/// The first line names the columns. Either they are `t_s,file,x_m,y_m,depth_m,heading_deg`; or
-/// `file,time_utc_hms,x_px,y_px,yaw_deg,scale`, the place of the frame's middle in a mosaic whose rows grow downwards, in
-/// its pixels, and how large the frame's pixels are in those.
+/// The table is CSV (RFC 4180), and its first line names the columns, in any order; further columns are ignored. Either
+/// they are `t_s,file,x_m,y_m,depth_m,heading_deg`; or `file,time_utc_hms,x_px,y_px,yaw_deg,scale`: the position of the
+/// frame's middle in a mosaic, in the mosaic's pixels with rows that grow downwards, and the size of the frame's pixels
+/// in those of the mosaic.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The frames, in order of time.
     pub frames: Vec<RecordedFrame>,
 }
 
+/// Largest table, for about ten million frames, bytes.
+const MAX_TABLE_BYTES: u64 = 1 << 30;
+
 impl Recording {
-    /// Reads the table of a folder; complaints name the line. A pixel of a mosaic is `metres_per_pixel` wide.
+    /// Reads the table of a folder; an error names the line. A pixel of a mosaic is `metres_per_pixel` wide.
     pub fn open(dir: &Path, metres_per_pixel: f64) -> Result<Self, UserError> {
         let path = table(dir)?;
-        let text = std::fs::read_to_string(&path).map_err(|e| UserError::file(&path, e))?;
-        let in_pixels = text.lines().next().is_some_and(|head| head.split(',').any(|name| name.trim() == "x_px"));
+        let file = std::fs::File::open(&path).map_err(|e| UserError::file(&path, e))?;
+        if file.metadata().is_ok_and(|about| about.len() > MAX_TABLE_BYTES) {
+            return Err(UserError::file(&path, format!("larger than {MAX_TABLE_BYTES} bytes")));
+        }
+        let mut reader = csv::ReaderBuilder::new()
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(std::io::BufReader::new(file.take(MAX_TABLE_BYTES)));
+        let names = reader.headers().map_err(|e| UserError::file(&path, e))?.clone();
+        let (columns, in_pixels) = match names.iter().any(|name| name == "x_px") {
+            true => (Columns::find(&names, &MOSAIC_COLUMNS), true),
+            false => (Columns::find(&names, &METRE_COLUMNS), false),
+        };
+        let columns = columns.map_err(|name| UserError::Input(format!("{}:1: no column {name}", path.display())))?;
         let mut frames: Vec<RecordedFrame> = Vec::new();
-        for (i, line) in text.lines().enumerate().skip(1).filter(|(_, l)| !l.trim().is_empty()) {
-            let place = format!("{}:{}", path.display(), i + 1);
-            let (frame, columns) = match in_pixels {
+        for row in reader.records() {
+            let row = row.map_err(|e| UserError::file(&path, e))?;
+            let place = format!("{}:{}", path.display(), row.position().map_or(0, csv::Position::line));
+            let row = Row { columns: &columns, fields: &row };
+            let frame = match in_pixels {
                 true => {
                     let midnight = frames.last().map_or(0.0, |last| (last.t_s / DAY_S).floor() * DAY_S);
-                    let frame = of_mosaic(dir, line, metres_per_pixel).map(|f| after(f, midnight, frames.last()));
-                    (frame, "file,time_utc_hms,x_px,y_px,yaw_deg,scale")
+                    of_mosaic(dir, row, metres_per_pixel).map(|f| after(f, midnight, frames.last()))
                 }
-                false => (parse(dir, line), "t_s,file,x_m,y_m,depth_m,heading_deg"),
+                false => of_metres(dir, row),
             };
-            let what = format!("{place}: expected {columns} with finite numbers");
-            let frame = frame.ok_or(UserError::Input(what))?;
+            let frame = frame.map_err(|wrong| UserError::Input(format!("{place}: {wrong}")))?;
             if frames.last().is_some_and(|last| last.t_s > frame.t_s) {
-                return Err(UserError::Input(format!("{place}: the time goes back")));
+                return Err(UserError::Input(format!("{place}: the time is earlier than on the line before")));
             }
             frames.push(frame);
         }
         if frames.is_empty() {
             return Err(UserError::file(&path, "there are no frames"));
         }
-        // A time of the day says nothing of the mission's.
+        // The table gives the time of the day, not the mission's.
         let began_s = if in_pixels { frames[0].t_s } else { 0.0 };
         frames.iter_mut().for_each(|frame| frame.t_s -= began_s);
         Ok(Self { frames })
@@ -84,21 +101,55 @@ impl Recording {
     }
 }
 
-fn parse(dir: &Path, line: &str) -> Option<RecordedFrame> {
-    let mut fields = line.split(',').map(str::trim);
-    let t_s = fields.next()?;
-    let file = fields.next()?;
-    let number = |text: Option<&str>| text?.parse::<f64>().ok().filter(|v| v.is_finite());
-    let (x_m, y_m) = (number(fields.next())?, number(fields.next())?);
-    let (depth_m, heading_deg) = (number(fields.next())?, number(fields.next())?);
-    let t_s = number(Some(t_s)).filter(|&t| t >= 0.0)?;
-    Some(RecordedFrame {
+const METRE_COLUMNS: [&str; 6] = ["t_s", "file", "x_m", "y_m", "depth_m", "heading_deg"];
+const MOSAIC_COLUMNS: [&str; 6] = ["file", "time_utc_hms", "x_px", "y_px", "yaw_deg", "scale"];
+
+/// Where the wanted columns are in a row.
+struct Columns([(&'static str, usize); 6]);
+
+impl Columns {
+    /// The name of a column that is missing is the error.
+    fn find(names: &csv::StringRecord, wanted: &[&'static str; 6]) -> Result<Self, &'static str> {
+        let mut found = wanted.map(|name| (name, 0));
+        for (name, place) in &mut found {
+            *place = names.iter().position(|other| other == *name).ok_or(*name)?;
+        }
+        Ok(Self(found))
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    columns: &'a Columns,
+    fields: &'a csv::StringRecord,
+}
+
+impl<'a> Row<'a> {
+    fn text(self, name: &str) -> Result<&'a str, String> {
+        let place = self.columns.0.iter().find(|(column, _)| *column == name).map(|(_, place)| *place);
+        let text = place.and_then(|place| self.fields.get(place)).filter(|text| !text.is_empty());
+        text.ok_or_else(|| format!("{name} is missing"))
+    }
+
+    fn number(self, name: &str) -> Result<f64, String> {
+        let text = self.text(name)?;
+        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        value.ok_or_else(|| format!("{name} is {text:?}; expected a finite number"))
+    }
+}
+
+fn of_metres(dir: &Path, row: Row<'_>) -> Result<RecordedFrame, String> {
+    let t_s = row.number("t_s")?;
+    if t_s < 0.0 {
+        return Err(format!("t_s is {t_s}; expected 0 or more"));
+    }
+    Ok(RecordedFrame {
         t_s,
-        file: dir.join(file),
-        x_m,
-        y_m,
-        depth_m,
-        heading_rad: heading_deg.to_radians(),
+        file: dir.join(row.text("file")?),
+        x_m: row.number("x_m")?,
+        y_m: row.number("y_m")?,
+        depth_m: row.number("depth_m")?,
+        heading_rad: row.number("heading_deg")?.to_radians(),
         scale: 1.0,
     })
 }
@@ -106,15 +157,22 @@ fn parse(dir: &Path, line: &str) -> Option<RecordedFrame> {
 const DAY_S: f64 = 86_400.0;
 
 /// A frame placed in a mosaic, at its time of the day.
-fn of_mosaic(dir: &Path, line: &str, metres_per_pixel: f64) -> Option<RecordedFrame> {
-    let mut fields = line.split(',').map(str::trim);
-    let file = fields.next().filter(|name| !name.is_empty())?;
-    let t_s = time_of_day(fields.next()?)?;
-    let mut number = || fields.next()?.parse::<f64>().ok().filter(|v| v.is_finite());
-    let (x_px, y_px, yaw_deg) = (number()?, number()?, number()?);
-    let scale = number().filter(|&scale| scale > 0.0)?;
-    let (x_m, y_m) = (x_px * metres_per_pixel, -y_px * metres_per_pixel);
-    Some(RecordedFrame { t_s, file: dir.join(file), x_m, y_m, depth_m: 0.0, heading_rad: yaw_deg.to_radians(), scale })
+fn of_mosaic(dir: &Path, row: Row<'_>, metres_per_pixel: f64) -> Result<RecordedFrame, String> {
+    let time = row.text("time_utc_hms")?;
+    let t_s = time_of_day(time).ok_or_else(|| format!("time_utc_hms is {time:?}; expected hhmmss"))?;
+    let scale = row.number("scale")?;
+    if scale <= 0.0 {
+        return Err(format!("scale is {scale}; expected more than 0"));
+    }
+    Ok(RecordedFrame {
+        t_s,
+        file: dir.join(row.text("file")?),
+        x_m: row.number("x_px")? * metres_per_pixel,
+        y_m: -row.number("y_px")? * metres_per_pixel,
+        depth_m: 0.0,
+        heading_rad: row.number("yaw_deg")?.to_radians(),
+        scale,
+    })
 }
 
 fn time_of_day(text: &str) -> Option<f64> {
@@ -205,12 +263,25 @@ mod tests {
         assert!((first.heading_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         assert_eq!((frames[1].t_s, frames[1].y_m), (20.0, -4.0));
         let bad = open("bad", "poses.csv", &text.replace("235950", "2359")).unwrap_err().to_string();
-        assert!(bad.contains("poses.csv:2: expected file,time_utc_hms"), "{bad}");
+        assert!(bad.contains("poses.csv:2: time_utc_hms is \"2359\"; expected hhmmss"), "{bad}");
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_fields_may_be_quoted() {
+        let text = "\u{feff}heading_deg, file ,note,x_m,y_m,depth_m,t_s\r\n90,\"reef, east.png\",\"\",1,2,3,4.5\r\n";
+        let frames = open("names", "poses.csv", text).unwrap().frames;
+        assert!(frames[0].file.ends_with("reef, east.png"), "{:?}", frames[0].file);
+        assert_eq!((frames[0].t_s, frames[0].x_m, frames[0].y_m, frames[0].depth_m), (4.5, 1.0, 2.0, 3.0));
+        let missing = open("missing", "poses.csv", "t_s,file,x_m,y_m\n0,a.png,1,2\n").unwrap_err().to_string();
+        assert!(missing.contains("poses.csv:1: no column depth_m"), "{missing}");
+        let text = "t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,4\n1,b.png,nan,2,3,4\n";
+        let wrong = open("wrong", "poses.csv", text).unwrap_err().to_string();
+        assert!(wrong.contains("poses.csv:3: x_m is \"nan\"; expected a finite number"), "{wrong}");
     }
 
     #[test]
     fn a_folder_without_poses_is_named() {
-        let said = open("none", "other.csv", "").unwrap_err().to_string();
-        assert!(said.contains("poses.csv: there is no such file"), "{said}");
+        let error = open("none", "other.csv", "").unwrap_err().to_string();
+        assert!(error.contains("poses.csv: there is no such file"), "{error}");
     }
 }

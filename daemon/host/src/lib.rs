@@ -1,8 +1,8 @@
 //! One host for each role, as a state machine without IO.
 //!
-//! A host joins a role ([`scenecast_vehicle::Vehicle`] or `scenecast_surface::Surface`) with its modem, its autopilot, its
-//! persistent state and the hand-over to the mapper. The runtime drives the hosts with ports, disks and a clock; the
-//! rehearsal drives the same hosts in virtual time. An owner repeats three steps after everything that happened:
+//! A host joins a role ([`scenecast_vehicle::Vehicle`] or `scenecast_surface::Surface`) with its modem, its autopilot,
+//! its persistent state and the hand-over to the mapper. The runtime drives the hosts with ports, disks and a clock;
+//! the rehearsal drives the same hosts in virtual time. The owner of a host repeats three steps after each event:
 //!
 //! ```text
 //! host.handle_*(.., now)                  bytes of a port, a frame of the camera, a map of the mapper, a timeout
@@ -14,7 +14,7 @@
 //!
 //! | type | joins |
 //! |---|---|
-//! | [`LinkHost`] | any end of the link and a modem station; the only place that asks a link for frames |
+//! | [`LinkHost`] | any end of the link and a modem station; the only caller of a link's `poll_transmit` |
 //! | [`VehicleHost`] | the vehicle's role, its modem and autopilot, persistence, the mapper |
 //! | `SurfaceHost` | the surface's role, its modem, the instruments and the autopilot of the surface vehicle |
 

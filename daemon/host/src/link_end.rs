@@ -1,4 +1,4 @@
-//! An end of the link as its modem needs it.
+//! The interface of a link's end toward its modem.
 
 use scenecast_core::UsblLine;
 use scenecast_protocol::link::{Cycle, SurfaceLink, Transmit, VehicleLink};
@@ -7,21 +7,21 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_vehicle::Vehicle;
 
-/// Either role, or a bare link of either: it takes and gives frames.
+/// An end of the link: a role, or the bare link of a role.
 pub trait LinkEnd {
-    /// Bits a second that it may put on air.
+    /// The budget: bits a second that this end may put on air.
     fn budget_bps(&self) -> u32;
 
     /// Takes the bytes of a received frame.
     fn handle_frame(&mut self, bytes: &[u8], now: Instant);
 
-    /// A transmission has left the modem, or never will.
+    /// The modem has sent a transmission, or dropped it.
     fn handle_transmit_outcome(&mut self, now: Instant);
 
-    /// The modem asks for at most so many frames.
+    /// The modem requests at most this many frames.
     fn handle_poll(&mut self, frames: u32);
 
-    /// The modem repeated so many bits by itself.
+    /// The modem repeated this many bits by itself.
     fn handle_repeated(&mut self, bits: u64, now: Instant);
 
     /// The modem's USBL head measured the position of another end.
@@ -35,11 +35,11 @@ pub trait LinkEnd {
     /// The next frame to put on air.
     fn poll_transmit(&mut self, now: Instant) -> Option<Transmit>;
 
-    /// When [`Self::poll_transmit`] should be asked again.
+    /// The time at which [`Self::poll_transmit`] should be called again.
     fn poll_timeout(&self, now: Instant) -> Option<Instant>;
 }
 
-/// What both kinds of ends have under the same names.
+/// Forwards the methods that every end has under the same name.
 macro_rules! forward {
     () => {
         fn budget_bps(&self) -> u32 {

@@ -12,42 +12,37 @@ use scenecast_protocol::wire::Address;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// News of frames and of the modem, for meters and logs. No link needs an answer to it.
+/// Events of frames and of the modem, for meters and logs. The link needs no reaction to them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FrameEvent {
-    /// A frame was handed to the modem.
+    /// A frame was given to the modem.
     Sent {
-        /// Its length.
         bytes: usize,
-        /// Its kind, as the link names it.
+        /// Kind of the frame, as the link names it.
         kind: scenecast_protocol::link::TransmitKind,
     },
-    /// The modem refused the frame that was handed over last. The link repairs it like a lost one.
+    /// The modem refused the last frame. The link repairs it like a lost one.
     NotSent(Refusal),
-    /// A frame came in and was given to the link.
-    Received {
-        /// Its length.
-        bytes: usize,
-    },
-    /// For the first time, more bits than the budget allows are on air in a window.
+    /// A frame was received and given to the link.
+    Received { bytes: usize },
+    /// The bits on air exceed the budget of a window for the first time.
     OverBudget {
-        /// Mean bit rate of the fullest window.
-        worst_window_bps: f64,
+        /// Mean bit rate of the fullest window, bit/s.
+        max_window_bps: f64,
     },
     /// The modem is set up and takes frames.
     ModemReady,
     /// The modem no longer answers; [`Self::ModemReady`] follows when it is set up again.
     ModemLost,
-    /// The modem refuses something that a person must change; the reason is a line for that person.
+    /// The modem refuses a setting that a person must change; the reason is a line for that person.
     ModemRefused {
-        /// One line.
         reason: String,
         /// Whether the modem has worked before.
         was_ready: bool,
     },
 }
 
-/// An end of the link at its modem: the only place that asks a link for frames.
+/// An end of the link at its modem: the only caller of a link's `poll_transmit`.
 #[derive(Debug)]
 pub struct LinkHost<E> {
     end: E,
@@ -63,7 +58,6 @@ impl<E: LinkEnd> LinkHost<E> {
         Self { end, station, budget: BudgetWatch::default(), was_ready: false, events: VecDeque::new() }
     }
 
-    /// The role or link.
     pub fn end(&self) -> &E {
         &self.end
     }
@@ -73,7 +67,7 @@ impl<E: LinkEnd> LinkHost<E> {
         &mut self.end
     }
 
-    /// Properties of the modem that the link reckons with.
+    /// The properties of the modem that the link assumes.
     pub fn profile(&self) -> &ModemProfile {
         self.station.profile()
     }
@@ -112,30 +106,31 @@ impl<E: LinkEnd> LinkHost<E> {
         self.deliver(now);
     }
 
-    /// When the host must be asked for output again, or [`Self::handle_timeout`] is due. A moment of the link that has
-    /// passed led to no frame: the link then waits for another event.
+    /// The time at which output should be polled again or [`Self::handle_timeout`] is due. A time of the link in the
+    /// past is left out: it led to no frame, so the link waits for another event.
     pub fn poll_timeout(&self, now: Instant) -> Option<Instant> {
         let link = self.end.poll_timeout(now).filter(|&at| at > now);
         link.into_iter().chain(self.station.poll_timeout()).min()
     }
 
-    /// Whether the modem's port has been silent for so long that it should be closed and opened again.
+    /// Whether the silent modem's port should be closed and opened again.
     pub fn wants_reopening(&self, now: Instant) -> bool {
         self.station.wants_reopening(now)
     }
 
-    /// Asks the link for cycles and frames while the modem takes any, then returns the next bytes for the modem's port.
+    /// Polls the link for cycles and frames while the modem accepts them, then returns the next
+    /// bytes for the modem's port.
     pub fn poll_output(&mut self, now: Instant) -> Option<Vec<u8>> {
         self.fill(now);
         self.poll_modem_output(now)
     }
 
-    /// Bytes of the driver alone, while the link must not speak.
+    /// The next bytes of the driver alone, while the link must not transmit.
     pub(crate) fn poll_modem_output(&mut self, now: Instant) -> Option<Vec<u8>> {
         self.station.poll_output(now)
     }
 
-    /// The next news of frames and modem.
+    /// The next event of frames and modem.
     pub fn poll_event(&mut self) -> Option<FrameEvent> {
         self.events.pop_front()
     }
@@ -159,7 +154,7 @@ impl<E: LinkEnd> LinkHost<E> {
         }
     }
 
-    /// Hands the link everything that the modem reports.
+    /// Gives all reports of the modem to the link.
     fn deliver(&mut self, now: Instant) {
         while let Some(event) = self.station.poll_event() {
             match event {
@@ -184,10 +179,10 @@ impl<E: LinkEnd> LinkHost<E> {
     }
 }
 
-/// Notices once that more is on air than the budget allows.
+/// Reports once that the bits on air exceed the budget.
 #[derive(Debug, Default)]
 struct BudgetWatch {
-    /// The largest budget so far, bits a window.
+    /// The largest budget so far, bits per window.
     window_bits: f64,
     is_exceeded: bool,
 }
@@ -200,7 +195,7 @@ impl BudgetWatch {
     fn check(&mut self, audit: &Audit) -> Option<FrameEvent> {
         let is_exceeded = audit.worst_window_bits() as f64 > self.window_bits + audit.largest_bits() as f64;
         let is_news = is_exceeded && !std::mem::replace(&mut self.is_exceeded, true);
-        is_news.then(|| FrameEvent::OverBudget { worst_window_bps: audit.worst_window_bps() })
+        is_news.then(|| FrameEvent::OverBudget { max_window_bps: audit.worst_window_bps() })
     }
 }
 
@@ -213,8 +208,8 @@ pub fn modem_station(config: &Config, end: Address, profile: ModemProfile) -> Re
     Ok(Station::new(driver(config, end, profile)?, address_book(config), audit))
 }
 
-/// A station without a modem, for a simulated channel: each output is the bytes of one frame, which is on air from then on
-/// for [`ModemProfile::airtime`]. Its port is open.
+/// A station without a modem, for a simulated channel. Its port is open. Each output is one frame, which
+/// stays on air for [`ModemProfile::airtime`].
 pub fn channel_station(profile: ModemProfile, window: Duration, now: Instant) -> Station {
     let driver = Paced::datagrams(profile, profile.bit_rate_bps);
     let mut station = Station::new(Box::new(driver), AddressBook { surface: 0 }, Audit::new(window));

@@ -4,21 +4,19 @@ use scenecast_drivers::autopilot::{Autopilot, Health};
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 
-/// News of an autopilot, for the log.
+/// An event of an autopilot, for the log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum PilotEvent {
     /// A line that a person should read.
     Note(String),
-    /// Its health has changed.
     Health {
-        /// The health now.
         health: Health,
         /// The counters so far, as one line.
         counters: String,
     },
 }
 
-/// An autopilot and the news of it.
+/// An autopilot and its events.
 pub(crate) struct Pilot {
     pub(crate) autopilot: Box<dyn Autopilot>,
     health: Health,
@@ -31,7 +29,7 @@ impl Pilot {
         Self { autopilot, health, events: VecDeque::new() }
     }
 
-    /// Lets time pass, if the autopilot is due; returns whether it was.
+    /// Calls the autopilot's timeout if it is due; returns whether it was.
     pub(crate) fn handle_timeout(&mut self, now: Instant) -> bool {
         let is_due = self.autopilot.poll_timeout() <= now;
         if is_due {
@@ -68,6 +66,6 @@ impl Pilot {
     fn counters(&self) -> String {
         let counters = self.autopilot.counters();
         let all: Vec<String> = counters.iter().map(|(name, n)| format!("{name} {n}")).collect();
-        if all.is_empty() { "nothing yet".to_owned() } else { all.join(", ") }
+        if all.is_empty() { "none yet".to_owned() } else { all.join(", ") }
     }
 }

@@ -1,4 +1,4 @@
-//! The surface's host.
+//! The host of the surface: role, modem and the surface vehicle's autopilot.
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
@@ -10,23 +10,21 @@ use scenecast_surface::position::{Follow, UsblSighting};
 use scenecast_surface::{Surface, SurfaceOutput};
 use std::collections::VecDeque;
 
-/// Requests and news of a surface's host.
+/// Requests and events of a surface's host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SurfaceHostEvent {
-    /// News of the role.
     Role(SurfaceOutput),
-    /// The surface vehicle sails there, metres east and north in the world's frame.
+    /// A new target of the surface vehicle, metres east and north in the world frame.
     Following(f64, f64),
-    /// News of frames and modem.
+    /// An event of frames or modem.
     Frame(FrameEvent),
-    /// News of the autopilot.
     Pilot(PilotEvent),
 }
 
 /// The autopilot of the surface vehicle, which follows a vehicle.
 pub struct Follower {
     pilot: Pilot,
-    /// `None`: it stays where it is.
+    /// `None` if the surface vehicle keeps its position.
     follow: Option<Follow>,
     vehicle: Address,
     target: Option<(f64, f64)>,
@@ -38,8 +36,8 @@ impl Follower {
         Self { pilot: Pilot::new(autopilot, now), follow, vehicle, target: None }
     }
 
-    /// Sails above the vehicle, by the position that the USBL head measures or else by the one that the vehicle reports.
-    /// Returns a new target.
+    /// Follows the vehicle by the position that the USBL head measures, or else by the one that the vehicle reports.
+    /// Returns a target if it changed.
     fn sail(&mut self, surface: &Surface, now: Instant) -> Option<(f64, f64)> {
         let autopilot = &mut self.pilot.autopilot;
         while autopilot.poll_step().is_some() {}
@@ -48,7 +46,7 @@ impl Follower {
         let seen = relay.vehicle(self.vehicle, now).map(|(e, velocity)| ((e.x_m, e.y_m), velocity));
         let seen = seen.or_else(|| surface.vehicle_in_world(self.vehicle).map(|at| (at, (0.0, 0.0))));
         let Some(own) = own else {
-            // Without a position of its own it stays where it is.
+            // Without its own position the surface vehicle stays where it is.
             autopilot.set_goal(None, now);
             return None;
         };
@@ -73,12 +71,11 @@ pub struct SurfaceHost {
 }
 
 impl SurfaceHost {
-    /// A surface at its modem.
+    /// Joins the surface's role with its modem.
     pub fn new(surface: Surface, station: Station, follower: Option<Follower>) -> Self {
         Self { link: LinkHost::new(surface, station), follower, events: VecDeque::new() }
     }
 
-    /// The role.
     pub fn surface(&self) -> &Surface {
         self.link.end()
     }
@@ -88,17 +85,17 @@ impl SurfaceHost {
         self.link.end_mut()
     }
 
-    /// The link's side of the host, for its account and its port.
+    /// The link's host, for the account of bits and the port.
     pub fn link(&self) -> &LinkHost<Surface> {
         &self.link
     }
 
-    /// The modem's port, as [`LinkHost`] has it.
+    /// The link's host, to report on the modem's port.
     pub fn link_mut(&mut self) -> &mut LinkHost<Surface> {
         &mut self.link
     }
 
-    /// The connection to the GPS was opened. Returns the bytes to send over it first.
+    /// The connection to the GPS was opened. Returns the first bytes to send.
     pub fn handle_gps_open(&mut self) -> &'static [u8] {
         self.surface_mut().handle_gps_open()
     }
@@ -144,13 +141,13 @@ impl SurfaceHost {
         events.extend(target.map(|(x, y)| SurfaceHostEvent::Following(x, y)));
     }
 
-    /// When [`Self::handle_timeout`] is due, or the host should be asked for output again.
+    /// The time at which [`Self::handle_timeout`] is due or output should be polled again.
     pub fn poll_timeout(&self, now: Instant) -> Option<Instant> {
         let pilot = self.follower.as_ref().map(|f| f.pilot.autopilot.poll_timeout());
         self.link.poll_timeout(now).into_iter().chain(pilot).min()
     }
 
-    /// The next request or news.
+    /// The next request or event.
     pub fn poll_event(&mut self) -> Option<SurfaceHostEvent> {
         if let Some(event) = self.events.pop_front() {
             return Some(event);

@@ -1,4 +1,4 @@
-//! The vehicle's host.
+//! The host of the vehicle: role, modem, autopilot, persistent state and mapper.
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
@@ -12,56 +12,50 @@ use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle, VehicleOutput};
 use std::collections::{BTreeMap, VecDeque};
 
-/// An older fix does not tell the autopilot where it is, seconds.
+/// Maximum age of a fix that is given to the autopilot, seconds.
 const MAX_FIX_AGE_S: f64 = 60.0;
 
-/// Requests and news of a vehicle's host.
+/// Requests and events of a vehicle's host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleHostEvent {
-    /// Make [`Vehicle::durable`] durable, then call [`VehicleHost::handle_persisted`]. Until then the host gives no further
-    /// event and no frame; where it fails, end the run.
+    /// Make [`Vehicle::durable`] durable, then call [`VehicleHost::handle_persisted`]. Until then the host returns
+    /// no further event and no frame. If it fails, end the run.
     Persist,
-    /// The vehicle goes there, metres east and north in the map's frame.
+    /// The vehicle's next waypoint, metres east and north in the map frame.
     Waypoint(MapPoint),
-    /// The vehicle stays where it is.
+    /// The vehicle holds its position.
     Hold,
-    /// The vehicle comes up.
     Surface,
-    /// Have the mapper follow these settings; those that are not named are as configured.
+    /// Give these settings to the mapper; others have their configured values.
     Tune(Settings),
-    /// The recorded survey has ended: have the mapper keep a checkpoint.
+    /// The recorded survey has ended: let the mapper keep a checkpoint.
     SurveyEnded,
-    /// A slot was decided about.
+    /// The vehicle applied or refused a slot.
     Applied(AppliedSlot),
-    /// A fix in the world was used, and when it was taken.
+    /// A fix was used; the time is that of its measurement.
     Fixed(Fix, Instant),
-    /// News of frames and modem.
+    /// An event of frames or modem.
     Frame(FrameEvent),
-    /// News of the autopilot.
     Pilot(PilotEvent),
 }
 
-/// Where a camera frame was taken, in the map's frame.
+/// The pose of a camera frame, in the map frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraPose {
-    /// East, metres.
     pub x_m: f64,
-    /// North, metres.
     pub y_m: f64,
-    /// Clockwise from north, radians.
     pub heading_rad: f64,
-    /// Below the surface, metres.
     pub depth_m: f64,
 }
 
-/// A vehicle's autopilot and the facts that its goals need.
+/// A vehicle's autopilot with the data for its goals.
 pub struct VehiclePilot {
     pilot: Pilot,
-    /// Converts places of the world to latitude and longitude, where the origin is known.
+    /// Converts world positions to latitude and longitude, if the origin is known.
     plane: Option<TangentPlane>,
     /// Depth of the survey, metres.
     depth_m: f64,
-    /// Whether it comes up where it is.
+    /// Whether the vehicle is surfacing at its position.
     is_rising: bool,
 }
 
@@ -71,7 +65,7 @@ impl VehiclePilot {
         Self { pilot: Pilot::new(autopilot, now), plane, depth_m, is_rising: false }
     }
 
-    /// Takes the autopilot's odometry into the vehicle, and gives the autopilot its goal.
+    /// Gives the autopilot's odometry to the vehicle, and the vehicle's goal to the autopilot.
     fn fly(&mut self, vehicle: &mut Vehicle, now: Instant) {
         let autopilot = &mut self.pilot.autopilot;
         while let Some(step) = autopilot.poll_step() {
@@ -99,9 +93,9 @@ impl VehiclePilot {
 /// Camera frames on their way through the mapper.
 #[derive(Debug, Default)]
 struct MapperQueue {
-    /// Frames that the mapper has not reported on yet.
+    /// Frames without a report of the mapper yet.
     outstanding: u32,
-    /// The recorded camera has given its last frame.
+    /// Whether the recording has ended.
     is_over: bool,
 }
 
@@ -110,29 +104,29 @@ pub struct VehicleHost {
     link: LinkHost<Vehicle>,
     pilot: Option<VehiclePilot>,
     mapper: MapperQueue,
-    /// The owner was asked to make the state durable and has not done it yet.
+    /// Whether the owner still has to make the state durable.
     is_persisting: bool,
     events: VecDeque<VehicleHostEvent>,
 }
 
 impl VehicleHost {
-    /// A vehicle at its modem. Without an autopilot, the owner acts on the waypoints and reports the odometry.
+    /// Joins the vehicle's role with its modem. Without an autopilot, the owner acts on
+    /// waypoints and reports the odometry.
     pub fn new(vehicle: Vehicle, station: Station, pilot: Option<VehiclePilot>) -> Self {
         let link = LinkHost::new(vehicle, station);
         Self { link, pilot, mapper: MapperQueue::default(), is_persisting: false, events: VecDeque::new() }
     }
 
-    /// The role.
     pub fn vehicle(&self) -> &Vehicle {
         self.link.end()
     }
 
-    /// The link's side of the host, for its account and its port.
+    /// The link's host, for the account of bits and the port.
     pub fn link(&self) -> &LinkHost<Vehicle> {
         &self.link
     }
 
-    /// The modem's port, as [`LinkHost`] has it.
+    /// The link's host, to report on the modem's port.
     pub fn link_mut(&mut self) -> &mut LinkHost<Vehicle> {
         &mut self.link
     }
@@ -163,35 +157,35 @@ impl VehicleHost {
         }
     }
 
-    /// When [`Self::handle_timeout`] is due, or the host should be asked for output again.
+    /// The time at which [`Self::handle_timeout`] is due or output should be polled again.
     pub fn poll_timeout(&self, now: Instant) -> Option<Instant> {
         let pilot = self.pilot.as_ref().map(|p| p.pilot.autopilot.poll_timeout());
         self.link.poll_timeout(now).into_iter().chain(pilot).min()
     }
 
-    /// Lets the vehicle choose its next waypoint, if it needs one.
+    /// Lets the vehicle choose a waypoint if it has none.
     pub fn steer(&mut self, now: Instant) {
         self.link.end_mut().steer(now);
     }
 
-    /// The vehicle's own sensors measured a stretch of path, where there is no autopilot.
+    /// Takes the odometry of a vehicle without an autopilot.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.link.end_mut().handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
     }
 
-    /// A recording gives the pose, where there is no autopilot to do it.
+    /// Takes the pose of a recording, for a vehicle without an autopilot.
     pub fn handle_pose(&mut self, pose: CameraPose, now: Instant) {
         if self.pilot.is_none() {
             self.link.end_mut().set_pose(pose.x_m, pose.y_m, pose.heading_rad, pose.depth_m, now);
         }
     }
 
-    /// Budget and shares of the configuration take the place of those that the surface ordered.
+    /// Replaces the budget and the shares that the surface ordered by those of the configuration.
     pub fn handle_budget(&mut self, budget: Budget, now: Instant) {
         self.link.end_mut().set_budget(budget, now);
     }
 
-    /// A camera frame goes to the mapper. Returns the pose that it was taken at: that of the autopilot, or else `recorded`.
+    /// A camera frame is given to the mapper. Returns its pose: that of the autopilot, or else `recorded`.
     pub fn handle_camera(&mut self, recorded: CameraPose) -> CameraPose {
         self.mapper.outstanding += 1;
         if self.pilot.is_none() {
@@ -202,12 +196,12 @@ impl VehicleHost {
         CameraPose { x_m, y_m, heading_rad: navigator.heading_rad(), depth_m: navigator.depth_m() }
     }
 
-    /// The recorded camera has given its last frame: the survey ends with the mapper's report on it.
+    /// The recording has ended; the survey ends with the mapper's report on its last frame.
     pub fn handle_camera_end(&mut self) {
         self.mapper.is_over = true;
     }
 
-    /// The mapper has seen the frame of `pose`; `None` at the start, when the map is that of a checkpoint.
+    /// The mapper has handled the frame of `pose`; `None` at the start, when the map is that of a checkpoint.
     pub fn handle_mapped(
         &mut self,
         pose: Option<CameraPose>,
@@ -224,18 +218,18 @@ impl VehicleHost {
         self.finish_after_last_frame();
     }
 
-    /// The mapper passed over a frame that could not be read.
+    /// The mapper skipped an unreadable frame.
     pub fn handle_missed(&mut self) {
         self.mapper.outstanding -= 1;
         self.finish_after_last_frame();
     }
 
-    /// The mapper has a new map.
+    /// Takes a new map of the mapper.
     pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
         self.link.end_mut().handle_map(update, now);
     }
 
-    /// The mapper has the best exemplars of each label, the best first.
+    /// Takes the mapper's exemplars of each label, the best first.
     pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<ExemplarPatch>>) {
         self.link.end_mut().handle_exemplars(exemplars);
     }
@@ -247,7 +241,7 @@ impl VehicleHost {
         }
     }
 
-    /// The survey is over: the vehicle stays, and the link continues.
+    /// Ends the survey: the vehicle holds its position, and the link continues.
     pub fn finish_survey(&mut self) {
         self.link.end_mut().finish_survey();
     }
@@ -258,7 +252,7 @@ impl VehicleHost {
         self.link.end_mut().handle_persisted();
     }
 
-    /// The next request or news; none while the state is being made durable.
+    /// The next request or event; `None` while the state is being made durable.
     pub fn poll_event(&mut self) -> Option<VehicleHostEvent> {
         if self.is_persisting {
             return None;
@@ -269,7 +263,7 @@ impl VehicleHost {
         Some(event)
     }
 
-    /// The next bytes for the modem's port. No frame is among them while a state has to be made durable first.
+    /// The next bytes for the modem's port. They hold no frame while a state must first be made durable.
     pub fn poll_output(&mut self, now: Instant) -> Option<Vec<u8>> {
         self.collect();
         if self.is_persisting || self.events.contains(&VehicleHostEvent::Persist) {

@@ -5,11 +5,11 @@ use tokio::net::TcpStream;
 use tokio::sync::mpsc;
 use tokio::task::AbortHandle;
 
-/// Pieces for a host that wait for its task; more are lost, as on a line that nobody reads.
+/// Pieces that wait for the task at a port; further ones are lost, as on a line without a reader.
 const WAITING_PIECES: usize = 1024;
 
-/// A message of a host or of a port. `modem` counts from 0 in the order of the scenario; `line` is a number of the
-/// port's choosing, 0 for a serial one.
+/// A message of a client or of a port. `modem` counts from 0 in the order of the scenario; `line` is the number that
+/// the port gave to the client, 0 for a serial line.
 #[derive(Debug)]
 pub enum FromHost {
     Bytes {
@@ -17,58 +17,58 @@ pub enum FromHost {
         line: u32,
         bytes: Vec<u8>,
     },
-    /// A TCP client has come.
+    /// A TCP client connected to the port.
     Joined {
         modem: usize,
         stream: TcpStream,
     },
-    /// A TCP client has gone.
+    /// A TCP client closed its connection.
     Left {
         modem: usize,
         line: u32,
     },
 }
 
-/// The way to one host; its task ends with it.
+/// The output to one client; its task is aborted when this is dropped.
 #[derive(Debug)]
-pub struct Line {
-    to_host: mpsc::Sender<Vec<u8>>,
+pub struct PortLine {
+    to_client: mpsc::Sender<Vec<u8>>,
     task: AbortHandle,
 }
 
-impl Line {
-    /// Starts a task that gets the bytes for the host.
+impl PortLine {
+    /// Starts a task that receives the bytes for the client.
     pub fn start<F: Future<Output = ()> + Send + 'static>(task: impl FnOnce(mpsc::Receiver<Vec<u8>>) -> F) -> Self {
-        let (to_host, told) = mpsc::channel(WAITING_PIECES);
-        Self { to_host, task: tokio::spawn(task(told)).abort_handle() }
+        let (to_client, output) = mpsc::channel(WAITING_PIECES);
+        Self { to_client, task: tokio::spawn(task(output)).abort_handle() }
     }
 
-    /// Sends bytes to the host, if it keeps up.
-    pub fn tell(&self, bytes: Vec<u8>) {
-        let _ = self.to_host.try_send(bytes);
+    /// Sends bytes to the client; they are lost if [`WAITING_PIECES`] pieces wait already.
+    pub fn send(&self, bytes: Vec<u8>) {
+        let _ = self.to_client.try_send(bytes);
     }
 }
 
-impl Drop for Line {
+impl Drop for PortLine {
     fn drop(&mut self) {
         self.task.abort();
     }
 }
 
-/// How fast a line takes bytes, in the world's time.
+/// The pace of a line in wall time.
 #[derive(Debug, Clone, Copy)]
 pub struct Speed {
-    /// Bytes a second of the world; `None` without pacing.
+    /// Bytes a second of wall time; `None` without pacing.
     pub bytes_per_s: Option<f64>,
 }
 
 impl Speed {
-    /// Most bytes to take at a time: the bytes of five milliseconds.
+    /// Maximum number of bytes to read at a time: those of five milliseconds.
     pub fn piece(&self) -> usize {
         self.bytes_per_s.map_or(4096, |rate| ((rate * 0.005) as usize).clamp(16, 4096))
     }
 
-    /// How long that many bytes keep the line busy.
+    /// Wall time for which that many bytes occupy the line.
     pub fn time_of(&self, bytes: usize) -> Duration {
         self.bytes_per_s.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(bytes as f64 / rate))
     }

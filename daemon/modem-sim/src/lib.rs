@@ -1,39 +1,39 @@
-//! `scenecast modem-sim`: emulated modems on devices and TCP ports, joined by an emulated water, at the pace of the world
+//! `scenecast modem-sim`: emulated modems on devices and TCP ports, joined by one simulated channel, in real time
 //! or faster.
 //!
-//! One task owns the [`Basin`](sim_channel::modem::Basin) and sleeps until the next thing is due there or a port has
+//! One task owns the [`Basin`](sim_channel::modem::Basin) and sleeps until its next event is due or a port has
 //! bytes; a task at each port moves them.
 
+mod commands;
+mod emulation;
 mod host;
 mod links;
-mod orders;
 #[cfg(unix)]
 mod pty;
 mod scenario;
-mod tank;
 mod tcp;
 
 pub use scenario::Scenario;
 
+use commands::EmulatorCommand;
+use emulation::Emulation;
 use host::FromHost;
 use links::Links;
-use orders::Order;
 use scenecast_core::UserError;
 use scenecast_runtime::Stop;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tank::Tank;
 use tokio::sync::mpsc;
 
-/// The options of the command.
+/// Arguments of the command.
 #[derive(Debug)]
 pub struct Options {
     pub scenario: PathBuf,
     /// Folder for symbolic links to devices.
     pub link_dir: Option<PathBuf>,
-    /// Seconds of the emulation a second.
+    /// Emulated seconds per second of wall time.
     pub time_scale: f64,
-    /// Instead of the scenario's seed.
+    /// Seed that replaces the scenario's.
     pub seed: Option<u64>,
 }
 
@@ -45,16 +45,16 @@ pub fn run(options: Options) -> Result<(), UserError> {
     let pace = Pace { began: Instant::now(), scale: options.time_scale };
     scenecast_runtime::block_on(async move {
         let mut stop = Stop::new()?;
-        let (to_tank, from_hosts) = mpsc::channel(256);
-        let mut tank = Tank::new(scenario, links, pace, to_tank)?;
+        let (to_emulation, from_hosts) = mpsc::channel(256);
+        let mut emulation = Emulation::new(scenario, links, pace, to_emulation)?;
         tokio::select! {
-            result = serve(&mut tank, from_hosts, pace) => result,
+            result = serve(&mut emulation, from_hosts, pace) => result,
             () = stop.asked() => Ok(()),
         }
     })
 }
 
-/// The emulation's time against the world's.
+/// Converts between emulated time and wall time.
 #[derive(Debug, Clone, Copy)]
 struct Pace {
     began: Instant,
@@ -66,7 +66,7 @@ impl Pace {
         self.began.elapsed().mul_f64(self.scale)
     }
 
-    /// When the world's clock shows a time of the emulation; one that is very far is cut to a day.
+    /// The wall time of an emulated time, at most one day ahead.
     fn wall(&self, at: Duration) -> tokio::time::Instant {
         const DAY: f64 = 86_400.0;
         let ahead = at.saturating_sub(self.now()).as_secs_f64() / self.scale;
@@ -74,10 +74,14 @@ impl Pace {
     }
 }
 
-async fn serve(tank: &mut Tank, mut from_hosts: mpsc::Receiver<FromHost>, pace: Pace) -> Result<(), UserError> {
-    let mut orders = orders::listen();
+async fn serve(
+    emulation: &mut Emulation,
+    mut from_hosts: mpsc::Receiver<FromHost>,
+    pace: Pace,
+) -> Result<(), UserError> {
+    let mut commands = commands::listen();
     loop {
-        let due = tank.poll_timeout().map(|at| pace.wall(at));
+        let due = emulation.poll_timeout().map(|at| pace.wall(at));
         let sleep = async {
             match due {
                 Some(due) => tokio::time::sleep_until(due).await,
@@ -87,16 +91,16 @@ async fn serve(tank: &mut Tank, mut from_hosts: mpsc::Receiver<FromHost>, pace: 
         tokio::select! {
             () = sleep => {}
             Some(from) = from_hosts.recv() => {
-                tank.handle_host(from, pace.now());
+                emulation.handle_host(from, pace.now());
                 while let Ok(from) = from_hosts.try_recv() {
-                    tank.handle_host(from, pace.now());
+                    emulation.handle_host(from, pace.now());
                 }
             }
-            Some(order) = orders.recv() => match order {
-                Order::Quit => return Ok(()),
-                order => tank.handle_order(order, pace.now()),
+            Some(command) = commands.recv() => match command {
+                EmulatorCommand::Quit => return Ok(()),
+                command => emulation.handle_command(command, pace.now()),
             },
         }
-        tank.advance(pace.now())?;
+        emulation.advance(pace.now())?;
     }
 }

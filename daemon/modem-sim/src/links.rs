@@ -1,9 +1,9 @@
-//! Symbolic links with stable names to devices whose names come and go.
+//! Symbolic links with stable names to devices whose names change.
 
 use scenecast_core::UserError;
 use std::path::{Path, PathBuf};
 
-/// A folder of links; those made here are removed at the end.
+/// A folder of links. Links made by this process are removed at its end.
 #[derive(Debug)]
 pub struct Links {
     folder: Option<PathBuf>,
@@ -11,7 +11,7 @@ pub struct Links {
 }
 
 impl Links {
-    /// Makes the folder if need be; without one there are no links.
+    /// Creates the folder if it does not exist; with `None` there are no links.
     pub fn new(folder: Option<&Path>) -> Result<Self, UserError> {
         if let Some(folder) = folder {
             std::fs::create_dir_all(folder)
@@ -20,8 +20,7 @@ impl Links {
         Ok(Self { folder: folder.map(Path::to_owned), made: Vec::new() })
     }
 
-    /// Points the link `name` to a device, replacing a link that is there, at once. Anything else there is left alone and
-    /// told.
+    /// Points the link `name` to a device and replaces an existing link atomically. A file that is no link is refused.
     #[cfg(unix)]
     pub fn point(&mut self, name: &str, device: &Path) -> Result<Option<PathBuf>, UserError> {
         let Some(folder) = &self.folder else { return Ok(None) };
@@ -38,7 +37,7 @@ impl Links {
         Ok(Some(link))
     }
 
-    /// Removes a link that was made here.
+    /// Removes a link if this process made it.
     pub fn remove(&mut self, name: &str) {
         if let Some(index) = self.made.iter().position(|link| link.file_name().is_some_and(|n| n == name)) {
             remove_link(&self.made.swap_remove(index));
@@ -52,7 +51,7 @@ impl Drop for Links {
     }
 }
 
-/// Nobody needs to know of a link that is already gone.
+/// A link that is already gone is no error.
 fn remove_link(link: &Path) {
     if std::fs::symlink_metadata(link).is_ok_and(|found| found.is_symlink()) {
         let _ = std::fs::remove_file(link);

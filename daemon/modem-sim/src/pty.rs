@@ -1,4 +1,4 @@
-//! A pseudo-terminal as the port of a modem: clients open and close it as they like.
+//! A pseudo-terminal as the port of a modem; clients may open and close it at any time.
 
 use super::host::{FromHost, Speed};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
@@ -16,9 +16,9 @@ use tokio::io::unix::AsyncFd;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 
-/// How often to look whether somebody has opened the device.
-const LOOK: Duration = Duration::from_millis(25);
-/// Bytes that wait for a client that does not read; more are lost.
+/// Interval at which an unopened device is polled for a client.
+const POLL_INTERVAL: Duration = Duration::from_millis(25);
+/// Bytes that wait for a client that does not read; further ones are lost.
 const WAITING_BYTES: usize = 256 * 1024;
 
 /// A pseudo-terminal in raw mode.
@@ -42,30 +42,30 @@ impl Pty {
         &self.device
     }
 
-    /// Moves bytes between the device and the tank until the tank lets go.
+    /// Moves bytes between the device and the emulation until the emulation drops `output`.
     pub async fn serve(
         self,
         modem: usize,
         speed: Speed,
-        to_tank: mpsc::Sender<FromHost>,
-        mut told: mpsc::Receiver<Vec<u8>>,
+        to_emulation: mpsc::Sender<FromHost>,
+        mut output: mpsc::Receiver<Vec<u8>>,
     ) {
         loop {
             self.clean();
             while self.is_closed() {
                 tokio::select! {
-                    () = tokio::time::sleep(LOOK) => {}
-                    // On a line that nobody has open bytes are lost.
-                    lost = told.recv() => if lost.is_none() { return },
+                    () = tokio::time::sleep(POLL_INTERVAL) => {}
+                    // Bytes are lost while no client has the device open.
+                    lost = output.recv() => if lost.is_none() { return },
                 }
             }
-            if self.attend(modem, speed, &to_tank, &mut told).await.is_none() {
+            if self.attend(modem, speed, &to_emulation, &mut output).await.is_none() {
                 return;
             }
         }
     }
 
-    /// Clears unread bytes and line settings of the last client.
+    /// Discards the unread bytes and the line settings of the last client.
     fn clean(&self) {
         const O_NOCTTY: i32 = nix::fcntl::OFlag::O_NOCTTY.bits();
         let device = OpenOptions::new().read(true).write(true).custom_flags(O_NOCTTY).open(&self.device);
@@ -78,17 +78,17 @@ impl Pty {
     /// Whether no client has the device open.
     fn is_closed(&self) -> bool {
         let mut fds = [PollFd::new(self.master.as_fd(), PollFlags::POLLIN)];
-        let looked = poll(&mut fds, PollTimeout::ZERO);
-        looked.is_ok() && fds[0].revents().is_some_and(|found| found.contains(PollFlags::POLLHUP))
+        let polled = poll(&mut fds, PollTimeout::ZERO);
+        polled.is_ok() && fds[0].revents().is_some_and(|found| found.contains(PollFlags::POLLHUP))
     }
 
-    /// Serves a client until it closes the device; `None` if the tank lets go.
+    /// Serves a client until it closes the device; `None` if the emulation drops `output`.
     async fn attend(
         &self,
         modem: usize,
         speed: Speed,
-        to_tank: &mpsc::Sender<FromHost>,
-        told: &mut mpsc::Receiver<Vec<u8>>,
+        to_emulation: &mpsc::Sender<FromHost>,
+        output: &mut mpsc::Receiver<Vec<u8>>,
     ) -> Option<()> {
         #[allow(deprecated, reason = "its successor is unsafe code; an OwnedFd does keep its descriptor")]
         let fd = AsyncFd::new(Arc::clone(&self.master)).ok()?;
@@ -104,10 +104,10 @@ impl Pty {
                         Ok(count) => count,
                     };
                     free_at = now + speed.time_of(count);
-                    to_tank.send(FromHost::Bytes { modem, line: 0, bytes: piece[..count].to_vec() }).await.ok()?;
+                    to_emulation.send(FromHost::Bytes { modem, line: 0, bytes: piece[..count].to_vec() }).await.ok()?;
                 }
                 () = tokio::time::sleep_until(free_at), if free_at > now => {}
-                more = told.recv() => {
+                more = output.recv() => {
                     let more = more?;
                     let room = WAITING_BYTES - waiting.len();
                     waiting.extend_from_slice(&more[..room.min(more.len())]);
@@ -123,7 +123,7 @@ impl Pty {
     }
 }
 
-/// Bytes as they are: no echo, no lines, no signals.
+/// Sets raw mode: no echo, no line editing, no signals.
 fn make_raw(device: impl AsFd) -> nix::Result<()> {
     let mut settings = tcgetattr(&device)?;
     cfmakeraw(&mut settings);

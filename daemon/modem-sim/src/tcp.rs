@@ -6,34 +6,34 @@ use tokio::net::tcp::OwnedReadHalf;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc;
 
-/// Lets clients in until the tank lets go.
-pub async fn accept(listener: TcpListener, modem: usize, to_tank: mpsc::Sender<FromHost>) {
+/// Accepts clients until the emulation ends.
+pub async fn accept(listener: TcpListener, modem: usize, to_emulation: mpsc::Sender<FromHost>) {
     loop {
         match listener.accept().await {
             Ok((stream, _)) => {
                 let _ = stream.set_nodelay(true);
-                if to_tank.send(FromHost::Joined { modem, stream }).await.is_err() {
+                if to_emulation.send(FromHost::Joined { modem, stream }).await.is_err() {
                     return;
                 }
             }
-            // Out of descriptors, or a client that gave up: the next one may fare better.
+            // No free descriptor, or the client closed the connection: the next attempt may succeed.
             Err(_) => tokio::time::sleep(std::time::Duration::from_millis(100)).await,
         }
     }
 }
 
-/// Moves bytes between a client and the tank until either lets go.
+/// Moves bytes between a client and the emulation until either closes.
 pub async fn serve(
     stream: TcpStream,
     (modem, line): (usize, u32),
     speed: Speed,
-    to_tank: mpsc::Sender<FromHost>,
-    mut told: mpsc::Receiver<Vec<u8>>,
+    to_emulation: mpsc::Sender<FromHost>,
+    mut output: mpsc::Receiver<Vec<u8>>,
 ) {
     let (reading, mut writing) = stream.into_split();
-    let read = read(reading, (modem, line), speed, to_tank.clone());
+    let read = read(reading, (modem, line), speed, to_emulation.clone());
     let write = async {
-        while let Some(bytes) = told.recv().await {
+        while let Some(bytes) = output.recv().await {
             if writing.write_all(&bytes).await.is_err() {
                 return;
             }
@@ -43,14 +43,19 @@ pub async fn serve(
         () = read => {}
         () = write => {}
     }
-    let _ = to_tank.send(FromHost::Left { modem, line }).await;
+    let _ = to_emulation.send(FromHost::Left { modem, line }).await;
 }
 
-async fn read(mut reading: OwnedReadHalf, (modem, line): (usize, u32), speed: Speed, to_tank: mpsc::Sender<FromHost>) {
+async fn read(
+    mut reading: OwnedReadHalf,
+    (modem, line): (usize, u32),
+    speed: Speed,
+    to_emulation: mpsc::Sender<FromHost>,
+) {
     let mut piece = vec![0; speed.piece()];
     while let Ok(count @ 1..) = reading.read(&mut piece).await {
         let bytes = piece[..count].to_vec();
-        if to_tank.send(FromHost::Bytes { modem, line, bytes }).await.is_err() {
+        if to_emulation.send(FromHost::Bytes { modem, line, bytes }).await.is_err() {
             return;
         }
         tokio::time::sleep(speed.time_of(count)).await;

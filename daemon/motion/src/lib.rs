@@ -3,7 +3,7 @@
 //! Internal to scenecast: rehearsals and tests use it; no crate that goes to sea does. No IO.
 
 mod motion;
-mod witness;
+mod track_audit;
 
 pub use motion::{Motion, Odometry};
-pub use witness::{length_m, stretches_outside};
+pub use track_audit::{length_m, stretches_outside};

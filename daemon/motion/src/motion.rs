@@ -1,9 +1,9 @@
-//! How the vehicle of a rehearsal really moves, and what its own sensors make of it.
+//! The true motion of a simulated vehicle, and the odometry of its drifting sensors.
 
 use scenecast_core::wrap_rad;
 use sim_channel::RandomStream;
 
-/// What the vehicle's sensors tell of a step.
+/// The measured displacement of a step, in error by the drift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Odometry {
     pub dx_m: f64,
@@ -12,11 +12,11 @@ pub struct Odometry {
     pub heading_rad: f64,
 }
 
-/// Kinematics with drifting dead reckoning: a scale error and a heading error that stay, and a random walk. With a turn
-/// rate it turns while it goes on; a current that no sensor sees carries it away.
+/// Kinematics with drifting dead reckoning: a constant scale error, a constant heading error, and a random walk. With a
+/// turn rate the vehicle turns while it moves. No sensor measures the current.
 #[derive(Debug)]
 pub struct Motion {
-    /// True place east, metres. Only the camera and the water may look.
+    /// True position east, metres. Only the simulated camera and channel may read it.
     pub x_m: f64,
     pub y_m: f64,
     /// True heading clockwise from north, radians.
@@ -27,25 +27,25 @@ pub struct Motion {
     heading_error_rad: f64,
     drift: f64,
     target: Option<(f64, f64)>,
-    /// Radians a second; without one it turns on the spot.
+    /// Turn rate, radians a second; `None` turns on the spot.
     turn_rate: Option<f64>,
-    /// East and north, metres a second.
+    /// Current east and north, metres a second.
     current: (f64, f64),
-    /// Where it believes to be, for a vehicle that reckons by itself.
-    believed: (f64, f64),
+    /// Position estimate of [`Self::step_on`], metres.
+    estimated: (f64, f64),
     rising: bool,
-    dice: RandomStream,
+    rng: RandomStream,
 }
 
-/// Speed up and down, metres a second: that of a small vehicle.
+/// Vertical speed of a small vehicle, metres a second.
 const VERTICAL_M_S: f64 = 0.3;
 
 impl Motion {
-    /// At rest at a place; `drift` is the error of dead reckoning a metre of way.
+    /// At rest at a position; `drift` is the error of dead reckoning per metre of path.
     pub fn new(x_m: f64, y_m: f64, speed_m_s: f64, drift: f64, seed: u64) -> Self {
-        let mut dice = RandomStream::new(seed, &[1]);
-        let scale_error = drift * dice.normal();
-        let heading_error_rad = drift * dice.normal();
+        let mut rng = RandomStream::new(seed, &[1]);
+        let scale_error = drift * rng.normal();
+        let heading_error_rad = drift * rng.normal();
         Self {
             x_m,
             y_m,
@@ -58,48 +58,48 @@ impl Motion {
             target: None,
             turn_rate: None,
             current: (0.0, 0.0),
-            believed: (0.0, 0.0),
+            estimated: (0.0, 0.0),
             rising: false,
-            dice,
+            rng,
         }
     }
 
-    /// Turns by at most `rad_s` radians a second, and goes on meanwhile.
+    /// Limits the turn rate to `rad_s` radians a second; the vehicle moves while it turns.
     pub fn with_turn_rate(mut self, rad_s: f64) -> Self {
         self.turn_rate = (rad_s > 0.0).then_some(rad_s);
         self
     }
 
-    /// A current that no sensor sees, east and north, metres a second.
+    /// Adds a current that no sensor measures, east and north, metres a second.
     pub fn with_current(mut self, east_m_s: f64, north_m_s: f64) -> Self {
         self.current = (east_m_s, north_m_s);
         self
     }
 
-    /// Sets the way to go from where it believes to be, or stops.
-    pub fn set_way(&mut self, way: Option<(f64, f64)>) {
-        let (x, y) = self.believed;
-        self.set_target(way.map(|(east, north)| (x + east, y + north)));
+    /// Sets a target relative to the estimated position, metres east and north, or stops.
+    pub fn set_relative_target(&mut self, offset: Option<(f64, f64)>) {
+        let (x, y) = self.estimated;
+        self.set_target(offset.map(|(east, north)| (x + east, y + north)));
     }
 
-    /// Moves for `dt_s` seconds by its own reckoning.
+    /// Moves for `dt_s` seconds by its own dead reckoning.
     pub fn step_on(&mut self, dt_s: f64) -> Odometry {
-        let step = self.step(self.believed, dt_s);
-        self.believed = (self.believed.0 + step.dx_m, self.believed.1 + step.dy_m);
+        let step = self.step(self.estimated, dt_s);
+        self.estimated = (self.estimated.0 + step.dx_m, self.estimated.1 + step.dy_m);
         step
     }
 
-    /// Sets the waypoint (in the vehicle's own coordinates), or stops.
+    /// Sets the target in the vehicle's estimated coordinates, or stops.
     pub fn set_target(&mut self, target: Option<(f64, f64)>) {
         (self.target, self.rising) = (target, false);
     }
 
-    /// Goes up where it is.
+    /// Surfaces at the current position.
     pub fn come_up(&mut self) {
         (self.target, self.rising) = (None, true);
     }
 
-    /// The depth after `dt_s` seconds, from `depth_m` and with the survey at `survey_m` below the surface.
+    /// The depth `dt_s` seconds after it was `depth_m`, for a survey at `survey_m`, in metres below the surface.
     pub fn depth_m(&self, depth_m: f64, survey_m: f64, dt_s: f64) -> f64 {
         let aim = if self.rising {
             0.0
@@ -111,30 +111,30 @@ impl Motion {
         depth_m + (aim - depth_m).clamp(-VERTICAL_M_S * dt_s, VERTICAL_M_S * dt_s)
     }
 
-    /// Moves for `dt_s` seconds; `believed` is where the vehicle believes to be, which is what it steers by.
-    pub fn step(&mut self, believed: (f64, f64), dt_s: f64) -> Odometry {
+    /// Moves for `dt_s` seconds; it steers by `estimated`, its own position estimate.
+    pub fn step(&mut self, estimated: (f64, f64), dt_s: f64) -> Odometry {
         self.x_m += self.current.0 * dt_s;
         self.y_m += self.current.1 * dt_s;
         let Some((tx, ty)) = self.target else {
             return Odometry { dx_m: 0.0, dy_m: 0.0, heading_rad: self.heading_rad };
         };
-        let (to_x, to_y) = (tx - believed.0, ty - believed.1);
-        let way = (self.speed_m_s * dt_s).min(to_x.hypot(to_y));
-        if way > 1e-9 {
+        let (to_x, to_y) = (tx - estimated.0, ty - estimated.1);
+        let path_m = (self.speed_m_s * dt_s).min(to_x.hypot(to_y));
+        if path_m > 1e-9 {
             let off = wrap_rad(to_x.atan2(to_y) - self.heading_rad);
             let most = self.turn_rate.map_or(f64::MAX, |rate| rate * dt_s);
-            // On a target that lies within its turning circle it would go round for ever: there it turns on the spot.
+            // A target within the turning circle would never be reached, so there the vehicle turns on the spot.
             let is_near = self.turn_rate.is_some_and(|rate| to_x.hypot(to_y) < 2.0 * self.speed_m_s / rate);
             self.heading_rad =
                 if is_near || off.abs() <= most { to_x.atan2(to_y) } else { self.heading_rad + off.signum() * most };
         }
         let (sin, cos) = self.heading_rad.sin_cos();
-        // It believes to go straight at the target; the compass error turns the true way.
+        // The estimated heading points at the target; the compass error turns the true path.
         let (true_sin, true_cos) = (self.heading_rad + self.heading_error_rad).sin_cos();
-        self.x_m += way * true_sin;
-        self.y_m += way * true_cos;
-        self.distance_m += way;
-        let measured = way * (1.0 + self.scale_error) + self.drift * way.sqrt() * 0.3 * self.dice.normal();
+        self.x_m += path_m * true_sin;
+        self.y_m += path_m * true_cos;
+        self.distance_m += path_m;
+        let measured = path_m * (1.0 + self.scale_error) + self.drift * path_m.sqrt() * 0.3 * self.rng.normal();
         Odometry { dx_m: measured * sin, dy_m: measured * cos, heading_rad: self.heading_rad }
     }
 }
@@ -146,19 +146,19 @@ mod tests {
     fn error_after_1_km(drift: f64, seed: u64) -> f64 {
         let mut motion = Motion::new(0.0, 0.0, 1.0, drift, seed);
         motion.set_target(Some((1e6, 0.0)));
-        let mut believed = (0.0, 0.0);
+        let mut estimated = (0.0, 0.0);
         for _ in 0..2000 {
-            let o = motion.step(believed, 0.5);
-            believed = (believed.0 + o.dx_m, believed.1 + o.dy_m);
+            let o = motion.step(estimated, 0.5);
+            estimated = (estimated.0 + o.dx_m, estimated.1 + o.dy_m);
         }
-        (believed.0 - motion.x_m).hypot(believed.1 - motion.y_m)
+        (estimated.0 - motion.x_m).hypot(estimated.1 - motion.y_m)
     }
 
     #[test]
-    fn it_arrives_whatever_its_turn_rate_and_turns_no_faster() {
+    fn a_vehicle_arrives_at_any_turn_rate_and_turns_no_faster() {
         for target in [(40.0, 0.0), (-30.0, -30.0), (0.5, -1.0)] {
             let mut motion = Motion::new(0.0, 0.0, 1.0, 0.0, 1).with_turn_rate(0.2);
-            motion.set_way(Some(target));
+            motion.set_relative_target(Some(target));
             let (mut fastest, mut last) = (0.0f64, motion.heading_rad);
             for _ in 0..200 {
                 motion.step_on(0.5);
@@ -172,14 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn a_current_carries_it_away_and_no_sensor_sees_it() {
+    fn a_current_moves_the_vehicle_unmeasured() {
         let mut motion = Motion::new(0.0, 0.0, 1.0, 0.0, 1).with_current(0.0, -0.1);
         let seen: f64 = (0..20).map(|_| motion.step_on(0.5).dy_m).sum();
         assert!((motion.y_m + 1.0).abs() < 1e-9 && seen == 0.0);
     }
 
     #[test]
-    fn dead_reckoning_drifts_by_about_its_percentage_of_the_way() {
+    fn dead_reckoning_drifts_by_about_its_percentage_of_the_path() {
         let errors: Vec<f64> = (0..40).map(|seed| error_after_1_km(0.01, seed)).collect();
         let mean = errors.iter().sum::<f64>() / 40.0;
         assert!((6.0..20.0).contains(&mean), "{mean} m after 1 km at 1 %");

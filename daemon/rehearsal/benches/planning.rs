@@ -19,7 +19,7 @@ fn map() -> LabelGrid {
     (0..SIDE).flat_map(|y| (0..SIDE / 2).map(move |x| (Cell::new(x, y), label(x, y)))).collect()
 }
 
-/// The map, what matters on it, and a vehicle whose camera sees 4 x 4 or 8 x 8 cells.
+/// The map, the utility, and a vehicle whose camera covers 4 x 4 or 8 x 8 cells.
 fn steering(kind: PlannerKind, sight_cells: f64) -> (Steering, LabelGrid, Utility) {
     let side = f64::from(SIDE) * CELL_M;
     let sight = sight_cells * CELL_M;
@@ -45,7 +45,7 @@ fn plan<const SIGHT: u32>(bencher: divan::Bencher<'_, '_>, name: &str) {
     });
 }
 
-/// So little is left that `horizon` plans the rest to its end, with nearly all of it to choose from.
+/// The remaining distance is so short that `horizon` plans it to its end, with nearly all of the map in reach.
 #[divan::bench(consts = [4, 8], sample_count = 20)]
 fn plan_to_the_end<const SIGHT: u32>(bencher: divan::Bencher<'_, '_>) {
     let (mut steering, map, utility) = steering(PlannerKind::Horizon, f64::from(SIGHT));

@@ -1,7 +1,7 @@
-//! What every driver must do, each at its emulator, in virtual time.
+//! Requirements for every driver, each at its emulator, in virtual time.
 
-use crate::VirtualTime;
-use crate::modem_bench::{Dock, DockSetting};
+use crate::modem_bench::{ModemBench, ModemSetting};
+use crate::virtual_time::VirtualTime;
 use scenecast_config::Config;
 use scenecast_drivers::modem;
 use scenecast_drivers::modem::{Class, Destination, Driver, Event, Refusal, Token};
@@ -16,11 +16,11 @@ use std::time::Duration;
 
 const SECOND: Duration = Duration::from_secs(1);
 
-/// After a fault, traffic goes on within so long.
-const RESUMES: Duration = Duration::from_secs(10);
+/// Maximum time until traffic resumes after a fault.
+const RESUME_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// What modems need by themselves: a Micromodem for a cycle of each end, for nothing is heard before the end of a packet;
-/// an S2C that speaks to one that has forgotten their connection, for a train and for its patience.
+/// Time that modems need in addition: a Micromodem for a cycle of each end, because a packet is received at its end; an
+/// S2C whose peer has lost the connection, for a packet train and a connection timeout.
 fn cycle(name: &str) -> Duration {
     match name {
         "s2c burst" => 6 * SECOND,
@@ -29,7 +29,7 @@ fn cycle(name: &str) -> Duration {
     }
 }
 
-/// Every kind with an emulator.
+/// Every modem kind that has an emulator.
 const KINDS: [(&str, &[&str]); 6] = [
     ("s2c burst", &["modem.kind=s2c"]),
     ("s2c im", &["modem.kind=s2c", "modem.s2c_mode=im"]),
@@ -44,8 +44,8 @@ fn config(sets: &[&str]) -> Config {
     scenecast_config::load(None, &sets).unwrap()
 }
 
-fn setting(sets: &[&str], loss: f64) -> DockSetting {
-    DockSetting { config: config(sets), range_m: 500.0, loss }
+fn setting(sets: &[&str], loss: f64) -> ModemSetting {
+    ModemSetting { config: config(sets), range_m: 500.0, loss }
 }
 
 fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
@@ -55,47 +55,47 @@ fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
     modem::driver(&config, end, profile).unwrap()
 }
 
-/// Two ends that speak with each other.
-fn speaking(sets: &[&str], loss: f64) -> Dock {
-    let mut dock = Dock::new(&setting(sets, loss), 5).unwrap();
-    dock.load = Some(2000);
-    let met = dock.run_until(Instant::from_secs_f64(900.0), |d| useful(d) > 10.0);
-    assert!(met, "{sets:?}: nothing got through");
-    dock
+/// Two ends after their handshake, with map data on the link.
+fn connected(sets: &[&str], loss: f64) -> ModemBench {
+    let mut bench = ModemBench::new(&setting(sets, loss), 5).unwrap();
+    bench.load = Some(2000);
+    let met = bench.run_until(Instant::from_secs_f64(900.0), |d| useful(d) > 10.0);
+    assert!(met, "{sets:?}: no data got through");
+    bench
 }
 
-fn useful(dock: &Dock) -> f64 {
-    dock.view().map_or(0.0, |v| v.replica().useful_bytes())
+fn useful(bench: &ModemBench) -> f64 {
+    bench.view().map_or(0.0, |v| v.replica().useful_bytes())
 }
 
-/// Whether the surface hears something new of the vehicle within `most`.
-fn resumes_within(dock: &mut Dock, most: Duration) -> bool {
-    let heard = dock.heard[1];
-    let until = dock.now + most;
-    dock.run_until(until, |d| d.heard[1] > heard)
+/// Whether the surface receives a frame of the vehicle within `most`.
+fn resumes_within(bench: &mut ModemBench, most: Duration) -> bool {
+    let last_received = bench.last_received[1];
+    let until = bench.now + most;
+    bench.run_until(until, |d| d.last_received[1] > last_received)
 }
 
-fn nothing_applied_twice(dock: &Dock) {
-    for (slot, times) in &dock.applied {
+fn nothing_applied_twice(bench: &ModemBench) {
+    for (slot, times) in &bench.applied {
         assert_eq!(times.len(), 1, "{slot:?} was applied at {times:?}");
     }
 }
 
 #[test]
-fn ends_meet_and_what_is_said_and_commanded_arrives() {
+fn ends_connect_and_their_data_and_directives_arrive() {
     for (name, sets) in KINDS {
-        let mut dock = speaking(sets, 0.1);
-        let version = dock.issue().unwrap();
-        let until = dock.now + 200 * SECOND;
-        let applied = dock.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
+        let mut bench = connected(sets, 0.1);
+        let version = bench.issue().unwrap();
+        let until = bench.now + 200 * SECOND;
+        let applied = bench.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
         assert!(applied, "{name}: the directive was not applied");
-        nothing_applied_twice(&dock);
-        assert!(dock.refusals.is_empty(), "{name}: {:?}", dock.refusals);
+        nothing_applied_twice(&bench);
+        assert!(bench.refusals.is_empty(), "{name}: {:?}", bench.refusals);
     }
 }
 
 #[test]
-fn what_does_not_fit_is_refused_to_the_caller() {
+fn frames_that_do_not_fit_are_refused() {
     for (name, sets) in KINDS {
         let mut driver = driver(&config(sets), Address::SURFACE);
         let most = driver.profile().frame_bytes;
@@ -122,61 +122,62 @@ fn unreachable_addresses_are_refused() {
 #[test]
 fn a_modem_with_another_address_is_refused_and_stays_silent() {
     for (name, sets) in KINDS.into_iter().filter(|(name, _)| *name != "transparent") {
-        let mut dock = Dock::new(&setting(sets, 0.0), 5).unwrap();
-        dock.inject(0, Fault::WrongAddress(7));
-        dock.run(60 * SECOND);
-        let said = dock.refusals.join(" ");
-        assert!(said.contains("is 7 and ours is 1"), "{name}: {said:?}");
-        assert_eq!(dock.vehicle.audit().transmissions(), 0, "{name}");
+        let mut bench = ModemBench::new(&setting(sets, 0.0), 5).unwrap();
+        bench.inject(0, Fault::WrongAddress(7));
+        bench.run(60 * SECOND);
+        let refusals = bench.refusals.join(" ");
+        assert!(refusals.contains("is 7 and ours is 1"), "{name}: {refusals:?}");
+        assert_eq!(bench.vehicle.audit().transmissions(), 0, "{name}");
     }
 }
 
-/// Traffic goes on by itself within ten seconds, and what a modem needs to begin a cycle or a connection, after a fault.
-fn survives(fault: impl Fn(&mut Dock), lasts: Duration) {
+/// Traffic resumes by itself within ten seconds and the time that a modem needs to begin a cycle or
+/// a connection, after a fault.
+fn survives(fault: impl Fn(&mut ModemBench), lasts: Duration) {
     for (name, sets) in KINDS {
         for end in [0, 1] {
-            let mut dock = speaking(sets, 0.0);
-            dock.issue().unwrap();
-            dock.run(Duration::from_millis(3700));
-            dock.issue().unwrap();
-            DockFault(&mut dock, end).apply(&fault);
-            dock.run(lasts);
-            assert!(resumes_within(&mut dock, RESUMES + cycle(name)), "{name}: end {end} does not come back");
-            let version = dock.issue().unwrap();
-            let until = dock.now + 120 * SECOND;
-            let applied = dock.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
+            let mut bench = connected(sets, 0.0);
+            bench.issue().unwrap();
+            bench.run(Duration::from_millis(3700));
+            bench.issue().unwrap();
+            FaultAt(&mut bench, end).apply(&fault);
+            bench.run(lasts);
+            assert!(resumes_within(&mut bench, RESUME_TIMEOUT + cycle(name)), "{name}: end {end} does not resume");
+            let version = bench.issue().unwrap();
+            let until = bench.now + 120 * SECOND;
+            let applied = bench.run_until(until, |d| d.applied.keys().any(|(_, v)| *v == version));
             assert!(applied, "{name}: end {end}: no directive gets through");
-            nothing_applied_twice(&dock);
+            nothing_applied_twice(&bench);
         }
     }
 }
 
-/// Tells a fault which end it is at.
-struct DockFault<'a>(&'a mut Dock, usize);
+/// A bench whose fault is at one end.
+struct FaultAt<'a>(&'a mut ModemBench, usize);
 
-impl DockFault<'_> {
-    fn apply(self, fault: &impl Fn(&mut Dock)) {
-        self.0.struck = self.1;
+impl FaultAt<'_> {
+    fn apply(self, fault: &impl Fn(&mut ModemBench)) {
+        self.0.faulty_end = self.1;
         fault(self.0);
     }
 }
 
 #[test]
 fn a_modem_that_restarts_in_its_turn_is_set_up_again() {
-    // Three seconds are its own.
-    survives(|d| d.inject(d.struck, Fault::Reboot), 3 * SECOND);
+    // The modem itself needs three seconds.
+    survives(|d| d.inject(d.faulty_end, Fault::Reboot), 3 * SECOND);
 }
 
 #[test]
-fn a_supply_that_fails_while_transmitting_is_survived() {
-    survives(|d| d.inject(d.struck, Fault::BrownOut), 3 * SECOND);
+fn a_brown_out_while_transmitting_is_survived() {
+    survives(|d| d.inject(d.faulty_end, Fault::BrownOut), 3 * SECOND);
 }
 
 #[test]
-fn a_cable_that_was_out_for_half_a_minute_is_used_again() {
+fn a_cable_unplugged_for_half_a_minute_is_used_again() {
     survives(
         |d| {
-            let end = d.struck;
+            let end = d.faulty_end;
             d.plug(end, false);
             d.run(30 * SECOND);
             d.plug(end, true);
@@ -187,7 +188,7 @@ fn a_cable_that_was_out_for_half_a_minute_is_used_again() {
 
 #[test]
 fn a_port_that_was_frozen_for_a_minute_is_used_again() {
-    survives(|d| d.inject(d.struck, Fault::Freeze(60 * SECOND)), 60 * SECOND);
+    survives(|d| d.inject(d.faulty_end, Fault::Freeze(60 * SECOND)), 60 * SECOND);
 }
 
 #[test]
@@ -195,8 +196,8 @@ fn ten_seconds_of_garbage_are_survived() {
     survives(
         |d| {
             for _ in 0..20 {
-                d.inject(d.struck, Fault::Garbage(500));
-                d.inject(d.struck, Fault::HalfLine);
+                d.inject(d.faulty_end, Fault::Garbage(500));
+                d.inject(d.faulty_end, Fault::HalfLine);
                 d.run(Duration::from_millis(500));
             }
         },
@@ -205,12 +206,12 @@ fn ten_seconds_of_garbage_are_survived() {
 }
 
 #[test]
-fn a_busy_modem_is_asked_again() {
-    survives(|d| d.inject(d.struck, Fault::Busy(10 * SECOND)), 10 * SECOND);
+fn a_busy_modem_gets_the_frame_again() {
+    survives(|d| d.inject(d.faulty_end, Fault::Busy(10 * SECOND)), 10 * SECOND);
 }
 
 #[test]
-fn ports_of_both_interpreters_understand_each_other() {
+fn ports_of_both_interpreters_interoperate() {
     use sim_channel::modem::s2c::Interpreter::{At, Net};
     let modem = |address, interpreter| -> Box<dyn Emulator> {
         Box::new(S2cEmulator::new(EmulatorConfig { interpreter, ..EmulatorConfig::new(address) }))
@@ -218,28 +219,28 @@ fn ports_of_both_interpreters_understand_each_other() {
     for sets in [KINDS[0].1, KINDS[1].1] {
         for (vehicle, surface) in [(At, At), (At, Net), (Net, At)] {
             let modems = [modem(1, vehicle), modem(10, surface)];
-            let mut dock = Dock::with_modems(&setting(sets, 0.0), modems, 5).unwrap();
-            dock.load = Some(2000);
-            dock.run(120 * SECOND);
-            let version = dock.issue().unwrap();
-            dock.run(60 * SECOND);
-            let what = format!("{sets:?} {vehicle:?} {surface:?}");
-            assert!(useful(&dock) > 2000.0, "{what}: {} bytes got through", useful(&dock));
-            assert!(dock.applied.contains_key(&(SlotId::Utility, version)), "{what}: the directive was not applied");
+            let mut bench = ModemBench::with_modems(&setting(sets, 0.0), modems, 5).unwrap();
+            bench.load = Some(2000);
+            bench.run(120 * SECOND);
+            let version = bench.issue().unwrap();
+            bench.run(60 * SECOND);
+            let case = format!("{sets:?} {vehicle:?} {surface:?}");
+            assert!(useful(&bench) > 2000.0, "{case}: {} bytes got through", useful(&bench));
+            assert!(bench.applied.contains_key(&(SlotId::Utility, version)), "{case}: the directive was not applied");
         }
     }
 }
 
-/// Every token that is accepted is settled once.
+/// Every accepted token ends with exactly one event.
 #[test]
-fn every_transmission_has_one_end() {
+fn every_transmission_ends_with_one_event() {
     for (name, sets) in KINDS {
         let mut driver = driver(&config(sets), Address::SURFACE);
         let (mut now, mut tokens) = (Instant::ZERO, Vec::<Token>::new());
         driver.handle_open(now);
-        let mut settled = Vec::new();
+        let mut ended = Vec::new();
         for step in 0..2000u32 {
-            answer_as_a_willing_modem(driver.as_mut(), now, step);
+            reply_as_a_modem(driver.as_mut(), now, step);
             let access = driver.profile().access;
             if driver.is_ready() && step % 50 == 0 && access != Access::Polled {
                 tokens.extend(driver.send(Destination::Modem(1), vec![9; 20], Class::Bulk, now));
@@ -255,7 +256,7 @@ fn every_transmission_has_one_end() {
             }
             while let Some(event) = driver.poll_event() {
                 if let Event::Sent(t) | Event::Delivered(t) | Event::Failed(t) | Event::Unknown(t) = event {
-                    settled.push(t);
+                    ended.push(t);
                 }
             }
             now = now + Duration::from_millis(200);
@@ -264,20 +265,20 @@ fn every_transmission_has_one_end() {
         driver.handle_closed(now);
         while let Some(event) = driver.poll_event() {
             if let Event::Sent(t) | Event::Delivered(t) | Event::Failed(t) | Event::Unknown(t) = event {
-                settled.push(t);
+                ended.push(t);
             }
         }
-        settled.sort_unstable();
-        assert!(tokens.len() > 5, "{name}: {} transmissions were taken", tokens.len());
-        assert_eq!(settled, tokens, "{name}");
+        ended.sort_unstable();
+        assert!(tokens.len() > 5, "{name}: {} transmissions were accepted", tokens.len());
+        assert_eq!(ended, tokens, "{name}");
     }
 }
 
-/// Replies of a modem that takes everything and tells nothing of what became of it.
-fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
+/// Replies of a modem that accepts all commands and never reports an outcome.
+fn reply_as_a_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
     while let Some(bytes) = driver.poll_output(now) {
         let text = String::from_utf8_lossy(&bytes).into_owned();
-        let said = match text.trim() {
+        let reply = match text.trim() {
             "+++AT?MODE" => "ERROR WRONG FORMAT\r\n".to_owned(),
             "AT?MODE" => "NET\r\n".to_owned(),
             "AT?AL" => "10\r\n".to_owned(),
@@ -295,8 +296,9 @@ fn answer_as_a_willing_modem(driver: &mut dyn Driver, now: Instant, step: u32) {
             }
             _ => continue,
         };
-        let said = if said.starts_with("$CA") && !said.starts_with("$CACFG,SRC") { relined(&said) } else { said };
-        driver.handle_bytes(said.as_bytes(), now);
+        let reply =
+            if reply.starts_with("$CA") && !reply.starts_with("$CACFG,SRC") { with_checksum(&reply) } else { reply };
+        driver.handle_bytes(reply.as_bytes(), now);
     }
 }
 
@@ -304,8 +306,8 @@ fn line(body: &str) -> String {
     String::from_utf8(modem::micromodem::format_sentence(body)).unwrap()
 }
 
-/// The same sentence with a right checksum.
-fn relined(said: &str) -> String {
-    let body = said.trim_start_matches('$').split('*').next().unwrap_or_default().to_owned();
+/// The same sentence with a valid checksum.
+fn with_checksum(reply: &str) -> String {
+    let body = reply.trim_start_matches('$').split('*').next().unwrap_or_default().to_owned();
     line(&body)
 }

@@ -1,4 +1,4 @@
-//! A surface that calls for vehicles that it does not know.
+//! A surface that sends discovery calls to unknown vehicles.
 
 use scenecast_core::Area;
 use scenecast_core::tuning_table::TuningTable;
@@ -58,7 +58,7 @@ fn a_vehicle_that_answers_a_discovery_call_gets_a_record() {
 }
 
 #[test]
-fn a_surface_speaks_with_all_configured_vehicles_by_their_names() {
+fn a_surface_exchanges_frames_with_all_configured_vehicles() {
     let sets = ["link.vehicles=[4, 1]", "vehicle.name=nereus"].map(str::to_owned);
     let config = scenecast_config::load(None, &sets).unwrap();
     let surface = scenecast_surface::assemble(

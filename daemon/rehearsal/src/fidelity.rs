@@ -1,4 +1,4 @@
-//! How faithful the operator's map is at a given bit budget.
+//! The agreement of the operator's map with the vehicle's at a given bit budget.
 
 use super::baseline::whole_png;
 use super::mission::{Mission, MissionOptions};
@@ -11,23 +11,21 @@ use std::time::Duration;
 /// One mission of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FidelityRow {
-    /// Bit budget of each transmitter, bits a second.
+    /// Bit budget of each end, bit/s.
     pub budget_bps: u32,
-    /// `delta` or `whole-png`.
+    /// The stream that was used: `delta` or `whole-png`.
     pub stream: &'static str,
     /// Share of explored cells on which the maps agree, mean over the survey.
     pub agreement_mean: f64,
-    /// Seconds until a change at the vehicle shows at the operator's: median.
+    /// Seconds until a change of the vehicle's map is on the operator's: median.
     pub age_s_median: f64,
-    /// The same: 95th percentile.
     pub age_s_p95: f64,
-    /// The same: maximum.
     pub age_s_max: f64,
-    /// Of the operator's map at the end of the survey with the truth, nats.
+    /// Mutual information of the operator's map with the true classes at the end of the survey, nats.
     pub mutual_information_nats: Option<f64>,
-    /// Bits that the vehicle put on air.
+    /// Number of bits that the vehicle put on air.
     pub sent_bits: u64,
-    /// Bytes of directives, exemplars and fixes are the same for both; this is what carried the map.
+    /// Bytes of map data; those of directives, exemplars and fixes are the same for both streams.
     pub map_bytes: u64,
 }
 

@@ -1,10 +1,10 @@
-//! One line a frame.
+//! The log of a mission's frames, one line a frame.
 
 use sim_channel::Arrival;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-/// What is kept of a frame until its fate is known.
+/// A frame whose outcome is not known yet.
 #[derive(Debug, Clone)]
 struct Sent {
     at_s: f64,
@@ -22,16 +22,15 @@ impl Sent {
 
 /// The log of a mission's frames.
 ///
-/// One line a frame, in the order in which their fates became known: time of transmission in seconds, `up` or `down`,
-/// bytes, kind, `ok` or `lost` and why, or `open`: still under
-/// way at the end.
+/// One line a frame, in the order of their outcomes: time of transmission in seconds, `up` or `down`, bytes, kind, and
+/// the outcome: `ok`, `lost` with the reason, or `open` for a frame that is still in transit at the end.
 #[derive(Debug)]
 pub struct FramesLog {
     open: BTreeMap<u64, Sent>,
     text: String,
-    /// Frames sent, and lost, up and down.
+    /// Number of frames sent, up and down.
     pub sent: [u64; 2],
-    /// Frames lost on the way, up and down.
+    /// Number of frames lost in the channel, up and down.
     pub lost: [u64; 2],
 }
 
@@ -50,7 +49,7 @@ impl FramesLog {
         self.open.insert(transmission, Sent { at_s, direction, bytes, kind });
     }
 
-    /// The fate of a frame is known; later copies are not logged again.
+    /// The outcome of a frame is known; later copies are not logged again.
     pub fn handle_fate(&mut self, arrival: &Arrival) {
         let Some(sent) = self.open.remove(&arrival.transmission) else { return };
         let fate = match &arrival.outcome {
@@ -63,7 +62,7 @@ impl FramesLog {
         sent.write(&fate, &mut self.text);
     }
 
-    /// The log so far; what is still under way is `open`.
+    /// The log so far; frames in transit are `open`.
     pub fn text(&self) -> String {
         let mut text = self.text.clone();
         for sent in self.open.values() {

@@ -1,4 +1,4 @@
-//! GPS receiver and compass of a rehearsed surface vehicle: what they say of where it is.
+//! NMEA sentences of a simulated GPS receiver and a simulated compass.
 
 use scenecast_core::{LatLon, TangentPlane, nmea};
 use sim_channel::RandomStream;
@@ -6,36 +6,35 @@ use sim_channel::RandomStream;
 /// Standard deviation of the compass, degrees.
 const COMPASS_SIGMA_DEG: f64 = 0.5;
 
-/// What a receiver is and how good it is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Receiver {
-    /// Where x = y = 0 of the world is.
+    /// Origin of the world frame.
     pub(super) origin: LatLon,
-    /// White noise, metres; beside it an error of as much that changes over minutes.
+    /// Standard deviation of the white noise, and of an error that changes over minutes, metres.
     pub(super) sigma_m: f64,
-    /// What it says of its quality: dilution of precision, and whether it has corrections.
+    /// Reported quality: dilution of precision, and whether the receiver uses corrections.
     pub(super) hdop: f64,
     pub(super) is_corrected: bool,
 }
 
-/// Says sentences, with a chance of its own.
+/// Writes sentences, with random errors of its own.
 #[derive(Debug)]
 pub(super) struct Instruments {
     receiver: Receiver,
     plane: TangentPlane,
-    dice: RandomStream,
+    rng: RandomStream,
     slow_error: (f64, f64),
 }
 
 impl Instruments {
     pub(super) fn new(receiver: Receiver, seed: u64) -> Self {
         let plane = TangentPlane::new(receiver.origin);
-        Self { receiver, plane, dice: RandomStream::new(seed, &[9]), slow_error: (0.0, 0.0) }
+        Self { receiver, plane, rng: RandomStream::new(seed, &[9]), slow_error: (0.0, 0.0) }
     }
 
-    /// Position and heading as NMEA 0183, once a second; `astray` is by how much the receiver is led astray.
+    /// Position and heading as NMEA 0183, once a second; `astray` is an additional error of the receiver, metres.
     pub(super) fn report(&mut self, at: (f64, f64), heading_rad: f64, astray: (f64, f64), second: u32) -> String {
-        let [a, b, c, d, e] = [(); 5].map(|()| self.dice.normal());
+        let [a, b, c, d, e] = [(); 5].map(|()| self.rng.normal());
         let Receiver { sigma_m, hdop, is_corrected, .. } = self.receiver;
         let slow = |error: f64, draw: f64| error * 0.99 + sigma_m * 0.14 * draw;
         self.slow_error = (slow(self.slow_error.0, a), slow(self.slow_error.1, b));

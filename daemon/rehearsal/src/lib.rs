@@ -1,4 +1,4 @@
-//! A whole mission in virtual time: the role code of the sea, a made-up sea floor and water around it.
+//! A whole mission in virtual time: the hosts of the sea, with a simulated sea floor, channel and vehicle.
 
 mod baseline;
 #[cfg(test)]
@@ -28,7 +28,7 @@ mod world;
 
 pub use fidelity::{FidelityRow, fidelity};
 pub use frames_log::FramesLog;
-pub use localisation::{Localisation, LocalisationRun, Tracks, fly_with_outliers, localisation, picture};
+pub use localisation::{Localisation, LocalisationRun, Tracks, localisation, localisation_plot, run_with_outliers};
 pub use meter::Delays;
 pub use mission::{Mission, MissionOptions};
 pub use outputs::write_outputs;

@@ -1,20 +1,19 @@
-//! How well the operator's map follows the vehicle's.
+//! Agreement and delay of the operator's map against the vehicle's.
 
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 
-/// Seconds from the moment that a cell of the two maps began to differ until it no longer did.
+/// Seconds for which a cell of the two maps differed.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Delays(Vec<f32>);
 
 impl Delays {
-    /// Takes a delay in.
     pub fn push(&mut self, seconds: f64) {
         self.0.push(seconds as f32);
     }
 
-    /// Median, 95th percentile and maximum; zeros if there was none.
+    /// Median, 95th percentile and maximum; zeros without any delay.
     pub fn summary(&self) -> [f64; 3] {
         let mut sorted = self.0.clone();
         sorted.sort_by(f32::total_cmp);
@@ -40,10 +39,10 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// Looks at both maps; `versions` tell whether either has changed since the last look.
+    /// Integrates the agreement up to `now`, and compares the maps again if `versions` differ from the last ones.
     pub fn look(&mut self, vehicle: &LabelGrid, operator: &LabelGrid, versions: (u64, u64), now: Instant) {
         if let Some(last) = self.last.replace(now) {
-            // Before the vehicle has a map there is nothing to agree about.
+            // Agreement is undefined before the vehicle has a map.
             let passed = if self.mapped { now.since(last).as_secs_f64() } else { 0.0 };
             self.integral += self.agreement * passed;
             self.seconds += passed;
@@ -67,22 +66,21 @@ impl Meter {
         }
     }
 
-    /// Share of explored cells on which the maps agree, at the last look.
+    /// Share of explored cells on which the maps agree, at the last comparison.
     pub fn agreement(&self) -> f64 {
         self.agreement
     }
 
-    /// The same, mean over time.
+    /// Mean over time of [`Self::agreement`].
     pub fn agreement_mean(&self) -> f64 {
         if self.seconds > 0.0 { self.integral / self.seconds } else { 0.0 }
     }
 
-    /// The survey is over: what comes now no longer counts for the mean.
+    /// Ends the survey: later changes do not count for the mean.
     pub fn end_survey(&mut self) {
         self.survey_mean = Some(self.agreement_mean());
     }
 
-    /// [`Self::agreement_mean`] over the survey.
     pub fn agreement_mean_of_survey(&self) -> f64 {
         self.survey_mean.unwrap_or_else(|| self.agreement_mean())
     }

@@ -13,15 +13,15 @@ use sim_channel::modem::{Basin, Emulator, Fault};
 use sim_channel::usbl::UsblConfig;
 use sim_channel::{Channel, NodeId, NodePosition};
 
-/// The ends of the link, as indices.
+/// Index of the vehicle's end in arrays of both ends.
 pub const VEHICLE: usize = 0;
-/// See [`VEHICLE`].
+/// Index of the surface's end in arrays of both ends.
 pub const SURFACE: usize = 1;
 
 /// The cable from an end's host to its modem.
 struct Cable {
     node: NodeId,
-    /// Bytes on their way to a modem that takes no more now.
+    /// Bytes that wait for a modem with a full input buffer.
     written: Vec<u8>,
     plugged: bool,
 }
@@ -33,11 +33,11 @@ pub struct ModemRig {
 }
 
 impl ModemRig {
-    /// Modems of the configured kind in `channel`, and a station for each end, whose port is open at `now`. Place the nodes
-    /// before a host is asked for output.
+    /// Modems of the configured kind in `channel`, and a station for each end, whose port is open at `now`. Place the
+    /// nodes before a host is asked for output.
     ///
     /// # Errors
-    /// A kind that has no emulator.
+    /// The configured kind of modem has no emulator.
     pub fn new(config: &Config, channel: Channel, seed: u64, now: Instant) -> Result<(Self, [Station; 2]), UserError> {
         let vehicle = scenecast_config::vehicle_address(config)?.number();
         let surface = config.modem.surface_address;
@@ -45,7 +45,7 @@ impl ModemRig {
         Self::with_modems(config, channel, modems, now)
     }
 
-    /// The same with these modems, the vehicle's first.
+    /// The same for given modems, the vehicle's first.
     pub fn with_modems(
         config: &Config,
         channel: Channel,
@@ -53,7 +53,7 @@ impl ModemRig {
         now: Instant,
     ) -> Result<(Self, [Station; 2]), UserError> {
         let mut config = config.clone();
-        // Emulated ports are serial ones.
+        // The emulated ports are serial.
         config.modem.device = Some("emulated".into());
         let vehicle = scenecast_config::vehicle_address(&config)?;
         let mut basin = Basin::new(channel);
@@ -68,7 +68,7 @@ impl ModemRig {
         Ok((Self { basin, cables }, stations))
     }
 
-    /// Puts an end's modem somewhere.
+    /// Sets the position of an end's modem.
     pub fn place(&mut self, end: usize, position: NodePosition) {
         let node = self.cables[end].node;
         self.basin.channel().place(node, position);
@@ -85,13 +85,13 @@ impl ModemRig {
         self.basin.channel()
     }
 
-    /// Breaks something of an end's modem.
+    /// Injects a fault into an end's modem.
     pub fn inject(&mut self, end: usize, fault: Fault, now: Instant) {
         let node = self.cables[end].node;
         self.basin.inject(node, fault, now.into());
     }
 
-    /// Pulls an end's cable, or puts it back.
+    /// Unplugs an end's cable, or plugs it in again.
     pub fn plug<E: LinkEnd>(&mut self, end: usize, host: &mut LinkHost<E>, plugged: bool, now: Instant) {
         let cable = &mut self.cables[end];
         if std::mem::replace(&mut cable.plugged, plugged) == plugged {
@@ -104,20 +104,20 @@ impl ModemRig {
         }
     }
 
-    /// The next moment at which something happens in the channel or in a modem.
+    /// The time of the next event in the channel or in a modem.
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.basin.poll_timeout().map(Instant::from)
     }
 
-    /// Lets time pass in the channel and in the modems.
+    /// Advances the channel and the modems to `now`.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.basin.advance(now.into());
         while self.basin.poll_hang_up().is_some() {
-            // A serial line stays open.
+            // A serial line stays open when the modem hangs up.
         }
     }
 
-    /// Gives an end's host the bytes of its modem, and lets time pass in its driver.
+    /// Gives an end's host the bytes of its modem, and advances its driver.
     pub fn read<E: LinkEnd>(&mut self, end: usize, host: &mut LinkHost<E>, now: Instant) {
         let cable = &mut self.cables[end];
         let bytes = self.basin.poll_host_bytes(cable.node);
@@ -131,7 +131,7 @@ impl ModemRig {
         }
     }
 
-    /// Puts a host's bytes on an end's cable; [`Self::flush`] hands them to the modem.
+    /// Writes a host's bytes to an end's cable; [`Self::flush`] passes them to the modem.
     pub fn write(&mut self, end: usize, bytes: &[u8]) {
         let cable = &mut self.cables[end];
         if cable.plugged {
@@ -139,7 +139,7 @@ impl ModemRig {
         }
     }
 
-    /// Hands an end's modem as many of the bytes on its cable as it takes.
+    /// Passes as many bytes from an end's cable to its modem as the modem accepts.
     pub fn flush(&mut self, end: usize, now: Instant) {
         let cable = &mut self.cables[end];
         let room = self.basin.host_room(cable.node).min(cable.written.len());
@@ -150,12 +150,12 @@ impl ModemRig {
     }
 }
 
-/// An end's station, its port still closed.
+/// The station of an end, with a closed port.
 fn station(config: &Config, end: Address) -> Result<Station, UserError> {
     modem_station(config, end, modem_of_process(config, end)?)
 }
 
-/// The modem of an end; the surface's has a head.
+/// The emulated modem of an end; with `head` an S2C has a USBL head.
 fn emulator(config: &Config, address: u8, head: bool, seed: u64) -> Result<Box<dyn Emulator>, UserError> {
     let seed = seed ^ u64::from(address);
     let baud = Some(config.modem.baud);

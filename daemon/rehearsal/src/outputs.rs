@@ -9,7 +9,7 @@ use scenecast_protocol::map::{LabelGrid, Rect};
 use serde_json::Value;
 use std::path::Path;
 
-/// Writes report, maps, images and frame log into a folder, which is made.
+/// Writes report, maps, images and frame log into a folder, which is created if necessary.
 pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path) -> Result<(), UserError> {
     let failed = |path: &Path, e: std::io::Error| UserError::Failed(format!("{}: {e}", path.display()));
     std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, format!("cannot be used as a folder: {e}")))?;
@@ -28,15 +28,15 @@ pub fn write_outputs(mission: &Mission, report: &Report, wall: Value, dir: &Path
         scenecast_files::write_whole(&exemplars.join(format!("label-{label}.webp")), webp)?;
     }
     scenecast_files::write_whole(&dir.join("frames.log"), mission.frames().text().as_bytes())?;
-    let mut figures = report.figures.clone();
-    figures["wall"] = wall;
-    let text = serde_json::to_string_pretty(&figures).map_err(|e| UserError::Failed(e.to_string()))? + "\n";
+    let mut json = report.json.clone();
+    json["wall"] = wall;
+    let text = serde_json::to_string_pretty(&json).map_err(|e| UserError::Failed(e.to_string()))? + "\n";
     scenecast_files::write_whole(&dir.join("report.json"), text.as_bytes())
 }
 
-/// Removes what an earlier run left that this one may not write again.
+/// Removes files of an earlier run that this one might not replace.
 fn remove_old(dir: &Path) {
-    // What is not there need not be removed; what cannot be removed is complained of when it is written.
+    // A file that cannot be removed leads to an error when it is written.
     let _ = std::fs::remove_file(dir.join("truth.png"));
     for entry in std::fs::read_dir(dir.join("exemplars")).into_iter().flatten().flatten() {
         let name = entry.file_name();

@@ -1,4 +1,4 @@
-//! The figures of a mission.
+//! The report of a mission.
 
 use super::mission::Mission;
 use scenecast_core::drop_counts::dropped;
@@ -10,16 +10,16 @@ use scenecast_scoring::mutual_information_nats;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// A report and how it was made.
+/// The measurements of a mission that has ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report {
     /// `report.json` without the member `wall`: the same for the same arguments and seed.
-    pub figures: Value,
+    pub json: Value,
 }
 
-/// Writes down a mission that has ended.
+/// Makes the report of a mission that has ended.
 pub fn report(mission: &Mission, scenario: &str) -> Report {
-    let figures = json!({
+    let json = json!({
         "format": 1,
         "mission": {
             "duration_s": round(mission.ended().unwrap_or(mission.now()).as_secs_f64()),
@@ -35,10 +35,10 @@ pub fn report(mission: &Mission, scenario: &str) -> Report {
         "fixes": { "sent": mission.surface().relay().map_or(0, |r| r.fixes()), "applied": mission.vehicle().fixes_applied() },
         "survey": survey(mission),
     });
-    Report { figures }
+    Report { json }
 }
 
-/// Six digits are enough, and the same on every machine.
+/// Rounds to six digits, so that every machine prints the same.
 fn round(x: f64) -> f64 {
     (x * 1e6).round() / 1e6
 }
@@ -60,7 +60,6 @@ impl Mission {
         Some((mi.nats, mi.normalised))
     }
 
-    /// The operator's map.
     pub fn operator_map(&self) -> LabelGrid {
         self.surface().map(self.address()).cloned().unwrap_or_default()
     }
@@ -100,17 +99,17 @@ fn map(m: &Mission) -> Value {
     })
 }
 
-/// A layer by its name: cells with a level, how well the operator's copy follows, and what that takes.
+/// A layer by its name: cells with a level, agreement and delay of the operator's copy, and its bytes.
 fn layer(m: &Mission, layer: &LayerSource) -> (String, Value) {
     let id = layer.id();
     let bytes = m.vehicle().stats().bytes_by_class.get(&Class::Layer(id)).copied().unwrap_or(0);
-    let mut figures = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
-    if let (Some(meter), Some(figures)) = (m.meters.layers.get(&id), figures.as_object_mut()) {
-        figures.insert("agreement_final".into(), round(meter.agreement()).into());
-        figures.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
-        figures.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
+    let mut report = json!({ "payload_bytes": bytes, "cells": layer.target().explored() });
+    if let (Some(meter), Some(report)) = (m.meters.layers.get(&id), report.as_object_mut()) {
+        report.insert("agreement_final".into(), round(meter.agreement()).into());
+        report.insert("agreement_mean".into(), round(meter.agreement_mean_of_survey()).into());
+        report.insert("age_s".into(), summary(meter.delays(m.now()).summary()));
     }
-    (layer.descriptor().name.clone().into_owned(), figures)
+    (layer.descriptor().name.clone().into_owned(), report)
 }
 
 fn by_class(m: &Mission) -> BTreeMap<String, u64> {
@@ -134,8 +133,8 @@ fn link(m: &Mission) -> Value {
     let at_surface = view.as_ref().map(|v| v.stats().clone()).unwrap_or_default();
     let one = |i: usize| {
         let audit = m.audits()[i];
-        let heard_by = [&at_surface, m.vehicle().stats()][i];
-        let (loss, goodput) = (&heard_by.loss_in, &heard_by.goodput_in);
+        let receiver = [&at_surface, m.vehicle().stats()][i];
+        let (loss, goodput) = (&receiver.loss_in, &receiver.goodput_in);
         json!({
             "sent_bps": round(audit.total_bits() as f64 / seconds),
             "max_window_bps": round(audit.worst_window_bps()),
@@ -144,7 +143,7 @@ fn link(m: &Mission) -> Value {
             "frames_lost": m.frames().lost[i],
             "loss_measured": round(loss.share()),
             "goodput_last_minute_bps": round(goodput.bits_per_s(m.now())),
-            "dropped": dropped(heard_by),
+            "dropped": dropped(receiver),
         })
     };
     json!({
@@ -209,15 +208,15 @@ fn survey(m: &Mission) -> Value {
 }
 
 impl Mission {
-    /// The newest image of each label of which the surface has one: WebP files.
+    /// The newest image of each label that has one at the surface, as WebP files.
     pub fn exemplars(&self) -> impl Iterator<Item = (u8, &[u8])> {
         let record = self.surface().record(self.address());
         let pages = record.into_iter().flat_map(|d| d.exemplars.pages());
         pages.filter_map(|(label, page)| Some((label, page.picture(None)?.webp.as_slice())))
     }
 
-    /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out, or do not lead back
-    /// where a fix has shown the vehicle to be outside.
+    /// Number of legs chosen after the fence took effect that leave it, cross a keep-out, or do not lead back inside
+    /// after a fix has placed the vehicle outside.
     pub fn legs_outside_fence(&self) -> usize {
         let Some(fence) = self.surface().record(self.address()).and_then(|d| d.fence.as_ref()) else { return 0 };
         let outside = |from, to| scenecast_motion::stretches_outside(&[from, to], fence) > 0;
@@ -227,7 +226,7 @@ impl Mission {
         self.logbook.legs.iter().skip(self.logbook.legs_before_fence).filter(is_out).count()
     }
 
-    /// Explored cells, each weighted by what the operator's last utility says its label is worth.
+    /// Explored cells, each weighted by its label's value in the operator's last utility.
     pub fn utility_collected(&self) -> f64 {
         let Some(utility) = self.vehicle().utility() else { return 0.0 };
         self.vehicle().cells().map(|(_, label)| utility.weight(label)).sum()

@@ -7,27 +7,25 @@ use scenecast_surface::{FenceOrder, LimitsOrder, Surface, Wish};
 use std::collections::BTreeMap;
 use std::collections::VecDeque;
 
-/// What the scripted operator does.
+/// An act of the scripted operator.
 #[derive(Debug, Clone, PartialEq)]
 enum Act {
-    /// Favours the label with this rank by area (0 = the largest) and turns from the largest.
+    /// Favours the label with this rank by area (0 = the largest) and avoids the largest one.
     Favour(usize),
-    /// Asks for an image of the label with this rank.
+    /// Requests an image of the label with this rank by area.
     Show(usize),
-    /// Sends a fence.
     Fence(FenceOrder),
-    /// Sends limits.
     Limits(LimitsOrder),
 }
 
-/// Acts at set times, each as soon as the operator's map lets him.
+/// Acts at set times; an act that needs a label waits until the operator's map has it.
 #[derive(Debug)]
 pub struct Script {
     acts: VecDeque<(Instant, Act)>,
 }
 
 impl Script {
-    /// Favours two labels and asks for three images in the course of a survey of `duration_s`.
+    /// Favours two labels and requests three images during a survey of `duration_s`.
     pub fn of_survey(duration_s: f64) -> Self {
         let acts = [
             (0.20, Act::Show(0)),
@@ -39,8 +37,8 @@ impl Script {
         Self { acts: acts.map(|(share, act)| (Instant::from_secs_f64(share * duration_s), act)).into() }
     }
 
-    /// The same with a fence a tenth inside of `area`, a keep-out in its middle, and half of the time and the way that the
-    /// survey would take.
+    /// The same acts, a fence a tenth inside of `area` with a keep-out in its middle, and a distance limit
+    /// of half the survey's path.
     pub fn fenced(duration_s: f64, area: Area, speed_m_s: f64) -> Self {
         let mut script = Self::of_survey(duration_s);
         let (w, h) = (area.east - area.west, area.north - area.south);
@@ -59,17 +57,17 @@ impl Script {
         script
     }
 
-    /// An operator who only looks.
+    /// The script of an operator without acts.
     pub fn none() -> Self {
         Self { acts: VecDeque::new() }
     }
 
-    /// When the next act is due.
+    /// The time of the next act.
     pub fn poll_timeout(&self) -> Option<Instant> {
         self.acts.front().map(|(at, _)| *at)
     }
 
-    /// Does what is due; what the map does not allow yet is tried again ten seconds later.
+    /// Performs the acts that are due; an act whose label is not on the map yet is retried ten seconds later.
     pub fn handle_timeout(&mut self, surface: &mut Surface, vehicle: Address, now: Instant) {
         while self.acts.front().is_some_and(|(at, _)| *at <= now) {
             let Some((at, act)) = self.acts.pop_front() else { return };

@@ -7,7 +7,7 @@ use scenecast_motion::Motion;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// Kinematics that are stepped twice a second of mission time.
+/// Simulated kinematics with two steps per second of mission time.
 #[derive(Debug)]
 pub struct SimulatedAutopilot {
     motion: Motion,
@@ -17,12 +17,11 @@ pub struct SimulatedAutopilot {
 }
 
 impl SimulatedAutopilot {
-    /// Seconds between two steps.
     const STEP_S: f64 = 0.5;
-    /// Dives and rises so fast, m/s.
+    /// Vertical speed of the vehicle, m/s.
     const DIVES_M_S: f64 = 0.3;
 
-    /// A vehicle that moves as `motion` does, at a depth.
+    /// A vehicle with the given motion and depth.
     pub fn new(motion: Motion, depth_m: f64, now: Instant) -> Self {
         Self { motion, depth_m, next: now, tray: Tray::default() }
     }
@@ -44,7 +43,7 @@ impl Autopilot for SimulatedAutopilot {
     fn handle_bytes(&mut self, _bytes: &[u8], _now: Instant) {}
 
     fn handle_timeout(&mut self, now: Instant) {
-        // A host that slept for long is caught up with a minute at most.
+        // After a long sleep of the host at most one minute is simulated.
         if now.since(self.next) > Duration::from_secs(60) {
             self.next = now;
         }
@@ -65,7 +64,7 @@ impl Autopilot for SimulatedAutopilot {
     }
 
     fn set_goal(&mut self, goal: Option<Goal>, _now: Instant) {
-        self.motion.set_way(goal.map(|g| (g.east_m, g.north_m)));
+        self.motion.set_relative_target(goal.map(|g| (g.east_m, g.north_m)));
         if let Some(depth) = goal.and_then(|g| g.depth_m) {
             let most = Self::DIVES_M_S;
             self.depth_m += (depth - self.depth_m).clamp(-most, most);

@@ -1,4 +1,4 @@
-//! Drivers under random and mutated lines: nothing panics, memory is bounded, and they still come back to work.
+//! Drivers under random and mutated lines: none panics, memory is bounded, and all become ready again.
 
 use scenecast_core::MicromodemRate;
 use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser, format_sentence};
@@ -8,7 +8,7 @@ use scenecast_protocol::time::Instant;
 use sim_channel::RandomStream;
 use std::time::Duration;
 
-/// Lines of an ordinary run; the long one is `SCENECAST_STORM_LINES=10000000`.
+/// Number of lines of an ordinary run; a long run has `SCENECAST_STORM_LINES=10000000`.
 const LINES: usize = 400_000;
 
 const SEEDS: [&[u8]; 22] = [
@@ -36,15 +36,14 @@ const SEEDS: [&[u8]; 22] = [
     b"$CACST,6,0,20250606230123.348554,06,32767,45,0102,0123,07,00,00,00,00,1,001,000,0,3,1,0,150*00\r\n",
 ];
 
-/// Draws whole numbers.
-struct Dice(RandomStream);
+struct LineRng(RandomStream);
 
-impl Dice {
+impl LineRng {
     fn below(&mut self, n: usize) -> usize {
         self.0.below(n)
     }
 
-    /// A line of the seeds, changed a little or much; sentences mostly with a right checksum, or nothing would be read.
+    /// A mutated line of the seeds. Most sentences have a valid checksum, or the drivers would read none.
     fn line(&mut self) -> Vec<u8> {
         let mut line = SEEDS[self.below(SEEDS.len())].to_vec();
         for _ in 0..self.below(4) {
@@ -95,13 +94,13 @@ fn drivers() -> [Box<dyn Driver>; 3] {
     ]
 }
 
-/// Feeds a driver like a host that keeps to the rules; says how often it was ready.
+/// Feeds a driver as a correct host does; returns the number of times that it was ready.
 fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
     driver.handle_bytes(line, now);
-    let mut told = 0;
+    let mut events = 0;
     while driver.poll_event().is_some() {
-        told += 1;
-        assert!(told < 10_000, "events without end");
+        events += 1;
+        assert!(events < 10_000, "events without end");
     }
     let _ = driver.send(Destination::Modem(1), vec![1; 30], Class::Bulk, now);
     let _ = driver.send(Destination::Modem(1), vec![1; 30], Class::Service, now);
@@ -115,28 +114,28 @@ fn feed(driver: &mut dyn Driver, line: &[u8], now: Instant) {
 }
 
 #[test]
-fn any_lines_are_survived_by_drivers() {
-    let mut dice = Dice(RandomStream::new(1, &[1]));
+fn drivers_survive_any_lines() {
+    let mut rng = LineRng(RandomStream::new(1, &[1]));
     let mut drivers = drivers();
     let mut now = Instant::from_secs_f64(1.0);
     drivers.iter_mut().for_each(|d| d.handle_open(now));
     for _ in 0..lines() {
-        let line = dice.line();
+        let line = rng.line();
         for driver in &mut drivers {
             feed(driver.as_mut(), &line, now);
         }
-        now = now + Duration::from_millis(dice.below(300) as u64);
+        now = now + Duration::from_millis(rng.below(300) as u64);
     }
 }
 
 #[test]
-fn any_lines_are_survived_by_parsers_in_bounded_memory() {
-    let mut dice = Dice(RandomStream::new(2, &[1]));
+fn parsers_survive_any_lines_in_bounded_memory() {
+    let mut rng = LineRng(RandomStream::new(2, &[1]));
     let (mut plain, mut wrapped, mut sentences) =
         (LineParser::default(), LineParser::default(), SentenceParser::default());
     wrapped.set_ties(true);
     for i in 0..lines() {
-        let line = dice.line();
+        let line = rng.line();
         for parser in [&mut plain, &mut wrapped] {
             parser.push(&line);
             while parser.next_line().is_some() {}

@@ -1,31 +1,29 @@
-//! Virtual time: from event to event.
+//! Virtual time, which jumps from event to event.
 
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// A small world in which time passes only from one event to the next.
+/// A simulation in which time jumps from one event to the next.
 pub trait VirtualTime {
-    /// The time.
     fn now(&self) -> Instant;
 
-    /// Sets the time; it never goes back.
+    /// Sets the time, which never decreases.
     fn set_now(&mut self, now: Instant);
 
-    /// The next moment at which something happens.
+    /// The time of the next event.
     fn next_event(&self) -> Instant;
 
-    /// What happens at this moment.
+    /// Handles the events that are due now.
     fn handle_events(&mut self);
 
-    /// Lets every end say what it may say now.
+    /// Lets every end act on its events and transmit.
     fn pump(&mut self);
 
-    /// Runs for `duration`.
     fn run(&mut self, duration: Duration) {
         self.run_until(self.now() + duration, |_| false);
     }
 
-    /// Runs until `done`, which is asked after every event, or until `until`; says whether it was done.
+    /// Runs until `done`, which is called after every event, or until `until`; returns whether it was done.
     fn run_until(&mut self, until: Instant, mut done: impl FnMut(&Self) -> bool) -> bool {
         self.pump();
         while !done(self) {

@@ -7,7 +7,7 @@ use scenecast_files::{read_classes, read_image};
 use scenecast_protocol::map::Cell;
 use std::path::Path;
 
-/// An image of the sea floor, its south-west corner at the origin, with the class of each pixel where that is known.
+/// An image of the sea floor with its south-west corner at the origin, and the classes of its pixels if they are known.
 #[derive(Debug, Clone)]
 pub struct World {
     image: RgbImage,
@@ -15,7 +15,7 @@ pub struct World {
     classes: Option<Vec<u8>>,
 }
 
-/// Class value that stands for "not annotated".
+/// Class value for "not annotated".
 const IGNORE: u8 = 255;
 
 impl World {
@@ -25,12 +25,12 @@ impl World {
         Self { image: reef.image, metres_per_pixel, classes: Some(reef.truth) }
     }
 
-    /// A reef that was drawn before.
+    /// A reef that was generated before.
     pub(crate) fn from_reef(reef: &scenecast_worlds::Reef, metres_per_pixel: f64) -> Self {
         Self { image: reef.image.clone(), metres_per_pixel, classes: Some(reef.truth.clone()) }
     }
 
-    /// A mosaic from a file, and its annotation from another of the same size.
+    /// Reads a mosaic, and its annotation from a file of the same size.
     pub fn from_files(mosaic: &Path, annotations: Option<&Path>, metres_per_pixel: f64) -> Result<Self, UserError> {
         let image = read_image(mosaic)?.to_rgb8();
         if image.width() < 64 || image.height() < 64 {
@@ -44,19 +44,19 @@ impl World {
         Ok(Self { image, metres_per_pixel, classes })
     }
 
-    /// The limits of the image.
+    /// The bounds of the image, metres.
     pub fn area(&self) -> Area {
         let (w, h) = self.image.dimensions();
         let mpp = self.metres_per_pixel;
         Area { west: 0.0, south: 0.0, east: f64::from(w) * mpp, north: f64::from(h) * mpp }
     }
 
-    /// Whether the classes are known.
+    /// Whether the world has annotated classes.
     pub fn is_annotated(&self) -> bool {
         self.classes.is_some()
     }
 
-    /// The colour of the sea floor at a place in metres; `None` outside the image.
+    /// The colour of the sea floor at a position in metres; `None` outside the image.
     pub fn colour_at(&self, x_m: f64, y_m: f64) -> Option<[u8; 3]> {
         let (column, line) =
             (x_m / self.metres_per_pixel, f64::from(self.image.height()) - y_m / self.metres_per_pixel);
@@ -64,8 +64,8 @@ impl World {
         inside.then(|| self.image.get_pixel_checked(column as u32, line as u32)).flatten().map(|p| p.0)
     }
 
-    /// What a down-looking camera sees at a place (metres) and heading (radians clockwise from north). Beyond its limits
-    /// the image is mirrored.
+    /// The view of a down-looking camera at a position (metres) and heading (radians clockwise from north). The image
+    /// is mirrored beyond its bounds.
     pub fn view(&self, x_m: f64, y_m: f64, heading_rad: f64, width: u32, height: u32) -> RgbImage {
         let (w, h) = self.image.dimensions();
         let (sin, cos) = heading_rad.sin_cos();
@@ -83,7 +83,7 @@ impl World {
         view
     }
 
-    /// The class of most annotated pixels of a cell; `None` outside the image or where nothing is annotated.
+    /// The class of most annotated pixels of a cell; `None` outside the image or the annotated parts.
     pub fn class_of(&self, cell: Cell, cell_m: f64) -> Option<u8> {
         let classes = self.classes.as_ref()?;
         let (w, h) = (self.image.width() as i64, self.image.height() as i64);

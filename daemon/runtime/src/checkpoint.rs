@@ -1,15 +1,13 @@
-//! The file of the scene model's checkpoints: the last one or the one before it, whole.
+//! The file of the scene model's checkpoint. It is replaced atomically.
 
 use super::journal::Storage;
 use scenecast_core::UserError;
 use std::io;
 
-/// The file's name.
 const NAME: &str = "scene.checkpoint";
-/// The name that it is written under.
+/// Name of the file while it is being written.
 const PART: &str = "scene.checkpoint.part";
 
-/// Keeps checkpoints.
 pub(super) struct CheckpointFile<S: Storage> {
     storage: S,
 }
@@ -19,17 +17,17 @@ impl<S: Storage> CheckpointFile<S> {
         Self { storage }
     }
 
-    /// Where it is, for people.
+    /// Path of the file, for messages.
     pub(super) fn path(&self) -> std::path::PathBuf {
         self.storage.path(NAME)
     }
 
-    /// The last checkpoint that was kept; none before the first.
+    /// The last checkpoint that was kept; `None` before the first.
     pub(super) fn read(&self) -> Result<Option<Vec<u8>>, UserError> {
         self.storage.read(NAME).map_err(|e| self.failed(e))
     }
 
-    /// Keeps a checkpoint: a power cut before this has returned leaves the last one or this one.
+    /// Keeps a checkpoint. A power cut before the return leaves either the previous one or this one.
     pub(super) fn keep(&mut self, bytes: &[u8]) -> Result<(), UserError> {
         self.write(bytes).map_err(|e| self.failed(e))
     }

@@ -3,7 +3,7 @@
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// A monotonic clock that may run faster than the world, for rehearsals.
+/// A monotonic clock that may run faster than wall time, for rehearsals.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock {
     began: std::time::Instant,
@@ -11,17 +11,16 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// A clock at zero that runs `scale` times as fast as the world.
+    /// A clock at zero that runs `scale` times as fast as wall time.
     pub fn new(scale: f64) -> Self {
         Self { began: std::time::Instant::now(), scale }
     }
 
-    /// Mission time now.
     pub fn now(&self) -> Instant {
         Instant::from_secs_f64(self.began.elapsed().as_secs_f64() * self.scale)
     }
 
-    /// When the world's clock shows a mission time.
+    /// The wall time of a mission time.
     pub fn wall(&self, at: Instant) -> tokio::time::Instant {
         tokio::time::Instant::from_std(self.began + Duration::from_secs_f64(at.as_secs_f64() / self.scale))
     }

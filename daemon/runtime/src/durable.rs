@@ -1,38 +1,42 @@
-//! The vehicle's durable state: what is read of it at the start, and kept while it runs.
+//! The vehicle's durable state: read at the start of a run, and kept during it.
 
 use super::journal::{Damage, Journal, JournalError, Storage};
 use scenecast_core::UserError;
 use scenecast_vehicle::{Durable, LastPlace};
 use std::path::Path;
 
-/// The journal's file. Its records hold a [`Durable`] in postcard; a change of that is another version of the file.
+/// The journal's file. Its records hold a [`Durable`] in postcard; another layout needs another version of the file.
 const JOURNAL: &str = "vehicle.journal";
-/// The file of builds before there was a journal.
-const BEFORE: &str = "vehicle.state";
-/// Length at which the journal begins anew: 64 records of a block.
-const MOST_BYTES: usize = 64 * 4096;
+/// The state file of builds without a journal.
+const EARLIER_FILE: &str = "vehicle.state";
+/// Length at which the journal is rewritten: 64 records of a block.
+const MAX_BYTES: usize = 64 * 4096;
 
-/// Keeps the durable state of a run.
+/// Writes the durable state of a run to the journal.
 pub(super) struct Keeper<S: Storage> {
     journal: Journal<S>,
 }
 
-/// A run that has begun.
-pub(super) struct Run<S: Storage> {
+/// A run whose state is on disk, so that it may transmit.
+pub(super) struct StartedRun<S: Storage> {
     pub(super) keeper: Keeper<S>,
     pub(super) durable: Durable,
-    /// Whether there was a run before it.
+    /// Whether an earlier run left a state.
     pub(super) is_again: bool,
 }
 
 impl<S: Storage> Keeper<S> {
-    /// Begins a run: what survived the last one. `checkpoint` is the lineage and the epoch of a scene model that goes on;
-    /// if they are those of the last run the epoch goes on too, otherwise it is one that no run before has used.
+    /// Begins a run with the state that survived the last one. `checkpoint` has the lineage and the epoch of a restored
+    /// scene model: if the last run had the same, its epoch continues; otherwise a new epoch begins.
     ///
     /// The first run of a mission has the given `lineage`, which is random.
-    pub(super) fn begin_run(storage: S, lineage: u64, checkpoint: Option<(u64, u8)>) -> Result<Run<S>, UserError> {
+    pub(super) fn begin_run(
+        storage: S,
+        lineage: u64,
+        checkpoint: Option<(u64, u8)>,
+    ) -> Result<StartedRun<S>, UserError> {
         let place = storage.path(JOURNAL);
-        let opened = Journal::open(storage, JOURNAL, MOST_BYTES);
+        let opened = Journal::open(storage, JOURNAL, MAX_BYTES);
         let (journal, state) = opened.map_err(|e| for_people(&place, e))?;
         let is_again = state.is_some();
         let durable = match state {
@@ -53,12 +57,12 @@ impl<S: Storage> Keeper<S> {
             }
         };
         let mut keeper = Self { journal };
-        // Label ids of another model mean something else: an epoch is safe before it is told to anybody.
+        // Label ids of another model have other meanings, so a new epoch is on disk before it is published.
         keeper.save(&durable)?;
-        Ok(Run { keeper, durable, is_again })
+        Ok(StartedRun { keeper, durable, is_again })
     }
 
-    /// Makes the state durable: a power cut before this has returned leaves the last one or this one.
+    /// Makes the state durable. A power cut before the return leaves either the previous state or this one.
     pub(super) fn save(&mut self, durable: &Durable) -> Result<(), UserError> {
         let place = self.journal.storage().path(JOURNAL);
         let state = postcard::to_allocvec(durable).map_err(|e| UserError::Failed(e.to_string()))?;
@@ -74,8 +78,8 @@ fn decode(state: &[u8]) -> Option<Durable> {
 }
 
 fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
-    let place = storage.path(BEFORE);
-    match storage.read(BEFORE) {
+    let place = storage.path(EARLIER_FILE);
+    match storage.read(EARLIER_FILE) {
         Ok(None) => Ok(()),
         Ok(Some(_)) => Err(UserError::file(
             &place,
@@ -188,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_gone_on_from_is_refused_in_one_line() {
+    fn an_unusable_state_is_refused_in_one_line() {
         let refused = |name: &str, content: &[u8]| {
             let disk = Disk::default();
             disk.put(name, content);

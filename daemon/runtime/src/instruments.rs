@@ -8,12 +8,12 @@ use scenecast_protocol::time::Instant;
 use scenecast_surface::position::{Mounting, Relay, RelayConfig};
 use std::time::Duration;
 
-/// Speed of sound that modems reckon with, m/s.
+/// Speed of sound that modems assume, m/s.
 const MODEM_SOUND_M_S: f64 = 1500.0;
-/// A receiver that is silent for so long is opened again.
+/// Silence of a receiver after which its port is opened again.
 const SILENCE_TIMEOUT: Duration = Duration::from_secs(15);
 
-/// The ports of the instruments that are configured.
+/// The ports of the configured instruments.
 pub(super) struct Instruments {
     gps: Option<Port>,
     compass: Option<Port>,
@@ -26,7 +26,7 @@ pub(super) enum FromInstrument {
 }
 
 impl Instruments {
-    /// Opens what is configured.
+    /// Opens the ports of the configured instruments.
     pub(super) fn open(config: &Config) -> Self {
         let p = &config.position;
         Self {
@@ -35,7 +35,7 @@ impl Instruments {
         }
     }
 
-    /// What an instrument reports next; never without any. Safe to abandon.
+    /// The next report of an instrument; without instruments it never returns. Cancel-safe.
     pub(super) async fn next(&mut self) -> FromInstrument {
         tokio::select! {
             report = Port::next_of(&mut self.gps) => FromInstrument::Gps(report),

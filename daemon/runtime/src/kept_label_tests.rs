@@ -1,8 +1,8 @@
-//! What a label means, through power cuts at any step of the disk and of the host.
+//! The meaning of a label, through power cuts at any step of the disk and of the host.
 
 use super::checkpoint::CheckpointFile;
-use super::durable::{Keeper, Run};
-use super::journal::disk::{Chance, Disk, Step};
+use super::durable::{Keeper, StartedRun};
+use super::journal::disk::{Disk, DiskRng, DiskStep};
 use scene_model::publish::LabelBook;
 use scene_model::topics::{FlatCell, TopicId};
 use scenecast_config::Config;
@@ -17,20 +17,20 @@ use std::time::Duration;
 
 const FRAMES: u32 = 40;
 /// Frames from one checkpoint to the next.
-const CHECKPOINT_EVERY: u32 = 7;
+const CHECKPOINT_INTERVAL: u32 = 7;
 
-/// A scene model that has births and deaths and nothing else.
+/// A scene model with only births and deaths of topics.
 #[derive(Serialize, Deserialize)]
-struct Scene {
+struct TopicScene {
     lineage: u64,
     book: LabelBook,
     topics: Vec<TopicId>,
-    /// What each topic really is, also after its death; a number that no run uses again.
+    /// The true identity of each topic, also after its death; no run uses a number again.
     meanings: BTreeMap<TopicId, u64>,
     next_topic: u32,
 }
 
-impl Scene {
+impl TopicScene {
     fn new(epoch: u8, lineage: u64) -> Self {
         Self {
             lineage,
@@ -41,16 +41,16 @@ impl Scene {
         }
     }
 
-    /// A topic is born, one in three times another one dies; then the map.
-    fn see(&mut self, chance: &mut Chance, born: &mut u64) -> MapUpdate {
+    /// A topic is born and, one time in three, another one dies; returns the map.
+    fn see(&mut self, rng: &mut DiskRng, born: &mut u64) -> MapUpdate {
         if self.topics.len() < 4 {
             *born += 1;
             self.topics.push(TopicId(self.next_topic));
             self.meanings.insert(TopicId(self.next_topic), *born);
             self.next_topic += 1;
         }
-        if self.topics.len() > 1 && chance.below(3) == 0 {
-            self.topics.remove(chance.below(self.topics.len()));
+        if self.topics.len() > 1 && rng.below(3) == 0 {
+            self.topics.remove(rng.below(self.topics.len()));
         }
         let cell = |(x, &topic): (usize, &TopicId)| FlatCell {
             x: x as i32,
@@ -80,30 +80,30 @@ impl Scene {
     }
 }
 
-struct World {
+struct LabelTrial {
     config: Config,
     disk: Disk,
-    chance: Chance,
+    rng: DiskRng,
     born: u64,
-    /// What each label of each epoch meant when it was told.
-    told: BTreeMap<(u8, u8), u64>,
+    /// The meaning of each label of each epoch when it was published.
+    published: BTreeMap<(u8, u8), u64>,
     epochs: Vec<u8>,
 }
 
-impl World {
+impl LabelTrial {
     fn new(seed: u64) -> Self {
         let config = scenecast_config::load(None, &[]).unwrap();
-        let (told, epochs) = (BTreeMap::new(), Vec::new());
-        Self { config, disk: Disk::default(), chance: Chance::new(seed), born: 0, told, epochs }
+        let (published, epochs) = (BTreeMap::new(), Vec::new());
+        Self { config, disk: Disk::default(), rng: DiskRng::new(seed), born: 0, published, epochs }
     }
 
-    /// One run of the vehicle; none if the power was cut.
+    /// One run of the vehicle; `None` if the power was cut.
     fn run(&mut self) -> Option<()> {
         let mut file = CheckpointFile::new(self.disk.clone());
-        let kept: Option<Scene> = file.read().ok()?.and_then(|bytes| postcard::from_bytes(&bytes).ok());
+        let kept: Option<TopicScene> = file.read().ok()?.and_then(|bytes| postcard::from_bytes(&bytes).ok());
         let claim = kept.as_ref().map(|scene| (scene.lineage, scene.book.epoch()));
-        let lineage = self.chance.below(1 << 30) as u64;
-        let Run { mut keeper, durable, .. } = Keeper::begin_run(self.disk.clone(), lineage, claim).ok()?;
+        let lineage = self.rng.below(1 << 30) as u64;
+        let StartedRun { mut keeper, durable, .. } = Keeper::begin_run(self.disk.clone(), lineage, claim).ok()?;
         let mut scene = match kept.filter(|scene| scene.lineage == durable.lineage) {
             Some(mut scene) if scene.book.epoch() == durable.epoch => {
                 scene.book.resume(durable.labels);
@@ -113,7 +113,7 @@ impl World {
                 scene.book.begin_epoch(durable.epoch);
                 scene
             }
-            None => Scene::new(durable.epoch, durable.lineage),
+            None => TopicScene::new(durable.epoch, durable.lineage),
         };
         self.epochs.push(durable.epoch);
         let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
@@ -127,28 +127,28 @@ impl World {
         let station = channel_station(profile, Duration::from_secs(10), Instant::ZERO);
         let mut host = VehicleHost::new(vehicle, station, None);
         for frame in 1..=FRAMES {
-            self.disk.step(Step::Host).ok()?;
-            let update = scene.see(&mut self.chance, &mut self.born);
-            // The model's thread keeps a checkpoint before or after the link's thread has heard of the frame.
-            let first = self.chance.below(2) == 0;
-            if first && frame % CHECKPOINT_EVERY == 0 {
+            self.disk.step(DiskStep::Host).ok()?;
+            let update = scene.see(&mut self.rng, &mut self.born);
+            // The model's thread keeps a checkpoint before or after the link's thread receives the map of the frame.
+            let first = self.rng.below(2) == 0;
+            if first && frame % CHECKPOINT_INTERVAL == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;
             }
             self.publish(&mut host, &mut keeper, &update, &scene)?;
-            if !first && frame % CHECKPOINT_EVERY == 0 {
+            if !first && frame % CHECKPOINT_INTERVAL == 0 {
                 file.keep(&postcard::to_allocvec(&scene).unwrap()).ok()?;
             }
         }
         Some(())
     }
 
-    /// The link's thread takes a map and does what the host asks for; then frames may go out.
+    /// The link's thread takes a map and acts on the host's events; then frames may go out.
     fn publish(
         &mut self,
         host: &mut VehicleHost,
         keeper: &mut Keeper<Disk>,
         update: &MapUpdate,
-        scene: &Scene,
+        scene: &TopicScene,
     ) -> Option<()> {
         host.handle_map(update, Instant::ZERO);
         while let Some(event) = host.poll_event() {
@@ -157,58 +157,58 @@ impl World {
                 host.handle_persisted();
             }
         }
-        self.disk.step(Step::Host).ok()?;
+        self.disk.step(DiskStep::Host).ok()?;
         let epoch = host.vehicle().durable().epoch;
         for (_, label) in host.vehicle().map().iter() {
             let meaning = scene.meaning(label).unwrap();
-            let first = *self.told.entry((epoch, label)).or_insert(meaning);
+            let first = *self.published.entry((epoch, label)).or_insert(meaning);
             assert_eq!(first, meaning, "label {label} of epoch {epoch} changed its meaning");
         }
         Some(())
     }
 
     fn power_cut(&mut self) {
-        self.disk.power_cut(Chance::new(self.chance.below(1 << 30) as u64));
+        self.disk.power_cut(DiskRng::new(self.rng.below(1 << 30) as u64));
     }
 }
 
 #[test]
-fn a_label_keeps_its_meaning_wherever_the_power_is_cut() {
-    let mut whole = World::new(1);
+fn a_label_keeps_its_meaning_at_any_power_cut() {
+    let mut whole = LabelTrial::new(1);
     whole.run().unwrap();
     let steps = whole.disk.steps().len();
     for (cut, seed) in (0..steps).flat_map(|cut| (1..4).map(move |seed| (cut, seed))) {
-        let mut world = World::new(seed);
+        let mut trial = LabelTrial::new(seed);
         for after in [cut, steps / 3 + seed as usize, cut / 2] {
-            world.disk.cut_after(after);
-            if world.run().is_none() {
-                world.power_cut();
+            trial.disk.cut_after(after);
+            if trial.run().is_none() {
+                trial.power_cut();
             }
         }
-        world.disk.cut_after(usize::MAX / 2);
-        world.run().unwrap();
+        trial.disk.cut_after(usize::MAX / 2);
+        trial.run().unwrap();
     }
 }
 
 #[test]
 fn labels_continue_with_a_checkpoint_and_begin_again_without() {
-    let mut world = World::new(5);
-    world.run().unwrap();
-    world.run().unwrap();
-    world.disk.put("scene.checkpoint", b"torn");
-    world.run().unwrap();
-    assert_eq!(world.epochs, [0, 0, 1]);
+    let mut trial = LabelTrial::new(5);
+    trial.run().unwrap();
+    trial.run().unwrap();
+    trial.disk.put("scene.checkpoint", b"torn");
+    trial.run().unwrap();
+    assert_eq!(trial.epochs, [0, 0, 1]);
 }
 
 #[test]
-fn a_checkpoint_of_another_mission_is_not_gone_on_from() {
-    let mut world = World::new(6);
-    world.run().unwrap();
-    let checkpoint = CheckpointFile::new(world.disk.clone()).read().unwrap().unwrap();
-    world.disk = Disk::default();
-    world.disk.put("scene.checkpoint", &checkpoint);
-    world.told.clear();
-    let before = world.born;
-    world.run().unwrap();
-    assert!(world.told[&(0, 1)] > before, "a topic of the earlier mission");
+fn a_checkpoint_of_another_mission_is_not_resumed() {
+    let mut trial = LabelTrial::new(6);
+    trial.run().unwrap();
+    let checkpoint = CheckpointFile::new(trial.disk.clone()).read().unwrap().unwrap();
+    trial.disk = Disk::default();
+    trial.disk.put("scene.checkpoint", &checkpoint);
+    trial.published.clear();
+    let before = trial.born;
+    trial.run().unwrap();
+    assert!(trial.published[&(0, 1)] > before, "a topic of the earlier mission");
 }

@@ -1,4 +1,4 @@
-//! The tokio shells around the roles: they move bytes, read the clock, keep files.
+//! The tokio shells around the hosts: they move bytes, read the clock and write files.
 
 mod checkpoint;
 mod clock;
@@ -33,10 +33,10 @@ pub use vehicle::run_vehicle;
 use scenecast_core::UserError;
 use std::hash::{BuildHasher, Hasher, RandomState};
 
-/// Longest wait for other threads at the end.
-const LONGEST_END: std::time::Duration = std::time::Duration::from_secs(1);
+/// Maximum wait for other threads at the end.
+const SHUTDOWN_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// Random bits for sessions: not secret, only different each run.
+/// Random bits for session numbers: not secret, but different in each run.
 pub fn random_bits() -> u64 {
     RandomState::new().build_hasher().finish()
 }
@@ -49,7 +49,7 @@ pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
     let result = runtime.block_on(future);
-    // A name that is being looked up would hold the end up for as long as the network likes.
-    runtime.shutdown_timeout(LONGEST_END);
+    // A pending name lookup would delay the end for the whole timeout of the resolver.
+    runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
     result
 }

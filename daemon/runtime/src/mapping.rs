@@ -13,72 +13,67 @@ use std::collections::BTreeMap;
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
-/// What the thread is told.
+/// A request to the mapper's thread.
 pub(super) enum ToMapper {
-    /// Follow these settings.
     Tune(Settings),
-    /// The camera saw something.
     Frame(Box<RecordedFrame>),
-    /// Keep a checkpoint now.
     Keep,
 }
 
-/// What the thread tells.
+/// A report of the mapper's thread.
 pub(super) enum FromMapper {
-    /// The map, after a camera frame or at the start.
-    Seen(Seen),
+    /// The map after a camera frame, or at the start of the run.
+    Mapped(Mapped),
     /// A camera frame that could not be read.
     Missed(UserError),
 }
 
-/// What the thread has made of a camera frame.
-pub(super) struct Seen {
-    /// None at the start, when the map is that of a checkpoint.
+/// The mapper's results after a camera frame.
+pub(super) struct Mapped {
+    /// `None` at the start, when the map is that of a checkpoint.
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
     pub(super) exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
 }
 
-/// The thread's two ends.
 pub(super) struct MapperThread {
     pub(super) orders: mpsc::UnboundedSender<ToMapper>,
-    pub(super) seen: mpsc::Receiver<FromMapper>,
+    pub(super) mapped: mpsc::Receiver<FromMapper>,
     thread: JoinHandle<()>,
 }
 
 impl MapperThread {
-    /// Starts the thread.
     pub(super) fn start(mapper: Mapper, keep: Keep) -> Result<Self, UserError> {
         let (orders, incoming) = mpsc::unbounded_channel();
-        let (outgoing, seen) = mpsc::channel(4);
+        let (outgoing, mapped) = mpsc::channel(4);
         let work = move || Work { mapper, keep, outgoing }.run(incoming);
         let thread = std::thread::Builder::new().name("scene-model".to_owned()).spawn(work);
         let thread = thread.map_err(|e| UserError::Failed(format!("the scene model's thread did not start: {e}")))?;
-        Ok(Self { orders, seen, thread })
+        Ok(Self { orders, mapped, thread })
     }
 
-    /// Waits until the thread has kept what it knows.
+    /// Waits until the thread has kept its last checkpoint.
     pub(super) fn finish(self) {
-        drop((self.orders, self.seen));
+        drop((self.orders, self.mapped));
         if self.thread.join().is_err() {
-            tracing::error!("the scene model's thread has panicked: what it knew since the last checkpoint is lost");
+            tracing::error!("the scene model's thread has panicked: its changes since the last checkpoint are lost");
         }
     }
 }
 
-/// When and where checkpoints are kept.
+/// Schedule and file of the checkpoints.
 pub(super) struct Keep {
     pub(super) file: CheckpointFile<Folder>,
     pub(super) lineage: u64,
-    /// Seconds of mission time from one to the next; 0: none.
+    /// Seconds of mission time between two checkpoints; 0 for none.
     pub(super) every_s: f64,
-    /// Mission time of the last one, or of the first frame.
+    /// Mission time of the last checkpoint, or of the first frame.
     pub(super) last_s: Option<f64>,
 }
 
 impl Keep {
-    /// Keeps a checkpoint if one is due. A disk that refuses does not end the mission: the one before it stays.
+    /// Keeps a checkpoint if one is due. A failing disk does not end the mission: the previous checkpoint stays.
     fn keep(&mut self, mapper: &Mapper, is_due: impl Fn(f64) -> bool) {
         let Some(now_s) = mapper.last_s().filter(|_| self.every_s > 0.0) else { return };
         if !is_due(self.last_s.map_or(f64::INFINITY, |last_s| (now_s - last_s).abs())) {
@@ -86,13 +81,13 @@ impl Keep {
         }
         match self.file.keep(&mapper.save(self.lineage)) {
             Ok(()) => self.last_s = Some(now_s),
-            Err(problem) => tracing::error!("no checkpoint of the scene model at {now_s} s: {problem}"),
+            Err(error) => tracing::error!("no checkpoint of the scene model at {now_s} s: {error}"),
         }
     }
 
     fn keep_if_due(&mut self, mapper: &Mapper) {
         let every_s = self.every_s;
-        // From the first frame on, for there is little to keep of that one.
+        // The interval begins at the first frame, whose map is not worth a checkpoint of its own.
         self.last_s = self.last_s.or(mapper.last_s());
         self.keep(mapper, |since_s| since_s >= every_s);
     }
@@ -109,33 +104,33 @@ struct Work {
 }
 
 impl Work {
-    /// Works until nobody listens any more, then keeps what it knows.
+    /// Handles requests until the host is gone, then keeps a last checkpoint.
     fn run(mut self, mut incoming: mpsc::UnboundedReceiver<ToMapper>) {
-        let mut is_heard = true;
+        let mut is_host_alive = true;
         if self.mapper.last_s().is_some() {
-            is_heard = self.tell(FromMapper::Seen(self.seen(None)));
+            is_host_alive = self.report(FromMapper::Mapped(self.mapped(None)));
         }
-        while is_heard && let Some(order) = incoming.blocking_recv() {
+        while is_host_alive && let Some(order) = incoming.blocking_recv() {
             match order {
                 ToMapper::Tune(settings) => self.mapper.tune(&settings),
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
-                // A frame that the frame rate leaves out changes nothing but where the vehicle is.
+                // A frame beyond the frame rate only changes the vehicle's pose.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_heard = self.tell(FromMapper::Seen(self.seen(Some(*frame))));
+                    is_host_alive = self.report(FromMapper::Mapped(self.mapped(Some(*frame))));
                 }
                 ToMapper::Frame(frame) => {
-                    let told = self.see(*frame);
-                    // First the checkpoint: then it has every label that the surface hears of.
+                    let report = self.see(*frame);
+                    // The checkpoint comes first, so that it contains every label that the surface receives.
                     self.keep.keep_if_due(&self.mapper);
-                    is_heard = self.tell(told);
+                    is_host_alive = self.report(report);
                 }
             }
         }
         self.keep.keep_now(&self.mapper);
     }
 
-    fn tell(&self, what: FromMapper) -> bool {
-        self.outgoing.blocking_send(what).is_ok()
+    fn report(&self, report: FromMapper) -> bool {
+        self.outgoing.blocking_send(report).is_ok()
     }
 
     fn see(&mut self, frame: RecordedFrame) -> FromMapper {
@@ -143,18 +138,18 @@ impl Work {
             Ok(image) => {
                 let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
                 self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
-                FromMapper::Seen(self.seen(Some(frame)))
+                FromMapper::Mapped(self.mapped(Some(frame)))
             }
-            Err(problem) => FromMapper::Missed(problem),
+            Err(error) => FromMapper::Missed(error),
         }
     }
 
-    fn seen(&self, frame: Option<RecordedFrame>) -> Seen {
-        Seen { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
+    fn mapped(&self, frame: Option<RecordedFrame>) -> Mapped {
+        Mapped { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
     }
 }
 
-/// The frames of the camera, in order, each at its time; nothing if there is no camera.
+/// The frames of the camera in order, each at its time; no frames without a camera.
 pub(super) struct Camera {
     frames: std::iter::Peekable<std::vec::IntoIter<RecordedFrame>>,
     clock: Clock,
@@ -163,23 +158,24 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// A camera that plays a recording, if there is one: behind the frame of `seen_s`, if an earlier run has seen that one.
+    /// A camera that plays a recording, if there is one. Playback resumes after the frame of `seen_s`, the
+    /// last one in the checkpoint.
     pub(super) fn new(recording: Option<Recording>, clock: Clock, seen_s: Option<f64>) -> Self {
         let mut frames = recording.map(|r| r.frames).unwrap_or_default();
-        let seen = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
-        let began_s = match seen {
+        let mapped = seen_s.and_then(|t_s| frames.iter().rposition(|frame| frame.t_s == t_s));
+        let began_s = match mapped {
             Some(index) => frames.drain(..=index).next_back().map_or(0.0, |frame| frame.t_s),
             None => 0.0,
         };
         Self { frames: frames.into_iter().peekable(), clock, began_s }
     }
 
-    /// Whether all frames were taken.
+    /// Whether the recording has ended.
     pub(super) fn is_over(&mut self) -> bool {
         self.frames.peek().is_none()
     }
 
-    /// The next frame, at its time; waits for ever when there is none.
+    /// Waits until the next frame is due and returns it; never returns after the last one.
     pub(super) async fn next(&mut self) -> RecordedFrame {
         match self.frames.peek() {
             Some(frame) => {

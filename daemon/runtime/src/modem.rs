@@ -7,10 +7,10 @@ use scenecast_host::{FrameEvent, LinkEnd, LinkHost};
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// A port that was opened again because the modem was silent gets this long before it is opened once more.
+/// Minimum time between two reopenings of the port because of a silent modem.
 const REOPEN_INTERVAL: Duration = Duration::from_secs(10);
 
-/// The port to the modem.
+/// The port to the modem, with the time of its last reopening.
 #[derive(Debug)]
 pub(super) struct ModemPort {
     port: Port,
@@ -25,7 +25,7 @@ impl ModemPort {
         Ok(Self { port, reopened: now })
     }
 
-    /// What the port reports next; safe to abandon.
+    /// The next report of the port. Cancel-safe.
     pub(super) async fn next(&mut self) -> FromPort {
         self.port.next().await
     }
@@ -39,14 +39,14 @@ impl ModemPort {
         }
     }
 
-    /// A port that takes no bytes is a dead one: the driver notices, and the bytes are stale by then.
+    /// Refused bytes are dropped: the port is dead, the driver detects it, and by then the bytes are stale.
     pub(super) fn write(&self, bytes: Vec<u8>) {
         if !self.port.write(bytes) {
             tracing::debug!("modem: the port takes no more");
         }
     }
 
-    /// Opens the port again where the driver wants it.
+    /// Opens the port again if the driver requests it.
     pub(super) fn reopen_if_silent<E: LinkEnd>(&mut self, link: &LinkHost<E>, now: Instant) {
         if link.wants_reopening(now) && now.since(self.reopened) > REOPEN_INTERVAL {
             self.reopened = now;
@@ -55,10 +55,10 @@ impl ModemPort {
     }
 }
 
-/// Logs news of frames and modem.
+/// Logs events of frames and modem.
 ///
 /// # Errors
-/// A modem that refuses a setting before it ever worked: it ends the run, for a person is still there.
+/// A modem that refuses a setting before it ever worked ends the run, while the person who started it is still there.
 pub(super) fn log(event: &FrameEvent) -> Result<(), UserError> {
     match event {
         FrameEvent::ModemReady => tracing::info!("modem: ready"),
@@ -68,8 +68,8 @@ pub(super) fn log(event: &FrameEvent) -> Result<(), UserError> {
         }
         FrameEvent::ModemRefused { reason, .. } => tracing::error!("modem: {reason}"),
         FrameEvent::NotSent(refusal) => tracing::error!("modem: a frame is not sent: {refusal}"),
-        FrameEvent::OverBudget { worst_window_bps } => {
-            tracing::error!("the bit budget was exceeded: {worst_window_bps:.0} bit/s in the worst window");
+        FrameEvent::OverBudget { max_window_bps } => {
+            tracing::error!("the bit budget was exceeded: {max_window_bps:.0} bit/s in the fullest window");
         }
         FrameEvent::Sent { .. } | FrameEvent::Received { .. } => {}
     }
@@ -81,7 +81,7 @@ pub(super) fn log_audit<E: LinkEnd>(link: &LinkHost<E>) {
     let a = link.audit();
     let (frames, bits, worst) = (a.transmissions(), a.total_bits(), a.worst_window_bps());
     let repeated = link.repeated_bits();
-    tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the worst window");
+    tracing::info!("{frames} transmissions, {bits} bits on air, {worst:.0} bit/s in the fullest window");
     if repeated > 0 {
         tracing::info!("{repeated} bits more were repeats of the modem, and charged to the budget");
     }

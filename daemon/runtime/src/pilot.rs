@@ -1,4 +1,4 @@
-//! The autopilot that is configured, and the port to it.
+//! The configured autopilot and its port.
 
 use crate::port::{FromPort, Port};
 use scenecast_config::{AutopilotKind, Config};
@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Makes the autopilot of kind `rehearsal`, a simulated vehicle; builds without the simulator have none.
 pub type SimulatedAutopilot = fn(&Config, Instant) -> Box<dyn Autopilot>;
 
-/// The autopilot that is configured, if any.
+/// The configured autopilot, if there is one.
 pub(super) fn autopilot(
     config: &Config,
     simulated: Option<SimulatedAutopilot>,
@@ -27,8 +27,8 @@ pub(super) fn autopilot(
         AutopilotKind::Rehearsal => match simulated {
             Some(make) => make(config, now),
             None => {
-                let what = "autopilot.kind = \"rehearsal\" is not allowed: this build has no simulator";
-                return Err(UserError::Input(format!("{what}; it takes none, mavlink, nmea or log")));
+                let cause = "autopilot.kind = \"rehearsal\" is not allowed: this build has no simulator";
+                return Err(UserError::Input(format!("{cause}; it takes none, mavlink, nmea or log")));
             }
         },
         AutopilotKind::None => return Ok(None),
@@ -41,19 +41,19 @@ pub(super) struct PilotPort {
 }
 
 impl PilotPort {
-    /// Opens the port that an autopilot is configured to have.
+    /// Opens the port of the configured autopilot.
     pub(super) fn open(config: &Config, has_autopilot: bool) -> Self {
         let a = &config.autopilot;
         let port = a.port.clone().filter(|_| has_autopilot && a.kind != AutopilotKind::Rehearsal);
         Self { port: port.map(|port| Port::open_when_there("autopilot", port, None)) }
     }
 
-    /// What the port reports next; never without one. Safe to abandon.
+    /// The next report of the port; without a port it never returns. Cancel-safe.
     pub(super) async fn next(&mut self) -> FromPort {
         Port::next_of(&mut self.port).await
     }
 
-    /// Bytes that the port does not take are stale by the time that it would.
+    /// Refused bytes are dropped, for they would be stale when the port accepts bytes again.
     pub(super) fn write(&self, bytes: Vec<u8>) {
         if let Some(port) = &self.port {
             port.write(bytes);
@@ -61,7 +61,7 @@ impl PilotPort {
     }
 }
 
-/// Logs news of the autopilot.
+/// Logs events of the autopilot.
 pub(super) fn log(event: PilotEvent) {
     match event {
         PilotEvent::Note(note) => tracing::info!("autopilot: {note}"),

@@ -1,7 +1,7 @@
-//! A vehicle whose power is cut at any step, and the surface that speaks to it.
+//! A vehicle whose power is cut at any step, and a surface that sends orders to it.
 
-use super::durable::{Keeper, Run};
-use super::journal::disk::{Chance, Disk, Step};
+use super::durable::{Keeper, StartedRun};
+use super::journal::disk::{Disk, DiskRng, DiskStep};
 use proptest::prelude::*;
 use scenecast_config::Config;
 use scenecast_core::Area;
@@ -20,12 +20,12 @@ use std::time::Duration;
 
 const TICK: Duration = Duration::from_millis(100);
 const PROPAGATION: Duration = Duration::from_millis(200);
-/// Ticks within which everything must have settled, whatever was cut.
-const MOST_TICKS: u32 = 9000;
+/// Maximum number of ticks until all orders are decided, for any sequence of cuts.
+const MAX_TICKS: u32 = 9000;
 const LABELS: u8 = 200;
 const WINDOW: Duration = Duration::from_secs(10);
 
-/// A frame on its way.
+/// A frame on its way through the channel.
 struct Arrival {
     at_vehicle: bool,
     bytes: Vec<u8>,
@@ -40,19 +40,19 @@ struct Onboard {
     book_epoch: u8,
 }
 
-/// Why the vehicle's program has ended.
+/// The reason that the vehicle's program ended.
 #[derive(Debug)]
-enum End {
+enum RunEnd {
     PowerCut,
     UserError(UserError),
 }
 
-struct World {
+struct PowerCutTrial {
     config: Config,
     surface: SurfaceHost,
     onboard: Onboard,
     disk: Disk,
-    chance: Chance,
+    rng: DiskRng,
     /// Power cuts to come, each by the steps since the last start.
     cuts: Vec<usize>,
     /// Percent of frames that are lost.
@@ -63,34 +63,34 @@ struct World {
     starts: u32,
     /// Slots that the vehicle has acted on.
     acted: BTreeSet<(SlotId, u16)>,
-    /// Epochs that the surface was told, with the start of the vehicle in which.
-    told: BTreeMap<u8, u32>,
-    /// What ended a run of the vehicle besides power cuts; the disk is mended after it.
-    problems: Vec<UserError>,
+    /// Epochs that the surface received, and the start of the vehicle in which each was first sent.
+    published_epochs: BTreeMap<u8, u32>,
+    /// Errors other than power cuts that ended a run of the vehicle; the disk is mended after each.
+    errors: Vec<UserError>,
 }
 
-impl World {
+impl PowerCutTrial {
     fn new(seed: u64, loss: usize, mut cuts: Vec<usize>) -> Self {
         let sets = ["link.max_idle_s=4", "link.status_period_s=4", "link.max_range_m=300"].map(str::to_owned);
         let config = scenecast_config::load(None, &sets).unwrap();
         let disk = Disk::default();
-        let mut chance = Chance::new(seed);
+        let mut rng = DiskRng::new(seed);
         let surface =
             scenecast_surface::assemble(&config, None, TuningTable::shipped(), profile(&config), seed, Instant::ZERO)
                 .unwrap();
         let station = channel_station(profile(&config), WINDOW, Instant::ZERO);
         let surface = SurfaceHost::new(surface, station, None);
         cuts.reverse();
-        let onboard = start(&config, &disk, &mut chance, &mut cuts, 0, Instant::ZERO);
-        let (on_air, acted, told) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
-        let problems = Vec::new();
+        let onboard = start(&config, &disk, &mut rng, &mut cuts, 0, Instant::ZERO);
+        let (on_air, acted, published_epochs) = (BTreeMap::new(), BTreeSet::new(), BTreeMap::new());
+        let errors = Vec::new();
         Self {
-            problems,
+            errors,
             config,
             surface,
             onboard,
             disk,
-            chance,
+            rng,
             cuts,
             loss,
             ticks: 0,
@@ -98,7 +98,7 @@ impl World {
             serial: 0,
             starts: 0,
             acted,
-            told,
+            published_epochs,
         }
     }
 
@@ -110,10 +110,10 @@ impl World {
         scenecast_config::vehicle_address(&self.config).unwrap()
     }
 
-    /// Runs until all is told and heard.
+    /// Runs until every order has been applied or refused.
     fn run(&mut self) {
-        while self.ticks < 250 || !self.is_settled() {
-            assert!(self.ticks < MOST_TICKS, "it never settles");
+        while self.ticks < 250 || !self.is_converged() {
+            assert!(self.ticks < MAX_TICKS, "it never converges");
             self.tick();
         }
         let last = [(SlotId::Constraints, 2), (SlotId::Budget, 2), (SlotId::Fix, 1), (SlotId::Utility, 1)];
@@ -124,7 +124,7 @@ impl World {
         assert_eq!(self.onboard.saved.budget_bps, Some(9000));
     }
 
-    fn is_settled(&self) -> bool {
+    fn is_converged(&self) -> bool {
         let mut slots = self.surface.surface().view(self.auv()).unwrap().slots();
         slots.all(|s| matches!(s.status, OrderStatus::Applied | OrderStatus::Refused(_)))
     }
@@ -133,7 +133,8 @@ impl World {
         self.ticks += 1;
         self.operate();
         self.surface.handle_timeout(self.now());
-        while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= Instant::ZERO + TICK * self.ticks) {
+        let now = self.now();
+        while let Some(due) = self.on_air.first_entry().filter(|e| e.key().0 <= now) {
             let Arrival { at_vehicle, bytes } = due.remove();
             match at_vehicle {
                 true => self.run_vehicle(Some(&bytes)),
@@ -145,7 +146,7 @@ impl World {
         }
         self.run_vehicle(None);
         while self.surface.poll_event().is_some() {}
-        while let Some(bytes) = self.surface.poll_output(self.now()) {
+        while let Some(bytes) = self.surface.poll_output(now) {
             self.transmit(bytes, false);
         }
         let shown: BTreeSet<u8> =
@@ -153,7 +154,6 @@ impl World {
         assert!(shown.len() <= 1, "labels of several epochs on one map: {shown:?}");
     }
 
-    /// What the operator does.
     fn operate(&mut self) {
         let (auv, now) = (self.auv(), self.now());
         let surface = self.surface.surface_mut();
@@ -174,21 +174,21 @@ impl World {
         }
     }
 
-    /// The vehicle's host, for a tick or a frame that came in; starts anew when it has ended.
+    /// The vehicle's host, for a tick or a frame that came in; starts again when it has ended.
     fn run_vehicle(&mut self, frame: Option<&[u8]>) {
         match self.try_vehicle(frame) {
             Ok(None) => {}
             Ok(Some(bytes)) => self.transmit(bytes, true),
-            Err(End::PowerCut) => self.restart(),
-            Err(End::UserError(problem)) => {
-                self.problems.push(problem);
+            Err(RunEnd::PowerCut) => self.restart(),
+            Err(RunEnd::UserError(error)) => {
+                self.errors.push(error);
                 self.disk.fail(None);
                 self.restart();
             }
         }
     }
 
-    fn try_vehicle(&mut self, frame: Option<&[u8]>) -> Result<Option<Vec<u8>>, End> {
+    fn try_vehicle(&mut self, frame: Option<&[u8]>) -> Result<Option<Vec<u8>>, RunEnd> {
         let now = self.now();
         self.onboard.host.handle_timeout(now);
         if let Some(bytes) = frame {
@@ -209,15 +209,15 @@ impl World {
         let Some(bytes) = self.onboard.host.poll_output(now) else { return Ok(None) };
         self.host_step()?;
         assert_eq!(&self.onboard.saved, self.onboard.host.vehicle().durable(), "sent before it was safe");
-        let told_in = *self.told.entry(self.onboard.saved.epoch).or_insert(self.starts);
-        assert_eq!(told_in, self.starts, "an epoch comes twice");
+        let published_in = *self.published_epochs.entry(self.onboard.saved.epoch).or_insert(self.starts);
+        assert_eq!(published_in, self.starts, "an epoch comes twice");
         Ok(Some(bytes))
     }
 
-    fn carry_out(&mut self, event: VehicleHostEvent) -> Result<(), End> {
+    fn carry_out(&mut self, event: VehicleHostEvent) -> Result<(), RunEnd> {
         let Onboard { keeper, host, saved, .. } = &mut self.onboard;
         if event == VehicleHostEvent::Persist {
-            let off = |problem| if self.disk.is_off() { End::PowerCut } else { End::UserError(problem) };
+            let off = |error| if self.disk.is_off() { RunEnd::PowerCut } else { RunEnd::UserError(error) };
             keeper.save(host.vehicle().durable()).map_err(off)?;
             *saved = host.vehicle().durable().clone();
             host.handle_persisted();
@@ -243,20 +243,20 @@ impl World {
         onboard.host.handle_map(&update, Instant::ZERO + TICK * self.ticks);
     }
 
-    fn host_step(&self) -> Result<(), End> {
-        self.disk.step(Step::Host).map_err(|_| End::PowerCut)
+    fn host_step(&self) -> Result<(), RunEnd> {
+        self.disk.step(DiskStep::Host).map_err(|_| RunEnd::PowerCut)
     }
 
     fn restart(&mut self) {
         let (before, now) = (self.onboard.saved.epoch, self.now());
         self.starts += 1;
-        self.onboard = start(&self.config, &self.disk, &mut self.chance, &mut self.cuts, self.starts, now);
+        self.onboard = start(&self.config, &self.disk, &mut self.rng, &mut self.cuts, self.starts, now);
         assert!(self.onboard.saved.epoch > before, "the epoch goes back or stays");
     }
 
     fn transmit(&mut self, bytes: Vec<u8>, by_vehicle: bool) {
         let end = self.now() + profile(&self.config).airtime(bytes.len());
-        if self.chance.below(100) >= self.loss {
+        if self.rng.below(100) >= self.loss {
             self.serial += 1;
             self.on_air.insert((end + PROPAGATION, self.serial), Arrival { at_vehicle: !by_vehicle, bytes });
         }
@@ -267,48 +267,41 @@ fn profile(config: &Config) -> ModemProfile {
     scenecast_config::modem_profile(config, config.modem.bit_rate)
 }
 
-/// Starts the vehicle's program, again and again while the power goes.
-fn start(
-    config: &Config,
-    disk: &Disk,
-    chance: &mut Chance,
-    cuts: &mut Vec<usize>,
-    starts: u32,
-    now: Instant,
-) -> Onboard {
+/// Starts the vehicle's program until it starts without a power cut.
+fn start(config: &Config, disk: &Disk, rng: &mut DiskRng, cuts: &mut Vec<usize>, starts: u32, now: Instant) -> Onboard {
     loop {
         if disk.is_off() || starts > 0 {
-            disk.power_cut(Chance::new(chance.below(1 << 30) as u64));
+            disk.power_cut(DiskRng::new(rng.below(1 << 30) as u64));
         }
         if let Some(steps) = cuts.pop() {
             disk.cut_after(steps);
         }
         match Keeper::begin_run(disk.clone(), 1, None) {
-            Ok(Run { keeper, durable, .. }) => {
+            Ok(StartedRun { keeper, durable, .. }) => {
                 let area = Area { west: 0.0, south: 0.0, east: 20.0, north: 20.0 };
                 let profile = profile(config);
-                let seed = chance.below(1 << 30) as u64;
+                let seed = rng.below(1 << 30) as u64;
                 let vehicle =
                     scenecast_vehicle::assemble(config, None, profile, area, durable.clone(), seed, now).unwrap();
                 let host = VehicleHost::new(vehicle, channel_station(profile, WINDOW, now), None);
                 let book_epoch = durable.epoch;
                 return Onboard { keeper, host, saved: durable, book_epoch };
             }
-            Err(problem) => assert!(disk.is_off(), "{problem}"),
+            Err(error) => assert!(disk.is_off(), "{error}"),
         }
     }
 }
 
 #[test]
 fn a_power_cut_applies_nothing_twice_and_keeps_label_meanings() {
-    let mut whole = World::new(1, 0, Vec::new());
+    let mut whole = PowerCutTrial::new(1, 0, Vec::new());
     whole.run();
     assert_eq!(whole.acted.len(), 6, "every version comes through");
     let steps = whole.disk.steps();
-    assert!(steps.iter().filter(|s| **s == Step::Sync).count() > 6);
+    assert!(steps.iter().filter(|s| **s == DiskStep::Sync).count() > 6);
     for cut in 0..steps.len() {
         for seed in 1..4 {
-            World::new(seed, 0, vec![cut]).run();
+            PowerCutTrial::new(seed, 0, vec![cut]).run();
         }
     }
 }
@@ -319,21 +312,21 @@ proptest! {
     fn power_cuts_and_losses_apply_nothing_twice(
         seed: u64, loss in 0usize..40, cuts in proptest::collection::vec(0usize..80, 1..8),
     ) {
-        World::new(seed, loss, cuts).run();
+        PowerCutTrial::new(seed, loss, cuts).run();
     }
 }
 
 #[test]
 fn a_failing_disk_ends_the_run_and_the_next_run_catches_up() {
-    for (seed, failing) in (0..50).flat_map(|seed| [(seed, Step::Sync), (seed, Step::Append)]) {
-        let mut world = World::new(seed, 0, Vec::new());
-        while world.ticks < 29 {
-            world.tick();
+    for (seed, failing) in (0..50).flat_map(|seed| [(seed, DiskStep::Sync), (seed, DiskStep::Append)]) {
+        let mut trial = PowerCutTrial::new(seed, 0, Vec::new());
+        while trial.ticks < 29 {
+            trial.tick();
         }
-        world.disk.fail(Some(failing));
-        world.run();
-        let doing = if failing == Step::Sync { "syncing" } else { "writing" };
-        let told = format!("vehicle.journal: {doing}: input/output error; check the disk, then start again");
-        assert_eq!(world.problems, [UserError::Failed(told)]);
+        trial.disk.fail(Some(failing));
+        trial.run();
+        let doing = if failing == DiskStep::Sync { "syncing" } else { "writing" };
+        let message = format!("vehicle.journal: {doing}: input/output error; check the disk, then start again");
+        assert_eq!(trial.errors, [UserError::Failed(message)]);
     }
 }

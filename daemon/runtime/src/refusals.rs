@@ -1,9 +1,9 @@
-//! What is said in the log of keys and of frames that are not authentic.
+//! Log lines about missing keys and frames that are not authentic.
 
 use scenecast_config::Config;
 use scenecast_protocol::link::{DropReason, LinkStats};
 
-/// Says in the log what it means to have no key.
+/// Warns of the risk of running without a key.
 pub(super) fn warn_without_key(config: &Config) {
     if config.link.key_file.is_none() {
         tracing::warn!(
@@ -13,7 +13,7 @@ pub(super) fn warn_without_key(config: &Config) {
     }
 }
 
-/// Says the first refusal of a kind in the log; the others are only counted.
+/// Logs the first refusal of each kind; the others are only counted.
 #[derive(Debug, Default)]
 pub(super) struct Refusals {
     has_unauthenticated: bool,
@@ -21,7 +21,7 @@ pub(super) struct Refusals {
 }
 
 impl Refusals {
-    /// Looks at what was refused so far.
+    /// Checks the counters of refused frames.
     pub(super) fn note(&mut self, stats: &LinkStats) {
         let is_there = |reason| stats.dropped.contains_key(&reason);
         if !self.has_unauthenticated && is_there(DropReason::Unauthenticated) {

@@ -8,7 +8,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 /// Reads a configuration, the same file and options each time.
 pub type Load = Box<dyn Fn() -> Result<Config, UserError>>;
 
-/// Reads the configuration again whenever SIGHUP asks for it.
+/// Reads the configuration again after each SIGHUP.
 pub(super) struct Reload {
     load: Load,
     #[cfg(unix)]
@@ -27,13 +27,13 @@ impl Reload {
         Ok(Self { load })
     }
 
-    /// The configuration as it is now, once it is asked for; one that cannot be read is logged and changes nothing.
+    /// Waits for a SIGHUP and returns the new configuration; a file that cannot be read is logged and ignored.
     pub(super) async fn next(&mut self) -> Config {
         loop {
             self.hang_up().await;
             match (self.load)() {
                 Ok(config) => return config,
-                Err(problem) => tracing::error!("{problem}; SIGHUP changes nothing"),
+                Err(error) => tracing::error!("{error}; no setting is changed"),
             }
         }
     }

@@ -1,7 +1,7 @@
-//! The scene model at the start of a run: that of the last checkpoint, or a new one.
+//! The scene model at the start of a run: restored from the last checkpoint, or new.
 
 use super::checkpoint::CheckpointFile;
-use super::durable::{Keeper, Run};
+use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
 use super::mapping::Keep;
 use scenecast_config::Config;
@@ -10,17 +10,17 @@ use scenecast_files::configured_vocabulary;
 use scenecast_vehicle::{Mapper, NoCheckpoint, Restored};
 use std::path::Path;
 
-/// What a run begins with.
+/// The state at the start of a run.
 pub(super) struct Start {
-    pub(super) run: Run<Folder>,
+    pub(super) run: StartedRun<Folder>,
     pub(super) mapper: Mapper,
     pub(super) keep: Keep,
 }
 
 /// Begins a run in the folder of its state.
 ///
-/// A checkpoint that cannot be gone on from costs the map that was learnt, and nothing that was promised: labels begin a
-/// new epoch. So it is said in the log, and does not keep the vehicle from its mission.
+/// An unusable checkpoint loses the learnt map, but no label changes its meaning, because a new epoch begins. It is
+/// logged as an error, and the mission starts.
 pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     let refused = |e: std::io::Error| UserError::file(dir, e);
     let folder = Folder::hold(dir).map_err(refused)?;
@@ -34,14 +34,14 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
             mapper.resume(durable.epoch, durable.labels);
             let (cells, at) = (mapper.cells(), mapper.last_s().unwrap_or(0.0));
             tracing::info!(
-                "the scene model goes on from its checkpoint at {at} s: {cells} cells, epoch {}",
+                "the scene model resumes from its checkpoint at {at} s: {cells} cells, epoch {}",
                 durable.epoch
             );
             mapper
         }
         other => {
             if other.is_some() {
-                tracing::warn!("the checkpoint of the scene model is of another mission: it begins anew");
+                tracing::warn!("the checkpoint of the scene model is of another mission: it starts from scratch");
             }
             Mapper::new(
                 config,
@@ -60,10 +60,10 @@ fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Rest
     let Some(bytes) = file.read()? else { return Ok(None) };
     match Mapper::restore(config, configured_vocabulary(config.scene.vocabulary.as_deref())?, &bytes) {
         Ok(restored) => Ok(Some(restored)),
-        Err(NoCheckpoint::Config(problem)) => Err(problem),
+        Err(NoCheckpoint::Config(error)) => Err(error),
         Err(why) => {
             let place = file.path();
-            tracing::error!("{}: {why}; the scene model begins anew, with new labels", place.display());
+            tracing::error!("{}: {why}; the scene model starts from scratch, with new labels", place.display());
             Ok(None)
         }
     }

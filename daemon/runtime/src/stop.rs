@@ -1,8 +1,8 @@
-//! Who asks a process to end: a person or the system.
+//! Requests of a person or the system that the process end.
 
 use scenecast_core::UserError;
 
-/// Hears Ctrl-C and SIGTERM from its making on: one that comes while the process is at other work is not lost.
+/// Catches Ctrl-C and SIGTERM from its creation on, so that none is lost while the process does other work.
 pub struct Stop {
     #[cfg(unix)]
     interrupt: tokio::signal::unix::Signal,
@@ -13,25 +13,23 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Listens from now on.
     #[cfg(unix)]
     pub fn new() -> Result<Self, UserError> {
         use tokio::signal::unix::{SignalKind, signal};
-        let problem = |e| UserError::Failed(format!("the signals to end: {e}"));
+        let error = |e| UserError::Failed(format!("the signals to end: {e}"));
         Ok(Self {
-            interrupt: signal(SignalKind::interrupt()).map_err(problem)?,
-            terminate: signal(SignalKind::terminate()).map_err(problem)?,
+            interrupt: signal(SignalKind::interrupt()).map_err(error)?,
+            terminate: signal(SignalKind::terminate()).map_err(error)?,
         })
     }
 
-    /// Listens from now on.
     #[cfg(not(unix))]
     pub fn new() -> Result<Self, UserError> {
         let interrupt = tokio::signal::windows::ctrl_c();
         Ok(Self { interrupt: interrupt.map_err(|e| UserError::Failed(format!("Ctrl-C: {e}")))? })
     }
 
-    /// Returns when the process is to end; safe to abandon.
+    /// Returns when the process is to end. Cancel-safe.
     pub async fn asked(&mut self) {
         #[cfg(unix)]
         tokio::select! {

@@ -24,7 +24,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
 
-/// The page gets a new snapshot at least this often.
+/// Maximum time between two snapshots for the page.
 const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Runs the surface until it is interrupted.
@@ -84,7 +84,7 @@ struct Ports {
     pilot: PilotPort,
 }
 
-/// Moves bytes, reads the clock, writes files and answers the page; every decision is the host's.
+/// Moves bytes, reads the clock, writes files and answers the page; the host makes all decisions.
 struct SurfaceShell {
     host: SurfaceHost,
     ports: Ports,
@@ -136,7 +136,7 @@ impl SurfaceShell {
     }
 
     fn handle_request(&mut self, request: SurfaceRequest, reply: oneshot::Sender<Reply>) {
-        // A browser that has gone away needs no answer.
+        // A browser that closed its connection needs no reply.
         let _ = reply.send(handle_request(self.host.surface_mut(), request, self.facts.cell_m, self.clock.now()));
     }
 
@@ -147,8 +147,8 @@ impl SurfaceShell {
         }
     }
 
-    /// Acts on every event of the host and writes what it has for the ports. Returns whether the page has something new to
-    /// show.
+    /// Acts on every event of the host and writes the bytes for the ports. Returns whether the
+    /// page needs a new snapshot.
     fn pump(&mut self) -> Result<bool, UserError> {
         let now = self.clock.now();
         let mut is_changed = self.handle_events()?;
@@ -217,7 +217,7 @@ impl SurfaceShell {
         let Some(map) = self.host.surface().map(vehicle) else { return Ok(()) };
         let png = match label_picture::encode(map) {
             Ok(png) => png,
-            // What came through the water ends no run.
+            // Received data must not end the run.
             Err(e) => {
                 tracing::warn!("operator-map-{}.png is not written: {e}", vehicle.number());
                 return Ok(());

@@ -1,9 +1,9 @@
 //! `scenecast auv`: ports, disk and clock around the vehicle's host.
 
 use super::clock::Clock;
-use super::durable::{Keeper, Run};
+use super::durable::{Keeper, StartedRun};
 use super::journal::Folder;
-use super::mapping::{Camera, FromMapper, MapperThread, Seen, ToMapper};
+use super::mapping::{Camera, FromMapper, Mapped, MapperThread, ToMapper};
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
@@ -19,10 +19,10 @@ use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
 use std::time::Duration;
 
-/// The host is asked again at least this often.
+/// Maximum time between two calls of the host.
 const MAX_SLEEP: Duration = Duration::from_secs(1);
 
-/// Runs the vehicle until it is interrupted; SIGHUP has it `load` budget and shares again.
+/// Runs the vehicle until it is interrupted; on SIGHUP it calls `load` for a new budget and new shares.
 pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
@@ -30,7 +30,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
         let Start { run, mut mapper, keep } = start(&config, dir)?;
-        let Run { keeper, durable, is_again } = run;
+        let StartedRun { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
@@ -82,7 +82,7 @@ struct Ports {
     pilot: PilotPort,
 }
 
-/// Moves bytes, reads the clock and syncs files; every decision is the host's.
+/// Moves bytes, reads the clock and syncs files; the host makes all decisions.
 struct VehicleShell {
     host: VehicleHost,
     camera: Camera,
@@ -115,9 +115,9 @@ impl VehicleShell {
                 report = self.ports.pilot.next() => self.handle_pilot(report),
                 config = self.reload.next() => self.follow(&config),
                 frame = self.camera.next() => self.handle_camera(frame),
-                seen = self.mapper.seen.recv() => match seen {
-                    Some(FromMapper::Seen(seen)) => self.handle_seen(seen),
-                    Some(FromMapper::Missed(problem)) => self.handle_missed(&problem),
+                mapped = self.mapper.mapped.recv() => match mapped {
+                    Some(FromMapper::Mapped(mapped)) => self.handle_seen(mapped),
+                    Some(FromMapper::Missed(error)) => self.handle_missed(&error),
                     None => return Err(UserError::Failed("the scene model's thread ended".to_owned())),
                 },
             }
@@ -134,7 +134,7 @@ impl VehicleShell {
         }
     }
 
-    /// Budget and shares of the configuration take the place of those that the surface ordered.
+    /// Replaces the budget and the shares that the surface ordered by those of the configuration.
     fn follow(&mut self, config: &Config) {
         let link = &config.link;
         let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background };
@@ -153,19 +153,19 @@ impl VehicleShell {
         }
     }
 
-    fn handle_seen(&mut self, seen: Seen) {
+    fn handle_seen(&mut self, mapped: Mapped) {
         let now = self.clock.now();
-        self.host.handle_mapped(seen.frame.as_ref().map(pose_of), &seen.update, seen.exemplars, now);
+        self.host.handle_mapped(mapped.frame.as_ref().map(pose_of), &mapped.update, mapped.exemplars, now);
     }
 
-    /// One bad frame does not end a mission.
-    fn handle_missed(&mut self, problem: &UserError) {
+    /// Logs an unreadable frame; it does not end the mission.
+    fn handle_missed(&mut self, error: &UserError) {
         self.missed += 1;
-        tracing::error!("a camera frame was passed over, {} so far: {problem}", self.missed);
+        tracing::error!("a camera frame was skipped, {} so far: {error}", self.missed);
         self.host.handle_missed();
     }
 
-    /// Acts on every event of the host, then writes what it has for the ports.
+    /// Acts on every event of the host, then writes the bytes for the ports.
     fn pump(&mut self) -> Result<(), UserError> {
         let now = self.clock.now();
         self.host.steer(now);

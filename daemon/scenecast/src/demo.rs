@@ -1,4 +1,4 @@
-//! A rehearsal at the pace of the world, with the operator's page.
+//! A rehearsal in real time, with the operator's page.
 
 use scenecast_console::{Console, LinkMeter, MissionFacts, bind, handle_request, snapshot, start};
 use scenecast_core::UserError;
@@ -10,15 +10,15 @@ use std::time::Duration;
 
 /// Wall time between two steps.
 const TICK: Duration = Duration::from_millis(50);
-/// Wall time that a step may take: then the page is served, however far the mission has come.
-const STEP_LIMIT: Duration = Duration::from_millis(200);
-/// Mission time that is flown between two looks at the wall clock.
+/// Maximum wall time of a step: after it the page is served, even if the mission is late.
+const MAX_STEP: Duration = Duration::from_millis(200);
+/// Mission time that passes between two readings of the wall clock.
 const STRIDE: Duration = Duration::from_millis(250);
-/// Wall time between two snapshots for the page when nothing happens.
-const PUBLISH: Duration = Duration::from_secs(1);
+/// Wall time between two snapshots for the page while the mission has no events.
+const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Flies a mission at `speed` mission seconds a second and serves the operator's page on `port`, until it is interrupted;
-/// without a page, until the operator has everything.
+/// Runs a mission at `speed` mission seconds per second of wall time and serves the operator's page on `port`, until it
+/// is interrupted; without a page, until the survey has ended and the link has drained.
 pub fn run_demo(mission: Mission, speed: f64, port: Option<u16>) -> Result<(), UserError> {
     block_on(async move {
         let stop = Stop::new()?;
@@ -58,8 +58,9 @@ impl Demo {
                 () = stop.asked() => return Ok(()),
                 _ = tick.tick() => {}
             }
-            // A machine that is too slow for the speed falls behind; it must not try to catch up, or each step takes longer.
-            let passed = before.elapsed().min(STEP_LIMIT + TICK);
+            // A machine that is too slow for the speed must not try to catch up, or each step
+            // takes longer than the last.
+            let passed = before.elapsed().min(MAX_STEP + TICK);
             before = std::time::Instant::now();
             self.fly(self.mission.now() + passed.mul_f64(self.facts.speed))?;
             self.count();
@@ -72,11 +73,11 @@ impl Demo {
         }
     }
 
-    /// Flies the mission on to `until`, or as far as there is time for.
+    /// Advances the mission to `until`, or as far as [`MAX_STEP`] allows.
     fn fly(&mut self, until: Instant) -> Result<(), UserError> {
         let end = Instant::from_secs_f64(self.mission.config().survey.duration_s);
         let began = std::time::Instant::now();
-        while self.mission.now() < until && began.elapsed() < STEP_LIMIT {
+        while self.mission.now() < until && began.elapsed() < MAX_STEP {
             let next = until.min(self.mission.now() + STRIDE);
             if next >= end && !self.facts.ended {
                 self.mission.advance(end)?;
@@ -92,11 +93,11 @@ impl Demo {
         let now = self.mission.now();
         while let Ok((request, reply)) = console.requests.try_recv() {
             let cell_m = self.facts.cell_m;
-            // A browser that has gone away needs no answer.
+            // A browser that closed its connection needs no reply.
             let _ = reply.send(handle_request(self.mission.surface_mut(), request, cell_m, now));
             changed = true;
         }
-        let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH);
+        let due = self.published.is_none_or(|at| at.elapsed() >= PUBLISH_INTERVAL);
         if changed || due {
             self.published = Some(std::time::Instant::now());
             let snapshot = snapshot(self.mission.surface(), &self.facts, &self.meter, now);
@@ -104,7 +105,7 @@ impl Demo {
         }
     }
 
-    /// The page's link panel shows what the surface knows: what it heard, and what it sent.
+    /// Counts the bits that the surface received and sent, for the page's link panel.
     fn count(&mut self) {
         let now = self.mission.now();
         let totals = [self.mission.received_bits(), self.mission.audits()[1].total_bits()];

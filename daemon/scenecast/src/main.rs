@@ -4,7 +4,7 @@ use clap::Parser;
 use clap::error::{ContextKind, ContextValue};
 use std::process::ExitCode;
 
-/// Options that have another name now.
+/// Old and new names of renamed options.
 const OLD_OPTIONS: [(&str, &str); 2] = [("--planes", "--layers"), ("--spend", "--background")];
 
 fn main() -> ExitCode {
@@ -26,7 +26,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The message for an old option.
+/// The error for an old option names the new one.
 fn renamed(error: &clap::Error) -> Option<String> {
     let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return None };
     let (old, new) = OLD_OPTIONS.into_iter().find(|(old, _)| old == given)?;

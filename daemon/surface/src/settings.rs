@@ -1,6 +1,6 @@
 //! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
 
-use scenecast_protocol::directive::{CellBand, Change, Figure, OrderStatus, PlannerKind, Settings};
+use scenecast_protocol::directive::{CellBand, Change, OrderStatus, PlannerKind, Settings, ShortDecimal};
 use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -57,12 +57,12 @@ impl SettingsOrder {
         };
         let given = [self.alpha, self.beta, self.gamma, self.refine_words_per_s, self.frames_per_s];
         let mut changes = [Change::Keep; 5];
-        for ((change, value), (name, _, range)) in changes.iter_mut().zip(given).zip(settings.figures()) {
+        for ((change, value), (name, _, range)) in changes.iter_mut().zip(given).zip(settings.numbers()) {
             *change = match value {
                 None => Change::Keep,
                 Some(0.0) => Change::Configured,
                 Some(value) => {
-                    let figure = Figure::new(value).filter(|figure| range.contains(&figure.value()));
+                    let figure = ShortDecimal::new(value).filter(|figure| range.contains(&figure.value()));
                     Change::To(figure.ok_or_else(|| {
                         format!("{name} {value}: it takes {} to {}, or 0 as configured", range.start(), range.end())
                     })?)
@@ -101,7 +101,7 @@ impl SettingsOrder {
             }
         }
         let text = |name: &str| name.to_owned();
-        let figure = |change| told(change, 0.0, Figure::value);
+        let figure = |change| told(change, 0.0, ShortDecimal::value);
         Self {
             planner: told(settings.planner, String::new(), |p| text(p.name())),
             cells: told(settings.cells, String::new(), |c| text(c.name())),
@@ -208,7 +208,7 @@ mod tests {
     fn what_is_allowed_is_what_the_configuration_allows() {
         use scenecast_config::Key;
         let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
-        for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().figures()) {
+        for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().numbers()) {
             let key = Key::find(name).unwrap();
             // 0 words a second is a configuration's way to have no refinement.
             let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };

@@ -1,23 +1,23 @@
-//! Progress of long work, on a terminal only.
+//! Progress of long work, shown on a terminal only.
 
 use std::io::{IsTerminal, Write};
 
-/// A line on the standard error output that shows how far the work is.
+/// A line on the standard error output with the share of the work that is done.
 pub struct Progress {
-    what: &'static str,
+    task: &'static str,
     shown: Option<u32>,
 }
 
 impl Progress {
-    pub fn new(what: &'static str) -> Self {
-        Self { what, shown: None }
+    pub fn new(task: &'static str) -> Self {
+        Self { task, shown: None }
     }
 
     /// Shows a share of the work, 0..=1.
     pub fn show(&mut self, share: f64) {
         let percent = (share * 100.0) as u32;
         if std::io::stderr().is_terminal() && self.shown.replace(percent) != Some(percent) {
-            eprint!("\r{} {percent:3} %", self.what);
+            eprint!("\r{} {percent:3} %", self.task);
             let _ = std::io::stderr().flush();
         }
     }

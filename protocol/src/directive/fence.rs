@@ -29,6 +29,20 @@ use crate::coordinates::DecimetrePoint;
 ///
 /// Source: surface. Eight vertices with edges of up to 800 m and a return point take at most 37 bytes, which fit a
 /// frame of 64 bytes under a key; without one, edges may have 6 km.
+///
+/// ```
+/// use scenecast_protocol::coordinates::DecimetrePoint;
+/// use scenecast_protocol::directive::{Fence, FenceFault, Polygon};
+///
+/// let square = |low, high| {
+///     Polygon([(low, low), (high, low), (high, high), (low, high)].map(|(x, y)| DecimetrePoint::new(x, y)).into())
+/// };
+/// let fence = Fence { fence: Some(square(0, 400)), keep_outs: vec![square(10, 50)], return_point: None };
+/// assert_eq!(fence.check(), Ok(()));
+/// assert!(fence.allows(DecimetrePoint::new(100, 100)) && !fence.allows(DecimetrePoint::new(20, 20)));
+/// let closed = Fence { keep_outs: vec![square(-10, 500)], ..fence };
+/// assert_eq!(closed.check(), Err(FenceFault::NothingLeft(1)));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Fence {
     /// The outline that the vehicle stays inside.
@@ -41,6 +55,7 @@ pub struct Fence {
 
 /// Why a fence is refused. Keep-outs are counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FenceFault {
     /// The fence is not a valid polygon.
     #[error("fence: {0}")]
@@ -107,7 +122,7 @@ impl Fence {
         self.fence.iter().chain(&self.keep_outs)
     }
 
-    /// Encodes the payload. A fence that [`Self::check`] refuses is cut to what the layout can state.
+    /// Encodes the payload. A fence that [`Self::check`] refuses is cut to the limits of the layout.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bits = BitWriter::default();
         let keep_outs = self.keep_outs.len().min(Self::MAX_KEEP_OUTS);

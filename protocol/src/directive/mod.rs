@@ -1,27 +1,30 @@
 //! The directive: the operator's orders to a vehicle, as independent versioned slots.
 
+mod budget;
+mod constraints;
 mod decision;
 mod fence;
-mod figure;
 mod fix;
 mod limits;
 mod outbox;
 mod polygon;
 mod requests;
 mod settings;
-mod tuning;
+mod short_decimal;
 mod utility;
 
+pub use budget::Budget;
+pub use constraints::Constraints;
 pub use decision::{SlotReport, SlotState};
 pub use fence::{Fence, FenceFault};
-pub use figure::Figure;
 pub use fix::Fix;
 pub use limits::{Band, Limits, LimitsFault, Reaction};
-pub use outbox::{OrderStatus, PendingSlot, SlotOutbox, SlotProgress};
+pub use outbox::{OrderStatus, SlotProgress};
+pub(crate) use outbox::{PendingSlot, SlotOutbox};
 pub use polygon::{Polygon, PolygonFault};
 pub use requests::{ExemplarRequest, ExemplarRequests};
-pub use settings::{Budget, Constraints, PlannerKind};
-pub use tuning::{CellBand, Change, Settings, SettingsFault};
+pub use settings::{CellBand, Change, PlannerKind, Settings, SettingsFault};
+pub use short_decimal::ShortDecimal;
 pub use utility::Utility;
 
 use crate::bytes::{Reader, Truncated};
@@ -157,7 +160,7 @@ pub enum Slot {
     Utility(Utility),
     /// Orders to hold or to abort.
     Constraints(Constraints),
-    /// Settings of mapping and planning.
+    /// Settings of the scene model, of the map that is sent, and of the planner.
     Settings(Settings),
     /// Bit budget, shares and background streams.
     Budget(Budget),
@@ -223,6 +226,15 @@ impl Slot {
 /// +-----+---------+-------------------------------+---------------
 ///   version       | payload ...
 /// ```
+///
+/// ```
+/// use scenecast_protocol::directive::{Constraints, Slot, VersionedSlot};
+///
+/// let hold = Slot::Constraints(Constraints { hold: true, abort: false });
+/// let bytes = VersionedSlot::encode(0xABCD, 1, &hold);
+/// assert_eq!(bytes, [0x20, 0xAB, 0xCD, 0, 1, 0x80]);
+/// assert_eq!(VersionedSlot::decode(&bytes).unwrap().content, Some(hold));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct VersionedSlot {
     /// The slot, also where the payload is unreadable.
@@ -237,6 +249,7 @@ pub struct VersionedSlot {
 
 impl VersionedSlot {
     /// Encodes `slot` at `version` of `series`.
+    #[must_use]
     pub fn encode(series: u16, version: u16, slot: &Slot) -> Vec<u8> {
         let mut out = vec![(slot.id() as u8) << 5];
         out.extend_from_slice(&series.to_be_bytes());
@@ -289,7 +302,7 @@ mod tests {
 
     #[test]
     fn all_settings_at_once_fit_a_frame_of_48_bytes() {
-        let figure = Change::To(Figure::new(0.01).unwrap());
+        let figure = Change::To(ShortDecimal::new(0.01).unwrap());
         let settings = Settings {
             planner: Change::To(PlannerKind::Greedy),
             cells: Change::To(CellBand::CoarseToFine),

@@ -118,19 +118,19 @@ impl SlotOutbox {
 
     /// Notes that the vehicle acknowledged a frame with this version.
     pub fn mark_received(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.advance(id, version, OrderStatus::Received, now, |life| {
-            matches!(life, OrderStatus::Queued | OrderStatus::OnAir)
+        self.advance(id, version, OrderStatus::Received, now, |status| {
+            matches!(status, OrderStatus::Queued | OrderStatus::OnAir)
         });
     }
 
     /// Takes the decisions in the vehicle's report; returns the slots that are newly applied or refused.
     pub fn handle_report(&mut self, reports: &[SlotReport; SLOTS], now: Instant) -> Vec<SlotId> {
-        let mut settled = Vec::new();
+        let mut decided = Vec::new();
         for (id, report) in SlotId::ALL.into_iter().zip(reports) {
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let status = match report.state {
                 SlotState::Unknown => {
-                    let forgotten = |l| matches!(l, OrderStatus::Received | OrderStatus::Applied);
+                    let forgotten = |s| matches!(s, OrderStatus::Received | OrderStatus::Applied);
                     self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
                     continue;
                 }
@@ -138,11 +138,11 @@ impl SlotOutbox {
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
-            if self.advance(id, slot.version, status, now, |l| l == OrderStatus::Received) {
-                settled.push(id);
+            if self.advance(id, slot.version, status, now, |s| s == OrderStatus::Received) {
+                decided.push(id);
             }
         }
-        settled
+        decided
     }
 
     /// Queues again each order that a restarted vehicle is not known to have in force.

@@ -8,6 +8,7 @@ pub struct Polygon(pub Vec<DecimetrePoint>);
 
 /// Why a polygon is not valid. Vertices and edges count from 1; edge n begins at vertex n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PolygonFault {
     /// Fewer than 3 or more than [`Polygon::MAX_VERTICES`] vertices.
     #[error("{0} vertices: it takes 3 to {most}", most = Polygon::MAX_VERTICES)]

@@ -1,40 +1,61 @@
-//! Short slots that set how a vehicle behaves.
+//! Settings of the vehicle: how it builds its map, which cells and layers it sends, and how it plans its path.
 
+use super::ShortDecimal;
 use crate::bytes::{Reader, Truncated};
-use crate::schedule::{BackgroundOrder, Shares};
+use crate::map::{LayerId, LayerMask};
+use std::ops::RangeInclusive;
 
-/// Orders that never wait for anything longer.
-///
-/// ```text
-/// byte 0: bit 7 hold, bit 6 abort; the rest reserved, 0, not read
-/// ```
+/// An order about one setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Constraints {
-    /// Stay where you are, until told to go on.
-    pub hold: bool,
-    /// Stop the survey and do what is set for an abort ([`super::Limits::on_abort`]); goes before `hold`.
-    pub abort: bool,
+pub enum Change<T> {
+    /// The setting stays as it is.
+    #[default]
+    Keep,
+    /// The setting returns to the vehicle's configured value.
+    Configured,
+    /// The setting gets this value.
+    To(T),
 }
 
-impl Constraints {
-    pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.push(u8::from(self.hold) << 7 | u8::from(self.abort) << 6);
+impl<T: Copy> Change<T> {
+    /// The combination of this order and a later one: the later one, unless it keeps the setting.
+    pub fn then(self, later: Self) -> Self {
+        if matches!(later, Self::Keep) { self } else { later }
     }
 
-    pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        let flags = r.u8()?;
-        Ok(Self { hold: flags & 0x80 != 0, abort: flags & 0x40 != 0 })
+    /// The ordered value; `None` if the configured value is in force.
+    pub fn value(self) -> Option<T> {
+        match self {
+            Self::To(value) => Some(value),
+            Self::Keep | Self::Configured => None,
+        }
+    }
+
+    fn code(self, index: impl FnOnce(T) -> u8) -> u8 {
+        match self {
+            Self::Keep => 0,
+            Self::Configured => 1,
+            Self::To(value) => index(value) + 2,
+        }
+    }
+
+    fn from_code(code: u8, value: impl FnOnce(u8) -> Option<T>) -> Result<Self, Truncated> {
+        match code {
+            0 => Ok(Self::Keep),
+            1 => Ok(Self::Configured),
+            _ => value(code - 2).map(Self::To).ok_or(Truncated),
+        }
     }
 }
 
-/// How the vehicle chooses its way.
+/// The planner that chooses the next waypoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlannerKind {
     /// Parallel legs over the whole survey.
     Lawnmower,
-    /// The place of the best gain a metre, again and again.
+    /// Always the place with the highest gain for each metre of path.
     Greedy,
-    /// The best way over all that is left of distance and time.
+    /// The best path over the whole remaining distance and time.
     Horizon,
 }
 
@@ -57,37 +78,322 @@ impl PlannerKind {
     }
 }
 
-/// Bits that the vehicle may put on air, and on what.
-///
-/// ```text
-/// bytes 0-2: budget in bits a second, 1..=16 777 215
-/// bytes 3-7: least shares in percent of directive, status, fix, map, exemplar; together at most 100
-/// bytes 8...: order of the background streams, see [`BackgroundOrder`]
-/// ```
+/// The cells of the map that a vehicle sends. The cells of its scene model do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Budget {
-    /// Bits a second over the vehicle's budget window.
-    pub bits_per_s: u32,
-    /// Least share of each class while it has something to send.
-    pub shares: Shares,
-    /// Order of the background streams.
-    pub background: BackgroundOrder,
+pub enum CellBand {
+    /// Every cell of the map, in no order of size.
+    Fine,
+    /// Where the backlog is long, every fourth cell in both directions first; then every cell.
+    CoarseToFine,
+    /// Every fourth cell in both directions. Other cells that the surface already knows stay up to date.
+    Coarse,
 }
 
-impl Budget {
-    pub(super) fn encode(&self, out: &mut Vec<u8>) {
-        out.extend_from_slice(self.bits_per_s.min(0xFF_FFFF).to_be_bytes().get(1..).unwrap_or_default());
-        out.extend_from_slice(&self.shares.0);
-        out.extend(self.background.to_bytes());
+impl CellBand {
+    /// Every band, in wire order.
+    pub const ALL: [Self; 3] = [Self::Fine, Self::CoarseToFine, Self::Coarse];
+
+    /// Name in files and in the API.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fine => "fine",
+            Self::CoarseToFine => "coarse-to-fine",
+            Self::Coarse => "coarse",
+        }
+    }
+
+    /// The band of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|band| band.name() == name)
+    }
+}
+
+/// A setting that no vehicle could obey.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{name} {value}: it takes {} to {}", range.start(), range.end())]
+pub struct SettingsFault {
+    /// Name of the setting, as in files and in the API.
+    pub name: &'static str,
+    /// The value that was ordered, in the unit of the setting.
+    pub value: f64,
+    /// The values that a vehicle accepts, in the same unit.
+    pub range: RangeInclusive<f64>,
+}
+
+/// Orders about the scene model, the cells and layers to send, and the planner. A setting that is not named stays as it is.
+///
+/// ```text
+///         7   6   5   4   3   2   1   0
+///       +-----------+-----------+-------+
+/// byte 0| planner   | cells     | layers|
+///       +---+---+---+---+---+---+---+---+
+/// byte 1| C | D | Q | a | b | g | r | f |
+///       +---+---+---+---+---+---+---+---+
+/// then 2 bytes, a mask of layers, if layers is 3
+/// then 2 bytes, a [`ShortDecimal`], for each of a, b, g, r, f that is 1
+/// ```
+/// * planner: 0 stays, 1 as configured, 2 lawnmower, 3 greedy, 4 horizon.
+/// * cells: 0 stays, 1 as configured, 2 fine, 3 coarse to fine, 4 coarse.
+/// * layers: 0 stay, 1 as configured, 2 those of C (layer 1), D (layer 0) and Q (layer 2), 3 those of the mask, whose bit 0
+///   is layer 0; 3 only if the mask has other layers than these three.
+/// * a, b, g: alpha, beta, gamma of the scene model; r: words resampled a second of mission time; f: camera frames a
+///   second that the scene model sees.
+///
+/// ```
+/// use scenecast_protocol::directive::{Change, PlannerKind, Settings, ShortDecimal};
+///
+/// let first = Settings { alpha: Change::To(ShortDecimal::new(0.1).unwrap()), ..Settings::default() };
+/// let second = Settings { planner: Change::To(PlannerKind::Horizon), ..Settings::default() };
+/// let both = first.then(&second);
+/// assert_eq!((both.alpha, both.planner), (first.alpha, second.planner));
+/// assert_eq!(Settings::from_bytes(&both.to_bytes()), Some(both));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Settings {
+    /// The planner that chooses the next waypoints.
+    pub planner: Change<PlannerKind>,
+    /// The cells of the map that it sends.
+    pub cells: Change<CellBand>,
+    /// The layers that it sends beside the labels.
+    pub layers: Change<LayerMask>,
+    /// Alpha of the scene model, within [`Self::PRIOR`]: the weight of labels that are common elsewhere.
+    pub alpha: Change<ShortDecimal>,
+    /// Beta of the scene model, within [`Self::PRIOR`]: the prior count of each word in a label.
+    pub beta: Change<ShortDecimal>,
+    /// Gamma of the scene model, within [`Self::GAMMA`]: the weight of a new label.
+    pub gamma: Change<ShortDecimal>,
+    /// Words resampled a second of mission time.
+    pub refine_words_per_s: Change<ShortDecimal>,
+    /// Camera frames a second that the scene model sees at most.
+    pub frames_per_s: Change<ShortDecimal>,
+}
+
+impl Settings {
+    /// The range of alpha and beta, dimensionless.
+    pub const PRIOR: RangeInclusive<f64> = 1e-9..=1e3;
+    /// The range of gamma, dimensionless.
+    pub const GAMMA: RangeInclusive<f64> = 1e-12..=1e3;
+    /// Words a second that may be resampled.
+    pub const WORDS_PER_S: RangeInclusive<f64> = 1.0..=1e8;
+    /// Frames a second that the scene model may see.
+    pub const FRAMES_PER_S: RangeInclusive<f64> = 0.01..=30.0;
+    /// Most bytes of the payload.
+    pub const MAX_BYTES: usize = 14;
+    /// The layers that have a bit in byte 1.
+    const SHORT_LAYERS: [(u8, LayerId); 3] =
+        [(0x80, LayerId::CONFIDENCE), (0x40, LayerId::DEPTH), (0x20, LayerId::CURIOSITY)];
+
+    /// The combination of these settings with later ones; where both name a setting, the later one counts.
+    #[must_use]
+    pub fn then(&self, later: &Self) -> Self {
+        Self {
+            planner: self.planner.then(later.planner),
+            cells: self.cells.then(later.cells),
+            layers: self.layers.then(later.layers),
+            alpha: self.alpha.then(later.alpha),
+            beta: self.beta.then(later.beta),
+            gamma: self.gamma.then(later.gamma),
+            refine_words_per_s: self.refine_words_per_s.then(later.refine_words_per_s),
+            frames_per_s: self.frames_per_s.then(later.frames_per_s),
+        }
+    }
+
+    /// Each numeric setting with its name and range.
+    pub fn numbers(&self) -> [(&'static str, Change<ShortDecimal>, RangeInclusive<f64>); 5] {
+        [
+            ("alpha", self.alpha, Self::PRIOR),
+            ("beta", self.beta, Self::PRIOR),
+            ("gamma", self.gamma, Self::GAMMA),
+            ("refine_words_per_s", self.refine_words_per_s, Self::WORDS_PER_S),
+            ("frames_per_s", self.frames_per_s, Self::FRAMES_PER_S),
+        ]
+    }
+
+    /// Checks that every number lies within its range; the error names the first one that does not.
+    pub fn check(&self) -> Result<(), SettingsFault> {
+        for (name, change, range) in self.numbers() {
+            let value = change.value().map(ShortDecimal::value);
+            if let Some(value) = value.filter(|value| !range.contains(value)) {
+                return Err(SettingsFault { name, value, range });
+            }
+        }
+        Ok(())
+    }
+
+    /// Encodes the payload, which is also the form in the journal.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let planner = self.planner.code(|p| p as u8);
+        let cells = self.cells.code(|c| c as u8);
+        let mask = self.layers.value().unwrap_or_default();
+        let is_short = Self::is_short(mask);
+        let layers = self.layers.code(|_| u8::from(!is_short));
+        let bits = Self::SHORT_LAYERS.into_iter().filter(|&(_, id)| is_short && mask.has(id));
+        let mut given = bits.fold(0, |given, (bit, _)| given | bit);
+        let mut numbers = Vec::new();
+        for (index, (_, change, _)) in self.numbers().into_iter().enumerate() {
+            if !matches!(change, Change::Keep) {
+                given |= 0x10 >> index;
+            }
+            ShortDecimal::encode(change, &mut numbers);
+        }
+        let mut out = vec![planner << 5 | cells << 2 | layers, given];
+        if !is_short {
+            out.extend_from_slice(&mask.0.to_be_bytes());
+        }
+        out.append(&mut numbers);
+        out
+    }
+
+    fn is_short(mask: LayerMask) -> bool {
+        mask.iter().all(|layer| Self::SHORT_LAYERS.iter().any(|&(_, id)| id == layer))
+    }
+
+    fn decode_layers(code: u8, given: u8, r: &mut Reader<'_>) -> Result<Change<LayerMask>, Truncated> {
+        let short = Self::SHORT_LAYERS.into_iter().filter(|&(bit, _)| given & bit != 0).map(|(_, id)| id).collect();
+        match code {
+            2 => Ok(Change::To(short)),
+            _ if short != LayerMask::default() => Err(Truncated),
+            3 => Some(LayerMask(r.u16()?)).filter(|&mask| !Self::is_short(mask)).map(Change::To).ok_or(Truncated),
+            _ => Change::from_code(code, |_| None),
+        }
     }
 
     pub(super) fn decode(r: &mut Reader<'_>) -> Result<Self, Truncated> {
-        let bits_per_s = r.u24()?;
-        let mut shares = [0; 5];
-        for share in &mut shares {
-            *share = r.u8()?;
+        let (choices, given) = (r.u8()?, r.u8()?);
+        let layers = Self::decode_layers(choices & 3, given, r)?;
+        let mut figure = |bit: u8| if given & bit != 0 { ShortDecimal::decode(r) } else { Ok(Change::Keep) };
+        Ok(Self {
+            alpha: figure(0x10)?,
+            beta: figure(0x08)?,
+            gamma: figure(0x04)?,
+            refine_words_per_s: figure(0x02)?,
+            frames_per_s: figure(0x01)?,
+            planner: Change::from_code(choices >> 5, |code| PlannerKind::ALL.get(usize::from(code)).copied())?,
+            cells: Change::from_code(choices >> 2 & 7, |code| CellBand::ALL.get(usize::from(code)).copied())?,
+            layers,
+        })
+    }
+
+    /// Decodes the bytes of [`Self::to_bytes`]; `None` if a code, a bit or the length is not allowed.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let mut r = Reader::new(bytes);
+        Self::decode(&mut r).ok().filter(|_| r.rest().is_empty())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::fmt;
+
+    fn to(value: f64) -> Change<ShortDecimal> {
+        Change::To(ShortDecimal::new(value).unwrap())
+    }
+
+    fn change<T: Copy + fmt::Debug + 'static>(value: impl Strategy<Value = T>) -> impl Strategy<Value = Change<T>> {
+        prop_oneof![Just(Change::Keep), Just(Change::Configured), value.prop_map(Change::To)]
+    }
+
+    fn figure() -> impl Strategy<Value = ShortDecimal> {
+        (100u16..=999, -14i32..=17)
+            .prop_map(|(digits, e)| ShortDecimal::new(f64::from(digits) * 10f64.powi(e)).unwrap())
+    }
+
+    fn settings() -> impl Strategy<Value = Settings> {
+        let choices = (
+            change(proptest::sample::select(PlannerKind::ALL.to_vec())),
+            change(proptest::sample::select(CellBand::ALL.to_vec())),
+            change(prop_oneof![0u16..8, any::<u16>()].prop_map(LayerMask)),
+        );
+        let figures = (change(figure()), change(figure()), change(figure()), change(figure()), change(figure()));
+        (choices, figures).prop_map(|((planner, cells, layers), (alpha, beta, gamma, refine, frames))| Settings {
+            planner,
+            cells,
+            layers,
+            alpha,
+            beta,
+            gamma,
+            refine_words_per_s: refine,
+            frames_per_s: frames,
+        })
+    }
+
+    #[test]
+    fn golden_bytes_of_settings() {
+        let settings = Settings {
+            planner: Change::To(PlannerKind::Horizon),
+            cells: Change::To(CellBand::Coarse),
+            layers: Change::To(LayerMask::from_iter([LayerId::DEPTH])),
+            alpha: to(0.01),
+            gamma: Change::Configured,
+            frames_per_s: to(0.25),
+            ..Settings::default()
+        };
+        let bytes = [0x92, 0x55, 0x28, 0x64, 0, 0, 0x2C, 0xFA];
+        assert_eq!(settings.to_bytes(), bytes);
+        assert_eq!(Settings::from_bytes(&bytes), Some(settings));
+        assert_eq!(Settings::default().to_bytes(), [0, 0]);
+        let of_layers = |mask| Settings { layers: Change::To(LayerMask(mask)), ..Settings::default() }.to_bytes();
+        assert_eq!(of_layers(0b100), [2, 0x20]);
+        assert_eq!(
+            (of_layers(0b010), of_layers(0), of_layers(0x8004)),
+            (vec![2, 0x80], vec![2, 0], vec![3, 0, 0x80, 4])
+        );
+    }
+
+    #[test]
+    fn an_order_adds_to_those_before_it_and_can_take_them_back() {
+        let first = Settings { alpha: to(0.5), gamma: to(1e-5), ..Settings::default() };
+        let second = Settings { alpha: Change::Configured, beta: to(0.2), ..Settings::default() };
+        let both = first.then(&second);
+        assert_eq!((both.alpha, both.beta, both.gamma), (Change::Configured, to(0.2), to(1e-5)));
+        assert_eq!((both.alpha.value(), both.then(&first).alpha), (None, to(0.5)));
+    }
+
+    #[test]
+    fn a_number_out_of_its_range_is_named() {
+        let message = |settings: Settings| settings.check().unwrap_err().to_string();
+        assert_eq!(
+            message(Settings { alpha: to(5000.0), ..Settings::default() }),
+            "alpha 5000: it takes 0.000000001 to 1000"
+        );
+        let fast = Settings { frames_per_s: to(31.0), ..Settings::default() };
+        assert_eq!(message(fast), "frames_per_s 31: it takes 0.01 to 30");
+        assert_eq!(Settings { gamma: to(1e-12), beta: to(1e3), ..Settings::default() }.check(), Ok(()));
+    }
+
+    #[test]
+    fn reserved_bits_and_codes_are_refused() {
+        for bytes in [
+            &[0xA0, 0][..],
+            &[0x14, 0],
+            &[3, 0],
+            &[0, 0x20],
+            &[0, 0x80],
+            &[3, 0, 0, 7],
+            &[3, 0x20, 0x80, 0],
+            &[0, 0x10, 0, 99],
+            &[0, 0x10, 0x80, 100],
+        ] {
+            assert_eq!(Settings::from_bytes(bytes), None, "{bytes:02X?}");
         }
-        let background = BackgroundOrder::from_bytes(r.take(r.rest().len())?).ok_or(Truncated)?;
-        Ok(Self { bits_per_s, shares: Shares(shares), background })
+        assert_eq!(Settings::from_bytes(&[0, 0, 0]), None);
+    }
+
+    proptest! {
+        #[test]
+        fn settings_round_trip(settings in settings()) {
+            let bytes = settings.to_bytes();
+            prop_assert!(bytes.len() <= Settings::MAX_BYTES);
+            prop_assert_eq!(Settings::from_bytes(&bytes), Some(settings));
+        }
+
+        #[test]
+        fn any_bytes_are_settings_or_are_refused(bytes in proptest::collection::vec(any::<u8>(), 0..14)) {
+            if let Some(settings) = Settings::from_bytes(&bytes) {
+                prop_assert_eq!(settings.to_bytes(), bytes);
+            }
+        }
     }
 }

@@ -12,6 +12,14 @@ use std::collections::BTreeMap;
 ///  2    weight of perplexity, hundredths, signed, -100..=100
 ///  3..  pairs: label 1..=254, weight in hundredths, signed, -100..=100; a label not named weighs 0
 /// ```
+///
+/// ```
+/// use scenecast_protocol::directive::Utility;
+///
+/// let utility = Utility { exploration: 20, weights: [(3, 80), (5, -20)].into(), ..Utility::default() };
+/// assert_eq!((utility.weight(3), utility.weight(5), utility.weight(9)), (0.8, -0.2, 0.0));
+/// assert!(utility.is_in_range());
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Utility {
     /// The epoch of the label ids.

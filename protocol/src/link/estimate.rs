@@ -27,7 +27,7 @@ impl Loss {
         self.share += (f64::from(u8::from(lost)) - self.share) / f64::from(self.frames);
     }
 
-    /// The share in 0..=1; 0 if nothing was counted.
+    /// The share in 0..=1; 0 before the first count.
     pub fn share(&self) -> f64 {
         self.share
     }

@@ -1,7 +1,7 @@
 //! Two ends that agree on their shared state, whatever frames the channel loses, delays, repeats or damages.
 //!
-//! [`VehicleLink`] and [`SurfaceLink`] are the ends. [`LinkPair`] is the state that either keeps toward one peer: the
-//! handshake and its runs, [`Flight`] (sent frames of unknown fate) and [`LinkWindow`] (received frames).
+//! [`VehicleLink`] and [`SurfaceLink`] are the ends. Toward each peer, an end keeps a handshake, its run, the [`Flight`]
+//! of sent frames whose fate is unknown, and the [`LinkWindow`] of received frames.
 
 mod estimate;
 mod flight;
@@ -16,7 +16,7 @@ mod window;
 
 pub use estimate::{Goodput, Loss};
 pub use flight::Flight;
-pub use pair::{Inbound, LinkPair};
+use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};

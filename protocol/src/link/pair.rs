@@ -73,7 +73,7 @@ impl<T> LinkPair<T> {
     }
 
     /// Whether there is a current run of the peer.
-    pub fn is_met(&self) -> bool {
+    pub fn has_run(&self) -> bool {
         self.handshake.run().is_some() && !self.handshake.is_leaving()
     }
 
@@ -113,7 +113,7 @@ impl<T> LinkPair<T> {
     }
 
     /// Whether the peer seems to use other runs than this end does.
-    pub fn has_lost_touch(&self) -> bool {
+    pub fn seems_out_of_step(&self) -> bool {
         self.strays >= Self::STRAYS
     }
 
@@ -129,7 +129,7 @@ impl<T> LinkPair<T> {
 
     /// Bytes of the seal of our frames, and of the nonce of a hello.
     pub fn seal_bytes(&self) -> usize {
-        match (self.is_keyed(self.direction_out()), self.is_met()) {
+        match (self.is_keyed(self.direction_out()), self.has_run()) {
             (true, true) => TAG_BYTES,
             (true, false) => TAG_BYTES + 8,
             (false, _) => 4,
@@ -260,7 +260,7 @@ impl<T> LinkPair<T> {
     }
 
     /// Whether the next frame must be a hello.
-    pub fn must_greet(&self) -> bool {
+    pub fn must_send_hello(&self) -> bool {
         self.owes_hello || self.handshake.run().is_none()
     }
 
@@ -274,7 +274,7 @@ impl<T> LinkPair<T> {
         stamp: Option<Stamp>,
         kind: FrameKind,
     ) -> FrameBuilder {
-        let kind = FrameKind::hello_if(kind.is_hello() || self.must_greet());
+        let kind = FrameKind::hello_if(kind.is_hello() || self.must_send_hello());
         let hello = kind.is_hello();
         let own = self.handshake.offered().filter(|_| hello).map_or(self.handshake.own(), |r| r.own);
         let direction = self.direction_out();
@@ -302,7 +302,7 @@ impl<T> LinkPair<T> {
     pub fn finish_frame(&mut self, builder: FrameBuilder, carried: T, kind: FrameKind, short: bool) -> Vec<u8> {
         self.stats.frames_sent += 1;
         let direction = self.direction_out();
-        if kind.is_hello() || self.must_greet() {
+        if kind.is_hello() || self.must_send_hello() {
             let to = self.handshake.offered().filter(|_| self.us != Address::SURFACE).map(|r| r.peer);
             let (session, nonce) = to.map_or((0, 0), |p| (p.session.get(), p.nonce));
             return match &self.authenticity {

@@ -9,9 +9,11 @@ mod grant;
 mod master;
 
 pub use clock_map::ClockMap;
-pub use floor::Floor;
-pub use grant::{Grant, quarter_seconds};
-pub use master::{Master, MasterConfig};
+pub(crate) use floor::Floor;
+pub use grant::Grant;
+pub(crate) use grant::quarter_seconds;
+pub(crate) use master::Master;
+pub use master::MasterConfig;
 
 use std::time::Duration;
 
@@ -32,6 +34,21 @@ pub enum Access {
 }
 
 /// The properties of a modem that the link depends on.
+///
+/// ```
+/// use scenecast_protocol::mac::{Access, ModemProfile};
+/// use std::time::Duration;
+///
+/// let modem = ModemProfile {
+///     frame_bytes: 64,
+///     bit_rate_bps: 1000.0,
+///     overhead_bits: 100,
+///     turn_around: Duration::from_millis(300),
+///     access: Access::Shared,
+/// };
+/// assert_eq!(modem.bits_on_air(50), 500);
+/// assert_eq!(modem.frame_airtime(), Duration::from_millis(612));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModemProfile {
     /// The size of a full frame in bytes.
@@ -48,12 +65,14 @@ pub struct ModemProfile {
 
 impl ModemProfile {
     /// Bits on air of a transmission of `bytes`. In a polled cycle every frame occupies the airtime of a full one.
+    #[must_use]
     pub fn bits_on_air(&self, bytes: usize) -> u64 {
         let bytes = if self.access == Access::Polled { bytes.max(self.frame_bytes) } else { bytes };
         bytes as u64 * 8 + self.overhead_bits
     }
 
     /// The airtime of a transmission of `bytes`.
+    #[must_use]
     pub fn airtime(&self, bytes: usize) -> Duration {
         self.time_of(self.bits_on_air(bytes))
     }

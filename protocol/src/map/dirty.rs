@@ -146,7 +146,7 @@ pub(super) struct Dirty {
     due: Tick,
     /// The lattice on which the tiles' values are computed.
     stride: Stride,
-    /// The number of cells inspected so far in choosing what to send.
+    /// The number of cells inspected so far in choosing the cells to send.
     looked_at: u64,
 }
 

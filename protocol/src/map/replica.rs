@@ -26,7 +26,7 @@ pub struct Replica {
     log: BTreeMap<u64, Vec<(Cell, u8)>>,
     logged: usize,
     shown: LabelGrid,
-    heard: BTreeMap<Cell, CellRecord>,
+    received: BTreeMap<Cell, CellRecord>,
     version: u64,
     updated: Option<Instant>,
 }
@@ -52,30 +52,30 @@ impl Replica {
         self.updated
     }
 
-    /// Cells that the vehicle has sent anything of.
+    /// The number of cells that a chunk has covered.
     pub fn received_cells(&self) -> usize {
-        self.heard.len()
+        self.received.len()
     }
 
     /// When a chunk last covered a cell.
-    pub fn heard(&self, cell: Cell) -> Option<Instant> {
-        self.heard.get(&cell).map(|h| h.at)
+    pub fn received_at(&self, cell: Cell) -> Option<Instant> {
+        self.received.get(&cell).map(|record| record.at)
     }
 }
 
 impl Replica {
-    /// Applies a chunk of frame `number`, unless it makes no sense here or has a label above `most`.
-    pub(super) fn apply_up_to(&mut self, most: u8, number: u64, chunk: &[u8], now: Instant) -> bool {
+    /// Applies a chunk of frame `number`, unless it does not decode here or has a label above `max_label`.
+    pub(super) fn apply_up_to(&mut self, max_label: u8, number: u64, chunk: &[u8], now: Instant) -> bool {
         let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
-        let is_large = self.heard.len().max(self.logged) + changes.len() > MAX_CELLS;
-        if is_large || changes.iter().any(|&(_, label)| label > most) {
+        let is_large = self.received.len().max(self.logged) + changes.len() > MAX_CELLS;
+        if is_large || changes.iter().any(|&(_, label)| label > max_label) {
             return false;
         }
         self.updated = Some(now);
         let mut changed = false;
         for &(cell, label) in &changes {
-            if self.heard.get(&cell).is_none_or(|h| h.number <= number) {
-                self.heard.insert(cell, CellRecord { number, at: now });
+            if self.received.get(&cell).is_none_or(|record| record.number <= number) {
+                self.received.insert(cell, CellRecord { number, at: now });
                 changed |= self.shown.set(cell, label) != label;
             }
         }

@@ -22,7 +22,7 @@ impl LabelRaster {
 
     /// Bytes of the change from `before` as an indexed PNG: the smaller of delta image and its dirty box.
     ///
-    /// Pixel 0 = untouched; 0 bytes if nothing changed.
+    /// Pixel 0 = untouched; 0 bytes without a change.
     pub fn smallest_delta_png(&self, before: &Self, deflated: Deflated<'_>) -> usize {
         if self == before {
             return 0;

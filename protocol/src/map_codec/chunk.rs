@@ -19,6 +19,7 @@ pub struct MapChunk {
 
 /// Why a chunk is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DecodeError {
     /// The bytes end inside the header.
     #[error("map chunk ends early")]
@@ -42,6 +43,18 @@ pub enum DecodeError {
 /// Grows a compact patch around `seed` as long as it fits. `wanted` selects the cells that may be sent now among those
 /// that differ between `base` and `target`; the others stay untouched. `None` if `seed` does not differ or is not
 /// wanted, or if not even one cell fits.
+///
+/// ```
+/// use scenecast_protocol::map::{Cell, LabelGrid};
+/// use scenecast_protocol::map_codec::{Codec, decode, encode};
+///
+/// let base = LabelGrid::default();
+/// let target: LabelGrid = (0..30).map(|x| (Cell::new(x, 4), 2)).collect();
+/// let chunk = encode(Codec::Auto, &base, &target, Cell::new(12, 4), 24, &|_| true).unwrap();
+/// assert!(chunk.bytes.len() <= 24);
+/// assert_eq!(decode(&base, &chunk.bytes), Ok(chunk.changes));
+/// assert!(decode(&target, &chunk.bytes).is_err(), "it was coded against another base");
+/// ```
 pub fn encode(
     codec: Codec,
     base: &LabelGrid,

@@ -14,6 +14,19 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// ```
 /// Little-endian; version 1. base: CRC-32 (as in PNG) of the base's labels, row by row, zeros if there is no base;
 /// sum: CRC-32 of everything before. A map has 1 to 2^26 cells.
+///
+/// ```
+/// use scenecast_protocol::map_codec::{ChunkFile, Codec, LabelRaster};
+///
+/// let base = LabelRaster::uniform(40, 30, 1);
+/// let mut target = base.clone();
+/// target.set(5, 6, 2);
+/// let (file, changed) = ChunkFile::encode(Codec::Auto, &base, &target, 100)?;
+/// assert_eq!(changed, 1);
+/// let read = ChunkFile::from_bytes(&file.to_bytes())?;
+/// assert_eq!(read.apply(Some(&base))?, target);
+/// # Ok::<(), scenecast_protocol::map_codec::ChunkFileError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ChunkFile {
     /// Width of the map in cells.
@@ -28,6 +41,7 @@ pub struct ChunkFile {
 
 /// Why a file of chunks cannot be made or used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChunkFileError {
     /// It does not begin with the magic.
     #[error("not a file of map chunks")]

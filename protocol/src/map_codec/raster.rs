@@ -2,14 +2,14 @@
 
 use crate::grid::{Cell, LabelGrid};
 
-/// Labels of a `width` x `height` map, row by row; 0 = unexplored.
+/// A map that stores a label for each cell of a rectangle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LabelRaster {
-    /// Columns.
+    /// The number of columns, at least 1.
     pub width: usize,
-    /// Rows.
+    /// The number of rows, at least 1.
     pub height: usize,
-    /// Labels, row by row.
+    /// `width * height` labels, row by row from the south; 0 is unexplored.
     pub labels: Vec<u8>,
 }
 
@@ -30,7 +30,7 @@ impl LabelRaster {
         Self { width, height, labels: grid.copy_area(0, 0, width, height) }
     }
 
-    /// What changes from `before`, which has the same size: 0 = untouched, 255 = becomes unexplored.
+    /// The change from `before`, which has the same size: 0 = untouched, 255 = becomes unexplored.
     pub fn delta_from(&self, before: &Self) -> Self {
         let delta = self.labels.iter().zip(&before.labels).map(|(&new, &old)| match new {
             same if same == old => 0,

@@ -4,27 +4,28 @@ use super::LabelRaster;
 use crate::grid::MAX_LABEL;
 use std::io::Cursor;
 
-/// Why a file is not taken as a map.
+/// Why a PNG file is not a label map.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RasterPngError {
     /// Not a PNG file, or a damaged or too large one.
     #[error("not a readable PNG: {0}")]
     Unreadable(#[from] png::DecodingError),
-    /// Pixels are colours.
+    /// Its pixels are colours instead of indexes.
     #[error("the PNG is {0:?}; an indexed one is needed, its pixel values being the labels")]
     NotIndexed(png::ColorType),
-    /// A pixel is no label.
+    /// A pixel value is above 254.
     #[error("the PNG has pixel value {0}; labels go up to {MAX_LABEL}")]
     NoLabel(u8),
 }
 
 /// Bytes that decoding a file may take.
-const MOST_BYTES: usize = 1 << 26;
+const MAX_BYTES: usize = 1 << 26;
 
 impl LabelRaster {
     /// Reads an indexed PNG whose pixel values are the labels (0 = unexplored), first row first.
     pub fn from_png(file: &[u8]) -> Result<Self, RasterPngError> {
-        let limits = png::Limits { bytes: MOST_BYTES };
+        let limits = png::Limits { bytes: MAX_BYTES };
         let mut decoder = png::Decoder::new_with_limits(Cursor::new(file), limits);
         decoder.set_transformations(png::Transformations::IDENTITY);
         let mut reader = decoder.read_info()?;
@@ -32,7 +33,7 @@ impl LabelRaster {
         if colours != png::ColorType::Indexed {
             return Err(RasterPngError::NotIndexed(colours));
         }
-        let size = reader.output_buffer_size().filter(|&size| size <= MOST_BYTES);
+        let size = reader.output_buffer_size().filter(|&size| size <= MAX_BYTES);
         let mut data = vec![0; size.ok_or(png::DecodingError::LimitsExceeded)?];
         let info = reader.next_frame(&mut data)?;
         let bits = info.bit_depth as usize;

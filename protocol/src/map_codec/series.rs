@@ -10,6 +10,16 @@ use std::collections::{BTreeMap, BTreeSet};
 ///
 /// The encoder considers both maps as a whole and, unless the codec is `png`, tiles the change with patches that do not
 /// overlap. This takes fewer bytes than repeated calls of [`encode`]. `None` if `room` is too small for a single cell.
+///
+/// ```
+/// use scenecast_protocol::map::{Cell, LabelGrid};
+/// use scenecast_protocol::map_codec::{Codec, encode_all};
+///
+/// let target: LabelGrid = (0..2500).map(|i| (Cell::new(i % 50, i / 50), 1 + (i / 50 % 3) as u8)).collect();
+/// let chunks = encode_all(Codec::Auto, &LabelGrid::default(), &target, 64).unwrap();
+/// assert!(chunks.iter().all(|chunk| chunk.bytes.len() <= 64));
+/// assert_eq!(chunks.iter().map(|chunk| chunk.changes.len()).sum::<usize>(), 2500);
+/// ```
 pub fn encode_all(codec: Codec, base: &LabelGrid, target: &LabelGrid, room: usize) -> Option<Vec<MapChunk>> {
     let cells = base.iter().chain(target.iter()).map(|(cell, _)| cell);
     let differs = |cell| base.get(cell) != target.get(cell) && target.get(cell) <= MAX_LABEL;

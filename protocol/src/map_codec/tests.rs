@@ -176,9 +176,9 @@ proptest! {
         let mut pixels = vec![0; reader.output_buffer_size().expect("bounded")];
         let info = reader.next_frame(&mut pixels).expect("valid image");
         prop_assert_eq!((info.width, info.height), (rect.width, rect.height));
-        let said: Vec<(Cell, u8)> = rect.cells().zip(pixels.chunks(3)).filter(|(_, p)| p[0] != 0)
+        let decoded: Vec<(Cell, u8)> = rect.cells().zip(pixels.chunks(3)).filter(|(_, p)| p[0] != 0)
             .map(|(cell, p)| (cell, if p[0] == 255 { 0 } else { p[0] })).collect();
-        prop_assert_eq!(said, chunk.changes);
+        prop_assert_eq!(decoded, chunk.changes);
     }
 }
 

@@ -53,6 +53,7 @@ pub struct Part<'a> {
 
 /// Why received bytes are not a part of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PartError {
     /// They are shorter than a header.
     #[error("the part is too short")]

@@ -76,7 +76,7 @@ impl LossyLink {
     }
 
     /// All frames on their way arrive in some order, some twice, or are lost; then their fates are reported in order.
-    fn settle(&mut self) {
+    fn deliver_all(&mut self) {
         let fates: Vec<bool> = (0..self.flying.len()).map(|_| !self.chance.happens(self.loss)).collect();
         let mut arriving: Vec<usize> = (0..fates.len()).filter(|&i| fates[i]).collect();
         for i in 0..arriving.len() {
@@ -92,7 +92,7 @@ impl LossyLink {
         for delivered in fates {
             let Flying { id, run, .. } = self.flying.pop_front().unwrap();
             if self.sender.handle_fate(id, &run, delivered) {
-                assert!(self.received.iter().any(|(r, _)| *r == id), "told complete, but is not");
+                assert!(self.received.iter().any(|(r, _)| *r == id), "reported complete, but is not");
                 self.delivered.push(id);
             }
         }
@@ -107,23 +107,23 @@ proptest! {
         seed: u64,
         lens in proptest::collection::vec(1usize..4000, 1..5),
         loss in 0.0..0.9f64,
-        told in 0.0..0.95f64,
+        assumed_loss in 0.0..0.95f64,
         rooms in (14usize..60, 0usize..1000),
         window in 1usize..60,
     ) {
         let mut link = LossyLink::new(seed, loss);
-        link.sender.set_loss(told);
+        link.sender.set_loss(assumed_loss);
         let objects: Vec<_> = lens.iter().map(|&len| link.chance.object(len)).collect();
         let ids: Vec<_> = objects.iter().map(|o| link.sender.push(o.clone()).unwrap()).collect();
         let mut rounds = 0;
         while !link.sender.is_empty() {
-            prop_assert!(link.sender.backlog_bytes() > 0, "nothing is under way, so something waits");
+            prop_assert!(link.sender.backlog_bytes() > 0, "no part is under way, so content waits");
             for _ in 0..window {
                 let room = rooms.0 + link.chance.below(rooms.1 + 1);
                 link.send(room);
             }
-            link.settle();
-            let now = told * link.chance.below(3) as f64 / 2.0;
+            link.deliver_all();
+            let now = assumed_loss * link.chance.below(3) as f64 / 2.0;
             link.sender.set_loss(now);
             prop_assert_eq!(link.received.len(), link.delivered.len(), "complete at both ends or at neither");
             rounds += 1;
@@ -154,7 +154,7 @@ proptest! {
         link.sender.push(object.clone()).unwrap();
         while !link.sender.is_empty() {
             while link.send(14) {}
-            link.settle();
+            link.deliver_all();
         }
         prop_assert!(link.received.len() == 1 && link.received[0].1 == object);
     }
@@ -171,7 +171,7 @@ fn a_lossless_link_sends_no_repair_symbol() {
             let part = Part::decode(&flying.bytes).unwrap();
             assert!(part.symbols().all(|(symbol, _)| symbol < part.layout.sources()));
         }
-        link.settle();
+        link.deliver_all();
         assert_eq!(link.delivered.len(), 1, "{len} bytes in rooms of {room}");
     }
 }
@@ -198,11 +198,11 @@ fn cost(len: usize, room: usize, loss: f64) -> Cost {
         link.sender.set_loss(loss);
         while link.send(room) {}
         one_pass += link.sent;
-        link.settle();
+        link.deliver_all();
         complete += link.received.len();
         while !link.sender.is_empty() {
             while link.send(room) {}
-            link.settle();
+            link.deliver_all();
         }
         in_all += link.sent;
     }
@@ -228,7 +228,7 @@ fn late_parts_of_a_complete_object_are_ignored() {
     link.sender.push(object).unwrap();
     while link.send(100) {}
     let parts: Vec<_> = link.flying.iter().map(|f| f.bytes.clone()).collect();
-    link.settle();
+    link.deliver_all();
     assert_eq!(link.received.len(), 1);
     for part in &parts {
         assert_eq!(link.receiver.handle_part(&Part::decode(part).unwrap()), Received::Nothing);
@@ -244,12 +244,12 @@ fn a_name_that_is_used_again_is_another_object() {
         if round % 7 == 0 {
             // Left incomplete at the receiver.
             link.send(30);
-            link.settle();
+            link.deliver_all();
             link.sender.cancel(id);
             continue;
         }
         while link.send(30) {}
-        link.settle();
+        link.deliver_all();
         assert_eq!(link.received.pop(), Some((id, object)));
     }
 }
@@ -273,7 +273,7 @@ fn the_head_is_known_before_the_rest() {
     let id = link.sender.push(object.clone()).unwrap();
     assert_eq!(link.receiver.head(id, 3), None);
     link.send(49);
-    link.settle();
+    link.deliver_all();
     assert_eq!(link.receiver.head(id, 3), Some(&object[..3]));
     assert_eq!(link.receiver.head(id, 600), None);
 }
@@ -290,7 +290,7 @@ fn a_restart_of_the_peer_voids_earlier_fates() {
         assert!(!link.sender.handle_fate(flying.id, &flying.run, true));
     }
     while link.send(49) {}
-    link.settle();
+    link.deliver_all();
     assert!(link.received.len() == 1 && link.received[0].1 == object);
 }
 
@@ -300,7 +300,7 @@ fn a_cancelled_object_is_not_received_again() {
     let object = link.chance.object(700);
     let id = link.sender.push(object).unwrap();
     link.send(49);
-    link.settle();
+    link.deliver_all();
     link.receiver.cancel(id);
     while link.send(49) {}
     let part = link.flying.pop_back().unwrap().bytes;

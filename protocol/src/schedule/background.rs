@@ -3,7 +3,7 @@
 use super::Class;
 use crate::map::{LayerId, LayerSet};
 
-/// Content that is only worth bits that nothing else needs.
+/// Content that is sent with spare capacity only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BackgroundStream {
     /// The cells between those of the coarse map, while the backlog is long: in its place among the background streams
@@ -24,7 +24,7 @@ impl BackgroundStream {
         [Self::Finer, Self::Exemplars].into_iter().chain(layers.iter().map(|(id, _)| Self::Layer(id)))
     }
 
-    /// Name in files and in the API.
+    /// The name of the stream in files and in the API.
     pub fn name_in(self, layers: &LayerSet) -> String {
         match self {
             Self::Finer => Self::FINER.to_owned(),
@@ -76,6 +76,17 @@ impl BackgroundStream {
 /// long form, if there is any other stream, as many bytes as it takes:
 ///     a bit 1, five bits: number of streams, five bits for each: 0 to 15 that layer, 16 finer cells, 17 exemplars, zeros
 /// ```
+///
+/// ```
+/// use scenecast_protocol::map::LayerSet;
+/// use scenecast_protocol::schedule::BackgroundOrder;
+///
+/// let layers = LayerSet::default();
+/// let order = BackgroundOrder::from_names(&["exemplars", "depth"], &layers)?;
+/// assert_eq!(order.names(&layers), ["exemplars", "depth"]);
+/// assert!(BackgroundOrder::from_names(&["depth", "depth"], &layers).is_err());
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BackgroundOrder([Option<BackgroundStream>; BackgroundOrder::MAX_STREAMS]);
 
@@ -122,7 +133,7 @@ impl BackgroundOrder {
         self.0.into_iter().flatten()
     }
 
-    /// Names in their order.
+    /// The names of the streams in their order.
     pub fn names(&self, layers: &LayerSet) -> Vec<String> {
         self.iter().map(|stream| stream.name_in(layers)).collect()
     }
@@ -162,14 +173,14 @@ impl BackgroundOrder {
         Self::new(&streams?).filter(|order| order.code() == code)
     }
 
-    /// The bytes of either form.
+    /// The bytes of the short form, or of the long form if the short one has no number for a stream.
     pub fn to_bytes(self) -> Vec<u8> {
         let bytes = self.code().to_be_bytes();
         let zeros = bytes.iter().take_while(|&&b| b == 0).count().min(bytes.len() - 2);
         bytes.into_iter().skip(zeros).collect()
     }
 
-    /// Reads [`Self::to_bytes`].
+    /// Decodes the bytes of [`Self::to_bytes`]; `None` if they are not in that form.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         if bytes.len() > Self::MAX_BYTES {
             return None;
@@ -182,6 +193,7 @@ impl BackgroundOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map::BUILT_IN_LAYERS;
     use proptest::prelude::*;
 
     const DEPTH: BackgroundStream = BackgroundStream::Layer(LayerId::DEPTH);
@@ -228,13 +240,11 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_is_wrong_is_refused_with_what_is_allowed() {
+    fn an_unknown_name_is_refused_with_the_allowed_ones() {
         let layers = LayerSet::default();
-        let said = BackgroundOrder::from_names(&["depth", "sonar"], &layers).unwrap_err();
-        assert_eq!(
-            said,
-            "background \"sonar\": it takes different ones of finer, exemplars, depth, confidence, curiosity"
-        );
+        let message = BackgroundOrder::from_names(&["depth", "sonar"], &layers).unwrap_err();
+        let names = BUILT_IN_LAYERS.each_ref().map(|layer| &*layer.descriptor.name).join(", ");
+        assert_eq!(message, format!("background \"sonar\": it takes different ones of finer, exemplars, {names}"));
         assert!(BackgroundOrder::from_names(&["depth", "depth"], &layers).unwrap_err().contains("twice"));
         let order = BackgroundOrder::from_names(&["exemplars", "finer"], &layers).unwrap();
         assert_eq!(order.names(&layers), ["exemplars", "finer"]);

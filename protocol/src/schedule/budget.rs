@@ -12,6 +12,17 @@ use std::time::Duration;
 /// * A token bucket (RFC 2215) as deep as `rate x window`, filled at `rate`, has enough bits. A transmission larger
 ///   than the bucket needs a full bucket and leaves a debt. This bounds the long-run mean where a transmission is large
 ///   compared to a window.
+///
+/// ```
+/// use scenecast_protocol::schedule::BitBudget;
+/// use scenecast_protocol::time::Instant;
+/// use std::time::Duration;
+///
+/// let mut budget = BitBudget::new(100, Duration::from_secs(10), Instant::ZERO);
+/// assert_eq!(budget.earliest(1000, Instant::ZERO), Instant::ZERO, "a full window is free");
+/// budget.spend(1000, Instant::ZERO);
+/// assert!(budget.earliest(500, Instant::ZERO) >= Instant::from_secs_f64(5.0));
+/// ```
 #[derive(Debug, Clone)]
 pub struct BitBudget {
     bits_per_s: u32,
@@ -54,6 +65,7 @@ impl BitBudget {
     }
 
     /// The earliest time at which a transmission of `bits` may begin, not before `now`.
+    #[must_use]
     pub fn earliest(&self, bits: u64, now: Instant) -> Instant {
         let mut at = now;
         let short = millionths(bits).min(self.capacity()) - self.tokens - self.gained(now);

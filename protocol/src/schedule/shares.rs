@@ -1,4 +1,4 @@
-//! Shares of the classes in what is sent.
+//! Shares of the classes in the bytes that an end sends.
 
 use crate::map::{LayerId, LayerSet};
 
@@ -7,17 +7,17 @@ use crate::map::{LayerId, LayerSet};
 pub enum Class {
     /// Slots of the directive but for the fix.
     Directive,
-    /// The vehicle's status.
+    /// The vehicle's status: pose and report.
     Status,
-    /// Position fixes.
+    /// Position fixes, which only the surface sends.
     Fix,
-    /// The label map.
+    /// Labels of the map's cells.
     Map,
-    /// Representative images.
+    /// Exemplars: images that show a label.
     Exemplar,
-    /// A layer of the map.
+    /// A layer of the map, such as depth.
     Layer(LayerId),
-    /// Headers, acknowledgements, checks, padding.
+    /// Headers, acknowledgement statements, integrity checks and padding.
     Overhead,
 }
 
@@ -54,7 +54,15 @@ impl Class {
 }
 
 /// Least share of each of [`Class::SHARED`] in percent of the bytes that an end sends, while the class has something to
-/// send. They add up to 100 at most; what is left over goes to the class that comes first.
+/// send. They add up to 100 at most; the rest goes to the class that comes first.
+///
+/// ```
+/// use scenecast_protocol::schedule::{Class, Shares};
+///
+/// let shares = Shares([20, 5, 5, 50, 20]);
+/// assert!(shares.is_sound());
+/// assert_eq!((shares.of(Class::Map), shares.of(Class::Overhead)), (0.5, 0.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shares(pub [u8; 5]);
 
@@ -77,7 +85,7 @@ impl Shares {
     }
 }
 
-/// Keeps the shares: a class with nothing to send lends its share, and does not get it back later.
+/// Keeps the shares. An idle class lends its share, and does not get it back later.
 #[derive(Debug, Clone, Default)]
 pub struct ClassShares {
     shares: Shares,
@@ -91,7 +99,7 @@ impl ClassShares {
     /// Most bytes that are owed or ahead.
     const MEMORY: f64 = 4096.0;
 
-    /// Nothing is owed yet.
+    /// Shares without any debt between the classes.
     pub fn new(shares: Shares) -> Self {
         Self { shares, ..Self::default() }
     }
@@ -115,17 +123,17 @@ impl ClassShares {
         }
     }
 
-    /// The shares in force.
+    /// The shares in force, in percent.
     pub fn shares(&self) -> Shares {
         self.shares
     }
 
-    /// Other shares from now on.
+    /// Changes the shares; debts stay.
     pub fn set(&mut self, shares: Shares) {
         self.shares = shares;
     }
 
-    /// Which of the waiting classes comes next: the one that is owed most, or else the first.
+    /// The waiting class that comes next: the one that is owed most, or else the first.
     pub fn next(&self, waiting: &[Class]) -> Option<Class> {
         let owed = |c: Class| self.slot(c).and_then(|i| self.owed.get(i)).copied().unwrap_or_default();
         let most = waiting.iter().copied().filter(|&c| owed(c) > 0.0).max_by(|&a, &b| owed(a).total_cmp(&owed(b)));
@@ -182,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layer_gets_its_part_of_the_maps_share_and_one_without_a_part_what_is_left_over() {
+    fn a_layer_without_a_part_of_the_map_gets_spare_capacity_only() {
         let [confidence, depth] = [LayerId::CONFIDENCE, LayerId::DEPTH].map(Class::Layer);
         let waiting = [Class::Map, confidence, depth];
         let mut keeper = ClassShares::new(Shares::default());

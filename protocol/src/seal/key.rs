@@ -15,6 +15,17 @@ const SESSION: &[u8; 16] = b"scenecast-sessn1";
 const HELLO_NONCE: &[u8; 16] = &[0; 16];
 
 /// The secret of a mission, 16 bytes that both ends hold; wiped from memory when dropped.
+///
+/// ```
+/// use scenecast_protocol::seal::MissionKey;
+///
+/// let key = MissionKey::from_bytes(*b"0123456789abcdef");
+/// let file = key.to_text();
+/// assert!(file.starts_with("scenecast-key 1 30313233"));
+/// let read = MissionKey::parse(&file)?;
+/// assert_eq!(read.fingerprint(), key.fingerprint());
+/// # Ok::<(), scenecast_protocol::seal::KeyError>(())
+/// ```
 #[derive(Clone)]
 pub struct MissionKey {
     bytes: Secret,

@@ -18,6 +18,17 @@ pub enum Direction {
 ///
 /// A frame has a head, which stays readable, and a body, which an encrypting session encrypts. Both are authenticated,
 /// and so are the direction and the number.
+///
+/// ```
+/// use scenecast_protocol::seal::{Direction, MissionKey};
+///
+/// let key = MissionKey::from_bytes([9; 16]).session(7, 1, 0xAAAA, 0xBBBB, true);
+/// let mut body = *b"hold";
+/// let tag = key.seal(Direction::Down, 1, b"head", &mut body);
+/// assert_ne!(&body, b"hold", "the session encrypts");
+/// assert!(key.open(Direction::Down, 1, b"head", &mut body, &tag));
+/// assert_eq!(&body, b"hold");
+/// ```
 pub struct SessionKey {
     cipher: ShortTagged,
     encrypt: bool,

@@ -7,6 +7,7 @@ const VERSION: &str = "1";
 
 /// Why a text is not a key file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum KeyError {
     /// There are only comments and empty lines.
     #[error("there is no key in it: one line is expected, scenecast-key 1 KEY CHECK")]

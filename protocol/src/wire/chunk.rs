@@ -1,8 +1,5 @@
 //! Chunks, the content of a frame.
 
-/// The longest header of a chunk in bytes.
-pub const MAX_CHUNK_HEADER: usize = 2;
-
 /// The kinds of chunks that a frame can carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ChunkKind {
@@ -57,7 +54,7 @@ pub struct Chunk<'a> {
 }
 
 /// Bytes that the header of a chunk takes when `payload` bytes go into `room`.
-pub fn chunk_header_len(payload: usize, room: usize) -> usize {
+fn chunk_header_len(payload: usize, room: usize) -> usize {
     match payload {
         0..=26 => 1,
         n if n + 1 == room => 1,

@@ -16,6 +16,7 @@ static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISCSI);
 
 /// Why received bytes are not a frame for this end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// Too short, or the header exceeds the frame.
     #[error("the frame is too short")]
@@ -165,6 +166,34 @@ impl Frame<'_> {
 }
 
 /// Writes a frame of at most a given size, chunk by chunk.
+///
+/// ```
+/// use scenecast_protocol::wire::{
+///     Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, Seal, SessionId,
+/// };
+///
+/// let header = Header {
+///     from: Address::vehicle(1).unwrap(),
+///     to: Address::SURFACE,
+///     session: SessionId::from_random(0x1234),
+///     number: 1,
+///     base: 1,
+///     remaining: 0,
+///     turn: None,
+///     stamp: None,
+///     nonce: None,
+///     ack: None,
+///     kind: FrameKind::Numbered,
+///     keyed: false,
+/// };
+/// let seal = Seal::Crc(MissionId(7), 0xBEEF);
+/// let mut builder = FrameBuilder::new(&header, 64);
+/// assert!(builder.push(ChunkKind::Map, &[1, 2, 3]));
+/// let bytes = builder.finish(&seal, true);
+///
+/// let frame = Envelope::decode(&bytes, |to| to == Address::SURFACE).unwrap().open(&seal).unwrap();
+/// assert_eq!(frame.chunks().next().unwrap().payload, [1, 2, 3]);
+/// ```
 #[derive(Debug)]
 pub struct FrameBuilder {
     bytes: Vec<u8>,

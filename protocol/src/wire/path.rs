@@ -40,11 +40,11 @@ impl PlannedPath {
             }
             before = next;
         }
-        let told = (0..=steps.len().min(Self::MAX_POINTS)).rev().find_map(|n| {
-            let (told, rest) = steps.split_at_checked(n)?;
-            Some(write(told, self.continues || !rest.is_empty())).filter(|bytes| bytes.len() <= room)
+        let sent = (0..=steps.len().min(Self::MAX_POINTS)).rev().find_map(|n| {
+            let (sent, rest) = steps.split_at_checked(n)?;
+            Some(write(sent, self.continues || !rest.is_empty())).filter(|bytes| bytes.len() <= room)
         });
-        told.unwrap_or_default()
+        sent.unwrap_or_default()
     }
 
     /// Decodes the bytes after a waypoint; `None` if no vehicle writes them.
@@ -149,11 +149,11 @@ mod tests {
                 prop_assert!(room == 0 || whole == PlannedPath::default());
                 return Ok(());
             };
-            let told = read.points.len();
-            prop_assert!(told <= PlannedPath::MAX_POINTS);
-            prop_assert_eq!(&read.points[..], &whole.points[..told]);
-            prop_assert_eq!(read.continues, continues || told < whole.points.len());
-            prop_assert!(room < 46 || told == whole.points.len().min(PlannedPath::MAX_POINTS));
+            let sent = read.points.len();
+            prop_assert!(sent <= PlannedPath::MAX_POINTS);
+            prop_assert_eq!(&read.points[..], &whole.points[..sent]);
+            prop_assert_eq!(read.continues, continues || sent < whole.points.len());
+            prop_assert!(room < 46 || sent == whole.points.len().min(PlannedPath::MAX_POINTS));
         }
 
         #[test]

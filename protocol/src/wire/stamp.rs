@@ -35,7 +35,7 @@ pub enum Stamp {
         /// Clock in milliseconds, low 24 bits.
         clock_ms: u32,
         /// Low 8 bits of the number of the surface's last received frame.
-        heard: u8,
+        last_received: u8,
         /// Time since the end of that reception, at most [`Stamp::MAX_HELD`].
         held: Duration,
     },
@@ -75,7 +75,7 @@ impl Stamp {
             let one_way = Some(r.u16()?).filter(|&ms| ms != u16::MAX).map(|ms| Duration::from_millis(ms.into()));
             return Ok(Self::Surface { clock_ms, one_way });
         }
-        Ok(Self::Vehicle { clock_ms, heard: r.u8()?, held: Duration::from_millis(r.u16()?.into()) })
+        Ok(Self::Vehicle { clock_ms, last_received: r.u8()?, held: Duration::from_millis(r.u16()?.into()) })
     }
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
@@ -85,8 +85,8 @@ impl Stamp {
             Self::Surface { one_way, .. } => {
                 out.extend_from_slice(&one_way.map_or(u16::MAX.to_be_bytes(), |d| millis(d, u16::MAX - 1)));
             }
-            Self::Vehicle { heard, held, .. } => {
-                out.push(heard);
+            Self::Vehicle { last_received, held, .. } => {
+                out.push(last_received);
                 out.extend_from_slice(&millis(held, u16::MAX));
             }
         }
@@ -103,7 +103,7 @@ mod tests {
         let mut bytes = Vec::new();
         Stamp::Surface { clock_ms: 0x01_0203, one_way: Some(Duration::from_millis(667)) }.encode(&mut bytes);
         Stamp::Surface { clock_ms: 1, one_way: None }.encode(&mut bytes);
-        Stamp::Vehicle { clock_ms: 0xFF_FFFF, heard: 9, held: Duration::from_millis(258) }.encode(&mut bytes);
+        Stamp::Vehicle { clock_ms: 0xFF_FFFF, last_received: 9, held: Duration::from_millis(258) }.encode(&mut bytes);
         assert_eq!(bytes, [1, 2, 3, 0x02, 0x9B, 0, 0, 1, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 9, 1, 2]);
         let mut r = Reader::new(&bytes);
         let stamp = Stamp::decode(Address::SURFACE, &mut r).unwrap();

@@ -112,6 +112,17 @@ impl ModeReason {
 ///             4 bits 0
 /// 7 more      [placement of the map, see `Placement`]; left out while it has not moved
 /// ```
+///
+/// ```
+/// use scenecast_protocol::coordinates::MapPoint;
+/// use scenecast_protocol::wire::VehicleStatus;
+///
+/// let status = VehicleStatus { position: MapPoint::new(12.5, -3.0), depth_m: 8.0, ..VehicleStatus::default() };
+/// let pose = status.encode_pose(64);
+/// let mut shown = VehicleStatus::default();
+/// shown.read_pose(&pose).unwrap();
+/// assert_eq!((pose.len(), shown.position, shown.depth_m), (15, status.position, 8.0));
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VehicleStatus {
     /// The activity of the vehicle at present.
@@ -156,6 +167,7 @@ pub struct VehicleStatus {
 
 /// Why bytes are not a status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StatusError {
     /// They are too short or too long.
     #[error("the status has another length")]

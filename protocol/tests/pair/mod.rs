@@ -40,7 +40,7 @@ pub(crate) struct Setup {
     pub(crate) access: Access,
     pub(crate) authenticity: Option<Authenticity>,
     /// How long a new label must be stable.
-    pub(crate) settle: Duration,
+    pub(crate) debounce: Duration,
     /// The share of each layer in percent of the map's; `None`: no layers are sent.
     pub(crate) layers: Option<[u8; 2]>,
 }
@@ -54,7 +54,7 @@ impl Setup {
             codec,
             access: Access::Shared,
             authenticity: None,
-            settle: Duration::ZERO,
+            debounce: Duration::ZERO,
             layers: None,
         }
     }
@@ -144,7 +144,7 @@ impl LinkedEnds {
         self.vehicle = vehicle(&self.setup, seed, self.durable.clone(), self.now);
         self.vehicle.assume_budget_spent(self.now);
         self.vehicle.set_map(map.iter(), self.now);
-        self.tell_layers();
+        self.send_layers();
         self.forget_modem(true);
     }
 
@@ -159,10 +159,10 @@ impl LinkedEnds {
             (LayerId::CONFIDENCE, cells(|x, y, p| ((x * 0.7 + y * 1.3 + p).sin() + 1.0) / 2.0)),
             (LayerId::DEPTH, cells(|x, y, p| 20.0 + (x * 0.11 + p).sin() * 4.0 + y * 0.2)),
         ];
-        self.tell_layers();
+        self.send_layers();
     }
 
-    fn tell_layers(&mut self) {
+    fn send_layers(&mut self) {
         for (id, cells) in &self.quantities {
             self.vehicle.set_layer(*id, cells.iter().copied(), self.now);
         }
@@ -191,7 +191,7 @@ impl LinkedEnds {
     fn layers_agree(&self) -> bool {
         let view = self.surface.vehicle(auv()).unwrap();
         self.vehicle.layers().all(|layer| match view.layer(layer.id()) {
-            Some(heard) => heard.levels().shown() == layer.target(),
+            Some(replica) => replica.levels().shown() == layer.target(),
             None => layer.target().is_empty(),
         })
     }
@@ -279,10 +279,10 @@ impl LinkedEnds {
         let of_vehicle = cycle.from == auv();
         // On a channel that damages bits, the surface's own modem sometimes fails to begin too.
         let chance = if of_vehicle { self.channel.loss } else { self.channel.corruption / 2.0 };
-        let heard = self.draw() >= chance && !(of_vehicle && self.mute[0]);
-        let way = if of_vehicle { self.channel.propagation } else { Duration::ZERO };
-        if heard {
-            let at = self.now + way + Duration::from_millis(300);
+        let is_received = self.draw() >= chance && !(of_vehicle && self.mute[0]);
+        let delay = if of_vehicle { self.channel.propagation } else { Duration::ZERO };
+        if is_received {
+            let at = self.now + delay + Duration::from_millis(300);
             self.schedule(at, PairEvent::Poll { of_vehicle, frames: cycle.frames.min(8) });
         }
     }
@@ -352,20 +352,20 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
         authenticity: setup.authenticity.clone(),
     };
     let mut link = VehicleLink::new(config, setup.codec, seed, durable, now);
-    link.source_mut().set_debounce(setup.settle);
+    link.source_mut().set_debounce(setup.debounce);
     for (id, share) in [LayerId::CONFIDENCE, LayerId::DEPTH].into_iter().zip(setup.layers.into_iter().flatten()) {
-        assert!(link.add_layer(layer(id, share, setup.codec, setup.settle)));
+        assert!(link.add_layer(layer(id, share, setup.codec, setup.debounce)));
     }
     link
 }
 
 /// A built-in layer; depths about 20 m.
-pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, settle: Duration) -> LayerSource {
+pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, debounce: Duration) -> LayerSource {
     let descriptor = match id {
         LayerId::DEPTH => LayerDescriptor::depth_around(20.0, 0.5),
         _ => LayerSet::default().get(id).unwrap().clone(),
     };
-    LayerSource::new(id, LayerDescriptor { share, ..descriptor }, codec, settle)
+    LayerSource::new(id, LayerDescriptor { share, ..descriptor }, codec, debounce)
 }
 
 fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {

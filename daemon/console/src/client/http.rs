@@ -160,7 +160,16 @@ mod tests {
         assert_eq!(authority("http://127.0.0.1:8460").unwrap(), "127.0.0.1:8460");
         assert_eq!(authority("http://surface.ship/").unwrap(), "surface.ship:80");
         assert_eq!(authority("http://[::1]:8460").unwrap(), "[::1]:8460");
-        for wrong in ["127.0.0.1:8460", "https://127.0.0.1", "http://a@b", "http://h/path", "", "http://h?q", "http://h:99999", "http://h:"] {
+        for wrong in [
+            "127.0.0.1:8460",
+            "https://127.0.0.1",
+            "http://a@b",
+            "http://h/path",
+            "",
+            "http://h?q",
+            "http://h:99999",
+            "http://h:",
+        ] {
             assert_eq!(authority(wrong), Err(2), "{wrong}");
         }
     }

@@ -221,12 +221,12 @@ mod tests {
 
     #[test]
     fn the_table_that_ships_can_be_sent_as_it_stands() {
-        use scenecast_protocol::directive::Figure;
+        use scenecast_protocol::directive::ShortDecimal;
         let table = TuningTable::shipped();
         assert!(table.rows().count() >= 16);
         for Row { setting: s, .. } in table.rows() {
             for value in [s.alpha, s.beta, s.gamma, s.refine_words_per_s, s.frames_per_s] {
-                assert_eq!(Figure::new(value).map(Figure::value), Some(value), "{s}");
+                assert_eq!(ShortDecimal::new(value).map(ShortDecimal::value), Some(value), "{s}");
             }
         }
         let [fine, coarse] =

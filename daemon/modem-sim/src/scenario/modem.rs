@@ -1,8 +1,8 @@
-//! `[[modem]]`: its make, its port and its place.
+//! `[[modem]]`: its make, its port and its position.
 
-use super::reader::Reader;
+use super::channel::{MAX_DISTANCE_M, MAX_S};
+use super::reader::TableReader;
 use super::seconds;
-use super::water::{MAX_DISTANCE_M, MAX_S};
 use scenecast_core::UserError;
 use sim_channel::modem::Emulator;
 use sim_channel::modem::micromodem::{Micromodem, MicromodemConfig};
@@ -14,42 +14,42 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 #[derive(Debug)]
-pub struct Modem {
-    /// For people, and the name of its symbolic link.
+pub struct ScenarioModem {
+    /// Name in messages and of its symbolic link.
     pub name: String,
-    pub make: Make,
-    /// How its host reaches it.
-    pub place: Place,
-    /// Where it is, and goes.
+    pub make: ModemMake,
+    /// The emulated port at which its host reaches it.
+    pub port: EmulatedPort,
+    /// Its positions over emulated time.
     pub track: Track,
-    /// Its place in the file, a byte.
+    /// Byte offset of its table in the file, for errors.
     pub(super) at: usize,
 }
 
 /// The kind of a modem and its settings.
 #[derive(Debug, Clone)]
-pub enum Make {
+pub enum ModemMake {
     S2c(S2cConfig),
     Micromodem(MicromodemConfig),
     Transparent(TransparentConfig),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum EmulatedPort {
     Pty,
-    /// A TCP port; port 0 for any that is free.
+    /// A TCP port; 0 takes any free one.
     Tcp(SocketAddr),
 }
 
-impl Place {
-    /// Whether two modems cannot both have it.
+impl EmulatedPort {
+    /// Whether two modems must not share it.
     pub fn is_fixed(&self) -> bool {
         matches!(self, Self::Tcp(address) if address.port() != 0)
     }
 }
 
-impl Make {
-    /// The emulator, with the wall clock at the start for those that have a calendar.
+impl ModemMake {
+    /// The emulator. `unix_s` is the wall time at the start, for modems with a calendar.
     pub fn emulator(&self, unix_s: u64) -> Box<dyn Emulator> {
         match self.clone() {
             Self::S2c(config) => Box::new(S2c::new(config)),
@@ -69,18 +69,18 @@ impl Make {
     }
 }
 
-pub(super) fn read(table: Reader<'_>, seed: u64) -> Result<Modem, UserError> {
+pub(super) fn read(table: TableReader<'_>, seed: u64) -> Result<ScenarioModem, UserError> {
     const NAME: &str = "a name of letters, digits, - and _";
     let name = table.text("name")?.ok_or_else(|| table.missing("name", NAME))?;
     if !name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_')) {
         return Err(table.wrong("name", NAME));
     }
-    type Read = fn(&Reader<'_>, Option<u32>) -> Result<Make, UserError>;
+    type Read = fn(&TableReader<'_>, Option<u32>) -> Result<ModemMake, UserError>;
     let kinds: [(&str, Read); 3] = [("s2c", s2c), ("micromodem", micromodem), ("transparent", transparent)];
     let kind =
         table.choice("kind", &kinds)?.ok_or_else(|| table.missing("kind", "one of s2c, micromodem, transparent"))?;
-    let place = read_place(&table)?;
-    let usual = if place == Place::Pty { Some(19_200) } else { None };
+    let port = read_port(&table)?;
+    let usual = if port == EmulatedPort::Pty { Some(19_200) } else { None };
     let baud = match table.whole("baud", 0..=10_000_000, "bit/s, 0 for no pacing")? {
         Some(baud) => u32::try_from(baud).ok().filter(|baud| *baud > 0),
         None => usual,
@@ -90,31 +90,31 @@ pub(super) fn read(table: Reader<'_>, seed: u64) -> Result<Modem, UserError> {
     let track = read_track(&table)?;
     let at = table.start();
     table.finish()?;
-    Ok(Modem { name, make, place, track, at })
+    Ok(ScenarioModem { name, make, port, track, at })
 }
 
-/// Each modem has noise of its own.
-fn seed_with(make: &mut Make, seed: u64, name: &str) {
+/// Gives each modem a random stream of its own.
+fn seed_with(make: &mut ModemMake, seed: u64, name: &str) {
     let own = name.bytes().fold(seed, |mixed, byte| mixed.wrapping_mul(31).wrapping_add(u64::from(byte)));
     match make {
-        Make::S2c(config) => config.seed = own,
-        Make::Micromodem(config) => config.seed = own,
-        Make::Transparent(config) => config.seed = own,
+        ModemMake::S2c(config) => config.seed = own,
+        ModemMake::Micromodem(config) => config.seed = own,
+        ModemMake::Transparent(config) => config.seed = own,
     }
 }
 
-fn read_place(table: &Reader<'_>) -> Result<Place, UserError> {
+fn read_port(table: &TableReader<'_>) -> Result<EmulatedPort, UserError> {
     const TAKES: &str = "\"pty\" or \"tcp:ADDRESS:PORT\", as in \"tcp:127.0.0.1:9200\"";
     match table.text("port")?.as_deref() {
-        None | Some("pty") => Ok(Place::Pty),
+        None | Some("pty") => Ok(EmulatedPort::Pty),
         Some(text) => {
             let address = text.strip_prefix("tcp:").and_then(|address| address.parse().ok());
-            address.map(Place::Tcp).ok_or_else(|| table.wrong("port", TAKES))
+            address.map(EmulatedPort::Tcp).ok_or_else(|| table.wrong("port", TAKES))
         }
     }
 }
 
-fn read_track(table: &Reader<'_>) -> Result<Track, UserError> {
+fn read_track(table: &TableReader<'_>) -> Result<Track, UserError> {
     const TAKES: &str = "rows [time in s, metres east, metres north, metres down], times growing";
     let range = -MAX_DISTANCE_M..=MAX_S;
     let place = |[x, y, z]: [f64; 3]| NodePosition::new(x, y, z);
@@ -132,14 +132,14 @@ fn read_track(table: &Reader<'_>) -> Result<Track, UserError> {
     Ok(Track::new(rows.into_iter().map(|[t, x, y, z]| (seconds(t), place([x, y, z]))).collect()))
 }
 
-fn address(table: &Reader<'_>, least: u64, most: u64) -> Result<u8, UserError> {
-    let given = table.whole("address", least..=most, "")?;
+fn address(table: &TableReader<'_>, min: u64, max: u64) -> Result<u8, UserError> {
+    let given = table.whole("address", min..=max, "")?;
     given
         .map(|address| address as u8)
-        .ok_or_else(|| table.missing("address", format!("a whole number from {least} to {most}")))
+        .ok_or_else(|| table.missing("address", format!("a whole number from {min} to {max}")))
 }
 
-fn s2c(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
+fn s2c(table: &TableReader<'_>, baud: Option<u32>) -> Result<ModemMake, UserError> {
     let mut config = S2cConfig { baud, ..S2cConfig::new(address(table, 1, 254)?) };
     let interpreters = [("NET", Interpreter::Net), ("AT", Interpreter::At)];
     config.interpreter = table.choice("interpreter", &interpreters)?.unwrap_or(config.interpreter);
@@ -152,10 +152,10 @@ fn s2c(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
         config.usbl = Some(usbl(&head)?);
         head.finish()?;
     }
-    Ok(Make::S2c(config))
+    Ok(ModemMake::S2c(config))
 }
 
-fn usbl(table: &Reader<'_>) -> Result<UsblConfig, UserError> {
+fn usbl(table: &TableReader<'_>) -> Result<UsblConfig, UserError> {
     let usual = UsblConfig::default();
     let latency = table.number("latency_s", 0.0..=60.0, "s")?;
     Ok(UsblConfig {
@@ -171,7 +171,7 @@ fn usbl(table: &Reader<'_>) -> Result<UsblConfig, UserError> {
     })
 }
 
-fn micromodem(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
+fn micromodem(table: &TableReader<'_>, baud: Option<u32>) -> Result<ModemMake, UserError> {
     let address = address(table, 0, 127)?;
     let usual = match table.whole("generation", 1..=2, "")? {
         Some(1) => MicromodemConfig::first_generation(address),
@@ -182,16 +182,16 @@ fn micromodem(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> 
     if !(3..=4).contains(&parts.len()) || !parts.iter().all(|part| part.parse::<u32>().is_ok()) {
         return Err(table.wrong("version", "three or four whole numbers with dots between, as in \"2.0.27087\""));
     }
-    Ok(Make::Micromodem(MicromodemConfig { baud, version, ..usual }))
+    Ok(ModemMake::Micromodem(MicromodemConfig { baud, version, ..usual }))
 }
 
-fn transparent(table: &Reader<'_>, baud: Option<u32>) -> Result<Make, UserError> {
+fn transparent(table: &TableReader<'_>, baud: Option<u32>) -> Result<ModemMake, UserError> {
     let usual = TransparentConfig::default();
     let whole = |key, range, unit, usual: usize| {
         Ok::<_, UserError>(table.whole(key, range, unit)?.map_or(usual, |n| n as usize))
     };
     let time = |key, usual| Ok::<_, UserError>(table.number(key, 0.0..=10.0, "s")?.map_or(usual, seconds));
-    Ok(Make::Transparent(TransparentConfig {
+    Ok(ModemMake::Transparent(TransparentConfig {
         baud,
         bit_rate: whole("bit_rate", 10..=1_000_000, "bit/s", usual.bit_rate as usize)? as u32,
         preamble: time("preamble_s", usual.preamble)?,

@@ -1,4 +1,4 @@
-//! Reading of a scenario's tables: every value with its place, range and unit, and no key unread.
+//! Reads a scenario's tables: every value with its line, range and unit, and no key is left unread.
 
 use scenecast_core::UserError;
 use std::cell::RefCell;
@@ -8,24 +8,24 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Where a scenario comes from, and its text.
+/// The path and the text of a scenario.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
+pub struct ScenarioSource<'a> {
     pub path: &'a Path,
     pub text: &'a str,
 }
 
-impl Source<'_> {
+impl ScenarioSource<'_> {
     /// An error at a byte of the text, as `FILE:LINE: cause`.
-    pub fn problem(&self, at: usize, what: impl Display) -> UserError {
+    pub fn error(&self, at: usize, cause: impl Display) -> UserError {
         let line = self.text.get(..at).map_or(1, |before| before.matches('\n').count() + 1);
-        UserError::Input(format!("{}:{line}: {what}", self.path.display()))
+        UserError::Input(format!("{}:{line}: {cause}", self.path.display()))
     }
 }
 
-/// One table, whose keys are asked for one by one.
-pub struct Reader<'a> {
-    source: Source<'a>,
+/// One table; it remembers the keys that were requested.
+pub struct TableReader<'a> {
+    source: ScenarioSource<'a>,
     name: String,
     at: usize,
     table: &'a DeTable<'a>,
@@ -34,9 +34,9 @@ pub struct Reader<'a> {
 
 type Found<T> = Result<Option<T>, UserError>;
 
-impl<'a> Reader<'a> {
+impl<'a> TableReader<'a> {
     /// A table called `name` (empty for the whole file) that begins at a byte of the text.
-    pub fn new(source: Source<'a>, name: String, at: usize, table: &'a DeTable<'a>) -> Self {
+    pub fn new(source: ScenarioSource<'a>, name: String, at: usize, table: &'a DeTable<'a>) -> Self {
         Self { source, name, at, table, known: RefCell::new(Vec::new()) }
     }
 
@@ -44,12 +44,12 @@ impl<'a> Reader<'a> {
         self.source.path
     }
 
-    /// Where the table begins, a byte of the text.
+    /// Byte offset of the table's start in the text.
     pub fn start(&self) -> usize {
         self.at
     }
 
-    /// The key as people write it.
+    /// The key with the name of its table, as in `channel.loss`.
     fn full(&self, key: &str) -> String {
         if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
     }
@@ -65,12 +65,12 @@ impl<'a> Reader<'a> {
         let at = self.value(key).map_or(self.at, |(_, at)| at);
         let given = self.value(key).map(|(value, _)| value.span());
         let given = given.and_then(|span| self.source.text.get(span)).unwrap_or("nothing");
-        self.source.problem(at, format!("{} = {given} is not allowed: it takes {takes}", self.full(key)))
+        self.source.error(at, format!("{} = {given} is not allowed: it takes {takes}", self.full(key)))
     }
 
-    /// Refuses the table for want of a key.
+    /// Refuses the table because a key is missing.
     pub fn missing(&self, key: &'static str, takes: impl Display) -> UserError {
-        self.source.problem(self.at, format!("{} is missing: it takes {takes}", self.full(key)))
+        self.source.error(self.at, format!("{} is missing: it takes {takes}", self.full(key)))
     }
 
     /// A number within a range.
@@ -92,7 +92,7 @@ impl<'a> Reader<'a> {
         number.filter(|n| range.contains(n)).map(Some).ok_or_else(|| self.wrong(key, takes.trim_end()))
     }
 
-    /// A text of at least one letter.
+    /// A text that is not empty.
     pub fn text(&self, key: &'static str) -> Found<String> {
         let Some((value, _)) = self.value(key) else { return Ok(None) };
         match value.get_ref() {
@@ -147,16 +147,16 @@ impl<'a> Reader<'a> {
     }
 
     /// A table in this one.
-    pub fn table(&self, key: &'static str) -> Found<Reader<'a>> {
+    pub fn table(&self, key: &'static str) -> Found<TableReader<'a>> {
         let Some((value, at)) = self.value(key) else { return Ok(None) };
         match value.get_ref() {
-            DeValue::Table(table) => Ok(Some(Reader::new(self.source, self.full(key), at, table))),
+            DeValue::Table(table) => Ok(Some(TableReader::new(self.source, self.full(key), at, table))),
             _ => Err(self.wrong(key, format!("a table, as in [{}]", self.full(key)))),
         }
     }
 
-    /// All tables of that name.
-    pub fn tables(&self, key: &'static str) -> Result<Vec<Reader<'a>>, UserError> {
+    /// All tables of an array of tables.
+    pub fn tables(&self, key: &'static str) -> Result<Vec<TableReader<'a>>, UserError> {
         let Some((value, _)) = self.value(key) else { return Ok(Vec::new()) };
         let tables = match value.get_ref() {
             DeValue::Array(tables) => tables.iter().map(|value| self.entry(key, value)).collect::<Option<Vec<_>>>(),
@@ -165,14 +165,14 @@ impl<'a> Reader<'a> {
         tables.ok_or_else(|| self.wrong(key, format!("tables, as in [[{}]]", self.full(key))))
     }
 
-    fn entry(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Option<Reader<'a>> {
+    fn entry(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Option<TableReader<'a>> {
         match value.get_ref() {
-            DeValue::Table(table) => Some(Reader::new(self.source, self.full(key), value.span().start, table)),
+            DeValue::Table(table) => Some(TableReader::new(self.source, self.full(key), value.span().start, table)),
             _ => None,
         }
     }
 
-    /// Refuses keys that nobody asked for.
+    /// Refuses keys that were never requested.
     pub fn finish(self) -> Result<(), UserError> {
         let known = self.known.borrow();
         match self.table.iter().find(|(name, _)| !known.iter().any(|key| name.get_ref() == key)) {
@@ -181,9 +181,9 @@ impl<'a> Reader<'a> {
                 let mut known = known.clone();
                 known.sort_unstable();
                 known.dedup();
-                let what =
+                let cause =
                     format!("there is no key {} here; allowed are {}", self.full(name.get_ref()), known.join(", "));
-                Err(self.source.problem(name.span().start, what))
+                Err(self.source.error(name.span().start, cause))
             }
         }
     }

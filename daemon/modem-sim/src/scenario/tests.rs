@@ -1,22 +1,22 @@
 use super::*;
 
 fn read(text: &str) -> Result<Scenario, UserError> {
-    Scenario::read(Source { path: Path::new("x.toml"), text })
+    Scenario::read(ScenarioSource { path: Path::new("x.toml"), text })
 }
 
 const PAIR: &str = "[[modem]]\nname = \"a\"\nkind = \"s2c\"\naddress = 1\n[[modem]]\nname = \"b\"\nkind = \"micromodem\"\naddress = 2\n";
 
 #[test]
-fn what_is_not_given_has_a_default() {
+fn keys_that_are_not_given_have_defaults() {
     let scenario = read(PAIR).unwrap();
     assert_eq!(scenario.channel, ChannelConfig::default());
-    let Make::S2c(config) = &scenario.modems[0].make else { panic!("an S2C") };
+    let ModemMake::S2c(config) = &scenario.modems[0].make else { panic!("an S2C") };
     assert_eq!((config.address, config.baud), (1, Some(19_200)));
-    assert_eq!(scenario.modems[1].place, Place::Pty);
+    assert_eq!(scenario.modems[1].port, EmulatedPort::Pty);
 }
 
 #[test]
-fn every_complaint_names_file_line_key_and_what_is_allowed() {
+fn every_error_names_the_file_line_key_and_allowed_values() {
     for (more, expected) in [
         ("sed = 1\n", "x.toml:9: there is no key modem.sed here; allowed are address, "),
         ("[chanel]\n", "x.toml:9: there is no key chanel here; allowed are channel, fault, "),
@@ -70,9 +70,9 @@ fn every_complaint_names_file_line_key_and_what_is_allowed() {
         ("track = [[0, 1, 2]]\n", "x.toml:9: modem.track = [[0, 1, 2]] is not allowed: it takes rows"),
         ("baud = 19200 19\n", "x.toml:9: "),
     ] {
-        let said = read(&format!("{PAIR}{more}")).expect_err(more);
-        assert_eq!(said.exit_code(), 2);
-        assert!(said.to_string().contains(expected), "{said}\n{expected}");
+        let error = read(&format!("{PAIR}{more}")).expect_err(more);
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().contains(expected), "{error}\n{expected}");
     }
     assert!(read("").unwrap_err().to_string().contains("there is no [[modem]]"));
 }

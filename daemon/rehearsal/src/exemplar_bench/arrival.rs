@@ -1,7 +1,7 @@
-//! How long an image takes from the order to the last bit, while the map takes all that it can get.
+//! The time from the order of an exemplar to its last bit, while the map uses all spare capacity.
 
 use super::Spread;
-use crate::VirtualTime;
+use crate::virtual_time::VirtualTime;
 use image::RgbImage;
 use scene_model::exemplars::ExemplarPatch as Picture;
 use scenecast_config::Config;
@@ -25,67 +25,62 @@ use std::time::Duration;
 
 const SURFACE: NodeId = NodeId(0);
 const VEHICLE: NodeId = NodeId(1);
-/// Time until both ends know each other and their estimates have settled.
+/// Time for the handshake and for the estimates of both ends to converge, seconds.
 const WARM_UP_S: f64 = 120.0;
-/// Time after which an image is given up.
-const GIVE_UP: Duration = Duration::from_secs(600);
-/// Labels on the map.
+/// Time after which a request counts as lost.
+const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(600);
 pub(super) const LABELS: u8 = 12;
-/// Edge of the part of the map that is always changing, cells.
+/// Edge of the part of the map that keeps changing, cells.
 const EDGE: i32 = 112;
-/// Seconds between two changes of it and between two fixes.
+/// Time between two changes of that part, and between two fixes, seconds.
 const CHANGE_S: f64 = 2.0;
 const FIX_S: f64 = 10.0;
 
-/// What is asked for and under which load.
+/// The requests and the load.
 #[derive(Debug, Clone, Copy)]
-pub struct Setting {
-    /// Images to ask for.
+pub struct ArrivalSetting {
     pub requests: usize,
-    /// Share of frames that is lost.
+    /// Share of frames that are lost.
     pub loss: f64,
-    /// Whether the map takes all that it can get.
+    /// Whether the map uses all spare capacity.
     pub loaded: bool,
-    /// Ask for twice the edge.
+    /// Whether each image is requested again with twice the edge.
     pub larger: bool,
 }
 
-/// How long images took.
 #[derive(Debug, Clone, Serialize)]
 pub struct Arrivals {
-    /// Images asked for.
     pub requested: usize,
-    /// Images that came.
     pub arrived: usize,
-    /// Seconds from the order to the image.
+    /// Time from the order to the whole image, seconds.
     pub seconds: Option<Spread>,
-    /// Share of them within 30 s.
+    /// Share of the images that arrived within 30 s.
     pub within_30_s: f64,
-    /// Bytes of an image on the link.
+    /// Bytes of an image as it was sent.
     pub bytes: Option<Spread>,
-    /// Bits a second that the vehicle put on air.
+    /// Rate of all bits that the vehicle put on air, bit/s.
     pub sent_bps: f64,
     /// Share of the vehicle's frames that were lost.
     pub loss: f64,
 }
 
-/// Asks for images of random labels one after the other, each a random while after the last one is there.
+/// Requests images of random labels one after the other, each a random time after the last one arrived.
 pub fn arrivals(
-    setting: Setting,
+    setting: ArrivalSetting,
     patches: &[RgbImage],
     seed: u64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Arrivals, UserError> {
-    let mut water = Water::new(setting, patches, seed)?;
-    water.run_until(Instant::from_secs_f64(WARM_UP_S), |_| false);
-    let (began, before) = (water.now, water.sent_bits());
+    let mut bench = ExemplarBench::new(setting, patches, seed)?;
+    bench.run_until(Instant::from_secs_f64(WARM_UP_S), |_| false);
+    let (began, before) = (bench.now, bench.sent_bits());
     let mut took = Vec::new();
     for i in 0..setting.requests {
-        let next = water.now + Duration::from_secs_f64(1.0 + 40.0 * water.dice.uniform());
-        water.run_until(next, |_| false);
-        let label = water.any_label();
-        let first = water.get(label, Wish::Another)?;
-        took.extend(if setting.larger { water.get(label, Wish::Larger(None))? } else { first });
+        let next = bench.now + Duration::from_secs_f64(1.0 + 40.0 * bench.rng.uniform());
+        bench.run_until(next, |_| false);
+        let label = bench.any_label();
+        let first = bench.get(label, Wish::Another)?;
+        took.extend(if setting.larger { bench.get(label, Wish::Larger(None))? } else { first });
         progress((i + 1) as f64 / setting.requests as f64);
     }
     let within = took.iter().filter(|(s, _)| *s <= 30.0).count();
@@ -95,14 +90,14 @@ pub fn arrivals(
         seconds: Spread::of(took.iter().map(|(s, _)| *s)),
         within_30_s: within as f64 / setting.requests.max(1) as f64,
         bytes: Spread::of(took.iter().map(|(_, n)| *n as f64)),
-        sent_bps: (water.sent_bits() - before) as f64 / water.now.since(began).as_secs_f64().max(1.0),
-        loss: water.lost as f64 / water.frames.max(1) as f64,
+        sent_bps: (bench.sent_bits() - before) as f64 / bench.now.since(began).as_secs_f64().max(1.0),
+        loss: bench.lost as f64 / bench.frames.max(1) as f64,
     })
 }
 
-/// Both roles and the water between them.
-pub(super) struct Water {
-    setting: Setting,
+/// Both roles and the channel between them.
+pub(super) struct ExemplarBench {
+    setting: ArrivalSetting,
     pub(super) now: Instant,
     pub(super) vehicle: VehicleHost,
     pub(super) surface: SurfaceHost,
@@ -110,15 +105,15 @@ pub(super) struct Water {
     channel: Channel,
     next_change: Instant,
     next_fix: Instant,
-    dice: RandomStream,
+    rng: RandomStream,
     frames: u64,
     lost: u64,
 }
 
-impl Water {
-    pub(super) fn new(setting: Setting, patches: &[RgbImage], seed: u64) -> Result<Self, UserError> {
+impl ExemplarBench {
+    pub(super) fn new(setting: ArrivalSetting, patches: &[RgbImage], seed: u64) -> Result<Self, UserError> {
         let mut config = Config::default();
-        // Noise has nothing that the other coder could take: it need not be tried.
+        // The other coder gains no byte on noise, so it is not tried.
         config.map.codec = Codec::Context;
         let now = Instant::ZERO;
         let modem = scenecast_config::modem_profile(&config, config.channel.bit_rate);
@@ -162,7 +157,7 @@ impl Water {
             channel,
             next_change: now,
             next_fix: now,
-            dice: RandomStream::new(seed, &[5]),
+            rng: RandomStream::new(seed, &[5]),
             frames: 0,
             lost: 0,
         })
@@ -172,16 +167,16 @@ impl Water {
         self.vehicle.link().audit().total_bits()
     }
 
-    /// A label of the map.
+    /// A random label of the map.
     fn any_label(&mut self) -> u8 {
-        1 + (self.dice.uniform() * f64::from(LABELS)) as u8
+        1 + (self.rng.uniform() * f64::from(LABELS)) as u8
     }
 
-    /// Asks for an image; seconds and bytes that it took, if it came.
+    /// Requests an image; its seconds and bytes, or `None` if it did not arrive.
     pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, UserError> {
         let asked = self.now;
         self.surface.surface_mut().request_exemplar(self.address, label, wish, asked).map_err(UserError::Failed)?;
-        if !self.run_until(asked + GIVE_UP, |w| w.is_met(label)) {
+        if !self.run_until(asked + GIVE_UP_TIMEOUT, |w| w.is_met(label)) {
             self.surface.surface_mut().cancel_exemplar(self.address, label, self.now).map_err(UserError::Failed)?;
             return Ok(None);
         }
@@ -197,11 +192,11 @@ impl Water {
         self.page(label).is_some_and(|page| page.asked.is_none())
     }
 
-    /// Labels as they come, in places that change more than the link can tell; without load the map stays as it is.
+    /// A map of random labels that change faster than the link can follow; without load the map stays constant.
     fn change_map(&mut self) {
         let cells = (0..EDGE * EDGE).map(|i| {
             let label = match self.setting.loaded {
-                true => 1 + (self.dice.uniform() * f64::from(LABELS)) as u8,
+                true => 1 + (self.rng.uniform() * f64::from(LABELS)) as u8,
                 false => 1 + (i % i32::from(LABELS)) as u8,
             };
             (Cell::new(i % EDGE, i / EDGE), label)
@@ -212,7 +207,7 @@ impl Water {
     }
 }
 
-impl VirtualTime for Water {
+impl VirtualTime for ExemplarBench {
     fn now(&self) -> Instant {
         self.now
     }
@@ -247,7 +242,7 @@ impl VirtualTime for Water {
         if now >= self.next_fix {
             self.next_fix = now + Duration::from_secs_f64(FIX_S);
             let fix = Fix { position: WorldPoint::new(8.0, 8.0), sigma_m: 1.0, age_s: 0.5 };
-            // Before the vehicle is known there is no slot for it.
+            // An unknown vehicle has no slot yet.
             let _ = self.surface.surface_mut().send_fix(self.address, fix, now);
         }
         if now >= self.next_change {
@@ -275,7 +270,7 @@ impl VirtualTime for Water {
     }
 }
 
-/// The patches dealt out to the labels, again and again, so that there is always another one.
+/// Assigns the patches to the labels in turn, so that each label always has another image.
 fn gallery(patches: &[RgbImage]) -> BTreeMap<u8, Vec<Picture>> {
     const EACH: usize = 40;
     let large = edge_px(1);

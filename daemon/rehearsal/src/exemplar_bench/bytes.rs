@@ -1,7 +1,7 @@
-//! How many bytes an image needs to look like its patch, and how many the vehicle sends.
+//! The bytes that an image needs for its similarity with the patch, and the bytes that the vehicle sends.
 
 use super::Spread;
-use crate::World;
+use crate::world::World;
 use image::RgbImage;
 use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
@@ -14,51 +14,48 @@ use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Frames across and along an image.
+/// Number of camera frames across and along a source.
 const FRAMES: (u32, u32) = (4, 3);
 
-/// The best patches of each label that are measured.
+/// Number of patches of each label that are measured, the best first.
 const EACH: usize = 2;
 
-/// Where patches come from.
 #[derive(Debug, Clone)]
-pub enum Source {
+pub enum PatchSource {
     /// A procedural reef of this seed.
     Reef(u64),
-    /// A photo.
     Photo(PathBuf),
 }
 
 /// Bytes of images of one size.
 #[derive(Debug, Clone, Serialize)]
 pub struct Sizes {
-    /// Edge, pixels.
     pub edge_px: u32,
-    /// Patches.
     pub patches: usize,
-    /// The fewest bytes with a structural similarity of at least 0.9, by trying every quality; only of the smallest images.
+    /// Minimum number of bytes with a structural similarity of at least 0.9, over all qualities;
+    /// of the smallest images only.
     pub fewest: Option<Spread>,
-    /// What the vehicle sends.
+    /// Bytes of the exemplar that the vehicle sends.
     pub sent: Option<Spread>,
-    /// Share of what it sends that looks as like as that.
+    /// Share of the sent exemplars with at least that similarity.
     pub similar_share: f64,
-    /// The similarity of what it sends: median and least.
+    /// Similarity of the sent exemplars: median and minimum.
     pub ssim: [f64; 2],
 }
 
-/// What was measured of the patches of several sources.
+/// Measurements of the patches of several sources.
 #[derive(Debug, Clone, Serialize)]
 pub struct Bytes {
-    /// Photos or procedural reefs that were flown over.
+    /// Number of photos or procedural reefs.
     pub sources: usize,
-    /// The first image of a label, and the larger one.
+    /// Results for the first image of a label, and for the larger one.
     pub sizes: Vec<Sizes>,
-    /// Tenths of the bytes of the first images as they are sent, from the least to the greatest.
+    /// Deciles of the bytes of the first images as they are sent, minimum and maximum included.
     pub tenths: Vec<f64>,
 }
 
-/// The photos in a folder, sorted by name; pictures of labels are passed over.
-pub fn photos(dir: &Path) -> Result<Vec<Source>, UserError> {
+/// The photos in a folder, sorted by name; images of annotated classes are skipped.
+pub fn photos(dir: &Path) -> Result<Vec<PatchSource>, UserError> {
     let entries = std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))?;
     let is_photo = |path: &PathBuf| {
         let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -70,16 +67,16 @@ pub fn photos(dir: &Path) -> Result<Vec<Source>, UserError> {
     if found.is_empty() {
         return Err(UserError::file(dir, "there is no .jpg or .png in it"));
     }
-    Ok(found.into_iter().map(Source::Photo).collect())
+    Ok(found.into_iter().map(PatchSource::Photo).collect())
 }
 
 /// The patches that the vehicle picks on a flight over a source.
-pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
+pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserError> {
     let config = Config::default();
     let mpp = config.camera.metres_per_pixel;
     let world = match source {
-        Source::Reef(seed) => World::procedural(*seed, mpp),
-        Source::Photo(path) => World::from_files(path, None, mpp)?,
+        PatchSource::Reef(seed) => World::procedural(*seed, mpp),
+        PatchSource::Photo(path) => World::from_files(path, None, mpp)?,
     };
     let mut mapper =
         Mapper::new(&config, scenecast_files::configured_vocabulary(config.scene.vocabulary.as_deref())?, 0, seed)?;
@@ -96,9 +93,9 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
     Ok(mapper.gallery().into_values().flat_map(of_label).collect())
 }
 
-/// Measures the patches of all sources; the patches too.
+/// Measures the patches of all sources; returns the patches as well.
 pub fn sizes(
-    sources: &[Source],
+    sources: &[PatchSource],
     seed: u64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(Bytes, Vec<RgbImage>), UserError> {

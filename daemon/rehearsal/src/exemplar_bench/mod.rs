@@ -1,26 +1,23 @@
-//! Images of labels: how long they take under full load, and how many bytes they need.
+//! Exemplars: their arrival times under full load, and their bytes.
 
 mod arrival;
 mod bytes;
 #[cfg(test)]
 mod tests;
 
-pub use arrival::{Arrivals, Setting, arrivals};
-pub use bytes::{Bytes, Sizes, Source, photos, sizes};
+pub use arrival::{ArrivalSetting, Arrivals, arrivals};
+pub use bytes::{Bytes, PatchSource, Sizes, photos, sizes};
 
-/// The middle of the values, one of them that is exceeded by a twentieth, and the greatest.
+/// Median, 95th percentile and maximum of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Spread {
-    /// Median.
     pub median: f64,
-    /// A twentieth is beyond.
     pub p95: f64,
-    /// Greatest.
     pub max: f64,
 }
 
 impl Spread {
-    /// Of values; `None` of none.
+    /// The spread of values; `None` for an empty sample.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.into_iter().collect();
         values.sort_by(f64::total_cmp);

@@ -1,14 +1,14 @@
-//! Images of labels between a vehicle and a surface on a lossy link.
+//! Exemplars between a vehicle and a surface on a lossy link.
 
-use super::arrival::{LABELS, Setting, Water};
-use crate::VirtualTime;
+use super::arrival::{ArrivalSetting, ExemplarBench, LABELS};
+use crate::virtual_time::VirtualTime;
 use image::RgbImage;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{AskState, Wish};
 
-const IDLE: Setting = Setting { requests: 0, loss: 0.1, loaded: false, larger: false };
+const IDLE: ArrivalSetting = ArrivalSetting { requests: 0, loss: 0.1, loaded: false, larger: false };
 
 fn patch(i: u32) -> RgbImage {
     let grain = |x: u32, y: u32| (x * 7919 + y * 104_729 + x * y * (31 + i)) % 97 / 3;
@@ -18,111 +18,111 @@ fn patch(i: u32) -> RgbImage {
     })
 }
 
-/// Ends that know each other; of what is left over nothing is spent.
-fn water(setting: Setting, seed: u64) -> Water {
+/// Ends after their handshake, with all background streams off.
+fn bench(setting: ArrivalSetting, seed: u64) -> ExemplarBench {
     let patches: Vec<RgbImage> = (0..30).map(patch).collect();
-    let mut water = Water::new(setting, &patches, seed).unwrap();
+    let mut bench = ExemplarBench::new(setting, &patches, seed).unwrap();
     let budget =
         Budget { bits_per_s: 10_000, shares: Shares::default(), background: BackgroundOrder::new(&[]).unwrap() };
-    water.vehicle.handle_budget(budget, water.now);
-    water.run_until(Instant::from_secs_f64(120.0), |_| false);
-    assert_eq!(exemplar_bytes(&water), 0);
-    water
+    bench.vehicle.handle_budget(budget, bench.now);
+    bench.run_until(Instant::from_secs_f64(120.0), |_| false);
+    assert_eq!(exemplar_bytes(&bench), 0);
+    bench
 }
 
-/// The operator says what left-over bits are spent on.
-fn background(water: &mut Water, names: &[&str]) {
+/// The operator orders background streams.
+fn background(bench: &mut ExemplarBench, names: &[&str]) {
     let background = BackgroundOrder::from_names(names, &scenecast_protocol::map::LayerSet::default()).unwrap();
-    water.surface.surface_mut().set_budget(10_000, None, Some(background), water.now).unwrap();
+    bench.surface.surface_mut().set_budget(10_000, None, Some(background), bench.now).unwrap();
 }
 
-fn wait(water: &mut Water, seconds: f64) {
-    let until = water.now + std::time::Duration::from_secs_f64(seconds);
-    water.run_until(until, |_| false);
+fn wait(bench: &mut ExemplarBench, seconds: f64) {
+    let until = bench.now + std::time::Duration::from_secs_f64(seconds);
+    bench.run_until(until, |_| false);
 }
 
-fn exemplar_bytes(water: &Water) -> u64 {
-    water.vehicle.vehicle().stats().bytes_by_class.get(&Class::Exemplar).copied().unwrap_or(0)
+fn exemplar_bytes(bench: &ExemplarBench) -> u64 {
+    bench.vehicle.vehicle().stats().bytes_by_class.get(&Class::Exemplar).copied().unwrap_or(0)
 }
 
-fn state(water: &Water, label: u8) -> Option<AskState> {
-    Some(water.page(label)?.asked?.state)
+fn state(bench: &ExemplarBench, label: u8) -> Option<AskState> {
+    Some(bench.page(label)?.asked?.state)
 }
 
 #[test]
 fn a_small_image_grows_and_another_follows_after_the_survey() {
-    let mut water = water(IDLE, 1);
-    let (_, small) = water.get(3, Wish::Another).unwrap().unwrap();
-    let first = water.page(3).unwrap().picture(None).unwrap().clone();
+    let mut bench = bench(IDLE, 1);
+    let (_, small) = bench.get(3, Wish::Another).unwrap().unwrap();
+    let first = bench.page(3).unwrap().picture(None).unwrap().clone();
     assert!(small <= 700 && first.size == 0 && first.asked, "{small} bytes");
-    let (_, large) = water.get(3, Wish::Larger(None)).unwrap().unwrap();
-    let pictures = &water.page(3).unwrap().pictures;
+    let (_, large) = bench.get(3, Wish::Larger(None)).unwrap().unwrap();
+    let pictures = &bench.page(3).unwrap().pictures;
     assert!(large <= 2800 && large > small, "{large} bytes");
     assert_eq!(pictures.iter().map(|p| (p.number, p.size)).collect::<Vec<_>>(), [(first.number, 1)]);
-    water.get(3, Wish::Another).unwrap().unwrap();
-    let numbers: Vec<u8> = water.page(3).unwrap().pictures.iter().map(|p| p.number).collect();
+    bench.get(3, Wish::Another).unwrap().unwrap();
+    let numbers: Vec<u8> = bench.page(3).unwrap().pictures.iter().map(|p| p.number).collect();
     assert!(numbers.len() == 2 && numbers[0] != numbers[1], "{numbers:?}");
 }
 
 #[test]
-fn what_is_cancelled_costs_no_more_bits() {
-    let loaded = Setting { loaded: true, ..IDLE };
-    let mut water = water(loaded, 2);
-    water.get(4, Wish::Another).unwrap().unwrap();
-    water.surface.surface_mut().request_exemplar(water.address, 4, Wish::Larger(None), water.now).unwrap();
-    let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
-    let version = water.surface.surface_mut().cancel_exemplar(water.address, 4, water.now).unwrap();
-    let heard = |w: &Water| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
-    assert!(water.run_until(until, heard), "the vehicle hears of it");
-    let then = exemplar_bytes(&water);
-    wait(&mut water, 120.0);
-    assert_eq!(exemplar_bytes(&water), then);
-    let page = water.page(4).unwrap();
+fn a_cancelled_image_costs_no_more_bits() {
+    let loaded = ArrivalSetting { loaded: true, ..IDLE };
+    let mut bench = bench(loaded, 2);
+    bench.get(4, Wish::Another).unwrap().unwrap();
+    bench.surface.surface_mut().request_exemplar(bench.address, 4, Wish::Larger(None), bench.now).unwrap();
+    let until = bench.now + std::time::Duration::from_secs(120);
+    assert!(bench.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
+    let version = bench.surface.surface_mut().cancel_exemplar(bench.address, 4, bench.now).unwrap();
+    let received = |w: &ExemplarBench| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
+    assert!(bench.run_until(until, received), "the vehicle receives the order");
+    let then = exemplar_bytes(&bench);
+    wait(&mut bench, 120.0);
+    assert_eq!(exemplar_bytes(&bench), then);
+    let page = bench.page(4).unwrap();
     assert_eq!((page.asked, page.pictures.len()), (None, 1), "the small one stays");
 }
 
 #[test]
 fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
-    let mut water = water(IDLE, 3);
-    let gallery = water.vehicle.vehicle().exemplars().clone();
-    water.vehicle.handle_exemplars(Default::default());
-    water.surface.surface_mut().request_exemplar(water.address, 2, Wish::Another, water.now).unwrap();
-    let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));
-    wait(&mut water, 60.0);
-    assert_eq!(state(&water, 2), Some(AskState::NoneYet));
-    water.vehicle.handle_exemplars(gallery);
-    assert!(water.run_until(until, |w| w.page(2).unwrap().pictures.len() == 1));
-    assert_eq!(state(&water, 2), None);
+    let mut bench = bench(IDLE, 3);
+    let gallery = bench.vehicle.vehicle().exemplars().clone();
+    bench.vehicle.handle_exemplars(Default::default());
+    bench.surface.surface_mut().request_exemplar(bench.address, 2, Wish::Another, bench.now).unwrap();
+    let until = bench.now + std::time::Duration::from_secs(120);
+    assert!(bench.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));
+    wait(&mut bench, 60.0);
+    assert_eq!(state(&bench, 2), Some(AskState::NoneYet));
+    bench.vehicle.handle_exemplars(gallery);
+    assert!(bench.run_until(until, |w| w.page(2).unwrap().pictures.len() == 1));
+    assert_eq!(state(&bench, 2), None);
 }
 
 #[test]
 fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
-    let mut water = water(IDLE, 4);
-    background(&mut water, &["exemplars"]);
-    let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
-    let (seconds, _) = water.get(LABELS, Wish::Another).unwrap().unwrap();
+    let mut bench = bench(IDLE, 4);
+    background(&mut bench, &["exemplars"]);
+    let until = bench.now + std::time::Duration::from_secs(120);
+    assert!(bench.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
+    let (seconds, _) = bench.get(LABELS, Wish::Another).unwrap().unwrap();
     assert!(seconds < 30.0, "{seconds} s");
-    wait(&mut water, 300.0);
-    let shown = |label: u8| water.page(label).unwrap().pictures.iter().map(|p| p.asked).collect::<Vec<_>>();
+    wait(&mut bench, 300.0);
+    let shown = |label: u8| bench.page(label).unwrap().pictures.iter().map(|p| p.asked).collect::<Vec<_>>();
     assert!((1..LABELS).all(|label| shown(label) == [false]), "{:?}", (1..LABELS).map(shown).collect::<Vec<_>>());
     assert_eq!(shown(LABELS), [true]);
-    let then = exemplar_bytes(&water);
-    wait(&mut water, 300.0);
-    assert_eq!(exemplar_bytes(&water), then, "each once");
+    let then = exemplar_bytes(&bench);
+    wait(&mut bench, 300.0);
+    assert_eq!(exemplar_bytes(&bench), then, "each once");
 }
 
 #[test]
 fn while_the_map_waits_background_images_get_only_frame_ends() {
-    let loaded = Setting { loaded: true, ..IDLE };
+    let loaded = ArrivalSetting { loaded: true, ..IDLE };
     let map_bytes = |names: &[&str]| {
-        let mut water = water(loaded, 5);
-        background(&mut water, names);
-        wait(&mut water, 120.0);
-        let map = water.vehicle.vehicle().stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
-        assert!(exemplar_bytes(&water) < map / 100, "{} beside {map}", exemplar_bytes(&water));
+        let mut bench = bench(loaded, 5);
+        background(&mut bench, names);
+        wait(&mut bench, 120.0);
+        let map = bench.vehicle.vehicle().stats().bytes_by_class.get(&Class::Map).copied().unwrap_or(0);
+        assert!(exemplar_bytes(&bench) < map / 100, "{} beside {map}", exemplar_bytes(&bench));
         map
     };
     let (without, with) = (map_bytes(&[]), map_bytes(&["exemplars"]));

@@ -1,30 +1,29 @@
-//! A budget that binds: what the link makes of it, and whether it keeps it.
+//! The link's efficiency under a budget below the channel's capacity, and its use of that budget.
 
+use super::bench::{LinkBench, LinkSetting};
 use super::table::{budget_use, round};
-use super::water::{Setting, Water};
 use scenecast_protocol::link::IssueError;
 use serde::Serialize;
 use sim_channel::LossModel;
 use std::time::Duration;
 
-/// Half duplex at 10 kbit/s on air, of which each end may use a part.
+/// One row: half duplex at 10 kbit/s on air, of which each end may use its budget.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BudgetRow {
-    /// Slant range.
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way.
+    /// Share of frames lost in each direction.
     pub loss: f64,
-    /// Bit budget of each end.
+    /// Bit budget of each end, bit/s.
     pub budget_bps: u32,
-    /// Useful payload over what the vehicle's budget could carry of it.
+    /// Useful payload over the payload that the vehicle's budget could carry.
     pub efficiency: f64,
-    /// Worst window of any transmitter over what the budget allows with one transmission more.
+    /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
 }
 
-/// Measures each row over `time`.
+/// Measures each row over `time` of virtual time.
 pub fn measure_budgets(time: Duration, seed: u64) -> Result<Vec<BudgetRow>, IssueError> {
     let mut rows = Vec::new();
     for budget_bps in [250, 1000] {
@@ -37,16 +36,16 @@ pub fn measure_budgets(time: Duration, seed: u64) -> Result<Vec<BudgetRow>, Issu
 
 fn measure(budget_bps: u32, frame_bytes: usize, time: Duration, seed: u64) -> Result<BudgetRow, IssueError> {
     let loss = 0.1;
-    let mut setting = Setting::new(1000.0, frame_bytes, LossModel::Independent { probability: loss });
+    let mut setting = LinkSetting::new(1000.0, frame_bytes, LossModel::Independent { probability: loss });
     setting.budget_bps = budget_bps;
-    let mut water = Water::under_load(&setting, seed);
-    let flow = water.measure_flow(time, None)?;
+    let mut bench = LinkBench::under_load(&setting, seed);
+    let flow = bench.measure_flow(time, None)?;
     Ok(BudgetRow {
         range_km: 1.0,
         frame_bytes,
         loss,
         budget_bps,
         efficiency: round(flow.useful_bps / (f64::from(budget_bps) * (1.0 - loss))),
-        budget_use: round(budget_use(&water)),
+        budget_use: round(budget_use(&bench)),
     })
 }

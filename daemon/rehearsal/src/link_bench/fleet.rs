@@ -1,8 +1,8 @@
-//! Fourteen vehicles on one medium, none of them known at the start.
+//! Fourteen vehicles that share one medium and are all unknown at the start.
 
+use super::bench::{LinkBench, LinkSetting};
 use super::table::{budget_use, round};
-use super::water::{Setting, Water};
-use crate::VirtualTime;
+use crate::virtual_time::VirtualTime;
 use scenecast_protocol::time::Instant;
 use serde::Serialize;
 use sim_channel::LossModel;
@@ -11,28 +11,26 @@ use std::time::Duration;
 const VEHICLES: u8 = 14;
 const LOAD: usize = 20_000;
 
-/// How many vehicles share the medium.
+/// Number of vehicles that share the medium.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FleetRow {
-    /// Vehicles.
     pub vehicles: u8,
-    /// Slant range of each.
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way, collisions not counted.
+    /// Share of frames lost in each direction, without collisions.
     pub loss: f64,
-    /// Seconds until all were known.
+    /// Time until the surface knew all vehicles, seconds.
     pub discovered_s: f64,
-    /// Time that a turn of each takes with changing hands.
+    /// Time of one turn of each vehicle with its turn-around, seconds.
     pub fair_share_s: f64,
-    /// Greatest age of any vehicle's map, once each was heard.
+    /// Maximum age of any vehicle's map after each was received once, seconds.
     pub max_age_s: f64,
-    /// `max_age_s` over `fair_share_s`.
+    /// Ratio of `max_age_s` to `fair_share_s`.
     pub max_age_shares: f64,
-    /// Useful payload of all over what the channel could carry of it.
+    /// Ratio of all useful payload to the channel's capacity for it.
     pub efficiency: f64,
-    /// Worst window of any transmitter over what the budget allows with one transmission more.
+    /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
 }
 
@@ -42,44 +40,44 @@ struct Ages {
 }
 
 impl Ages {
-    /// Time since a frame of its state was taken or the state was known to be equal.
-    fn sample(&mut self, water: &Water) {
-        for vehicle in &water.vehicles {
-            let taken = water.surface.end().vehicle(vehicle.address).and_then(|v| v.replica().taken());
-            let settled = water.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
-            let age = water.now.since(taken.unwrap_or(Instant::ZERO));
-            self.oldest = self.oldest.max(if settled { Duration::ZERO } else { age });
+    /// Time since the last frame of a vehicle's state, or since the state was known to be equal.
+    fn sample(&mut self, bench: &LinkBench) {
+        for vehicle in &bench.vehicles {
+            let taken = bench.surface.end().vehicle(vehicle.address).and_then(|v| v.replica().taken());
+            let converged = bench.surface.end().vehicle(vehicle.address).is_some() && vehicle.host.end().is_converged();
+            let age = bench.now.since(taken.unwrap_or(Instant::ZERO));
+            self.oldest = self.oldest.max(if converged { Duration::ZERO } else { age });
         }
     }
 }
 
-/// Measures the row over `time`; all chance is drawn from `seed`.
+/// Measures the row over `time`; all random numbers are drawn from `seed`.
 pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
     let loss = 0.1;
-    let mut setting = Setting::new(1000.0, 256, LossModel::Independent { probability: loss });
+    let mut setting = LinkSetting::new(1000.0, 256, LossModel::Independent { probability: loss });
     setting.vehicles = VEHICLES;
     setting.discovery_period = Some(Duration::from_secs(60));
-    let mut water = Water::new(&setting, seed);
-    water.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
-    let began = water.now;
-    let is_known = |w: &Water| {
+    let mut bench = LinkBench::new(&setting, seed);
+    bench.vehicles.iter_mut().for_each(|v| v.load = Some(LOAD));
+    let began = bench.now;
+    let is_known = |w: &LinkBench| {
         w.vehicles.iter().all(|v| w.surface.end().vehicle(v.address).is_some_and(|p| p.replica().taken().is_some()))
     };
-    water.run_until(began + Duration::from_secs(3600), is_known);
-    let found = water.now.since(began);
-    water.run(Duration::from_secs(120));
-    let useful = |w: &Water| -> f64 {
+    bench.run_until(began + Duration::from_secs(3600), is_known);
+    let found = bench.now.since(began);
+    bench.run(Duration::from_secs(120));
+    let useful = |w: &LinkBench| -> f64 {
         w.vehicles.iter().filter_map(|v| w.surface.end().vehicle(v.address)).map(|v| v.replica().useful_bytes()).sum()
     };
-    let (from, before) = (water.now, useful(&water));
-    water.grants = Default::default();
+    let (from, before) = (bench.now, useful(&bench));
+    bench.grants = Default::default();
     let mut ages = Ages { oldest: Duration::ZERO };
-    while water.now < from + time {
-        water.run(Duration::from_secs(1));
-        ages.sample(&water);
+    while bench.now < from + time {
+        bench.run(Duration::from_secs(1));
+        ages.sample(&bench);
     }
-    let useful_bps = (useful(&water) - before) * 8.0 / water.now.since(from).as_secs_f64();
-    let fair_share_s = fair_share(&water).as_secs_f64();
+    let useful_bps = (useful(&bench) - before) * 8.0 / bench.now.since(from).as_secs_f64();
+    let fair_share_s = fair_share(&bench).as_secs_f64();
     FleetRow {
         vehicles: VEHICLES,
         range_km: 1.0,
@@ -90,14 +88,14 @@ pub fn measure_fleet(time: Duration, seed: u64) -> FleetRow {
         max_age_s: round(ages.oldest.as_secs_f64()),
         max_age_shares: round(ages.oldest.as_secs_f64() / fair_share_s),
         efficiency: round(useful_bps / (10_000.0 * (1.0 - loss))),
-        budget_use: round(budget_use(&water)),
+        budget_use: round(budget_use(&bench)),
     }
 }
 
-/// The mean turn that was granted and what changing hands costs, for each vehicle.
-fn fair_share(water: &Water) -> Duration {
-    let (grants, granted) = water.grants;
-    let setting = water.setting();
+/// Mean granted turn with its propagation, turn-around and grant, summed over the vehicles.
+fn fair_share(bench: &LinkBench) -> Duration {
+    let (grants, granted) = bench.grants;
+    let setting = bench.setting();
     let modem = setting.modem();
     let hands = setting.round_trip() + modem.turn_around * 2 + modem.airtime(GRANT_BYTES);
     (granted / grants.max(1) as u32 + hands) * u32::from(setting.vehicles)

@@ -5,11 +5,11 @@ use scenecast_protocol::time::Instant;
 use std::collections::{BTreeMap, VecDeque};
 
 /// Bytes of the state; an address is two bytes.
-const CELLS: usize = 1 << 16;
+pub(super) const CELLS: usize = 1 << 16;
 /// Bytes in front of each run of a chunk: address of its first byte, number of bytes.
 const RUN_HEAD: usize = 4;
 
-/// Neighbouring bytes with their values.
+/// Consecutive bytes with their values.
 ///
 /// ```text
 /// byte  field
@@ -18,12 +18,12 @@ const RUN_HEAD: usize = 4;
 ///  4..  values
 /// ```
 #[derive(Debug)]
-pub struct Run {
+pub struct ByteRun {
     start: u16,
     values: Vec<u8>,
 }
 
-impl Run {
+impl ByteRun {
     fn cells(&self) -> impl Iterator<Item = (usize, u8)> + '_ {
         (usize::from(self.start)..).zip(self.values.iter().copied())
     }
@@ -53,31 +53,32 @@ impl Run {
     }
 }
 
-/// Where a byte is on its way to the peer.
+/// Progress of a byte toward the peer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Place {
-    /// The peer is known to hold it.
+enum ByteState {
+    /// The peer is known to have it.
     Held,
     /// It waits for a transmission.
     Waiting,
-    /// It is in a frame of unknown fate.
+    /// It is in a frame whose outcome is unknown.
     Flying,
 }
 
-/// The sending side: rewrites byte after byte, round and round, as fast as it is read.
+/// The sending side: rewrites all bytes in a cycle, as fast as it is read.
 ///
-/// Invariants: a byte that differs from what the peer is known to hold waits or flies; one that waits is in `queue` once.
+/// Invariants: a byte that differs from the peer's known copy waits or flies; one that waits
+/// is in `queue` exactly once.
 #[derive(Debug)]
 pub struct OpaqueSource {
     target: Vec<u8>,
     acked: Vec<u8>,
     digest: u64,
-    places: Vec<Place>,
-    /// What waits, oldest news first: first byte and end.
+    places: Vec<ByteState>,
+    /// Waiting ranges, oldest change first: first byte and end.
     queue: VecDeque<(usize, usize)>,
-    waiting: usize,
-    flying: usize,
-    /// The byte to be rewritten next.
+    pub(super) waiting: usize,
+    pub(super) flying: usize,
+    /// Address of the byte that is rewritten next.
     pen: usize,
 }
 
@@ -87,7 +88,7 @@ impl Default for OpaqueSource {
             target: vec![0; CELLS],
             acked: vec![0; CELLS],
             digest: 0,
-            places: vec![Place::Held; CELLS],
+            places: vec![ByteState::Held; CELLS],
             queue: VecDeque::new(),
             waiting: 0,
             flying: 0,
@@ -97,31 +98,31 @@ impl Default for OpaqueSource {
 }
 
 impl OpaqueSource {
-    /// What the peer ought to hold.
+    /// The state that the peer should reach.
     pub fn target(&self) -> &[u8] {
         &self.target
     }
 
-    /// Rewrites as many bytes as it takes for `bytes` to wait, or for all that are not in frames of unknown fate.
+    /// Rewrites bytes until `bytes` of them wait, or all that are not in frames whose outcome is unknown.
     pub fn fill(&mut self, bytes: usize) {
         while self.waiting < bytes.min(CELLS - self.flying) {
             let cell = self.pen;
             self.pen = (self.pen + 1) % CELLS;
             self.target[cell] = self.target[cell].wrapping_add(1);
-            if self.places[cell] == Place::Held {
+            if self.places[cell] == ByteState::Held {
                 self.wait(cell);
             }
         }
     }
 
-    /// Takes back all but the `keep` oldest of the changes that wait.
+    /// Reverts all waiting changes except the `keep` oldest.
     pub fn take_back(&mut self, keep: usize) {
         while self.waiting > keep {
             let Some((start, end)) = self.queue.pop_back() else { return };
             let from = end - (self.waiting - keep).min(end - start);
             for cell in from..end {
                 self.target[cell] = self.acked[cell];
-                self.places[cell] = Place::Held;
+                self.places[cell] = ByteState::Held;
             }
             self.waiting -= end - from;
             if from > start {
@@ -131,7 +132,7 @@ impl OpaqueSource {
     }
 
     fn wait(&mut self, cell: usize) {
-        self.places[cell] = Place::Waiting;
+        self.places[cell] = ByteState::Waiting;
         self.waiting += 1;
         match self.queue.back_mut() {
             Some((_, end)) if *end == cell => *end += 1,
@@ -139,31 +140,31 @@ impl OpaqueSource {
         }
     }
 
-    /// Puts what was lost before everything else that waits.
+    /// Puts lost bytes in front of all others that wait.
     fn wait_first(&mut self, start: usize, end: usize) {
         self.waiting += end - start;
-        self.places[start..end].fill(Place::Waiting);
+        self.places[start..end].fill(ByteState::Waiting);
         match self.queue.front_mut() {
             Some((first, _)) if *first == end => *first = start,
             _ => self.queue.push_front((start, end)),
         }
     }
 
-    fn take(&mut self, most: usize) -> Option<Run> {
+    fn take(&mut self, most: usize) -> Option<ByteRun> {
         let (start, end) = self.queue.pop_front()?;
         let cut = end.min(start + most);
         if cut < end {
             self.queue.push_front((cut, end));
         }
-        self.places[start..cut].fill(Place::Flying);
+        self.places[start..cut].fill(ByteState::Flying);
         self.waiting -= cut - start;
         self.flying += cut - start;
-        Some(Run { start: start as u16, values: self.target[start..cut].to_vec() })
+        Some(ByteRun { start: start as u16, values: self.target[start..cut].to_vec() })
     }
 }
 
 impl StateSource for OpaqueSource {
-    type Carried = Vec<Run>;
+    type Carried = Vec<ByteRun>;
 
     fn next_chunk(&mut self, room: usize, _now: Instant) -> Option<(Vec<u8>, Self::Carried)> {
         let mut bytes = Vec::with_capacity(room);
@@ -192,7 +193,7 @@ impl StateSource for OpaqueSource {
             self.flying -= run.values.len();
             for cell in (start..start + run.values.len()).rev() {
                 match self.target[cell] == self.acked[cell] {
-                    true => self.places[cell] = Place::Held,
+                    true => self.places[cell] = ByteState::Held,
                     false => self.wait_first(cell, cell + 1),
                 }
             }
@@ -201,7 +202,7 @@ impl StateSource for OpaqueSource {
 
     fn handle_peer_restart(&mut self, _now: Instant) {
         self.acked.fill(0);
-        self.places.fill(Place::Held);
+        self.places.fill(ByteState::Held);
         self.queue.clear();
         (self.digest, self.waiting, self.flying) = (0, 0, 0);
         for cell in (0..CELLS).filter(|&c| self.target[c] != 0).collect::<Vec<_>>() {
@@ -229,9 +230,9 @@ impl StateSource for OpaqueSource {
 pub struct OpaqueReplica {
     base: Vec<u8>,
     digest: u64,
-    log: BTreeMap<u64, Vec<Run>>,
+    log: BTreeMap<u64, Vec<ByteRun>>,
     shown: Vec<u8>,
-    /// Number of the last frame that spoke of each byte.
+    /// Number of the last frame with a value of each byte.
     spoken: Vec<u64>,
     version: u64,
     useful_bytes: f64,
@@ -254,22 +255,21 @@ impl Default for OpaqueReplica {
 }
 
 impl OpaqueReplica {
-    /// What is held.
     pub fn shown(&self) -> &[u8] {
         &self.shown
     }
 
-    /// Bytes of chunks that told something new; of a chunk that partly did, its share.
+    /// Bytes of chunks that changed the replica; of a chunk that changed part of its bytes, that share.
     pub fn useful_bytes(&self) -> f64 {
         self.useful_bytes
     }
 
-    /// When a chunk was last taken.
+    /// Time of the last chunk that was applied.
     pub fn taken(&self) -> Option<Instant> {
         self.taken
     }
 
-    /// Bytes that differ from what ought to be held.
+    /// Number of bytes that differ from the source's state.
     pub fn missing(&self, target: &[u8]) -> usize {
         self.shown.iter().zip(target).filter(|(a, b)| a != b).count()
     }
@@ -277,9 +277,9 @@ impl OpaqueReplica {
 
 impl StateReplica for OpaqueReplica {
     fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
-        let Some(runs) = Run::read_all(chunk) else { return false };
+        let Some(runs) = ByteRun::read_all(chunk) else { return false };
         let (mut cells, mut news) = (0, 0);
-        for (cell, value) in runs.iter().flat_map(Run::cells) {
+        for (cell, value) in runs.iter().flat_map(ByteRun::cells) {
             cells += 1;
             if self.spoken[cell] <= number {
                 self.spoken[cell] = number;
@@ -317,7 +317,7 @@ impl StateReplica for OpaqueReplica {
     }
 }
 
-/// Mixes a byte and its address; 0 for the value at the beginning.
+/// Hash of a byte and its address; 0 for the initial value.
 fn term(cell: usize, value: u8) -> u64 {
     if value == 0 {
         return 0;
@@ -330,80 +330,4 @@ fn term(cell: usize, value: u8) -> u64 {
 
 fn fold(digest: u64) -> u16 {
     (digest ^ digest >> 16 ^ digest >> 32 ^ digest >> 48) as u16
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const NOW: Instant = Instant::ZERO;
-
-    /// Passes chunks over, of which every third is lost, until nothing waits.
-    fn pass(source: &mut OpaqueSource, replica: &mut OpaqueReplica, number: &mut u64) {
-        while let Some((chunk, carried)) = source.next_chunk(100, NOW) {
-            *number += 1;
-            let delivered = !number.is_multiple_of(3);
-            assert!(!delivered || replica.apply(*number, &chunk, NOW));
-            source.handle_fate(carried, delivered, NOW);
-            replica.advance_base(*number);
-            assert_eq!(source.digest(), replica.base_digest());
-        }
-    }
-
-    #[test]
-    fn the_replica_is_equal_once_every_byte_got_through() {
-        let (mut source, mut replica, mut number) = (OpaqueSource::default(), OpaqueReplica::default(), 0);
-        for bytes in [1, 5000, 70_000, 99] {
-            source.fill(bytes.min(CELLS));
-            pass(&mut source, &mut replica, &mut number);
-            assert_eq!(source.target(), replica.shown());
-            assert!(source.is_converged());
-        }
-    }
-
-    #[test]
-    fn a_chunk_fills_its_room_while_more_waits() {
-        let mut source = OpaqueSource::default();
-        source.fill(300);
-        let (first, carried) = source.next_chunk(100, NOW).unwrap();
-        source.handle_fate(carried, false, NOW);
-        let (again, _) = source.next_chunk(50, NOW).unwrap();
-        let (rest, _) = source.next_chunk(100, NOW).unwrap();
-        assert_eq!([first.len(), again.len(), rest.len()], [100, 50, 100]);
-    }
-
-    #[test]
-    fn changes_that_are_taken_back_are_not_sent() {
-        let (mut source, mut replica, mut number) = (OpaqueSource::default(), OpaqueReplica::default(), 0);
-        source.fill(5000);
-        source.take_back(7);
-        assert_eq!(replica.missing(source.target()), 7);
-        pass(&mut source, &mut replica, &mut number);
-        assert_eq!(source.target(), replica.shown());
-    }
-
-    #[test]
-    fn a_source_whose_bytes_are_all_under_way_is_as_full_as_it_gets() {
-        let mut source = OpaqueSource::default();
-        source.fill(2 * CELLS);
-        assert_eq!(source.waiting, CELLS);
-        let mut carried = Vec::new();
-        while let Some((_, runs)) = source.next_chunk(1000, NOW) {
-            carried.push(runs);
-        }
-        source.fill(CELLS);
-        assert_eq!((source.waiting, source.flying), (0, CELLS));
-        source.handle_fate(carried.remove(0), true, NOW);
-        source.fill(CELLS);
-        assert_eq!((source.waiting, source.flying), (996, CELLS - 996));
-    }
-
-    #[test]
-    fn only_news_is_useful() {
-        let (mut source, mut replica) = (OpaqueSource::default(), OpaqueReplica::default());
-        source.fill(96);
-        let (chunk, _) = source.next_chunk(100, NOW).unwrap();
-        assert!(replica.apply(1, &chunk, NOW) && replica.apply(2, &chunk, NOW));
-        assert_eq!(replica.useful_bytes(), 100.0);
-    }
 }

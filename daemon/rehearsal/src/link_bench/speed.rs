@@ -1,8 +1,8 @@
-//! How fast the link runs on one core of this machine.
+//! The speed of the link's code on one core of this machine.
 
+use super::bench::{BenchVehicle, LinkBench, LinkSetting, auv, surface};
 use super::opaque::OpaqueReplica;
-use super::water::{Setting, Vehicle, Water, auv, surface};
-use crate::VirtualTime;
+use crate::virtual_time::VirtualTime;
 use scenecast_host::LinkHost;
 use scenecast_protocol::link::SurfaceLink;
 use scenecast_protocol::mac::ModemProfile;
@@ -11,26 +11,25 @@ use sim_channel::LossModel;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Bytes that always wait at the vehicle.
+/// Bytes that always wait at the vehicle under load.
 const LOAD: usize = 20_000;
 
-/// Figures of one run on this machine; another run gives others.
+/// Measurements of one run on this machine; they differ from run to run.
 #[derive(Debug, Clone, Copy)]
 pub struct Speed {
     /// Frames sent and received a second, both ends on one core, 64 bytes each.
     pub small_frames_per_s: f64,
-    /// The same: 256 bytes.
     pub frames_per_s: f64,
-    /// Seconds that an hour of virtual time under load takes with 64-byte frames, the simulated water included.
+    /// Seconds that an hour of virtual time under load takes with 64-byte frames, the simulated channel included.
     pub hour_s: f64,
 }
 
-/// Takes some seconds.
+/// Measures this machine for some seconds.
 pub fn measure_speed() -> Speed {
-    let setting = Setting::new(1000.0, 64, LossModel::Independent { probability: 0.1 });
-    let mut water = Water::under_load(&setting, 1);
+    let setting = LinkSetting::new(1000.0, 64, LossModel::Independent { probability: 0.1 });
+    let mut bench = LinkBench::under_load(&setting, 1);
     let began = std::time::Instant::now();
-    water.run(Duration::from_secs(3600));
+    bench.run(Duration::from_secs(3600));
     let hour_s = began.elapsed().as_secs_f64();
     Speed { small_frames_per_s: frames_per_s(64), frames_per_s: frames_per_s(256), hour_s }
 }
@@ -45,22 +44,22 @@ fn frames_per_s(frame_bytes: usize) -> f64 {
     (wire.frames - frames) as f64 / began.elapsed().as_secs_f64()
 }
 
-/// Two ends under load, and a frame arrives when its airtime has passed.
+/// Two ends under load; a frame arrives at the end of its airtime.
 struct Wire {
     now: Instant,
     surface: LinkHost<SurfaceLink<OpaqueReplica>>,
-    vehicle: Vehicle,
+    vehicle: BenchVehicle,
     modem: ModemProfile,
-    /// Frames on air by when they end and whether the surface sent them.
+    /// Frames on air, by their end and whether the surface sent them.
     on_air: BTreeMap<(Instant, bool), Vec<u8>>,
     frames: u64,
 }
 
 impl Wire {
     fn new(frame_bytes: usize) -> Self {
-        let setting = Setting::new(0.0, frame_bytes, LossModel::None);
+        let setting = LinkSetting::new(0.0, frame_bytes, LossModel::None);
         let now = Instant::ZERO;
-        let mut vehicle = Vehicle::new(&setting, auv(), 1, now);
+        let mut vehicle = BenchVehicle::new(&setting, auv(), 1, now);
         vehicle.load = Some(LOAD);
         let surface = surface(&setting, 2, now);
         Self { now, surface, vehicle, modem: setting.modem(), on_air: BTreeMap::new(), frames: 0 }
@@ -115,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ends_on_a_wire_use_nearly_all_of_it() {
+    fn ends_on_a_wire_use_nearly_all_of_its_capacity() {
         let mut wire = Wire::new(256);
         wire.run(Duration::from_secs(600));
         let share = wire.frames as f64 * 256.0 * 8.0 / 10_000.0 / 600.0;

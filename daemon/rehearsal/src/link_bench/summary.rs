@@ -1,28 +1,24 @@
 //! Order statistics of a sample.
 
-/// A sorted sample.
 #[derive(Debug, Clone)]
 pub struct Summary(Vec<f64>);
 
 impl Summary {
-    /// Of these figures.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         Self(values)
     }
 
-    /// The least figure that `share` of them do not exceed; 0 if there are none.
+    /// The smallest value that a `share` of the sample does not exceed; 0 for an empty sample.
     pub fn quantile(&self, share: f64) -> f64 {
         let rank = (share * self.0.len() as f64).ceil() as usize;
         self.0.get(rank.max(1) - 1).copied().unwrap_or_default()
     }
 
-    /// The middle one.
     pub fn median(&self) -> f64 {
         self.quantile(0.5)
     }
 
-    /// 95th percentile.
     pub fn p95(&self) -> f64 {
         self.quantile(0.95)
     }
@@ -33,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_figures_of_the_sample() {
+    fn quantiles_are_values_of_the_sample() {
         let s = Summary::of((1..=20).rev().map(f64::from).collect());
         assert_eq!([s.median(), s.p95(), s.quantile(1.0)], [10.0, 19.0, 20.0]);
         assert_eq!(Summary::of(Vec::new()).median(), 0.0);

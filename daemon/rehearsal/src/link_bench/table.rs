@@ -1,24 +1,21 @@
-//! The golden table: one row a setting.
+//! The golden table, with one row for each setting.
 
-use super::trial::{Effort, Flow};
-use super::water::{BIT_RATE_BPS, Setting, WINDOW, Water};
+use super::bench::{BIT_RATE_BPS, LinkBench, LinkSetting, WINDOW};
+use super::trial::{Flow, LinkEffort};
 use scenecast_protocol::link::IssueError;
 use scenecast_protocol::schedule::Audit;
 use serde::Serialize;
 use sim_channel::{LossModel, RandomStream, presets};
 
-/// How frames are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pattern {
-    /// Each by itself.
     Independent,
-    /// In bursts, as in a shallow harbour.
+    /// Losses in bursts, as in a shallow harbour.
     Harbour,
 }
 
 impl Pattern {
-    /// As it is printed.
     pub fn name(self) -> &'static str {
         match self {
             Self::Independent => "independent",
@@ -27,82 +24,79 @@ impl Pattern {
     }
 }
 
-/// One line of the table.
+/// One row of the golden table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
-    /// Slant range.
+pub struct LinkRow {
     pub range_km: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// Share of frames lost each way; for a harbour the share that was.
+    /// Share of frames lost in each direction; for a harbour the measured share.
     pub loss: f64,
-    /// How they were lost.
     pub pattern: Pattern,
-    /// Useful payload over what the channel could carry of it.
+    /// Ratio of useful payload to the channel's capacity for it.
     pub efficiency: f64,
-    /// Issue to applied: median.
     pub directive_median_s: f64,
-    /// Issue to applied: 95th percentile.
+    /// Time from issue to application of a directive: 95th percentile, seconds.
     pub directive_p95_s: f64,
-    /// Issue to known at the surface: 95th percentile.
+    /// Time from issue until the surface knows of the application: 95th percentile, seconds.
     pub directive_known_p95_s: f64,
-    /// Last change to equality: 95th percentile.
+    /// Time from the last change to equal maps: 95th percentile, seconds.
     pub converge_p95_s: f64,
-    /// Share of stops that kept the bound of convergence.
+    /// Share of stops after which the maps were equal within the bound.
     pub converge_within: f64,
-    /// Worst window of any transmitter over what the budget allows with one transmission more.
+    /// Ratio of the fullest window of any transmitter to the budget plus one transmission.
     pub budget_use: f64,
-    /// Times that the two ends were found to differ.
+    /// Number of resynchronisations of the link.
     pub resyncs: u64,
-    /// Frames that began sooner than the modem turns around.
+    /// Number of frames that began before the end of the turn-around.
     pub early_frames: u64,
 }
 
-/// Where and how a row is measured.
+/// Channel and frame size of a row.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct LinkCase {
     range_km: f64,
     frame_bytes: usize,
-    /// `None`: a harbour.
+    /// Share of independent losses; `None` for a harbour.
     loss: Option<f64>,
 }
 
-/// Every place of the table.
-pub fn places() -> Vec<Place> {
-    let mut places = Vec::new();
+/// The cases of the table, in order.
+pub fn link_cases() -> Vec<LinkCase> {
+    let mut link_cases = Vec::new();
     for range_km in [0.1, 1.0, 3.0] {
         for frame_bytes in [64, 256, 1000] {
             for loss in [Some(0.0), Some(0.1), Some(0.3), Some(0.5), None] {
-                places.push(Place { range_km, frame_bytes, loss });
+                link_cases.push(LinkCase { range_km, frame_bytes, loss });
             }
         }
     }
-    places
+    link_cases
 }
 
-impl Place {
-    fn setting(&self) -> Setting {
+impl LinkCase {
+    fn setting(&self) -> LinkSetting {
         let loss = match self.loss {
             Some(probability) => LossModel::Independent { probability },
             None => presets::shallow_harbour().loss,
         };
-        Setting::new(self.range_km * 1000.0, self.frame_bytes, loss)
+        LinkSetting::new(self.range_km * 1000.0, self.frame_bytes, loss)
     }
 
-    /// Measures the row; all chance is drawn from `seed`.
-    pub fn measure(&self, effort: &Effort, seed: u64) -> Result<Row, IssueError> {
+    /// Measures the row; all random numbers are drawn from `seed`.
+    pub fn measure(&self, effort: &LinkEffort, seed: u64) -> Result<LinkRow, IssueError> {
         let setting = self.setting();
-        let mut dice = RandomStream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
-        let mut seed = || (dice.uniform() * 2f64.powi(53)) as u64;
-        let mut flowing = Water::under_load(&setting, seed());
+        let mut rng = RandomStream::new(seed, &[self.range_km.to_bits(), self.frame_bytes as u64]);
+        let mut seed = || (rng.uniform() * 2f64.powi(53)) as u64;
+        let mut flowing = LinkBench::under_load(&setting, seed());
         let Flow { useful_bps, loss } = flowing.measure_flow(effort.saturated, None)?;
         let loss = self.loss.unwrap_or(loss);
-        let mut directed = Water::under_load(&setting, seed());
+        let mut directed = LinkBench::under_load(&setting, seed());
         let directives = directed.measure_directives(effort.directives, &mut RandomStream::new(seed(), &[]))?;
-        let mut stopped = Water::under_load(&setting, seed());
+        let mut stopped = LinkBench::under_load(&setting, seed());
         let convergence = stopped.measure_convergence(effort.stops, loss, &mut RandomStream::new(seed(), &[]));
-        let waters = [flowing, directed, stopped];
-        Ok(Row {
+        let benches = [flowing, directed, stopped];
+        Ok(LinkRow {
             range_km: self.range_km,
             frame_bytes: self.frame_bytes,
             loss: round(loss),
@@ -113,26 +107,26 @@ impl Place {
             directive_known_p95_s: round(directives.known.p95()),
             converge_p95_s: round(convergence.time.p95()),
             converge_within: round(convergence.within),
-            budget_use: round(waters.iter().map(budget_use).fold(0.0, f64::max)),
-            resyncs: waters.iter().map(resyncs).sum(),
-            early_frames: waters.iter().map(|w| w.tally.early_frames).sum(),
+            budget_use: round(benches.iter().map(budget_use).fold(0.0, f64::max)),
+            resyncs: benches.iter().map(resyncs).sum(),
+            early_frames: benches.iter().map(|w| w.tally.early_frames).sum(),
         })
     }
 }
 
-/// Worst window of any transmitter, over the budget of a window and one transmission.
-pub fn budget_use(water: &Water) -> f64 {
-    let budget = f64::from(water.setting().budget_bps) * WINDOW.as_secs_f64();
+/// Ratio of the fullest window of any transmitter to the budget of a window plus one transmission.
+pub fn budget_use(bench: &LinkBench) -> f64 {
+    let budget = f64::from(bench.setting().budget_bps) * WINDOW.as_secs_f64();
     let of = |audit: &Audit| audit.worst_window_bits() as f64 / (budget + audit.largest_bits() as f64);
-    water.vehicles.iter().map(|v| of(v.host.audit())).fold(of(water.surface.audit()), f64::max)
+    bench.vehicles.iter().map(|v| of(v.host.audit())).fold(of(bench.surface.audit()), f64::max)
 }
 
-fn resyncs(water: &Water) -> u64 {
-    let at_surface = water.view().map_or(0, |v| v.stats().resyncs);
-    at_surface + water.vehicles.iter().map(|v| v.host.end().stats().resyncs).sum::<u64>()
+fn resyncs(bench: &LinkBench) -> u64 {
+    let at_surface = bench.view().map_or(0, |v| v.stats().resyncs);
+    at_surface + bench.vehicles.iter().map(|v| v.host.end().stats().resyncs).sum::<u64>()
 }
 
-/// To a thousandth, so that a table says no more than it knows.
+/// Rounds to a thousandth, the precision of the measurements.
 pub fn round(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0
 }

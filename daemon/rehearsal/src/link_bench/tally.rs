@@ -1,22 +1,22 @@
-//! What became of the time on the medium and of the frames in it.
+//! Account of the airtime and of the frames in the channel.
 
 use sim_channel::{LossReason, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Frames of one direction, counted where they were meant to arrive.
+/// Frames of one direction, counted at their destination.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Frames {
-    /// Frames that arrived or did not.
+pub struct FrameCount {
+    /// Number of frames that arrived or were lost.
     pub sent: u64,
-    /// Lost by the water.
+    /// Number of frames that the channel lost.
     pub lost: u64,
-    /// Lost because two spoke at a time, or to one that spoke itself.
+    /// Number of frames lost by a collision or to a destination that was transmitting.
     pub talked_over: u64,
 }
 
-impl Frames {
-    /// Counts what became of a frame.
+impl FrameCount {
+    /// Counts the outcome of a frame.
     pub fn count(&mut self, outcome: &ReceptionOutcome) {
         self.sent += 1;
         match outcome {
@@ -28,23 +28,23 @@ impl Frames {
         }
     }
 
-    /// Share that the water lost of those that nobody talked over.
+    /// Share that the channel lost of the frames without collision.
     pub fn loss(&self) -> f64 {
         self.lost as f64 / (self.sent - self.talked_over).max(1) as f64
     }
 }
 
-/// Time on air by what it was for, and frames by direction.
+/// Airtime by end and kind of frame, and frames by direction.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     /// Time on air by sender (`surface`, `vehicle`) and kind of frame.
     pub airtime: BTreeMap<(&'static str, &'static str), Duration>,
-    /// Frames that began sooner after a frame for the same end had come in than its modem turns around.
+    /// Number of frames that an end began within its turn-around after receiving a frame.
     pub early_frames: u64,
-    /// From the surface.
-    pub down: Frames,
-    /// Times that the surface forgot what it had of a vehicle, or met it.
+    /// Frames that the surface sent.
+    pub down: FrameCount,
+    /// Number of times that the surface reset the state of a vehicle, or completed a handshake.
     pub restarts: u64,
-    /// From the vehicles.
-    pub up: Frames,
+    /// Frames that the vehicles sent.
+    pub up: FrameCount,
 }

@@ -1,13 +1,13 @@
-//! How far the vehicle's position is off, with and without the localisation relay.
+//! The error of the vehicle's position, with and without the localisation relay.
 //!
-//! The parts are those that go to sea: sentences of a GPS are read, the relay fuses them with what a USBL head tells, the
-//! fix is written and read as on the wire, and the vehicle's navigator takes it late. Simulated are the way, the sensors,
-//! the loss on the link and the time that a fix waits for its turn.
+//! The code is that of the sea: sentences of a GPS are read, the relay fuses them with the USBL head's measurements,
+//! the fix is encoded and decoded, and the vehicle's navigator takes it late. The track, the sensors, the losses of the
+//! link and the time that a fix waits for its turn are simulated.
 
-mod picture;
+mod plot;
 mod ship;
 
-pub use picture::picture;
+pub use plot::localisation_plot;
 
 use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::{Fix, Slot, VersionedSlot};
@@ -21,33 +21,32 @@ use sim_channel::{NodePosition, RandomStream};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Length of the way, metres.
-const WAY_M: u32 = 3000;
-/// Metres a second, and so seconds a metre.
+/// Length of the track, metres.
+const TRACK_M: u32 = 3000;
+/// Speed of the vehicle, metres a second; at 1 a second is a metre.
 const SPEED_M_S: f64 = 1.0;
-/// Drift of the vehicle's own reckoning a metre of way.
+/// Drift of dead reckoning per metre of track.
 const DRIFT: f64 = 0.01;
-/// Seconds between two fixes.
 const FIX_PERIOD_S: u32 = 10;
-/// Probability that a fix is lost on its way down.
+/// Probability that a fix is lost in the channel.
 const LOSS: f64 = 0.1;
-/// Longest that a fix waits for its turn, seconds.
-const LONGEST_WAIT_S: f64 = 8.0;
+/// Maximum time that a fix waits for its turn, seconds.
+const MAX_WAIT_S: f64 = 8.0;
 const DEPTH_M: f64 = 30.0;
 const SOUND_M_S: f64 = 1500.0;
 
-/// One way over 3 km.
+/// The tracks of one run over 3 km.
 #[derive(Debug, Clone, Default)]
 pub struct Tracks {
-    /// Where the vehicle was, each second.
+    /// True position of the vehicle, each second.
     pub truth: Vec<(f64, f64)>,
-    /// Where it would have believed to be without fixes.
+    /// Estimated position without fixes, each second.
     pub reckoned: Vec<(f64, f64)>,
-    /// Where it believed to be with them.
+    /// Estimated position with fixes, each second.
     pub relayed: Vec<(f64, f64)>,
-    /// Fixes that it was sent, and whether it used them.
+    /// Fixes that were sent, and whether the vehicle used each.
     pub fixes: Vec<((f64, f64), bool)>,
-    /// Where the surface vehicle was.
+    /// Position of the surface vehicle, each second.
     pub ship: Vec<(f64, f64)>,
 }
 
@@ -58,39 +57,36 @@ impl Tracks {
     }
 }
 
-/// What a run came to; metres, means over the way.
+/// Mean errors of a run over the track, metres.
 #[derive(Debug, Clone, Serialize)]
 pub struct LocalisationRun {
-    /// Seed of everything random.
     pub seed: u64,
     /// Error by dead reckoning alone.
     pub without_m: f64,
-    /// Error with the relay.
     pub with_m: f64,
     /// Error with the relay when one fix of ten is an outlier.
     pub with_outliers_m: f64,
-    /// Of the run with outliers: fixes sent, used, and what the relay and the vehicle kept from being used, by reason.
+    /// Counts of the run with outliers: fixes sent, used, and refused by the relay or the vehicle, by reason.
     pub outliers: BTreeMap<&'static str, u64>,
 }
 
-/// All runs and their means.
+/// The errors of all runs, and their means.
 #[derive(Debug, Clone, Serialize)]
 pub struct Localisation {
-    /// One for each seed.
     pub runs: Vec<LocalisationRun>,
     /// Means over the runs, metres: `without`, `with`, `with_outliers`.
     pub mean_m: BTreeMap<&'static str, f64>,
-    /// Error with the relay over that without: the means.
+    /// Ratio of the mean error with the relay to the one without.
     pub ratio: f64,
-    /// Error with outliers over that without outliers: the means.
+    /// Ratio of the mean error with outliers to the one without outliers.
     pub outlier_ratio: f64,
-    /// The least favourable ratios of a single run: `with`, `with_outliers`.
+    /// The largest ratios of a single run: `with`, `with_outliers`.
     pub max: BTreeMap<&'static str, f64>,
     /// Whether `ratio` is at most 1/3 and `outlier_ratio` at most 1.2.
     pub reached: bool,
 }
 
-/// Runs over `seeds` ways from `seed` on.
+/// Runs `seeds` tracks, with the seeds from `seed` on.
 pub fn localisation(seed: u64, seeds: u64, progress: &mut dyn FnMut(f64)) -> Localisation {
     let mut runs = Vec::new();
     for i in 0..seeds {
@@ -98,7 +94,7 @@ pub fn localisation(seed: u64, seeds: u64, progress: &mut dyn FnMut(f64)) -> Loc
         progress((i + 1) as f64 / seeds as f64);
     }
     let mean = |of: &dyn Fn(&LocalisationRun) -> f64| runs.iter().map(of).sum::<f64>() / runs.len().max(1) as f64;
-    let worst = |of: &dyn Fn(&LocalisationRun) -> f64| round(runs.iter().map(of).fold(0.0, f64::max));
+    let max_ratio = |of: &dyn Fn(&LocalisationRun) -> f64| round(runs.iter().map(of).fold(0.0, f64::max));
     let (without, with, dirty) = (mean(&|r| r.without_m), mean(&|r| r.with_m), mean(&|r| r.with_outliers_m));
     let (ratio, outlier_ratio) = (round(with / without), round(dirty / with));
     Localisation {
@@ -106,8 +102,8 @@ pub fn localisation(seed: u64, seeds: u64, progress: &mut dyn FnMut(f64)) -> Loc
         ratio,
         outlier_ratio,
         max: [
-            ("with", worst(&|r| r.with_m / r.without_m)),
-            ("with_outliers", worst(&|r| r.with_outliers_m / r.with_m)),
+            ("with", max_ratio(&|r| r.with_m / r.without_m)),
+            ("with_outliers", max_ratio(&|r| r.with_outliers_m / r.with_m)),
         ]
         .into(),
         reached: ratio <= 1.0 / 3.0 && outlier_ratio <= 1.2,
@@ -120,8 +116,8 @@ fn round(x: f64) -> f64 {
 }
 
 fn run(seed: u64) -> LocalisationRun {
-    let (clean, _) = fly_with_outliers(seed, 0.0);
-    let (dirty, outliers) = fly_with_outliers(seed, 0.1);
+    let (clean, _) = run_with_outliers(seed, 0.0);
+    let (dirty, outliers) = run_with_outliers(seed, 0.1);
     LocalisationRun {
         seed,
         without_m: round(clean.mean_error(&clean.reckoned)),
@@ -131,46 +127,46 @@ fn run(seed: u64) -> LocalisationRun {
     }
 }
 
-/// A way of 3 km in which a share of the fixes are outliers: in equal parts echoes at the head, a GPS that is led astray,
-/// and fixes that are off although neither was noticed.
-pub fn fly_with_outliers(seed: u64, outliers: f64) -> (Tracks, BTreeMap<&'static str, u64>) {
-    Way::new(seed, outliers).fly()
+/// A track of 3 km in which a share of the fixes are outliers: in equal parts echoes at the head, GPS errors, and
+/// errors that the surface cannot detect.
+pub fn run_with_outliers(seed: u64, outliers: f64) -> (Tracks, BTreeMap<&'static str, u64>) {
+    LocalisationTrial::new(seed, outliers).fly()
 }
 
-/// What is wrong with a fix.
+/// The fault of a fix.
 #[derive(Clone, Copy)]
 enum Outlier {
-    /// Bearing and elevation, radians, are those of an echo.
+    /// An echo with this bearing and elevation, radians.
     Echo(f64, f64),
-    /// The GPS is led astray: direction and distance, each 0..1.
+    /// An error of the GPS: direction and distance, each 0..1.
     Astray(f64, f64),
-    /// The relay was fooled: what it sends is off by so much east and north, metres.
+    /// An undetected error of the fix, metres east and north.
     Fooled(f64, f64),
 }
 
-/// What chance does to a fix.
+/// The random events of a fix.
 #[derive(Clone, Copy)]
-struct Lot {
+struct FixDraw {
     outlier: Option<Outlier>,
     is_lost: bool,
     wait_s: f64,
 }
 
-impl Lot {
-    /// As many draws whatever comes out, so that runs with and without outliers meet the same noise.
-    fn draw(dice: &mut RandomStream, outliers: f64) -> Self {
-        let [lot, kind, a, b, loss, wait] = [(); 6].map(|()| dice.uniform());
+impl FixDraw {
+    /// Always draws the same number of values, so that runs with and without outliers have the same noise.
+    fn draw(rng: &mut RandomStream, outliers: f64) -> Self {
+        let [draw, kind, a, b, loss, wait] = [(); 6].map(|()| rng.uniform());
         let turn = a * std::f64::consts::TAU;
         let outlier = match (kind * 3.0) as u32 {
             0 => Outlier::Astray(a, b),
             1 => Outlier::Echo(turn, (1.0 - 2.0 * b).asin()),
             _ => Outlier::Fooled((15.0 + 185.0 * b) * turn.sin(), (15.0 + 185.0 * b) * turn.cos()),
         };
-        Self { outlier: (lot < outliers).then_some(outlier), is_lost: loss < LOSS, wait_s: wait * LONGEST_WAIT_S }
+        Self { outlier: (draw < outliers).then_some(outlier), is_lost: loss < LOSS, wait_s: wait * MAX_WAIT_S }
     }
 }
 
-/// A fix on its way down.
+/// A fix in transit to the vehicle.
 struct UnderWay {
     slot: Vec<u8>,
     arrives: Instant,
@@ -178,9 +174,9 @@ struct UnderWay {
     travel: Duration,
 }
 
-struct Way {
+struct LocalisationTrial {
     outliers: f64,
-    dice: RandomStream,
+    rng: RandomStream,
     sensors: Sensors,
     head: UsblHead,
     ship: Ship,
@@ -191,12 +187,12 @@ struct Way {
     counts: BTreeMap<&'static str, u64>,
 }
 
-impl Way {
+impl LocalisationTrial {
     fn new(seed: u64, outliers: f64) -> Self {
         let usbl = UsblConfig { outlier_probability: 0.0, ..UsblConfig::default() };
         Self {
             outliers,
-            dice: RandomStream::new(seed, &[7]),
+            rng: RandomStream::new(seed, &[7]),
             sensors: Sensors::new(seed),
             head: UsblHead::new(usbl, seed),
             ship: Ship::new(seed),
@@ -210,7 +206,7 @@ impl Way {
 
     fn fly(mut self) -> (Tracks, BTreeMap<&'static str, u64>) {
         let mut at = (0.0, 0.0);
-        for second in 1..=(f64::from(WAY_M) / SPEED_M_S) as u32 {
+        for second in 1..=(f64::from(TRACK_M) / SPEED_M_S) as u32 {
             let now = Instant::from_secs_f64(f64::from(second));
             let heading = heading(f64::from(second) * SPEED_M_S);
             let step = (heading.sin() * SPEED_M_S, heading.cos() * SPEED_M_S);
@@ -219,13 +215,13 @@ impl Way {
             for navigator in [&mut self.navigator, &mut self.reckoner] {
                 navigator.handle_odometry(dx, dy, heading, DEPTH_M, now);
             }
-            let lot = (second % FIX_PERIOD_S == 0).then(|| Lot::draw(&mut self.dice, self.outliers));
-            if let Some(Lot { outlier: Some(Outlier::Astray(direction, distance)), .. }) = lot {
-                self.ship.lead_astray(direction, distance);
+            let draw = (second % FIX_PERIOD_S == 0).then(|| FixDraw::draw(&mut self.rng, self.outliers));
+            if let Some(FixDraw { outlier: Some(Outlier::Astray(direction, distance)), .. }) = draw {
+                self.ship.disturb_gps(direction, distance);
             }
             self.ship.step(second, now);
-            if let Some(lot) = lot {
-                self.sight(at, &lot, now);
+            if let Some(draw) = draw {
+                self.sight(at, &draw, now);
             }
             self.deliver(now);
             self.tracks.truth.push(at);
@@ -240,8 +236,8 @@ impl Way {
         (self.tracks, self.counts)
     }
 
-    /// The head hears the vehicle: what the relay makes of it goes under way.
-    fn sight(&mut self, at: (f64, f64), lot: &Lot, now: Instant) {
+    /// The head measures the vehicle, and the relay sends a fix.
+    fn sight(&mut self, at: (f64, f64), draw: &FixDraw, now: Instant) {
         let from = NodePosition::new(self.ship.at.0, self.ship.at.1, 1.0);
         let target = NodePosition::new(at.0, at.1, DEPTH_M);
         let seen = self.head.measure(&from, &target, now.into());
@@ -252,20 +248,20 @@ impl Way {
             accuracy_m: seen.accuracy_m,
             age_s: UsblConfig::default().latency.as_secs_f64(),
         };
-        if let Some(Outlier::Echo(bearing_rad, elevation_rad)) = lot.outlier {
+        if let Some(Outlier::Echo(bearing_rad, elevation_rad)) = draw.outlier {
             (sighting.bearing_rad, sighting.elevation_rad) = (bearing_rad, elevation_rad);
         }
-        let told = now + UsblConfig::default().latency;
-        let Some(mut fix) = self.ship.sight(&sighting, DEPTH_M, told) else { return };
-        if let Some(Outlier::Fooled(east, north)) = lot.outlier {
+        let reported_at = now + UsblConfig::default().latency;
+        let Some(mut fix) = self.ship.sight(&sighting, DEPTH_M, reported_at) else { return };
+        if let Some(Outlier::Fooled(east, north)) = draw.outlier {
             fix.position = WorldPoint::new(fix.position.east_m + east, fix.position.north_m + north);
         }
         *self.counts.entry("sent").or_default() += 1;
-        if lot.is_lost {
+        if draw.is_lost {
             return;
         }
-        let wait = lot.wait_s;
-        let leaves = told + Duration::from_secs_f64(wait);
+        let wait = draw.wait_s;
+        let leaves = reported_at + Duration::from_secs_f64(wait);
         let slot = VersionedSlot::encode(1, 1, &Slot::Fix(Fix { age_s: fix.age_s + wait, ..fix }));
         let travel = Duration::from_secs_f64(seen.range_m / SOUND_M_S);
         self.under_way.push(UnderWay { slot, arrives: leaves + travel, travel });
@@ -285,7 +281,7 @@ impl Way {
     }
 }
 
-/// Clockwise from north, after so many metres: legs of 400 m, 50 m apart, that advance to the north.
+/// Heading after a distance, radians clockwise from north: legs of 400 m, 50 m apart, that advance to the north.
 fn heading(way_m: f64) -> f64 {
     const LEG_M: f64 = 400.0;
     const STEP_M: f64 = 50.0;
@@ -299,10 +295,10 @@ fn heading(way_m: f64) -> f64 {
     f64::to_radians(degrees)
 }
 
-/// Sensors whose error grows by the drift with the way whatever its shape: a current that they do not see, which turns
-/// slowly, and beside it a compass and a log that are off by a third of the drift each.
+/// Sensors whose error grows by the drift with the distance, for any shape of the track: they do not measure a slowly
+/// turning current, and compass and log each have an error of a third of the drift.
 struct Sensors {
-    dice: RandomStream,
+    rng: RandomStream,
     current_towards: f64,
     compass: f64,
     log: f64,
@@ -310,18 +306,18 @@ struct Sensors {
 
 impl Sensors {
     fn new(seed: u64) -> Self {
-        let mut dice = RandomStream::new(seed, &[8]);
-        let current_towards = dice.uniform() * std::f64::consts::TAU;
-        let [compass, log] = [(); 2].map(|()| DRIFT / 3.0 * dice.normal());
-        Self { dice, current_towards, compass, log }
+        let mut rng = RandomStream::new(seed, &[8]);
+        let current_towards = rng.uniform() * std::f64::consts::TAU;
+        let [compass, log] = [(); 2].map(|()| DRIFT / 3.0 * rng.normal());
+        Self { rng, current_towards, compass, log }
     }
 
     fn measure(&mut self, (dx, dy): (f64, f64)) -> (f64, f64) {
-        let way = dx.hypot(dy);
-        self.current_towards += 0.01 * way.sqrt() * self.dice.normal();
+        let path_m = dx.hypot(dy);
+        self.current_towards += 0.01 * path_m.sqrt() * self.rng.normal();
         let (sin, cos) = self.compass.sin_cos();
         let (x, y) = ((dx * cos - dy * sin) * (1.0 + self.log), (dx * sin + dy * cos) * (1.0 + self.log));
-        let unseen = DRIFT * way;
+        let unseen = DRIFT * path_m;
         (x - unseen * self.current_towards.sin(), y - unseen * self.current_towards.cos())
     }
 }
@@ -338,11 +334,11 @@ mod tests {
 
     #[test]
     fn dead_reckoning_drifts_by_its_percentage_repeatably() {
-        let (tracks, _) = fly_with_outliers(3, 0.1);
+        let (tracks, _) = run_with_outliers(3, 0.1);
         let (x, y) = *tracks.truth.last().unwrap();
         let (rx, ry) = *tracks.reckoned.last().unwrap();
-        let drift = (x - rx).hypot(y - ry) / f64::from(WAY_M);
-        assert!((0.005..0.015).contains(&drift), "{drift} of the way");
-        assert_eq!(fly_with_outliers(3, 0.1).0.relayed, tracks.relayed);
+        let drift = (x - rx).hypot(y - ry) / f64::from(TRACK_M);
+        assert!((0.005..0.015).contains(&drift), "{drift} of the track");
+        assert_eq!(run_with_outliers(3, 0.1).0.relayed, tracks.relayed);
     }
 }

@@ -1,4 +1,4 @@
-//! The surface vehicle at anchor: GPS, compass and USBL head, from which the relay makes the fixes.
+//! The surface vehicle at anchor: GPS, compass and USBL head, whose measurements the relay fuses into fixes.
 
 use crate::instruments::{Instruments, Receiver};
 use scenecast_config::Config;
@@ -10,14 +10,14 @@ use sim_channel::NodePosition;
 use sim_channel::usbl::{UsblConfig, UsblFix, UsblHead};
 use std::time::Duration;
 
-/// Where a rehearsal lies that does not say: where equator and first meridian meet.
+/// Origin of a rehearsal that does not set one: equator and first meridian.
 const NOWHERE: LatLon = LatLon { lat_deg: 0.0, lon_deg: 0.0 };
 /// Depth of the head, metres.
 pub(super) const HEAD_M: f64 = 1.0;
-/// Of a fix's standard deviation, the part of the receiver and the part of its slow error; the rest is the head's.
+/// Share of a fix's standard deviation for the receiver's noise, and for its slow error; the rest is the head's.
 const GPS_PART: f64 = 0.4;
 
-/// The instruments, and a sighting that the head has not told yet.
+/// The instruments, and a sighting that the head has not reported yet.
 #[derive(Debug)]
 pub(super) struct Anchored {
     at: NodePosition,
@@ -28,7 +28,7 @@ pub(super) struct Anchored {
 }
 
 impl Anchored {
-    /// With the head at a place; the relay is for the surface.
+    /// Creates the instruments for a head at a position, and the surface's relay.
     pub(super) fn new(config: &Config, at: NodePosition, origin: Option<LatLon>, seed: u64) -> (Self, Relay) {
         let (origin, sigma) = (origin.unwrap_or(NOWHERE), config.navigation.fix_sigma_m);
         let head_sigma = sigma * (1.0 - 2.0 * GPS_PART * GPS_PART).sqrt();
@@ -49,20 +49,20 @@ impl Anchored {
         (Self { at, instruments, head, seconds: 0, sighted: None }, Relay::new(relay))
     }
 
-    /// NMEA sentences of GPS and compass, to be asked once a second.
+    /// NMEA sentences of GPS and compass, to be read once a second.
     pub(super) fn report(&mut self) -> String {
         self.seconds += 1;
         self.instruments.report((self.at.x_m, self.at.y_m), 0.0, (0.0, 0.0), self.seconds)
     }
 
-    /// The vehicle answers from where it is now; its answer is under way for `travel`.
+    /// The vehicle replies from its present position; the reply travels for `travel`.
     pub(super) fn range(&mut self, vehicle: &NodePosition, travel: Duration, now: Instant) {
         let mut fix = self.head.measure(&self.at, vehicle, now.into());
         fix.ready_at = fix.ready_at.saturating_add(travel);
         self.sighted = Some(fix);
     }
 
-    /// What the head tells now.
+    /// The sighting whose report is due now.
     pub(super) fn poll_sighting(&mut self, now: Instant) -> Option<UsblSighting> {
         let fix = self.sighted.take_if(|f| Instant::from(f.ready_at) <= now)?;
         Some(UsblSighting {

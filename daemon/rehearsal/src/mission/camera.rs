@@ -11,7 +11,6 @@ use std::path::Path;
 
 /// The next frame of the camera.
 pub(super) enum NextFrame {
-    /// The recording has ended.
     Over,
     /// The next recorded frame is due at this moment.
     DueAt(Instant),
@@ -31,7 +30,7 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// Plays the configured recording, or else looks at `world`.
+    /// Plays the configured recording, or else views `world`.
     pub(super) fn new(config: &Config, world: World, record: Option<&Path>) -> Result<Self, UserError> {
         let recording = match &config.camera.source {
             CameraSource::Rehearsal => None,
@@ -40,15 +39,15 @@ impl Camera {
         Ok(Self { world, recording, next: 0, recorder: record.map(Recorder::new).transpose()? })
     }
 
-    /// Whether the frames are recorded ones: then the vehicle's path is recorded, too.
+    /// Whether the frames, and so the vehicle's path, come from a recording.
     pub(super) fn is_recorded(&self) -> bool {
         self.recording.is_some()
     }
 
-    /// The survey's area: the configured one, or all that there is to see.
+    /// The survey's area: the configured one, or else the whole image.
     ///
     /// # Errors
-    /// A configured area outside of the image.
+    /// The configured area is outside of the image.
     pub(super) fn survey_area(&self, config: &Config) -> Result<Area, UserError> {
         let all = || self.recording.as_ref().map_or_else(|| self.world.area(), Recording::area);
         let area = config.survey.area_m.unwrap_or_else(all);
@@ -75,12 +74,11 @@ impl Camera {
         NextFrame::Recorded(frame.clone())
     }
 
-    /// Records a frame, if frames are to be recorded.
+    /// Records a frame if the mission records frames.
     pub(super) fn record(&mut self, image: &RgbImage, frame: &RecordedFrame) -> Result<(), UserError> {
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.push(image, frame))
     }
 
-    /// Completes the recording.
     pub(super) fn finish_recording(&self) -> Result<(), UserError> {
         self.recorder.as_ref().map_or(Ok(()), Recorder::finish)
     }

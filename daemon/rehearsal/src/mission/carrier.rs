@@ -14,7 +14,7 @@ use std::time::Duration;
 
 const NODES: [NodeId; 2] = [NodeId(1), NodeId(0)];
 
-/// Kinds `tcp` and `udp` are no modems: there the channel is bare, and an output of a host is a frame.
+/// A bare channel for the kinds `tcp` and `udp`, in which an output of a host is a frame.
 enum Medium {
     Channel(Channel),
     Modems(ModemRig),
@@ -24,12 +24,12 @@ enum Medium {
 pub(crate) struct Carrier {
     medium: Medium,
     pub(crate) log: FramesLog,
-    /// Transmissions of each end that the log does not know yet.
+    /// Transmissions of each end that are not in the log yet.
     unlogged: [VecDeque<u64>; 2],
 }
 
 impl Carrier {
-    /// The medium that the configuration names, and the stations of vehicle and surface.
+    /// The configured medium, and the stations of vehicle and surface.
     pub(super) fn new(config: &Config, seed: u64, now: Instant) -> Result<(Self, [Station; 2]), UserError> {
         let channel = Channel::new(channel_config(config), seed);
         let (medium, stations) = match config.modem.kind {
@@ -47,7 +47,6 @@ impl Carrier {
         Ok((carrier, stations))
     }
 
-    /// Puts an end somewhere.
     pub(super) fn place(&mut self, end: usize, position: NodePosition) {
         match &mut self.medium {
             Medium::Channel(channel) => channel.place(NODES[end], position),
@@ -71,7 +70,7 @@ impl Carrier {
         }
     }
 
-    /// Lets time pass in medium and hosts, and gives the hosts what arrives.
+    /// Lets time pass in medium and hosts, and gives the hosts the arriving bytes.
     pub(super) fn deliver(&mut self, vehicle: &mut VehicleHost, surface: &mut SurfaceHost, now: Instant) {
         match &mut self.medium {
             Medium::Channel(channel) => {
@@ -95,8 +94,8 @@ impl Carrier {
         }
     }
 
-    /// Takes what the hosts have for their ports. A host reports each of its frames in an event afterwards, which
-    /// [`Self::log_sent`] waits for.
+    /// Takes the hosts' output for their ports. A host reports each of its frames in a later event, for
+    /// which the method [`Self::log_sent`] waits.
     pub(super) fn collect(&mut self, vehicle: &mut VehicleHost, surface: &mut SurfaceHost, now: Instant) {
         self.write(VEHICLE, *vehicle.link().profile(), || vehicle.poll_output(now), now);
         self.write(SURFACE, *surface.link().profile(), || surface.poll_output(now), now);
@@ -124,7 +123,7 @@ impl Carrier {
         }
     }
 
-    /// An end has handed a frame to its modem or to the channel.
+    /// An end has given a frame to its modem or to the channel.
     pub(super) fn log_sent(&mut self, end: usize, bytes: usize, kind: &'static str, now: Instant) {
         match self.unlogged[end].pop_front() {
             Some(transmission) => {

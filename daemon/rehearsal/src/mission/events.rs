@@ -1,4 +1,4 @@
-//! The events of a mission, in the order in which they are handled.
+//! The events of a mission, in the order of their handling.
 
 use super::Mission;
 use super::camera::NextFrame;
@@ -13,7 +13,7 @@ use scenecast_surface::SurfaceOutput;
 use sim_channel::NodePosition;
 use std::time::Duration;
 
-/// The camera is asked again so late after the survey that it never matters.
+/// After the survey the next frame of the camera is due so late that none is taken.
 const NO_FRAME: Duration = Duration::from_secs(3600);
 
 impl Mission {

@@ -1,4 +1,4 @@
-//! The record that a mission's report is made from.
+//! The record of a mission, the source of its report.
 
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::SlotId;
@@ -7,23 +7,22 @@ use scenecast_protocol::time::Instant;
 use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle};
 use std::collections::BTreeMap;
 
-/// From where to where in the world, metres east and north.
+/// Start and end of a leg in the world frame.
 pub type Leg = ((f64, f64), (f64, f64));
 
-/// Everything that happened in a mission and is counted at its end.
+/// The events of a mission that its report counts.
 #[derive(Default)]
 pub(crate) struct Logbook {
     /// Each decision of the vehicle about a slot.
     pub(crate) applied: Vec<AppliedSlot>,
-    /// When the operator issued each version of a slot.
+    /// Time at which the operator issued each version of a slot.
     pub(crate) issued: BTreeMap<(SlotId, u16), Instant>,
     /// Each waypoint: from, to, by the vehicle's own position estimate.
     pub(crate) legs: Vec<Leg>,
-    /// Number of legs when the vehicle put the last fence in force.
+    /// Number of legs when the last fence took effect.
     pub(crate) legs_before_fence: usize,
     /// Estimated position of the vehicle at each frame that the mapper took.
     pub(crate) track: Vec<(f64, f64)>,
-    /// The mapper's last update.
     pub(crate) update: Option<MapUpdate>,
     /// Bytes that the map would have taken as a PNG file at each of its versions.
     pub(crate) png_full_bytes: u64,

@@ -1,4 +1,4 @@
-//! How well the operator's map follows the vehicle's, layer by layer.
+//! Agreement and delay of the operator's map, layer by layer.
 
 use crate::meter::Meter;
 use scenecast_protocol::map::{LabelGrid, LayerId, LayerReplica};
@@ -23,7 +23,6 @@ impl Meters {
         self.operator_version += 1;
     }
 
-    /// Compares both ends now.
     pub(super) fn look(&mut self, vehicle: &Vehicle, surface: &Surface, address: Address, now: Instant) {
         let Some(operator) = surface.map(address) else { return };
         let versions = (vehicle.map_version(), self.operator_version);

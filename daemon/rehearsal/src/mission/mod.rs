@@ -39,15 +39,13 @@ use timetable::Timetable;
 
 /// The choices of a rehearsal besides its configuration.
 pub struct MissionOptions {
-    /// The sea floor.
     pub world: World,
-    /// Seed of everything random.
     pub seed: u64,
-    /// Folder to record the camera frames in, if they are to be recorded.
+    /// Folder for a recording of the camera frames.
     pub record: Option<std::path::PathBuf>,
 }
 
-/// A mission under way. Each part owns its state; the mission passes events from one to the other.
+/// A running mission. Each part owns its state; the mission passes events from one to the other.
 pub struct Mission {
     pub(crate) config: Config,
     pub(crate) seed: u64,
@@ -60,7 +58,7 @@ pub struct Mission {
     anchored: Anchored,
     pub(crate) carrier: Carrier,
     script: Script,
-    /// News of the surface since the last [`Mission::take_events`].
+    /// Events of the surface since the last [`Mission::take_events`].
     events: Vec<SurfaceOutput>,
     pub(crate) logbook: Logbook,
     pub(crate) meters: Meters,
@@ -68,7 +66,7 @@ pub struct Mission {
 }
 
 impl Mission {
-    /// A mission at its start.
+    /// A mission before its first event.
     pub fn new(config: Config, options: MissionOptions) -> Result<Self, UserError> {
         let MissionOptions { world, seed, record } = options;
         let now = Instant::ZERO;
@@ -112,17 +110,14 @@ impl Mission {
         Ok(mission)
     }
 
-    /// The time.
     pub fn now(&self) -> Instant {
         self.times.now
     }
 
-    /// When the survey ended.
     pub fn ended(&self) -> Option<Instant> {
         self.times.ended
     }
 
-    /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -137,7 +132,6 @@ impl Mission {
         self.logbook.received_bits
     }
 
-    /// The surface.
     pub fn surface(&self) -> &Surface {
         self.surface.surface()
     }
@@ -147,22 +141,20 @@ impl Mission {
         self.surface.surface_mut()
     }
 
-    /// The vehicle.
     pub fn vehicle(&self) -> &Vehicle {
         self.vehicle.vehicle()
     }
 
-    /// Each waypoint of the vehicle: from where to where, by its own position estimate.
+    /// The legs of the vehicle, start and waypoint, by its own position estimate.
     pub fn legs(&self) -> &[Leg] {
         &self.logbook.legs
     }
 
-    /// Metres that the vehicle really went.
+    /// Length of the vehicle's true path, metres.
     pub fn distance_m(&self) -> f64 {
         self.motion.distance_m
     }
 
-    /// The vehicle's address.
     pub fn address(&self) -> Address {
         self.address
     }
@@ -172,22 +164,21 @@ impl Mission {
         [self.vehicle.link().audit(), self.surface.link().audit()]
     }
 
-    /// Frames sent and lost.
     pub fn frames(&self) -> &FramesLog {
         &self.carrier.log
     }
 
-    /// What the surface had to tell since the last call.
+    /// Events of the surface since the last call.
     pub fn take_events(&mut self) -> Vec<SurfaceOutput> {
         std::mem::take(&mut self.events)
     }
 
-    /// Whether the survey has ended and the operator has everything.
+    /// Whether the survey has ended and the operator's map is complete.
     pub fn is_drained(&self) -> bool {
         self.times.ended.is_some() && self.vehicle().is_converged() && self.meters.labels.agreement() >= 1.0
     }
 
-    /// Runs until `until`, or a little beyond the last event before it.
+    /// Handles all events until `until`.
     pub fn advance(&mut self, until: Instant) -> Result<(), UserError> {
         loop {
             let next = self.next_event();
@@ -203,7 +194,7 @@ impl Mission {
         Ok(())
     }
 
-    /// Flies the survey to its end, then lets the channel drain for at most `drain`.
+    /// Runs the survey to its end, then lets the link drain for at most `drain`.
     pub fn run(&mut self, drain: Duration, progress: &mut dyn FnMut(f64)) -> Result<(), UserError> {
         let end = Instant::from_secs_f64(self.config.survey.duration_s);
         while self.now() < end {
@@ -218,7 +209,7 @@ impl Mission {
         self.camera.finish_recording()
     }
 
-    /// The camera and the sampler stop; the link continues.
+    /// Stops camera and sampler; the link continues.
     pub fn end_survey(&mut self) {
         if self.times.ended.is_none() {
             self.look();
@@ -235,7 +226,7 @@ impl Mission {
         (x - self.motion.x_m).hypot(y - self.motion.y_m)
     }
 
-    /// Edge of a cell in metres.
+    /// Edge of a map cell, metres.
     pub fn cell_m(&self) -> f64 {
         cell_m(&self.config)
     }

@@ -16,7 +16,8 @@ fn plan(waypoint: Option<MapPoint>, path: &PlannedPath) -> Plan {
 }
 
 impl Mission {
-    /// Flies on; whatever the operator sees is a plan that the vehicle `had` at most 40 s before. Returns how often it was new.
+    /// Continues the mission and checks that each plan shown to the operator is one that the vehicle `had` at most 40 s
+    /// before. Returns the number of new plans.
     fn watch_plans(&mut self, had: &mut VecDeque<Plan>, seconds: u32) -> usize {
         let mut seen: Vec<Plan> = Vec::new();
         for _ in 0..seconds * 5 {
@@ -26,7 +27,7 @@ impl Mission {
                 had.pop_front();
             }
             let Some(shown) = self.shown_plan() else { continue };
-            // An order that was applied has taken it away, or it was a plan of the vehicle, whole.
+            // The shown plan is empty after an applied order, or it is a whole plan of the vehicle.
             assert!(shown == Plan::default() || had.contains(&shown), "{shown:?} is no plan of the vehicle");
             if seen.last() != Some(&shown) {
                 seen.push(shown);
@@ -48,7 +49,7 @@ fn the_shown_plan_is_the_vehicles_and_soon_the_current_one() {
     assert!(mission.watch_plans(&mut had, 90) > 1, "the legs of the lawnmower");
     let (address, now) = (mission.address, mission.now());
     mission.surface_mut().set_utility(address, &[(1, 0.8)].into(), (0.2, 0.0), now).unwrap();
-    assert!(mission.watch_plans(&mut had, 120) > 4, "the planner changes its mind");
+    assert!(mission.watch_plans(&mut had, 120) > 4, "the planner replaces its plan");
     mission.surface.surface_mut().set_hold(address, true, mission.times.now).unwrap();
     mission.watch_plans(&mut had, 60);
     let (status, _) = mission.surface().view(address).unwrap().status().unwrap();

@@ -6,19 +6,18 @@ use std::time::Duration;
 
 /// Seconds between two steps of the vehicle's motion.
 pub(super) const STEP_S: f64 = 0.5;
-const LOOK_INTERVAL: Duration = Duration::from_secs(1);
+const COMPARE_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The time, and when each of the regular events is next due.
+/// The mission time, and the next time of each regular event.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Timetable {
     pub(super) now: Instant,
-    /// When the survey ended.
     pub(super) ended: Option<Instant>,
     pub(super) frame: Instant,
     step: Instant,
     look: Instant,
     fix: Instant,
-    /// `None`: there are no fixes.
+    /// `None` for a mission without fixes.
     fix_interval: Option<Duration>,
 }
 
@@ -29,13 +28,12 @@ impl Timetable {
         Self { now, ended: None, frame: now, step: now, look: now, fix: Instant::from_secs_f64(period_s), fix_interval }
     }
 
-    /// The next regular event.
     pub(super) fn next_event(&self) -> Instant {
         let fix = self.fix_interval.map(|_| self.fix);
         [self.look, self.step, self.frame].into_iter().chain(fix).min().unwrap_or(self.look)
     }
 
-    /// Whether a step of the motion is due; if so, the next one is scheduled. Likewise the other two.
+    /// Whether a step of the motion is due; if so, it schedules the next one, as the two methods below do.
     pub(super) fn takes_step(&mut self) -> bool {
         let is_due = self.now >= self.step;
         if is_due {
@@ -53,7 +51,7 @@ impl Timetable {
     pub(super) fn takes_look(&mut self) -> bool {
         let is_due = self.now >= self.look;
         if is_due {
-            self.look = self.look + LOOK_INTERVAL;
+            self.look = self.look + COMPARE_INTERVAL;
         }
         is_due
     }

@@ -1,7 +1,7 @@
 //! The operator tunes a vehicle that is under way: the map follows, both maps agree, labels keep their meaning.
 
 use super::{Mission, MissionOptions};
-use crate::World;
+use crate::world::World;
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
 use scenecast_protocol::map::{LabelGrid, LayerId};
@@ -31,7 +31,7 @@ impl Mission {
         self.advance(Instant::from_secs_f64(seconds)).unwrap();
     }
 
-    /// Sends an order and flies until the vehicle has said that it follows it.
+    /// Sends an order and flies until the vehicle has reported it in force.
     fn tune(&mut self, order: &str) {
         let order: SettingsOrder = serde_json::from_str(order).unwrap();
         let (address, now) = (self.address, self.now());
@@ -48,7 +48,7 @@ impl Mission {
         assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().settings.asked());
     }
 
-    /// Ends the survey and lets the link say what it has.
+    /// Ends the survey and drains the link.
     fn drain(&mut self) {
         self.end_survey();
         let give_up = self.now() + Duration::from_secs(3600);
@@ -62,7 +62,7 @@ impl Mission {
         self.surface().map(self.address).unwrap()
     }
 
-    fn heard_of(&self, kind: LayerId) -> u64 {
+    fn received_version(&self, kind: LayerId) -> u64 {
         self.surface().view(self.address).and_then(|v| v.layer(kind)).map_or(0, |p| p.version())
     }
 
@@ -82,43 +82,43 @@ fn priors_frame_rate_and_layers_change_under_way_and_the_maps_agree() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);
-    assert!(frames >= 50 && labels > 1 && mission.heard_of(LayerId::CONFIDENCE) > 0);
+    assert!(frames >= 50 && labels > 1 && mission.received_version(LayerId::CONFIDENCE) > 0);
     mission.tune(r#"{"gamma": 0.2, "alpha": 0.5, "frames_per_s": 0.1, "layers": "depth"}"#);
     assert_eq!(mission.mapper.priors(), [0.5, 0.1, 0.2]);
-    // What was in the water when the vehicle began to follow has come in.
+    // Frames that were on their way when the settings changed have arrived.
     mission.fly_to(mission.now().as_secs_f64() + 30.0);
     let (since, frames, confidence) =
-        (mission.now(), mission.logbook.track.len(), mission.heard_of(LayerId::CONFIDENCE));
-    let depth = mission.heard_of(LayerId::DEPTH);
+        (mission.now(), mission.logbook.track.len(), mission.received_version(LayerId::CONFIDENCE));
+    let depth = mission.received_version(LayerId::DEPTH);
     mission.fly_to(since.as_secs_f64() + 100.0);
     assert!((9..=11).contains(&(mission.logbook.track.len() - frames)), "one frame in ten seconds is seen");
-    assert_eq!(mission.heard_of(LayerId::CONFIDENCE), confidence, "a layer that is not told costs nothing");
-    assert!(mission.heard_of(LayerId::DEPTH) > depth);
+    assert_eq!(mission.received_version(LayerId::CONFIDENCE), confidence, "a layer that is not sent costs no bytes");
+    assert!(mission.received_version(LayerId::DEPTH) > depth);
     mission.tune(r#"{"frames_per_s": 0, "layers": "", "gamma": 0}"#);
-    assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "what an order does not name stays");
+    assert_eq!(mission.mapper.priors(), [0.5, 0.1, 1e-4], "settings that an order does not name stay");
     mission.fly_to(mission.now().as_secs_f64() + 60.0);
-    assert!(mission.heard_of(LayerId::CONFIDENCE) > confidence);
+    assert!(mission.received_version(LayerId::CONFIDENCE) > confidence);
     mission.drain();
-    let told = mission.vehicle().layers().find(|p| p.id() == LayerId::CONFIDENCE).unwrap().target().clone();
-    let heard = mission.surface().view(mission.address).unwrap().layer(LayerId::CONFIDENCE).unwrap();
-    assert!(same(&told, heard.levels().shown()), "a layer goes on from where it rested");
+    let sent = mission.vehicle().layers().find(|p| p.id() == LayerId::CONFIDENCE).unwrap().target().clone();
+    let received = mission.surface().view(mission.address).unwrap().layer(LayerId::CONFIDENCE).unwrap();
+    assert!(same(&sent, received.levels().shown()), "a layer resumes from its last state");
     assert_eq!((mission.mapper.epoch(), mission.settings_applied()), (0, 2), "labels keep their meaning");
     assert!(mission.mapper.current().labels >= labels);
 }
 
 #[test]
-fn only_coarse_cells_are_told_until_all_are_wanted_again() {
+fn only_coarse_cells_are_sent_until_all_are_requested_again() {
     let mut mission = mission(&["survey.speed_m_s=1"]);
     mission.fly_to(60.0);
     mission.tune(r#"{"cells": "coarse"}"#);
     let known = mission.vehicle().map().clone();
     mission.fly_to(200.0);
     let seen = mission.mapper.current().cells.len();
-    let told = mission.vehicle().map();
-    assert!(told.explored() < seen * 2 / 3, "{} of {seen} cells are told", told.explored());
+    let sent = mission.vehicle().map();
+    assert!(sent.explored() < seen * 2 / 3, "{} of {seen} cells are sent", sent.explored());
     for (cell, label) in mission.mapper.current().cells {
-        let is_told = Stride::Four.on_lattice(cell).is_some() || known.get(cell) != 0;
-        assert_eq!(told.get(cell), if is_told { label } else { 0 }, "{cell:?}");
+        let is_sent = Stride::Four.on_lattice(cell).is_some() || known.get(cell) != 0;
+        assert_eq!(sent.get(cell), if is_sent { label } else { 0 }, "{cell:?}");
     }
     mission.drain();
     mission.tune(r#"{"cells": "fine"}"#);
@@ -137,6 +137,6 @@ fn coarse_cells_need_far_fewer_bits() {
             [&scenecast_protocol::schedule::Class::Map]
     };
     let (fine, coarse) = (bytes("map.cells=fine"), bytes("map.cells=coarse"));
-    // A sixteenth of the cells, but each alone: labels of neighbours tell less of each other four cells apart.
+    // A sixteenth of the cells, but each alone: labels four cells apart predict each other less.
     assert!(coarse * 2 < fine, "{coarse} bytes of coarse cells, {fine} of all");
 }

@@ -1,8 +1,8 @@
 //! The link under load of opaque bytes through drivers and emulated modems.
 
-use crate::VirtualTime;
 use crate::link_bench::{OpaqueReplica, OpaqueSource, Summary};
 use crate::modem_rig::{ModemRig, SURFACE, VEHICLE};
+use crate::virtual_time::VirtualTime;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_drivers::modem::Station;
@@ -21,24 +21,21 @@ use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream}
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// Bytes that wait at the vehicle under load: more than its modem ever holds.
+/// Bytes that wait at the vehicle under load: more than its modem can hold.
 const LOAD: usize = 25_000;
 /// Time after which a directive counts as lost.
-const GIVE_UP: Duration = Duration::from_secs(600);
+const GIVE_UP_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Properties of the modems and of the channel between them.
 #[derive(Debug, Clone)]
-pub struct DockSetting {
-    /// Of both ends.
+pub struct ModemSetting {
     pub config: Config,
-    /// Slant range, m.
     pub range_m: f64,
-    /// Share of frames that the channel loses, each way.
+    /// Share of frames that the channel loses in each direction.
     pub loss: f64,
 }
 
-impl DockSetting {
-    /// The channel.
+impl ModemSetting {
     pub(super) fn channel(&self) -> ChannelConfig {
         let loss = LossModel::Independent { probability: self.loss };
         ChannelConfig { loss: if self.loss > 0.0 { loss } else { LossModel::None }, ..ChannelConfig::default() }
@@ -46,8 +43,7 @@ impl DockSetting {
 }
 
 /// A vehicle's and a surface's link at their modems.
-pub struct Dock {
-    /// The time.
+pub struct ModemBench {
     pub now: Instant,
     /// The modems and the channel between them.
     pub rig: ModemRig,
@@ -55,37 +51,37 @@ pub struct Dock {
     pub vehicle: LinkHost<VehicleLink<OpaqueSource>>,
     /// The surface's link at its modem.
     pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
-    /// Bytes that always wait at the vehicle.
+    /// Bytes that always wait at the vehicle; `None` without load.
     pub load: Option<usize>,
-    /// When each slot was applied, each time.
+    /// Times at which each slot was applied.
     pub applied: BTreeMap<(SlotId, u16), Vec<Instant>>,
-    /// When a frame last came to each end.
-    pub heard: [Instant; 2],
-    /// The end that a fault strikes.
-    pub struck: usize,
-    /// What the modems told a person to change.
+    /// Time at which each end last received a frame.
+    pub last_received: [Instant; 2],
+    /// The end at which faults are injected.
+    pub faulty_end: usize,
+    /// Refusals of the modems that a person must act on.
     pub refusals: Vec<String>,
     address: Address,
     budget_bits: f64,
 }
 
-impl Dock {
-    /// Ends that have not met.
-    pub fn new(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
+impl ModemBench {
+    /// Ends before their handshake, at emulated modems.
+    pub fn new(setting: &ModemSetting, seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let rig = ModemRig::new(&setting.config, Channel::new(setting.channel(), seed), seed, now)?;
         Self::at(setting, rig, seed, now)
     }
 
-    /// The same at these modems.
-    pub fn with_modems(setting: &DockSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, UserError> {
+    /// Ends before their handshake at the given modems.
+    pub fn with_modems(setting: &ModemSetting, modems: [Box<dyn Emulator>; 2], seed: u64) -> Result<Self, UserError> {
         let now = Instant::from_secs_f64(1.0);
         let rig = ModemRig::with_modems(&setting.config, Channel::new(setting.channel(), seed), modems, now)?;
         Self::at(setting, rig, seed, now)
     }
 
     fn at(
-        setting: &DockSetting,
+        setting: &ModemSetting,
         (mut rig, [at_vehicle, at_surface]): (ModemRig, [Station; 2]),
         seed: u64,
         now: Instant,
@@ -127,70 +123,70 @@ impl Dock {
             rig,
             load: None,
             applied: BTreeMap::new(),
-            heard: [now; 2],
-            struck: VEHICLE,
+            last_received: [now; 2],
+            faulty_end: VEHICLE,
             refusals: Vec::new(),
             address,
             budget_bits: f64::from(config.link.budget_bps) * config.link.budget_window_s,
         })
     }
 
-    /// Ends under load that know each other.
-    pub fn under_load(setting: &DockSetting, seed: u64) -> Result<Self, UserError> {
-        let mut dock = Self::new(setting, seed)?;
-        dock.load = Some(LOAD);
-        dock.run(Duration::from_secs(180));
-        Ok(dock)
+    /// Ends under load after their handshake.
+    pub fn under_load(setting: &ModemSetting, seed: u64) -> Result<Self, UserError> {
+        let mut bench = Self::new(setting, seed)?;
+        bench.load = Some(LOAD);
+        bench.run(Duration::from_secs(180));
+        Ok(bench)
     }
 
-    /// The vehicle as the surface knows it.
+    /// The surface's view of the vehicle.
     pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
         self.surface.end().vehicle(self.address)
     }
 
     fn note(&mut self, end: usize, event: FrameEvent) {
         match event {
-            FrameEvent::Received { .. } => self.heard[end] = self.now,
+            FrameEvent::Received { .. } => self.last_received[end] = self.now,
             FrameEvent::ModemRefused { reason, .. } => self.refusals.push(reason),
             _ => {}
         }
     }
 
-    /// Useful bits a second at the replica over `time`.
+    /// Useful bit/s at the replica over `time`.
     pub fn measure_flow(&mut self, time: Duration) -> f64 {
-        let useful = |dock: &Self| dock.view().map_or(0.0, |v| v.replica().useful_bytes());
+        let useful = |bench: &Self| bench.view().map_or(0.0, |v| v.replica().useful_bytes());
         let before = useful(self);
         self.run(time);
         (useful(self) - before) * 8.0 / time.as_secs_f64()
     }
 
-    /// Issues directives at random moments: from issue to applied, seconds.
+    /// Issues directives at random times; returns the times from issue to application, seconds.
     pub fn measure_directives(&mut self, count: usize, seed: u64) -> Summary {
-        let mut dice = RandomStream::new(seed, &[7]);
+        let mut rng = RandomStream::new(seed, &[7]);
         let mut latencies = Vec::new();
         for _ in 0..count {
-            self.run(Duration::from_secs_f64(5.0 + dice.uniform() * 30.0));
+            self.run(Duration::from_secs_f64(5.0 + rng.uniform() * 30.0));
             let issued = self.now;
             let Some(version) = self.issue() else { continue };
-            self.run_until(issued + GIVE_UP, |d| d.applied.contains_key(&(SlotId::Utility, version)));
+            self.run_until(issued + GIVE_UP_TIMEOUT, |d| d.applied.contains_key(&(SlotId::Utility, version)));
             latencies.push(self.now.since(issued).as_secs_f64());
         }
         Summary::of(latencies)
     }
 
-    /// Issues a directive; its version.
+    /// Issues a directive and returns its version.
     pub fn issue(&mut self) -> Option<u16> {
         let weights = [(1, 50), (2, -20), (3, 100), (7, 5)].into_iter().collect();
         let slot = Slot::Utility(Utility { weights, ..Utility::default() });
         self.surface.end_mut().issue(self.address, slot, self.now).ok()
     }
 
-    /// Breaks something of a modem.
+    /// Injects a fault into a modem.
     pub fn inject(&mut self, end: usize, fault: Fault) {
         self.rig.inject(end, fault, self.now);
     }
 
-    /// Pulls a cable, or puts it back.
+    /// Unplugs a cable, or plugs it in again.
     pub fn plug(&mut self, end: usize, plugged: bool) {
         match end {
             VEHICLE => self.rig.plug(end, &mut self.vehicle, plugged, self.now),
@@ -198,13 +194,13 @@ impl Dock {
         }
     }
 
-    /// Most of the vehicle's bits in any window, over what the budget allows.
+    /// Ratio of the vehicle's bits in the fullest window to the budget.
     pub fn budget_use(&mut self) -> f64 {
         self.vehicle.audit().worst_window_bits() as f64 / self.budget_bits
     }
 }
 
-impl VirtualTime for Dock {
+impl VirtualTime for ModemBench {
     fn now(&self) -> Instant {
         self.now
     }

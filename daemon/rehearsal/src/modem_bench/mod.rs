@@ -1,12 +1,14 @@
-//! What reaches the other end through drivers and emulated modems, in virtual time.
+//! Throughput and latency through drivers and emulated modems, in virtual time.
 
 mod load;
 mod pusher;
 
-pub use load::{Dock, DockSetting};
+pub use load::{ModemBench, ModemSetting};
 pub use pusher::push;
 
-use crate::{Mission, MissionOptions, World, report};
+use crate::mission::{Mission, MissionOptions};
+use crate::report::report;
+use crate::world::World;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::Serialize;
@@ -15,56 +17,48 @@ use std::time::Duration;
 /// An S2C modem in burst mode under load.
 #[derive(Debug, Clone, Serialize)]
 pub struct BurstRow {
-    /// Distance, m.
     pub range_m: f64,
-    /// Share of frames that the water loses, each way.
+    /// Share of frames that the channel loses in each direction.
     pub loss: f64,
-    /// What the modem carries for a host that only keeps its pool full, bit/s.
+    /// Throughput of the modem for a host that only keeps its pool full, bit/s.
     pub raw_bps: f64,
     /// Useful payload that reaches the replica, bit/s.
     pub useful_bps: f64,
-    /// The second as a share of the first.
+    /// Ratio of `useful_bps` to `raw_bps`.
     pub share: f64,
-    /// From issue of a directive to its being applied, with the bulk queue full, s.
+    /// Time from issue to application of a directive with a full bulk queue, median, s.
     pub directive_median_s: f64,
-    /// 95 of 100 directives take no longer, s.
+    /// 95th percentile of the same time, s.
     pub directive_p95_s: f64,
-    /// Most bits a second on air in any window of the vehicle, over the budget.
+    /// Ratio of the vehicle's bits in the fullest window to the budget.
     pub budget_use: f64,
 }
 
-/// A survey through modems.
 #[derive(Debug, Clone, Serialize)]
 pub struct SurveyRow {
-    /// Which modem.
     pub modem: String,
-    /// Length of the survey, s.
+    /// Duration of the survey, s.
     pub survey_s: f64,
     /// Share of cells on the operator's map that agree with the vehicle's, mean over the survey.
     pub agreement_mean: f64,
-    /// The same once the link has drained: 1 if the maps are equal.
+    /// The same share once the link has drained: 1 if the maps are equal.
     pub agreement_final: f64,
     /// Time that the link took after the survey, s.
     pub drain_s: f64,
 }
 
-/// Everything.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModemTable {
-    /// Seed of everything random.
     pub seed: u64,
-    /// Bursts.
     pub burst: BurstRow,
-    /// Surveys.
     pub surveys: Vec<SurveyRow>,
 }
 
-/// Range of every row, m.
+/// Range between the modems in every row, m.
 const RANGE_M: f64 = 1000.0;
-/// Loss of every row.
 const LOSS: f64 = 0.1;
 
-/// Measures everything; takes about a minute.
+/// Measures all rows, in about a minute.
 pub fn modem_table(seed: u64, progress: &mut dyn FnMut(f64)) -> Result<ModemTable, UserError> {
     progress(0.0);
     let burst = measure_burst(seed, Duration::from_secs(1200), 60)?;
@@ -94,13 +88,13 @@ pub fn scenario(sets: &[&str]) -> Result<Config, UserError> {
 
 /// Throughput against a raw pusher, and latency of `directives` directives meanwhile.
 pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<BurstRow, UserError> {
-    // A budget that does not bind: the modem is what is measured.
+    // A budget above the modem's rate, so that the modem is the limit.
     let config = scenario(&["modem.kind=s2c", "link.budget_bps=40000"])?;
-    let setting = DockSetting { config, range_m: RANGE_M, loss: LOSS };
+    let setting = ModemSetting { config, range_m: RANGE_M, loss: LOSS };
     let raw_bps = push(&setting, seed, time);
-    let mut dock = Dock::under_load(&setting, seed)?;
-    let useful_bps = dock.measure_flow(time);
-    let latency = dock.measure_directives(directives, seed);
+    let mut bench = ModemBench::under_load(&setting, seed)?;
+    let useful_bps = bench.measure_flow(time);
+    let latency = bench.measure_directives(directives, seed);
     Ok(BurstRow {
         range_m: RANGE_M,
         loss: LOSS,
@@ -109,11 +103,11 @@ pub fn measure_burst(seed: u64, time: Duration, directives: usize) -> Result<Bur
         share: thousandths(useful_bps / raw_bps),
         directive_median_s: thousandths(latency.median()),
         directive_p95_s: thousandths(latency.p95()),
-        budget_use: thousandths(dock.budget_use()),
+        budget_use: thousandths(bench.budget_use()),
     })
 }
 
-/// A survey of `duration_s` through modems, and what the link takes after it.
+/// A survey of `duration_s` through modems, and the time that the link takes to drain after it.
 pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<SurveyRow, UserError> {
     let mut config = scenario(sets)?;
     config.survey.duration_s = duration_s;
@@ -121,12 +115,12 @@ pub fn survey(name: &str, sets: &[&str], seed: u64, duration_s: f64) -> Result<S
     let mut mission = Mission::new(config, options)?;
     mission.run(Duration::from_secs(7200), &mut |_| {})?;
     let report = report(&mission, name);
-    let figure = |key: &str| report.figures["map"][key].as_f64().unwrap_or_default();
+    let value = |key: &str| report.json["map"][key].as_f64().unwrap_or_default();
     Ok(SurveyRow {
         modem: name.to_owned(),
         survey_s: duration_s,
-        agreement_mean: figure("agreement_mean"),
-        agreement_final: figure("agreement_final"),
+        agreement_mean: value("agreement_mean"),
+        agreement_final: value("agreement_final"),
         drain_s: thousandths(mission.now().as_secs_f64() - duration_s),
     })
 }

@@ -1,6 +1,6 @@
-//! What an emulated S2C modem itself can carry: a host that does nothing but keep its pool full.
+//! The capacity of an emulated S2C modem, measured by a host that only keeps its pool full.
 
-use super::DockSetting;
+use super::ModemSetting;
 use scenecast_drivers::modem::s2c::{Line, LineParser};
 use sim_channel::modem::Basin;
 use sim_channel::modem::s2c::{S2c, S2cConfig};
@@ -10,11 +10,11 @@ use std::time::Duration;
 const FROM: NodeId = NodeId(1);
 const TO: NodeId = NodeId(2);
 const RECORD: usize = 1000;
-/// Between two tries while the pool is full.
-const FULL: Duration = Duration::from_millis(500);
+/// Time between two attempts while the pool is full.
+const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Bits a second of payload that the other host gets over `time`, after the connection is up.
-pub fn push(setting: &DockSetting, seed: u64, time: Duration) -> f64 {
+/// Payload that the other host receives over `time` after the connection is up, bit/s.
+pub fn push(setting: &ModemSetting, seed: u64, time: Duration) -> f64 {
     const WARM_UP: Duration = Duration::from_secs(60);
     let mut basin = Basin::new(Channel::new(setting.channel(), seed));
     for (node, x) in [(FROM, 0.0), (TO, setting.range_m)] {
@@ -27,13 +27,13 @@ pub fn push(setting: &DockSetting, seed: u64, time: Duration) -> f64 {
     let (mut now, mut next) = (Duration::ZERO, Some(Duration::ZERO));
     let mut carried = 0usize;
     while now < WARM_UP + time {
-        now = basin.poll_timeout().into_iter().chain(next).min().unwrap_or(now + FULL).max(now);
+        now = basin.poll_timeout().into_iter().chain(next).min().unwrap_or(now + RETRY_INTERVAL).max(now);
         basin.advance(now);
         replies.push(&basin.poll_host_bytes(FROM));
         while let Some(line) = replies.next_line() {
             match line {
                 Line::Reply(_, text) if text == "OK" => next = Some(now),
-                Line::Reply(..) => next = Some(now + FULL),
+                Line::Reply(..) => next = Some(now + RETRY_INTERVAL),
                 _ => {}
             }
         }

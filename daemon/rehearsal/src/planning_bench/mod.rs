@@ -1,58 +1,51 @@
-//! Planners against each other: utility collected a metre on label maps that are seen bit by bit.
+//! A comparison of the planners: utility per metre on label maps that the vehicle sees cell by cell.
 
-mod drive;
-mod picture;
+mod planner_run;
+mod plot;
 mod scene;
 
-use drive::{Drive, Task, Told};
-pub use picture::picture;
+use planner_run::{MapKnowledge, PlannerRun, Task};
+pub use plot::plot;
 use scene::Scene;
 use scenecast_core::UserError;
 use scenecast_protocol::directive::PlannerKind;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Seeds of one run.
 pub const SEEDS: u64 = 32;
 
-/// One scene with one start, driven by every planner.
+/// One scene with one start, run with every planner.
 #[derive(Debug)]
 pub struct Trial {
-    /// Name of the scene.
     pub name: String,
-    /// Utility a metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
+    /// Utility per metre in units of the scene's mean, by planner in the order of [`PlannerKind::ALL`].
     pub utility_per_m: [f64; 3],
-    /// The same of `horizon` if it is told the whole map before it starts.
+    /// The same value for `horizon` if it knows the whole map from the start.
     pub map_known_per_m: f64,
-    /// Breaches of fence, keep-outs and limit, by the witness.
+    /// Breaches of fence, keep-outs and limit, by the track audit.
     pub violations: usize,
     pub(crate) scene: Scene,
     pub(crate) task: Task,
-    pub(crate) drives: Vec<Drive>,
+    pub(crate) runs: Vec<PlannerRun>,
 }
 
 /// Medians over all trials, by planner.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Medians {
-    /// Parallel legs.
     pub lawnmower: f64,
-    /// Best gain a metre.
     pub greedy: f64,
-    /// Best way over a horizon.
+    /// The planner of the best path over a horizon.
     pub horizon: f64,
 }
 
-/// What the bench found.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlanningTable {
-    /// Utility collected a metre, in units of what a metre brings where all is new, on the mean of the scene: so rare and
-    /// common classes weigh alike.
+    /// Utility per metre in units of the scene's mean utility of a metre on which all is new, so that rare and
+    /// common classes have equal weight.
     pub median: Medians,
-    /// Median of `horizon` where it is told the whole map before it starts: what not knowing costs is between the two.
+    /// Median of `horizon` if it knows the whole map from the start: the difference is the cost of not knowing it.
     pub map_known: f64,
-    /// Breaches of any constraint.
     pub violations: usize,
-    /// Seeds.
     pub seeds: u64,
 }
 
@@ -69,8 +62,8 @@ pub fn annotated_images(dir: &Path) -> Vec<(PathBuf, PathBuf)> {
     found
 }
 
-/// Drives every trial: each seed has a procedural reef and, where there are any, one of the annotated images.
-pub fn drive_all(
+/// Runs every trial: each seed has a procedural reef and, if there are any, one of the annotated images.
+pub fn run_all(
     seed: u64,
     images: &[(PathBuf, PathBuf)],
     each: &mut dyn FnMut(f64, &Trial) -> Result<(), UserError>,
@@ -96,16 +89,16 @@ pub fn drive_all(
 
 fn trial(scene: Scene, seed: u64) -> Trial {
     let task = Task::draw(&scene, seed);
-    let drives = PlannerKind::ALL.map(|kind| drive::drive(&scene, &task, kind, Told::Seen));
-    let all = drive::drive(&scene, &task, PlannerKind::Horizon, Told::All);
-    let rate = |d: &Drive| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9);
-    let utility_per_m = drives.each_ref().map(rate);
+    let runs = PlannerKind::ALL.map(|kind| planner_run::run_planner(&scene, &task, kind, MapKnowledge::Seen));
+    let all = planner_run::run_planner(&scene, &task, PlannerKind::Horizon, MapKnowledge::All);
+    let rate = |d: &PlannerRun| d.utility / d.metres().max(1e-9) / task.mean_per_m.max(1e-9);
+    let utility_per_m = runs.each_ref().map(rate);
     let map_known_per_m = rate(&all);
-    let violations = drives.iter().chain([&all]).map(|d| d.violations(&task)).sum();
-    Trial { name: scene.name.clone(), utility_per_m, map_known_per_m, violations, scene, task, drives: drives.into() }
+    let violations = runs.iter().chain([&all]).map(|d| d.violations(&task)).sum();
+    Trial { name: scene.name.clone(), utility_per_m, map_known_per_m, violations, scene, task, runs: runs.into() }
 }
 
-/// Rounded to a thousandth.
+/// Median of the values, rounded to a thousandth.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
@@ -121,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trial_is_the_same_again_and_breaks_nothing() {
+    fn a_trial_is_repeatable_and_violates_no_constraint() {
         let scene = Scene::small(3);
         let (a, b) = (trial(scene.clone(), 3), trial(scene, 3));
         assert_eq!(a.utility_per_m, b.utility_per_m);
@@ -129,6 +122,6 @@ mod tests {
         assert!(a.utility_per_m.iter().all(|&u| u > 0.0), "{:?}", a.utility_per_m);
         let lawnmower = a.utility_per_m[0];
         assert!(a.map_known_per_m > lawnmower, "{} against {lawnmower}", a.map_known_per_m);
-        assert!(a.drives.iter().all(|d| d.metres() > 0.5 * a.task.limit_m), "the limit is made use of");
+        assert!(a.runs.iter().all(|d| d.metres() > 0.5 * a.task.limit_m), "the limit is used");
     }
 }

@@ -1,6 +1,6 @@
-//! Label maps to drive over.
+//! The label maps of the planning bench.
 
-use crate::World;
+use crate::world::World;
 use image::RgbImage;
 use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::LabelBook;
@@ -14,29 +14,26 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Edge of a cell, metres: a scene stands for a site of about a hundred cells.
+/// Edge of a cell, metres; a scene is about a hundred cells wide.
 pub(crate) const CELL_M: f64 = 0.25;
-/// Cells across an image.
 const CELLS: f64 = 100.0;
-/// Times that each word is drawn again.
+/// Number of sweeps over all words.
 const SWEEPS: u64 = 25;
-/// Weight of unseen cells.
 const EXPLORATION: i8 = 5;
-/// Smallest share of the annotated cells that makes a class worth a survey.
-const LEAST_SHARE: f64 = 0.05;
+/// Minimum share of the annotated cells for the class that the operator favours.
+const MIN_SHARE: f64 = 0.05;
 
-/// A label map as the scene model gives it, and what the operator favours on it.
+/// A label map of the scene model, and the operator's utility on it.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     pub name: String,
-    /// Its south-west corner is the origin.
+    /// Bounds of the scene, metres; the south-west corner is the origin.
     pub labels: LabelGrid,
     pub area: Area,
     pub utility: Utility,
 }
 
 impl Scene {
-    /// An annotated image.
     pub fn from_files(image: &Path, annotations: &Path, seed: u64) -> Result<Self, UserError> {
         let rgb = image::open(image).map_err(|e| UserError::file(image, e))?.to_rgb8();
         let px = (f64::from(rgb.width()) / CELLS).floor().max(4.0);
@@ -72,7 +69,7 @@ impl Scene {
     }
 }
 
-/// The labels of a whole image, seen at once.
+/// The labels of a whole image that is seen at once.
 fn label(image: &RgbImage, px: f64, seed: u64) -> LabelGrid {
     let (words, scene) = (WordConfig::default(), Config::default().scene);
     let camera = DownCamera { metres_per_pixel: CELL_M / px, altitude_m: 4.0 };
@@ -97,13 +94,14 @@ fn label(image: &RgbImage, px: f64, seed: u64) -> LabelGrid {
     model.refine(seen.len() as u64 * SWEEPS);
     let flat = model.label_map();
     let mut book = LabelBook::new(0);
-    // A label gets its number when it has lasted for two maps.
+    // A topic gets a label when it has lasted for two maps.
     book.publish(&flat);
     book.publish(&flat).iter().map(|c| (Cell::new(c.x, c.y), c.label)).collect()
 }
 
-/// The operator is after the rarest class that covers a twentieth of the scene. He weighs each label by how much of it is that
-/// class, the best one with 1, those that have it no more often than the scene with 0.
+/// The utility of an operator who looks for the rarest class that covers at least a twentieth of the scene.
+/// The weight of a label grows with the share of that class in it: 1 for the best label, 0 at or below the
+/// share in the whole scene.
 fn favour(labels: &LabelGrid, world: &World) -> Utility {
     let mut counts: BTreeMap<u8, BTreeMap<u8, f64>> = BTreeMap::new();
     let mut classes: BTreeMap<u8, f64> = BTreeMap::new();
@@ -113,7 +111,7 @@ fn favour(labels: &LabelGrid, world: &World) -> Utility {
         *counts.entry(label).or_default().entry(class).or_default() += 1.0;
     }
     let cells: f64 = classes.values().sum();
-    let common = classes.iter().filter(|(_, n)| **n >= LEAST_SHARE * cells);
+    let common = classes.iter().filter(|(_, n)| **n >= MIN_SHARE * cells);
     let Some((&favoured, &n)) = common.min_by(|a, b| a.1.total_cmp(b.1)) else { return Utility::default() };
     let share = |of: &BTreeMap<u8, f64>| of.get(&favoured).unwrap_or(&0.0) / of.values().sum::<f64>();
     let best = counts.values().map(share).fold(0.0, f64::max).max(1e-9);

@@ -7,13 +7,14 @@ use std::io::{Error, Result};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// What the disk writes whole or not at all; smaller than a block, so that parts of a record may come in any order.
+/// Bytes that the disk writes atomically; smaller than a block, so that the parts of a record may
+/// be written in any order.
 const SECTOR: usize = 512;
 
-/// Chooses one of so many possibilities.
-pub(crate) struct Chance(u64);
+/// Random choices of the simulated disk.
+pub(crate) struct DiskRng(u64);
 
-impl Chance {
+impl DiskRng {
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -26,13 +27,13 @@ impl Chance {
 
 /// A step of the file system or of its host.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Step {
+pub(crate) enum DiskStep {
     Create,
     Append,
     Sync,
     Rename,
     SyncFolder,
-    /// Something that the host does.
+    /// An action of the host outside the disk.
     Host,
 }
 
@@ -45,42 +46,41 @@ struct Content {
 #[derive(Debug, Default)]
 struct Platter {
     contents: Vec<Content>,
-    /// Names, as they were after each change since the folder was last synced.
+    /// The names after each change since the folder was last synced.
     names: Vec<BTreeMap<String, usize>>,
-    steps: Vec<Step>,
+    steps: Vec<DiskStep>,
     cut_at: Option<usize>,
-    failing: Option<Step>,
+    failing: Option<DiskStep>,
 }
 
-/// The disk; clones are the same one.
+/// A simulated disk; clones share it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Disk(Rc<RefCell<Platter>>);
 
 impl Disk {
-    /// Cuts the power before so many further steps are done.
+    /// Cuts the power after this many further steps.
     pub(crate) fn cut_after(&self, steps: usize) {
         let mut platter = self.0.borrow_mut();
         platter.cut_at = Some(platter.steps.len() + steps);
     }
 
-    /// Whether the power is gone.
+    /// Whether the power is cut.
     pub(crate) fn is_off(&self) -> bool {
         let platter = self.0.borrow();
         platter.cut_at == Some(platter.steps.len())
     }
 
-    /// Steps so far.
-    pub(crate) fn steps(&self) -> Vec<Step> {
+    pub(crate) fn steps(&self) -> Vec<DiskStep> {
         self.0.borrow().steps.clone()
     }
 
     /// Steps of this kind fail from now on.
-    pub(crate) fn fail(&self, step: Option<Step>) {
+    pub(crate) fn fail(&self, step: Option<DiskStep>) {
         self.0.borrow_mut().failing = step;
     }
 
-    /// Takes a step, unless the power is gone.
-    pub(crate) fn step(&self, step: Step) -> Result<()> {
+    /// Counts a step; an error if the power is cut.
+    pub(crate) fn step(&self, step: DiskStep) -> Result<()> {
         if self.is_off() {
             return Err(Error::other("the power is gone"));
         }
@@ -89,23 +89,23 @@ impl Disk {
         if platter.failing == Some(step) { Err(Error::other("input/output error")) } else { Ok(()) }
     }
 
-    /// The power comes back: of what was not synced, `chance` has chosen what is there.
-    pub(crate) fn power_cut(&self, mut chance: Chance) {
+    /// The power comes back; `rng` chooses which of the unsynced bytes are on the disk.
+    pub(crate) fn power_cut(&self, mut rng: DiskRng) {
         let mut platter = self.0.borrow_mut();
         platter.cut_at = None;
         if !platter.names.is_empty() {
-            let kept = chance.below(platter.names.len());
+            let kept = rng.below(platter.names.len());
             let kept = platter.names[kept].clone();
             platter.names = vec![kept];
         }
         let before = platter.contents.clone();
         for (at, content) in platter.contents.iter_mut().enumerate() {
             let older = at.checked_sub(1).map_or(&[][..], |i| &before[i].bytes);
-            content.survive(older, &mut chance);
+            content.survive(older, &mut rng);
         }
     }
 
-    /// Writes a file behind the journal's back.
+    /// Writes a file directly, without the journal.
     pub(crate) fn put(&self, name: &str, bytes: &[u8]) {
         let mut platter = self.0.borrow_mut();
         platter.contents.push(Content { safe: bytes.len(), bytes: bytes.to_vec() });
@@ -117,18 +117,18 @@ impl Disk {
 }
 
 impl Content {
-    /// Each sector that was not synced is there, or half there, or holds zeros or what an older file had there.
-    fn survive(&mut self, older: &[u8], chance: &mut Chance) {
+    /// Each unsynced sector is written, half written, zero, or holds bytes of an older file.
+    fn survive(&mut self, older: &[u8], rng: &mut DiskRng) {
         let unsynced = self.bytes.len() - self.safe;
-        self.bytes.truncate(self.safe + [0, chance.below(unsynced + 1), unsynced][chance.below(3)]);
+        self.bytes.truncate(self.safe + [0, rng.below(unsynced + 1), unsynced][rng.below(3)]);
         let mut from = self.safe;
         while from < self.bytes.len() {
             let to = (from + 1).next_multiple_of(SECTOR).min(self.bytes.len());
             let sector = &mut self.bytes[from..to];
-            match chance.below(6) {
+            match rng.below(6) {
                 0 => sector.fill(0),
                 1 => sector.iter_mut().enumerate().for_each(|(i, b)| *b = older.get(from + i).copied().unwrap_or(0)),
-                2 => sector[chance.below(to - from)..].fill(0),
+                2 => sector[rng.below(to - from)..].fill(0),
                 _ => {}
             }
             from = to;
@@ -151,7 +151,7 @@ impl Storage for Disk {
     }
 
     fn create(&mut self, name: &str) -> Result<usize> {
-        self.step(Step::Create)?;
+        self.step(DiskStep::Create)?;
         let mut platter = self.0.borrow_mut();
         platter.contents.push(Content::default());
         let at = platter.contents.len() - 1;
@@ -162,20 +162,20 @@ impl Storage for Disk {
     }
 
     fn append(&mut self, file: &mut usize, bytes: &[u8]) -> Result<()> {
-        // A write that fails, or that the power cut meets, may have written something.
+        // A write that fails or is cut off may have written some bytes.
         self.0.borrow_mut().contents[*file].bytes.extend_from_slice(bytes);
-        self.step(Step::Append)
+        self.step(DiskStep::Append)
     }
 
     fn sync(&mut self, file: &mut usize) -> Result<()> {
-        self.step(Step::Sync)?;
+        self.step(DiskStep::Sync)?;
         let content = &mut self.0.borrow_mut().contents[*file];
         content.safe = content.bytes.len();
         Ok(())
     }
 
     fn rename(&mut self, from: &str, to: &str) -> Result<()> {
-        self.step(Step::Rename)?;
+        self.step(DiskStep::Rename)?;
         let mut platter = self.0.borrow_mut();
         let mut names = platter.change_names();
         let at = names.remove(from).ok_or_else(|| Error::other("no such file"))?;
@@ -185,7 +185,7 @@ impl Storage for Disk {
     }
 
     fn sync_folder(&mut self) -> Result<()> {
-        self.step(Step::SyncFolder)?;
+        self.step(DiskStep::SyncFolder)?;
         let mut platter = self.0.borrow_mut();
         let last = platter.names.pop();
         platter.names = last.into_iter().collect();

@@ -15,62 +15,56 @@ pub(crate) use storage::{Folder, Storage};
 
 use std::io;
 
-/// Why a state could not be read, or not be made safe.
+/// The reason that a state could not be read or made durable.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum JournalError {
-    /// The file is no journal to go on from.
+    /// The file is no valid journal.
     #[error(transparent)]
     Damage(#[from] Damage),
-    /// The file system refused.
     #[error("{doing}: {cause}; check the disk, then start again")]
-    Io {
-        /// What it was asked for.
-        doing: &'static str,
-        /// What it said.
-        cause: io::Error,
-    },
-    /// A write failed before; nobody knows what is on the disk behind it.
+    Io { doing: &'static str, cause: io::Error },
+    /// An earlier write failed, so the content of the file is unknown.
     #[error("a write has failed before; check the disk, then start again")]
     Broken,
 }
 
-/// Names what was being done.
+/// Adds the operation to an error of the file system.
 fn doing(doing: &'static str) -> impl FnOnce(io::Error) -> JournalError {
     move |cause| JournalError::Io { doing, cause }
 }
 
-/// Where the next record goes.
-enum End<F> {
-    /// To the beginning of a new file.
+/// The destination of the next record.
+enum JournalEnd<F> {
+    /// The beginning of a new file.
     New,
-    /// To the end of this file, which has so many bytes.
+    /// The end of this file, whose length is `bytes`.
     Open { file: F, bytes: usize },
-    /// Nowhere: a failed write or sync leaves it open what the disk holds, whatever a later one says.
+    /// None: after a failed write or sync the content of the disk is unknown, even if a later one succeeds.
     Broken,
 }
 
-/// A file of records, each a whole state; the last one counts.
+/// A file of records, each a complete state; the last one is valid.
 ///
 /// The first record of a run, and one for which the file has no room left, begins a new file: written beside the old
-/// one, synced, renamed, and the folder synced. So nothing is ever written behind what an earlier run has left.
+/// one, synced, renamed, and the folder synced. So no run ever writes behind the remains of an earlier one.
 pub(super) struct Journal<S: Storage> {
     storage: S,
     name: &'static str,
     most_bytes: usize,
     sequence: u64,
-    end: End<S::File>,
+    end: JournalEnd<S::File>,
     confirmed: Vec<u8>,
 }
 
 impl<S: Storage> Journal<S> {
-    /// The journal of this name, and its state; no state before the first.
+    /// Opens the journal of this name; its state is `None` before the first record.
     pub(super) fn open(
         storage: S,
         name: &'static str,
         most_bytes: usize,
     ) -> Result<(Self, Option<Vec<u8>>), JournalError> {
         let bytes = storage.read(name).map_err(doing("reading"))?;
-        let mut journal = Self { storage, name, most_bytes, sequence: 0, end: End::New, confirmed: Vec::new() };
+        let mut journal = Self { storage, name, most_bytes, sequence: 0, end: JournalEnd::New, confirmed: Vec::new() };
         let Some(bytes) = bytes else { return Ok((journal, None)) };
         let scan = record::scan(&bytes)?;
         if let Some(offset) = scan.torn {
@@ -81,26 +75,27 @@ impl<S: Storage> Journal<S> {
         Ok((journal, Some(scan.last.body.to_vec())))
     }
 
-    /// The file system below.
     pub(super) fn storage(&self) -> &S {
         &self.storage
     }
 
-    /// Makes a state safe. Before this has returned `Ok` a power cut leaves this state or the last confirmed one.
+    /// Makes a state durable. A power cut before the return of `Ok` leaves this state or the last confirmed one.
     pub(super) fn persist(&mut self, state: &[u8]) -> Result<(), JournalError> {
         let record = record::encode(self.sequence + 1, state);
-        self.end = match std::mem::replace(&mut self.end, End::Broken) {
-            End::Broken => return Err(JournalError::Broken),
-            End::Open { file, bytes } if self.confirmed == state => {
-                self.end = End::Open { file, bytes };
+        self.end = match std::mem::replace(&mut self.end, JournalEnd::Broken) {
+            JournalEnd::Broken => return Err(JournalError::Broken),
+            JournalEnd::Open { file, bytes } if self.confirmed == state => {
+                self.end = JournalEnd::Open { file, bytes };
                 return Ok(());
             }
-            End::Open { mut file, bytes } if bytes + record.len() <= self.most_bytes => {
+            JournalEnd::Open { mut file, bytes } if bytes + record.len() <= self.most_bytes => {
                 self.storage.append(&mut file, &record).map_err(doing("writing"))?;
                 self.storage.sync(&mut file).map_err(doing("syncing"))?;
-                End::Open { file, bytes: bytes + record.len() }
+                JournalEnd::Open { file, bytes: bytes + record.len() }
             }
-            End::New | End::Open { .. } => End::Open { file: self.begin_file(&record)?, bytes: record.len() },
+            JournalEnd::New | JournalEnd::Open { .. } => {
+                JournalEnd::Open { file: self.begin_file(&record)?, bytes: record.len() }
+            }
         };
         self.sequence += 1;
         self.confirmed = state.to_vec();

@@ -1,4 +1,4 @@
-//! Records of the journal, and what is left of them after a power cut.
+//! Records of the journal, and their remains after a power cut.
 
 /// Kind of file, without its version.
 const KIND: &[u8; 6] = b"scVJRN";
@@ -8,40 +8,37 @@ const HEAD: usize = 20;
 const TAIL: usize = 4;
 
 /// Records begin at multiples of this, the size of a page and of the largest usual sector: writing a record never
-/// writes a sector anew that holds a confirmed one.
+/// rewrites a sector that holds a confirmed one.
 pub(super) const BLOCK: usize = 4096;
 
 static CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 
-/// Why a file is no journal to go on from.
+/// The reason that a file is no valid journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Damage {
-    /// Written by another version.
     #[error("the file is of another version of scenecast; use that one, or move the file away to begin a new mission")]
     Version,
-    /// Not what a power cut leaves.
+    /// Damage that no power cut causes.
     #[error("damaged at byte {offset}; restore the file, or move it away to begin a new mission")]
     At {
-        /// Where the first unreadable record begins.
+        /// Start of the first unreadable record, a byte offset.
         offset: usize,
     },
 }
 
-/// A record that was read.
+/// A record as it was read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Record<'a> {
     /// One more than that of the record before it, across files.
     pub(super) sequence: u64,
-    /// What it holds.
     pub(super) body: &'a [u8],
 }
 
-/// What a file holds.
+/// The content of a journal file.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Scan<'a> {
-    /// The last whole record.
     pub(super) last: Record<'a>,
-    /// Where a record begins that was being written when the power was cut.
+    /// Start of a record that a power cut interrupted, a byte offset.
     pub(super) torn: Option<usize>,
 }
 
@@ -93,7 +90,7 @@ pub(super) fn scan(bytes: &[u8]) -> Result<Scan<'_>, Damage> {
             None => break,
         }
     }
-    // A disk may show blocks of a file that is gone; those are told by their sequence.
+    // A disk may show blocks of a file that is gone; their sequence numbers give them away.
     let follows = |offset: usize| at(offset).is_some_and(|r| r.sequence > last.sequence);
     if (offset..bytes.len()).step_by(BLOCK).any(follows) {
         return Err(Damage::At { offset });
@@ -115,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_before_a_whole_record_is_told_with_its_place() {
+    fn damage_before_a_whole_record_is_reported_with_its_position() {
         let records: Vec<Vec<u8>> = (5..8).map(|n| encode(n, &[n as u8; 5000])).collect();
         let file = records.concat();
         let length = HEAD + 5000 + TAIL;

@@ -1,33 +1,33 @@
-//! What the journal asks of a file system.
+//! The operations that the journal needs of a file system.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// A folder, as a power cut treats it: content is safe after [`Storage::sync`], names are after [`Storage::sync_folder`].
+/// A folder under power cuts: content is durable after [`Storage::sync`], names are after [`Storage::sync_folder`].
 pub(crate) trait Storage {
-    /// A file that can be appended to; it stays the same file under a new name.
+    /// A file open for appending; a rename does not close it.
     type File;
 
-    /// Where a file is, for people.
+    /// Path of a file, for messages.
     fn path(&self, name: &str) -> PathBuf;
 
-    /// All of a file; `None` if there is none of this name.
+    /// The content of a file; `None` if no file has this name.
     fn read(&self, name: &str) -> io::Result<Option<Vec<u8>>>;
 
-    /// An empty file; another one of this name is gone.
+    /// Creates an empty file, which replaces one of the same name.
     fn create(&mut self, name: &str) -> io::Result<Self::File>;
 
-    /// Writes at the end of a file.
+    /// Appends bytes to a file; they are durable after [`Storage::sync`].
     fn append(&mut self, file: &mut Self::File, bytes: &[u8]) -> io::Result<()>;
 
-    /// Makes the content of a file safe.
+    /// Makes the content of a file durable.
     fn sync(&mut self, file: &mut Self::File) -> io::Result<()>;
 
-    /// Gives a file another name, in place of the file that had it.
+    /// Renames a file and replaces one of the new name.
     fn rename(&mut self, from: &str, to: &str) -> io::Result<()>;
 
-    /// Makes the names of the folder safe.
+    /// Makes the names in the folder durable.
     fn sync_folder(&mut self) -> io::Result<()>;
 }
 
@@ -38,13 +38,13 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// The folder, which is created if it is not there; an error if another process holds it.
+    /// Opens the folder and creates it if necessary; an error if another process holds it.
     pub(crate) fn hold(path: &Path) -> io::Result<Self> {
         create_folder(path)?;
         let handle = File::open(path)?;
         match handle.try_lock() {
             Err(TryLockError::WouldBlock) => Err(io::Error::new(ErrorKind::ResourceBusy, HELD)),
-            // A file system without locks has to do without.
+            // On a file system without locks the folder is not protected.
             Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => Err(e),
             _ => Ok(Self { path: path.to_owned(), handle }),
         }
@@ -52,7 +52,7 @@ impl Folder {
 }
 
 impl Folder {
-    /// The same folder for another owner; it is held until both are gone.
+    /// The same folder for another owner; it stays locked until both are dropped.
     pub(crate) fn share(&self) -> io::Result<Self> {
         Ok(Self { path: self.path.clone(), handle: self.handle.try_clone()? })
     }
@@ -60,7 +60,7 @@ impl Folder {
 
 const HELD: &str = "another process keeps its state there; stop it, or set another runtime.state_dir";
 
-/// Creates a folder and those above it; a new one is as safe as its name in the one above.
+/// Creates a folder and its parents, and syncs the parent of each new one so that its name is durable.
 pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
     if path.as_os_str().is_empty() || path.is_dir() {
         return Ok(());
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_journal_in_a_new_folder_comes_back_without_its_torn_end() {
+    fn a_journal_in_a_new_folder_is_read_without_its_torn_end() {
         let path = scratch("journal").join("a/b");
         let (mut journal, found) = open(&path);
         assert_eq!(found, None);

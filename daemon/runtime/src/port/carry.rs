@@ -1,30 +1,30 @@
 //! Moving bytes between a stream and the host.
 
-use super::{Ends, ToPort, read};
+use super::{PortEnds, ToPort, read};
 use std::io::{self, Write};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::Instant;
 
-/// Longest a stream may take no byte of what is to be written before it counts as dead.
-const WRITE_LIMIT: Duration = Duration::from_secs(30);
+/// A stream that accepts no byte for this time counts as dead.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Carries bytes both ways until the stream ends or fails, or says nothing for `quiet`, or the host is gone (`Ok`).
+/// Carries bytes both ways until the stream ends or fails, or is silent for `quiet`, or until the host is gone (`Ok`).
 pub(super) async fn carry(
     stream: impl AsyncRead + AsyncWrite + Unpin,
     quiet: Option<Duration>,
-    ends: &mut Ends,
+    ends: &mut PortEnds,
 ) -> io::Result<()> {
-    if !ends.tell_open().await {
+    if !ends.report_open().await {
         return Ok(());
     }
     let (mut reader, mut writer) = tokio::io::split(stream);
     let mut buffer = [0; 4096];
     let mut out = bytes::Bytes::new();
-    let (mut heard, mut written) = (Instant::now(), Instant::now());
+    let (mut last_read, mut written) = (Instant::now(), Instant::now());
     loop {
-        // A write that the device takes slowly must not keep what it says from the host. Nothing waits for the line to
-        // drain: that would hold up the thread.
+        // A slow write must not delay input from the device. No write waits for the line to drain, which would block
+        // the thread.
         tokio::select! {
             n = writer.write(&out), if !out.is_empty() => {
                 let n = n?;
@@ -34,8 +34,8 @@ pub(super) async fn carry(
                 let _ = out.split_to(n);
                 written = Instant::now();
             }
-            () = tokio::time::sleep_until(written + WRITE_LIMIT), if !out.is_empty() => {
-                return Err(io::Error::new(io::ErrorKind::TimedOut, "it takes no bytes"));
+            () = tokio::time::sleep_until(written + WRITE_TIMEOUT), if !out.is_empty() => {
+                return Err(io::Error::new(io::ErrorKind::TimedOut, "it accepts no bytes"));
             }
             order = ends.to.recv(), if out.is_empty() => match order {
                 Some(ToPort::Bytes(bytes)) => (out, written) = (bytes, Instant::now()),
@@ -47,33 +47,33 @@ pub(super) async fn carry(
                 if n == 0 {
                     return Err(io::ErrorKind::UnexpectedEof.into());
                 }
-                heard = Instant::now();
-                if !ends.tell(read(&buffer, n)).await {
+                last_read = Instant::now();
+                if !ends.report(read(&buffer, n)).await {
                     return Ok(());
                 }
             }
-            e = silence(heard, quiet) => return Err(e),
+            e = silence(last_read, quiet) => return Err(e),
         }
     }
 }
 
-/// Ends when nothing has come for too long.
-pub(super) async fn silence(heard: Instant, quiet: Option<Duration>) -> io::Error {
+/// Returns an error after `quiet` without a received byte; without `quiet` it never returns.
+pub(super) async fn silence(last_read: Instant, quiet: Option<Duration>) -> io::Error {
     match quiet {
-        Some(quiet) => tokio::time::sleep_until(heard + quiet).await,
+        Some(quiet) => tokio::time::sleep_until(last_read + quiet).await,
         None => std::future::pending().await,
     }
-    io::Error::new(io::ErrorKind::TimedOut, "nothing came for long")
+    io::Error::new(io::ErrorKind::TimedOut, "no bytes arrived for too long")
 }
 
-/// The host wants it opened again.
+/// The error that makes the keeper open the port again, on the host's request.
 pub(super) fn reopening() -> io::Error {
     io::Error::other("it does not answer")
 }
 
-/// Appends what the host writes.
-pub(super) async fn append(mut file: std::fs::File, ends: &mut Ends) -> io::Result<()> {
-    if !ends.tell_open().await {
+/// Appends the bytes that the host writes to a file.
+pub(super) async fn append(mut file: std::fs::File, ends: &mut PortEnds) -> io::Result<()> {
+    if !ends.report_open().await {
         return Ok(());
     }
     while let Some(order) = ends.to.recv().await {
@@ -92,7 +92,7 @@ mod tests {
 
     const SECOND: Duration = Duration::from_secs(1);
 
-    /// A stream that takes 16 bytes until somebody reads them, carried; its far side and the port.
+    /// A carried stream that holds 16 unread bytes: its far side, the port and the task.
     fn carried(quiet: Option<Duration>) -> (tokio::io::DuplexStream, Port, tokio::task::JoinHandle<io::Result<()>>) {
         let (near, far) = tokio::io::duplex(16);
         let (port, mut ends) = Port::pair();
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_device_that_takes_nothing_is_still_heard_and_counts_as_dead_after_a_while_however_much_it_says() {
+    async fn a_device_that_accepts_no_bytes_is_read_until_its_timeout() {
         let (mut far, mut port, task) = carried(None);
         assert_eq!(port.next().await, FromPort::Open);
         assert!(port.write(vec![7; 100]));
@@ -113,28 +113,28 @@ mod tests {
         }
         assert!(!task.is_finished());
         assert_eq!(task.await.unwrap().unwrap_err().kind(), io::ErrorKind::TimedOut);
-        assert_eq!(began.elapsed().as_secs(), WRITE_LIMIT.as_secs());
+        assert_eq!(began.elapsed().as_secs(), WRITE_TIMEOUT.as_secs());
     }
 
     #[tokio::test(start_paused = true)]
-    async fn a_device_that_takes_bytes_slowly_gets_them_all() {
+    async fn a_slow_device_receives_all_bytes() {
         let (mut far, mut port, task) = carried(None);
         assert_eq!(port.next().await, FromPort::Open);
         assert!(port.write((0..100).collect()));
-        let mut heard = Vec::new();
-        while heard.len() < 100 {
+        let mut received = Vec::new();
+        while received.len() < 100 {
             tokio::time::sleep(20 * SECOND).await;
             let mut buffer = [0; 8];
             let n = far.read(&mut buffer).await.unwrap();
-            heard.extend_from_slice(&buffer[..n]);
+            received.extend_from_slice(&buffer[..n]);
         }
-        assert_eq!(heard, (0..100).collect::<Vec<u8>>());
+        assert_eq!(received, (0..100).collect::<Vec<u8>>());
         drop(port);
         assert!(task.await.unwrap().is_ok(), "the host is gone");
     }
 
     #[tokio::test(start_paused = true)]
-    async fn an_instrument_that_says_nothing_counts_as_gone_though_the_host_writes_to_it() {
+    async fn a_silent_instrument_counts_as_gone_despite_writes_to_it() {
         let (mut far, mut port, task) = carried(Some(10 * SECOND));
         assert_eq!(port.next().await, FromPort::Open);
         far.write_all(b"$").await.unwrap();

@@ -1,7 +1,7 @@
-//! What keeps a port open.
+//! Opens a port, and opens it again whenever it fails.
 
 use super::carry::{append, carry};
-use super::{Ends, FromPort, tcp, udp};
+use super::{FromPort, PortEnds, tcp, udp};
 use scenecast_core::PortAddress;
 use std::fs::File;
 use std::io;
@@ -10,14 +10,14 @@ use tokio::net::{TcpListener, TcpStream, UdpSocket};
 use tokio::time::Instant;
 use tokio_serial::{SerialPort, SerialPortBuilderExt, SerialStream};
 
-/// The first pause before opening again.
-const FIRST_PAUSE: Duration = Duration::from_millis(200);
-/// The longest one, so that a cable that is back is soon noticed.
-const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-/// Longest wait for a connection: an address that nobody answers at must not take minutes.
-const CONNECT_LIMIT: Duration = Duration::from_secs(5);
+/// Time before a failed port is first opened again.
+const FIRST_RETRY_INTERVAL: Duration = Duration::from_millis(200);
+/// Maximum time between two attempts, short enough that a cable is soon noticed when it is plugged in again.
+const MAX_RETRY_INTERVAL: Duration = Duration::from_secs(2);
+/// Maximum wait for a connection; the default of the system is minutes.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A port that is open.
+/// An open port of any kind.
 pub(super) enum Opened {
     Serial(SerialStream),
     Connection(TcpStream),
@@ -26,13 +26,12 @@ pub(super) enum Opened {
     File(File),
 }
 
-/// Opens it once.
 pub(super) async fn open(place: &PortAddress) -> io::Result<Opened> {
     Ok(match place {
         PortAddress::Serial(device, baud) => Opened::Serial(serial(device, *baud)?),
         PortAddress::Listen(address) => Opened::Listener(TcpListener::bind(address).await?),
         PortAddress::Connect(address) => {
-            let connection = tokio::time::timeout(CONNECT_LIMIT, TcpStream::connect(address)).await;
+            let connection = tokio::time::timeout(CONNECT_TIMEOUT, TcpStream::connect(address)).await;
             Opened::Connection(connection.map_err(|_| io::Error::new(io::ErrorKind::TimedOut, "no answer"))??)
         }
         PortAddress::Datagrams(own, remote) => {
@@ -45,27 +44,27 @@ pub(super) async fn open(place: &PortAddress) -> io::Result<Opened> {
 
 fn serial(device: &str, baud: u32) -> io::Result<SerialStream> {
     let mut stream = tokio_serial::new(device, baud).open_native_async()?;
-    // Two ends may share a pseudo-terminal in a rehearsal; where exclusiveness is not to be had, it is not needed.
+    // Two ends may share a pseudo-terminal in a rehearsal; a system without exclusive access needs none.
     let _ = stream.set_exclusive(false);
-    // Some modems garble what they say while RTS is up and flow control off; a pseudo-terminal has no such line.
+    // Some modems garble their output while RTS is up and flow control off; a pseudo-terminal has no such line.
     let _ = stream.write_request_to_send(false);
     Ok(stream)
 }
 
-/// Keeps a port open until its host is gone: an unplugged adapter comes back under its stable path.
-pub(super) struct Keeper {
+/// Keeps a port open until its host is gone. An unplugged adapter is opened again when its path exists again.
+pub(super) struct PortKeeper {
     pub(super) name: &'static str,
     pub(super) place: PortAddress,
     pub(super) quiet: Option<Duration>,
-    pub(super) ends: Ends,
+    pub(super) ends: PortEnds,
 }
 
-impl Keeper {
-    /// Serves `first`, and then whatever can be opened.
+impl PortKeeper {
+    /// Serves `first`, then opens and serves the port again after each failure.
     pub(super) async fn run(mut self, first: Option<Opened>) {
         let mut next = first;
-        let mut pause = FIRST_PAUSE;
-        let mut said = false;
+        let mut pause = FIRST_RETRY_INTERVAL;
+        let mut is_logged = false;
         while !self.ends.from.is_closed() {
             let began = Instant::now();
             let opened = match next.take() {
@@ -77,20 +76,20 @@ impl Keeper {
                 Err(e) => Err(e),
             };
             let Err(e) = ended else { return };
-            if began.elapsed() > LONGEST_PAUSE {
-                (pause, said) = (FIRST_PAUSE, false);
+            if began.elapsed() > MAX_RETRY_INTERVAL {
+                (pause, is_logged) = (FIRST_RETRY_INTERVAL, false);
             }
-            // One that stays away is said once.
-            match std::mem::replace(&mut said, true) {
-                false => tracing::warn!("{}: {}: {e}; it is opened again when it is there", self.name, self.place),
+            // A lasting failure is logged once as a warning.
+            match std::mem::replace(&mut is_logged, true) {
+                false => tracing::warn!("{}: {}: {e}; it is opened again when it is available", self.name, self.place),
                 true => tracing::debug!("{}: {}: {e}", self.name, self.place),
             }
             tokio::time::sleep(pause).await;
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            pause = (pause * 2).min(MAX_RETRY_INTERVAL);
         }
     }
 
-    /// Carries bytes until that fails, or the host is gone (`Ok`).
+    /// Carries bytes until the port fails, or the host is gone (`Ok`).
     async fn serve(&mut self, opened: Opened) -> io::Result<()> {
         if !matches!(opened, Opened::Listener(_)) {
             tracing::info!("{}: open", self.name);
@@ -105,7 +104,7 @@ impl Keeper {
             Opened::Socket(socket, remote) => udp::carry(socket, remote, self.quiet, &mut self.ends).await,
             Opened::File(file) => append(file, &mut self.ends).await,
         };
-        if result.is_err() && !self.ends.tell(FromPort::Closed).await {
+        if result.is_err() && !self.ends.report(FromPort::Closed).await {
             return Ok(());
         }
         result

@@ -1,4 +1,4 @@
-//! Ways to modems and instruments: serial, TCP, UDP, files. They move bytes, and open themselves again whenever they fail.
+//! Ports to modems and instruments: serial, TCP, UDP, files. They move bytes, and are opened again after each failure.
 
 mod carry;
 mod keeper;
@@ -6,83 +6,80 @@ mod tcp;
 mod udp;
 
 use bytes::Bytes;
-use keeper::Keeper;
+use keeper::PortKeeper;
 use scenecast_core::PortAddress;
 use std::io;
 use std::time::Duration;
 use tokio::sync::mpsc;
 
-/// What a port is told.
+/// A request to a port.
 #[derive(Debug)]
 enum ToPort {
-    /// Write this.
     Bytes(Bytes),
-    /// Close and open again: nobody answers.
+    /// Close and open again, for the device does not answer.
     Reopen,
 }
 
-/// What a port tells.
+/// A report of a port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FromPort {
-    /// It is open.
     Open,
-    /// It is closed, and being opened again.
+    /// The port is closed and will be opened again.
     Closed,
-    /// This was read.
     Bytes(Bytes),
 }
 
-/// A port and the way to it.
+/// The host's side of a port.
 #[derive(Debug)]
 pub struct Port {
     to: mpsc::Sender<ToPort>,
     from: mpsc::Receiver<FromPort>,
 }
 
-/// The far side of a [`Port`].
-struct Ends {
+/// The task's side of a [`Port`].
+struct PortEnds {
     to: mpsc::Receiver<ToPort>,
     from: mpsc::Sender<FromPort>,
 }
 
 impl Port {
-    /// Opens it now; one that fails later is opened again by itself. `name` is for the log.
+    /// Opens the port now. If it fails later, it is opened again. `name` appears in the log.
     ///
     /// # Errors
-    /// Why it cannot be opened. A peer that does not take a connection yet is waited for instead.
+    /// The port cannot be opened. A TCP peer that refuses the connection is no error: it is tried again.
     pub async fn open(name: &'static str, place: PortAddress) -> io::Result<Self> {
         let first = match &place {
             PortAddress::Connect(_) => None,
             there => Some(keeper::open(there).await?),
         };
         let (port, ends) = Self::pair();
-        tokio::spawn(Keeper { name, place, quiet: None, ends }.run(first));
+        tokio::spawn(PortKeeper { name, place, quiet: None, ends }.run(first));
         Ok(port)
     }
 
-    /// Opens it as soon as it is there, and again for ever. An instrument that says nothing for `quiet` counts as gone, where
-    /// that is given: an unplugged adapter or a half-open connection may never tell.
+    /// Opens the port as soon as it exists, and again after each failure. If `quiet` is given, a port that is silent
+    /// for this time is opened again: an unplugged adapter or a half-open connection may never report an error.
     pub fn open_when_there(name: &'static str, place: PortAddress, quiet: Option<Duration>) -> Self {
         let (port, ends) = Self::pair();
-        tokio::spawn(Keeper { name, place, quiet, ends }.run(None));
+        tokio::spawn(PortKeeper { name, place, quiet, ends }.run(None));
         port
     }
 
-    fn pair() -> (Self, Ends) {
+    fn pair() -> (Self, PortEnds) {
         let (to, to_port) = mpsc::channel(64);
         let (from_port, from) = mpsc::channel(64);
-        (Self { to, from }, Ends { to: to_port, from: from_port })
+        (Self { to, from }, PortEnds { to: to_port, from: from_port })
     }
 
-    /// The next thing that it tells; safe to abandon.
+    /// The next report of the port. Cancel-safe.
     pub async fn next(&mut self) -> FromPort {
         match self.from.recv().await {
-            Some(told) => told,
+            Some(report) => report,
             None => std::future::pending().await,
         }
     }
 
-    /// What an optional port reports next; never without one. Safe to abandon.
+    /// The next report of an optional port; `None` never returns. Cancel-safe.
     pub async fn next_of(port: &mut Option<Self>) -> FromPort {
         match port {
             Some(port) => port.next().await,
@@ -90,31 +87,31 @@ impl Port {
         }
     }
 
-    /// Writes bytes; says whether the port took them. What it does not take is stale by the time that it would.
+    /// Writes bytes and returns whether the port accepted them. Do not repeat refused bytes: they would be stale.
     pub fn write(&self, bytes: Vec<u8>) -> bool {
         self.to.try_send(ToPort::Bytes(bytes.into())).is_ok()
     }
 
-    /// Closes it and opens it again.
+    /// Closes the port and opens it again.
     pub fn reopen(&self) {
         let _ = self.to.try_send(ToPort::Reopen);
     }
 }
 
-impl Ends {
-    /// The port has been opened: what waited while it was not is stale. Says whether the host is still there.
-    async fn tell_open(&mut self) -> bool {
+impl PortEnds {
+    /// Reports an opened port and drops the stale bytes that waited for it. Returns whether the host is still there.
+    async fn report_open(&mut self) -> bool {
         while self.to.try_recv().is_ok() {}
         self.from.send(FromPort::Open).await.is_ok()
     }
 
-    /// Says whether the host is still there.
-    async fn tell(&self, told: FromPort) -> bool {
-        self.from.send(told).await.is_ok()
+    /// Sends a report; returns whether the host is still there.
+    async fn report(&self, report: FromPort) -> bool {
+        self.from.send(report).await.is_ok()
     }
 }
 
-/// Bytes of a buffer that were just read.
+/// A report of the first `n` bytes of a buffer.
 fn read(buffer: &[u8], n: usize) -> FromPort {
     FromPort::Bytes(Bytes::copy_from_slice(buffer.get(..n).unwrap_or_default()))
 }

@@ -1,21 +1,21 @@
-//! Connections that others make.
+//! TCP ports that wait for the other side to connect.
 
 use super::carry::carry;
-use super::{Ends, FromPort};
+use super::{FromPort, PortEnds};
 use std::io;
 use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 
-/// After the system refused to accept one.
-const PAUSE: Duration = Duration::from_millis(200);
+/// Pause after the system refused to accept a connection.
+const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Serves one connection at a time, until the host is gone. A new one replaces the old, which may be the remains of a peer
-/// that lost power.
+/// Serves one connection at a time until the host is gone. A new connection replaces the old one, whose peer
+/// may have lost its power.
 pub(super) async fn accept(
     name: &'static str,
     listener: TcpListener,
     quiet: Option<Duration>,
-    ends: &mut Ends,
+    ends: &mut PortEnds,
 ) -> io::Result<()> {
     let mut next = None;
     loop {
@@ -30,7 +30,7 @@ pub(super) async fn accept(
             Ok(accepted) => accepted,
             Err(e) => {
                 tracing::warn!("{name}: {e}");
-                tokio::time::sleep(PAUSE).await;
+                tokio::time::sleep(RETRY_INTERVAL).await;
                 continue;
             }
         };
@@ -42,14 +42,14 @@ pub(super) async fn accept(
     }
 }
 
-/// Carries bytes over one connection; says whether the host is gone.
-async fn serve(name: &'static str, stream: TcpStream, quiet: Option<Duration>, ends: &mut Ends) -> bool {
+/// Carries bytes over one connection; returns whether the host is gone.
+async fn serve(name: &'static str, stream: TcpStream, quiet: Option<Duration>, ends: &mut PortEnds) -> bool {
     let _ = stream.set_nodelay(true);
     match carry(stream, quiet, ends).await {
         Ok(()) => true,
         Err(e) => {
             tracing::warn!("{name}: the connection ended: {e}");
-            !ends.tell(FromPort::Closed).await
+            !ends.report(FromPort::Closed).await
         }
     }
 }

@@ -1,17 +1,17 @@
-//! Datagrams, one a frame: for benches, radio links and autopilots.
+//! Datagrams with one frame each, for benches, radio links and autopilots.
 
 use super::carry::{reopening, silence};
-use super::{Ends, ToPort, read};
+use super::{PortEnds, ToPort, read};
 use std::io;
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::net::UdpSocket;
 use tokio::time::Instant;
 
-/// The largest datagram that is read.
-const LARGEST: usize = 2048;
-/// After the system told of an error.
-const PAUSE: Duration = Duration::from_millis(200);
+/// Maximum length of a datagram, bytes.
+const MAX_DATAGRAM_BYTES: usize = 2048;
+/// Pause after an error of the system.
+const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 
 /// A socket at `own`, or anywhere if that is empty, and the address of `remote`, if it is not.
 pub(super) async fn open(own: &str, remote: &str) -> io::Result<(UdpSocket, Option<SocketAddr>)> {
@@ -29,26 +29,27 @@ pub(super) async fn open(own: &str, remote: &str) -> io::Result<(UdpSocket, Opti
     Ok((UdpSocket::bind(own).await.map_err(wrong)?, remote))
 }
 
-/// Carries datagrams to `fixed`, or to whoever was heard last. Nobody connects, so it is always open.
+/// Carries datagrams to `fixed`, or else to the sender of the last one. A socket has no connection,
+/// so it is always open.
 pub(super) async fn carry(
     socket: UdpSocket,
     fixed: Option<SocketAddr>,
     quiet: Option<Duration>,
-    ends: &mut Ends,
+    ends: &mut PortEnds,
 ) -> io::Result<()> {
-    if !ends.tell_open().await {
+    if !ends.report_open().await {
         return Ok(());
     }
     let mut peer = fixed;
-    let mut buffer = [0; LARGEST];
-    let mut heard = Instant::now();
+    let mut buffer = [0; MAX_DATAGRAM_BYTES];
+    let mut last_read = Instant::now();
     loop {
         tokio::select! {
             order = ends.to.recv() => match (order, peer) {
                 (None, _) => return Ok(()),
                 (Some(ToPort::Reopen), _) => return Err(reopening()),
                 (Some(ToPort::Bytes(bytes)), Some(peer)) => {
-                    // A peer that is not there yet refuses; it may come.
+                    // A peer that is not running yet refuses datagrams; it may start later.
                     if let Err(e) = socket.send_to(&bytes, peer).await {
                         tracing::debug!("{peer}: {e}");
                     }
@@ -57,15 +58,15 @@ pub(super) async fn carry(
             },
             received = socket.recv_from(&mut buffer) => match received {
                 Ok((n, from)) => {
-                    (peer, heard) = (fixed.or(Some(from)), Instant::now());
-                    if !ends.tell(read(&buffer, n)).await {
+                    (peer, last_read) = (fixed.or(Some(from)), Instant::now());
+                    if !ends.report(read(&buffer, n)).await {
                         return Ok(());
                     }
                 }
-                // A peer that is not there yet: the system tells so by an error of the next call.
-                Err(_) => tokio::time::sleep(PAUSE).await,
+                // The refusal of a peer that is not running yet is returned as an error of this call.
+                Err(_) => tokio::time::sleep(RETRY_INTERVAL).await,
             },
-            e = silence(heard, quiet) => return Err(e),
+            e = silence(last_read, quiet) => return Err(e),
         }
     }
 }

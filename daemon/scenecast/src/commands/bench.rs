@@ -1,45 +1,45 @@
 //! `scenecast bench`
 
 use super::bench_exemplar::ExemplarBench;
-use super::bench_link::Link;
+use super::bench_link::LinkBench;
 use super::bench_localisation::LocalisationBench;
-use super::bench_modem::Modem;
-use super::bench_planning::Planning;
+use super::bench_modem::ModemBench;
+use super::bench_planning::PlanningBench;
 use super::sim::WorldArguments;
 use clap::{Args, Subcommand};
 use scenecast_core::UserError;
 use scenecast_rehearsal::{FidelityRow, fidelity};
 
-/// Measurements.
+/// Reproducible measurements of the parts of scenecast.
 #[derive(Debug, Subcommand)]
-pub(super) enum Bench {
-    /// Images of labels: seconds from the order under full load, bytes for a likeness of 0.9.
+pub(super) enum BenchCommand {
+    /// Exemplars: seconds from the order to the image under full load, bytes for a similarity of 0.9.
     Exemplar(ExemplarBench),
     /// The operator's map at 100, 250, 1000 and 10 000 bit/s: our stream against whole PNGs.
     Fidelity(Fidelity),
     /// The link over range, frame size and loss: efficiency, latency of directives, convergence.
-    Link(Link),
+    Link(LinkBench),
     /// The vehicle's position over 3 km: dead reckoning, with the relay, with outliers.
     Localisation(LocalisationBench),
     /// Drivers and emulated modems: throughput, latency of directives, surveys through slow modems.
-    Modem(Modem),
-    /// Planners against each other: utility collected a metre.
-    Planning(Planning),
+    Modem(ModemBench),
+    /// The planners: utility collected per metre.
+    Planning(PlanningBench),
 }
 
-/// The same mission at four bit budgets with 10 % loss, for our stream and for "send the whole PNG again whenever it
-/// changed", with the same frames, acknowledgements, repair and turns.
+/// The same mission at four bit budgets with 10 % loss, once with our stream and once with a baseline that sends the
+/// whole PNG again after each change. Frames, acknowledgements, repair and turns are the same.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench fidelity --seed 3")]
 pub(super) struct Fidelity {
-    /// Print JSON
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     world: WorldArguments,
 }
 
-impl Bench {
+impl BenchCommand {
     pub(super) fn run(self) -> Result<(), UserError> {
         match self {
             Self::Exemplar(e) => e.run(),
@@ -54,7 +54,7 @@ impl Bench {
 
 impl Fidelity {
     fn run(mut self) -> Result<(), UserError> {
-        // What the rows have in common unless it is set otherwise: small frames suit small budgets.
+        // Defaults of all rows, which the user's own settings override: small frames suit small budgets.
         let defaults = ["channel.loss=0.1", "link.frame_bytes=64"].map(str::to_owned);
         self.world.sets.splice(0..0, defaults);
         let config = self.world.config()?;

@@ -2,33 +2,35 @@
 
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_rehearsal::exemplar_bench::{Arrivals, Bytes, Setting, Source, Spread, arrivals, photos, sizes};
+use scenecast_rehearsal::exemplar_bench::{
+    ArrivalSetting, Arrivals, Bytes, PatchSource, Spread, arrivals, photos, sizes,
+};
 use scenecast_tools::Progress;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Procedural reefs where no photos are given.
+/// Number of procedural reefs if no photos are given.
 const REEFS: u64 = 6;
 
-/// How long an image of a label takes from the order to the last bit at 10 kbit/s, with 10 % of the frames lost, while the map
-/// takes all that it can get; and how many bytes an image needs to look like its patch: structural similarity (Wang et al.
-/// 2004: luma, Gaussian window of 11 x 11 pixels) of at least 0.9.
+/// The time from the order of an exemplar to its last bit at 10 kbit/s, with 10 % of the frames lost, while the map
+/// uses all spare capacity; and the bytes that an image needs for a structural similarity of at least 0.9 with its
+/// patch (Wang et al. 2004: luma, Gaussian window of 11 x 11 pixels).
 ///
-/// Patches are those that the vehicle picks on a flight over procedural reefs, or over photos at a centimetre a pixel. Takes a
-/// minute or two; the same seed gives the same figures.
+/// The patches are those that the vehicle picks on a flight over procedural reefs, or over photos at a centimetre a
+/// pixel. It takes a minute or two; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench exemplar --images photos --images more-photos")]
 pub(super) struct ExemplarBench {
-    /// Print JSON
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder of photos of the sea floor, .jpg or .png; can be given several times [default: procedural reefs]
+    /// Folder of photos of the sea floor, .jpg or .png; may be repeated [default: procedural reefs]
     #[arg(long, value_name = "DIR")]
     images: Vec<PathBuf>,
-    /// Images to ask for in each row
+    /// Number of images to request in each row
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     requests: u32,
 }
@@ -36,21 +38,21 @@ pub(super) struct ExemplarBench {
 impl ExemplarBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let sources = match self.images.as_slice() {
-            [] => (0..REEFS).map(|i| Source::Reef(self.seed + i)).collect(),
+            [] => (0..REEFS).map(|i| PatchSource::Reef(self.seed + i)).collect(),
             dirs => dirs.iter().map(|dir| photos(dir)).collect::<Result<Vec<_>, _>>()?.concat(),
         };
-        let mut progress = Progress::new("pictures");
+        let mut progress = Progress::new("images");
         let (bytes, patches) = sizes(&sources, self.seed, &mut |share| progress.show(share))?;
         drop(progress);
         if patches.is_empty() {
             return Err(UserError::Failed("no label held long enough to have an image".to_owned()));
         }
         let requests = self.requests as usize;
-        let full = Setting { requests, loss: 0.1, loaded: true, larger: false };
+        let full = ArrivalSetting { requests, loss: 0.1, loaded: true, larger: false };
         let settings = [
             ("full load", full),
-            ("full load, larger", Setting { larger: true, ..full }),
-            ("idle", Setting { loaded: false, ..full }),
+            ("full load, larger", ArrivalSetting { larger: true, ..full }),
+            ("idle", ArrivalSetting { loaded: false, ..full }),
         ];
         let mut rows: Vec<(&str, Arrivals)> = Vec::new();
         let mut progress = Progress::new("requests");
@@ -72,11 +74,11 @@ impl ExemplarBench {
 
 fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
     println!("10 kbit/s, 10 % of the frames lost. Seconds from the order to the image:");
-    println!("row                  asked  came   median     p95     max  in 30 s  bytes median  vehicle bit/s");
+    println!("row                  requested arrived   median     p95     max  in 30 s  bytes median  vehicle bit/s");
     for (name, a) in rows {
         let s = a.seconds.map_or([0.0; 3], in_order);
         println!(
-            "{name:<20} {:>5} {:>5} {:>8.1} {:>7.1} {:>7.1} {:>7.1}% {:>13.0} {:>14.0}",
+            "{name:<20} {:>9} {:>7} {:>8.1} {:>7.1} {:>7.1} {:>7.1}% {:>13.0} {:>14.0}",
             a.requested,
             a.arrived,
             s[0],
@@ -90,7 +92,7 @@ fn print(rows: &[(&str, Arrivals)], bytes: &Bytes) {
     println!();
     println!("Bytes of the patches that the vehicle picked, from {} sources:", bytes.sources);
     println!(
-        "edge  patches  fewest at SSIM 0.9: median    p95    max  sent: median    p95    max  at 0.9  SSIM median  least"
+        "edge  patches  fewest at SSIM 0.9: median    p95    max  sent: median    p95    max  at 0.9  SSIM median    min"
     );
     for s in &bytes.sizes {
         let sent = s.sent.map_or([0.0; 3], in_order);

@@ -2,23 +2,23 @@
 
 use clap::Args;
 use scenecast_core::UserError;
-use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkTable, RangingRow, Row, link_table, measure_speed};
+use scenecast_rehearsal::link_bench::{BudgetRow, FleetRow, LinkRow, LinkTable, RangingRow, link_table, measure_speed};
 use scenecast_tools::Progress;
 
-/// The link in virtual time with opaque payload of which there is always more: 10 kbit/s half duplex, 0.2 s turn-around,
-/// turns granted by the surface. Takes less than a minute; the same seed gives the same table.
+/// The link in virtual time under saturating opaque payload: 10 kbit/s half duplex, 0.2 s turn-around, turns granted by
+/// the surface. It takes less than a minute; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench link --seed 3 --json")]
-pub(super) struct Link {
-    /// Print JSON, without the figures of this machine
+pub(super) struct LinkBench {
+    /// Print JSON, without the speed of this machine
     #[arg(long)]
     json: bool,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
-impl Link {
+impl LinkBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("link");
         let table = link_table(self.seed, &mut |share| progress.show(share)).map_err(failed)?;
@@ -61,7 +61,7 @@ fn print_table(table: &LinkTable) {
     print_fleet(&table.fleet);
 }
 
-fn print_row(r: &Row) {
+fn print_row(r: &LinkRow) {
     println!(
         "{:>5} {:>5} {:<11} {:>4.0} {:>6.3} {:>6.1} {:>6.1} {:>6.1} {:>8.1} {:>7.2} {:>7.2} {:>6}",
         r.range_km,
@@ -120,7 +120,7 @@ fn print_speed() {
     println!();
     println!(
         "This machine, one core: {:.0} frames/s of 64 bytes and {:.0} of 256, both ends; a saturated hour of 64-byte frames, \
-         water included, in {:.2} s.",
+         channel included, in {:.2} s.",
         speed.small_frames_per_s, speed.frames_per_s, speed.hour_s
     );
 }

@@ -3,26 +3,26 @@
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_rehearsal::{Localisation, fly_with_outliers, localisation, picture};
+use scenecast_rehearsal::{Localisation, localisation, localisation_plot, run_with_outliers};
 use scenecast_tools::Progress;
 use std::path::PathBuf;
 
-/// How far off the vehicle's position is over 3 km, with a drift of 1 % of the way: by dead reckoning alone, with a fix
-/// each 10 s of which 10 % are lost, and with 10 % of the fixes outliers: echoes at the USBL head, a GPS led astray, fixes
-/// that nothing at the surface shows to be wrong. Takes some seconds; the same seed gives the same figures.
+/// The error of the vehicle's position over 3 km, with a drift of 1 % of the distance: by dead reckoning alone, with a
+/// fix each 10 s of which 10 % are lost, and with 10 % outliers among the fixes: echoes at the USBL head, a faulty GPS,
+/// and errors that the surface cannot detect. It takes some seconds; the same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench localisation --seed 3 --out tracks")]
 pub(super) struct LocalisationBench {
-    /// Print JSON
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Seed of the first way
+    /// Seed of the first track, any whole number
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Ways, each with the seed after that of the one before
+    /// Number of tracks; each has the seed after that of the one before
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Draw the first way with outliers as DIR/localisation.svg
+    /// Draw the first track with outliers as DIR/localisation.svg
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -34,10 +34,12 @@ impl LocalisationBench {
         drop(progress);
         if let Some(dir) = &self.out {
             std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
-            let (tracks, _) = fly_with_outliers(self.seed, 0.1);
-            let title =
-                format!("3 km, drift 1 % of the way, a fix each 10 s, 10 % lost, 10 % outliers; seed {}", self.seed);
-            write_whole(&dir.join("localisation.svg"), picture(&tracks, &title).as_bytes())?;
+            let (tracks, _) = run_with_outliers(self.seed, 0.1);
+            let title = format!(
+                "3 km, drift 1 % of the distance, a fix each 10 s, 10 % lost, 10 % outliers; seed {}",
+                self.seed
+            );
+            write_whole(&dir.join("localisation.svg"), localisation_plot(&tracks, &title).as_bytes())?;
         }
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(|e| UserError::Failed(e.to_string()))?;
@@ -80,6 +82,6 @@ fn print(found: &Localisation) {
         mean("with_outliers"),
         found.outlier_ratio
     );
-    let said = if found.reached { "reached" } else { "NOT reached" };
-    println!("Allowed: a ratio of 1/3 with the relay, of 1.2 with outliers: {said}.");
+    let verdict = if found.reached { "reached" } else { "NOT reached" };
+    println!("Allowed: a ratio of 1/3 with the relay, of 1.2 with outliers: {verdict}.");
 }

@@ -5,21 +5,21 @@ use scenecast_core::UserError;
 use scenecast_rehearsal::modem_bench::{ModemTable, modem_table};
 use scenecast_tools::Progress;
 
-/// Both ends' drivers at emulated modems, 1 km and 10 % loss, in virtual time: what an S2C in burst mode carries for the
-/// link and for a host that only keeps its pool full, how long directives take meanwhile, and surveys of 20 minutes
-/// through slow modems. The same seed gives the same figures.
+/// Both ends' drivers at emulated modems, 1 km and 10 % loss, in virtual time: the throughput of an S2C in burst mode
+/// for the link and for a host that only keeps its pool full, the latency of directives meanwhile, and surveys of 20
+/// minutes through slow modems. The same seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench modem --seed 3 --json")]
-pub(super) struct Modem {
-    /// Print JSON
+pub(super) struct ModemBench {
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
 
-impl Modem {
+impl ModemBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let mut progress = Progress::new("modems");
         let table = modem_table(self.seed, &mut |share| progress.show(share))?;
@@ -43,7 +43,7 @@ fn print_table(table: &ModemTable) {
         "  directive       {:>7.1} s median, {:.1} s p95, issue to applied, bulk queue full",
         b.directive_median_s, b.directive_p95_s
     );
-    println!("  budget used     {:>7.3} in the worst window", b.budget_use);
+    println!("  budget used     {:>7.3} in the fullest window", b.budget_use);
     println!();
     println!("survey through                 agreement mean   final  drain s");
     for row in &table.surveys {

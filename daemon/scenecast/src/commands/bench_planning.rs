@@ -3,34 +3,36 @@
 use clap::Args;
 use scenecast_core::UserError;
 use scenecast_files::write_whole;
-use scenecast_rehearsal::planning_bench::{Trial, annotated_images, drive_all, picture};
+use scenecast_rehearsal::planning_bench::{Trial, annotated_images, plot, run_all};
 use scenecast_tools::Progress;
 use std::path::PathBuf;
 
-/// Utility collected a metre by each planner, with a fence, keep-outs and 40 % of the distance that full coverage takes.
+/// Utility that each planner collects per metre, with a fence, keep-outs and 40 % of the
+/// distance that full coverage takes.
 ///
-/// Label maps are those of the scene model, on procedural reefs and on annotated images; the operator favours one class
-/// through the labels that cover it. A map is seen bit by bit. The unit is what a metre
-/// brings where all in sight is new, on the mean of the scene. `told all` is what `horizon` would collect if it knew the whole
-/// map before it starts, about the most that the limit allows. Takes a few minutes; the same seed gives the same table.
+/// The label maps are made by the scene model from procedural reefs and annotated images; the operator favours
+/// one class through the labels that cover it. The planner learns the map cell by cell. The unit is the scene's
+/// mean utility of a metre on which every cell in view is new. `known map` is the result of `horizon` if it knows
+/// the whole map before it starts, close to the maximum that the limit allows. It takes a few minutes; the same
+/// seed gives the same table.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast bench planning --seed 3 --out tracks")]
-pub(super) struct Planning {
-    /// Print JSON
+pub(super) struct PlanningBench {
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder of images NAME.jpg with classes in NAME_label.png; skipped if it is not there
+    /// Folder of images NAME.jpg with classes in NAME_label.png; skipped if it does not exist
     #[arg(long, value_name = "DIR", default_value = "../shared/data/eilatmixx")]
     scenes: PathBuf,
-    /// Folder for a picture of the tracks of each trial
+    /// Folder for an image of the tracks of each trial
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
-impl Planning {
+impl PlanningBench {
     pub(super) fn run(self) -> Result<(), UserError> {
         let images = annotated_images(&self.scenes);
         if images.is_empty() {
@@ -41,11 +43,11 @@ impl Planning {
         }
         if !self.json {
             println!(
-                "scene             lawnmower   greedy  horizon  told all  horizon/lawnmower  horizon/greedy  violations"
+                "scene             lawnmower   greedy  horizon known map  horizon/lawnmower  horizon/greedy  violations"
             );
         }
         let mut progress = Progress::new("planning");
-        let table = drive_all(self.seed, &images, &mut |share, trial| {
+        let table = run_all(self.seed, &images, &mut |share, trial| {
             progress.show(share);
             if !self.json {
                 print_trial(trial);
@@ -71,7 +73,7 @@ impl Planning {
 
     fn paint(&self, trial: &Trial) -> Result<(), UserError> {
         let Some(dir) = &self.out else { return Ok(()) };
-        let png = picture(trial).map_err(|e| UserError::Failed(e.to_string()))?;
+        let png = plot(trial).map_err(|e| UserError::Failed(e.to_string()))?;
         write_whole(&dir.join(format!("{}.png", trial.name)), &png)
     }
 }

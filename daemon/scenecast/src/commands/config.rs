@@ -5,10 +5,10 @@ use scenecast_core::UserError;
 use std::path::PathBuf;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Role {
-    /// Keys of the vehicle
+enum ReaderRole {
+    /// Keys of the vehicle's process
     Auv,
-    /// Keys of the surface
+    /// Keys of the surface's process
     Asv,
     /// Keys of rehearsals: sim and demo
     Scenario,
@@ -22,7 +22,7 @@ enum Role {
 pub(super) struct ConfigCommand {
     /// Process that reads the file
     #[arg(long, value_enum, default_value = "scenario")]
-    role: Role,
+    role: ReaderRole,
     /// Print the reference of all keys, as Markdown
     #[arg(long, conflicts_with_all = ["role", "schema"])]
     reference: bool,
@@ -37,11 +37,11 @@ pub(super) struct ConfigCommand {
 enum Action {
     /// Rewrite a configuration file that has old names of keys.
     ///
-    /// Comments, order and values stay. Lists by position, such as shares, become tables. Each change is printed. The file
-    /// is replaced whole or not at all, and a file without old names is not touched.
+    /// Comments, order and values stay. Lists by position, such as shares, become tables. Each change is printed. The
+    /// file is replaced whole or not at all, and a file without old names is not touched.
     #[command(after_help = "Example: scenecast config migrate auv.toml")]
     Migrate {
-        /// Configuration file
+        /// Configuration file to rewrite in place
         #[arg(value_name = "FILE")]
         file: PathBuf,
     },
@@ -59,12 +59,12 @@ impl ConfigCommand {
     }
 }
 
-impl From<Role> for scenecast_config::Role {
-    fn from(role: Role) -> Self {
+impl From<ReaderRole> for scenecast_config::Role {
+    fn from(role: ReaderRole) -> Self {
         match role {
-            Role::Auv => Self::Auv,
-            Role::Asv => Self::Asv,
-            Role::Scenario => Self::Scenario,
+            ReaderRole::Auv => Self::Auv,
+            ReaderRole::Asv => Self::Asv,
+            ReaderRole::Scenario => Self::Scenario,
         }
     }
 }

@@ -12,7 +12,7 @@ pub(super) struct Demo {
     /// Port of the operator's page on 127.0.0.1
     #[arg(long, default_value_t = 8460)]
     port: u16,
-    /// Mission seconds per second
+    /// Mission seconds per second of wall time
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
     /// Do not serve the page

@@ -28,7 +28,7 @@ pub(super) struct New {
     out: PathBuf,
 }
 
-/// Write a new random token to a new file that only its owner may read. Whoever has it may give orders.
+/// Write a new random token to a new file that only its owner may read. Its holders may give orders.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key token --out console.token")]
 pub(super) struct Token {
@@ -41,7 +41,7 @@ pub(super) struct Token {
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key show mission.key")]
 pub(super) struct Show {
-    /// Key file
+    /// Key file of the mission
     #[arg(value_name = "FILE")]
     file: PathBuf,
 }
@@ -88,7 +88,7 @@ fn random_token() -> Result<Zeroizing<String>, UserError> {
     Ok(Zeroizing::new(format!("{:032x}\n", u128::from_be_bytes(*bytes))))
 }
 
-/// Writes a secret to a file that does not exist yet, readable by its owner alone; leaves no half file.
+/// Writes a secret to a file that does not exist yet, readable by its owner alone; an interrupted write leaves no file.
 fn write_new(path: &Path, text: &str) -> Result<(), UserError> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_key_is_its_owners_alone_and_is_read_again() {
+    fn a_new_key_is_readable_by_its_owner_only() {
         let (path, key) = (fresh("new"), random_key().unwrap());
         write_new(&path, &key.to_text()).unwrap();
         let (read, warning) = scenecast_config::read_key(&path).unwrap();

@@ -47,7 +47,7 @@ enum Command {
     #[cfg(feature = "rehearsal")]
     /// Run a simulated mission in virtual time, and write a report.
     Sim(sim::Sim),
-    /// Run the vehicle.
+    /// Run the vehicle: mapping, planning and the link.
     Auv(node::Node),
     #[cfg(feature = "surface")]
     /// Run the surface, with the operator's map and page.
@@ -59,9 +59,9 @@ enum Command {
     /// Emulate modems in one channel, each on a serial device or a TCP port of its own.
     ModemSim(modem_sim::ModemSim),
     #[cfg(feature = "rehearsal")]
-    /// Measure the link, the modems, planners, localisation and images.
+    /// Measure the link, the modems, planners, localisation and exemplars.
     #[command(subcommand)]
-    Bench(bench::Bench),
+    Bench(bench::BenchCommand),
     /// Make or show a mission key, or make a token for the operator's page.
     #[command(subcommand)]
     Key(key::Key),
@@ -84,7 +84,7 @@ enum Command {
     Config(config::ConfigCommand),
 }
 
-/// Carries out a command.
+/// Runs the command that was parsed; an error has its exit code.
 pub fn run(arguments: Arguments) -> Result<(), UserError> {
     match arguments.command {
         #[cfg(feature = "rehearsal")]

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 /// Emulate modems in one channel, each on a serial device or a TCP port of its own.
 ///
-/// Prints one line for each modem: its name, its device or TCP address, and its link. It reads commands from the standard
-/// input, such as "fault auv reboot" or "move auv 500 0 20"; "help" lists them. Ctrl-C ends it.
+/// Prints one line for each modem: its name, its device or TCP address, and its link. It reads commands from the
+/// standard input, such as "fault auv reboot" or "move auv 500 0 20"; "help" lists them. Ctrl-C ends it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast modem-sim --scenario config/scenarios/modems-s2c-1km.toml --link-dir /tmp/modems, then open /tmp/modems/auv at 19200 baud"

@@ -10,7 +10,7 @@ use std::path::PathBuf;
     after_help = "Example: scenecast asv --config config/asv.toml, and in another terminal: scenecast auv --config config/auv.toml"
 )]
 pub(super) struct Node {
-    /// Configuration file
+    /// Configuration file of this process
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
     /// Set a key of the configuration, as in link.budget_bps=2000

@@ -36,7 +36,7 @@ pub(super) struct WorldArguments {
 }
 
 impl WorldArguments {
-    /// The configuration, all arguments applied.
+    /// The configuration with all arguments applied.
     pub fn config(&self) -> Result<Config, UserError> {
         let mut sets = self.sets.clone();
         sets.extend(self.metres_per_pixel.map(|m| format!("camera.metres_per_pixel={m:?}")));
@@ -50,7 +50,7 @@ impl WorldArguments {
         Ok(config)
     }
 
-    /// The sea floor.
+    /// The sea floor: the given image or a procedural reef.
     pub fn world(&self, config: &Config) -> Result<World, UserError> {
         match &self.mosaic {
             Some(mosaic) => World::from_files(mosaic, self.annotations.as_deref(), config.camera.metres_per_pixel),
@@ -78,7 +78,7 @@ pub(super) struct Sim {
     /// Record the camera frames and poses into a folder, for camera.source=frames:DIR
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
-    /// Longest time in seconds for the link to send the rest after the survey
+    /// Maximum time in seconds for the link to send the rest after the survey
     #[arg(long, value_name = "SECONDS", default_value_t = 7200.0, allow_negative_numbers = true)]
     drain: f64,
     /// Folder for report.json, maps, images and frames.log
@@ -103,12 +103,12 @@ impl Sim {
         let seconds = started.elapsed().as_secs_f64();
         let speedup = mission.now().as_secs_f64() / seconds;
         write_outputs(&mission, &report, json!({ "seconds": seconds, "speedup": speedup }), &self.out)?;
-        let map = &report.figures["map"];
+        let map = &report.json["map"];
         println!(
             "{}: {} cells, {} labels, agreement {} at the end, {} on the mean, {seconds:.1} s",
             self.out.join("report.json").display(),
-            report.figures["scene"]["cells"],
-            report.figures["scene"]["labels"],
+            report.json["scene"]["cells"],
+            report.json["scene"]["labels"],
             map["agreement_final"],
             map["agreement_mean"],
         );

@@ -19,10 +19,10 @@ pub enum Vocabulary {
 
 /// Train a vocabulary on a folder of images
 ///
-/// A vocabulary holds the typical tones and the spread of colours and textures, to which visual words are related. Use images
-/// of a similar site, with the same camera and light. Words then have the same meaning in every mission from its first frame.
-/// The built-in vocabulary adapts to the first frames of each mission instead. Set scene.vocabulary of the vehicle to the
-/// file, or use scenecast scene run --vocabulary. Images named *_label are skipped.
+/// A vocabulary holds the typical tones and the spread of colours and textures, to which visual words are related. Use
+/// images of a similar site, with the same camera and light. Words then have the same meaning in every mission from its
+/// first frame. The built-in vocabulary adapts to the first frames of each mission instead. Set scene.vocabulary of the
+/// vehicle to the file, or use scenecast scene run --vocabulary. Images named *_label are skipped.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast vocabulary train --images last-dive --out reef.vocabulary")]
 pub struct Train {
@@ -32,7 +32,7 @@ pub struct Train {
     /// Edge of a map cell in pixels of the images
     #[arg(long, value_name = "PIXELS", default_value_t = 25.0, allow_negative_numbers = true)]
     cell_px: f32,
-    /// File to write
+    /// Vocabulary file to write, replaced if it exists
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
@@ -51,20 +51,20 @@ impl Train {
             return Err(UserError::Input(format!("--cell-px {}: it takes 4 to 1000 pixels", self.cell_px)));
         }
         let files = images_of(&self.images)?;
-        let problem = RefCell::new(None);
+        let error = RefCell::new(None);
         let progress = RefCell::new((Progress::new("vocabulary"), 0));
         let read = |file: &PathBuf| {
             let (shown, count) = &mut *progress.borrow_mut();
             *count += 1;
             shown.show(f64::from(*count) / (2 * files.len()) as f64);
             let image = read_usable(file, self.cell_px);
-            image.map_err(|e| *problem.borrow_mut() = Some(e)).ok().map(|image| (image, self.cell_px))
+            image.map_err(|e| *error.borrow_mut() = Some(e)).ok().map(|image| (image, self.cell_px))
         };
-        // The first image that cannot be read ends the work.
+        // The first unreadable image ends the training.
         let measures = train_vocabulary(&WordConfig::default(), || files.iter().map_while(read));
         drop(progress);
-        if let Some(problem) = problem.into_inner() {
-            return Err(problem);
+        if let Some(error) = error.into_inner() {
+            return Err(error);
         }
         let bytes = scene_model::vocabulary::save(&measures);
         write_whole(&self.out, &bytes)?;
@@ -83,7 +83,7 @@ fn read_usable(file: &Path, cell_px: f32) -> Result<RgbImage, UserError> {
     Ok(image)
 }
 
-/// The images of a folder by name.
+/// The images of a folder, sorted by name.
 fn images_of(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {

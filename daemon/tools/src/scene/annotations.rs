@@ -1,4 +1,4 @@
-//! Classes that somebody has given to places or pixels.
+//! Annotated classes of places or pixels.
 
 use super::lines::{Lines, number};
 use image::GrayImage;
@@ -7,20 +7,20 @@ use scenecast_files::read_classes;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Class that stands for "not annotated".
+/// Class value for "not annotated".
 const IGNORE: u8 = 255;
-/// Most different classes of places.
+/// Maximum number of different classes of places.
 const MAX_CLASSES: usize = 255;
 
-/// Annotations as they were read.
+/// Annotations in the form of their file.
 pub(crate) enum Annotated {
-    /// A class a pixel of the mosaic.
+    /// One class for each pixel of the mosaic.
     Pixels {
         classes: GrayImage,
-        /// Classes that do not count.
+        /// Classes that are left out of the score.
         ignore: Vec<u8>,
     },
-    /// A class at each place: x, y, z in metres.
+    /// One class for each place: x, y, z in metres.
     Places(Vec<([f64; 3], u8)>),
 }
 
@@ -47,7 +47,7 @@ impl Annotated {
                 continue;
             }
             let place = parse(line.text).map(|(at, class)| (at, class.to_owned()));
-            let (at, class) = place.map_err(|what| lines.problem(what))?;
+            let (at, class) = place.map_err(|error| lines.error(error))?;
             let is_ignored = |number: u8| number == IGNORE || ignore.contains(&number);
             if class.parse().is_ok_and(is_ignored) {
                 continue;
@@ -55,7 +55,7 @@ impl Annotated {
             let next = names.len();
             let index = *names.entry(class).or_insert(next);
             if index >= MAX_CLASSES {
-                return Err(lines.problem(format!("more than {MAX_CLASSES} different classes")));
+                return Err(lines.error(format!("more than {MAX_CLASSES} different classes")));
             }
             places.push((at, index as u8));
         }
@@ -90,16 +90,16 @@ mod tests {
     }
 
     #[test]
-    fn classes_are_numbers_or_names_and_some_do_not_count() {
+    fn classes_are_numbers_or_names_and_ignored_ones_are_left_out() {
         let places = read("good", "x,y,z,class\n1,2,3,sand\n0,0,0,255\n0,0,0,7\n4,5,6,3\n1,1,1,sand\n").unwrap();
         assert_eq!(places, [([1.0, 2.0, 3.0], 0), ([4.0, 5.0, 6.0], 1), ([1.0, 1.0, 1.0], 0)]);
     }
 
     #[test]
-    fn a_wrong_line_is_named() {
-        let said = |text: &str| read("bad", text).unwrap_err().to_string();
-        assert!(said("1,2,3,1\n1,2,3\n").contains(":2: class is missing"));
-        assert!(said("1,nan,3,1\n").contains(":1: y = nan"));
-        assert!(said("0,0,0,255\n").contains("nothing is annotated"));
+    fn a_wrong_line_is_refused_with_its_number() {
+        let refusal = |text: &str| read("bad", text).unwrap_err().to_string();
+        assert!(refusal("1,2,3,1\n1,2,3\n").contains(":2: class is missing"));
+        assert!(refusal("1,nan,3,1\n").contains(":1: y = nan"));
+        assert!(refusal("0,0,0,255\n").contains("nothing is annotated"));
     }
 }

@@ -1,13 +1,13 @@
-//! How far a map may reach: it is written as a picture.
+//! The bounds of a map, which is written as an image.
 
 use scene_model::topics::FlatCell;
 use scenecast_core::UserError;
 use scenecast_protocol::map::Rect;
 
-/// Most cells of the rectangle around a map.
+/// Maximum number of cells in the rectangle around a map.
 const MAX_CELLS: u64 = 1 << 26;
 
-/// The rectangle around cells from (west, south) to (east, north); a problem if it is too large for a picture.
+/// The rectangle around cells from (west, south) to (east, north); an error if it is too large for an image.
 pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<Rect, String> {
     let (width, height) = ((east - west + 1) as u64, (north - south + 1) as u64);
     if width.saturating_mul(height) > MAX_CELLS {
@@ -18,7 +18,7 @@ pub(super) fn rectangle(west: i64, south: i64, east: i64, north: i64) -> Result<
     Ok(Rect { x: west as i32, y: south as i32, width: width as u32, height: height as u32 })
 }
 
-/// The rectangle around a map; one cell if there is none.
+/// The rectangle around a map; one cell for an empty map.
 pub(super) fn around(map: &[FlatCell]) -> Result<Rect, UserError> {
     let Some(first) = map.first() else { return Ok(Rect { x: 0, y: 0, width: 1, height: 1 }) };
     let mut limits = (first.x, first.y, first.x, first.y);

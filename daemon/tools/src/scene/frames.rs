@@ -1,13 +1,13 @@
 //! Words of a recorded survey: images from above with their poses.
 
-use super::{Sighting, Source};
+use super::{Sighting, WordSource};
 use scene_model::project::{DownCamera, Pose};
 use scene_model::words::WordExtractor;
 use scenecast_core::UserError;
 use scenecast_files::Recording;
 use std::path::Path;
 
-/// The frames of a recording; those that cannot be read are counted and passed over.
+/// The frames of a recording; unreadable ones are counted and skipped.
 pub(crate) struct Frames {
     recording: Recording,
     extractor: WordExtractor,
@@ -29,15 +29,15 @@ impl Frames {
     }
 }
 
-impl Source for Frames {
+impl WordSource for Frames {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         while let Some(frame) = self.recording.frames.get(self.next) {
             self.next += 1;
             let done = self.next as f64 / self.recording.frames.len() as f64;
             let image = match frame.image() {
                 Ok(image) => image,
-                Err(problem) => {
-                    self.unreadable.push(problem.to_string());
+                Err(error) => {
+                    self.unreadable.push(error.to_string());
                     continue;
                 }
             };
@@ -59,6 +59,6 @@ impl Source for Frames {
 
     fn skipped(&self) -> Option<String> {
         let (count, all) = (self.unreadable.len(), self.recording.frames.len());
-        self.unreadable.first().map(|first| format!("{count} of {all} frames passed over, the first: {first}"))
+        self.unreadable.first().map(|first| format!("{count} of {all} frames skipped, the first: {first}"))
     }
 }

@@ -1,33 +1,33 @@
-//! A source is learnt from, in one go or as it comes in.
+//! A model learns from a source: in sweeps after all input, or online.
 
 use super::process::cpu_seconds;
-use super::{Sighting, Source};
+use super::{Sighting, WordSource};
 use scene_model::topics::{Inserted, SceneModel};
 use scenecast_core::UserError;
 use std::time::Instant;
 
-/// Longest time between two sightings that is refined for, seconds.
+/// Maximum time between two sightings for which the model refines, seconds.
 const MAX_GAP_S: f64 = 60.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Schedule {
-    /// All words, so many times, when everything was seen.
+    /// This many sweeps over all words after the whole input was read.
     Sweeps(u32),
-    /// So many words a second of the source's time, while it comes in.
+    /// This many words per second of the source's time, while the input is read.
     Online(f64),
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Effort {
+pub(crate) struct LearningEffort {
     pub(crate) resampled: u64,
     pub(crate) seconds: f64,
-    /// CPU time of resampling, all threads together.
+    /// CPU time of resampling, summed over all threads.
     pub(crate) cpu_seconds: f64,
-    /// Words that were not taken in.
+    /// Counts of words that the model accepted and skipped.
     pub(crate) skipped: Inserted,
 }
 
-impl Effort {
+impl LearningEffort {
     fn measure(&mut self, work: impl FnOnce() -> u64) -> u64 {
         let (began, cpu) = (Instant::now(), cpu_seconds());
         let done = work();
@@ -38,18 +38,19 @@ impl Effort {
     }
 }
 
-/// Has a model learn from a source; `progress` is told the share that is done.
+/// Lets a model learn from a source; `progress` is called with the share that is done, 0..=1.
 ///
-/// Online, the time from one sighting to the next is that of refining, and after the last one as long as on the mean.
+/// Online, the model refines for the time from one sighting to the next, and after the last one for
+/// the mean of these times.
 pub(crate) fn learn(
     model: &mut SceneModel,
-    source: &mut dyn Source,
+    source: &mut dyn WordSource,
     schedule: Schedule,
     progress: &mut dyn FnMut(f64),
-) -> Result<Effort, UserError> {
-    let mut effort = Effort::default();
+) -> Result<LearningEffort, UserError> {
+    let mut effort = LearningEffort::default();
     let (mut owed, mut last, mut gaps) = (0.0, None, (0.0, 0u64));
-    let mut refine = |model: &mut SceneModel, effort: &mut Effort, words: f64| {
+    let mut refine = |model: &mut SceneModel, effort: &mut LearningEffort, words: f64| {
         owed += words;
         if owed >= 1.0 {
             owed -= effort.measure(|| model.refine(owed as u64)) as f64;

@@ -1,4 +1,4 @@
-//! Text files, line by line, however long a line or a file is.
+//! Text files, read line by line with bounded memory.
 
 use scenecast_core::UserError;
 use std::fmt::Display;
@@ -6,10 +6,10 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// Most bytes of a line.
+/// Maximum length of a line, bytes.
 const MAX_BYTES: usize = 1 << 20;
 
-/// The lines of a file that say something: not empty, no comment behind `#`.
+/// The lines of a file that are neither empty nor a comment behind `#`.
 pub(super) struct Lines {
     path: PathBuf,
     reader: BufReader<File>,
@@ -19,7 +19,7 @@ pub(super) struct Lines {
     number: u64,
 }
 
-pub(super) struct Line<'a> {
+pub(super) struct TextLine<'a> {
     pub(super) text: &'a str,
     pub(super) number: u64,
     pub(super) offset: u64,
@@ -37,17 +37,17 @@ impl Lines {
         Ok(Self { path: path.to_owned(), reader, buffer: Vec::new(), length, offset: 0, number: 0 })
     }
 
-    /// Share of the file that was read.
+    /// Share of the file that was read, 0..=1.
     pub(super) fn done(&self) -> f64 {
         self.offset as f64 / self.length.max(1) as f64
     }
 
-    /// A problem with the line that was read last.
-    pub(super) fn problem(&self, what: impl Display) -> UserError {
-        UserError::Input(format!("{}:{}: {what}", self.path.display(), self.number))
+    /// An error in the line that was read last.
+    pub(super) fn error(&self, cause: impl Display) -> UserError {
+        UserError::Input(format!("{}:{}: {cause}", self.path.display(), self.number))
     }
 
-    /// Goes to where a line begins.
+    /// Moves to the start of a line.
     pub(super) fn seek(&mut self, offset: u64, number: u64) -> Result<(), UserError> {
         if offset != self.offset {
             let moved = match i64::try_from(i128::from(offset) - i128::from(self.offset)) {
@@ -60,8 +60,8 @@ impl Lines {
         Ok(())
     }
 
-    /// The next line; none at the end of the file.
-    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>, UserError> {
+    /// The next line; `None` at the end of the file.
+    pub(super) fn next(&mut self) -> Result<Option<TextLine<'_>>, UserError> {
         loop {
             self.buffer.clear();
             let offset = self.offset;
@@ -73,23 +73,23 @@ impl Lines {
             self.number += 1;
             self.offset += read as u64;
             if read > MAX_BYTES {
-                return Err(self.problem(format!("the line is longer than {MAX_BYTES} bytes")));
+                return Err(self.error(format!("the line is longer than {MAX_BYTES} bytes")));
             }
-            let says_something = |text: &str| !text.is_empty() && !text.starts_with('#');
+            let has_content = |text: &str| !text.is_empty() && !text.starts_with('#');
             match std::str::from_utf8(&self.buffer) {
-                Err(_) => return Err(self.problem("not text in UTF-8")),
-                Ok(text) if !says_something(text.trim_start_matches('\u{feff}').trim()) => {}
+                Err(_) => return Err(self.error("not text in UTF-8")),
+                Ok(text) if !has_content(text.trim_start_matches('\u{feff}').trim()) => {}
                 Ok(_) => {
                     let text = std::str::from_utf8(&self.buffer).unwrap_or_default();
                     let text = text.trim_start_matches('\u{feff}').trim();
-                    return Ok(Some(Line { text, number: self.number, offset }));
+                    return Ok(Some(TextLine { text, number: self.number, offset }));
                 }
             }
         }
     }
 }
 
-/// A number that is finite.
+/// Reads a finite number; errors name the field.
 pub(super) fn number(field: Option<&str>, name: &str) -> Result<f64, String> {
     let text = field.map(str::trim).ok_or_else(|| format!("{name} is missing"))?;
     let value: Option<f64> = text.parse().ok();

@@ -1,13 +1,13 @@
 //! Words of a mosaic: one image of the ground from above.
 
-use super::{Sighting, Source};
+use super::{Sighting, WordSource};
 use scene_model::project::Observation;
 use scene_model::words::WordExtractor;
 use scenecast_core::UserError;
 use scenecast_files::read_image;
 use std::path::Path;
 
-/// Least edge of a cell: with less there is nothing to see in one.
+/// Minimum edge of a cell, in pixels; a smaller one holds no texture.
 const MIN_CELL_PX: f64 = 4.0;
 
 /// A mosaic, its top left corner at the origin: x grows to the right, y upwards, so y is below 0.
@@ -19,7 +19,7 @@ pub(crate) struct Mosaic {
 }
 
 impl Mosaic {
-    /// Finds the words of a mosaic whose pixels are `metres_per_pixel` wide.
+    /// Extracts the words of a mosaic whose pixels are `metres_per_pixel` wide.
     pub(crate) fn open(
         path: &Path,
         extractor: &mut WordExtractor,
@@ -30,14 +30,14 @@ impl Mosaic {
         let image = read_image(path)?.to_rgb8();
         let (width, height) = image.dimensions();
         if cell_px < MIN_CELL_PX {
-            let what =
+            let cause =
                 format!("--cell-size {cell_m}: {cell_px:.3} pixels of the mosaic; at least {MIN_CELL_PX} are needed");
-            return Err(UserError::Input(what));
+            return Err(UserError::Input(cause));
         }
         if f64::from(width.min(height)) < cell_px {
-            let what =
+            let cause =
                 format!("the image has {width} x {height} pixels; a mosaic needs at least a cell of {cell_px:.1}");
-            return Err(UserError::file(path, what));
+            return Err(UserError::file(path, cause));
         }
         let place = |word: &scene_model::words::Word| Observation {
             word: word.id,
@@ -52,7 +52,7 @@ impl Mosaic {
     }
 }
 
-impl Source for Mosaic {
+impl WordSource for Mosaic {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         Ok(self.observations.take().map(|observations| Sighting { t_s: 0.0, observations, done: 1.0 }))
     }

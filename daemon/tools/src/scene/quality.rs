@@ -1,4 +1,4 @@
-//! How much a model's labels tell about annotations.
+//! Agreement of a model's labels with annotations.
 
 use super::Annotated;
 use super::bounds::around;
@@ -12,12 +12,13 @@ use std::collections::BTreeMap;
 /// Mutual information of labels and classes, and of displaced labels and classes.
 pub(crate) type Quality = SceneScore;
 
-/// Most cells times classes that are counted.
+/// Maximum number of cells times classes in the table of counts.
 const MAX_COUNTS: u64 = 1 << 27;
-/// Class of cells that have none.
+/// Class value of cells without annotation.
 const NONE: u8 = 255;
 
-/// Scores a model, cell by cell; a cell has the class that most of its pixels or places have, ties to the lowest.
+/// Scores a model cell by cell. The class of a cell is that of most of its pixels or places; of
+/// equally frequent ones the lowest.
 ///
 /// `cell_px` is the edge of a cell in pixels of the mosaic, where the annotations are an image.
 pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -> Result<Quality, UserError> {
@@ -30,7 +31,7 @@ pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -
         }
         Annotated::Places(places) => {
             let volume = model.label_volume();
-            let sheet = Sheet::new(&volume, places)?;
+            let sheet = LayerSheet::new(&volume, places)?;
             let classes = sheet.classes(places, model.config().cell_m);
             let annotations = Annotations::new(&classes, classes.dimensions(), 1.0, &[NONE]).map_err(refused)?;
             Ok(score(&sheet.labels(&volume), &annotations))
@@ -38,13 +39,13 @@ pub(crate) fn quality(model: &SceneModel, annotated: &Annotated, cell_px: f32) -
     }
 }
 
-/// The layers of a world in three dimensions, one below the other.
-struct Sheet {
+/// The heights of a map in three dimensions, laid side by side in one grid.
+struct LayerSheet {
     bounds: Rect,
     layers: Vec<i32>,
 }
 
-impl Sheet {
+impl LayerSheet {
     fn new(volume: &[FlatCell], places: &[([f64; 3], u8)]) -> Result<Self, UserError> {
         let bounds = around(volume)?;
         let mut layers: Vec<i32> = volume.iter().map(|cell| cell.z).collect();
@@ -53,9 +54,9 @@ impl Sheet {
         let classes = places.iter().map(|place| u64::from(place.1) + 1).max().unwrap_or(1);
         let cells = u64::from(bounds.width) * u64::from(bounds.height) * layers.len() as u64;
         if cells * classes > MAX_COUNTS {
-            let what =
+            let cause =
                 format!("{cells} cells and {classes} classes are too many to score: choose a larger --cell-size");
-            return Err(UserError::Input(what));
+            return Err(UserError::Input(cause));
         }
         Ok(Self { bounds, layers })
     }

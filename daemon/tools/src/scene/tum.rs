@@ -1,10 +1,10 @@
 //! Words of an RGB-D sequence in the layout of the TUM benchmark (Sturm et al. 2012; the paper's Algorithm 1).
 //!
-//! `rgb.txt` and `depth.txt` are lines `time file`, `groundtruth.txt` lines `time tx ty tz qx qy qz qw`: camera to world. Depth is
-//! a 16-bit PNG in units of 1/5000 m, 0 where there is no reading.
+//! `rgb.txt` and `depth.txt` are lines `time file`, `groundtruth.txt` lines `time tx ty tz qx qy qz qw`: camera to
+//! world. Depth is a 16-bit PNG in units of 1/5000 m, 0 where there is no reading.
 
 use super::lines::{Lines, number};
-use super::{Sighting, Source};
+use super::{Sighting, WordSource};
 use image::{DynamicImage, RgbImage};
 use scene_model::project::{CameraPose, DepthImage, PinholeCamera};
 use scene_model::words::WordExtractor;
@@ -12,12 +12,12 @@ use scenecast_core::UserError;
 use scenecast_files::read_image;
 use std::path::{Path, PathBuf};
 
-/// Longest time between an image and the depth or the pose that it is taken for, seconds.
-const APART_S: f64 = 0.02;
-/// Width for which the usual intrinsics are, pixels.
-const USUAL_WIDTH: f64 = 640.0;
-const USUAL: Intrinsics = Intrinsics([525.0, 525.0, 319.5, 239.5]);
-/// Least and most pixels of a cell that words are looked for in.
+/// Maximum time between an image and the depth image or the pose that is matched with it, seconds.
+const MAX_APART_S: f64 = 0.02;
+/// Image width of the benchmark's intrinsics, pixels.
+const DEFAULT_WIDTH_PX: f64 = 640.0;
+const DEFAULT_INTRINSICS: Intrinsics = Intrinsics([525.0, 525.0, 319.5, 239.5]);
+/// Minimum and maximum edge of a cell in which words are extracted, pixels.
 const CELL_PX: (f32, f32) = (4.0, 200.0);
 
 /// fx, fy, cx, cy in pixels.
@@ -35,9 +35,9 @@ impl std::str::FromStr for Intrinsics {
     }
 }
 
-/// The frames of a sequence that have depth and pose; others are counted and passed over.
+/// The frames of a sequence that have depth and pose; others are counted and skipped.
 pub(crate) struct Tum {
-    frames: std::vec::IntoIter<Frame>,
+    frames: std::vec::IntoIter<TumFrame>,
     all: usize,
     first_s: f64,
     extractor: WordExtractor,
@@ -49,7 +49,7 @@ pub(crate) struct Tum {
     words_without_depth: u64,
 }
 
-struct Frame {
+struct TumFrame {
     t_s: f64,
     image: PathBuf,
     depth: PathBuf,
@@ -57,7 +57,7 @@ struct Frame {
 }
 
 impl Tum {
-    /// Opens a folder; without intrinsics the camera is the benchmark's usual one, for the width of the images.
+    /// Opens a folder; without intrinsics the camera is the benchmark's own, scaled to the width of the images.
     pub(crate) fn open(
         dir: &Path,
         extractor: WordExtractor,
@@ -71,13 +71,14 @@ impl Tum {
         let mut frames = Vec::new();
         for (t_s, image) in &images {
             if let (Some(depth), Some(pose)) = (nearest(&depths, *t_s), nearest(&poses, *t_s)) {
-                frames.push(Frame { t_s: *t_s, image: dir.join(image), depth: dir.join(depth), pose: *pose });
+                frames.push(TumFrame { t_s: *t_s, image: dir.join(image), depth: dir.join(depth), pose: *pose });
             }
         }
         let without_partner = images.len() - frames.len();
         if frames.is_empty() {
-            let what = format!("none of its {} images has a depth image and a pose within {APART_S} s", images.len());
-            return Err(UserError::file(&dir.join("rgb.txt"), what));
+            let cause =
+                format!("none of its {} images has a depth image and a pose within {MAX_APART_S} s", images.len());
+            return Err(UserError::file(&dir.join("rgb.txt"), cause));
         }
         Ok(Self {
             all: images.len(),
@@ -93,7 +94,7 @@ impl Tum {
         })
     }
 
-    fn see(&mut self, frame: &Frame) -> Result<Vec<scene_model::project::Observation>, String> {
+    fn see(&mut self, frame: &TumFrame) -> Result<Vec<scene_model::project::Observation>, String> {
         let image = read_image(&frame.image).map_err(|e| e.to_string())?.to_rgb8();
         let depth = read_depth(&frame.depth, self.depth_scale)?;
         let camera = self.camera(&image);
@@ -106,13 +107,14 @@ impl Tum {
     }
 
     fn camera(&self, image: &RgbImage) -> PinholeCamera {
-        let scale = f64::from(image.width()) / USUAL_WIDTH;
-        let Intrinsics([fx, fy, cx, cy]) = self.intrinsics.unwrap_or(Intrinsics(USUAL.0.map(|pixels| pixels * scale)));
+        let scale = f64::from(image.width()) / DEFAULT_WIDTH_PX;
+        let Intrinsics([fx, fy, cx, cy]) =
+            self.intrinsics.unwrap_or(Intrinsics(DEFAULT_INTRINSICS.0.map(|pixels| pixels * scale)));
         PinholeCamera { fx, fy, cx, cy }
     }
 }
 
-impl Source for Tum {
+impl WordSource for Tum {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         while let Some(frame) = self.frames.next() {
             match self.see(&frame) {
@@ -120,36 +122,36 @@ impl Source for Tum {
                     let done = 1.0 - self.frames.len() as f64 / self.all.max(1) as f64;
                     return Ok(Some(Sighting { t_s: frame.t_s - self.first_s, observations, done }));
                 }
-                Err(what) => self.unreadable.push(what),
+                Err(error) => self.unreadable.push(error),
             }
         }
         Ok(None)
     }
 
     fn skipped(&self) -> Option<String> {
-        let mut said = Vec::new();
+        let mut notes = Vec::new();
         if self.without_partner > 0 {
             let (few, all) = (self.without_partner, self.all);
-            said.push(format!("{few} of {all} images have no depth image or no pose within {APART_S} s"));
+            notes.push(format!("{few} of {all} images have no depth image or no pose within {MAX_APART_S} s"));
         }
         if let Some(first) = self.unreadable.first() {
-            said.push(format!("{} frames passed over, the first: {first}", self.unreadable.len()));
+            notes.push(format!("{} frames skipped, the first: {first}", self.unreadable.len()));
         }
         if self.words_without_depth > 0 {
-            said.push(format!("{} words have no depth under them", self.words_without_depth));
+            notes.push(format!("{} words have no depth under them", self.words_without_depth));
         }
-        (!said.is_empty()).then(|| said.join("; "))
+        (!notes.is_empty()).then(|| notes.join("; "))
     }
 }
 
-/// Lines `time what`, by time; complaints name the line.
+/// Reads lines `time value` and sorts them by time; errors name the line.
 fn read_list<T>(path: &Path, read: impl Fn(&str) -> Result<T, String>) -> Result<Vec<(f64, T)>, UserError> {
     let mut lines = Lines::open(path)?;
     let mut list = Vec::new();
     while let Some(line) = lines.next()? {
         let (time, rest) = line.text.split_once([' ', '\t', ',']).unwrap_or((line.text, ""));
         let entry = number(Some(time), "the time").and_then(|t_s| Ok((t_s, read(rest.trim())?)));
-        list.push(entry.map_err(|what| lines.problem(what))?);
+        list.push(entry.map_err(|error| lines.error(error))?);
     }
     if list.is_empty() {
         return Err(UserError::file(path, "there are no lines"));
@@ -178,8 +180,8 @@ fn nearest<T>(list: &[(f64, T)], t_s: f64) -> Option<&T> {
     let after = list.partition_point(|entry| entry.0 < t_s);
     let near = list[after.saturating_sub(1)..(after + 1).min(list.len())].iter();
     let best = near.min_by(|a, b| (a.0 - t_s).abs().total_cmp(&(b.0 - t_s).abs()))?;
-    // Times have microseconds; as floating-point numbers they may lie a little further apart.
-    ((best.0 - t_s).abs() <= APART_S + 1e-6).then_some(&best.1)
+    // Times have microseconds; as floating-point numbers they may differ a little more than the limit.
+    ((best.0 - t_s).abs() <= MAX_APART_S + 1e-6).then_some(&best.1)
 }
 
 fn read_depth(path: &Path, scale: f64) -> Result<DepthImage, String> {
@@ -193,7 +195,7 @@ fn read_depth(path: &Path, scale: f64) -> Result<DepthImage, String> {
     }
 }
 
-/// The middle one of the readings.
+/// Median depth over every seventh valid reading, metres.
 fn median(depth: &DepthImage) -> Option<f32> {
     let mut readings: Vec<f32> = depth.metres.iter().copied().filter(|&metres| metres > 0.0).step_by(7).collect();
     if readings.is_empty() {
@@ -208,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_nearest_in_time_counts_if_it_is_near_enough() {
+    fn the_nearest_in_time_is_matched_within_the_limit() {
         let list = [(1.0, 'a'), (1.03, 'b'), (2.0, 'c')];
         let found: Vec<Option<&char>> = [0.99, 1.014, 1.016, 1.06, 2.02, 9.0].map(|t| nearest(&list, t)).to_vec();
         assert_eq!(found, [Some(&'a'), Some(&'a'), Some(&'b'), None, Some(&'c'), None]);

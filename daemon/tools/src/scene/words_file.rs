@@ -1,29 +1,30 @@
 //! Words from a file: lines `t,x,y,z,w1,w2,...`.
 
 use super::bounds::rectangle;
-use super::lines::{Line, Lines, number};
-use super::{Sighting, Source};
+use super::lines::{Lines, TextLine, number};
+use super::{Sighting, WordSource};
 use scene_model::project::Observation;
 use scene_model::topics::coord_of;
 use scenecast_core::UserError;
 use std::path::Path;
 
-/// Words of one sighting at most; so much is held at once.
+/// Maximum number of words of one sighting, which are held in memory at once.
 const MAX_WORDS: usize = 1 << 16;
-/// Most different words, as the scene model has it.
+/// Maximum number of different words, the scene model's own limit.
 const MAX_VOCABULARY: u32 = 1 << 20;
 
-/// A file of words, read twice: once to check all of it, then as it is learnt from.
+/// A file of words, read twice: once to check all lines, then to learn from them.
 ///
-/// A line is a place and the words there: seconds, metres, word ids. A first line that begins with `t` names the columns.
+/// A line is a place and the words there: seconds, metres, word ids. A first line that begins
+/// with `t` names the columns.
 pub(crate) struct WordsFile {
     lines: Lines,
     pub(crate) vocabulary: u32,
-    /// Where each line begins, in order of time, if the file has another order.
+    /// Start of each line in order of time, if the file is not in that order.
     order: Option<std::vec::IntoIter<Mark>>,
     marks: (usize, usize),
     in_time: bool,
-    /// Number of the first line, which may be the head of the table.
+    /// Number of the first line, which may name the columns.
     begun: u64,
     ahead: Option<(f64, Vec<Observation>)>,
 }
@@ -37,7 +38,7 @@ struct Mark {
 }
 
 impl WordsFile {
-    /// Checks a file; with `in_time` its lines come in order of time, otherwise as they are.
+    /// Checks a file. With `in_time` its lines are returned in order of time, otherwise in the order of the file.
     pub(crate) fn open(
         path: &Path,
         vocabulary: Option<u32>,
@@ -50,7 +51,7 @@ impl WordsFile {
         let most = vocabulary.unwrap_or(MAX_VOCABULARY);
         let mut seen = Vec::new();
         while let Some(line) = lines.next()? {
-            let Line { number, offset, .. } = line;
+            let TextLine { number, offset, .. } = line;
             if begun == 0 {
                 begun = number;
             }
@@ -63,7 +64,7 @@ impl WordsFile {
                 seen.first().map_or(Ok(()), |o| extent.take(o))?;
                 Ok(t_s)
             });
-            let Some(t_s) = parsed.map_err(|what| lines.problem(what))? else { continue };
+            let Some(t_s) = parsed.map_err(|error| lines.error(error))? else { continue };
             largest = seen.iter().map(|o| o.word).fold(largest, u32::max);
             words += seen.len() as u64;
             if in_time {
@@ -101,7 +102,7 @@ impl WordsFile {
             let Some(line) = self.lines.next()? else { return Ok(None) };
             let mut seen = Vec::new();
             let first = line.number == self.begun;
-            match parse(line.text, first, &mut seen).map_err(|what| self.lines.problem(what))? {
+            match parse(line.text, first, &mut seen).map_err(|error| self.lines.error(error))? {
                 Some(t_s) => return Ok(Some((t_s, seen))),
                 None => continue,
             }
@@ -116,7 +117,7 @@ impl WordsFile {
     }
 }
 
-impl Source for WordsFile {
+impl WordSource for WordsFile {
     fn next(&mut self) -> Result<Option<Sighting>, UserError> {
         let Some((t_s, mut observations)) = self.next_line()? else { return Ok(None) };
         while observations.len() < MAX_WORDS {
@@ -131,7 +132,7 @@ impl Source for WordsFile {
     }
 }
 
-/// Reads a line; no time if it is the head of the table.
+/// Reads a line; `None` if it names the columns.
 fn parse(text: &str, first: bool, seen: &mut Vec<Observation>) -> Result<Option<f64>, String> {
     seen.clear();
     let mut fields = text.split(',');
@@ -148,7 +149,7 @@ fn parse(text: &str, first: bool, seen: &mut Vec<Observation>) -> Result<Option<
     Ok(Some(t_s))
 }
 
-/// How far the cells of the words reach.
+/// Bounds of the cells that hold the words.
 struct Extent {
     cell_m: [f64; 3],
     limits: Option<[i64; 4]>,
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn words_come_in_order_of_time_whatever_the_order_of_the_lines() {
+    fn words_are_returned_in_order_of_time() {
         let text = "# words\nt,x,y,z,w1\n# later\n2,0,0,0,5,6\n\n1,0,0,0,7\r\n2,1,0,-3,8\n1,5,5,5\n";
         let mut file = open("order", text, None, true).unwrap();
         assert_eq!(sightings(&mut file), [(1.0, vec![7]), (2.0, vec![5, 6, 8])]);
@@ -202,9 +203,9 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_line_is_named_with_what_is_wrong() {
-        let said = |text: &str| open("wrong", text, Some(9), true).err().unwrap().to_string();
-        for (line, what) in [
+    fn a_wrong_line_is_refused_with_its_number_and_cause() {
+        let refusal = |text: &str| open("wrong", text, Some(9), true).err().unwrap().to_string();
+        for (line, expected) in [
             ("1,nan,0,0,1", ":2: x = nan: it takes a finite number"),
             ("1,0,inf,0,1", ":2: y = inf"),
             ("1,0,0", ":2: z is missing"),
@@ -215,11 +216,11 @@ mod tests {
             ("1,100000,100000,0,1", ":2: the map would reach over 100001 x 100001 cells"),
             ("t,0,0,0,1", ":2: t = \"t\" is no number"),
         ] {
-            let said = said(&format!("0,0,0,0,1\n{line}\n"));
-            assert!(said.contains(what), "{said}");
+            let error = refusal(&format!("0,0,0,0,1\n{line}\n"));
+            assert!(error.contains(expected), "{error}");
         }
         for empty in ["", "\n\n", "t,x,y,z\n", "1,0,0,0\n"] {
-            assert!(said(empty).contains("there are no words"), "{empty:?}");
+            assert!(refusal(empty).contains("there are no words"), "{empty:?}");
         }
     }
 }

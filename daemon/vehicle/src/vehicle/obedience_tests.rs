@@ -9,8 +9,8 @@ use scenecast_motion::Motion;
 use scenecast_motion::stretches_outside;
 use scenecast_protocol::coordinates::{DecimetrePoint, MapPoint, WorldPoint};
 use scenecast_protocol::directive::{
-    CellBand, Change, Constraints, Fence, Figure, Limits, PlannerKind, Polygon, Reaction, RefusalReason, Settings,
-    Slot, Utility,
+    CellBand, Change, Constraints, Fence, Limits, PlannerKind, Polygon, Reaction, RefusalReason, Settings,
+    ShortDecimal, Slot, Utility,
 };
 use scenecast_protocol::mac::ModemProfile;
 use scenecast_protocol::map::Cell;
@@ -295,7 +295,7 @@ fn the_last_good_fence_survives_a_refusal_and_a_restart() {
 
 #[test]
 fn bad_settings_are_refused_and_good_ones_survive_a_restart() {
-    let figure = |value: f64| Change::To(Figure::new(value).unwrap());
+    let figure = |value: f64| Change::To(ShortDecimal::new(value).unwrap());
     let mut sea = Sea::new(0.0, 1);
     let asked = Settings {
         planner: Change::To(PlannerKind::Greedy),

@@ -124,7 +124,7 @@ pub fn stamp(data: &[u8]) {
         (u32::from_be_bytes([0, script.u8(), script.u8(), script.u8()]), script.u8(), script.u8(), script.u8());
     let millis = |a, b| Duration::from_millis(u16::from_be_bytes([a, b]).into());
     let surface = Stamp::Surface { clock_ms, one_way: Some(millis(a, b)).filter(|d| d.as_millis() < 65_535) };
-    let vehicle = Stamp::Vehicle { clock_ms, heard: a, held: millis(b, c) };
+    let vehicle = Stamp::Vehicle { clock_ms, last_received: a, held: millis(b, c) };
     reads_back(&Header { stamp: Some(vehicle), ..header() });
     reads_back(&Header { from: Address::SURFACE, to: header().from, stamp: Some(surface), ..header() });
     let mut moment = || Instant::from_micros(u64::from(script.u16()) << 32 | u64::from(script.u16()) << 8);

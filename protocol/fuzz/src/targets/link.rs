@@ -96,7 +96,7 @@ impl StateReplica for Pile {
 
 /// A state whose host can add to it.
 pub trait Grow: StateSource {
-    /// Adds about `amount` bytes.
+    /// Adds about `amount` bytes of new content.
     fn grow(&mut self, amount: u8, now: Instant);
 }
 
@@ -130,7 +130,7 @@ pub trait FuzzEnd: fmt::Debug {
     fn handle_frame(&mut self, bytes: &[u8], now: Instant);
     fn poll_transmit(&mut self, now: Instant) -> Option<Transmit>;
     fn handle_transmit_outcome(&mut self, now: Instant);
-    /// The modem requests frames.
+    /// The modem requests `frames` frames of a cycle.
     fn poll(&mut self, frames: u32, now: Instant);
     fn wakeup(&self, now: Instant) -> Option<Instant>;
     /// Takes every event and decides about every slot; returns the number of events.

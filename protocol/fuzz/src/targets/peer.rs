@@ -93,14 +93,14 @@ impl FuzzPeer {
         self.authenticity.as_ref().is_some_and(|a| hello || a.all || self.us == Address::SURFACE)
     }
 
-    /// A hello. Bits of `what` select a new run, and the answer to a discovery call or a frame to everybody.
-    pub fn hello(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
+    /// A hello. Bits of `flags` select a new run, and the answer to a discovery call or a frame to everybody.
+    pub fn hello(&mut self, flags: u8, script: &mut Script<'_>) -> Vec<u8> {
         let keyed = self.is_keyed(true);
-        if what & 1 != 0 {
+        if flags & 1 != 0 {
             let nonce = if keyed { u64::from(script.u8()) + 1 } else { 0 };
             self.begin_run((SessionId::from_random(script.u16()), nonce));
         }
-        let to = if what & 2 != 0 && self.us == Address::SURFACE { Address::EVERYBODY } else { self.end };
+        let to = if flags & 2 != 0 && self.us == Address::SURFACE { Address::EVERYBODY } else { self.end };
         let (session, nonce) = self.own;
         let header = Header {
             to,
@@ -111,20 +111,20 @@ impl FuzzPeer {
             ack: None,
             kind: FrameKind::Hello,
             keyed,
-            ..self.header(what, script)
+            ..self.header(flags, script)
         };
         let theirs = self.theirs;
-        self.theirs = self.call.filter(|_| what & 2 != 0).unwrap_or(theirs);
+        self.theirs = self.call.filter(|_| flags & 2 != 0).unwrap_or(theirs);
         let bytes = self.seal(&header, &[], 0);
         self.theirs = theirs;
         bytes
     }
 
-    /// A numbered frame whose header follows `what` and the script, with a body from the script.
-    pub fn numbered(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
-        let mut header = self.header(what, script);
+    /// A numbered frame whose header follows `flags` and the script, with a body from the script.
+    pub fn numbered(&mut self, flags: u8, script: &mut Script<'_>) -> Vec<u8> {
+        let mut header = self.header(flags, script);
         let mut number = self.flight.next_number();
-        if what & 0x10 != 0 {
+        if flags & 0x10 != 0 {
             let ahead = script.u16() as i16;
             number = number.saturating_add_signed(ahead.into()).max(1);
             (header.number, header.base) = (number as u16, script.u16() % 2048 + 1);
@@ -135,29 +135,29 @@ impl FuzzPeer {
     }
 
     /// As [`Self::numbered`], but for another run of the end, or with a CRC where a tag is due.
-    pub fn misaddressed(&mut self, what: u8, script: &mut Script<'_>) -> Vec<u8> {
-        let header = Header { keyed: false, ..self.header(what, script) };
+    pub fn misaddressed(&mut self, flags: u8, script: &mut Script<'_>) -> Vec<u8> {
+        let header = Header { keyed: false, ..self.header(flags, script) };
         let mut bytes = raw::head(&header);
         bytes.extend_from_slice(script.bytes());
-        let session = if what & 0x10 != 0 { self.theirs.0.get() } else { 0 };
+        let session = if flags & 0x10 != 0 { self.theirs.0.get() } else { 0 };
         raw::close_with_crc(&mut bytes, MISSION, session);
         bytes
     }
 
-    fn header(&self, what: u8, script: &mut Script<'_>) -> Header {
+    fn header(&self, flags: u8, script: &mut Script<'_>) -> Header {
         let from = self.us;
-        let turn = (what & 1 == 0).then(|| script.u8());
+        let turn = (flags & 1 == 0).then(|| script.u8());
         let remaining = script.u8();
-        let stamp = (what & 4 != 0).then(|| {
+        let stamp = (flags & 4 != 0).then(|| {
             let (clock_ms, a) = (u32::from(script.u16()), script.u16());
             let time = Duration::from_millis(a.into());
             match from == Address::SURFACE {
                 true => Stamp::Surface { clock_ms, one_way: (a != u16::MAX).then_some(time) },
-                false => Stamp::Vehicle { clock_ms, heard: script.u8(), held: time },
+                false => Stamp::Vehicle { clock_ms, last_received: script.u8(), held: time },
             }
         });
         let true_ack = AckStatement { horizon_low: (self.heard & 0xFFF) as u16, lost: Vec::new() };
-        let ack = match what & 0x28 {
+        let ack = match flags & 0x28 {
             0x08 => Some(true_ack),
             0x28 => AckStatement::decode(&mut Reader::new(script.bytes())).ok(),
             _ => None,

@@ -15,7 +15,7 @@ pub struct SurfaceConfig {
     pub modem: ModemProfile,
     /// Bit budget on air in bit/s.
     pub budget_bps: u32,
-    /// LinkWindow over which the budget holds.
+    /// Window over which the budget holds.
     pub budget_window: Duration,
     /// Least share of each class while it has something to send.
     pub shares: Shares,

@@ -38,6 +38,7 @@ impl SurfaceEvent {
 
 /// Why a slot cannot be issued.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IssueError {
     /// No vehicle with this address is known.
     #[error("no such vehicle")]

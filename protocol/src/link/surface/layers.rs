@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum LayerOutcome {
     Accepted,
-    /// It makes no sense, or is of a layer that the vehicle has not announced.
+    /// It is unreadable, or belongs to a layer that the vehicle has not announced.
     Skipped,
     /// It contradicts the layer, so the two ends hold different states.
     OutOfStep,
@@ -65,7 +65,7 @@ impl Layers {
         if is_consistent { LayerOutcome::Accepted } else { LayerOutcome::OutOfStep }
     }
 
-    /// A part of an announced layer comes again if the vehicle has not heard of the first one; it changes nothing.
+    /// A repeated part of a layer that is already known has no effect: the vehicle lacks the acknowledgement of the first.
     fn handle_descriptor(&mut self, id: LayerId, part: &DescriptorPart<'_>) -> LayerOutcome {
         if let Some(replica) = self.get(id) {
             let is_same = replica.descriptor().digest() == part.digest;
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!((layers.handle_chunk(4, &chunk, Instant::ZERO), layers.version()), (LayerOutcome::Accepted, 1));
         let shown = layers.get(LayerId::DEPTH).unwrap().levels().shown();
         assert!(source.target().iter().all(|(cell, level)| shown.get(cell) == level));
-        assert_eq!(layers.handle_chunk(5, &descriptor, Instant::ZERO), LayerOutcome::Accepted, "said again");
+        assert_eq!(layers.handle_chunk(5, &descriptor, Instant::ZERO), LayerOutcome::Accepted, "repeated");
         let (descriptor, _) = other.next_chunk(200, Instant::ZERO).unwrap();
         assert_eq!(layers.handle_chunk(6, &descriptor, Instant::ZERO), LayerOutcome::OutOfStep, "another scale");
         layers.clear();

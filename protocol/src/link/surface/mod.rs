@@ -149,6 +149,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 
     /// The next event; the host calls this until it returns `None`.
+    #[must_use]
     pub fn poll_event(&mut self) -> Option<SurfaceEvent> {
         self.events.pop_front()
     }

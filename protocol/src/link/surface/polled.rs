@@ -44,6 +44,7 @@ impl Cycles {
 
 impl<R: StateReplica> SurfaceLink<R> {
     /// The cycle to begin next, if it is time for one ([`crate::mac::Access::Polled`]).
+    #[must_use]
     pub fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
         if let Some(cycle) = self.cycle.wanted.take() {
             return Some(cycle);

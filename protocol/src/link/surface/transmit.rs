@@ -15,6 +15,7 @@ const TURN_LOSS_RISK: f64 = 0.04;
 impl<R: StateReplica> SurfaceLink<R> {
     /// The next frame, if there is one and the budget allows it. The host calls this after every event and at
     /// [`Self::poll_timeout`] until it returns `None`.
+    #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         match self.config.modem.access {
             Access::Shared => self.poll_shared(now),
@@ -24,6 +25,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     }
 
     /// When [`Self::poll_transmit`] may next have a frame, unless the link waits for the modem.
+    #[must_use]
     pub fn poll_timeout(&self, now: Instant) -> Option<(Instant, Wakeup)> {
         let next = match self.config.modem.access {
             Access::ModemOwned { .. } => self.fleet.next_without_turn(),

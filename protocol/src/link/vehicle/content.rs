@@ -10,7 +10,7 @@ use crate::time::Instant;
 use crate::wire::{Backlog, ChunkKind, FrameBuilder, room_for_payload};
 use std::time::Duration;
 
-/// A chunk of a frame, by what its fate means to the sender.
+/// A chunk of a frame, with the data that the sender needs once its fate is known.
 #[derive(Debug)]
 pub(super) enum Part<C> {
     Map(C),

@@ -1,4 +1,4 @@
-//! Layers of the map: their chunks in a frame, and the turns that they are worth.
+//! Layers of the map: their chunks in a frame, and the turns that they need.
 
 use super::content::{Carried, Part, VehicleContent};
 use crate::map::{Cell, LayerId, LayerMask, LayerSource, StateSource};

@@ -1,6 +1,6 @@
 //! The vehicle's end of the link.
 //!
-//! [`VehicleLink`] joins parts that own their state: `content` (what waits to be sent), `repeat` (copies
+//! [`VehicleLink`] joins parts that own their state: `content` (the data to send), `repeat` (copies
 //! of the frames of a turn), `timing` (the surface's clock), `discovery` (the answer to a call). `turn`
 //! writes frames, `receive` handles them.
 
@@ -84,8 +84,7 @@ impl<S: StateSource> VehicleLink<S> {
         &mut self.content.source
     }
 
-    /// Replicates a layer beside the state, also while the link is under way; `false` if there is one with its index
-    /// already.
+    /// Replicates a layer beside the state, from now on; returns `false` if a layer with its index exists.
     pub fn add_layer(&mut self, layer: LayerSource) -> bool {
         self.repeater.forget();
         self.content.add_layer(layer)
@@ -229,6 +228,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// The next event; the host calls this until it returns `None`.
+    #[must_use]
     pub fn poll_event(&mut self) -> Option<VehicleEvent> {
         self.events.pop_front()
     }
@@ -266,6 +266,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     /// When [`Self::poll_transmit`] may next have a frame, unless the link waits for the surface.
+    #[must_use]
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
         self.next_wakeup().map(|at| (at, Wakeup::Turn))
     }
@@ -284,8 +285,8 @@ impl VehicleLink {
         Self::with_source(config, MapSource::new(codec), seed, restored, now)
     }
 
-    /// Sets labels of cells; returns how many changed. Cells that the surface does not hold yet are
-    /// sent when there is room.
+    /// Sets labels of cells (1 to 254, or 0 for unexplored); returns how many changed. Cells that the surface does not
+    /// hold yet are sent when there is room.
     pub fn set_map(&mut self, cells: impl IntoIterator<Item = (Cell, u8)>, now: Instant) -> usize {
         let changed = self.content.source.set(cells, now);
         if changed > 0 {

@@ -71,7 +71,7 @@ impl<S: StateSource> VehicleLink<S> {
         if !CallReply::is_call(&self.config, envelope) {
             return self.pair.stats.drop(DropReason::Checksum);
         }
-        if self.pair.is_met() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
+        if self.pair.has_run() && self.last_received().is_some_and(|at| now.since(at) < CONTACT_TIMEOUT) {
             return;
         }
         let grant = self.call_reply.handle_call(&self.config, &envelope.header, now);
@@ -125,7 +125,7 @@ impl<S: StateSource> VehicleLink<S> {
     /// by itself if need be.
     fn owe_answer(&mut self, now: Instant) {
         if matches!(self.config.modem.access, Access::ModemOwned { .. })
-            && (self.pair.unstated() > 0 || self.pair.must_greet())
+            && (self.pair.unstated() > 0 || self.pair.must_send_hello())
         {
             self.answer_due.get_or_insert(now + Duration::from_secs(1));
         }

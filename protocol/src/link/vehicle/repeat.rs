@@ -88,7 +88,7 @@ impl Repeater {
         self.new_frames
     }
 
-    /// How often a turn of `frames` frames, `bytes` in all, is sent when nothing new is left: another copy is sent as
+    /// How often a turn of `frames` frames, `bytes` in all, is sent when no new data is left: another copy is sent as
     /// long as it takes less time than the next turn would, times the probability that it makes that turn needless.
     /// There are no copies where the budget limits the link, or where frames of earlier turns are outstanding: then
     /// another turn is needed anyway.

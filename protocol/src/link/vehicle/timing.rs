@@ -58,6 +58,10 @@ impl SurfaceTiming {
     /// The stamp of a frame written at `now`.
     pub(super) fn stamp(&self, now: Instant) -> Option<Stamp> {
         let latest = self.latest?;
-        Some(Stamp::Vehicle { clock_ms: Stamp::clock(now), heard: latest.number as u8, held: now.since(latest.at) })
+        Some(Stamp::Vehicle {
+            clock_ms: Stamp::clock(now),
+            last_received: latest.number as u8,
+            held: now.since(latest.at),
+        })
     }
 }

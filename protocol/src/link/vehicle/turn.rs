@@ -25,6 +25,7 @@ struct FramePlan {
 impl<S: StateSource> VehicleLink<S> {
     /// The next frame, if it is our turn, there is a reason to transmit and the budget allows it. The host calls this
     /// after every event and at [`Self::poll_timeout`] until it returns `None`.
+    #[must_use]
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let modem = self.config.modem;
         if self.content.handle_timeout(now) {
@@ -34,8 +35,8 @@ impl<S: StateSource> VehicleLink<S> {
             self.end_turn();
         }
         let open = self.floor.frames(&modem, now).min(u32::from(u8::MAX));
-        let nobody = !self.pair.has_contact() && !self.call_reply.is_pending();
-        if open == 0 || nobody || !self.has_reason_to_transmit(now) {
+        let has_no_peer = !self.pair.has_contact() && !self.call_reply.is_pending();
+        if open == 0 || has_no_peer || !self.has_reason_to_transmit(now) {
             return None;
         }
         let bits = modem.bits_on_air(modem.frame_bytes);
@@ -47,7 +48,7 @@ impl<S: StateSource> VehicleLink<S> {
             return None;
         }
         self.blocked_until = None;
-        if self.pair.is_met() && self.pair.is_full() {
+        if self.pair.has_run() && self.pair.is_full() {
             // The surface has acknowledged no frame for so long that the frame numbers run out.
             self.renew(now);
         }
@@ -71,7 +72,7 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     pub(super) fn begin_turn(&mut self) {
-        let may_repeat = self.config.modem.access == Access::Shared && !self.pair.must_greet();
+        let may_repeat = self.config.modem.access == Access::Shared && !self.pair.must_send_hello();
         self.repeater.begin_turn(self.pair.horizon(), self.pair.outstanding(), may_repeat);
     }
 
@@ -86,15 +87,15 @@ impl<S: StateSource> VehicleLink<S> {
         }
         let answer = self.answer_due.is_some_and(|at| now >= at) || self.call_reply.is_pending();
         let news = self.content.backlog_bytes(&self.budget, now) > 0;
-        answer || (self.pair.is_met() && (news || self.content.status.is_waiting(now)))
+        answer || (self.pair.has_run() && (news || self.content.status.is_waiting(now)))
     }
 
     pub(super) fn next_wakeup(&self) -> Option<Instant> {
         if !matches!(self.config.modem.access, Access::ModemOwned { .. }) {
             return self.floor.next_wakeup();
         }
-        let status = self.content.status.next_due().filter(|_| self.pair.is_met());
-        let held = self.content.next_due().filter(|_| self.pair.is_met());
+        let status = self.content.status.next_due().filter(|_| self.pair.has_run());
+        let held = self.content.next_due().filter(|_| self.pair.has_run());
         let due = [status, held, self.answer_due].into_iter().flatten().min();
         match self.blocked_until {
             Some(blocked) => Some(due.map_or(blocked, |at| at.max(blocked))),
@@ -153,21 +154,21 @@ impl<S: StateSource> VehicleLink<S> {
     fn write_frame(&mut self, frames: u32, now: Instant) -> (Transmit, bool) {
         let modem = self.config.modem;
         let size = modem.frame_bytes;
-        let greets = self.pair.must_greet();
-        let plan = if greets { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
-        let wish = (plan.is_last_new && !greets).then(|| self.wish(now));
+        let sends_hello = self.pair.must_send_hello();
+        let plan = if sends_hello { FramePlan { remaining: 0, is_last_new: true } } else { self.plan(frames, now) };
+        let wish = (plan.is_last_new && !sends_hello).then(|| self.wish(now));
         let has_stamp = size >= SMALL_FRAME && (plan.is_last_new || self.repeater.new_frames() == 0);
         let stamp = self.timing.stamp(now).filter(|_| has_stamp);
         let ack_room = self.ack_room(plan.is_last_new);
         let mut builder = self.pair.begin_frame(size, ack_room, wish, stamp, FrameKind::Numbered);
         let mut carried = Carried::new();
-        if !greets {
+        if !sends_hello {
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
             let context = FillContext { budget: &self.budget, slots, refused_frames, now };
             carried = self.content.fill(&mut builder, &context);
         }
         let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
-        let is_complete = takes_turns && !greets && self.content.backlog_bytes(&self.budget, now) == 0;
+        let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;
         let remaining = match is_complete {
             // The rest of the turn is filled with copies as far as they pay off.
             true if !carried.is_empty() => {
@@ -182,13 +183,13 @@ impl<S: StateSource> VehicleLink<S> {
         };
         builder.set_remaining(remaining.min(255) as u8);
         let last = remaining == 0;
-        let kind = FrameKind::hello_if(greets);
+        let kind = FrameKind::hello_if(sends_hello);
         let transmit = self.close(builder, carried, kind, last || is_complete || !takes_turns);
-        if !greets {
+        if !sends_hello {
             let copies = (is_complete && remaining > 0).then_some(remaining);
             self.repeater.keep(self.pair.next_number() - 1, &transmit.bytes, copies);
         }
-        self.answer_due = greets.then(|| now + Duration::from_secs(10));
+        self.answer_due = sends_hello.then(|| now + Duration::from_secs(10));
         (transmit, last && takes_turns)
     }
 

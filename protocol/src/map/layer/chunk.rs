@@ -32,13 +32,13 @@ pub enum LayerChunk<'a> {
 /// Consecutive bytes of a descriptor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DescriptorPart<'a> {
-    /// [`LayerDescriptor::digest`].
+    /// The digest of the whole descriptor ([`LayerDescriptor::digest`]).
     pub digest: u16,
     /// Place of the first of them, 0 to 63.
     pub first: u8,
     /// Whether they are the last ones.
     pub is_last: bool,
-    /// The bytes.
+    /// Bytes of the descriptor from `first` on, at least one.
     pub bytes: &'a [u8],
 }
 

@@ -16,9 +16,9 @@ pub struct Decimal {
 }
 
 impl Decimal {
-    /// 0.
+    /// The number 0, with exponent 0.
     pub const ZERO: Self = Self { digits: 0, exponent: 0 };
-    /// Bytes on the wire.
+    /// The length on the wire: 24 bits of digits, 8 of exponent.
     pub const BYTES: usize = 4;
     /// The exponent lies within this of 0.
     const MAX_EXPONENT: i8 = 9;

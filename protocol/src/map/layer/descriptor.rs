@@ -45,7 +45,7 @@ pub struct LayerDescriptor {
     pub upper_end: UpperEnd,
     /// Least part of the map's share of the traffic while labels wait too, percent; 0: the layer is a background stream.
     pub share: u8,
-    /// The colours.
+    /// The colours in which levels are shown.
     pub palette: Palette,
     /// Between which levels the colours are spread.
     pub spread: Spread,
@@ -105,7 +105,7 @@ impl Palette {
     /// Every palette, in wire order.
     pub const ALL: [Self; 2] = [Self::Cividis, Self::Inferno];
 
-    /// Name in the API.
+    /// The name of this value in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cividis => "cividis",
@@ -118,7 +118,7 @@ impl Spread {
     /// Every spread, in wire order.
     pub const ALL: [Self; 3] = [Self::Scale, Self::Present, Self::Common];
 
-    /// Name in the API.
+    /// The name of this value in the API.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scale => "scale",

@@ -36,12 +36,12 @@ pub struct LayerSource {
 pub enum LayerCarried {
     /// So many bytes of the description.
     Descriptor(usize),
-    /// Levels of cells.
+    /// Cells with the levels that a patch carries.
     Levels(Vec<(Cell, u8)>),
 }
 
 impl LayerSource {
-    /// A layer without levels. A new level of a cell that the surface knows has to stand for `debounce` to be sent.
+    /// A layer in which every level is still unknown. A new level of a cell that the surface knows has to stand for `debounce` to be sent.
     pub fn new(id: LayerId, descriptor: LayerDescriptor, codec: Codec, debounce: Duration) -> Self {
         let mut levels = MapSource::new(codec);
         levels.set_debounce(debounce);
@@ -66,7 +66,7 @@ impl LayerSource {
         self.levels.set(levels, now)
     }
 
-    /// As [`MapSource::set_coarse_limit`].
+    /// Sets the backlog above which coarse cells go first, as [`MapSource::set_coarse_limit`] does.
     pub fn set_coarse_limit(&mut self, after_bytes: Option<usize>) {
         self.levels.set_coarse_limit(after_bytes);
     }
@@ -166,7 +166,7 @@ impl fmt::Debug for LayerReplica {
 }
 
 impl LayerReplica {
-    /// A layer without levels.
+    /// A layer in which every level is still unknown.
     pub fn new(descriptor: LayerDescriptor) -> Self {
         Self { descriptor, levels: Replica::default() }
     }

@@ -25,7 +25,7 @@ impl LayerId {
         (0..Self::COUNT).filter_map(Self::new)
     }
 
-    /// 0 to 15.
+    /// The index of the layer, 0 to 15.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
@@ -59,7 +59,7 @@ impl FromIterator<LayerId> for LayerMask {
 pub struct LayerSet(BTreeMap<LayerId, LayerDescriptor>);
 
 impl Default for LayerSet {
-    /// The built-in layers.
+    /// The built-in layers: depth, confidence, curiosity.
     fn default() -> Self {
         Self(BUILT_IN_LAYERS.iter().map(|layer| (layer.id, layer.descriptor.clone())).collect())
     }
@@ -91,8 +91,8 @@ impl LayerSet {
         self.0.insert(id, layer);
     }
 
-    /// Adds a layer under the next free index; `None` if there are 16 already, or the description is not sound, or another
-    /// layer has the name.
+    /// Adds a layer under the next free index; `None` if there are 16 already, if the description is not sound, or if
+    /// another layer of the set has the same name.
     pub fn add(&mut self, layer: LayerDescriptor) -> Option<LayerId> {
         let free = LayerId::all().find(|&id| self.get(id).is_none())?;
         let is_new = layer.is_sound() && self.id(&layer.name).is_none();

@@ -160,11 +160,11 @@ mod tests {
     #[test]
     fn decisions_read_back_and_wrong_endings_are_refused() {
         for seed in 0..400 {
-            let said = decisions(seed, seed as usize % 97);
+            let coded = decisions(seed, seed as usize % 97);
             let mut head = BitWriter::default();
             head.put(5, seed % 11);
             let mut encoder = Encoder::new(head);
-            for &(bit, one) in &said {
+            for &(bit, one) in &coded {
                 encoder.code(bit, one);
             }
             let bits = encoder.bits();
@@ -174,7 +174,7 @@ mod tests {
                 let mut reader = BitReader::new(bytes);
                 reader.take(seed % 11).expect("head");
                 let mut decoder = Decoder::new(reader);
-                let right = said.iter().all(|&(bit, one)| decoder.code(false, one) == bit);
+                let right = coded.iter().all(|&(bit, one)| decoder.code(false, one) == bit);
                 (right, decoder.ended_well())
             };
             assert_eq!(ends_well(&bytes), (true, true), "seed {seed}");

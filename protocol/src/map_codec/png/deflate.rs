@@ -13,7 +13,6 @@ const TRIALS: [(i32, i32); 5] = [(6, 3), (7, 0), (10, 0), (10, 3), (10, 4)];
 /// The number of quick trials, which come first.
 const QUICK: usize = 2;
 
-/// Compressors, kept for reuse.
 pub(super) struct Deflater {
     compressors: Vec<CompressorOxide>,
 }

@@ -1,4 +1,4 @@
-//! Layout of the status, and what is refused.
+//! Layout of the status, and its refusals.
 
 use super::*;
 use crate::coordinates::WorldPoint;
@@ -92,14 +92,14 @@ proptest! {
             let version_low = if state == SlotState::Unknown { 0 } else { version_low };
             *slot = SlotReport { version_low, state };
         }
-        let (mut heard, mut first) = (VehicleStatus::default(), 0);
+        let (mut received, mut first) = (VehicleStatus::default(), 0);
         for _ in 0..=SLOTS {
             let Some((bytes, next)) = status.encode_report(room, first) else {
                 prop_assert!(room < 12);
                 return Ok(());
             };
             prop_assert!(bytes.len() <= room.max(10));
-            heard.read_report(&bytes).unwrap();
+            received.read_report(&bytes).unwrap();
             first = next;
             if first == 0 {
                 break;
@@ -108,7 +108,7 @@ proptest! {
         if room < 17 {
             status.placement = None;
         }
-        prop_assert_eq!((first, heard), (0, status));
+        prop_assert_eq!((first, received), (0, status));
     }
 
     #[test]

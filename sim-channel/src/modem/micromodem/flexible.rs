@@ -7,6 +7,8 @@ use super::sentence::{NmeaSentence, from_hex, to_hex};
 use super::signal::PacketSignal;
 use super::statistics;
 use super::transmitter::QueuedPacket;
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use std::time::Duration;
 
 /// The host sends flexible data: `$CCTDP,<dst>,<rate>,<ack>,<reserved>,<hex>`.
@@ -53,36 +55,8 @@ pub(super) fn on_packet(base: &mut MicromodemBase, packet: &Packet, signal: &Pac
 /// The frames as triples `crc_ok;nbytes;data`, joined by `;`.
 fn triples(frames: &[Option<Vec<u8>>], base64: bool) -> String {
     let triple = |frame: &Option<Vec<u8>>| match frame {
-        Some(bytes) => format!("1;{};{}", bytes.len(), if base64 { to_base64(bytes) } else { to_hex(bytes) }),
+        Some(bytes) => format!("1;{};{}", bytes.len(), if base64 { STANDARD.encode(bytes) } else { to_hex(bytes) }),
         None => "0;0;".to_string(),
     };
     frames.iter().map(triple).collect::<Vec<_>>().join(";")
-}
-
-/// Base64 of RFC 4648, with padding.
-fn to_base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let group = |chunk: &[u8]| {
-        let bits = chunk.iter().chain([&0, &0]).take(3).fold(0usize, |bits, byte| bits << 8 | usize::from(*byte));
-        let digit = |index: usize| {
-            let sextet = bits >> (18 - 6 * index) & 63;
-            if index <= chunk.len() { char::from(*ALPHABET.get(sextet).unwrap_or(&b'=')) } else { '=' }
-        };
-        [digit(0), digit(1), digit(2), digit(3)]
-    };
-    bytes.chunks(3).flat_map(group).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn base64_matches_the_examples_of_its_standard() {
-        let pairs =
-            [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foob", "Zm9vYg=="), ("foobar", "Zm9vYmFy")];
-        for (plain, coded) in pairs {
-            assert_eq!(to_base64(plain.as_bytes()), coded);
-        }
-    }
 }

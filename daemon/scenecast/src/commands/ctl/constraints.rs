@@ -19,9 +19,9 @@ pub(super) enum FenceCommand {
     /// Replace fence, keep-outs and return point by those of a GeoJSON file.
     #[command(after_help = FILE)]
     Set {
-        /// GeoJSON file
+        /// GeoJSON file with the outlines and the return point
         file: PathBuf,
-        /// The coordinates are metres east and north of the origin
+        /// Read the coordinates as metres east and north of the origin
         #[arg(long)]
         metres: bool,
     },
@@ -49,7 +49,8 @@ pub(super) enum ReturnPointCommand {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum LimitsCommand {
-    /// Replace the limits. A limit that is not given is removed; a reaction that is not given is as configured on the vehicle.
+    /// Replace the limits. A limit that is not given is removed; a reaction that is not given is
+    /// as configured on the vehicle.
     #[command(
         after_help = "Example: scenecast ctl limits set --depth 5..30 --silence 300 --on-silence return --wait 120"
     )]
@@ -70,7 +71,7 @@ pub(super) struct Limits {
     /// Maximum duration of the survey, including the return path
     #[arg(long, value_name = "SECONDS")]
     time: Option<f64>,
-    /// Longest silence of the surface
+    /// Maximum silence of the surface, seconds
     #[arg(long, value_name = "SECONDS")]
     silence: Option<f64>,
     /// Reaction to that silence: hold, return or surface
@@ -79,7 +80,7 @@ pub(super) struct Limits {
     /// Reaction outside of the fence, in a keep-out or out of a band
     #[arg(long, value_name = "REACTION")]
     on_breach: Option<String>,
-    /// Reaction to an abort
+    /// Reaction to an abort: hold, return or surface
     #[arg(long, value_name = "REACTION")]
     on_abort: Option<String>,
     /// Keep the last limits that are not given

@@ -42,7 +42,7 @@ pub(super) struct Ctl {
     /// File with the token of the surface, if it requires one
     #[arg(long, global = true, value_name = "FILE")]
     token_file: Option<PathBuf>,
-    /// Print JSON
+    /// Print JSON instead of text
     #[arg(long, global = true)]
     json: bool,
     /// Address of the vehicle, if there are several
@@ -60,11 +60,11 @@ enum Command {
     /// Print the state of mission, link and vehicles, with the age of each value.
     #[command(after_help = "Example: scenecast ctl status")]
     Status,
-    /// Write the operator's map in the format of the file's extension: .png (with world file and projection), .geojson, .ply,
-    /// .csv, .json.
+    /// Write the operator's map in the format of the file's extension: .png (with world file and
+    /// projection), .geojson, .ply, .csv, .json.
     #[command(after_help = "Example: scenecast ctl map --out reef.png")]
     Map {
-        /// File to write
+        /// File to write, replaced if it exists
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
     },
@@ -85,15 +85,16 @@ enum Command {
         #[command(subcommand)]
         change: Option<BudgetCommand>,
     },
-    /// Print the settings of the vehicle, requested and in force, or send others. Settings that are not given stay unchanged.
+    /// Print the settings of the vehicle, requested and in force, or send others. Settings that
+    /// are not given stay unchanged.
     #[command(after_help = SETTINGS_EXAMPLES)]
     Settings(SettingsArgs),
     /// Write an image of a label, and request it from the vehicle if the surface has none.
     #[command(after_help = EXEMPLAR_EXAMPLES)]
     Exemplar {
-        /// Label
+        /// Label on the map, 1 to 254
         label: u8,
-        /// File to write, WebP
+        /// WebP file to write, replaced if it exists
         #[arg(long, value_name = "FILE", required_unless_present = "cancel")]
         out: Option<PathBuf>,
         /// Request another image even if there is one
@@ -135,7 +136,7 @@ enum Command {
     /// Order the vehicle to abort: it ends its survey and carries out the reaction of its limits.
     #[command(after_help = "Example: scenecast ctl abort --yes --wait 60")]
     Abort {
-        /// Confirm the abort
+        /// Confirm the abort, which ends the survey
         #[arg(long)]
         yes: bool,
     },
@@ -177,8 +178,8 @@ struct SettingsArgs {
     /// lawnmower, greedy, horizon; "": as configured
     #[arg(long, value_name = "NAME")]
     planner: Option<String>,
-    /// Use the most informative settings whose stream fits a budget [default: the map's share of the vehicle's budget]. The options
-    /// above have precedence
+    /// Use the most informative settings whose stream fits a budget [default: the map's share of the
+    /// vehicle's budget]. The options above have precedence
     #[arg(long, value_name = "BIT/S", num_args = 0..=1, allow_negative_numbers = true)]
     fit: Option<Option<f64>>,
     /// Print the order instead of sending it
@@ -230,8 +231,8 @@ enum BudgetCommand {
         /// Minimum shares in percent by class, in total at most 100; other classes stay unchanged
         #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
         shares: Vec<(String, u8)>,
-        /// Background streams that use spare capacity, in this order: none, or different ones of finer, exemplars and the names
-        /// of layers
+        /// Background streams that use spare capacity, in this order: none, or different ones of finer,
+        /// exemplars and the names of layers
         #[arg(long, value_name = "STREAM,..", value_delimiter = ',')]
         background: Option<Vec<String>>,
     },

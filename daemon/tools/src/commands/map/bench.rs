@@ -13,37 +13,37 @@ use std::time::Instant;
 
 /// Measure a folder of numbered maps, each encoded against the one before, and the first against an empty map.
 ///
-/// Each step is decoded and compared with its map. The output also has the sizes of the best PNG files: the whole map of
-/// each step, and the smaller of delta image and dirty box. Their compression by zopfli takes most of the time.
+/// Each step is decoded and compared with its map. The output also has the sizes of the best PNG files: the whole map
+/// of each step, and the smaller of delta image and dirty box. Their compression by zopfli takes most of the time.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map bench --series steps --frame-bytes 256")]
-pub struct Bench {
+pub struct MapBench {
     /// Folder of indexed PNG files of one size, in the order of the last number in their names
     #[arg(long, value_name = "DIR")]
     series: PathBuf,
     #[command(flatten)]
     coding: Coding,
-    /// Print JSON
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
 
-/// Totals over a series.
+/// Totals over all steps of a series.
 #[derive(Debug, Default, Serialize)]
 struct Totals {
     steps: usize,
     frame_bytes: u16,
     #[serde(flatten)]
     sizes: Sizes,
-    /// Our bytes against those of whole PNG files; none if those are none.
+    /// Ratio of our bytes to those of whole PNG files; `None` if there are none.
     ratio_full: Option<f64>,
     ratio_delta: Option<f64>,
-    /// Mean and longest time of a step, encoding and decoding together.
+    /// Mean and maximum time of a step, encoding and decoding together, ms.
     step_ms_mean: f64,
     step_ms_max: f64,
 }
 
-impl Bench {
+impl MapBench {
     pub fn run(self) -> Result<(), UserError> {
         let files = numbered(&self.series)?;
         let mut totals = Totals { frame_bytes: self.coding.frame_bytes, ..Totals::default() };

@@ -1,4 +1,4 @@
-//! What the chunks of one change take.
+//! Sizes of the chunks of one change.
 
 use super::Coding;
 use super::zopfli_bytes::zopfli_bytes;
@@ -11,7 +11,7 @@ use serde::Serialize;
 pub struct Sizes {
     /// Bytes of all chunks, their heads included.
     pub(super) bytes: usize,
-    /// Frames that the chunks fill one after another, no chunk in two.
+    /// Number of frames that the chunks fill in order; no chunk is split.
     pub(super) frames: usize,
     pub(super) cells_changed: usize,
     pub(super) codec: String,
@@ -36,7 +36,7 @@ pub fn encode(coding: &Coding, base: &LabelRaster, target: &LabelRaster) -> Resu
     ChunkFile::encode(coding.codec, base, target, coding.frame_bytes.into()).map_err(refused)
 }
 
-/// Wrong input, for the files were read before.
+/// A coding error is wrong input: the files were read without error before.
 pub fn refused(error: ChunkFileError) -> UserError {
     UserError::Input(error.to_string())
 }

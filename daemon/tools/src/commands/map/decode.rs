@@ -17,7 +17,7 @@ pub struct Decode {
     /// File of chunks that map encode has written
     #[arg(long = "in", value_name = "FILE")]
     input: PathBuf,
-    /// Map to write
+    /// Map to write, an indexed PNG
     #[arg(long, value_name = "T2.png")]
     out: PathBuf,
 }

@@ -11,13 +11,13 @@ use std::path::PathBuf;
 
 /// Write the chunks that turn one map into another, and print their sizes as JSON.
 ///
-/// Maps are indexed PNG files: pixel value = label, 0 = unexplored, at most 254. "bytes" counts all bytes of all
-/// chunks with their heads. "png_full_bytes" and "png_delta_bytes" are the sizes of the best PNG files (zopfli; the delta
-/// as a whole image or cut to its box).
+/// Maps are indexed PNG files: pixel value = label, 0 = unexplored, at most 254. "bytes" counts all bytes of all chunks
+/// with their heads. "png_full_bytes" and "png_delta_bytes" are the sizes of the best PNG files (zopfli; the delta as a
+/// whole image or cut to its box).
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map encode --base yesterday.png --target today.png --out change.scmc")]
 pub struct Encode {
-    /// Map after the change
+    /// Map after the change, an indexed PNG
     #[arg(long, value_name = "T.png")]
     target: PathBuf,
     /// Map that the receiver has [default: an empty map]

@@ -4,7 +4,7 @@ use scenecast_core::UserError;
 use scenecast_protocol::map_codec::LabelRaster;
 use std::path::{Path, PathBuf};
 
-/// The map in an indexed PNG.
+/// Reads a map from an indexed PNG.
 pub fn read_map(path: &Path) -> Result<LabelRaster, UserError> {
     let bytes = std::fs::read(path).map_err(|e| UserError::file(path, e))?;
     LabelRaster::from_png(&bytes).map_err(|e| UserError::file(path, e))
@@ -19,7 +19,7 @@ pub fn same_size(base: (&Path, &LabelRaster), map: (&Path, &LabelRaster)) -> Res
     Err(UserError::file(map.0, format!("{} x {} cells; {base}; both must be the same", map.1.width, map.1.height)))
 }
 
-/// The PNG files of a folder by the number in their names.
+/// The PNG files of a folder, sorted by the last number in their names.
 pub fn numbered(dir: &Path) -> Result<Vec<PathBuf>, UserError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(|e| UserError::file(dir, e))? {
@@ -43,7 +43,7 @@ fn number(path: &Path) -> Result<u64, UserError> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let last = stem.rsplit(|c: char| !c.is_ascii_digit()).find(|digits| !digits.is_empty());
     let number = last.and_then(|digits| digits.parse().ok());
-    number.ok_or_else(|| UserError::file(path, "its name has no number below 2^64 that tells its place in the series"))
+    number.ok_or_else(|| UserError::file(path, "its name has no number below 2^64 for its position in the series"))
 }
 
 #[cfg(test)]
@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_number_of_a_name_tells_its_place() {
+    fn the_last_number_of_a_name_is_its_position() {
         let of = |name: &str| number(Path::new(name)).ok();
         assert_eq!(of("dir9/step-007.png"), Some(7));
         assert_eq!(of("reef2_12b.png"), Some(12));

@@ -20,7 +20,7 @@ pub enum Map {
     /// Decode such chunks into a map.
     Decode(decode::Decode),
     /// Measure a folder of numbered maps, each encoded against the one before.
-    Bench(bench::Bench),
+    Bench(bench::MapBench),
     /// Train the table that the context coder starts from.
     TrainPrior(train::TrainPrior),
 }
@@ -36,7 +36,7 @@ impl Map {
     }
 }
 
-/// How chunks are written.
+/// Options of the encoder for chunks.
 #[derive(Debug, Args)]
 struct Coding {
     /// Codec: auto (the smaller result for each chunk), png or context

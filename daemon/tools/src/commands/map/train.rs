@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 /// Train the table that the context coder starts from, on procedural maps. This takes minutes.
 ///
-/// Seed 1 and the default number of scenes give the built-in table, byte for byte. Both ends of a link must have the same
-/// table, so another one makes another wire format.
+/// Seed 1 and the default number of scenes give the built-in table, byte for byte. Both ends of a link must have the
+/// same table, so another one makes another wire format.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map train-prior --seed 1 --out prior.bin")]
 pub struct TrainPrior {
@@ -20,7 +20,7 @@ pub struct TrainPrior {
     /// Procedural maps to train on
     #[arg(long, value_name = "N", default_value_t = PRIOR_SCENES, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     scenes: u64,
-    /// Table to write
+    /// File to write the table to
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }

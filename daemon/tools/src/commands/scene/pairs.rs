@@ -1,4 +1,4 @@
-//! Images with their annotations beside them.
+//! Images with their annotations in the same folder.
 
 use scenecast_core::UserError;
 use std::collections::BTreeMap;
@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn each_annotation_finds_its_image_whatever_its_kind() {
+    fn each_annotation_finds_its_image_of_any_format() {
         let files = ["b.TIF", "b_label.png", "a.jpg", "a_label.png", "alone.png", "legend.txt"];
         let found = pairs(&folder("kinds", &files)).unwrap();
         let names: Vec<String> =
@@ -68,10 +68,10 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_pair_or_two_is_named() {
-        let said = |name: &str, files: &[&str]| pairs(&folder(name, files)).unwrap_err().to_string();
-        assert!(said("none", &["a.jpg"]).contains("no NAME_label.png"));
-        assert!(said("orphan", &["a_label.png"]).contains("a_label.png: no image a.jpg"));
-        assert!(said("twice", &["a_label.png", "a.jpg", "a.png"]).contains("two images"));
+    fn an_annotation_without_exactly_one_image_is_refused() {
+        let refusal = |name: &str, files: &[&str]| pairs(&folder(name, files)).unwrap_err().to_string();
+        assert!(refusal("none", &["a.jpg"]).contains("no NAME_label.png"));
+        assert!(refusal("orphan", &["a_label.png"]).contains("a_label.png: no image a.jpg"));
+        assert!(refusal("twice", &["a_label.png", "a.jpg", "a.png"]).contains("two images"));
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::progress::Progress;
 use crate::scene::{
-    Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, Outcome, Schedule, Source, Tum, WordsFile, learn, quality,
-    read_vocabulary, write,
+    Annotated, CELL_PX, FLAT_M, Frames, Intrinsics, Mosaic, RunReport, Schedule, Tum, WordSource, WordsFile, learn,
+    quality, read_vocabulary, write,
 };
 use clap::Args;
 use scene_model::topics::{Birth, SceneConfig, SceneModel};
@@ -13,14 +13,15 @@ use std::path::{Path, PathBuf};
 
 /// Label words, a mosaic or a sequence of images, and print the measurements as one line of JSON.
 ///
-/// Writes labels.png (indexed; pixel = label, 0 = unexplored; x to the right, y up; for stacked cells the label with most
-/// words in the column) and labels.csv (for each cell: its centre in metres, label, confidence and perplexity; of stacked
-/// cells, the one in the image comes last). Labels are numbered from 1 by age. The same seed gives the same labels with any
-/// number of threads.
+/// Writes labels.png (indexed; pixel = label, 0 = unexplored; x to the right, y up; for stacked cells the label with
+/// most words in the column) and labels.csv (for each cell: its centre in metres, label, confidence and perplexity; of
+/// stacked cells, the one in the image comes last). Labels are numbered from 1 by age. The same seed gives the same
+/// labels with any number of threads.
 ///
-/// "seconds" and "cpu_seconds" are wall and CPU time of resampling, "words_per_cpu_second" is resampled / cpu_seconds.
-/// "labels" counts the labels in use, "labels_used" those in labels.csv. The mutual information of labels and annotated
-/// classes is taken cell by cell, and its null value is that of the displaced labels. Without annotations both are null.
+/// "seconds" and "cpu_seconds" are wall and CPU time of resampling, "words_per_cpu_second" is resampled /
+/// cpu_seconds. "labels" counts the labels in use, "labels_used" those in labels.csv. The mutual information of
+/// labels and annotated classes is taken cell by cell, and its null value is that of the displaced labels.
+/// Without annotations both are null.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene run --mosaic reef.jpg --annotations classes.png --out run1
 Example: scenecast scene run --words words.csv --cell-size 0.5 --refine-rate 100000 --out run2
@@ -28,11 +29,11 @@ Example: scenecast scene run --source tum:rgbd_dataset_freiburg1_desk --cell-siz
 pub struct Run {
     #[command(flatten)]
     input: Input,
-    /// Classes. For a mosaic a grey or indexed image of its size, pixel = class; otherwise lines x,y,z,class. Class 255 is
-    /// ignored
+    /// Classes: for a mosaic a grey or indexed image of its size, pixel = class; otherwise
+    /// lines x,y,z,class; 255 is ignored
     #[arg(long, value_name = "LABELS")]
     annotations: Option<PathBuf>,
-    /// Other classes that are ignored
+    /// Further classes that are ignored
     #[arg(long, value_name = "CLASS,..", value_delimiter = ',', requires = "annotations")]
     ignore: Vec<u8>,
     /// Edge of a cell in metres, or three edges: x,y,z [default: 1 for words, 0.25 for tum, and otherwise 25 pixels]
@@ -46,7 +47,7 @@ pub struct Run {
     /// Number of words that are resampled per second of the input's time, while the input is read in order of time
     #[arg(long, value_name = "WORDS_PER_S", allow_negative_numbers = true)]
     refine_rate: Option<f64>,
-    /// Sampling threads
+    /// Number of threads that sample in parallel
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: u16,
     /// Folder for labels.png and labels.csv
@@ -54,7 +55,7 @@ pub struct Run {
     out: PathBuf,
 }
 
-/// Where words come from.
+/// The input: words, a mosaic or a sequence of images.
 #[derive(Debug, Args)]
 struct Input {
     #[command(flatten)]
@@ -85,13 +86,13 @@ struct Which {
     /// Image of the ground; its top left corner is the origin
     #[arg(long, value_name = "IMG")]
     mosaic: Option<PathBuf>,
-    /// tum:DIR: an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt; frames:DIR: images from above with
-    /// poses.csv
+    /// tum:DIR: an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt;
+    /// frames:DIR: downward images and poses.csv
     #[arg(long, value_name = "KIND:DIR")]
     source: Option<String>,
 }
 
-/// Parameters of the model.
+/// Parameters of the scene model.
 #[derive(Debug, Args)]
 struct Parameters {
     /// Prior count of each label in each cell
@@ -114,7 +115,7 @@ struct Parameters {
     seed: u64,
 }
 
-/// Edges of a cell in x, y, z; only one where all are equal.
+/// Edges of a cell in x, y, z, metres; `z` is `None` if one number was given for all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Edges {
     x: f64,
@@ -132,12 +133,12 @@ fn edges(text: &str) -> Result<Edges, String> {
     }
 }
 
-/// A source with all that goes with it.
+/// A source with its vocabulary, cells and annotations.
 struct Opened {
-    source: Box<dyn Source>,
+    source: Box<dyn WordSource>,
     vocabulary: u32,
     cell_m: [f64; 3],
-    /// Edge of a cell in pixels, for a mosaic.
+    /// Edge of a cell in pixels; only a mosaic uses it.
     cell_px: f32,
     annotated: Option<Annotated>,
 }
@@ -153,23 +154,23 @@ impl Run {
         let mut progress = Progress::new("labels");
         let effort = learn(&mut model, source.as_mut(), schedule, &mut |share| progress.show(share))?;
         drop(progress);
-        let passed_over = source.skipped();
+        let skipped = source.skipped();
         if model.words() == 0 {
-            let what = passed_over.unwrap_or_else(|| "the source gave none".to_owned());
-            return Err(UserError::Input(format!("there are no words to label: {what}")));
+            let cause = skipped.unwrap_or_else(|| "the source gave none".to_owned());
+            return Err(UserError::Input(format!("there are no words to label: {cause}")));
         }
-        if let Some(what) = passed_over {
-            eprintln!("scenecast: {what}");
+        if let Some(skipped) = skipped {
+            eprintln!("scenecast: {skipped}");
         }
         if effort.skipped.skipped_full > 0 {
-            eprintln!("scenecast: {} words of full cells passed over", effort.skipped.skipped_full);
+            eprintln!("scenecast: {} words of full cells skipped", effort.skipped.skipped_full);
         }
         let mut quality = annotated.map(|annotated| quality(&model, &annotated, cell_px)).transpose()?;
         if quality.take_if(|quality| quality.mutual_information.n == 0).is_some() {
-            eprintln!("scenecast: no cell of the map is annotated, so there is nothing to compare with");
+            eprintln!("scenecast: no cell of the map is annotated, so the labels are not scored");
         }
-        let outcome = Outcome::new(&model, &effort, quality.as_ref());
-        let line = serde_json::to_string(&outcome).map_err(|e| UserError::Failed(e.to_string()))?;
+        let report = RunReport::new(&model, &effort, quality.as_ref());
+        let line = serde_json::to_string(&report).map_err(|e| UserError::Failed(e.to_string()))?;
         write(&model, &self.out)?;
         println!("{line}");
         Ok(())
@@ -199,7 +200,7 @@ impl Run {
         let vocabulary = extractor.vocabulary_size();
         let dir = Path::new(dir);
         let annotated = self.places()?;
-        let (source, cell_m): (Box<dyn Source>, _) = match kind {
+        let (source, cell_m): (Box<dyn WordSource>, _) = match kind {
             "tum" => {
                 let scale = self.input.depth_scale;
                 if !(1.0..=1e6).contains(&scale) {
@@ -261,13 +262,13 @@ impl Run {
         Err(UserError::Input(format!("--metres-per-pixel {metres}: it takes metres from 0.000001 to 1000")))
     }
 
-    /// Cells of a world with height.
+    /// Edges of cells in three dimensions, metres.
     fn cubes(&self, usual: f64) -> [f64; 3] {
         let edges = self.cell_size.unwrap_or(Edges { x: usual, y: usual, z: None });
         [edges.x, edges.y, edges.z.unwrap_or(edges.x)]
     }
 
-    /// Cells of a flat world.
+    /// Edges of the cells of a flat world, metres.
     fn columns(&self, usual: f64) -> [f64; 3] {
         let edges = self.cell_size.unwrap_or(Edges { x: usual, y: usual, z: None });
         [edges.x, edges.y, edges.z.unwrap_or(FLAT_M)]

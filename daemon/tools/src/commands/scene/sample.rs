@@ -7,19 +7,19 @@ use scenecast_files::write_whole;
 use scenecast_worlds::{LabelWorld, sample};
 use std::path::PathBuf;
 
-/// Words in each cell of a world; the cell shows the label that most of them have.
-const CUSTOMERS: u32 = 16;
-/// Edge of the picture aimed at, pixels.
-const PICTURE_PX: u32 = 960;
-/// Most pixels of a picture.
+/// Words in each cell of a world; the cell shows their most frequent label.
+const WORDS_PER_CELL: u32 = 16;
+/// Approximate edge of the image, pixels.
+const IMAGE_PX: u32 = 960;
+/// Maximum number of pixels of the image.
 const MAX_PIXELS: u64 = 1 << 24;
 /// Palette index of the space between worlds; labels have 1 to 254.
 const PAPER: u8 = 255;
 
-/// Draw random worlds from the model's prior, to show the maps that alpha and gamma favour
+/// Draw random worlds from the model's prior, to show the maps that alpha and gamma favour.
 ///
-/// Each world has a seed of its own. Each colour is a label, and the oldest label of each world has the first colour. Colours
-/// repeat in worlds with more than 254 labels.
+/// Each world has a seed of its own. Each colour is a label, and the oldest label of each world has the first colour.
+/// Colours repeat in worlds with more than 254 labels.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast scene sample --alpha 0.001 --gamma 0.3 --size 64x64 --grid 3x3 --seed 1 --out worlds.png"
@@ -40,7 +40,7 @@ pub struct Sample {
     /// Seed of the first world; the others follow from it
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Indexed PNG to write
+    /// File to write, an indexed PNG
     #[arg(long, value_name = "FILE.png")]
     out: PathBuf,
 }
@@ -64,7 +64,7 @@ impl Sample {
         let mut pixels = vec![PAPER; sheet.width as usize * sheet.height as usize];
         for index in 0..worlds {
             let (columns, rows) = (self.size.0 as usize, self.size.1 as usize);
-            let world = sample(self.seed.wrapping_add(index), columns, rows, self.alpha, self.gamma, CUSTOMERS);
+            let world = sample(self.seed.wrapping_add(index), columns, rows, self.alpha, self.gamma, WORDS_PER_CELL);
             sheet.draw(&world, index as u32, &mut pixels);
         }
         let png = encode(sheet.width, sheet.height, &pixels).map_err(|e| UserError::Failed(e.to_string()))?;
@@ -72,11 +72,11 @@ impl Sample {
     }
 }
 
-/// Where the worlds are in the picture.
+/// The arrangement of the worlds in the image.
 struct Sheet {
     across: u32,
     size: (u32, u32),
-    /// Pixels of a cell's edge.
+    /// Edge of a cell in the image, pixels.
     scale: u32,
     gap: u32,
     width: u32,
@@ -86,13 +86,13 @@ struct Sheet {
 impl Sheet {
     fn new(size: (u32, u32), grid: (u32, u32)) -> Result<Self, UserError> {
         let cells = (size.0 * grid.0).max(size.1 * grid.1);
-        let scale = (PICTURE_PX / cells).max(1);
-        let gap = (PICTURE_PX / 80).max(1);
+        let scale = (IMAGE_PX / cells).max(1);
+        let gap = (IMAGE_PX / 80).max(1);
         let length = |cells: u32, worlds: u32| worlds * (cells * scale + gap) + gap;
         let (width, height) = (length(size.0, grid.0), length(size.1, grid.1));
         if u64::from(width) * u64::from(height) > MAX_PIXELS {
-            let what = format!("--size and --grid make {width} x {height} pixels, more than the {MAX_PIXELS} allowed");
-            return Err(UserError::Input(what));
+            let cause = format!("--size and --grid make {width} x {height} pixels, more than the {MAX_PIXELS} allowed");
+            return Err(UserError::Input(cause));
         }
         Ok(Self { across: grid.0, size, scale, gap, width, height })
     }

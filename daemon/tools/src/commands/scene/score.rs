@@ -17,8 +17,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Score the scene model and two baselines on annotated images of the sea floor.
 ///
 /// Each NAME_label.png (grey or indexed, pixel value = class) belongs to the image NAME.jpg, .png or .tif of the same
-/// size. The spatial null value is the mean mutual information of a method's map after 3 flips and 12 torus shifts: that of
-/// any map with such patches. The excess over it measures the information that the map takes from the image.
+/// size. The spatial null value is the mean mutual information of a method's map after 3 flips and 12 torus shifts:
+/// that of any map with such patches. The excess over it measures the information that the map takes from the image.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene score --dir reefs --seeds 3 --json")]
 pub struct Score {
@@ -31,23 +31,23 @@ pub struct Score {
     /// Maximum number of labels of each method
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..=254))]
     max_labels: u32,
-    /// Cells across an image
+    /// Number of cells across an image
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(4..=1000))]
     cells_across: u32,
     /// Sweeps of the scene model over all words
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     sweeps: u32,
-    /// Classes that are ignored
+    /// Classes that are ignored, separated by commas
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
-    /// Print JSON
+    /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
 
-/// All scores of a folder.
+/// The scores of all images of a folder.
 #[derive(Debug, Serialize)]
-struct Report {
+struct ScoreReport {
     max_labels: u32,
     cells_across: u32,
     sweeps: u32,
@@ -55,9 +55,9 @@ struct Report {
     ignored_classes: Vec<u8>,
     kernel: &'static str,
     scenes: Vec<SceneReport>,
-    /// Over the scenes, figure by figure and method by method.
+    /// Medians over the scenes of each score, by method.
     median: BTreeMap<&'static str, MeanScore>,
-    /// Of the scene model over each baseline, mean over the scenes.
+    /// Gain of the scene model over each baseline, mean over the scenes.
     mean_gain: BTreeMap<&'static str, Gain>,
 }
 
@@ -96,7 +96,7 @@ impl Score {
         Ok(())
     }
 
-    /// Scores of all scenes in the order of their names, on all cores; the first problem in that order if there is one.
+    /// Scores of all scenes in the order of their names, on all cores; or the first error in that order.
     fn scenes(&self, trial: Trial, pairs: &[Pair]) -> Result<Vec<SceneReport>, UserError> {
         let (next, steps) = (AtomicUsize::new(0), pairs.len() * Method::ALL.len());
         let done = Mutex::new((BTreeMap::new(), Progress::new("scenes"), 0));
@@ -124,7 +124,7 @@ impl Score {
         scenes.into_values().collect()
     }
 
-    fn report(self, scenes: Vec<SceneReport>) -> Report {
+    fn report(self, scenes: Vec<SceneReport>) -> ScoreReport {
         let of = |method: Method| scenes.iter().map(move |scene| scene.methods[method.name()]);
         let median = Method::ALL.map(|method| (method.name(), MeanScore::median(&of(method).collect::<Vec<_>>())));
         let gain_over = |baseline: Method| {
@@ -135,7 +135,7 @@ impl Score {
             Gain { mutual_information_nats: gain(|s| s.mutual_information_nats), excess_nats: gain(|s| s.excess_nats) }
         };
         let mean_gain = [Method::MeanLab, Method::PooledWords].map(|baseline| (baseline.name(), gain_over(baseline)));
-        Report {
+        ScoreReport {
             max_labels: self.max_labels,
             cells_across: self.cells_across,
             sweeps: self.sweeps,
@@ -154,7 +154,7 @@ fn scene(trial: Trial, pair: &Pair, ignore: &[u8], step: &dyn Fn()) -> Result<Sc
     let (width_px, height_px) = image.dimensions();
     let classes = read_classes(&pair.classes, image.dimensions())?;
     let classes = GrayImage::from_raw(width_px, height_px, classes)
-        .ok_or_else(|| UserError::file(&pair.classes, "has another number of pixels than its head says"))?;
+        .ok_or_else(|| UserError::file(&pair.classes, "has another number of pixels than its header states"))?;
     let refused = |error: TrialError| {
         let of_classes = matches!(error, TrialError::Annotations(_) | TrialError::NoClasses);
         UserError::file(if of_classes { &pair.classes } else { &pair.image }, error)
@@ -183,7 +183,7 @@ fn name(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-impl Report {
+impl ScoreReport {
     fn print(&self) {
         println!("K {}, {} sweeps, mean of {} seeds, nats", self.max_labels, self.sweeps, self.seeds);
         println!("{:<20} {:<20} {:>6} {:>6} {:>6} {:>7}", "scene", "method", "MI", "NMI", "null", "excess");

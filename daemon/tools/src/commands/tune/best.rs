@@ -1,9 +1,9 @@
-//! The setting to take to sea.
+//! The best setting as a configuration file.
 
 use scenecast_config::Config;
 use scenecast_core::tuning_table::{Measurement, Row};
 
-/// The setting as a configuration file, with everything else of the scene model that it was found with.
+/// A configuration file with the setting and the other parameters of the scene model that it was measured with.
 pub fn toml(row: &Row, config: &Config, budget_bps: f64) -> String {
     let Measurement { mutual_information_nats, normalised_mutual_information, map_bytes, stream_bps, .. } =
         row.measurement;
@@ -34,7 +34,7 @@ mod tests {
     use scenecast_protocol::directive::CellBand;
 
     #[test]
-    fn it_can_be_loaded_as_a_configuration() {
+    fn the_best_setting_can_be_loaded_as_a_configuration() {
         let path = std::env::temp_dir().join(format!("scenecast-{}-best.toml", std::process::id()));
         let shipped = TuningTable::shipped();
         let row = shipped.rows().find(|row| row.setting.cells == CellBand::Coarse).unwrap();

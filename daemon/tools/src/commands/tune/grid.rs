@@ -1,4 +1,4 @@
-//! The settings that are tried.
+//! The grid of settings to measure.
 
 use scenecast_config::Config;
 use scenecast_config::cell_m;
@@ -16,7 +16,7 @@ pub struct Grid {
     alpha: Vec<f64>,
     beta: Vec<f64>,
     gamma: Vec<f64>,
-    /// These empty: that of the configuration.
+    /// This list and those below: if empty, the configured value.
     cell_m: Vec<f64>,
     refine_words_per_s: Vec<f64>,
     frames_per_s: Vec<f64>,
@@ -39,17 +39,17 @@ impl Default for Grid {
     }
 }
 
-/// Most settings of a grid.
-const MAX: usize = 100_000;
+/// Maximum number of settings of a grid.
+const MAX_SETTINGS: usize = 100_000;
 
 impl Grid {
-    /// The grid in a file, or the paper's; what it does not name is as configured.
+    /// The grid in a file, or the paper's; parameters that it does not name have their configured values.
     pub fn load(path: Option<&Path>, config: &Config) -> Result<Self, UserError> {
         let mut grid = match path {
             None => Self::default(),
             Some(path) => {
                 let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
-                Self::read(&text).map_err(|what| UserError::Input(format!("{}{what}", path.display())))?
+                Self::read(&text).map_err(|cause| UserError::Input(format!("{}{cause}", path.display())))?
             }
         };
         let every_frame = config.camera.rate_hz;
@@ -97,8 +97,8 @@ impl Grid {
         }
         let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len()]);
         let count = count.map(|n| n.max(1)).fold(1usize, usize::saturating_mul);
-        if count > MAX {
-            return Err(format!(": {count} settings; at most {MAX} are allowed"));
+        if count > MAX_SETTINGS {
+            return Err(format!(": {count} settings; at most {MAX_SETTINGS} are allowed"));
         }
         grid.drop_repeats();
         Ok(grid)
@@ -118,7 +118,7 @@ impl Grid {
         each_once(&mut self.cells);
     }
 
-    /// All settings, those with the same cells one after another, none twice.
+    /// All settings without repeats, grouped by the size of cells.
     pub fn settings(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
         for &cell_m in &self.cell_m {
@@ -134,7 +134,7 @@ impl Grid {
         settings
     }
 
-    /// The first value of each list that need not be named.
+    /// The first value of each optional list; the priors are 0.
     fn first(&self) -> Setting {
         let of = |values: &[f64]| values.first().copied().unwrap_or_default();
         Setting {
@@ -162,7 +162,7 @@ impl Grid {
     }
 }
 
-/// The bands of cells that a setting may have. Coarse to fine is none of them: it ends with every cell sent, as fine does.
+/// Reads the bands of cells. Coarse to fine is refused: it ends with every cell sent, as fine does.
 fn bands<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<CellBand>, D::Error> {
     let band = |name: String| {
         let band = CellBand::from_name(&name).filter(|&band| band != CellBand::CoarseToFine);
@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_file_it_is_the_grid_of_the_paper() {
+    fn the_default_grid_is_that_of_the_paper() {
         let settings = Grid::load(None, &Config::default()).unwrap().settings();
         assert_eq!(settings.len(), 36);
         let first = settings[0];
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_gives_what_it_names_and_no_setting_twice() {
+    fn a_file_overrides_the_lists_that_it_names_without_repeats() {
         let path = std::env::temp_dir().join(format!("scenecast-{}-grid.toml", std::process::id()));
         let text = "alpha = [1, 0.5, 1]\ncell_m = [0.1, 0.2]\nframes_per_s = [0.5, 0.1]\ncells = ['fine', 'coarse']\n";
         std::fs::write(&path, text).unwrap();
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_file_is_answered_with_line_and_range() {
+    fn a_wrong_file_is_refused_with_its_line_and_range() {
         assert!(Grid::read("alpha = [1]\nbta = [1]").unwrap_err().starts_with(":2: unknown field `bta`"));
         assert!(Grid::read("beta = [0]").unwrap_err().contains("beta has 0; it takes numbers from"));
         assert!(Grid::read("cells = ['huge']").unwrap_err().contains("it takes fine and coarse"));

@@ -1,4 +1,4 @@
-//! What a setting reaches and what its map takes.
+//! Measurement of one setting: the quality of its map and the bytes of its stream.
 
 use super::survey::Survey;
 use scene_model::publish::LabelBook;
@@ -11,7 +11,7 @@ use scenecast_protocol::map_codec::{Stride, encode_all};
 use scenecast_scoring::{LabelGrid, score};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Flies the survey with a setting, then sweeps over all words.
+/// Runs the survey with a setting, then sweeps over all words.
 pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, UserError> {
     let config = survey.config;
     let codec = config.map.codec;
@@ -26,10 +26,11 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
     let is_coarse = setting.cells == CellBand::Coarse;
     let interval = |index: usize| (index as f64 * survey.step_s * setting.frames_per_s + 1e-6).floor();
     let (mut last, mut refined) = (None, 0);
-    // A label has its id when it has lasted for two maps, so the last map is told once more after the last frame.
+    // A topic gets a label when it has lasted for two maps, so the last map is published again after the last frame.
     for (index, seen) in survey.frames().map(Some).chain([None]).enumerate() {
         if let Some(seen) = seen {
-            // As at sea: of each interval of the frame rate the first frame is seen, and no refinement is lost.
+            // As on the vehicle: of each interval of the frame rate only the first frame is used; its refinement also
+            // covers the skipped ones.
             if last.is_some_and(|last| interval(last) == interval(index)) {
                 continue;
             }
@@ -44,7 +45,7 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
         if book.epoch() != epoch {
             sent = map::LabelGrid::default();
         }
-        let target = told(published.iter().map(|cell| (Cell::new(cell.x, cell.y), cell.label)), is_coarse);
+        let target = sent_cells(published.iter().map(|cell| (Cell::new(cell.x, cell.y), cell.label)), is_coarse);
         streamed += bytes(&sent, &target)?;
         sent = target;
     }
@@ -60,18 +61,18 @@ pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -
         null_mutual_information_nats: scored.null_nats,
         mosaic_mutual_information_nats: score(&labels, &survey.colours).mutual_information.nats,
         labels: scored.labels,
-        map_bytes: bytes(&map::LabelGrid::default(), &told(numbered(&map), is_coarse))?,
+        map_bytes: bytes(&map::LabelGrid::default(), &sent_cells(numbered(&map), is_coarse))?,
         stream_bps: streamed as f64 * 8.0 / survey.duration_s(),
     })
 }
 
-/// The cells that are told. The lattice of the coarse ones is told as a map of its own: its chunks see nothing else.
-fn told(cells: impl Iterator<Item = (Cell, u8)>, is_coarse: bool) -> map::LabelGrid {
+/// The cells that are sent. Coarse cells are sent as a map of their own, so that their chunks have no finer neighbours.
+fn sent_cells(cells: impl Iterator<Item = (Cell, u8)>, is_coarse: bool) -> map::LabelGrid {
     let stride = if is_coarse { Stride::Four } else { Stride::One };
     cells.filter_map(|(cell, label)| Some((stride.on_lattice(cell)?, label))).collect()
 }
 
-/// What an operator sees of coarse cells: each stands for the block of which it is the south-west corner.
+/// The operator's map of coarse cells: each fills the block of which it is the south-west corner.
 fn blocks(map: &[FlatCell]) -> Vec<FlatCell> {
     let side = Stride::Four.cells();
     let corners: BTreeMap<(i32, i32), FlatCell> = map.iter().map(|cell| ((cell.x, cell.y), *cell)).collect();
@@ -79,10 +80,10 @@ fn blocks(map: &[FlatCell]) -> Vec<FlatCell> {
     map.iter().filter_map(|cell| Some(FlatCell { topic: corner(cell)?.topic, ..*cell })).collect()
 }
 
-/// The mean of the figures of several sites.
+/// The mean of the measurements at several sites.
 pub fn mean(of: &[Measurement]) -> Measurement {
     let n = of.len().max(1) as f64;
-    let mean = |figure: fn(&Measurement) -> f64| of.iter().map(figure).sum::<f64>() / n;
+    let mean = |value: fn(&Measurement) -> f64| of.iter().map(value).sum::<f64>() / n;
     Measurement {
         mutual_information_nats: mean(|m| m.mutual_information_nats),
         normalised_mutual_information: mean(|m| m.normalised_mutual_information),

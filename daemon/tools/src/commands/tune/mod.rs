@@ -3,7 +3,7 @@
 mod best;
 mod grid;
 mod measure;
-mod picture;
+mod plot;
 mod survey;
 
 use crate::progress::Progress;
@@ -21,9 +21,9 @@ use survey::{Site, Survey};
 
 /// Find the settings of the scene model whose maps agree best with annotations of a similar site.
 ///
-/// For each setting, a virtual camera surveys the mosaic line by line, the scene model refines as at sea, and each change of
-/// the map is encoded as in the stream (map chunks only, without loss). Then the model sweeps over all words, and the map is
-/// compared with the annotations. An interrupted run resumes.
+/// For each setting, a virtual camera surveys the mosaic line by line, the scene model refines as at sea, and each
+/// change of the map is encoded as in the stream (map chunks only, without loss). Then the model sweeps over all words,
+/// and the map is compared with the annotations. An interrupted run resumes.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
@@ -42,10 +42,12 @@ pub struct Tune {
     /// Seeds of procedural sea floors, instead of an image; the results are means over them
     #[arg(long, value_name = "SEEDS", value_delimiter = ',', conflicts_with_all = ["mosaic", "annotations"])]
     procedural: Vec<u64>,
-    /// Classes that are ignored
+    /// Classes that are ignored, separated by commas
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
-    /// TOML file with lists alpha, beta, gamma, cell_m (metres), refine_words_per_s, frames_per_s and cells ("fine", "coarse"), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4, 1e-5; the rest as configured]
+    /// TOML file with lists alpha, beta, gamma, cell_m (metres), refine_words_per_s, frames_per_s and cells ("fine",
+    /// "coarse"), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4,
+    /// 1e-5; the rest as configured]
     #[arg(long, value_name = "FILE")]
     grid: Option<PathBuf>,
     /// Maximum rate of the stream of the best setting, bit/s [default: link.budget_bps]
@@ -60,7 +62,7 @@ pub struct Tune {
     /// Number of settings that are measured in parallel [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Configuration file
+    /// Configuration file of the vehicle
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Set a key of the configuration, as in scene.max_labels=32 (scenecast config lists them)
@@ -83,7 +85,7 @@ impl Tune {
         std::fs::create_dir_all(&self.out).map_err(|e| UserError::file(&self.out, e))?;
         let inputs = Site::fingerprint(&sites, &format!("{} sweeps, seed {}", self.sweeps, self.seed));
         let path = self.out.join("tuning.csv");
-        let mut table = Growing { table: open(&path, &inputs)?, path, inputs };
+        let mut table = GrowingTable { table: open(&path, &inputs)?, path, inputs };
         let settings = grid.settings();
         let left: Vec<Setting> = settings.iter().copied().filter(|setting| !table.table.has(setting)).collect();
         if left.len() < settings.len() {
@@ -107,8 +109,8 @@ impl Tune {
         }
     }
 
-    /// Measures settings, those with one size of cells after another, each written down as soon as it is known.
-    fn search(&self, sites: &[Site<'_>], settings: &[Setting], table: &mut Growing) -> Result<(), UserError> {
+    /// Measures settings grouped by the size of their cells; each measurement is written to the table at once.
+    fn search(&self, sites: &[Site<'_>], settings: &[Setting], table: &mut GrowingTable) -> Result<(), UserError> {
         let progress = Mutex::new((Progress::new("settings"), 0));
         let table = Mutex::new(table);
         for same_cells in settings.chunk_by(|a, b| a.cell_m == b.cell_m) {
@@ -140,19 +142,19 @@ impl Tune {
 
     fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), UserError> {
         let best = most(rows.iter().filter(|row| row.measurement.stream_bps <= budget_bps));
-        let figure = picture::Figure::new(rows, best);
-        write_whole(&self.out.join("tuning.svg"), figure.svg().as_bytes())?;
-        write_whole(&self.out.join("tuning.png"), &figure.png()?)?;
+        let plot = plot::Plot::new(rows, best);
+        write_whole(&self.out.join("tuning.svg"), plot.svg().as_bytes())?;
+        write_whole(&self.out.join("tuning.png"), &plot.png()?)?;
         let path = self.out.join("best.toml");
         let Some(best) = best else {
-            // One of an earlier run would pass for the answer.
+            // The file of an earlier run would be taken for the result.
             match std::fs::remove_file(&path) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(UserError::file(&path, e)),
                 _ => {}
             }
             let least = least(rows.iter()).map_or(f64::INFINITY, |row| row.measurement.stream_bps);
-            let what = format!("the stream of no setting fits --budget {budget_bps} bit/s: the least is {least:.0}");
-            return Err(UserError::Failed(what));
+            let cause = format!("no setting's stream fits --budget {budget_bps} bit/s: the lowest has {least:.0}");
+            return Err(UserError::Failed(cause));
         };
         write_whole(&path, best::toml(best, config, budget_bps).as_bytes())?;
         let Measurement { mutual_information_nats, map_bytes, stream_bps, .. } = best.measurement;
@@ -165,15 +167,15 @@ impl Tune {
     }
 }
 
-/// The table of a run, written with each setting that is measured.
-struct Growing {
+/// The table of a run, rewritten after each measurement.
+struct GrowingTable {
     table: TuningTable,
     path: PathBuf,
-    /// Fingerprint of everything but the setting that the figures depend on.
+    /// Fingerprint of all inputs of a measurement except the setting.
     inputs: String,
 }
 
-impl Growing {
+impl GrowingTable {
     fn add(&mut self, setting: Setting, measurement: Measurement) -> Result<(), UserError> {
         self.table.insert(self.inputs.clone(), Row { setting, measurement });
         write_whole(&self.path, self.table.text().as_bytes())
@@ -182,17 +184,17 @@ impl Growing {
 
 /// The table of an earlier run with the same inputs, or an empty one.
 fn open(path: &Path, inputs: &str) -> Result<TuningTable, UserError> {
-    let refused = |line: usize, what: String| UserError::Input(format!("{}:{line}: {what}", path.display()));
+    let refused = |line: usize, cause: String| UserError::Input(format!("{}:{line}: {cause}", path.display()));
     let table = match std::fs::read_to_string(path) {
         Ok(text) => {
-            TuningTable::read(&text).map_err(|(line, what)| refused(line, format!("{what}; give another --out")))?
+            TuningTable::read(&text).map_err(|(line, cause)| refused(line, format!("{cause}; give another --out")))?
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => TuningTable::default(),
         Err(e) => return Err(UserError::file(path, e)),
     };
-    let what = "was measured with another sea floor, annotations or options than this run's";
+    let cause = "was measured with another sea floor, annotations or options than this run's";
     match table.line_of_others(inputs) {
-        Some(line) => Err(refused(line, format!("{what}; give those again, or another --out"))),
+        Some(line) => Err(refused(line, format!("{cause}; give those again, or another --out"))),
         None => Ok(table),
     }
 }

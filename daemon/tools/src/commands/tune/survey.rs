@@ -11,15 +11,15 @@ use scenecast_files::{read_classes, read_image};
 use scenecast_scoring::{Annotations, mosaic_classes};
 use std::path::Path;
 
-/// Part of a frame by which neighbouring lines, and frames along a line, overlap at least.
-const OVERLAP: f64 = 0.1;
-/// Most words of a survey: 1.5 GB of them.
+/// Minimum overlap of neighbouring frames and lines, as a share of a frame's edge.
+const MIN_OVERLAP: f64 = 0.1;
+/// Maximum number of words of a survey: 1.5 GB of memory.
 const MAX_WORDS: f64 = 1e8;
 const MIN_PX: u32 = 64;
-/// Width and height of a sea floor that is drawn, and about the size of its patches, pixels.
+/// Width and height of a procedural sea floor, and the approximate size of its patches, pixels.
 const REEF_PX: (u32, u32, u32) = (2600, 1800, 100);
 
-/// What all settings have in common.
+/// The inputs that all settings share.
 pub struct Site<'a> {
     image: RgbImage,
     classes: GrayImage,
@@ -33,8 +33,8 @@ impl<'a> Site<'a> {
         let image = read_image(mosaic)?.to_rgb8();
         let (width, height) = image.dimensions();
         if width.min(height) < MIN_PX {
-            let what = format!("the image has {width} x {height} pixels; a mosaic needs at least 64 x 64");
-            return Err(UserError::file(mosaic, what));
+            let cause = format!("the image has {width} x {height} pixels; a mosaic needs at least 64 x 64");
+            return Err(UserError::file(mosaic, cause));
         }
         let classes = read_classes(annotations, image.dimensions())?;
         if classes.iter().all(|class| ignore.contains(class)) {
@@ -45,11 +45,11 @@ impl<'a> Site<'a> {
         digest.update(image.as_raw());
         digest.update(&classes);
         let classes = GrayImage::from_raw(width, height, classes)
-            .ok_or_else(|| UserError::file(annotations, "has another number of pixels than its head says"))?;
+            .ok_or_else(|| UserError::file(annotations, "has another number of pixels than its header states"))?;
         Ok(Self { image, classes, ignore, config, crc: digest.finalize() })
     }
 
-    /// A sea floor that is drawn, with every pixel annotated.
+    /// A procedural sea floor, with every pixel annotated.
     pub fn procedural(seed: u64, config: &'a Config) -> Self {
         let reef = scenecast_worlds::reef(seed, REEF_PX.0, REEF_PX.1, REEF_PX.2, 8);
         let classes = GrayImage::from_raw(reef.width, reef.height, reef.truth).unwrap_or_default();
@@ -57,7 +57,7 @@ impl<'a> Site<'a> {
         Self { image: reef.image, classes, ignore: &[], config, crc }
     }
 
-    /// 16 hexadecimal digits over everything but the setting that a measurement of these sites depends on.
+    /// 16 hexadecimal digits over all inputs of a measurement of these sites except the setting.
     pub fn fingerprint(sites: &[Self], options: &str) -> String {
         let Some(Self { config, ignore, .. }) = sites.first() else { return String::new() };
         let Config { camera, scene, survey, link, map, .. } = config;
@@ -81,10 +81,10 @@ impl<'a> Site<'a> {
     }
 }
 
-/// The frames of a survey as words, with cells of one size.
+/// The frames of a survey as words, for one size of cells.
 pub struct Survey<'a> {
     pub(super) config: &'a Config,
-    /// The annotations on the map's cells, and the colours of the mosaic as if they were some.
+    /// The annotations of the map's cells, and the mosaic's colours as a second set of classes.
     pub(super) annotations: Annotations,
     pub(super) colours: Annotations,
     camera: DownCamera,
@@ -101,10 +101,10 @@ impl<'a> Survey<'a> {
         let cell_px = (cell_m / mpp) as f32;
         let (width, height) = site.image.dimensions();
         if !(1.0..=width.min(height) as f32 / 4.0).contains(&cell_px) {
-            let what = format!("cells of {cell_m} m are {cell_px} pixels of {mpp} m");
+            let cells = format!("cells of {cell_m} m are {cell_px} pixels of {mpp} m");
             let allowed = format!("1 to {} pixels are allowed with this mosaic", width.min(height) / 4);
             return Err(UserError::Input(format!(
-                "{what}; {allowed} (--metres-per-pixel, scene.cell_m, the grid's cell_m)"
+                "{cells}; {allowed} (--metres-per-pixel, scene.cell_m, the grid's cell_m)"
             )));
         }
         let size = (config.camera.width_px.min(width), config.camera.height_px.min(height));
@@ -113,9 +113,9 @@ impl<'a> Survey<'a> {
         let per_cell = f64::from(words.colour + words.context + words.spread + words.texture + words.binary);
         let per_frame = f64::from(size.0) * f64::from(size.1) / f64::from(cell_px).powi(2) * per_cell;
         if per_frame * corners.len() as f64 > MAX_WORDS {
-            let what = format!("a survey of {} frames with {per_frame:.0} words each is too long", corners.len());
+            let cause = format!("a survey of {} frames with {per_frame:.0} words each is too long", corners.len());
             return Err(UserError::Input(format!(
-                "{what}; raise survey.speed_m_s, lower camera.rate_hz or take larger cells"
+                "{cause}; raise survey.speed_m_s, lower camera.rate_hz or take larger cells"
             )));
         }
         let mut extractor = WordExtractor::new(&words);
@@ -138,17 +138,17 @@ impl<'a> Survey<'a> {
         })
     }
 
-    /// What the camera sees, frame after frame; the mosaic's north-west corner is the origin of the world.
+    /// The observations of the camera, frame by frame; the mosaic's north-west corner is the origin of the world.
     pub fn frames(&self) -> impl Iterator<Item = Vec<Observation>> {
         self.frames.iter().map(|(pose, words)| self.camera.project(self.size.0, self.size.1, pose, words))
     }
 
-    /// Time of the whole survey, seconds.
+    /// Duration of the whole survey, seconds.
     pub fn duration_s(&self) -> f64 {
         self.frames.len() as f64 * self.step_s
     }
 
-    /// The scene model with a setting.
+    /// The configuration of the scene model for one setting.
     pub fn scene(&self, setting: &Setting, seed: u64) -> SceneConfig {
         let scene = &self.config.scene;
         let birth = match scene.birth {
@@ -171,14 +171,14 @@ impl<'a> Survey<'a> {
 }
 
 /// North-west corners of the frames of `size` that cross a mosaic line by line, about `step` pixels apart along the
-/// lines, and how far apart they are.
+/// lines, and the actual distance between two frames, pixels.
 fn corners(mosaic: (u32, u32), size: (u32, u32), step: f64) -> (Vec<(u32, u32)>, f64) {
     let places = |length: u32, frame: u32, step: f64| -> Vec<u32> {
         let free = f64::from(length - frame);
         let steps = (free / step).ceil().max(if free > 0.0 { 1.0 } else { 0.0 }) as u32;
         (0..=steps).map(|i| (free * f64::from(i) / f64::from(steps.max(1))).round() as u32).collect()
     };
-    let most = |frame: u32| f64::from(frame) * (1.0 - OVERLAP);
+    let most = |frame: u32| f64::from(frame) * (1.0 - MIN_OVERLAP);
     let across = places(mosaic.0, size.0, step.clamp(1.0, most(size.0)));
     let mut corners = Vec::new();
     for (line, &top) in places(mosaic.1, size.1, most(size.1)).iter().enumerate() {
@@ -193,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_survey_leaves_no_pixel_out_and_turns_at_the_end_of_lines() {
+    fn a_survey_covers_every_pixel_and_turns_at_the_end_of_lines() {
         for (mosaic, size, step) in
             [((1000, 700), (320, 240), 90.0), ((320, 240), (320, 240), 5.0), ((333, 90), (64, 64), 1e9)]
         {

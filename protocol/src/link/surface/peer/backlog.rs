@@ -18,7 +18,7 @@ impl ReportedBacklog {
         Self { backlog, received: received(stats), at: now }
     }
 
-    /// The reported backlog less what has come in since, and when the report came in.
+    /// The reported backlog less the bytes received since, and when the report came in.
     pub(super) fn left(&self, stats: &LinkStats) -> (Backlog, Instant) {
         let now = received(stats);
         let left = |reported: u32, before: u32, now: u32| reported.saturating_sub(now.wrapping_sub(before));

@@ -1,4 +1,4 @@
-//! The surface's copy of what a vehicle has sent.
+//! The surface's copy of a vehicle's state: map, layers, status and objects.
 
 use super::backlog::ReportedBacklog;
 use super::status::StatusParts;

@@ -1,6 +1,6 @@
 //! One vehicle as the surface knows it.
 //!
-//! [`VehiclePeer`] joins parts that own their state: `content` (what the vehicle has sent), `timing` (its clock),
+//! [`VehiclePeer`] joins parts that own their state: `content` (the copy of its state), `timing` (its clock),
 //! [`Contact`] (when it was last in contact). `turn` writes the frames of a turn, `pool` those that go out without one.
 
 mod backlog;
@@ -133,7 +133,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             Err(reason) => {
                 // The vehicle builds on frames that we never acknowledged, or means another run of ours.
                 let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
-                let strays = self.pair.has_lost_touch() && silent;
+                let strays = self.pair.seems_out_of_step() && silent;
                 self.is_out_of_step |= reason == DropReason::NoBase || strays;
                 return;
             }
@@ -220,8 +220,8 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     fn handle_stamp(&mut self, header: &Header, airtime: Duration, now: Instant) {
-        let Some(Stamp::Vehicle { clock_ms, heard, held }) = header.stamp else { return };
-        if let Some(measured) = self.timing.round_trip(heard, held, now - airtime) {
+        let Some(Stamp::Vehicle { clock_ms, last_received, held }) = header.stamp else { return };
+        if let Some(measured) = self.timing.round_trip(last_received, held, now - airtime) {
             self.master.handle_round_trip(measured);
         }
         let one_way = self.master.round_trip().unwrap_or_default() / 2;
@@ -239,7 +239,7 @@ impl<R: StateReplica> VehiclePeer<R> {
     pub(super) fn owe_answer(&mut self, now: Instant) {
         let is_proven = self.pair.is_proven();
         let wait = if is_proven { Duration::from_secs(2) } else { Duration::ZERO };
-        if self.pair.unstated() > 0 || (self.pair.is_met() && !is_proven) {
+        if self.pair.unstated() > 0 || (self.pair.has_run() && !is_proven) {
             self.contact.answer_due.get_or_insert(now + wait);
         }
     }

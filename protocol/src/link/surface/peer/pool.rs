@@ -36,20 +36,20 @@ impl Contact {
 }
 
 impl<R: StateReplica> VehiclePeer<R> {
-    fn must_greet(&self, now: Instant) -> bool {
-        let is_doubtful = !self.pair.is_met() || self.contact.is_silent(now) || self.pair.is_full();
+    fn must_send_hello(&self, now: Instant) -> bool {
+        let is_doubtful = !self.pair.has_run() || self.contact.is_silent(now) || self.pair.is_full();
         is_doubtful && now >= self.contact.hello_due
     }
 
     /// Whether a frame should go out at `now`: a hello, an acknowledgement, or a slot.
     pub(in crate::link::surface) fn has_reason_to_transmit(&self, now: Instant) -> bool {
-        if self.must_greet(now) {
+        if self.must_send_hello(now) {
             return true;
         }
         let answer = self.contact.is_answer_due(now);
         let unstated = self.pair.unstated();
         let owes = (!self.pair.is_proven() && answer) || (unstated > 0 && (unstated >= MAX_UNACKNOWLEDGED || answer));
-        self.pair.is_met() && (owes || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
+        self.pair.has_run() && (owes || !self.outbox.pending(now, now - self.slot_timeout()).is_empty())
     }
 
     /// When there will be a reason to transmit, if no frame comes in.
@@ -67,7 +67,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         budget: &BitBudget,
         now: Instant,
     ) -> Option<Ready> {
-        let kind = FrameKind::hello_if(self.must_greet(now));
+        let kind = FrameKind::hello_if(self.must_send_hello(now));
         let plan = self.plan_turn(modem, kind, 1, shares, now - self.slot_timeout());
         let slots = plan.into_iter().next()?;
         let allowed = budget.earliest(self.bits(&slots, modem), now);
@@ -78,7 +78,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         let ready = self.write_turn(&[slots], modem, None, kind, now).pop()?;
         self.master.note_begun(now);
         // A run that was met must be proven by a numbered frame, or the vehicle will not transmit.
-        let must_prove = self.pair.is_met() && !self.pair.is_proven();
+        let must_prove = self.pair.has_run() && !self.pair.is_proven();
         self.contact.answer_due = must_prove.then(|| now + self.slot_timeout());
         if kind.is_hello() {
             self.contact.note_hello(now);

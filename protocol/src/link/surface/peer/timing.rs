@@ -30,9 +30,9 @@ impl VehicleTiming {
     }
 
     /// The two-way propagation time, from a frame that began at `began` and whose stamp names the low byte of our
-    /// frame `heard`, received `held` before.
-    pub(super) fn round_trip(&self, heard: u8, held: Duration, began: Instant) -> Option<Duration> {
-        let sent = self.sent.iter().rev().find(|(number, _)| *number as u8 == heard).map(|(_, at)| *at)?;
+    /// frame `last_received`, received `held` before.
+    pub(super) fn round_trip(&self, last_received: u8, held: Duration, began: Instant) -> Option<Duration> {
+        let sent = self.sent.iter().rev().find(|(number, _)| *number as u8 == last_received).map(|(_, at)| *at)?;
         let is_exact = held < Stamp::MAX_HELD;
         (is_exact && sent + held <= began).then(|| began.since(sent).saturating_sub(held))
     }

@@ -44,7 +44,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         again_before: Instant,
     ) -> TurnPlan {
         let copies = copies as usize;
-        if kind.is_hello() || !self.pair.is_met() {
+        if kind.is_hello() || !self.pair.has_run() {
             return vec![Vec::new(); copies.min(2)];
         }
         let groups = pack(
@@ -70,7 +70,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         kind: FrameKind,
         now: Instant,
     ) -> Vec<Ready> {
-        let turn_kind = FrameKind::hello_if(kind.is_hello() || !self.pair.is_met());
+        let turn_kind = FrameKind::hello_if(kind.is_hello() || !self.pair.has_run());
         self.last_turn = LastTurn { began: self.pair.next_number(), kind: turn_kind };
         let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem)).sum();
         let mut at = now;
@@ -107,7 +107,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         let stamp = Stamp::Surface { clock_ms: Stamp::clock(at), one_way };
         let fixed = 9 + 1 + Stamp::SURFACE_BYTES + self.pair.seal_bytes();
         let ack_room = modem.frame_bytes.saturating_sub(chunks + fixed).max(SHORT_ACK);
-        let number = (!kind.is_hello() && self.pair.is_met()).then(|| self.pair.next_number());
+        let number = (!kind.is_hello() && self.pair.has_run()).then(|| self.pair.next_number());
         let has_room = has_room && number.is_some();
         let mut builder = self.pair.begin_frame(modem.frame_bytes, ack_room, grant, has_room.then_some(stamp), kind);
         builder.set_remaining(remaining);

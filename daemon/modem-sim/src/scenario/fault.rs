@@ -1,36 +1,36 @@
-//! `[[fault]]`, and the same in words for a running emulation.
+//! `[[fault]]`, and the same faults as commands of a running emulation.
 
-use super::reader::Reader;
-use super::water::MAX_S;
+use super::channel::MAX_S;
+use super::reader::TableReader;
 use super::{index_of, seconds};
 use scenecast_core::UserError;
 use std::time::Duration;
 
-/// The faults of a modem.
+/// A fault of one modem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
-    /// Every message is refused with BUSY for so long.
+pub enum ModemFault {
+    /// Every message is refused with BUSY for this time.
     Busy(Duration),
     /// It restarts; settings that were not stored are lost.
     Reboot,
-    /// Noise on the line to the host for so long.
+    /// Noise on the line to the host for this time.
     Garbage(Duration),
     /// The output to the host ends in half a line.
     HalfLine,
-    /// The port neither reads nor writes for so long.
+    /// The port neither reads nor writes for this time.
     Freeze(Duration),
-    /// It has another address than it was given.
+    /// It has another address than the configured one.
     WrongAddress(u8),
     /// The supply fails in its next transmission, which is cut short, and it restarts.
     BrownOut,
     /// It accepts a megabyte of data before it reports a full buffer.
     BigBuffer,
-    /// The device or the TCP port is gone for so long.
+    /// The device or the TCP port is gone for this time.
     Unplug(Duration),
 }
 
-/// Names, whether a number follows, its default, and its meaning.
-const TROUBLES: [(&str, Option<f64>, &str); 9] = [
+/// Name, default of the number that may follow, and unit of that number.
+const FAULTS: [(&str, Option<f64>, &str); 9] = [
     ("busy", Some(10.0), "s"),
     ("reboot", None, ""),
     ("garbage", Some(10.0), "s"),
@@ -42,14 +42,14 @@ const TROUBLES: [(&str, Option<f64>, &str); 9] = [
     ("unplug", Some(30.0), "s"),
 ];
 
-impl Trouble {
-    /// The allowed faults, for people.
+impl ModemFault {
+    /// The allowed faults, separated by commas.
     pub fn names() -> String {
-        TROUBLES.map(|(name, ..)| name).join(", ")
+        FAULTS.map(|(name, ..)| name).join(", ")
     }
 
     fn new(name: &str, number: Option<f64>) -> Option<Self> {
-        let (name, usual, _) = TROUBLES.iter().find(|(known, ..)| *known == name)?;
+        let (name, usual, _) = FAULTS.iter().find(|(known, ..)| *known == name)?;
         let number = number.or(*usual);
         let length = number.map_or(Duration::ZERO, seconds);
         Some(match *name {
@@ -65,7 +65,7 @@ impl Trouble {
         })
     }
 
-    /// From the words of a line, as in `freeze 60`.
+    /// Reads the words of a command, as in `freeze 60`.
     pub fn parse(words: &[&str]) -> Result<Self, String> {
         let wrong =
             || format!("it takes one of {}, and seconds or an address behind those that have one", Self::names());
@@ -80,19 +80,19 @@ impl Trouble {
 }
 
 /// A fault of `[[fault]]`: time, modem, kind.
-pub(super) fn read(table: Reader<'_>, names: &[&str]) -> Result<(Duration, usize, Trouble), UserError> {
+pub(super) fn read(table: TableReader<'_>, names: &[&str]) -> Result<(Duration, usize, ModemFault), UserError> {
     let at = table.number("at_s", 0.0..=MAX_S, "s")?;
     let at = at.ok_or_else(|| table.missing("at_s", format!("a number from 0 to {MAX_S} s")))?;
     let modem = index_of(&table, "modem", names)?;
-    let words = TROUBLES.map(|(name, _, unit)| (name, (name, unit)));
-    let takes = format!("one of {}", Trouble::names());
+    let words = FAULTS.map(|(name, _, unit)| (name, (name, unit)));
+    let takes = format!("one of {}", ModemFault::names());
     let (name, unit) = table.choice("what", &words)?.ok_or_else(|| table.missing("what", takes.clone()))?;
     let number = match unit {
         "s" => table.number("for_s", 0.0..=MAX_S, "s")?,
         "address" => table.whole("address", 1..=254, "")?.map(|address| address as f64),
         _ => None,
     };
-    let trouble = Trouble::new(name, number).ok_or_else(|| table.wrong("what", takes))?;
+    let fault = ModemFault::new(name, number).ok_or_else(|| table.wrong("what", takes))?;
     table.finish()?;
-    Ok((seconds(at), modem, trouble))
+    Ok((seconds(at), modem, fault))
 }

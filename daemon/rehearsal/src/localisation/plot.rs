@@ -1,4 +1,4 @@
-//! A way with and without the relay, as a drawing.
+//! A track with and without the relay, as a drawing.
 
 use super::Tracks;
 use std::fmt::Write;
@@ -8,7 +8,7 @@ const MARGIN: f64 = 30.0;
 const FOOT: f64 = 96.0;
 
 /// Draws truth, dead reckoning and relayed estimate as SVG, north up.
-pub fn picture(tracks: &Tracks, title: &str) -> String {
+pub fn localisation_plot(tracks: &Tracks, title: &str) -> String {
     let all = || tracks.truth.iter().chain(&tracks.reckoned).chain(&tracks.relayed).chain(&tracks.ship);
     let (mut west, mut south, mut east, mut north) = (f64::MAX, f64::MAX, f64::MIN, f64::MIN);
     for &(x, y) in all() {
@@ -17,8 +17,8 @@ pub fn picture(tracks: &Tracks, title: &str) -> String {
     let scale = (WIDTH - 2.0 * MARGIN) / (east - west).max(1.0);
     let height = (north - south).max(1.0) * scale + 2.0 * MARGIN;
     let at = |&(x, y): &(f64, f64)| ((x - west) * scale + MARGIN, (north - y) * scale + MARGIN);
-    let line = |way: &[(f64, f64)], colour: &str, style: &str| {
-        let points = way.iter().step_by(5).map(&at).fold(String::new(), |mut all, (x, y)| {
+    let line = |track: &[(f64, f64)], colour: &str, style: &str| {
+        let points = track.iter().step_by(5).map(&at).fold(String::new(), |mut all, (x, y)| {
             let _ = write!(all, "{x:.1},{y:.1} ");
             all
         });
@@ -46,7 +46,7 @@ pub fn picture(tracks: &Tracks, title: &str) -> String {
 }
 
 fn legend(tracks: &Tracks, title: &str, scale: f64, top: f64) -> String {
-    let error = |way: &[(f64, f64)]| format!("{:.1} m", tracks.mean_error(way));
+    let error = |track: &[(f64, f64)]| format!("{:.1} m", tracks.mean_error(track));
     let bar = 100.0 * scale;
     let mut text = format!("<text x=\"{MARGIN}\" y=\"{:.0}\" font-weight=\"bold\">{title}</text>\n", top + 8.0);
     let entries = [
@@ -56,12 +56,12 @@ fn legend(tracks: &Tracks, title: &str, scale: f64, top: f64) -> String {
         ("#b7a3d9", "the surface vehicle".to_owned()),
         ("#edae49", "fix that the vehicle refused".to_owned()),
     ];
-    for (i, (colour, what)) in entries.iter().enumerate() {
+    for (i, (colour, name)) in entries.iter().enumerate() {
         let (x, y) = (MARGIN + (i % 2) as f64 * 400.0, top + 32.0 + (i / 2) as f64 * 22.0);
         let _ = writeln!(
             text,
             "<rect x=\"{x:.0}\" y=\"{:.0}\" width=\"18\" height=\"5\" fill=\"{colour}\"/>\
-             <text x=\"{:.0}\" y=\"{y:.0}\">{what}</text>",
+             <text x=\"{:.0}\" y=\"{y:.0}\">{name}</text>",
             y - 8.0,
             x + 24.0
         );

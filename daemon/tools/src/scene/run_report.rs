@@ -1,8 +1,8 @@
-//! What a run of the scene model is worth, and its labels in files.
+//! The report of a run of the scene model, and its labels in files.
 
 use super::Quality;
 use super::bounds::around;
-use super::learn::Effort;
+use super::learn::LearningEffort;
 use super::process::peak_rss_bytes;
 use scene_model::topics::{FlatCell, SceneModel, TopicId, centre_of};
 use scenecast_core::UserError;
@@ -13,9 +13,9 @@ use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The figures of a run.
+/// Measurements of a run, printed as one line of JSON.
 #[derive(Debug, Serialize)]
-pub(crate) struct Outcome {
+pub(crate) struct RunReport {
     words: u64,
     cells: usize,
     resampled: u64,
@@ -32,8 +32,8 @@ pub(crate) struct Outcome {
     kernel: &'static str,
 }
 
-impl Outcome {
-    pub(crate) fn new(model: &SceneModel, effort: &Effort, quality: Option<&Quality>) -> Self {
+impl RunReport {
+    pub(crate) fn new(model: &SceneModel, effort: &LearningEffort, quality: Option<&Quality>) -> Self {
         Self {
             words: model.words(),
             cells: model.cells(),
@@ -53,7 +53,7 @@ impl Outcome {
     }
 }
 
-/// The topics of a map from the oldest on: the first has the label 1.
+/// The topics of a map, oldest first: the first has the label 1.
 fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
     let mut topics: Vec<TopicId> = volume.iter().map(|cell| cell.topic).collect();
     topics.sort_unstable();
@@ -61,11 +61,11 @@ fn numbers(volume: &[FlatCell]) -> Vec<TopicId> {
     topics
 }
 
-/// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions by y, x; of stacked cells the one
-/// that the map shows comes last.
+/// Writes `labels.png`, the flattened map, and `labels.csv`, every cell in three dimensions sorted by y and x. Of
+/// stacked cells, the one in the flattened map comes last.
 pub(crate) fn write(model: &SceneModel, dir: &Path) -> Result<(), UserError> {
     let (map, mut volume) = (model.label_map(), model.label_volume());
-    // Painted in this order the rows make the flattened map.
+    // Rows painted in this order give the flattened map.
     let shows =
         |cell: &FlatCell| map.binary_search_by_key(&(cell.y, cell.x), |c| (c.y, c.x)).is_ok_and(|i| map[i].z == cell.z);
     volume.sort_by_cached_key(|cell| (cell.y, cell.x, shows(cell)));

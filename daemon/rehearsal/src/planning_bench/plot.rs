@@ -7,22 +7,21 @@ use scenecast_core::palette::colour;
 use scenecast_protocol::map::Cell;
 use std::io::Cursor;
 
-/// Pixels of a cell's edge.
+/// Edge of a cell in the image, pixels.
 const PX: u32 = 5;
-/// Columns between two panels.
 const GAP: u32 = 12;
 const OUTLINE: Rgb<u8> = Rgb([220, 30, 30]);
 const TRACK: Rgb<u8> = Rgb([255; 3]);
 const SHADE: Rgb<u8> = Rgb([15, 20, 30]);
 
-/// Lawnmower, greedy and horizon from left to right, as a PNG file. Favoured labels have their colours, the others a faint
-/// grey of it; the fence and the keep-outs are red.
-pub fn picture(trial: &Trial) -> image::ImageResult<Vec<u8>> {
+/// Lawnmower, greedy and horizon from left to right, as a PNG file. Favoured labels have their colours, the others a
+/// faint grey of theirs; the fence and the keep-outs are red.
+pub fn plot(trial: &Trial) -> image::ImageResult<Vec<u8>> {
     let cells = |metres: f64| (metres / CELL_M).round() as u32;
     let (width, height) = (cells(trial.scene.area.east) * PX, cells(trial.scene.area.north) * PX);
-    let panels = trial.drives.len() as u32;
+    let panels = trial.runs.len() as u32;
     let mut image = RgbImage::from_pixel(panels * width + (panels - 1) * GAP, height, Rgb([255; 3]));
-    for (panel, drive) in (0..).zip(&trial.drives) {
+    for (panel, run) in (0..).zip(&trial.runs) {
         let left = panel * (width + GAP);
         for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
             let cell = Cell::new((x / PX) as i32, ((height - 1 - y) / PX) as i32);
@@ -38,7 +37,7 @@ pub fn picture(trial: &Trial) -> image::ImageResult<Vec<u8>> {
                 .for_each(|(a, b)| line(&mut image, place(a.to_world().xy()), place(b.to_world().xy()), 1, OUTLINE));
         }
         for (reach, colour) in [(2, SHADE), (1, TRACK)] {
-            drive.track.windows(2).for_each(|leg| line(&mut image, place(leg[0]), place(leg[1]), reach, colour));
+            run.track.windows(2).for_each(|leg| line(&mut image, place(leg[0]), place(leg[1]), reach, colour));
         }
     }
     let mut png = Cursor::new(Vec::new());

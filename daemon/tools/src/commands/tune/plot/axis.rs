@@ -1,6 +1,6 @@
-//! Values to places along an axis, with round ticks.
+//! Maps values to positions along an axis, with round ticks.
 
-/// An axis from a lowest to a highest value between two places.
+/// An axis from a lowest to a highest value between two positions, pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis {
     low: f64,
@@ -13,7 +13,7 @@ pub struct Axis {
 const TICKS: f64 = 5.0;
 
 impl Axis {
-    /// An axis that has room for all of the values, from 0 if they are far from equal.
+    /// An axis over all of the values; it starts at 0 unless they are close to each other.
     pub fn over(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
@@ -28,7 +28,7 @@ impl Axis {
         self.from + (self.to - self.from) * (value - self.low) / (self.high - self.low)
     }
 
-    /// Places and texts of the ticks.
+    /// Position and text of each tick.
     pub fn ticks(&self) -> Vec<(f64, String)> {
         let decimals = (-self.step.log10().floor()).max(0.0) as usize;
         let count = ((self.high - self.low) / self.step).round() as u32;
@@ -40,7 +40,7 @@ impl Axis {
     }
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is no smaller.
+/// The smallest of 1, 2, 5 times a power of ten that is at least `least`.
 fn round_step(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
     let step = [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|&step| step >= least * (1.0 - 1e-9));
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_reach_over_all_values() {
+    fn ticks_are_round_and_cover_all_values() {
         let axis = Axis::over([0.12, 0.29].into_iter(), 0.0, 100.0);
         let texts: Vec<String> = axis.ticks().into_iter().map(|tick| tick.1).collect();
         assert_eq!(texts, ["0.0", "0.1", "0.2", "0.3"]);

@@ -9,13 +9,21 @@ use std::fmt;
 /// ```text
 /// bit 15: 0; bits 14-10: e; bits 9-0: m, 100..=999. The value is m x 10^(e - 14); all bits 0: as configured.
 /// ```
+///
+/// ```
+/// use scenecast_protocol::directive::ShortDecimal;
+///
+/// assert_eq!(ShortDecimal::new(0.0025).unwrap().value(), 0.0025);
+/// assert_eq!(ShortDecimal::new(1.23456).unwrap().value(), 1.23, "three digits");
+/// assert_eq!(ShortDecimal::new(-1.0), None);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Figure {
+pub struct ShortDecimal {
     digits: u16,
     exponent: u8,
 }
 
-impl Figure {
+impl ShortDecimal {
     const OFFSET: i32 = 14;
     const MAX_EXPONENT: i32 = 31;
 
@@ -72,7 +80,7 @@ fn power(exponent: i32) -> f64 {
     10f64.powi(exponent)
 }
 
-impl fmt::Display for Figure {
+impl fmt::Display for ShortDecimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.value().fmt(f)
     }
@@ -88,11 +96,11 @@ mod tests {
         for text in ["0.01", "1e-12", "0.0005", "5e-5", "0.123", "999", "1000", "30", "50000", "1e8", "9.99e19", "0.3"]
         {
             let value: f64 = text.parse().unwrap();
-            assert_eq!(Figure::new(value).map(Figure::value), Some(value), "{text}");
+            assert_eq!(ShortDecimal::new(value).map(ShortDecimal::value), Some(value), "{text}");
         }
-        assert_eq!(Figure::new(0.099_96).map(Figure::value), Some(0.1));
+        assert_eq!(ShortDecimal::new(0.099_96).map(ShortDecimal::value), Some(0.1));
         for off in [0.0, -1.0, 9e-13, 1e20, f64::NAN, f64::INFINITY, f64::MIN_POSITIVE] {
-            assert_eq!(Figure::new(off), None, "{off}");
+            assert_eq!(ShortDecimal::new(off), None, "{off}");
         }
     }
 
@@ -100,9 +108,9 @@ mod tests {
         #[test]
         fn a_number_is_off_by_half_a_percent_at_most(power in -12.0f64..19.9) {
             let value = 10f64.powf(power);
-            let told = Figure::new(value).unwrap();
-            prop_assert!((told.value() / value - 1.0).abs() <= 0.005);
-            prop_assert_eq!(Figure::new(told.value()), Some(told));
+            let number = ShortDecimal::new(value).unwrap();
+            prop_assert!((number.value() / value - 1.0).abs() <= 0.005);
+            prop_assert_eq!(ShortDecimal::new(number.value()), Some(number));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! One planner on one scene.
+//! The run of one planner on one scene.
 
 use super::scene::{CELL_M, Scene};
 use scenecast_core::Area;
@@ -9,42 +9,42 @@ use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_vehicle::{Course, Footprint, Steering};
 use sim_channel::RandomStream;
 
-/// Edge of what the camera sees, metres: eight cells.
+/// Edge of the camera's footprint, metres: eight cells.
 const SIGHT_M: f64 = 2.0;
-/// Metres that the vehicle keeps from outlines.
+/// Minimum distance between the vehicle and an outline, metres.
 const CLEARANCE_M: f64 = 0.5;
-/// Share of a full coverage that may be gone.
+/// Distance limit as a share of the path of full coverage.
 const SHARE: f64 = 0.4;
-/// More legs than any drive has.
-const MOST_LEGS: usize = 20_000;
+/// Maximum number of legs, more than any run needs.
+const MAX_LEGS: usize = 20_000;
 
-/// What a vehicle is told before it starts.
+/// The vehicle's orders at the start of a run.
 #[derive(Debug, Clone)]
 pub(crate) struct Task {
     pub fence: Fence,
     pub start: (f64, f64),
-    /// Metres that may be gone, the way back to the start included.
+    /// Distance limit, metres, with the return path to the start.
     pub limit_m: f64,
-    /// Utility of a metre on which everything in sight is new, on the mean of the scene.
+    /// Mean utility in the scene of a metre on which every cell in view is new.
     pub mean_per_m: f64,
 }
 
-/// What came of it.
+/// Track and utility of a run.
 #[derive(Debug)]
-pub(crate) struct Drive {
+pub(crate) struct PlannerRun {
     pub track: Vec<(f64, f64)>,
-    /// Weight of every cell that was seen.
+    /// Sum of the weights of all cells that were seen.
     pub utility: f64,
 }
 
 impl Task {
-    /// A fence with cut corners, one or two keep-outs, and a start inside.
+    /// Draws a fence with cut corners, one or two keep-outs, and a start inside.
     pub fn draw(scene: &Scene, seed: u64) -> Self {
-        let mut dice = RandomStream::new(seed, &[0x91A7]);
+        let mut rng = RandomStream::new(seed, &[0x91A7]);
         let Area { east, north, .. } = scene.area;
         let place = |x: f64, y: f64| DecimetrePoint::nearest(WorldPoint::new(x, y)).unwrap_or_default();
-        let cut = |dice: &mut RandomStream| (0.03 + 0.12 * dice.uniform()) * east.min(north);
-        let [a, b, c, d] = [cut(&mut dice), cut(&mut dice), cut(&mut dice), cut(&mut dice)];
+        let cut = |rng: &mut RandomStream| (0.03 + 0.12 * rng.uniform()) * east.min(north);
+        let [a, b, c, d] = [cut(&mut rng), cut(&mut rng), cut(&mut rng), cut(&mut rng)];
         let fence = [
             (a, 0.0),
             (east - b, 0.0),
@@ -56,10 +56,10 @@ impl Task {
             (0.0, a),
         ];
         let fence = Polygon(fence.iter().map(|&(x, y)| place(x, y)).collect());
-        let keep_outs: Vec<Polygon> = (0..=dice.below(2))
+        let keep_outs: Vec<Polygon> = (0..=rng.below(2))
             .map(|_| {
-                let (x, y) = ((0.2 + 0.6 * dice.uniform()) * east, (0.2 + 0.6 * dice.uniform()) * north);
-                let r = (0.04 + 0.06 * dice.uniform()) * east.min(north);
+                let (x, y) = ((0.2 + 0.6 * rng.uniform()) * east, (0.2 + 0.6 * rng.uniform()) * north);
+                let r = (0.04 + 0.06 * rng.uniform()) * east.min(north);
                 Polygon(vec![place(x - r, y - r), place(x + r, y - 0.5 * r), place(x + 0.4 * r, y + r)])
             })
             .collect();
@@ -67,7 +67,7 @@ impl Task {
         let clear = |p: (f64, f64)| scenecast_vehicle::planning::Bounds::new(&fence, SIGHT_M / 2.0).allows(p);
         let mut start = (east / 2.0, north / 2.0);
         for _ in 0..1000 {
-            start = (dice.uniform() * east, dice.uniform() * north);
+            start = (rng.uniform() * east, rng.uniform() * north);
             if clear(start) {
                 break;
             }
@@ -81,8 +81,7 @@ impl Task {
     }
 }
 
-impl Drive {
-    /// Metres gone.
+impl PlannerRun {
     pub fn metres(&self) -> f64 {
         length_m(&self.track)
     }
@@ -95,45 +94,45 @@ impl Drive {
     }
 }
 
-/// What the planner is told of the sea floor.
+/// The part of the sea floor that the planner knows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Told {
-    /// What the vehicle has seen.
+pub(crate) enum MapKnowledge {
+    /// The cells that the vehicle has seen so far.
     Seen,
-    /// All of it from the start: no vehicle can, so this is about what the limit lets anybody collect.
+    /// The whole map from the start, which gives an upper bound of the utility.
     All,
 }
 
-/// Drives until what is left is the way back, and back.
-pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -> Drive {
+/// Runs a planner until the rest of the limit is needed for the return path, then returns.
+pub(crate) fn run_planner(scene: &Scene, task: &Task, kind: PlannerKind, knowledge: MapKnowledge) -> PlannerRun {
     let sight = Footprint { across: SIGHT_M, along: SIGHT_M };
     let mut steering = Steering::new(scene.area, sight, CELL_M, kind, CLEARANCE_M);
     steering.set_fence(&task.fence);
     let mut map = LabelGrid::default();
-    let mut drive = Drive { track: vec![task.start], utility: 0.0 };
+    let mut run = PlannerRun { track: vec![task.start], utility: 0.0 };
     let (mut at, mut version, mut is_back) = (task.start, 1, false);
-    drive.utility += look(scene, at, &mut map);
-    for _ in 0..MOST_LEGS {
-        let left_m = task.limit_m - drive.metres();
-        let known = if told == Told::All { &scene.labels } else { &map };
+    run.utility += look(scene, at, &mut map);
+    for _ in 0..MAX_LEGS {
+        let left_m = task.limit_m - run.metres();
+        let known = if knowledge == MapKnowledge::All { &scene.labels } else { &map };
         let course = match is_back {
             true => steering.next_home(at),
             false => steering.next(at, (known, version), Some(&scene.utility), left_m),
         };
         match course {
             Course::Go(to) => {
-                drive.utility += go(scene, &mut steering, at, to, &mut map);
-                drive.track.push(to);
+                run.utility += go(scene, &mut steering, at, to, &mut map);
+                run.track.push(to);
                 (at, version) = (to, version + 1);
             }
             Course::UsedUp if !is_back => is_back = true,
             _ => break,
         }
     }
-    drive
+    run
 }
 
-/// Goes straight and looks every half sight; utility of what was seen for the first time.
+/// Moves straight and takes a view each half footprint; returns the utility of the cells seen for the first time.
 fn go(scene: &Scene, steering: &mut Steering, from: (f64, f64), to: (f64, f64), map: &mut LabelGrid) -> f64 {
     let looks = ((to.0 - from.0).hypot(to.1 - from.1) / (SIGHT_M / 2.0)).ceil().max(1.0) as u32;
     let place = |i: u32| {

@@ -1,16 +1,16 @@
-//! A second opinion on where a vehicle went: shares no code with the planners.
+//! An audit of a vehicle's track against a fence. It shares no code with the planners, so that it finds their errors.
 
 use scenecast_protocol::directive::{Fence, Polygon};
 
-/// Metres between two places that are looked at.
-const GRAIN_M: f64 = 0.05;
+/// Distance between two samples of a track, metres.
+const SAMPLE_M: f64 = 0.05;
 
-/// Stretches of a track, at most 5 cm each, that lie outside the fence or in a keep-out.
+/// Number of samples of a track, at most 5 cm apart, that are outside the fence or in a keep-out.
 pub fn stretches_outside(track: &[(f64, f64)], fence: &Fence) -> usize {
     let mut outside = 0;
     for leg in track.windows(2) {
         let ((ax, ay), (bx, by)) = (leg[0], leg[1]);
-        let parts = ((bx - ax).hypot(by - ay) / GRAIN_M).ceil().max(1.0) as u32;
+        let parts = ((bx - ax).hypot(by - ay) / SAMPLE_M).ceil().max(1.0) as u32;
         let place = |i: u32| {
             let t = f64::from(i) / f64::from(parts);
             (ax + t * (bx - ax), ay + t * (by - ay))
@@ -28,7 +28,7 @@ fn is_forbidden(p: (f64, f64), fence: &Fence) -> bool {
     fence.fence.as_ref().is_some_and(|f| winding(f, p) == 0) || fence.keep_outs.iter().any(|k| winding(k, p) != 0)
 }
 
-/// How often an outline goes round a place, by the sum of the angles under which its edges are seen.
+/// Winding number of an outline around a point, by the sum of the angles that its edges subtend.
 fn winding(outline: &Polygon, (x, y): (f64, f64)) -> i32 {
     let angle = |place: &scenecast_protocol::coordinates::DecimetrePoint| {
         (place.to_world().north_m - y).atan2(place.to_world().east_m - x)
@@ -46,7 +46,7 @@ mod tests {
     use scenecast_protocol::coordinates::DecimetrePoint;
 
     #[test]
-    fn what_lies_outside_or_in_a_keep_out_is_seen() {
+    fn positions_outside_or_in_a_keep_out_are_counted() {
         let square = |x: i32, side: i32| {
             let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
             Polygon(vec![place(x, x), place(x + side, x), place(x + side, x + side), place(x, x + side)])

@@ -1,6 +1,6 @@
 //! `[channel]`, `[[link]]`, `[[outage]]` and `[[stranger]]`: the channel, and other transmitters.
 
-use super::reader::Reader;
+use super::reader::TableReader;
 use super::{index_of, node, seconds};
 use scenecast_core::UserError;
 use sim_channel::acoustics::wind_of_sea_state;
@@ -8,23 +8,22 @@ use sim_channel::loss::{GilbertElliott, RangeTable, Snr, ThreeState, Trace};
 use sim_channel::{ChannelConfig, LossModel, NodeId, NodePosition, Outage, OutageScope, presets};
 use std::time::Duration;
 
-/// Somebody who talks at random and understands nobody.
+/// A transmitter that sends at random times and receives no frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stranger {
     pub position: NodePosition,
     pub bytes: usize,
-    /// How long a transmission takes.
     pub airtime: Duration,
     pub mean_gap: Duration,
 }
 
-/// Longest time that a scenario speaks of, s.
+/// Largest time in a scenario, s.
 pub(super) const MAX_S: f64 = 1e7;
-/// Farthest place from the origin, m.
+/// Largest coordinate of a position, m.
 pub(super) const MAX_DISTANCE_M: f64 = 1e6;
 
-/// A preset, and the keys beside it.
-pub(super) fn read_channel(table: Reader<'_>) -> Result<ChannelConfig, UserError> {
+/// Reads a preset and the keys that change it.
+pub(super) fn read_channel(table: TableReader<'_>) -> Result<ChannelConfig, UserError> {
     let mut channel = table.choice("preset", &presets::ALL)?.map_or_else(ChannelConfig::default, |preset| preset());
     if let Some(loss) = table.table("loss")? {
         channel.loss = read_loss(loss)?;
@@ -46,8 +45,8 @@ fn set<T>(place: &mut T, given: Option<T>) {
     }
 }
 
-/// `from`, `to` and a loss of its own.
-pub(super) fn read_link(table: Reader<'_>, names: &[&str]) -> Result<(NodeId, NodeId, LossModel), UserError> {
+/// Reads `from`, `to` and the loss model of that link.
+pub(super) fn read_link(table: TableReader<'_>, names: &[&str]) -> Result<(NodeId, NodeId, LossModel), UserError> {
     let (from, to) = (index_of(&table, "from", names)?, index_of(&table, "to", names)?);
     let loss =
         table.table("loss")?.ok_or_else(|| table.missing("loss", "a table, as in loss = { model = \"none\" }"))?;
@@ -56,8 +55,8 @@ pub(super) fn read_link(table: Reader<'_>, names: &[&str]) -> Result<(NodeId, No
     Ok(link)
 }
 
-/// A silence of everything, of a `modem`, or of one direction `from` .. `to`.
-pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, UserError> {
+/// An outage of all links, of one `modem`, or of the direction `from` .. `to`.
+pub(super) fn read_outage(table: TableReader<'_>, names: &[&str]) -> Result<Outage, UserError> {
     let from = table.number("from_s", 0.0..=MAX_S, "s")?.map_or(Duration::ZERO, seconds);
     let until = table.number("until_s", 0.0..=MAX_S, "s")?.map_or(Duration::MAX, seconds);
     if until <= from {
@@ -75,8 +74,8 @@ pub(super) fn read_outage(table: Reader<'_>, names: &[&str]) -> Result<Outage, U
     Ok(Outage { from, until, scope })
 }
 
-/// Somebody else on the same water.
-pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, UserError> {
+/// Reads another transmitter in the same channel.
+pub(super) fn read_stranger(table: TableReader<'_>) -> Result<Stranger, UserError> {
     let position = table.numbers("position_m", -MAX_DISTANCE_M..=MAX_DISTANCE_M, "m")?;
     let stranger = Stranger {
         position: position.map_or_else(NodePosition::default, |[x, y, z]| NodePosition::new(x, y, z)),
@@ -88,7 +87,7 @@ pub(super) fn read_stranger(table: Reader<'_>) -> Result<Stranger, UserError> {
     Ok(stranger)
 }
 
-type ReadModel = fn(&Reader<'_>) -> Result<LossModel, UserError>;
+type ReadModel = fn(&TableReader<'_>) -> Result<LossModel, UserError>;
 
 const MODELS: [(&str, ReadModel); 8] = [
     ("none", |_| Ok(LossModel::None)),
@@ -101,7 +100,7 @@ const MODELS: [(&str, ReadModel); 8] = [
     ("fit", fit),
 ];
 
-fn read_loss(table: Reader<'_>) -> Result<LossModel, UserError> {
+fn read_loss(table: TableReader<'_>) -> Result<LossModel, UserError> {
     let names = MODELS.map(|(name, _)| name).join(", ");
     let read = table.choice("model", &MODELS)?.ok_or_else(|| table.missing("model", format!("one of {names}")))?;
     let model = read(&table)?;
@@ -109,20 +108,20 @@ fn read_loss(table: Reader<'_>) -> Result<LossModel, UserError> {
     Ok(model)
 }
 
-fn probability(table: &Reader<'_>, key: &'static str) -> Result<f64, UserError> {
+fn probability(table: &TableReader<'_>, key: &'static str) -> Result<f64, UserError> {
     table.number(key, 0.0..=1.0, "")?.ok_or_else(|| table.missing(key, "a number from 0 to 1"))
 }
 
-fn dwell(table: &Reader<'_>, key: &'static str) -> Result<Duration, UserError> {
+fn dwell(table: &TableReader<'_>, key: &'static str) -> Result<Duration, UserError> {
     let given = table.number(key, 0.001..=MAX_S, "s")?;
     given.map(seconds).ok_or_else(|| table.missing(key, format!("a number from 0.001 to {MAX_S} s")))
 }
 
-fn independent(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn independent(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     Ok(LossModel::Independent { probability: probability(table, "probability")? })
 }
 
-fn gilbert_elliott(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn gilbert_elliott(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     let model = GilbertElliott {
         dwell_good: dwell(table, "good_s")?,
         dwell_bad: dwell(table, "bad_s")?,
@@ -132,7 +131,7 @@ fn gilbert_elliott(table: &Reader<'_>) -> Result<LossModel, UserError> {
     Ok(model.into())
 }
 
-fn three_state(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn three_state(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     let half = |key| Ok::<_, UserError>(table.number(key, 0.0..=1.0, "")?.unwrap_or(0.5));
     let model = ThreeState {
         dwell: [dwell(table, "good_s")?, dwell(table, "medium_s")?, dwell(table, "bad_s")?],
@@ -144,7 +143,7 @@ fn three_state(table: &Reader<'_>) -> Result<LossModel, UserError> {
     Ok(model.into())
 }
 
-fn snr(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn snr(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     let mut model = Snr::default();
     set(&mut model.source_level_db, table.number("source_level_db", 100.0..=230.0, "dB re 1 uPa at 1 m")?);
     set(&mut model.frequency_khz, table.number("frequency_khz", 0.1..=100.0, "kHz")?);
@@ -161,8 +160,8 @@ fn snr(table: &Reader<'_>) -> Result<LossModel, UserError> {
     Ok(model.into())
 }
 
-/// A file beside the scenario.
-fn file(table: &Reader<'_>) -> Result<(std::path::PathBuf, String), UserError> {
+/// Reads a file whose path is relative to the scenario.
+fn file(table: &TableReader<'_>) -> Result<(std::path::PathBuf, String), UserError> {
     let name =
         table.text("file")?.ok_or_else(|| table.missing("file", "the name of a file, relative to the scenario"))?;
     let path = table.path().parent().unwrap_or(std::path::Path::new(".")).join(name);
@@ -171,13 +170,13 @@ fn file(table: &Reader<'_>) -> Result<(std::path::PathBuf, String), UserError> {
     Ok((path, text))
 }
 
-fn range(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn range(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     let (path, text) = file(table)?;
     RangeTable::from_csv(&text).map(LossModel::from).map_err(|e| UserError::file(&path, e))
 }
 
 /// A CSV of time and delivered, or a `frames.log` of ours; `direction` picks `up` or `down` from the latter.
-fn trace(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn trace(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     let (path, text) = file(table)?;
     let direction = table.choice("direction", &[("up", "up"), ("down", "down")])?;
     let is_log = direction.is_some() || path.extension().is_some_and(|extension| extension == "log");
@@ -186,7 +185,7 @@ fn trace(table: &Reader<'_>) -> Result<LossModel, UserError> {
 }
 
 /// One link of a table of Markov fits, two or three states, a step taken as `step_s`.
-fn fit(table: &Reader<'_>) -> Result<LossModel, UserError> {
+fn fit(table: &TableReader<'_>) -> Result<LossModel, UserError> {
     let (path, text) = file(table)?;
     let step = dwell(table, "step_s")?;
     let states = table.whole("states", 2..=3, "")?.unwrap_or(3);

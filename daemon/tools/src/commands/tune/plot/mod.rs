@@ -1,4 +1,5 @@
-//! The paper's scatter: what a map tells against what it takes, with the colours of the mosaic and with the annotations.
+//! The paper's scatter plot: mutual information of the map, with the mosaic's colours and with
+//! the annotations, against its bytes.
 
 mod axis;
 mod raster;
@@ -12,20 +13,20 @@ use svg::Svg;
 
 pub(super) const WIDTH: u32 = 1240;
 pub(super) const HEIGHT: u32 = 620;
-/// Width of a character of the picture's text, and height of a line, pixels.
+/// Width of a character and height of a line of text, pixels.
 pub(super) const CHARACTER: (f64, f64) = (9.0, 18.0);
 
 const INK: Colour = [40, 48, 56];
 const FAINT: Colour = [222, 227, 231];
 const FRONT: Colour = [120, 128, 136];
 const BEST: Colour = [200, 30, 40];
-/// Colours of the values of alpha, one after another (Okabe and Ito's, that colour-blind people can tell apart).
+/// Colours of the values of alpha, in order (Okabe and Ito, distinguishable for colour-blind readers).
 const SERIES: [Colour; 7] =
     [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0], [140, 140, 40]];
 
 pub(super) type Colour = [u8; 3];
 
-/// Where a text stands from its place.
+/// The part of a text that is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     Start,
@@ -33,16 +34,16 @@ pub enum Anchor {
     End,
 }
 
-/// What a picture is drawn on; places are in pixels from the top left corner.
+/// A drawing surface; positions are in pixels from the top left corner.
 pub(super) trait Canvas {
     fn line(&mut self, from: (f64, f64), to: (f64, f64), width: f64, colour: Colour);
     fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Colour);
     fn ring(&mut self, centre: (f64, f64), radius: f64, colour: Colour);
-    /// A line of text whose middle height is at the place.
+    /// Draws a line of text, vertically centred at the position.
     fn text(&mut self, at: (f64, f64), anchor: Anchor, colour: Colour, text: &str);
 }
 
-pub struct Figure<'a> {
+pub struct Plot<'a> {
     rows: &'a [Row],
     best: Option<&'a Row>,
     alphas: Vec<f64>,
@@ -51,19 +52,23 @@ pub struct Figure<'a> {
 struct Panel {
     left: f64,
     title: &'static str,
-    told: fn(&Measurement) -> f64,
+    information: fn(&Measurement) -> f64,
 }
 
 const PANELS: [Panel; 2] = [
-    Panel { left: 80.0, title: "MI with the mosaic's colours, nats", told: |m| m.mosaic_mutual_information_nats },
-    Panel { left: 590.0, title: "MI with the annotations, nats", told: |m| m.mutual_information_nats },
+    Panel {
+        left: 80.0,
+        title: "MI with the mosaic's colours, nats",
+        information: |m| m.mosaic_mutual_information_nats,
+    },
+    Panel { left: 590.0, title: "MI with the annotations, nats", information: |m| m.mutual_information_nats },
 ];
 const PANEL_WIDTH: f64 = 420.0;
 const TOP: f64 = 60.0;
 const BOTTOM: f64 = 540.0;
 const LEGEND: f64 = 1040.0;
 
-impl<'a> Figure<'a> {
+impl<'a> Plot<'a> {
     pub fn new(rows: &'a [Row], best: Option<&'a Row>) -> Self {
         let mut alphas: Vec<f64> = rows.iter().map(|row| row.setting.alpha).collect();
         alphas.sort_by(|a, b| b.total_cmp(a));
@@ -92,9 +97,9 @@ impl<'a> Figure<'a> {
 
     fn panel(&self, canvas: &mut dyn Canvas, panel: &Panel) {
         let bytes = |row: &Row| row.measurement.map_bytes as f64;
-        let told = |row: &Row| (panel.told)(&row.measurement);
+        let information = |row: &Row| (panel.information)(&row.measurement);
         let across = Axis::over(self.rows.iter().map(bytes), panel.left, panel.left + PANEL_WIDTH);
-        let up = Axis::over(self.rows.iter().map(told), BOTTOM, TOP);
+        let up = Axis::over(self.rows.iter().map(information), BOTTOM, TOP);
         for (x, tick) in across.ticks() {
             canvas.line((x, TOP), (x, BOTTOM), 1.0, FAINT);
             canvas.text((x, BOTTOM + 18.0), Anchor::Middle, INK, &tick);
@@ -107,8 +112,8 @@ impl<'a> Figure<'a> {
         canvas.line((panel.left, BOTTOM), (panel.left + PANEL_WIDTH, BOTTOM), 1.5, INK);
         canvas.text((panel.left - 60.0, TOP - 32.0), Anchor::Start, INK, panel.title);
         canvas.text((panel.left + PANEL_WIDTH / 2.0, BOTTOM + 48.0), Anchor::Middle, INK, "bytes of the map");
-        let place = |row: &Row| (across.place(bytes(row)), up.place(told(row)));
-        let front = front(self.rows, told);
+        let place = |row: &Row| (across.place(bytes(row)), up.place(information(row)));
+        let front = front(self.rows, information);
         for step in front.windows(2) {
             let (from, to) = (place(step[0]), place(step[1]));
             canvas.line(from, (to.0, from.1), 1.5, FRONT);
@@ -151,14 +156,16 @@ impl<'a> Figure<'a> {
     }
 }
 
-/// The rows of which no other takes as few bytes and tells more, from small to large.
-fn front(rows: &[Row], told: impl Fn(&Row) -> f64) -> Vec<&Row> {
+/// The Pareto front, smallest map first: rows with more information than every row of as few bytes.
+fn front(rows: &[Row], information: impl Fn(&Row) -> f64) -> Vec<&Row> {
     let mut by_bytes: Vec<&Row> = rows.iter().collect();
-    by_bytes.sort_by(|a, b| a.measurement.map_bytes.cmp(&b.measurement.map_bytes).then(told(b).total_cmp(&told(a))));
+    by_bytes.sort_by(|a, b| {
+        a.measurement.map_bytes.cmp(&b.measurement.map_bytes).then(information(b).total_cmp(&information(a)))
+    });
     let mut most = f64::NEG_INFINITY;
     by_bytes.retain(|row| {
-        let better = told(row) > most;
-        most = most.max(told(row));
+        let better = information(row) > most;
+        most = most.max(information(row));
         better
     });
     by_bytes
@@ -187,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn the_front_has_what_nothing_smaller_beats() {
+    fn the_front_has_rows_that_no_smaller_map_beats() {
         let rows = rows();
         let bytes: Vec<usize> = front(&rows, |row| row.measurement.mutual_information_nats)
             .iter()
@@ -197,20 +204,20 @@ mod tests {
     }
 
     #[test]
-    fn both_pictures_show_every_setting_and_have_the_same_size() {
+    fn both_plots_show_every_setting_and_have_the_same_size() {
         let rows = rows();
-        let figure = Figure::new(&rows, rows.first());
-        let svg = figure.svg();
+        let plot = Plot::new(&rows, rows.first());
+        let svg = plot.svg();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && svg.contains("bytes of the map"));
-        assert_eq!(svg.matches("r=\"5\"").count(), 2 * rows.len() + figure.alphas.len());
-        let png = image::load_from_memory(&figure.png().unwrap()).unwrap();
+        assert_eq!(svg.matches("r=\"5\"").count(), 2 * rows.len() + plot.alphas.len());
+        let png = image::load_from_memory(&plot.png().unwrap()).unwrap();
         assert_eq!((png.width(), png.height()), (WIDTH, HEIGHT));
     }
 
     #[test]
-    fn nothing_and_equals_can_be_drawn() {
-        Figure::new(&[], None).png().unwrap();
+    fn empty_and_equal_rows_can_be_drawn() {
+        Plot::new(&[], None).png().unwrap();
         let rows = [rows()[0]; 3];
-        assert!(!Figure::new(&rows, None).svg().contains("NaN"));
+        assert!(!Plot::new(&rows, None).svg().contains("NaN"));
     }
 }

@@ -1,8 +1,8 @@
-//! A picture as SVG.
+//! The plot as an SVG document.
 
 use super::{Anchor, Canvas, Colour};
 
-/// An SVG document in the making.
+/// An SVG document under construction.
 #[derive(Debug)]
 pub struct Svg {
     text: String,

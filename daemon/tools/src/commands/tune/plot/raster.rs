@@ -1,4 +1,4 @@
-//! A picture as PNG.
+//! The plot as a PNG.
 
 use super::{Anchor, CHARACTER, Canvas, Colour};
 use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_9X18_BOLD};
@@ -26,7 +26,8 @@ impl Raster {
         Ok(png.into_inner())
     }
 
-    /// Paints each pixel of a box as far as the shape covers it; `depth` is how far inside the shape a place lies.
+    /// Paints the pixels of a box in proportion to their cover by a shape; `depth` is the distance of
+    /// a point inside its edge.
     fn shape(&mut self, from: (f64, f64), to: (f64, f64), colour: Colour, depth: impl Fn(f64, f64) -> f64) {
         let pixels = |a: f64, b: f64, length: u32| {
             let low = (a.min(b) - 2.0).clamp(0.0, f64::from(length));
@@ -72,25 +73,25 @@ impl Canvas for Raster {
             Anchor::Middle => x - width / 2.0,
             Anchor::End => x - width,
         };
-        let mut page = Page { image: &mut self.image, ink: Rgb(colour) };
+        let mut page = TextPage { image: &mut self.image, ink: Rgb(colour) };
         let style = MonoTextStyle::new(&FONT_9X18_BOLD, BinaryColor::On);
         let Ok(_) = style.draw_string(text, Point::new(left as i32, y as i32), Baseline::Middle, &mut page);
     }
 }
 
-/// The image as a sheet that letters are stamped on.
-struct Page<'a> {
+/// The image as a target of the font's pixels.
+struct TextPage<'a> {
     image: &'a mut RgbImage,
     ink: Rgb<u8>,
 }
 
-impl OriginDimensions for Page<'_> {
+impl OriginDimensions for TextPage<'_> {
     fn size(&self) -> Size {
         Size::new(self.image.width(), self.image.height())
     }
 }
 
-impl DrawTarget for Page<'_> {
+impl DrawTarget for TextPage<'_> {
     type Color = BinaryColor;
     type Error = Infallible;
 

@@ -2,7 +2,7 @@
 
 use super::opaque::{OpaqueReplica, OpaqueSource};
 use super::tally::Tally;
-use crate::VirtualTime;
+use crate::virtual_time::VirtualTime;
 use scenecast_host::{FrameEvent, LinkEnd, LinkHost, channel_station};
 use scenecast_protocol::directive::SlotId;
 use scenecast_protocol::directive::SlotState;
@@ -18,31 +18,29 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 const SURFACE: NodeId = NodeId(0);
-/// Bits a second on air.
+/// Bit rate of the channel, bit/s.
 pub const BIT_RATE_BPS: u32 = 10_000;
-/// Window of the budget.
 pub const WINDOW: Duration = Duration::from_secs(10);
-/// Speed of sound in every row.
+/// Speed of sound of every row, m/s.
 const SOUND_SPEED_M_S: f64 = 1500.0;
 
-/// What the ends and the water between them are like.
+/// Properties of the ends and of the channel between them.
 #[derive(Debug, Clone)]
-pub struct Setting {
-    /// Slant range of every vehicle.
+pub struct LinkSetting {
+    /// Slant range of every vehicle, metres.
     pub range_m: f64,
-    /// Bytes of a full frame.
+    /// Maximum length of a frame, bytes.
     pub frame_bytes: usize,
-    /// How frames are lost, each way.
+    /// Pattern of losses in each direction.
     pub loss: LossModel,
-    /// Vehicles, numbered from 1.
     pub vehicles: u8,
-    /// Whether the surface knows none of them at the start and calls so often.
+    /// Period of discovery calls if all vehicles are unknown at the start.
     pub discovery_period: Option<Duration>,
-    /// Bit budget of each end.
+    /// Bit budget of each end, bit/s.
     pub budget_bps: u32,
 }
 
-impl Setting {
+impl LinkSetting {
     /// One known vehicle, and a budget that does not bind.
     pub fn new(range_m: f64, frame_bytes: usize, loss: LossModel) -> Self {
         Self { range_m, frame_bytes, loss, vehicles: 1, discovery_period: None, budget_bps: BIT_RATE_BPS }
@@ -59,42 +57,39 @@ impl Setting {
         }
     }
 
-    /// Two-way propagation.
     pub fn round_trip(&self) -> Duration {
         Duration::from_secs_f64(2.0 * self.range_m / SOUND_SPEED_M_S)
     }
 }
 
-/// A vehicle and what the harness keeps of it.
+/// A vehicle and its measurements.
 #[derive(Debug)]
-pub struct Vehicle {
-    /// Its address.
+pub struct BenchVehicle {
     pub address: Address,
-    /// Its end of the link at its modem.
+    /// The vehicle's end of the link at its modem.
     pub host: LinkHost<VehicleLink<OpaqueSource>>,
-    /// Bytes that always wait, while it is under load.
+    /// Bytes that always wait while the vehicle is under load.
     pub load: Option<usize>,
-    /// When a slot was last applied, by slot and version.
+    /// Time at which a slot was last applied, by slot and version.
     pub applied: BTreeMap<(SlotId, u16), Instant>,
 }
 
 /// The ends and the channel between them.
-pub struct Water {
-    /// The time.
+pub struct LinkBench {
     pub now: Instant,
     /// The surface's end of the link at its modem.
     pub surface: LinkHost<SurfaceLink<OpaqueReplica>>,
     /// The vehicles, in the order of their addresses.
-    pub vehicles: Vec<Vehicle>,
-    /// Where airtime and frames went.
+    pub vehicles: Vec<BenchVehicle>,
+    /// Account of airtime and frames.
     pub tally: Tally,
-    /// Turns that were granted, and the time that they add up to.
+    /// Number of granted turns and their total time.
     pub grants: (u64, Duration),
-    setting: Setting,
+    setting: LinkSetting,
     modem: ModemProfile,
     channel: Channel,
-    /// When each end last took in a frame that was meant for it.
-    heard: BTreeMap<NodeId, Instant>,
+    /// Time at which each end last received a frame addressed to it.
+    last_received: BTreeMap<NodeId, Instant>,
 }
 
 /// The vehicle of every row that has only one.
@@ -102,14 +97,14 @@ pub fn auv() -> Address {
     address(1)
 }
 
-/// The address of the vehicle with this number.
+/// Address of the vehicle with an index.
 fn address(number: u8) -> Address {
     Address::vehicle(number).unwrap_or(Address::EVERYBODY)
 }
 
-impl Water {
-    /// Ends that have not met, all chance drawn from `seed`.
-    pub fn new(setting: &Setting, seed: u64) -> Self {
+impl LinkBench {
+    /// Ends before their handshake; all random numbers are drawn from `seed`.
+    pub fn new(setting: &LinkSetting, seed: u64) -> Self {
         let now = Instant::from_secs_f64(1000.0);
         let config = ChannelConfig {
             sound_speed_m_s: SOUND_SPEED_M_S,
@@ -119,14 +114,14 @@ impl Water {
         };
         let mut channel = Channel::new(config, seed);
         channel.place(SURFACE, NodePosition::default());
-        let mut dice = RandomStream::new(seed, &[1]);
-        let mut draw = || (dice.uniform() * 2f64.powi(53)) as u64;
+        let mut rng = RandomStream::new(seed, &[1]);
+        let mut draw = || (rng.uniform() * 2f64.powi(53)) as u64;
         let mut vehicles = Vec::new();
         for number in 1..=setting.vehicles {
             let angle = f64::from(number) / f64::from(setting.vehicles) * std::f64::consts::TAU;
             let place = NodePosition::new(angle.cos() * setting.range_m, angle.sin() * setting.range_m, 0.0);
             channel.place(NodeId(number), place);
-            vehicles.push(Vehicle::new(setting, address(number), draw(), now));
+            vehicles.push(BenchVehicle::new(setting, address(number), draw(), now));
         }
         Self {
             now,
@@ -137,21 +132,20 @@ impl Water {
             setting: setting.clone(),
             modem: setting.modem(),
             channel,
-            heard: BTreeMap::new(),
+            last_received: BTreeMap::new(),
         }
     }
 
-    /// What it is like.
-    pub fn setting(&self) -> &Setting {
+    /// The setting of the bench.
+    pub fn setting(&self) -> &LinkSetting {
         &self.setting
     }
 
-    /// The only vehicle.
-    pub fn vehicle(&mut self) -> &mut Vehicle {
+    pub fn vehicle(&mut self) -> &mut BenchVehicle {
         &mut self.vehicles[0]
     }
 
-    /// The only vehicle as the surface knows it.
+    /// The surface's view of the only vehicle.
     pub fn view(&self) -> Option<PeerView<'_, OpaqueReplica>> {
         self.surface.end().vehicle(auv())
     }
@@ -167,7 +161,7 @@ impl Water {
     fn transmit(&mut self, from: NodeId, bytes: Vec<u8>, kind: &'static str) {
         assert!(bytes.len() <= self.modem.frame_bytes, "a frame larger than the modem takes");
         let airtime = self.modem.airtime(bytes.len());
-        let busy_until = self.heard.get(&from).map(|&at| at + self.modem.turn_around);
+        let busy_until = self.last_received.get(&from).map(|&at| at + self.modem.turn_around);
         self.tally.early_frames += u64::from(busy_until.is_some_and(|at| self.now < at));
         let who = if from == SURFACE { "surface" } else { "vehicle" };
         *self.tally.airtime.entry((who, kind)).or_default() += airtime;
@@ -175,7 +169,7 @@ impl Water {
     }
 }
 
-impl VirtualTime for Water {
+impl VirtualTime for LinkBench {
     fn now(&self) -> Instant {
         self.now
     }
@@ -184,7 +178,7 @@ impl VirtualTime for Water {
         self.now = now;
     }
 
-    /// The next moment at which something happens, at most a while away.
+    /// The time of the next event, a bounded time ahead.
     fn next_event(&self) -> Instant {
         let hosts = self.vehicles.iter().filter_map(|v| v.host.poll_timeout(self.now));
         let arrival = self.channel.poll_timeout().map(Instant::from);
@@ -203,7 +197,7 @@ impl VirtualTime for Water {
             }
             let ReceptionOutcome::Delivered { bytes, .. } = arrival.outcome else { continue };
             if Envelope::decode(&bytes, |to| to.number() == arrival.to.0 || to == Address::EVERYBODY).is_ok() {
-                self.heard.insert(arrival.to, self.now);
+                self.last_received.insert(arrival.to, self.now);
             }
             match arrival.to {
                 SURFACE => self.surface.handle_bytes(&bytes, self.now),
@@ -212,7 +206,6 @@ impl VirtualTime for Water {
         }
     }
 
-    /// Lets every end say what it may say now.
     fn pump(&mut self) {
         while let Some(event) = self.surface.end_mut().poll_event() {
             if let SurfaceEvent::VehicleRestarted(_) = event {
@@ -245,9 +238,9 @@ fn poll_frame<E: LinkEnd>(host: &mut LinkHost<E>, now: Instant) -> Option<(Vec<u
     Some((bytes, kind))
 }
 
-impl Vehicle {
-    /// A vehicle that has met nobody.
-    pub(super) fn new(setting: &Setting, address: Address, seed: u64, now: Instant) -> Self {
+impl BenchVehicle {
+    /// A vehicle before its handshake.
+    pub(super) fn new(setting: &LinkSetting, address: Address, seed: u64, now: Instant) -> Self {
         let config = VehicleConfig {
             address,
             mission: MissionId(7),
@@ -263,7 +256,7 @@ impl Vehicle {
         Self { address, host, load: None, applied: BTreeMap::new() }
     }
 
-    /// Applies the slots that came in, and fills the source while it is under load.
+    /// Applies received slots, and fills the source while the vehicle is under load.
     pub(super) fn handle_news(&mut self, now: Instant) {
         let link = self.host.end_mut();
         while let Some(event) = link.poll_event() {
@@ -281,12 +274,12 @@ impl Vehicle {
 }
 
 /// The surface of a setting at its modem.
-pub(super) fn surface(setting: &Setting, seed: u64, now: Instant) -> LinkHost<SurfaceLink<OpaqueReplica>> {
+pub(super) fn surface(setting: &LinkSetting, seed: u64, now: Instant) -> LinkHost<SurfaceLink<OpaqueReplica>> {
     let link = SurfaceLink::new(surface_config(setting), seed, now);
     LinkHost::new(link, channel_station(setting.modem(), WINDOW, now))
 }
 
-fn surface_config(setting: &Setting) -> SurfaceConfig {
+fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
     let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),

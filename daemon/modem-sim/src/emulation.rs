@@ -1,9 +1,9 @@
-//! The test basin with its modems, their ports, and the schedule of faults.
+//! The test basin with its modems, their emulated ports, and the schedule of faults.
 
-use super::host::{FromHost, Line, Speed};
+use super::commands::EmulatorCommand;
+use super::host::{FromHost, PortLine, Speed};
 use super::links::Links;
-use super::orders::Order;
-use super::scenario::{Modem, Place, Scenario, Trouble, node};
+use super::scenario::{EmulatedPort, ModemFault, Scenario, ScenarioModem, node};
 use super::{Pace, tcp};
 use scenecast_core::UserError;
 use sim_channel::modem::{Basin, Fault, HostId};
@@ -15,50 +15,50 @@ use std::time::{Duration, SystemTime};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc;
 
-/// Noise on a line comes in pieces, so that a line without pacing has it for as long.
-const NOISE_PIECE: Duration = Duration::from_millis(100);
-/// Bytes of noise in a piece, as 19200 baud carry.
+/// Noise is sent in pieces at this interval, so that it lasts as long on a line without pacing.
+const NOISE_INTERVAL: Duration = Duration::from_millis(100);
+/// Bytes of noise in a piece: the capacity of a line of 19200 baud in [`NOISE_INTERVAL`].
 const NOISE_BYTES: u16 = 192;
 
-/// Everything that is emulated, and the ways to it.
-pub struct Tank {
+/// The emulated basin and the tasks at its ports.
+pub struct Emulation {
     basin: Basin,
-    modems: Vec<Modem>,
-    ports: Vec<Port>,
+    modems: Vec<ScenarioModem>,
+    ports: Vec<ModemClients>,
     plan: BTreeMap<(Duration, u64), Act>,
     planned: u64,
-    /// Modems whose supply fails when they next transmit.
-    weak: BTreeSet<usize>,
+    /// Modems whose supply fails during their next transmission.
+    brown_outs_due: BTreeSet<usize>,
     links: Links,
     pace: Pace,
-    to_tank: mpsc::Sender<FromHost>,
+    to_emulation: mpsc::Sender<FromHost>,
 }
 
-/// The hosts at one modem.
+/// The clients at one modem.
 #[derive(Default)]
-struct Port {
+struct ModemClients {
     /// The serial line or the TCP listener; `None` while it is unplugged.
-    door: Option<Line>,
-    clients: BTreeMap<u32, (HostId, Line)>,
+    listener: Option<PortLine>,
+    clients: BTreeMap<u32, (HostId, PortLine)>,
     last_client: u32,
-    /// The address that a TCP port had first, so that it comes back at the same.
+    /// The first address of a TCP port; the port returns at the same address after it was unplugged.
     bound: Option<SocketAddr>,
 }
 
 #[derive(Debug, Clone, Copy)]
 enum Act {
-    Trouble(usize, Trouble),
+    Fault(usize, ModemFault),
     Noise(usize, Duration),
     Plug(usize),
 }
 
-impl Tank {
-    /// The scenario, its ports open and printed.
+impl Emulation {
+    /// Opens the ports of a scenario and prints them.
     pub fn new(
         scenario: Scenario,
         links: Links,
         pace: Pace,
-        to_tank: mpsc::Sender<FromHost>,
+        to_emulation: mpsc::Sender<FromHost>,
     ) -> Result<Self, UserError> {
         let Scenario { seed, channel, links: losses, modems, strangers, faults } = scenario;
         let mut basin = Basin::new(Channel::new(channel, seed));
@@ -80,16 +80,16 @@ impl Tank {
         for (from, to, loss) in losses {
             basin.channel().set_link_loss(from, to, loss);
         }
-        let ports = modems.iter().map(|_| Port::default()).collect();
-        let (plan, weak) = (BTreeMap::new(), BTreeSet::new());
-        let mut tank = Self { basin, modems, ports, plan, planned: 0, weak, links, pace, to_tank };
-        for index in 0..tank.modems.len() {
-            tank.plug(index)?;
+        let ports = modems.iter().map(|_| ModemClients::default()).collect();
+        let (plan, brown_outs_due) = (BTreeMap::new(), BTreeSet::new());
+        let mut emulation = Self { basin, modems, ports, plan, planned: 0, brown_outs_due, links, pace, to_emulation };
+        for index in 0..emulation.modems.len() {
+            emulation.plug(index)?;
         }
-        for (at, index, trouble) in faults {
-            tank.plan(at, Act::Trouble(index, trouble));
+        for (at, index, fault) in faults {
+            emulation.plan(at, Act::Fault(index, fault));
         }
-        Ok(tank)
+        Ok(emulation)
     }
 
     pub fn poll_timeout(&self) -> Option<Duration> {
@@ -97,7 +97,7 @@ impl Tank {
         [planned, self.basin.poll_timeout()].into_iter().flatten().min()
     }
 
-    /// Runs everything that is due, and sends the output to the hosts.
+    /// Runs everything that is due, and sends the output to the clients.
     pub fn advance(&mut self, now: Duration) -> Result<(), UserError> {
         while let Some(entry) = self.plan.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((at, _), act) = entry.remove_entry();
@@ -109,20 +109,22 @@ impl Tank {
         while let Some(NodeId(node)) = self.basin.poll_hang_up() {
             self.hang_up(usize::from(node) - 1);
         }
-        self.tell_hosts();
+        self.send_outputs();
         Ok(())
     }
 
-    fn tell_hosts(&mut self) {
+    fn send_outputs(&mut self) {
         for (index, port) in self.ports.iter().enumerate() {
             let first = self.basin.poll_bytes_for(node(index), HostId::FIRST);
-            if let (Some(door), Place::Pty, false) = (&port.door, self.modems[index].place, first.is_empty()) {
-                door.tell(first);
+            if let (Some(listener), EmulatedPort::Pty, false) =
+                (&port.listener, self.modems[index].port, first.is_empty())
+            {
+                listener.send(first);
             }
             for (host, line) in port.clients.values() {
                 let bytes = self.basin.poll_bytes_for(node(index), *host);
                 if !bytes.is_empty() {
-                    line.tell(bytes);
+                    line.send(bytes);
                 }
             }
         }
@@ -138,7 +140,7 @@ impl Tank {
             }
             FromHost::Joined { modem, stream } => {
                 let port = &mut self.ports[modem];
-                if port.door.is_none() {
+                if port.listener.is_none() {
                     return;
                 }
                 let host = self.basin.attach(node(modem));
@@ -147,9 +149,9 @@ impl Tank {
                     return;
                 }
                 port.last_client += 1;
-                let (line, to_tank) = (port.last_client, self.to_tank.clone());
+                let (line, to_emulation) = (port.last_client, self.to_emulation.clone());
                 let speed = speed(&self.modems[modem], self.pace);
-                let client = Line::start(|told| tcp::serve(stream, (modem, line), speed, to_tank, told));
+                let client = PortLine::start(|output| tcp::serve(stream, (modem, line), speed, to_emulation, output));
                 port.clients.insert(line, (host, client));
             }
             FromHost::Left { modem, line } => {
@@ -160,20 +162,20 @@ impl Tank {
         }
     }
 
-    /// Something from the person in front of it.
-    pub fn handle_order(&mut self, order: Order, now: Duration) {
-        let name = match &order {
-            Order::Fault(name, _) | Order::Move(name, _) => name,
-            Order::Quit => return,
+    /// Carries out a line of the standard input; an unknown modem is reported on the standard error output.
+    pub fn handle_command(&mut self, command: EmulatorCommand, now: Duration) {
+        let name = match &command {
+            EmulatorCommand::Fault(name, _) | EmulatorCommand::Move(name, _) => name,
+            EmulatorCommand::Quit => return,
         };
         let Some(index) = self.modems.iter().position(|modem| modem.name == *name) else {
             let names: Vec<_> = self.modems.iter().map(|modem| modem.name.as_str()).collect();
             return eprintln!("there is no modem {name}; it takes one of {}", names.join(", "));
         };
-        match order {
-            Order::Fault(_, trouble) => self.plan(now, Act::Trouble(index, trouble)),
-            Order::Move(_, position) => self.basin.channel().place(node(index), position),
-            Order::Quit => {}
+        match command {
+            EmulatorCommand::Fault(_, fault) => self.plan(now, Act::Fault(index, fault)),
+            EmulatorCommand::Move(_, position) => self.basin.channel().place(node(index), position),
+            EmulatorCommand::Quit => {}
         }
     }
 
@@ -184,15 +186,15 @@ impl Tank {
 
     fn carry_out(&mut self, act: Act, now: Duration) -> Result<(), UserError> {
         match act {
-            Act::Trouble(index, trouble) => {
-                tracing::info!("{:.1} s: {}: {trouble:?}", now.as_secs_f64(), self.modems[index].name);
-                self.break_down(index, trouble, now);
+            Act::Fault(index, fault) => {
+                tracing::info!("{:.1} s: {}: {fault:?}", now.as_secs_f64(), self.modems[index].name);
+                self.apply_fault(index, fault, now);
                 Ok(())
             }
             Act::Noise(index, until) => {
                 self.basin.inject(node(index), Fault::Garbage(NOISE_BYTES), now);
-                if now + NOISE_PIECE < until {
-                    self.plan(now + NOISE_PIECE, Act::Noise(index, until));
+                if now + NOISE_INTERVAL < until {
+                    self.plan(now + NOISE_INTERVAL, Act::Noise(index, until));
                 }
                 Ok(())
             }
@@ -200,22 +202,22 @@ impl Tank {
         }
     }
 
-    fn break_down(&mut self, index: usize, trouble: Trouble, now: Duration) {
-        let fault = match trouble {
-            Trouble::Busy(length) => Fault::Busy(length),
-            Trouble::Reboot => Fault::Reboot,
-            Trouble::Garbage(length) => return self.plan(now, Act::Noise(index, now + length)),
-            Trouble::HalfLine => Fault::HalfLine,
-            Trouble::Freeze(length) => Fault::Freeze(length),
-            Trouble::WrongAddress(address) => Fault::WrongAddress(address),
-            Trouble::BrownOut => {
-                self.weak.insert(index);
+    fn apply_fault(&mut self, index: usize, fault: ModemFault, now: Duration) {
+        let fault = match fault {
+            ModemFault::Busy(length) => Fault::Busy(length),
+            ModemFault::Reboot => Fault::Reboot,
+            ModemFault::Garbage(length) => return self.plan(now, Act::Noise(index, now + length)),
+            ModemFault::HalfLine => Fault::HalfLine,
+            ModemFault::Freeze(length) => Fault::Freeze(length),
+            ModemFault::WrongAddress(address) => Fault::WrongAddress(address),
+            ModemFault::BrownOut => {
+                self.brown_outs_due.insert(index);
                 return;
             }
-            Trouble::BigBuffer => Fault::BigBuffer,
-            Trouble::Unplug(length) => {
+            ModemFault::BigBuffer => Fault::BigBuffer,
+            ModemFault::Unplug(length) => {
                 self.hang_up(index);
-                self.ports[index].door = None;
+                self.ports[index].listener = None;
                 self.links.remove(&self.modems[index].name);
                 return self.plan(now + length, Act::Plug(index));
             }
@@ -223,31 +225,35 @@ impl Tank {
         self.basin.inject(node(index), fault, now);
     }
 
-    /// Supplies that were to fail do so where a transmission is on air.
+    /// A brown-out that is due takes effect once its modem is transmitting.
     fn fail_supplies(&mut self, now: Duration) {
-        let failing: Vec<_> =
-            self.weak.iter().copied().filter(|index| self.basin.channel().is_busy(node(*index), now)).collect();
+        let failing: Vec<_> = self
+            .brown_outs_due
+            .iter()
+            .copied()
+            .filter(|index| self.basin.channel().is_busy(node(*index), now))
+            .collect();
         for index in failing {
-            self.weak.remove(&index);
+            self.brown_outs_due.remove(&index);
             self.basin.inject(node(index), Fault::BrownOut, now);
         }
     }
 
-    /// The TCP clients of a modem lose their connections.
+    /// Closes the connections of the TCP clients of a modem.
     fn hang_up(&mut self, index: usize) {
         for (_, (host, _)) in std::mem::take(&mut self.ports[index].clients) {
             self.basin.detach(node(index), host);
         }
     }
 
-    /// Opens a port and prints where it is.
+    /// Opens a port and prints its device or address.
     fn plug(&mut self, index: usize) -> Result<(), UserError> {
-        if self.ports[index].door.is_some() {
+        if self.ports[index].listener.is_some() {
             return Ok(());
         }
-        match self.modems[index].place {
-            Place::Pty => self.plug_pty(index),
-            Place::Tcp(address) => self.plug_tcp(index, address),
+        match self.modems[index].port {
+            EmulatedPort::Pty => self.plug_pty(index),
+            EmulatedPort::Tcp(address) => self.plug_tcp(index, address),
         }
     }
 
@@ -260,9 +266,9 @@ impl Tank {
         let bound = listener.local_addr().map_err(failed)?;
         let listener = TcpListener::from_std(listener).map_err(failed)?;
         print_line(&format!("{name} {bound}"));
-        let to_tank = self.to_tank.clone();
+        let to_emulation = self.to_emulation.clone();
         self.ports[index].bound = Some(bound);
-        self.ports[index].door = Some(Line::start(|_| tcp::accept(listener, index, to_tank)));
+        self.ports[index].listener = Some(PortLine::start(|_| tcp::accept(listener, index, to_emulation)));
         Ok(())
     }
 
@@ -275,8 +281,8 @@ impl Tank {
             Some(link) => print_line(&format!("{} {device} {}", modem.name, link.display())),
             None => print_line(&format!("{} {device}", modem.name)),
         }
-        let (speed, to_tank) = (speed(modem, self.pace), self.to_tank.clone());
-        self.ports[index].door = Some(Line::start(|told| pty.serve(index, speed, to_tank, told)));
+        let (speed, to_emulation) = (speed(modem, self.pace), self.to_emulation.clone());
+        self.ports[index].listener = Some(PortLine::start(|output| pty.serve(index, speed, to_emulation, output)));
         Ok(())
     }
 
@@ -289,12 +295,12 @@ impl Tank {
     }
 }
 
-/// How fast the line of a modem is in the world's time.
-fn speed(modem: &Modem, pace: Pace) -> Speed {
+/// The pace of a modem's line in wall time.
+fn speed(modem: &ScenarioModem, pace: Pace) -> Speed {
     Speed { bytes_per_s: modem.make.line_rate().map(|rate| rate * pace.scale) }
 }
 
-/// Nobody may be reading any more; that is no reason to end.
+/// The reader of the standard output may be gone; the emulation continues.
 fn print_line(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }

@@ -1,0 +1,96 @@
+//! The bytes in `WIRE.md` are those that the code writes and reads.
+
+mod document;
+mod parts;
+mod samples;
+
+use document::{DOCUMENT, assert_same, frames, hex, rows, section};
+use samples::{
+    CALL_NONCE, CALL_SESSION, MISSION, SURFACE_NONCE, SURFACE_SESSION, VEHICLE_SESSION, all_up_to, answer_of_vehicle,
+    answered, auv, call, clock, first_of_surface, frame, header, here, hold, key, map_payload, session, surface_hello,
+    vehicle_hello,
+};
+use scenecast_protocol::seal::Direction;
+use scenecast_protocol::wire::{Address, ChunkKind, Header, Seal, WIRE_VERSION};
+
+#[test]
+fn frames_with_a_crc_are_those_of_the_document() {
+    let crc = |session: u16| Seal::Crc(MISSION, session);
+    let slot = [(ChunkKind::Slot, hold())];
+    let grant = Header {
+        base: 2,
+        turn: Some(48),
+        stamp: clock(55_100, Some(667)),
+        ack: all_up_to(3, vec![1]),
+        ..header(Address::SURFACE, 3)
+    };
+    let map = Header { base: 2, remaining: 1, ..header(auv(), 2) };
+    let empty = Header { turn: Some(40), ..header(auv(), 2) };
+    let expected = vec![
+        ("hello of the surface", frame(surface_hello(false), 64, true, crc(0), &[])),
+        ("hello of the vehicle", frame(vehicle_hello(false), 64, true, crc(SURFACE_SESSION), &[])),
+        ("first numbered frame of the surface", frame(first_of_surface(false), 64, true, crc(VEHICLE_SESSION), &slot)),
+        ("grant with an ack statement", frame(grant, 64, true, crc(VEHICLE_SESSION), &[])),
+        ("answer of the vehicle", frame(answer_of_vehicle(false), 64, true, crc(SURFACE_SESSION), &answered())),
+        (
+            "map frame in the middle of a turn",
+            frame(map, 48, false, crc(SURFACE_SESSION), &[(ChunkKind::Map, map_payload())]),
+        ),
+        ("frame without content", frame(empty, 64, true, crc(SURFACE_SESSION), &[])),
+        ("call", frame(call(false), 64, true, crc(0), &[])),
+        ("here", frame(here(false), 64, true, crc(CALL_SESSION), &[])),
+    ];
+    assert_same(frames(section("### 11.2", "### 11.3")), expected);
+}
+
+#[test]
+fn frames_with_a_tag_are_those_of_the_document() {
+    let key = key();
+    let hello = |session: u16, nonce: u64| Seal::Hello(&key, MISSION, session, nonce);
+    let (plain, secret) = (session(false), session(true));
+    let slot = [(ChunkKind::Slot, hold())];
+    let down = |key| frame(first_of_surface(true), 64, true, Seal::Session(key, Direction::Down, 1), &slot);
+    let up = |key| frame(answer_of_vehicle(true), 64, true, Seal::Session(key, Direction::Up, 1), &answered());
+    let expected = vec![
+        ("keyed hello of the surface", frame(surface_hello(true), 64, true, hello(0, 0), &[])),
+        (
+            "keyed hello of the vehicle",
+            frame(vehicle_hello(true), 64, true, hello(SURFACE_SESSION, SURFACE_NONCE), &[]),
+        ),
+        ("keyed numbered frame of the surface", down(&plain)),
+        ("keyed numbered frame of the vehicle", up(&plain)),
+        ("encrypted numbered frame of the surface", down(&secret)),
+        ("encrypted numbered frame of the vehicle", up(&secret)),
+        ("keyed call", frame(call(true), 64, true, hello(0, 0), &[])),
+        ("keyed here", frame(here(true), 64, true, hello(CALL_SESSION, CALL_NONCE), &[])),
+    ];
+    assert_same(frames(section("### 11.3", "## 12")), expected);
+}
+
+#[test]
+fn golden_values_of_the_keys_are_those_of_the_document() {
+    let found = rows(section("### 12.6", "## 13"));
+    let compact = |bytes: &[u8]| hex(bytes).replace(' ', "").to_lowercase();
+    let sealed = |encrypt: bool, direction: Direction| {
+        let mut body = *b"body of a frame";
+        let tag = session(encrypt).seal(direction, 5, b"head", &mut body);
+        (compact(&tag), compact(&body))
+    };
+    let expected = [
+        ("fingerprint", format!("{:08x}", key().fingerprint())),
+        ("key file", key().to_text().trim().to_owned()),
+        ("hello tag of these three parts", compact(&key().hello_tag(&[b"hello", b"", &[1, 2]]))),
+        ("tag, e = 0, down", sealed(false, Direction::Down).0),
+        ("tag, e = 0, up", sealed(false, Direction::Up).0),
+        ("ciphertext, e = 1, down", sealed(true, Direction::Down).1),
+        ("tag, e = 1, down", sealed(true, Direction::Down).0),
+    ];
+    for (name, bytes) in expected {
+        assert_eq!(found.get(name), Some(&bytes.as_str()), "{name}");
+    }
+}
+
+#[test]
+fn the_document_has_the_wire_version_of_the_code() {
+    assert!(DOCUMENT.starts_with(&format!("# The wire of scenecast, version {WIRE_VERSION}\n")));
+}

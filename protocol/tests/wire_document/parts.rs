@@ -1,0 +1,273 @@
+//! The parts of a frame: fields of the header, layer chunks, status and slots.
+
+use crate::document::{assert_same, pairs, rows, section};
+use crate::samples::{MISSION, auv, clock, frame, header, hold, place, status, vehicle_stamp};
+use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
+use scenecast_protocol::directive::{
+    Band, Budget, CellBand, Change, Constraints, ExemplarRequest, ExemplarRequests, Fence, Fix, Limits, PlannerKind,
+    Polygon, Reaction, Settings, ShortDecimal, Slot, Utility, VersionedSlot,
+};
+use scenecast_protocol::map::{
+    Cell, DescriptorPart, LabelGrid, LayerChunk, LayerDescriptor, LayerId, LayerMask, LayerSet,
+};
+use scenecast_protocol::map_codec;
+use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Shares};
+use scenecast_protocol::wire::{
+    AckStatement, Address, ChunkKind, Header, Placement, PlannedPath, Reader, Seal, Stamp, VehicleStatus, unwrap_number,
+};
+use std::collections::BTreeMap;
+
+/// Rows of the document with the bytes that the code writes.
+type Rows = Vec<(&'static str, Vec<u8>)>;
+
+#[test]
+fn parts_of_a_frame_are_those_of_the_document() {
+    let found = rows(section("### 11.1", "### 11.2"));
+    let mut found: BTreeMap<&str, Vec<u8>> =
+        found.into_iter().map(|(name, bytes)| (name, pairs(bytes).expect("digits"))).collect();
+    // Formats inside of the map codec have tests there.
+    found.retain(|name, _| {
+        !name.starts_with("head of a map chunk's payload") && !name.starts_with("the same, a payload")
+    });
+    let map = found.keys().find(|name| name.starts_with("payload of a map chunk")).copied().expect("the row");
+    let changes = map_codec::decode(&LabelGrid::default(), &found[map]).expect("a sound chunk");
+    assert_eq!(changes, [(Cell::new(-1, 2), 7), (Cell::new(0, 2), 1)]);
+    found.remove(map);
+
+    let expected = [header_fields(), layer_chunks(), status_chunks(), orders(), settings_and_budgets()].concat();
+    assert_same(found, expected);
+    assert_eq!((unwrap_number(3, 65_530), unwrap_number(65_530, 65_540)), (65_539, 65_530));
+}
+
+fn header_fields() -> Rows {
+    let in_frame = |header: Header, from: usize, to: usize| {
+        frame(header, 2000, true, Seal::Crc(MISSION, 0), &[])[from..to].to_vec()
+    };
+    let base = |base: u16, bytes: usize| in_frame(Header { base, ..header(auv(), 9) }, 6, 6 + bytes);
+    let stamp = |from: Address, stamp: Stamp, bytes: usize| {
+        in_frame(Header { stamp: Some(stamp), ..header(from, 9) }, 8, 8 + bytes)
+    };
+    let statement = |horizon_low: u16, lost: Vec<u16>| {
+        let (statement, mut bytes) = (AckStatement { horizon_low, lost }, Vec::new());
+        assert!(statement.encode(99, &mut bytes));
+        assert_eq!(AckStatement::decode(&mut Reader::new(&bytes)), Ok(statement));
+        bytes
+    };
+    let head = |payload: usize, head: usize, is_full: bool| {
+        let size = if is_full { 8 + head + payload + 4 } else { 1024 };
+        let chunk = [(ChunkKind::Map, vec![9; payload])];
+        frame(header(auv(), 9), size, true, Seal::Crc(MISSION, 0), &chunk)[8..8 + head].to_vec()
+    };
+    vec![
+        ("base 127", base(127, 1)),
+        ("base 128", base(128, 2)),
+        ("base 2048", base(2048, 2)),
+        (
+            "stamp of the surface: clock 66 051 ms, one way 667 ms",
+            stamp(Address::SURFACE, clock(66_051, Some(667)).expect("a stamp"), 5),
+        ),
+        (
+            "stamp of the surface: clock 1 ms, one way not known",
+            stamp(Address::SURFACE, clock(1, None).expect("a stamp"), 5),
+        ),
+        (
+            "stamp of a vehicle: clock 16 777 215 ms, frame 9 received 258 ms before",
+            stamp(auv(), vehicle_stamp(16_777_215, 9, 258), 6),
+        ),
+        ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
+        ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),
+        (
+            "statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code with k = 2",
+            statement(30, vec![20, 25]),
+        ),
+        ("head of a map chunk that fills the rest of a full frame", head(200, 1, true)),
+        ("head of a map chunk of 26 bytes", head(26, 1, false)),
+        ("head of a map chunk of 27 bytes", head(27, 2, false)),
+        ("head of a map chunk of 300 bytes", head(300, 2, false)),
+    ]
+}
+
+fn layer_chunks() -> Rows {
+    let layer = |chunk: LayerChunk<'_>| {
+        let bytes = chunk.encode();
+        assert_eq!(LayerChunk::decode(&bytes), Some(chunk));
+        bytes
+    };
+    let built_in = LayerSet::default();
+    let [confidence, curiosity] = [LayerId::CONFIDENCE, LayerId::CURIOSITY].map(|id| built_in.get(id).unwrap());
+    let depth = LayerDescriptor::depth_around(75.5, 0.5);
+    assert_eq!((depth.bounds(1), confidence.bounds(4)), (Some((12.0, 12.5)), Some((0.75, 1.0))));
+    let part = |descriptor: &LayerDescriptor, from: usize, to: usize| {
+        let bytes = descriptor.to_bytes();
+        let part = DescriptorPart {
+            digest: descriptor.digest(),
+            first: from as u8,
+            is_last: to == bytes.len(),
+            bytes: &bytes[from..to],
+        };
+        layer(LayerChunk::Descriptor(built_in.id(&descriptor.name).unwrap(), part))
+    };
+    let whole = |descriptor: &LayerDescriptor| part(descriptor, 0, descriptor.to_bytes().len());
+    let digest = 0x27A6 ^ confidence.digest();
+    vec![
+        ("layer chunk: confidence announced, quarters of 0 to 1", whole(confidence)),
+        ("layer chunk: depth announced, steps of 0.5 m, level 1 from 12 m on", whole(&depth)),
+        ("the same in two chunks, the first", part(&depth, 0, 10)),
+        ("the second", part(&depth, 10, 19)),
+        ("layer chunk: curiosity announced, whole bits", whole(curiosity)),
+        ("head of a layer chunk: a patch of confidence", layer(LayerChunk::Patch(LayerId::CONFIDENCE, &[]))),
+        (
+            "layer chunk: the digest of confidence, of levels with the digest 27A6",
+            layer(LayerChunk::Digest(LayerId::CONFIDENCE, digest)),
+        ),
+    ]
+}
+
+fn status_chunks() -> Rows {
+    let pose = |waypoint: Option<(f64, f64)>, path: &[(f64, f64)], continues: bool| {
+        let point = |(x_m, y_m)| MapPoint { x_m, y_m };
+        let path = PlannedPath { points: path.iter().copied().map(point).collect(), continues };
+        let bytes = VehicleStatus { waypoint: waypoint.map(point), path, ..status() }.encode_pose(99);
+        assert_eq!(VehicleStatus::default().read_pose(&bytes), Ok(()));
+        bytes
+    };
+    vec![
+        (
+            "pose: hold by order, x 1.5 m, y -0.1 m, depth 18 m, heading 90 degrees, sigma 1.25 m, fix 8 s ago, 4000 cells",
+            pose(None, &[], false),
+        ),
+        ("the same with a waypoint at (1, -2) m", pose(Some((1.0, -2.0)), &[], false)),
+        (
+            "the same with a path from there to (2.4, -3.4) and (-0.6, -3.4) m",
+            pose(Some((1.0, -2.0)), &[(2.4, -3.4), (-0.6, -3.4)], false),
+        ),
+        ("the same with an empty path that continues", pose(Some((1.0, -2.0)), &[], true)),
+        (
+            "the first pose with an autopilot that does not answer",
+            VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
+        ),
+        (
+            "report: epoch 1, 9 labels, digest BEEF, budget 10 000 bit/s (2500 x 2^2), 3 frames refused, 448 bytes of labels (14 x 2^5) \
+             and 15 of all else wait, utility version 7 applied, fix version 2 refused (2)",
+            status().encode_report(99, 0).unwrap().0,
+        ),
+        (
+            "the same with a placement: version 2, 12.5 m east, -0.1 m north",
+            VehicleStatus {
+                placement: Some(Placement { version: 2, origin: WorldPoint::new(12.5, -0.1) }),
+                ..status()
+            }
+            .encode_report(99, 0)
+            .unwrap()
+            .0,
+        ),
+    ]
+}
+
+/// A version of a slot in series ABCD; it must read back.
+fn slot(version: u16, content: Slot) -> Vec<u8> {
+    let bytes = VersionedSlot::encode(0xABCD, version, &content);
+    let read = VersionedSlot { id: content.id(), series: 0xABCD, version, content: Some(content) };
+    assert_eq!(VersionedSlot::decode(&bytes), Ok(read));
+    bytes
+}
+
+fn orders() -> Rows {
+    let utility =
+        Utility { epoch: 1, exploration: 20, curiosity: 0, weights: [(3, 80), (5, -20)].into_iter().collect() };
+    let fix = Fix { position: WorldPoint::new(-12.3, 400.0), sigma_m: 1.5, age_s: 0.82 };
+    let requests = ExemplarRequests {
+        epoch: 1,
+        wanted: vec![
+            ExemplarRequest { label: 3, serial: 2, size: 0, picture: 0 },
+            ExemplarRequest { label: 5, serial: 1, size: 1, picture: 9 },
+        ],
+    };
+    let limits = Limits {
+        depth: Some(Band { low_dm: 50, high_dm: 400 }),
+        distance_m: Some(3000),
+        silence_s: Some(600),
+        on_silence: Some(Reaction::Return),
+        ..Limits::default()
+    };
+    let outline = |vertices: &[(i32, i32)]| Polygon(vertices.iter().map(|&(x, y)| place(x, y)).collect());
+    let fence = Fence {
+        fence: Some(outline(&[(0, 0), (40, 0), (40, 30), (0, 30)])),
+        keep_outs: vec![outline(&[(10, 10), (15, 10), (10, 18)])],
+        return_point: Some(place(2, 3)),
+    };
+    vec![
+        (
+            "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",
+            slot(4, Slot::Utility(utility)),
+        ),
+        ("slot: series ABCD, version 1, constraints: hold", hold()),
+        (
+            "slot: series ABCD, version 2, constraints: abort",
+            slot(2, Slot::Constraints(Constraints { hold: false, abort: true })),
+        ),
+        (
+            "slot: series ABCD, version 6, limits: depth 5 to 40 m, 3000 m, silence 600 s, on silence return",
+            slot(6, Slot::Limits(limits)),
+        ),
+        (
+            "slot: series ABCD, version 7, fence: (0, 0), (40, 0), (40, 30), (0, 30) m, keep-out (10, 10), (15, 10), \
+             (10, 18) m, return point (2, 3) m",
+            slot(7, Slot::Fence(fence)),
+        ),
+        (
+            "slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, image 9 with an edge of \
+             128 pixels",
+            slot(1, Slot::Requests(requests)),
+        ),
+        ("slot: series ABCD, version 9, fix: x -12.3 m, y 400 m, sigma 1.5 m, age 0.82 s", slot(9, Slot::Fix(fix))),
+    ]
+}
+
+fn settings_and_budgets() -> Rows {
+    let budget = Budget { bits_per_s: 400, shares: Shares([10, 5, 5, 50, 20]), background: BackgroundOrder::default() };
+    let curious = BackgroundOrder::new(&[
+        BackgroundStream::Layer(LayerId::CURIOSITY),
+        BackgroundStream::Finer,
+        BackgroundStream::Layer(LayerId::DEPTH),
+        BackgroundStream::Exemplars,
+        BackgroundStream::Layer(LayerId::CONFIDENCE),
+    ]);
+    let curious = Budget { background: curious.unwrap(), ..budget };
+    let last = BackgroundStream::Layer(LayerId::new(15).unwrap());
+    let long = Budget { background: BackgroundOrder::new(&[BackgroundStream::Finer, last]).unwrap(), ..budget };
+    let settings = Settings {
+        planner: Change::To(PlannerKind::Horizon),
+        cells: Change::To(CellBand::Coarse),
+        layers: Change::To(LayerMask::from_iter([LayerId::DEPTH])),
+        alpha: Change::To(ShortDecimal::new(0.01).unwrap()),
+        gamma: Change::Configured,
+        frames_per_s: Change::To(ShortDecimal::new(0.25).unwrap()),
+        ..Settings::default()
+    };
+    vec![
+        (
+            "slot: series ABCD, version 2, settings: planner horizon, coarse cells, depth alone, alpha 0.01, gamma as \
+             configured, 0.25 frames a second",
+            slot(2, Slot::Settings(settings)),
+        ),
+        (
+            "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, spare capacity to finer cells, depth, \
+             exemplars, confidence",
+            slot(3, Slot::Budget(budget)),
+        ),
+        (
+            "slot: series ABCD, version 3, the same budget, spare capacity to curiosity, finer cells, depth, exemplars, \
+             confidence",
+            slot(3, Slot::Budget(curious)),
+        ),
+        (
+            "slot: series ABCD, version 3, the same budget, spare capacity to finer cells and layer 15",
+            slot(3, Slot::Budget(long)),
+        ),
+        (
+            "slot: series ABCD, version 2, settings: layers 2 and 15 alone",
+            slot(2, Slot::Settings(Settings { layers: Change::To(LayerMask(0x8004)), ..Settings::default() })),
+        ),
+    ]
+}
