@@ -35,7 +35,8 @@ section! {
 section! {
     /// The camera.
     camera: Camera {
-        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal.
+        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal; a vehicle at
+        /// sea then has no camera frames.
         source: CameraSource = CameraSource::Rehearsal, ANY, [Auv Scenario];
         /// Frames per second.
         rate_hz: f64 = 0.5, range(0.01, 30.0, "1/s"), [Scenario];
