@@ -50,7 +50,7 @@ pub fn assemble(
     };
     link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or_else(|| background(config)));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_telling(config.map.cells == "coarse", config.map.coarse_after_s, selected_layers(config));
+    vehicle.configure_map(config.map.cells == "coarse", config.map.coarse_after_s, selected_layers(config));
     if config.map.stream == "whole-png" {
         vehicle.send_whole_png();
     }

@@ -1,4 +1,4 @@
-//! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
+//! Random orders, maps, drift and silence: no waypoint leads out of the fence, into a keep-out or beyond a limit.
 
 use super::{Vehicle, VehicleOutput};
 use crate::{Durable, MapUpdate, Navigator};
@@ -288,9 +288,9 @@ fn the_last_good_fence_survives_a_refusal_and_a_restart() {
     let config = Config::default();
     let durable = sea.vehicle.durable().clone();
     let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
-    assert!(!again.steering.bounds().holds((25.0, 5.0)));
-    assert!(again.steering.bounds().holds((15.0, 5.0)));
-    assert_eq!(again.steering.home(), (5.0, 5.0));
+    assert!(!again.guidance.steering().bounds().holds((25.0, 5.0)));
+    assert!(again.guidance.steering().bounds().holds((15.0, 5.0)));
+    assert_eq!(again.guidance.steering().home(), (5.0, 5.0));
 }
 
 #[test]

@@ -1,13 +1,9 @@
 //! Where the vehicle is, through a restart.
 
-use super::Vehicle;
 use crate::Navigator;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
-use scenecast_protocol::map::Cell;
-use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Placement, PlannedPath};
+use scenecast_protocol::wire::Placement;
 use serde::{Deserialize, Serialize};
-use std::time::Duration;
 
 /// Where the vehicle was at its last fix; decimetres, so that it compares.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,54 +49,10 @@ impl LastPlace {
     }
 }
 
-impl Vehicle {
-    /// The position is known from elsewhere, as in a recorded mission.
-    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        let before = self.navigator.position();
-        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
-        self.guard.handle_way(before.distance_m(MapPoint { x_m, y_m }));
-    }
-
-    /// For so long nobody measured the way: it may be anywhere that it could have gone to, and counts as gone there.
-    pub fn handle_unseen(&mut self, time: Duration) {
-        let metres = time.as_secs_f64() * self.guard.speed_m_s();
-        self.navigator.handle_unseen_way(metres);
-        self.guard.handle_way(metres);
-    }
-
-    /// Labels of cells as the vehicle sees them.
-    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
-        self.telling.seen.iter()
-    }
-
-    pub fn navigator(&self) -> &Navigator {
-        &self.navigator
-    }
-
-    /// Fixes that corrected the estimate.
-    pub fn fixes_applied(&self) -> u64 {
-        self.fixes_applied
-    }
-
-    /// The current goal in the map frame.
-    pub fn waypoint(&self) -> Option<MapPoint> {
-        self.waypoint
-    }
-
-    /// Where it plans to go from there.
-    pub fn path(&self) -> &PlannedPath {
-        &self.path
-    }
-
-    /// Whether the autopilot does not answer; the status tells it.
-    pub fn set_autopilot_silent(&mut self, is_silent: bool) {
-        self.autopilot_silent = is_silent;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_protocol::time::Instant;
 
     #[test]
     fn golden_bytes_of_a_place() {
