@@ -364,7 +364,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "stamp of a vehicle: clock 16 777 215 ms, frame 9 heard 258 ms before",
             stamp(auv(), heard(16_777_215, 9, 258), 6),
         ),
-        ("statement: horizon low ABC, nothing lost", statement(0xABC, vec![])),
+        ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),
         ("statement: horizon 7, lost 6 and 3 (distances 1 and 4), a bitmap", statement(7, vec![1, 4])),
         (
             "statement: horizon 30, lost 10 and 5 (distances 20 and 25), a Rice code with k = 2",
@@ -393,7 +393,7 @@ fn parts_of_a_frame_are_those_of_the_document() {
             "the same with a path from there to (2.4, -3.4) and (-0.6, -3.4) m",
             pose(Some((1.0, -2.0)), &[(2.4, -3.4), (-0.6, -3.4)], false),
         ),
-        ("the same with a path of which nothing is told but that it goes on", pose(Some((1.0, -2.0)), &[], true)),
+        ("the same with an empty path that continues", pose(Some((1.0, -2.0)), &[], true)),
         (
             "the first pose with an autopilot that does not answer",
             VehicleStatus { autopilot_silent: true, ..status() }.encode_pose(99),
@@ -477,7 +477,7 @@ fn frames_with_a_crc_are_those_of_the_document() {
         ..header(Address::SURFACE, 3)
     };
     let map = Header { base: 2, remaining: 1, ..header(auv(), 2) };
-    let nothing = Header { turn: Some(40), ..header(auv(), 2) };
+    let empty = Header { turn: Some(40), ..header(auv(), 2) };
     let expected = vec![
         ("hello of the surface", frame(surface_hello(false), 64, true, crc(0), &[])),
         ("hello of the vehicle", frame(vehicle_hello(false), 64, true, crc(SURFACE_SESSION), &[])),
@@ -488,7 +488,7 @@ fn frames_with_a_crc_are_those_of_the_document() {
             "map frame in the middle of a turn",
             frame(map, 48, false, crc(SURFACE_SESSION), &[(ChunkKind::Map, map_payload())]),
         ),
-        ("frame that says nothing", frame(nothing, 64, true, crc(SURFACE_SESSION), &[])),
+        ("frame without content", frame(empty, 64, true, crc(SURFACE_SESSION), &[])),
         ("call", frame(call(false), 64, true, crc(0), &[])),
         ("here", frame(here(false), 64, true, crc(CALL_SESSION), &[])),
     ];

@@ -66,14 +66,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut restarted = Mapper::restore(&checkpoint)?;
     let again = (FRAMES / 2 + 1..FRAMES).map(|frame| restarted.see(&reef, frame)).last().unwrap_or_default();
     let is_equal = restarted.model.save() == mapper.model.save();
-    println!(
-        "restarted from the {bytes} bytes of {} s; each word has the same label as without: {is_equal}",
-        FRAMES + 2
-    );
+    println!("restarted from {bytes} bytes of {} s; all words have the same labels: {is_equal}", FRAMES + 2);
     let differ = map.iter().filter(|cell| !again.contains(cell)).count();
-    println!(
-        "{differ} of {} published cells differ, since the next map after a restart evaluates every cell",
-        map.len()
-    );
+    println!("{differ} of {} published cells differ: the first map after a restart evaluates all cells", map.len());
     Ok(())
 }

@@ -112,8 +112,8 @@ impl LabelBook {
         self.topics.resize(self.topics.len().max(published), None);
     }
 
-    /// Begins another epoch, whose labels are numbered from 1. Topics that held enough cells before the call
-    /// get their labels at once.
+    /// Begins another epoch, whose labels are numbered from 1. Topics that held enough cells in the last
+    /// [`Self::publish`] can get their labels in the next one.
     pub fn begin_epoch(&mut self, epoch: u8) {
         self.epoch = epoch;
         self.topics.clear();

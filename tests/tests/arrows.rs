@@ -8,9 +8,10 @@ const IO_CRATES: [&str; 8] =
     ["axum", "hyper", "nix", "serialport", "scenecast-files", "tokio", "tokio-serial", "tracing-subscriber"];
 
 /// Crates that do no IO.
-const SANS_IO: [&str; 10] = [
+const SANS_IO: [&str; 11] = [
     "scenecast-core",
     "scenecast-drivers",
+    "scenecast-host",
     "scenecast-motion",
     "scenecast-protocol",
     "scenecast-scoring",
@@ -22,13 +23,12 @@ const SANS_IO: [&str; 10] = [
 ];
 
 /// Crates that no vehicle carries.
-const ASHORE: [&str; 10] = [
+const ASHORE: [&str; 9] = [
     "scenecast-console",
     "scenecast-modem-sim",
     "scenecast-motion",
     "scenecast-rehearsal",
     "scenecast-scoring",
-    "scenecast-surface",
     "scenecast-tests",
     "scenecast-tools",
     "scenecast-worlds",

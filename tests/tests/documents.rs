@@ -125,7 +125,7 @@ fn commands_of_the_documents_run() {
     }
     let dir = scratch("documents");
     RUN.iter().for_each(|(line, parts)| run_line(line, parts, &[], &dir));
-    let (_demo, port) = demo();
+    let (_demo, port) = demo("/api/v2/vehicles/1/map.png");
     let url = format!("http://127.0.0.1:{port}");
     RUN_WITH_DEMO.iter().for_each(|(line, parts)| run_line(line, parts, &["--url", &url], &dir));
     let report = std::fs::read_to_string(dir.join("run2/report.json")).expect("a report was written");
@@ -133,13 +133,12 @@ fn commands_of_the_documents_run() {
     std::fs::remove_dir_all(dir).expect("the folder can be removed");
 }
 
-/// A demo that has a map.
-fn demo() -> (Process, u16) {
+/// A demo that serves `path`.
+fn demo(path: &str) -> (Process, u16) {
     let port = free_port();
-    let demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "20", "--duration", "600"]);
-    let image = "/api/v2/vehicles/1/map.png";
-    wait_until("the demo has a map", Duration::from_secs(60), || {
-        http(port, "GET", image, "", "").is_some_and(|(status, _)| status == 200)
+    let demo = Process::start(&["demo", "--port", &port.to_string(), "--speed", "4", "--duration", "600"]);
+    wait_until(path, Duration::from_secs(300), || {
+        http(port, "GET", path, "", "").is_some_and(|(status, _)| status == 200)
     });
     (demo, port)
 }
@@ -183,9 +182,10 @@ fn every_key_in_the_documents_exists() {
     let sections: BTreeSet<&str> = keys.iter().filter_map(|k| k.split('.').next()).collect();
     // Members of reports and of the API, and old names of keys.
     let others = |page: &Page| ["reports.md", "http.md", "configuration.md"].iter().any(|n| page.path.ends_with(n));
+    let is_file = |span: &str| [".rs", ".png", ".journal", ".checkpoint", ".key"].iter().any(|end| span.ends_with(end));
     let is_key = |span: &str| {
         let words = span.split('.').all(|w| !w.is_empty() && w.bytes().all(|b| b.is_ascii_lowercase() || b == b'_'));
-        words && span.split_once('.').is_some_and(|(section, _)| sections.contains(section)) && !span.ends_with(".rs")
+        words && !is_file(span) && span.split_once('.').is_some_and(|(section, _)| sections.contains(section))
     };
     let mut faults = Vec::new();
     for page in pages() {
@@ -317,7 +317,7 @@ fn the_reference_of_the_configuration_is_up_to_date() {
 
 #[test]
 fn the_reference_of_http_is_up_to_date() {
-    let (_demo, port) = demo();
+    let (_demo, port) = demo("/api/openapi.json");
     let (_, body) = http(port, "GET", "/api/openapi.json", "", "").expect("the demo serves the document");
     let document: Value = serde_json::from_slice(&body).expect("the document is JSON");
     generated("docs/reference/http.md", "http", &http_reference(&document));

@@ -73,9 +73,9 @@ fn whole_missions_pass_with_either_codec() {
 
 #[test]
 fn layers_arrive_and_labels_do_not_wait_for_them() {
-    let without = fly(&["map.planes=[]"], 8);
+    let without = fly(&["map.layers=[]"], 8);
     assert_eq!(without["map"]["layers"], serde_json::json!({}));
-    for sets in [&["map.layer_shares=[0, 0, 0]"], &["map.layer_shares=[10, 5, 0]"]] {
+    for sets in [&["map.layer_shares={}"], &["map.layer_shares={ confidence = 10, depth = 5 }"]] {
         let with = fly(sets, 8);
         assert_sound(&with);
         for layer in ["confidence", "depth"] {
@@ -90,13 +90,14 @@ fn layers_arrive_and_labels_do_not_wait_for_them() {
 }
 
 #[test]
-fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_differs() {
+fn curiosity_is_sent_only_with_a_share_or_as_background() {
     let without = fly(&[], 8);
-    assert_eq!(without.to_string(), fly(&[r#"map.planes=["confidence", "depth"]"#], 8).to_string());
+    assert_eq!(without.to_string(), fly(&[r#"map.layers=["confidence", "depth"]"#], 8).to_string());
     assert_eq!(without["map"]["layers"]["curiosity"], Value::Null);
-    for sets in
-        [r#"link.spend=["finer", "depth", "exemplars", "confidence", "curiosity"]"#, "map.layer_shares=[0, 0, 10]"]
-    {
+    for sets in [
+        r#"link.background=["finer", "depth", "exemplars", "confidence", "curiosity"]"#,
+        "map.layer_shares.curiosity=10",
+    ] {
         let with = fly(&[sets], 8);
         assert_sound(&with);
         let layer = &with["map"]["layers"]["curiosity"];
@@ -108,7 +109,7 @@ fn curiosity_is_told_for_a_place_in_the_spending_or_a_share_and_else_nothing_dif
 
 #[test]
 fn levels_of_curiosity_tell_the_cells_of_a_reef_apart() {
-    let config = config(&[r#"link.spend=["curiosity"]"#]);
+    let config = config(&[r#"link.background=["curiosity"]"#]);
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 8, record: None }).unwrap();
     mission.advance(Instant::from_secs_f64(119.0)).unwrap();
     let vehicle = mission.vehicle();
@@ -148,7 +149,7 @@ fn the_map_codes_far_smaller_than_whole_pngs() {
 /// How far the vehicle is from where it believes to be in the second half of 400 s, metres, on the mean of each 10 s.
 fn position_error(sets: &[&str]) -> f64 {
     let mut config = config(sets);
-    config.operator.script = "none".into();
+    config.operator.script = scenecast_config::OperatorScript::None;
     let mut mission = Mission::new(config, MissionOptions { world: reef(), seed: 11, record: None }).unwrap();
     let errors = (20..40).map(|tens| {
         mission.advance(Instant::from_secs_f64(10.0 * f64::from(tens))).unwrap();

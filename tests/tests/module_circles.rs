@@ -252,7 +252,7 @@ fn circle(arrows: &Arrows) -> Option<Vec<String>> {
                         return Some(path);
                     }
                     if seen.insert(next.clone()) {
-                        longer.push([&path[..], &[next.clone()]].concat());
+                        longer.push([&path[..], std::slice::from_ref(next)].concat());
                     }
                 }
             }

@@ -1,25 +1,23 @@
 //! Values that follow from several keys.
 
-use crate::{Config, load_key};
+use crate::{Authenticate, Config, load_key};
+use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
-use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::Authenticity;
 use scenecast_protocol::mac::{Access, ModemProfile};
-use scenecast_protocol::map::LayerSet;
-use scenecast_protocol::schedule::BackgroundOrder;
 use scenecast_protocol::wire::Address;
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The vehicle that a configuration speaks of.
+/// The address of `vehicle.address`.
 pub fn vehicle_address(config: &Config) -> Result<Address, UserError> {
     let number = config.vehicle.address;
-    Address::vehicle(number).ok_or_else(|| UserError::Input(format!("vehicle.address = {number}: allowed is 1 to 14")))
+    Address::vehicle(number)
+        .ok_or_else(|| UserError::Input(format!("vehicle.address = {number} is not allowed; allowed: 1 to 14")))
 }
 
-/// A modem that only has a bit rate on air.
+/// A modem that is described by its bit rate on air alone.
 pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
     ModemProfile {
         frame_bytes: config.link.frame_bytes as usize,
@@ -28,12 +26,6 @@ pub fn modem_profile(config: &Config, bit_rate_bps: f64) -> ModemProfile {
         turn_around: Duration::from_secs_f64(config.link.turn_around_s),
         access: Access::Shared,
     }
-}
-
-/// The limits of the survey that are configured, if any.
-pub fn survey_area(config: &Config) -> Option<Area> {
-    let [west, south, east, north] = config.survey.area_m;
-    (east > west && north > south).then_some(Area { west, south, east, north })
 }
 
 /// The depth at which the survey is flown, metres.
@@ -46,18 +38,13 @@ pub fn cell_m(config: &Config) -> f64 {
     if config.scene.cell_m > 0.0 { config.scene.cell_m } else { 25.0 * config.camera.metres_per_pixel }
 }
 
-/// How frames are made authentic, as both ends must have it; `None` without a key.
+/// The key and the use of it, the same at both ends; `None` without a key.
 pub fn authenticity(config: &Config) -> Result<Option<Authenticity>, UserError> {
-    let (all, encrypt) = (config.link.authenticate == "all", config.link.encrypt);
+    let (all, encrypt) = (config.link.authenticate == Authenticate::All, config.link.encrypt);
     Ok(load_key(config)?.map(|key| Authenticity { key: Arc::new(key), all, encrypt }))
 }
 
-/// What left-over bits are spent on; the file was checked when it was read.
-pub fn background(config: &Config) -> BackgroundOrder {
-    BackgroundOrder::from_names(&config.link.spend, &LayerSet::default()).unwrap_or_default()
-}
-
-/// The vehicles that the surface speaks with from the beginning, by address and name.
+/// The vehicles that the surface works with from the start, by address and name.
 pub fn vehicle_names(config: &Config) -> Result<BTreeMap<Address, String>, UserError> {
     let own = vehicle_address(config)?;
     if config.link.vehicles.is_empty() {
@@ -68,21 +55,17 @@ pub fn vehicle_names(config: &Config) -> Result<BTreeMap<Address, String>, UserE
     Ok(addresses.map(named).collect())
 }
 
-/// The name of a vehicle that the configuration does not name.
+/// The name of a vehicle without a configured name.
 pub fn default_name(address: Address) -> String {
     format!("vehicle {}", address.number())
 }
 
-/// The table of `scene.tuning_table`, or the one that ships.
+/// The table of `scene.tuning_table`, or the built-in one.
 ///
 /// # Errors
 /// A file that cannot be read, with its line.
 pub fn tuning_table(config: &Config) -> Result<TuningTable, UserError> {
-    let file = &config.scene.tuning_table;
-    if file.is_empty() {
-        return Ok(TuningTable::shipped());
-    }
-    let path = Path::new(file);
+    let Some(path) = &config.scene.tuning_table else { return Ok(TuningTable::shipped()) };
     let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
-    TuningTable::parse(file, &text)
+    TuningTable::parse(&path.display().to_string(), &text)
 }

@@ -8,30 +8,27 @@ use std::io::Read;
 use std::path::Path;
 use zeroize::Zeroizing;
 
-/// More than a key and its comments need.
+/// A bound for the file: a key with comments is shorter.
 const MAX_BYTES: u64 = 64 * 1024;
 
-/// The key of `link.key_file`; `None` if it is empty: frames are then not authenticated.
+/// The key of `link.key_file`; `None` if it is empty, so that frames are not authenticated.
 ///
-/// Warns in the log if others on this machine may read the file, so the log must have begun.
+/// Logs a warning if other users of this machine may read the file.
 pub fn load_key(config: &Config) -> Result<Option<MissionKey>, UserError> {
-    let file = &config.link.key_file;
-    if file.is_empty() {
-        return Ok(None);
-    }
-    let (key, warning) = read_key(Path::new(file))?;
+    let Some(path) = &config.link.key_file else { return Ok(None) };
+    let (key, warning) = read_key(path)?;
     if let Some(warning) = warning {
         tracing::warn!("{warning}");
     }
     Ok(Some(key))
 }
 
-/// The key in a file, and a warning if others on this machine may read it.
+/// The key in a file, and a warning if other users of this machine may read it.
 pub fn read_key(path: &Path) -> Result<(MissionKey, Option<String>), UserError> {
     let problem = |e: std::io::Error| UserError::file(path, format!("{e}; scenecast key new writes a key file"));
     let file = File::open(path).map_err(problem)?;
     let warning = others_may_read(&file)
-        .then(|| format!("{}: others may read this key; chmod 600 keeps it to its owner", path.display()));
+        .then(|| format!("{}: other users may read this key; chmod 600 FILE prevents that", path.display()));
     let mut text = Zeroizing::new(String::with_capacity(1024));
     file.take(MAX_BYTES).read_to_string(&mut text).map_err(problem)?;
     let key = MissionKey::parse(&text).map_err(|e| UserError::file(path, e))?;
@@ -57,7 +54,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("scenecast-key-file-{}-{name}", std::process::id()));
         std::fs::write(&path, text).unwrap();
         let mut config = Config::default();
-        config.link.key_file = path.display().to_string();
+        config.link.key_file = Some(path.clone());
         (path, config)
     }
 
@@ -85,7 +82,7 @@ mod tests {
         assert!(said.starts_with(&format!("{}: line 2: ", path.display())), "{said}");
         assert!(said.contains("scenecast-key 1 KEY CHECK"), "{said}");
         let missing = load_key(&config).unwrap_err().to_string();
-        assert!(missing.contains(&config.link.key_file) && missing.contains("scenecast key new"), "{missing}");
+        assert!(missing.contains(&path.display().to_string()) && missing.contains("scenecast key new"), "{missing}");
     }
 
     #[cfg(unix)]

@@ -1,6 +1,9 @@
 //! Reading of configuration files and `--set` options.
 
-use super::{Allowed, Config, KEYS, Key};
+use crate::check::check_together;
+use crate::key::Section;
+use crate::old_keys::{OldKey, as_table};
+use crate::{Config, Key};
 use scenecast_core::UserError;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
@@ -15,7 +18,8 @@ struct Given {
 
 /// The defaults, changed by a file and then by `key=value` options.
 ///
-/// Every problem is one line that names the place, the key and what is allowed.
+/// # Errors
+/// One line that names the place, the key and the allowed values.
 pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, UserError> {
     let mut given = Vec::new();
     if let Some(path) = file {
@@ -25,111 +29,63 @@ pub fn load(file: Option<&Path>, sets: &[String]) -> Result<Config, UserError> {
     for set in sets {
         given.push(read_set(set)?);
     }
-    let mut table = Table::try_from(Config::default()).map_err(|e| UserError::Failed(e.to_string()))?;
-    for g in given {
-        let value = check(&g)?;
-        let (section, name) = g.key.split_once('.').unwrap_or((&g.key, ""));
-        if let Some(Value::Table(section)) = table.get_mut(section) {
-            section.insert(name.to_owned(), value);
-        }
+    let mut config = Config::default();
+    for value in &given {
+        apply(&mut config, value)?;
     }
-    let config: Config = table.try_into().map_err(|e: toml::de::Error| UserError::Input(e.message().to_owned()))?;
     check_together(&config)?;
     Ok(config)
 }
 
-/// What no single value tells: an area has a size, a turn has room for a frame, a seal needs a key.
-fn check_together(config: &Config) -> Result<(), UserError> {
-    const LONGEST_FRAME_S: f64 = 55.0;
-    let [west, south, east, north] = config.survey.area_m;
-    if config.survey.area_m != [0.0; 4] && !(east - west >= 1.0 && north - south >= 1.0) {
-        let given = format!("survey.area_m = {:?}", config.survey.area_m);
-        let rule = "west, south, east, north with east and north at least 1 m above west and south, or all 0";
-        return Err(UserError::Input(format!("{given} is not allowed: it takes {rule}")));
-    }
-    let link = &config.link;
-    check_shares("link.shares", &link.shares)?;
-    check_shares("map.layer_shares", &config.map.layer_shares)?;
-    if link.key_file.is_empty() && (link.encrypt || link.authenticate == "all") {
-        let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
-        let what = "it needs a key; set link.key_file to a file that scenecast key new has written";
-        return Err(UserError::Input(format!("{given} is not allowed with an empty link.key_file: {what}")));
-    }
-    crate::modem::check(config)?;
-    super::place::check(config)?;
-    check_frame(config)?;
-    let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
-    for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
-        if bits / rate > LONGEST_FRAME_S {
-            let least = (bits / LONGEST_FRAME_S).ceil();
-            let frame = config.link.frame_bytes;
-            let what =
-                format!("{key} = {rate}: a frame of link.frame_bytes = {frame} takes longer than {LONGEST_FRAME_S} s");
-            return Err(UserError::Input(format!("{what}; allowed is {least} bit/s or more, or a smaller frame")));
-        }
-    }
-    Ok(())
-}
-
-/// Under a key a frame ends in a tag, beside which the longest thing that cannot be cut must fit.
-fn check_frame(config: &Config) -> Result<(), UserError> {
-    let link = &config.link;
-    let (least, with, what) = match (link.key_file.as_str(), link.authenticate.as_str()) {
-        ("", _) => return Ok(()),
-        (_, "all") => (48, "link.authenticate = \"all\"", "the vehicle's report"),
-        _ => (36, "a link.key_file", "a position fix"),
-    };
-    let frame_bytes = crate::full_frame_bytes(config);
-    if frame_bytes >= least {
-        return Ok(());
-    }
-    let given = match config.modem.kind.as_str() {
-        "micromodem" => format!("modem.rate = {} with frames of {frame_bytes} bytes", config.modem.rate),
-        _ => format!("link.frame_bytes = {frame_bytes}"),
-    };
-    let why = format!("{what} does not fit a smaller frame beside the tag");
-    Err(UserError::Input(format!("{given} is not allowed with {with}: it takes {least} to 1024 bytes, for {why}")))
-}
-
-fn check_shares(key: &str, shares: &[u8]) -> Result<(), UserError> {
-    let sum: u32 = shares.iter().map(|&s| u32::from(s)).sum();
-    if sum <= 100 {
-        return Ok(());
-    }
-    let given = format!("{key} = {shares:?}");
-    Err(UserError::Input(format!("{given} is not allowed: they add up to {sum} %, and together they take 100 or less")))
-}
-
 fn read_file(path: &Path, text: &str, given: &mut Vec<Given>) -> Result<(), UserError> {
-    let place = |at: usize| format!("{}:{}", path.display(), text.get(..at).map_or(1, |t| t.matches('\n').count() + 1));
+    let place = |at: usize| format!("{}:{}", path.display(), line_of(text, at));
     let table = DeTable::parse(text)
         .map_err(|e| UserError::Input(format!("{}: {}", place(e.span().map_or(0, |s| s.start)), e.message())))?;
     for (section, value) in table.get_ref() {
-        let DeValue::Table(keys) = value.get_ref() else {
-            return Err(unknown(section.get_ref(), &place(section.span().start)));
+        let is_known = Section::ALL.iter().any(|s| s.name == section.get_ref());
+        let keys = match value.get_ref() {
+            DeValue::Table(keys) if is_known => keys,
+            _ => return Err(unknown(section.get_ref(), &place(section.span().start))),
         };
-        if !KEYS.iter().any(|k| k.name.split('.').next() == Some(section.get_ref())) {
-            return Err(unknown(section.get_ref(), &place(section.span().start)));
-        }
         for (name, value) in keys {
             let key = format!("{}.{}", section.get_ref(), name.get_ref());
-            let place = place(name.span().start);
-            let value = plain(value).ok_or_else(|| UserError::Input(format!("{place}: {key} cannot be read")))?;
-            given.push(Given { key, value, place });
+            let mut push = |key: String, at: usize, value| {
+                let place = place(at);
+                let value = plain(value).ok_or_else(|| UserError::Input(format!("{place}: {key} cannot be read")))?;
+                given.push(Given { key, value, place });
+                Ok(())
+            };
+            match value.get_ref() {
+                DeValue::Table(members) if Key::find(&key).is_some_and(Key::is_table) => {
+                    for (member, value) in members {
+                        push(format!("{key}.{}", member.get_ref()), member.span().start, value)?;
+                    }
+                }
+                _ => push(key, name.span().start, value)?,
+            }
         }
     }
     Ok(())
 }
 
-/// A value without its place in the file; dates and nested tables have no use here.
-fn plain(value: &Spanned<DeValue<'_>>) -> Option<Value> {
+/// The number of the line in which byte `at` is.
+pub(crate) fn line_of(text: &str, at: usize) -> usize {
+    text.get(..at).map_or(1, |before| before.matches('\n').count() + 1)
+}
+
+/// A value without its place in the file; no key takes a date.
+pub(crate) fn plain(value: &Spanned<DeValue<'_>>) -> Option<Value> {
     Some(match value.get_ref() {
         DeValue::String(s) => Value::String(s.to_string()),
         DeValue::Integer(i) => Value::Integer(i64::from_str_radix(i.as_str(), i.radix()).ok()?),
         DeValue::Float(f) => Value::Float(f.as_str().parse().ok()?),
         DeValue::Boolean(b) => Value::Boolean(*b),
         DeValue::Array(a) => Value::Array(a.iter().map(plain).collect::<Option<_>>()?),
-        DeValue::Datetime(_) | DeValue::Table(_) => return None,
+        DeValue::Table(t) => {
+            let members = t.iter().map(|(name, value)| Some((name.get_ref().to_string(), plain(value)?)));
+            Value::Table(members.collect::<Option<_>>()?)
+        }
+        DeValue::Datetime(_) => return None,
     })
 }
 
@@ -142,121 +98,86 @@ fn read_set(set: &str) -> Result<Given, UserError> {
     Ok(Given { key: key.trim().to_owned(), value, place: format!("--set {set}") })
 }
 
-fn check(given: &Given) -> Result<Value, UserError> {
-    let Some(key) = KEYS.iter().find(|k| k.name == given.key) else { return Err(unknown(&given.key, &given.place)) };
-    let default = default_of(key);
-    fit(&given.value, &default, key).ok_or_else(|| {
-        UserError::Input(format!(
-            "{}: {} = {} is not allowed: it takes {}",
-            given.place,
-            key.name,
-            given.value,
-            key.takes(&default)
-        ))
+fn apply(config: &mut Config, given: &Given) -> Result<(), UserError> {
+    let Given { key: name, value, place } = given;
+    let Some((key, member)) = find(name) else { return Err(unknown(name, place)) };
+    let members = (key.operations.members)();
+    if let (None, false, Value::Table(table)) = (member, members.is_empty(), value) {
+        return table.iter().try_for_each(|(member, value)| {
+            let member = Given { key: format!("{name}.{member}"), value: value.clone(), place: place.clone() };
+            apply(config, &member)
+        });
+    }
+    if let Some(member) = member.filter(|member| !members.contains(member)) {
+        let takes = format!("{} has {}", key.name, members.join(", "));
+        return Err(UserError::Input(format!("{place}: {} has no member {member}; {takes}", key.name)));
+    }
+    (key.operations.set)(config, member, value, &key.rule).ok_or_else(|| refused(key, given))
+}
+
+fn refused(key: &Key, given: &Given) -> UserError {
+    let Given { key: name, value, place } = given;
+    let new_form = value.as_array().and_then(|list| as_table(list, key.name));
+    UserError::Input(match new_form {
+        Some(table) => format!("{place}: {name} = {value} is the old form; write {} = {table}", key.leaf()),
+        None => format!("{place}: {name} = {value} is not allowed; allowed: {}", key.allowed()),
     })
 }
 
-/// `value` in the type of `default`, if it lies within what the key allows.
-fn fit(value: &Value, default: &Value, key: &Key) -> Option<Value> {
-    let in_range = |x: f64| match key.allowed {
-        Allowed::Range(low, high) | Allowed::List(low, high) => (low..=high).contains(&x),
-        _ => false,
+/// The key of a name, and the member of its table, if the name ends in one.
+fn find(name: &str) -> Option<(&'static Key, Option<&str>)> {
+    if let Some(key) = Key::find(name) {
+        return Some((key, None));
+    }
+    let (key, member) = name.rsplit_once('.')?;
+    Key::find(key).filter(|key| key.is_table()).map(|key| (key, Some(member)))
+}
+
+fn unknown(name: &str, place: &str) -> UserError {
+    if let Some(OldKey { new, .. }) = OldKey::find(name) {
+        let advice = "scenecast config migrate FILE rewrites a file";
+        return UserError::Input(format!("{place}: {name} is now called {new} ({advice})"));
+    }
+    let names: Vec<&str> = if name.contains('.') {
+        Key::all().map(|key| key.name).collect()
+    } else {
+        Section::ALL.iter().map(|section| section.name).collect()
     };
-    match (default, value) {
-        (Value::Integer(_), Value::Integer(i)) => in_range(*i as f64).then(|| value.clone()),
-        (Value::Float(_), Value::Float(f)) => in_range(*f).then(|| value.clone()),
-        (Value::Float(_), Value::Integer(i)) => in_range(*i as f64).then_some(Value::Float(*i as f64)),
-        (Value::Boolean(_), Value::Boolean(_)) => Some(value.clone()),
-        (Value::String(_), Value::String(s)) => match key.allowed {
-            Allowed::Choice(words) => words.contains(&s.as_str()).then(|| value.clone()),
-            _ => Some(value.clone()),
-        },
-        (Value::Array(_), Value::Array(v)) if matches!(key.allowed, Allowed::List(..) | Allowed::Words(_)) => {
-            let is_allowed = |x: &Value| match key.allowed {
-                Allowed::Words(words) => x.as_str().is_some_and(|word| words.contains(&word)),
-                _ => x.as_integer().is_some_and(|i| in_range(i as f64)),
-            };
-            let differ = (1..v.len()).all(|i| !v[..i].contains(&v[i]));
-            (v.iter().all(is_allowed) && differ).then(|| value.clone())
-        }
-        (Value::Array(d), Value::Array(v)) if d.len() == v.len() => {
-            d.iter().zip(v).map(|(d, v)| fit(v, d, key)).collect::<Option<Vec<_>>>().map(Value::Array)
-        }
-        _ => None,
-    }
-}
-
-pub(super) fn default_of(key: &Key) -> Value {
-    let table = Table::try_from(Config::default()).unwrap_or_default();
-    let (section, name) = key.name.split_once('.').unwrap_or_default();
-    table.get(section).and_then(|s| s.get(name)).cloned().unwrap_or(Value::Boolean(false))
-}
-
-impl Key {
-    /// What the key takes, for people.
-    pub(super) fn takes(&self, default: &Value) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
-        match (self.allowed, default) {
-            (Allowed::Range(low, high), Value::Integer(_)) => format!("a whole number from {low} to {high}{unit}"),
-            (Allowed::Range(low, high), Value::Array(a)) => {
-                let whole = if a.iter().all(Value::is_integer) { "whole " } else { "" };
-                format!("{} {whole}numbers from {low} to {high}{unit}", a.len())
-            }
-            (Allowed::List(low, high), _) => format!("a list of different whole numbers from {low} to {high}{unit}"),
-            (Allowed::Range(low, high), _) => format!("a number from {low} to {high}{unit}"),
-            (Allowed::Choice(words), _) => format!("one of {}", words.join(", ")),
-            (Allowed::Words(words), _) => format!("a list of different ones of {}", words.join(", ")),
-            (Allowed::Text, _) => "text in quotes".to_owned(),
-            (Allowed::Flag, _) => "true or false".to_owned(),
-        }
-    }
-}
-
-fn unknown(key: &str, place: &str) -> UserError {
-    let nearest = KEYS.iter().map(|k| k.name).min_by_key(|name| distance(name, key)).unwrap_or_default();
-    UserError::Input(format!(
-        "{place}: there is no key {key}; the nearest is {nearest} (scenecast config lists them all)"
-    ))
-}
-
-/// Edit distance.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut corner = std::mem::replace(&mut row[0], i + 1);
-        for (j, &cb) in b.iter().enumerate() {
-            let best = (corner + usize::from(ca != cb)).min(row[j] + 1).min(row[j + 1] + 1);
-            corner = std::mem::replace(&mut row[j + 1], best);
-        }
-    }
-    row[b.len()]
+    let nearest = names.into_iter().min_by_key(|known| strsim::damerau_levenshtein(known, name));
+    let nearest = nearest.map(|known| format!("; the nearest is {known}")).unwrap_or_default();
+    UserError::Input(format!("{place}: there is no key {name}{nearest} (scenecast config lists all keys)"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::LayerName;
 
     fn message(sets: &[&str]) -> String {
         let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
         load(None, &sets).unwrap_err().to_string()
     }
 
+    fn loaded(sets: &[&str]) -> Config {
+        load(None, &sets.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()).unwrap()
+    }
+
     #[test]
-    fn every_key_has_a_default_within_what_it_allows_and_every_field_has_a_key() {
-        for key in KEYS {
-            let default = default_of(key);
-            assert_eq!(fit(&default, &default, key).as_ref(), Some(&default), "{}", key.name);
+    fn every_default_is_allowed_and_is_read_as_it_was_written() {
+        for key in Key::all() {
+            let mut config = Config::default();
+            let default = key.value(&config);
+            assert_eq!((key.operations.set)(&mut config, None, &default, &key.rule), Some(()), "{}", key.name);
+            assert_eq!(key.value(&config), default, "{}", key.name);
         }
-        let table = Table::try_from(Config::default()).unwrap();
-        let fields: usize = table.values().map(|s| s.as_table().unwrap().len()).sum();
-        assert_eq!(fields, KEYS.len());
+        assert_eq!(loaded(&[]), Config::default());
     }
 
     #[test]
     fn a_misspelt_key_is_answered_with_the_nearest_one() {
         let said = message(&["link.bugdet_bps=2000"]);
         assert!(said.contains("no key link.bugdet_bps") && said.contains("nearest is link.budget_bps"), "{said}");
+        assert!(message(&["lnik=2"]).contains("nearest is link "));
     }
 
     #[test]
@@ -264,7 +185,7 @@ mod tests {
         let said = message(&["link.frame_bytes=9"]);
         assert_eq!(
             said,
-            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed: it takes a whole number from 32 to 1024 bytes"
+            "--set link.frame_bytes=9: link.frame_bytes = 9 is not allowed; allowed: a whole number from 32 to 1024 bytes"
         );
     }
 
@@ -272,10 +193,31 @@ mod tests {
     fn a_file_is_read_with_its_line_in_every_complaint() {
         let mut given = Vec::new();
         read_file(Path::new("x.toml"), "[link]\nbudget_bps = 5\n", &mut given).unwrap();
-        let said = check(&given[0]).unwrap_err().to_string();
+        let said = apply(&mut Config::default(), &given[0]).unwrap_err().to_string();
         assert!(said.starts_with("x.toml:2: link.budget_bps = 5"), "{said}");
         let broken = read_file(Path::new("x.toml"), "[link]\n\nbudget_bps = = 5\n", &mut given).unwrap_err();
         assert!(broken.to_string().starts_with("x.toml:3: "), "{broken}");
+    }
+
+    #[test]
+    fn a_member_of_a_table_is_refused_with_its_own_line() {
+        let mut given = Vec::new();
+        read_file(Path::new("x.toml"), "[link.shares]\nmap = 60\nfix = 101\n", &mut given).unwrap();
+        let mut config = Config::default();
+        apply(&mut config, &given[0]).unwrap();
+        assert_eq!(config.link.shares.0, [10, 5, 5, 60, 20]);
+        let said = apply(&mut config, &given[1]).unwrap_err().to_string();
+        assert!(said.starts_with("x.toml:3: link.shares.fix = 101"), "{said}");
+    }
+
+    #[test]
+    fn an_old_key_is_refused_with_the_new_one() {
+        let said = message(&["link.spend=[]"]);
+        assert!(said.starts_with("--set link.spend=[]: link.spend is now called link.background"), "{said}");
+        let mut given = Vec::new();
+        read_file(Path::new("x.toml"), "[map]\n# planes\nplanes = []\n", &mut given).unwrap();
+        let said = apply(&mut Config::default(), &given[0]).unwrap_err().to_string();
+        assert!(said.starts_with("x.toml:3: map.planes is now called map.layers"), "{said}");
     }
 
     #[test]
@@ -284,31 +226,49 @@ mod tests {
             let said = message(&[set]);
             assert!(said.contains(set.split('=').next().unwrap()) && said.contains("link.key_file"), "{said}");
         }
-        let all = ["link.encrypt=true", "link.authenticate=all", "link.key_file=k"].map(str::to_owned);
-        assert!(load(None, &all).is_ok());
+        loaded(&["link.encrypt=true", "link.authenticate=all", "link.key_file=k"]);
     }
 
     #[test]
     fn shares_add_up_to_a_hundred_at_most_and_vehicles_differ() {
-        let said = message(&["link.shares=[10, 5, 5, 60, 30]"]);
-        assert!(said.contains("link.shares = [10, 5, 5, 60, 30]") && said.contains("110 %"), "{said}");
-        let said = message(&["link.shares=[10, 5]"]);
-        assert!(said.ends_with("it takes 5 whole numbers from 0 to 100 %"), "{said}");
+        let said = message(&["link.shares={ map = 60, exemplar = 30 }"]);
+        assert!(said.contains("directive = 10, status = 5, fix = 5, map = 60, exemplar = 30"), "{said}");
+        assert!(said.contains("link.shares") && said.contains("110 %"), "{said}");
+        let said = message(&["link.shares.map=101"]);
+        assert!(said.contains("link.shares.map = 101") && said.contains("a whole number from 0 to 100 %"), "{said}");
+        let said = message(&["link.shares={ sonar = 5 }"]);
+        assert!(said.ends_with("link.shares has directive, status, fix, map, exemplar"), "{said}");
         let said = message(&["link.vehicles=[2, 2]"]);
-        assert!(said.ends_with("it takes a list of different whole numbers from 1 to 14"), "{said}");
-        assert_eq!(load(None, &["link.vehicles=[1, 3]".into()]).unwrap().link.vehicles, [1, 3]);
+        assert!(said.ends_with("a list of different whole numbers from 1 to 14"), "{said}");
+        assert_eq!(loaded(&["link.vehicles=[1, 3]"]).link.vehicles, [1, 3]);
     }
 
     #[test]
-    fn planes_are_named_each_once_and_their_shares_leave_something_to_labels() {
-        let said = message(&["map.planes=[\"colour\"]"]);
-        assert!(said.ends_with("it takes a list of different ones of confidence, depth, curiosity"), "{said}");
-        assert!(message(&["map.planes=[\"depth\", \"depth\"]"]).contains("different ones"));
-        assert!(message(&["map.planes=depth"]).contains("a list"));
-        let said = message(&["map.layer_shares=[60, 0, 50]"]);
-        assert!(said.contains("map.layer_shares = [60, 0, 50]") && said.contains("110 %"), "{said}");
-        let config = load(None, &["map.planes=[]".into(), "map.layer_shares=[20, 10, 0]".into()]).unwrap();
-        assert_eq!((config.map.planes.len(), config.map.layer_shares), (0, [20, 10, 0]));
+    fn members_that_are_not_given_keep_their_values() {
+        let config = loaded(&["link.shares={ map = 40 }", "link.shares.fix=15"]);
+        assert_eq!(config.link.shares.0, [10, 5, 15, 40, 20]);
+    }
+
+    #[test]
+    fn a_positional_list_is_refused_with_the_new_form() {
+        let said = message(&["link.shares=[10, 5, 5, 60, 20]"]);
+        let table = "{ directive = 10, status = 5, fix = 5, map = 60, exemplar = 20 }";
+        assert!(said.contains("old form") && said.ends_with(&format!("write shares = {table}")), "{said}");
+        let said = message(&["link.shares=[10, 5]"]);
+        assert!(said.ends_with("for each of directive, status, fix, map, exemplar"), "{said}");
+    }
+
+    #[test]
+    fn layers_are_named_each_once_and_their_shares_leave_something_to_labels() {
+        let said = message(&["map.layers=[\"colour\"]"]);
+        assert!(said.ends_with("a list of different words of depth, confidence, curiosity"), "{said}");
+        assert!(message(&["map.layers=[\"depth\", \"depth\"]"]).contains("different words"));
+        assert!(message(&["map.layers=depth"]).contains("a list"));
+        let said = message(&["map.layer_shares={ confidence = 60, curiosity = 50 }"]);
+        assert!(said.contains("map.layer_shares") && said.contains("110 %"), "{said}");
+        let config = loaded(&["map.layers=[]", "map.layer_shares.depth=10"]);
+        let depth = LayerName::new("depth").unwrap();
+        assert_eq!((config.map.layers.len(), config.map.layer_shares.get(&depth)), (0, Some(&10)));
     }
 
     #[test]
@@ -318,12 +278,12 @@ mod tests {
         assert!(said.starts_with("link.frame_bytes = 40") && said.contains("48 to 1024"), "{said}");
         let said = message(&["link.key_file=k", "link.frame_bytes=32"]);
         assert!(said.contains("a position fix") && said.contains("36 to 1024"), "{said}");
-        assert!(load(None, &sealed[2..].iter().map(|s| (*s).to_owned()).collect::<Vec<_>>()).is_ok());
+        loaded(&sealed[2..]);
     }
 
     #[test]
     fn whole_numbers_do_for_fractions_and_bare_words_for_text() {
-        let config = load(None, &["channel.range_m=1000".into(), "map.codec=png".into()]).unwrap();
-        assert_eq!((config.channel.range_m, config.map.codec.as_str()), (1000.0, "png"));
+        let config = loaded(&["channel.range_m=1000", "map.codec=png"]);
+        assert_eq!((config.channel.range_m, config.map.codec.to_string().as_str()), (1000.0, "png"));
     }
 }

@@ -1,69 +1,76 @@
 //! Checks of the modem's keys, and the address of its port.
 
-use crate::Config;
+use crate::{Config, HostPort, ModemKind, S2cMode};
 use scenecast_core::{MicromodemRate, PortAddress, S2C_BURST_FRAME_BYTES, S2C_INSTANT_BYTES, UserError};
 
-/// Bytes of a full frame: the modem's unit where it has one, else what the configuration says.
+/// Highest addresses that an S2C network can have.
+const S2C_HIGHEST: [u8; 7] = [2, 6, 14, 30, 62, 126, 254];
+/// Highest address of a Micromodem.
+const MICROMODEM_HIGHEST: u8 = 127;
+
+/// Bytes of a full frame: the modem's unit, if it has one, or else `link.frame_bytes`.
 pub fn full_frame_bytes(config: &Config) -> usize {
-    match (config.modem.kind.as_str(), config.modem.s2c_mode.as_str()) {
-        ("s2c", "im") => S2C_INSTANT_BYTES,
-        ("s2c", _) => S2C_BURST_FRAME_BYTES,
-        ("micromodem", _) => MicromodemRate::of(config.modem.rate).frame_bytes,
-        _ => config.link.frame_bytes as usize,
+    match (config.modem.kind, config.modem.s2c_mode) {
+        (ModemKind::S2c, S2cMode::Instant) => S2C_INSTANT_BYTES,
+        (ModemKind::S2c, S2cMode::Burst) => S2C_BURST_FRAME_BYTES,
+        (ModemKind::Micromodem, _) => MicromodemRate::of(config.modem.rate).frame_bytes,
+        (ModemKind::Transparent | ModemKind::Tcp | ModemKind::Udp, _) => config.link.frame_bytes as usize,
     }
 }
 
-/// What the keys of a modem must be together.
+/// The addresses of modems must differ and must exist in the modems' network.
 ///
 /// # Errors
-/// A line that names the key and what is allowed.
+/// A line that names the key and the allowed values.
 pub(crate) fn check(config: &Config) -> Result<(), UserError> {
     let m = &config.modem;
-    if !matches!(m.kind.as_str(), "s2c" | "micromodem") {
-        return Ok(());
-    }
+    let (highest, limit) = match m.kind {
+        ModemKind::S2c => (m.highest_address, "modem.highest_address"),
+        ModemKind::Micromodem => (MICROMODEM_HIGHEST, "a Micromodem's highest address"),
+        ModemKind::Transparent | ModemKind::Tcp | ModemKind::Udp => return Ok(()),
+    };
     let own = [config.vehicle.address];
     let vehicles = if config.link.vehicles.is_empty() { &own[..] } else { &config.link.vehicles[..] };
     if vehicles.contains(&m.surface_address) {
         let given = format!("modem.surface_address = {}", m.surface_address);
         return Err(UserError::Input(format!(
-            "{given} is not allowed: it is a vehicle's address, and its modem has it too"
+            "{given} is not allowed: it is a vehicle's address, which that vehicle's modem has too"
         )));
     }
-    let highest = if m.kind == "s2c" { m.highest_address } else { 127 };
     let all = vehicles.iter().copied().chain([m.surface_address]);
     if let Some(beyond) = all.filter(|&a| a > highest).max() {
-        let limit = if m.kind == "s2c" { "modem.highest_address" } else { "a Micromodem's highest address" };
         return Err(UserError::Input(format!("address {beyond} is not allowed: {limit} is {highest}")));
     }
-    const HIGHEST: [u8; 7] = [2, 6, 14, 30, 62, 126, 254];
-    if m.kind == "s2c" && !HIGHEST.contains(&m.highest_address) {
+    if m.kind == ModemKind::S2c && !S2C_HIGHEST.contains(&m.highest_address) {
         let given = format!("modem.highest_address = {}", m.highest_address);
-        return Err(UserError::Input(format!("{given} is not allowed: it takes one of 2, 6, 14, 30, 62, 126, 254")));
+        return Err(UserError::Input(format!("{given} is not allowed; allowed: one of 2, 6, 14, 30, 62, 126, 254")));
     }
     Ok(())
 }
 
-/// Where the modem is.
+/// The port of the modem.
+///
+/// # Errors
+/// Keys that are missing or exclude each other.
 pub fn modem_port(config: &Config) -> Result<PortAddress, UserError> {
     let m = &config.modem;
-    let kind = m.kind.as_str();
-    let missing = |what: &str| Err(UserError::Input(format!("modem kind {kind} needs {what}")));
-    match (kind, m.device.as_str(), m.listen.as_str(), m.connect.as_str()) {
-        ("udp", _, "", "") => missing("modem.connect, modem.listen, or both"),
-        ("udp", _, listen, connect) => Ok(PortAddress::Datagrams(listen.to_owned(), connect.to_owned())),
-        ("tcp", _, "", "") => missing("modem.listen or modem.connect"),
-        ("tcp", _, listen, "") | (_, "", listen, "") if !listen.is_empty() => {
-            Ok(PortAddress::Listen(listen.to_owned()))
+    let kind = m.kind;
+    let text = |address: &Option<HostPort>| address.as_ref().map(HostPort::to_string).unwrap_or_default();
+    let missing = |keys: &str| Err(UserError::Input(format!("modem.kind = \"{kind}\" needs {keys}")));
+    match (kind, &m.device, &m.listen, &m.connect) {
+        (ModemKind::Udp, _, None, None) => missing("modem.connect, modem.listen, or both"),
+        (ModemKind::Udp, _, listen, connect) => Ok(PortAddress::Datagrams(text(listen), text(connect))),
+        (ModemKind::Tcp, _, None, None) => missing("modem.listen or modem.connect"),
+        (ModemKind::Tcp, _, Some(listen), None) => Ok(PortAddress::Listen(listen.to_string())),
+        (ModemKind::Tcp, _, None, Some(connect)) => Ok(PortAddress::Connect(connect.to_string())),
+        (_, Some(device), ..) if kind != ModemKind::Tcp => {
+            Ok(PortAddress::Serial(device.display().to_string(), m.baud))
         }
-        ("tcp", _, "", address) | (_, "", "", address) if !address.is_empty() => {
-            Ok(PortAddress::Connect(address.to_owned()))
+        (_, _, None, None) => missing("modem.device (a serial device) or modem.connect (HOST:PORT)"),
+        (_, _, Some(listen), None) => Ok(PortAddress::Listen(listen.to_string())),
+        (_, _, None, Some(connect)) => Ok(PortAddress::Connect(connect.to_string())),
+        (_, _, Some(_), Some(_)) => {
+            Err(UserError::Input(format!("modem.kind = \"{kind}\" takes modem.listen or modem.connect, not both")))
         }
-        ("tcp", ..) => Err(UserError::Input("modem kind tcp takes modem.listen or modem.connect, not both".to_owned())),
-        (_, "", "", "") => missing("modem.device (a serial device) or modem.connect (ADDRESS:PORT)"),
-        (_, "", ..) => {
-            Err(UserError::Input(format!("modem kind {kind} takes modem.listen or modem.connect, not both")))
-        }
-        (_, device, ..) => Ok(PortAddress::Serial(device.to_owned(), m.baud)),
     }
 }

@@ -1,20 +1,93 @@
-//! Writing of a configuration file with every key explained.
+//! Configuration files with every key explained.
 
-use super::KEYS;
-use super::load::default_of;
+use crate::key::{Key, Role, Section};
+use crate::{Config, load};
+use scenecast_core::UserError;
 
-/// A file with the defaults of every key that a role reads: `a` the vehicle, `s` the surface, `r` the rehearsal.
-pub fn print(role: char) -> String {
+/// Columns of a comment.
+const WIDTH: usize = 100;
+
+/// A file that ships with the program.
+struct Shipped {
+    path: &'static str,
+    role: Role,
+    head: &'static str,
+    /// Values that differ from the defaults.
+    sets: &'static [&'static str],
+}
+
+const SHIPPED: [Shipped; 3] = [
+    Shipped {
+        path: "config/auv.toml",
+        role: Role::Auv,
+        head: "# The vehicle. Every key may be left out. The values are the defaults, except modem.connect, survey.area_m\n\
+               # and runtime.state_dir.\n\
+               # A rehearsal on one machine: scenecast asv --config config/asv.toml, then in another terminal\n\
+               # scenecast auv --config config/auv.toml\n",
+        sets: &["modem.connect=127.0.0.1:8461", "survey.area_m=[0, 0, 100, 60]", "runtime.state_dir=state/auv"],
+    },
+    Shipped {
+        path: "config/asv.toml",
+        role: Role::Asv,
+        head: "# The surface. Every key may be left out. The values are the defaults, except modem.listen and\n\
+               # runtime.state_dir.\n",
+        sets: &["modem.listen=127.0.0.1:8461", "runtime.state_dir=state/asv"],
+    },
+    Shipped {
+        path: "config/scenarios/default.toml",
+        role: Role::Scenario,
+        head: "# A rehearsal with every key at its default.\n\
+               # scenecast sim --scenario config/scenarios/default.toml --out run\n",
+        sets: &[],
+    },
+];
+
+/// The files that ship with the program: path in the repository and text.
+///
+/// # Errors
+/// A value that is not allowed; a test rules that out.
+pub fn shipped_files() -> Result<Vec<(&'static str, String)>, UserError> {
+    let text = |file: &Shipped| {
+        let sets: Vec<String> = file.sets.iter().map(|set| (*set).to_owned()).collect();
+        Ok((file.path, format!("{}\n{}", file.head, print_values(file.role, &load(None, &sets)?))))
+    };
+    SHIPPED.iter().map(text).collect()
+}
+
+/// A file with the defaults of every key that a role reads.
+pub fn print(role: Role) -> String {
+    print_values(role, &Config::default())
+}
+
+fn print_values(role: Role, config: &Config) -> String {
     let mut out = String::new();
-    let mut section = "";
-    for key in KEYS.iter().filter(|k| k.roles.contains(role)) {
-        let (s, name) = key.name.split_once('.').unwrap_or_default();
-        if s != section {
-            section = s;
-            out.push_str(&format!("\n[{s}]\n"));
+    for section in Section::ALL {
+        let keys: Vec<&Key> = section.keys.iter().filter(|key| key.roles.contains(&role)).collect();
+        if keys.is_empty() {
+            continue;
         }
-        let default = default_of(key);
-        out.push_str(&format!("# {}\n# takes {}\n{name} = {default}\n", key.doc, key.takes(&default)));
+        let gap = if out.is_empty() { "" } else { "\n" };
+        out.push_str(&format!("{gap}[{}]\n", section.name));
+        for key in keys {
+            let allowed = format!("Allowed: {}.", key.allowed());
+            let value = key.value(config);
+            out.push_str(&format!("{}{}{} = {value}\n", comment(key.doc()), comment(&allowed), key.leaf()));
+        }
     }
-    out.trim_start().to_owned()
+    out
+}
+
+/// A text as lines of a comment.
+fn comment(text: &str) -> String {
+    let mut lines = vec![String::from("#")];
+    for word in text.split_whitespace() {
+        if lines.last().is_some_and(|line| line.len() + 1 + word.len() > WIDTH) {
+            lines.push(String::from("#"));
+        }
+        if let Some(line) = lines.last_mut() {
+            line.push(' ');
+            line.push_str(word);
+        }
+    }
+    lines.iter().map(|line| format!("{line}\n")).collect()
 }

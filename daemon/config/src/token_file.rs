@@ -1,4 +1,4 @@
-//! The file of the token that the operator's page and scripts show.
+//! The file of the token that the operator's page and scripts present.
 
 use super::Config;
 use super::key_file::others_may_read;
@@ -8,22 +8,18 @@ use std::io::Read;
 use std::path::Path;
 use zeroize::Zeroizing;
 
-/// More than a token and its comments need.
+/// A bound for the file: a token with comments is shorter.
 const MAX_BYTES: u64 = 4096;
-/// Bytes of a token.
+/// Allowed lengths of a token, bytes.
 const LENGTH: std::ops::RangeInclusive<usize> = 16..=256;
 
 /// The token of `console.token_file`; `None` if it is empty.
 ///
-/// Warns in the log if others on this machine may read the file, so the log must have begun.
+/// Logs a warning if other users of this machine may read the file.
 pub fn load_token(config: &Config) -> Result<Option<Zeroizing<String>>, UserError> {
-    let file = &config.console.token_file;
-    if file.is_empty() {
-        return Ok(None);
-    }
-    let path = Path::new(file);
+    let Some(path) = &config.console.token_file else { return Ok(None) };
     if File::open(path).is_ok_and(|f| others_may_read(&f)) {
-        tracing::warn!("{file}: others may read this token; chmod 600 keeps it to its owner");
+        tracing::warn!("{}: other users may read this token; chmod 600 FILE prevents that", path.display());
     }
     let named = |p: UserError| UserError::Input(format!("console.token_file = {p}"));
     read_token(path).map(Some).map_err(named)
@@ -37,8 +33,8 @@ pub fn read_token(path: &Path) -> Result<Zeroizing<String>, UserError> {
     let mut lines = text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#'));
     let token = lines.next().unwrap_or_default();
     if !LENGTH.contains(&token.len()) || !token.bytes().all(|b| b.is_ascii_graphic()) {
-        let rule = "one line of 16 to 256 letters, digits and signs of ASCII without blanks";
-        return Err(UserError::file(path, format!("no token: it takes {rule}; scenecast key token writes one")));
+        let rule = "one line of 16 to 256 printable ASCII characters without blanks";
+        return Err(UserError::file(path, format!("no token; allowed: {rule}; scenecast key token writes one")));
     }
     Ok(Zeroizing::new(token.to_owned()))
 }

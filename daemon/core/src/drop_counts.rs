@@ -1,4 +1,4 @@
-//! What a link has counted and measured, for people and programs.
+//! Counters of dropped frames, by the name of the reason.
 
 use scenecast_protocol::link::{DropReason, LinkStats};
 use std::collections::BTreeMap;

@@ -1,19 +1,19 @@
-//! What went wrong, for people.
+//! The error that ends a command.
 
 use std::fmt;
 use std::path::Path;
 
-/// A problem that ends a command, with the exit code that tells which kind it is.
+/// An error that ends a command; its kind gives the exit code.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum UserError {
-    /// Wrong usage or input: one line that says what, where and what is allowed. Exit code 2.
+    /// Wrong usage or input, exit code 2: one line with the cause, the place and the allowed values.
     Input(String),
     /// Right usage, but it could not be done. Exit code 1.
     Failed(String),
 }
 
 impl UserError {
-    /// A problem with a file, as `FILE: what`.
+    /// An error of a file, as `FILE: cause`.
     pub fn file(path: &Path, what: impl fmt::Display) -> Self {
         Self::Input(format!("{}: {what}", path.display()))
     }

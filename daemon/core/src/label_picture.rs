@@ -3,7 +3,7 @@
 use crate::palette::colour;
 use scenecast_protocol::map::{Cell, LabelGrid, Rect};
 
-/// Most cells of a map that is drawn or told as a rectangle: a few frames can claim two cells at the ends of the world.
+/// Most cells of a map that is sent as a rectangle: a few frames can claim two cells at the ends of the world.
 pub const MAX_CELLS: u64 = 1 << 23;
 
 /// Why a map is not drawn.
@@ -53,7 +53,7 @@ pub fn encode_within(grid: &LabelGrid, bounds: Rect) -> Result<Vec<u8>, PictureE
     Ok(bytes)
 }
 
-/// The whole map as an indexed PNG; one black pixel if nothing is explored.
+/// The whole map as an indexed PNG; one black pixel if no cell is explored.
 pub fn encode(grid: &LabelGrid) -> Result<Vec<u8>, PictureError> {
     encode_within(grid, grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 1, height: 1 }))
 }

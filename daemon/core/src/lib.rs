@@ -1,4 +1,4 @@
-//! What the crates of the daemon share: coordinates, sensor sentences, pictures of label maps and the error for people.
+//! Shared types of the daemon's crates: coordinates, sensor sentences, pictures of label maps, the error for people.
 //!
 //! Internal to scenecast. No IO: bytes and time come in as arguments.
 

@@ -1,6 +1,6 @@
 //! Lines in a stream of bytes that nobody trusts.
 
-/// Collects the lines of a stream; what is longer than allowed is dropped and counted.
+/// Collects the lines of a stream; longer lines than allowed are dropped and counted.
 #[derive(Debug)]
 pub struct Lines {
     collected: Vec<u8>,
@@ -20,7 +20,7 @@ impl Lines {
         self.overlong
     }
 
-    /// The stream begins anew: half a line is none.
+    /// Drops a half line, for a stream that begins again.
     pub fn clear(&mut self) {
         self.collected.clear();
         self.is_overlong = false;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// What a packet of one rate carries, in a band of 5 kHz.
+/// The capacity of a packet of one rate, in a band of 5 kHz.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MicromodemRate {
     pub number: u8,
@@ -28,7 +28,7 @@ const RATES: [MicromodemRate; 6] = [
 
 /// The packet that a modem sends to have another one send, or before one of its own at rate 0.
 pub const CYCLE_INIT: Duration = Duration::from_millis(900);
-/// What a cycle init, and the head of a packet, count for in a frame: 21 bits and the address fields, generously.
+/// Bits that the cycle-init and the head of a packet add to a frame: 21 bits and the address fields, rounded up.
 pub const OVERHEAD_BITS: u64 = 64;
 
 impl MicromodemRate {
@@ -42,7 +42,7 @@ impl MicromodemRate {
         Duration::from_millis(self.packet_ms)
     }
 
-    /// Bits a second while a packet is on air, what it costs besides its bytes included.
+    /// Bits a second while a packet is on air, overhead included.
     pub fn bits_per_s(&self) -> f64 {
         let bits = (self.frame_bytes as u64 * 8 + OVERHEAD_BITS) * u64::from(self.frames);
         bits as f64 / self.packet().as_secs_f64()

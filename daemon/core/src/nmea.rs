@@ -7,7 +7,7 @@
 
 use crate::geodesy::LatLon;
 
-/// What a sentence says, in units of this program.
+/// The content of a sentence, in the units of this program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sentence {
     /// GGA, and RMC where there is no GGA: a position.
@@ -19,7 +19,7 @@ pub enum Sentence {
         /// Whether the solution has corrections: differential, real-time kinematic.
         is_corrected: bool,
     },
-    /// The receiver says that it has no position.
+    /// The receiver reports that it has no position.
     NoPosition,
     /// RMC, VTG: the way over ground.
     Motion {
@@ -71,7 +71,7 @@ pub fn fields(line: &[u8]) -> Result<Vec<&str>, NmeaError> {
     Ok(body.split(',').collect())
 }
 
-/// What a line says; nothing for a sentence that is of no use here.
+/// Parses a line; `None` for a sentence that is not used here.
 pub fn parse(line: &[u8]) -> Result<Vec<Sentence>, NmeaError> {
     let all = fields(line)?;
     let f = |i: usize| all.get(i).copied().unwrap_or("");
@@ -119,7 +119,7 @@ fn motion(speed_m_s: Option<f64>, course_deg: Option<f64>) -> Result<Option<Sent
     is_sound.then_some(Some(motion)).ok_or(NmeaError::Field)
 }
 
-/// A finite number; nothing if the field is empty.
+/// A finite number; `None` if the field is empty.
 fn number(field: &str) -> Result<Option<f64>, NmeaError> {
     if field.is_empty() {
         return Ok(None);

@@ -31,7 +31,7 @@ pub static PALETTE: [u32; 254] = [
     0x965a87, 0x78874b, 0xb41eb4, 0x78a569,
 ];
 
-/// The colour of a label as red, green and blue; black where nothing has been seen.
+/// The colour of a label as red, green and blue; black for an unexplored cell.
 pub fn colour(label: u8) -> [u8; 3] {
     let rgb = usize::from(label).checked_sub(1).and_then(|i| PALETTE.get(i)).copied().unwrap_or(0);
     [(rgb >> 16) as u8, (rgb >> 8) as u8, rgb as u8]

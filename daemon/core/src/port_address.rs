@@ -15,7 +15,7 @@ pub enum PortAddress {
     /// Datagrams: an address to receive at, and one to send to; without the first any port, without the second to whoever
     /// was heard last.
     Datagrams(String, String),
-    /// What is written is appended.
+    /// A file to append to.
     File(PathBuf),
 }
 

@@ -3,7 +3,7 @@
 /// Address of a modem in the water, as its make counts them.
 pub type ModemAddress = u8;
 
-/// What an ultra-short baseline told of another modem.
+/// The position of another modem as a USBL head measured it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsblLine {
     pub remote: ModemAddress,

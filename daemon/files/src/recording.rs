@@ -72,12 +72,6 @@ impl Recording {
         Ok(Self { frames })
     }
 
-    /// The folder of a `frames:DIR` source.
-    pub fn folder(source: &str) -> Result<&Path, UserError> {
-        let dir = source.strip_prefix("frames:").filter(|d| !d.is_empty());
-        dir.map(Path::new).ok_or_else(|| UserError::Input(format!("camera.source = {source:?}: it takes frames:DIR")))
-    }
-
     /// Limits of the places in the recording.
     pub fn area(&self) -> Area {
         let nowhere = Area { west: f64::MAX, south: f64::MAX, east: f64::MIN, north: f64::MIN };

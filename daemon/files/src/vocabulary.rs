@@ -21,6 +21,6 @@ pub fn read_vocabulary(path: &Path) -> Result<Measures, UserError> {
 ///
 /// # Errors
 /// As [`read_vocabulary`].
-pub fn configured_vocabulary(file: &str) -> Result<Option<Measures>, UserError> {
-    (!file.is_empty()).then(|| read_vocabulary(Path::new(file))).transpose()
+pub fn configured_vocabulary(file: Option<&Path>) -> Result<Option<Measures>, UserError> {
+    file.map(read_vocabulary).transpose()
 }

@@ -1,4 +1,4 @@
-//! What goes between the tank and the tasks at its ports.
+//! Messages between the test basin and the tasks at its ports.
 
 use std::time::Duration;
 use tokio::net::TcpStream;
@@ -8,7 +8,7 @@ use tokio::task::AbortHandle;
 /// Pieces for a host that wait for its task; more are lost, as on a line that nobody reads.
 const WAITING_PIECES: usize = 1024;
 
-/// What a host, or the port, has to say. `modem` counts from 0 in the order of the scenario; `line` is a number of the
+/// A message of a host or of a port. `modem` counts from 0 in the order of the scenario; `line` is a number of the
 /// port's choosing, 0 for a serial one.
 #[derive(Debug)]
 pub enum FromHost {
@@ -37,13 +37,13 @@ pub struct Line {
 }
 
 impl Line {
-    /// Starts a task that is given what the host is told.
+    /// Starts a task that gets the bytes for the host.
     pub fn start<F: Future<Output = ()> + Send + 'static>(task: impl FnOnce(mpsc::Receiver<Vec<u8>>) -> F) -> Self {
         let (to_host, told) = mpsc::channel(WAITING_PIECES);
         Self { to_host, task: tokio::spawn(task(told)).abort_handle() }
     }
 
-    /// Tells the host something, if it keeps up.
+    /// Sends bytes to the host, if it keeps up.
     pub fn tell(&self, bytes: Vec<u8>) {
         let _ = self.to_host.try_send(bytes);
     }
@@ -63,7 +63,7 @@ pub struct Speed {
 }
 
 impl Speed {
-    /// Most bytes to take at a time: what comes in five milliseconds.
+    /// Most bytes to take at a time: the bytes of five milliseconds.
     pub fn piece(&self) -> usize {
         self.bytes_per_s.map_or(4096, |rate| ((rate * 0.005) as usize).clamp(16, 4096))
     }

@@ -25,7 +25,7 @@ use std::time::{Duration, Instant};
 use tank::Tank;
 use tokio::sync::mpsc;
 
-/// What the command was told.
+/// The options of the command.
 #[derive(Debug)]
 pub struct Options {
     pub scenario: PathBuf,

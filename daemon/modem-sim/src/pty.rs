@@ -65,7 +65,7 @@ impl Pty {
         }
     }
 
-    /// Leaves nothing for the next client of what the last one has not read, nor of how it set the line.
+    /// Clears unread bytes and line settings of the last client.
     fn clean(&self) {
         const O_NOCTTY: i32 = nix::fcntl::OFlag::O_NOCTTY.bits();
         let device = OpenOptions::new().read(true).write(true).custom_flags(O_NOCTTY).open(&self.device);

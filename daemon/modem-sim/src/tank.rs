@@ -1,4 +1,4 @@
-//! The basin with its modems, their ports, and what goes wrong when.
+//! The test basin with its modems, their ports, and the schedule of faults.
 
 use super::host::{FromHost, Line, Speed};
 use super::links::Links;
@@ -17,7 +17,7 @@ use tokio::sync::mpsc;
 
 /// Noise on a line comes in pieces, so that a line without pacing has it for as long.
 const NOISE_PIECE: Duration = Duration::from_millis(100);
-/// Bytes of noise in a piece: what 19200 baud carry.
+/// Bytes of noise in a piece, as 19200 baud carry.
 const NOISE_BYTES: u16 = 192;
 
 /// Everything that is emulated, and the ways to it.
@@ -37,7 +37,7 @@ pub struct Tank {
 /// The hosts at one modem.
 #[derive(Default)]
 struct Port {
-    /// The serial line, or what accepts TCP clients; `None` while it is unplugged.
+    /// The serial line or the TCP listener; `None` while it is unplugged.
     door: Option<Line>,
     clients: BTreeMap<u32, (HostId, Line)>,
     last_client: u32,
@@ -97,7 +97,7 @@ impl Tank {
         [planned, self.basin.poll_timeout()].into_iter().flatten().min()
     }
 
-    /// Does everything that is due, and tells the hosts.
+    /// Runs everything that is due, and sends the output to the hosts.
     pub fn advance(&mut self, now: Duration) -> Result<(), UserError> {
         while let Some(entry) = self.plan.first_entry().filter(|entry| entry.key().0 <= now) {
             let ((at, _), act) = entry.remove_entry();

@@ -50,7 +50,7 @@ fn setting(sets: &[&str], loss: f64) -> DockSetting {
 
 fn driver(config: &Config, end: Address) -> Box<dyn Driver> {
     let mut config = config.clone();
-    config.modem.device = "emulated".into();
+    config.modem.device = Some("emulated".into());
     let profile = scenecast_drivers::modem::modem_of_process(&config, end).unwrap();
     modem::driver(&config, end, profile).unwrap()
 }

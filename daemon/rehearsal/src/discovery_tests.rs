@@ -18,7 +18,7 @@ fn a_vehicle_that_answers_a_discovery_call_gets_a_record() {
     let far = load(&["vehicle.address=3"]);
     let vehicle = scenecast_vehicle::assemble(&far, None, modem, area, Durable::default(), 7, Instant::ZERO).unwrap();
     let surface = scenecast_surface::assemble(
-        &load(&["link.call_every_s=60"]),
+        &load(&["link.discovery_period_s=60"]),
         None,
         TuningTable::shipped(),
         modem,

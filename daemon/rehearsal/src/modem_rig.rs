@@ -1,6 +1,6 @@
 //! Emulated modems in one simulated channel, in virtual time, and the ports between them and the ends' hosts.
 
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::UserError;
 use scenecast_drivers::modem::{Station, modem_of_process};
 use scenecast_host::{LinkEnd, LinkHost, modem_station};
@@ -54,7 +54,7 @@ impl ModemRig {
     ) -> Result<(Self, [Station; 2]), UserError> {
         let mut config = config.clone();
         // Emulated ports are serial ones.
-        config.modem.device = "emulated".to_owned();
+        config.modem.device = Some("emulated".into());
         let vehicle = scenecast_config::vehicle_address(&config)?;
         let mut basin = Basin::new(channel);
         basin.advance(now.into());
@@ -159,16 +159,20 @@ fn station(config: &Config, end: Address) -> Result<Station, UserError> {
 fn emulator(config: &Config, address: u8, head: bool, seed: u64) -> Result<Box<dyn Emulator>, UserError> {
     let seed = seed ^ u64::from(address);
     let baud = Some(config.modem.baud);
-    Ok(match config.modem.kind.as_str() {
-        "s2c" => {
+    Ok(match config.modem.kind {
+        ModemKind::S2c => {
             let usbl = head.then(UsblConfig::default);
             Box::new(S2c::new(S2cConfig { baud, usbl, seed, ..S2cConfig::new(address) }))
         }
-        "micromodem" => Box::new(Micromodem::new(MicromodemConfig { baud, seed, ..MicromodemConfig::new(address) })),
-        "transparent" => {
+        ModemKind::Micromodem => {
+            Box::new(Micromodem::new(MicromodemConfig { baud, seed, ..MicromodemConfig::new(address) }))
+        }
+        ModemKind::Transparent => {
             let bit_rate = config.modem.bit_rate as u32;
             Box::new(Transparent::new(TransparentConfig { baud, bit_rate, seed, ..TransparentConfig::default() }))
         }
-        other => return Err(UserError::Input(format!("modem.kind = \"{other}\" has no emulator"))),
+        kind @ (ModemKind::Tcp | ModemKind::Udp) => {
+            return Err(UserError::Input(format!("modem.kind = \"{kind}\" has no emulator")));
+        }
     })
 }

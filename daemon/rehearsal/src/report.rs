@@ -87,7 +87,7 @@ fn map(m: &Mission) -> Value {
         "width": bounds.map_or(0, |b| b.width),
         "height": bounds.map_or(0, |b| b.height),
         "cell_m": m.cell_m(),
-        "codec": m.config.map.codec,
+        "codec": m.config.map.codec.to_string(),
         "versions": m.vehicle().map_version(),
         "updates_sent": stats.chunks_sent,
         "flips_suppressed": m.vehicle().flips_suppressed(),
@@ -200,7 +200,7 @@ fn exemplars(m: &Mission) -> Value {
 fn survey(m: &Mission) -> Value {
     json!({
         "distance_m": round(m.motion.distance_m),
-        "planner": m.config.survey.planner,
+        "planner": m.config.survey.planner.name(),
         "waypoints": m.logbook.legs.len(),
         "waypoints_outside_fence": m.legs_outside_fence(),
         "explored_cells": m.vehicle().map().explored(),

@@ -1,8 +1,7 @@
 //! GPS and compass of the surface vehicle, and the settings of the relay that they feed.
 
 use crate::port::{FromPort, Port};
-use scenecast_config::{Config, is_gpsd, origin, position_places};
-use scenecast_core::UserError;
+use scenecast_config::Config;
 use scenecast_core::gps::GpsLanguage;
 use scenecast_host::SurfaceHost;
 use scenecast_protocol::time::Instant;
@@ -28,12 +27,12 @@ pub(super) enum FromInstrument {
 
 impl Instruments {
     /// Opens what is configured.
-    pub(super) fn open(config: &Config) -> Result<Self, UserError> {
-        let [gps, compass] = position_places(config)?;
-        Ok(Self {
-            gps: gps.map(|place| Port::open_when_there("GPS", place, Some(SILENCE_TIMEOUT))),
-            compass: compass.map(|place| Port::open_when_there("compass", place, Some(SILENCE_TIMEOUT))),
-        })
+    pub(super) fn open(config: &Config) -> Self {
+        let p = &config.position;
+        Self {
+            gps: p.gps.clone().map(|gps| Port::open_when_there("GPS", gps.address, Some(SILENCE_TIMEOUT))),
+            compass: p.compass.clone().map(|port| Port::open_when_there("compass", port, Some(SILENCE_TIMEOUT))),
+        }
     }
 
     /// What an instrument reports next; never without any. Safe to abandon.
@@ -61,26 +60,24 @@ impl Instruments {
 }
 
 /// The relay of a surface that has a GPS.
-pub(super) fn relay(config: &Config) -> Result<Option<Relay>, UserError> {
-    let [gps, _] = position_places(config)?;
-    let language = if is_gpsd(config) { GpsLanguage::Gpsd } else { GpsLanguage::Nmea };
-    gps.map(|_| relay_config(config, language).map(Relay::new)).transpose()
+pub(super) fn relay(config: &Config) -> Option<Relay> {
+    config.position.gps.as_ref().map(|gps| Relay::new(relay_config(config, gps.language)))
 }
 
-fn relay_config(config: &Config, language: GpsLanguage) -> Result<RelayConfig, UserError> {
+fn relay_config(config: &Config, language: GpsLanguage) -> RelayConfig {
     let p = &config.position;
     let sound_ratio = if p.sound_speed_m_s > 0.0 { p.sound_speed_m_s / MODEM_SOUND_M_S } else { 1.0 };
-    Ok(RelayConfig {
-        origin: origin(config)?,
+    RelayConfig {
+        origin: config.mission.origin_deg,
         language,
         mounting: Mounting {
             lever_m: p.usbl_lever_m,
             depth_m: p.usbl_depth_m,
             from_bow: p.usbl_from_bow,
-            turn_rad: p.usbl_turn_deg.to_radians(),
+            turn_rad: p.usbl_rotation_deg.to_radians(),
             sound_ratio,
         },
-        most_sigma_m: p.most_sigma_m,
+        most_sigma_m: p.max_sigma_m,
         period: Duration::from_secs_f64(p.fix_period_s),
-    })
+    }
 }

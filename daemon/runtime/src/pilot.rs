@@ -1,7 +1,7 @@
 //! The autopilot that is configured, and the port to it.
 
 use crate::port::{FromPort, Port};
-use scenecast_config::{Config, autopilot_place};
+use scenecast_config::{AutopilotKind, Config};
 use scenecast_core::UserError;
 use scenecast_drivers::autopilot::mavlink::MavlinkConfig;
 use scenecast_drivers::autopilot::{Autopilot, Mavlink, Nmea};
@@ -19,19 +19,19 @@ pub(super) fn autopilot(
     now: Instant,
 ) -> Result<Option<Box<dyn Autopilot>>, UserError> {
     let a = &config.autopilot;
-    let silence = Duration::from_secs_f64(a.silence_s);
-    Ok(Some(match a.kind.as_str() {
-        "mavlink" => Box::new(Mavlink::new(MavlinkConfig { system: a.system, arms: a.arm, silence }, now)),
-        "nmea" => Box::new(Nmea::new(true, silence, now)),
-        "log" => Box::new(Nmea::new(false, silence, now)),
-        "rehearsal" => match simulated {
+    let silence = Duration::from_secs_f64(a.timeout_s);
+    Ok(Some(match a.kind {
+        AutopilotKind::Mavlink => Box::new(Mavlink::new(MavlinkConfig { system: a.system, arms: a.arm, silence }, now)),
+        AutopilotKind::Nmea => Box::new(Nmea::new(true, silence, now)),
+        AutopilotKind::Log => Box::new(Nmea::new(false, silence, now)),
+        AutopilotKind::Rehearsal => match simulated {
             Some(make) => make(config, now),
             None => {
                 let what = "autopilot.kind = \"rehearsal\" is not allowed: this build has no simulator";
                 return Err(UserError::Input(format!("{what}; it takes none, mavlink, nmea or log")));
             }
         },
-        _ => return Ok(None),
+        AutopilotKind::None => return Ok(None),
     }))
 }
 
@@ -42,9 +42,10 @@ pub(super) struct PilotPort {
 
 impl PilotPort {
     /// Opens the port that an autopilot is configured to have.
-    pub(super) fn open(config: &Config, has_autopilot: bool) -> Result<Self, UserError> {
-        let place = if has_autopilot { autopilot_place(config)? } else { None };
-        Ok(Self { port: place.map(|place| Port::open_when_there("autopilot", place, None)) })
+    pub(super) fn open(config: &Config, has_autopilot: bool) -> Self {
+        let a = &config.autopilot;
+        let port = a.port.clone().filter(|_| has_autopilot && a.kind != AutopilotKind::Rehearsal);
+        Self { port: port.map(|port| Port::open_when_there("autopilot", port, None)) }
     }
 
     /// What the port reports next; never without one. Safe to abandon.

@@ -5,7 +5,7 @@ use scenecast_protocol::link::{DropReason, LinkStats};
 
 /// Says in the log what it means to have no key.
 pub(super) fn warn_without_key(config: &Config) {
-    if config.link.key_file.is_empty() {
+    if config.link.key_file.is_none() {
         tracing::warn!(
             "link.key_file is empty: whoever reaches the water can command the vehicle and forge its map; \
              scenecast key new makes a key, and both ends need the same file"

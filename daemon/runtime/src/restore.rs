@@ -43,7 +43,12 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
             if other.is_some() {
                 tracing::warn!("the checkpoint of the scene model is of another mission: it begins anew");
             }
-            Mapper::new(config, configured_vocabulary(&config.scene.vocabulary)?, durable.epoch, config.runtime.seed)?
+            Mapper::new(
+                config,
+                configured_vocabulary(config.scene.vocabulary.as_deref())?,
+                durable.epoch,
+                config.runtime.seed,
+            )?
         }
     };
     let last_s = mapper.last_s();
@@ -53,7 +58,7 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
 
 fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {
     let Some(bytes) = file.read()? else { return Ok(None) };
-    match Mapper::restore(config, configured_vocabulary(&config.scene.vocabulary)?, &bytes) {
+    match Mapper::restore(config, configured_vocabulary(config.scene.vocabulary.as_deref())?, &bytes) {
         Ok(restored) => Ok(Some(restored)),
         Err(NoCheckpoint::Config(problem)) => Err(problem),
         Err(why) => {

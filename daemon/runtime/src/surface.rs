@@ -31,14 +31,14 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
-        let listener = match config.console.listen.as_str() {
-            "" => None,
-            address => {
+        let listener = match &config.console.listen {
+            None => None,
+            Some(address) => {
                 let token = scenecast_config::load_token(&config)?;
-                Some(bind(address, "console.listen", token, &config.console.host).await?)
+                Some(bind(address.as_str(), "console.listen", token, &config.console.host).await?)
             }
         };
-        let dir = PathBuf::from(&config.runtime.state_dir);
+        let dir = config.runtime.state_dir.clone();
         let is_again = dir.exists();
         create_folder(&dir).map_err(|e| UserError::file(&dir, e))?;
         let clock = Clock::new(config.runtime.time_scale);
@@ -52,22 +52,22 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             super::random_bits(),
             clock.now(),
         )?;
-        if let Some(relay) = relay(&config)? {
+        if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
         }
         if is_again {
             surface.assume_budget_spent(clock.now());
         }
-        let console = listener.map(|listener| {
-            println!("the operator's page is at http://{} (end with Ctrl-C)", config.console.listen);
+        let console = listener.zip(config.console.listen.as_ref()).map(|(listener, address)| {
+            println!("the operator's page is at http://{address} (end with Ctrl-C)");
             start(listener)
         });
         let facts = MissionFacts::new(&config, &profile, super::random_bits(), config.runtime.time_scale);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
         let modem = ModemPort::open(&config, clock.now()).await?;
-        let instruments = Instruments::open(&config)?;
+        let instruments = Instruments::open(&config);
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
-        let ports = Ports { modem, instruments, pilot: PilotPort::open(&config, autopilot.is_some())? };
+        let ports = Ports { modem, instruments, pilot: PilotPort::open(&config, autopilot.is_some()) };
         let vehicle = scenecast_config::vehicle_address(&config)?;
         let p = &config.position;
         let follow = p.follow.then(|| Follow::new(p.stand_off_m, p.dead_band_m));

@@ -11,14 +11,12 @@ use super::reload::{Load, Reload};
 use super::restore::{Start, start};
 use super::stop::Stop;
 use crate::port::FromPort;
-use scenecast_config::{Config, origin, survey_depth_m};
+use scenecast_config::{CameraSource, Config, survey_depth_m};
 use scenecast_core::{Area, TangentPlane, UserError};
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_host::{CameraPose, FrameEvent, VehicleHost, VehicleHostEvent, VehiclePilot, modem_station};
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::map::LayerSet;
-use scenecast_protocol::schedule::Shares;
-use std::path::Path;
 use std::time::Duration;
 
 /// The host is asked again at least this often.
@@ -30,15 +28,15 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let stop = Stop::new()?;
         let config = load()?;
         warn_without_key(&config);
-        let dir = Path::new(&config.runtime.state_dir);
+        let dir = config.runtime.state_dir.as_path();
         let Start { run, mut mapper, keep } = start(&config, dir)?;
         let Run { keeper, durable, is_again } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
-        let recording = match config.camera.source.as_str() {
-            "" => None,
-            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
+        let recording = match &config.camera.source {
+            CameraSource::Rehearsal => None,
+            CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
         };
         let area = survey_area(&config, recording.as_ref())?;
         let mut vehicle = scenecast_vehicle::assemble(
@@ -61,8 +59,8 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         let station = modem_station(&config, address, profile)?;
         let reload = Reload::new(load)?;
         let autopilot = pilot::autopilot(&config, simulated, clock.now())?;
-        let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some())? };
-        let plane = origin(&config)?.map(TangentPlane::new);
+        let ports = Ports { modem, pilot: PilotPort::open(&config, autopilot.is_some()) };
+        let plane = config.mission.origin_deg.map(TangentPlane::new);
         let pilot = autopilot.map(|a| VehiclePilot::new(a, plane, survey_depth_m(&config), clock.now()));
         let mut host = VehicleHost::new(vehicle, station, pilot);
         if is_recorded && camera.is_over() {
@@ -74,7 +72,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
 }
 
 fn survey_area(config: &Config, recording: Option<&Recording>) -> Result<Area, UserError> {
-    let area = scenecast_config::survey_area(config).or_else(|| recording.map(Recording::area));
+    let area = config.survey.area_m.or_else(|| recording.map(Recording::area));
     let missing = "survey.area_m: set the west, south, east and north limits of the survey";
     area.ok_or_else(|| UserError::Input(missing.to_owned()))
 }
@@ -138,8 +136,8 @@ impl VehicleShell {
 
     /// Budget and shares of the configuration take the place of those that the surface ordered.
     fn follow(&mut self, config: &Config) {
-        let background = scenecast_config::background(config);
-        let budget = Budget { bits_per_s: config.link.budget_bps, shares: Shares(config.link.shares), background };
+        let link = &config.link;
+        let budget = Budget { bits_per_s: link.budget_bps, shares: link.shares, background: link.background };
         let streams = budget.background.names(&LayerSet::default()).join(", ");
         tracing::info!("SIGHUP: budget {} bit/s, shares {:?} %, then {streams}", budget.bits_per_s, budget.shares.0);
         self.host.handle_budget(budget, self.clock.now());

@@ -1,25 +1,44 @@
 //! The `scenecast` command.
 
 use clap::Parser;
+use clap::error::{ContextKind, ContextValue};
 use std::process::ExitCode;
+
+/// Options that have another name now.
+const OLD_OPTIONS: [(&str, &str); 2] = [("--planes", "--layers"), ("--spend", "--background")];
 
 fn main() -> ExitCode {
     let arguments = match scenecast::commands::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(e) if !e.use_stderr() => e.exit(),
         Err(e) => {
-            let text = e.to_string();
-            let what = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-            let rest: Vec<&str> = text.lines().skip(1).map(str::trim).take_while(|l| !l.is_empty()).collect();
-            eprintln!("scenecast: {what} {} (scenecast COMMAND --help tells what there is)", rest.join(" "));
+            let renamed = renamed(&e);
+            eprintln!("scenecast: {}", renamed.unwrap_or_else(|| one_line(&e.to_string())));
             return ExitCode::from(2);
         }
     };
     match scenecast::commands::run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(problem) => {
-            eprintln!("scenecast: {problem}");
-            ExitCode::from(problem.exit_code())
+        Err(error) => {
+            eprintln!("scenecast: {error}");
+            ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// The message for an old option.
+fn renamed(error: &clap::Error) -> Option<String> {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidArg) else { return None };
+    let (old, new) = OLD_OPTIONS.into_iter().find(|(old, _)| old == given)?;
+    Some(format!("the option {old} is now called {new}"))
+}
+
+/// The message and the tips of an error of clap, without its usage, on one line.
+fn one_line(text: &str) -> String {
+    let mut paragraphs = text.trim_start_matches("error: ").split("\n\n").map(str::trim);
+    let message = paragraphs.next().unwrap_or_default();
+    let tips = paragraphs.filter_map(|paragraph| paragraph.strip_prefix("tip: "));
+    let parts: Vec<&str> = [message].into_iter().chain(tips).collect();
+    let line = parts.join("; ").replace("\n  tip:", ";");
+    format!("{} (scenecast COMMAND --help lists all options)", line.split_whitespace().collect::<Vec<_>>().join(" "))
 }

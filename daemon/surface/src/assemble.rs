@@ -1,12 +1,11 @@
 //! From a configuration to a surface.
 
 use crate::Surface;
-use scenecast_config::{Config, background, vehicle_names};
+use scenecast_config::{Config, vehicle_names};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink};
 use scenecast_protocol::mac::{MasterConfig, ModemProfile};
-use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::MissionId;
 use std::time::Duration;
@@ -26,18 +25,19 @@ pub fn assemble(
         modem,
         budget_bps: config.link.budget_bps,
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),
-        shares: Shares(config.link.shares),
+        shares: config.link.shares,
         master: MasterConfig {
             max_propagation: Duration::from_secs_f64(config.link.max_range_m / 1480.0),
             max_turn: Duration::from_secs_f64(config.link.max_turn_s),
             max_idle: Duration::from_secs_f64(config.link.max_idle_s),
         },
         vehicles: vehicles.keys().copied().collect(),
-        discovery_period: (config.link.call_every_s > 0.0).then(|| Duration::from_secs_f64(config.link.call_every_s)),
+        discovery_period: (config.link.discovery_period_s > 0.0)
+            .then(|| Duration::from_secs_f64(config.link.discovery_period_s)),
         authenticity,
     };
     let link = SurfaceLink::new(link, seed, now);
     let mut surface = Surface::new(link, vehicles).with_tuning_table(table);
-    surface.set_background(background(config));
+    surface.set_background(config.link.background);
     Ok(surface)
 }

@@ -203,13 +203,13 @@ mod tests {
 
     #[test]
     fn what_is_allowed_is_what_the_configuration_allows() {
-        use scenecast_config::{Allowed, KEYS};
+        use scenecast_config::Key;
         let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
         for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().figures()) {
-            let key = KEYS.iter().find(|k| k.name == name).unwrap();
+            let key = Key::find(name).unwrap();
             // 0 words a second is a configuration's way to have no refinement.
             let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };
-            assert_eq!(key.allowed, Allowed::Range(low, *range.end()), "{name}");
+            assert_eq!(key.rule.range, (low, *range.end()), "{name}");
         }
     }
 

@@ -1,12 +1,11 @@
 //! From a configuration to a vehicle.
 
 use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
-use scenecast_config::{Config, background, cell_m, vehicle_address};
+use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
-use scenecast_protocol::directive::{PlannerKind, Reaction};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
 use scenecast_protocol::mac::ModemProfile;
-use scenecast_protocol::map::{LayerDescriptor, LayerId, LayerMask, LayerSet, LayerSource};
+use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerId, LayerMask, LayerSource};
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -29,17 +28,17 @@ pub fn assemble(
         modem,
         budget_bps: durable.budget_bps.unwrap_or(config.link.budget_bps),
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),
-        shares: Shares(durable.shares.unwrap_or(config.link.shares)),
+        shares: durable.shares.map_or(config.link.shares, Shares),
         status_period: Duration::from_secs_f64(config.link.status_period_s),
         authenticity,
     };
-    let codec = config.map.codec.parse().unwrap_or_default();
+    let codec = config.map.codec;
     let mut link = VehicleLink::new(link, codec, seed, durable.inbox.clone(), now);
     for layer in layers(config, codec) {
         link.add_layer(layer);
     }
-    link.source_mut().set_debounce(Duration::from_secs_f64(config.map.settle_s));
-    let planner = PlannerKind::from_name(&config.survey.planner).unwrap_or(PlannerKind::Horizon);
+    link.source_mut().set_debounce(Duration::from_secs_f64(config.map.debounce_s));
+    let planner = config.survey.planner;
     let steering = Steering::new(area, footprint(config), cell_m(config), planner, config.survey.clearance_m);
     let (x, y) = steering.start();
     let depth = (config.survey.depth_m - config.survey.altitude_m).max(0.0);
@@ -48,10 +47,10 @@ pub fn assemble(
         Some(last) => Navigator::resume(last, depth, drift),
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
-    link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or_else(|| background(config)));
+    link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
     let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_map(config.map.cells == "coarse", config.map.coarse_after_s, selected_layers(config));
-    if config.map.stream == "whole-png" {
+    vehicle.configure_map(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, selected_layers(config));
+    if config.map.stream == MapStream::WholePng {
         vehicle.send_whole_png();
     }
     Ok(vehicle)
@@ -65,34 +64,32 @@ fn footprint(config: &Config) -> Footprint {
 /// What the vehicle does of its own accord.
 fn habits(config: &Config) -> Habits {
     let survey = &config.survey;
-    let reaction = |name: &str| Reaction::from_name(name).unwrap_or(Reaction::Return);
     Habits {
-        on_silence: reaction(&survey.on_silence),
-        on_breach: reaction(&survey.on_breach),
-        on_abort: reaction(&survey.on_abort),
+        on_silence: survey.on_silence,
+        on_breach: survey.on_breach,
+        on_abort: survey.on_abort,
         silence_s: if survey.max_silence_s > 0.0 { survey.max_silence_s } else { f64::INFINITY },
         speed_m_s: survey.speed_m_s,
         altitude_m: survey.altitude_m,
     }
 }
 
-/// The layers that are sent unless the operator selects others. The names were checked when the file was read.
+/// The layers that are sent unless the operator selects others.
 fn selected_layers(config: &Config) -> LayerMask {
-    let built_in = LayerSet::default();
-    config.map.planes.iter().filter_map(|name| built_in.id(name)).collect()
+    config.map.layers.iter().map(|layer| layer.id()).collect()
 }
 
 /// Every layer that the operator could request, with its part of the map's share.
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
-    let debounce = Duration::from_secs_f64(map.settle_s);
-    let possible = if map.stream == "delta" { LayerMask(u16::MAX) } else { LayerMask::default() };
-    LayerId::all().filter(move |&id| possible.has(id)).filter_map(move |id| {
-        let built_in = match id {
+    let debounce = Duration::from_secs_f64(map.debounce_s);
+    let possible = BUILT_IN_LAYERS.iter().zip(LayerName::all()).filter(|_| map.stream == MapStream::Delta);
+    possible.map(move |(layer, name)| {
+        let built_in = match layer.id {
             LayerId::DEPTH => LayerDescriptor::depth_around(config.survey.depth_m, map.depth_step_m),
-            _ => LayerSet::default().get(id)?.clone(),
+            _ => layer.descriptor.clone(),
         };
-        let share = config.map.layer_share(&built_in.name);
-        Some(LayerSource::new(id, LayerDescriptor { share, ..built_in }, codec, debounce))
+        let share = map.layer_shares.get(&name).copied().unwrap_or(0);
+        LayerSource::new(layer.id, LayerDescriptor { share, ..built_in }, codec, debounce)
     })
 }

@@ -79,7 +79,7 @@ impl Mapper {
         if *model.config() != configured || words != configured_words.config() {
             return Err(NoCheckpoint::OtherParameters);
         }
-        if !config.scene.vocabulary.is_empty() && !is_same(&kept.words, &configured_words) {
+        if config.scene.vocabulary.is_some() && !is_same(&kept.words, &configured_words) {
             return Err(NoCheckpoint::OtherParameters);
         }
         let mut mapper = fresh;

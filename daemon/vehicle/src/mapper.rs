@@ -8,8 +8,7 @@ use scene_model::project::{DownCamera, Pose};
 use scene_model::publish::{LabelBook, PublishedCell};
 use scene_model::topics::{Birth, FlatCell, SceneConfig, SceneModel};
 use scene_model::words::{Measures, WordConfig, WordExtractor};
-use scenecast_config::Config;
-use scenecast_config::cell_m;
+use scenecast_config::{BirthRule, Config, cell_m};
 use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Figure, Settings};
 use scenecast_protocol::map::{Cell, LayerId};
@@ -69,10 +68,10 @@ impl Mapper {
         let extractor =
             vocabulary.map_or_else(|| WordExtractor::new(&WordConfig::default()), WordExtractor::from_measures);
         let cell_m = cell_m(config);
-        let birth = match config.scene.birth.as_str() {
-            "collapsed" => Birth::Collapsed,
-            "rost" => Birth::Rost,
-            _ => Birth::Literal,
+        let birth = match config.scene.birth {
+            BirthRule::Literal => Birth::Literal,
+            BirthRule::Collapsed => Birth::Collapsed,
+            BirthRule::Rost => Birth::Rost,
         };
         let scene = SceneConfig {
             cell_m: [cell_m, cell_m, 1e4],

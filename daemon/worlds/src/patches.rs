@@ -8,7 +8,7 @@ const ALPHA: f64 = 0.01;
 const GAMMA: f64 = 0.06;
 /// How often every patch is drawn again. With more sweeps the largest label would take over the grid.
 const SWEEPS: usize = 3;
-/// The exponent of the neighbours' count: a patch stands for many words, so that it outweighs a single one.
+/// The exponent of the neighbours' count. A patch stands for many words, so a neighbour weighs more than one word does.
 const SHARPNESS: i32 = 2;
 
 /// The labels of a grid of patches, row by row.

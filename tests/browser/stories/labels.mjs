@@ -16,15 +16,23 @@ async function edit(s, name, fill) {
   await s.button("Save").click();
 }
 
-/** Requests an image of the first label without one; resolves to its button after the image has arrived. */
+/** Requests an image of one label after the other until one has arrived; resolves to its button. The vehicle of a running mission may
+ *  have no image of a label yet ("None yet"), and then the next label is tried. */
 async function firstImage(s) {
   await firstLabels(s);
-  const ask = s.page.getByRole("button", { name: /^Request: an image of/ }).first();
-  const name = (await ask.getAttribute("aria-label")).replace(/^.*image of /, "");
-  await ask.click();
-  const image = s.page.getByRole("button", { name: `Image of ${name}, enlarge` });
-  await s.until("the image", () => image.isVisible(), { ms: 300000, advance: 2 });
-  return image;
+  const received = s.page.getByRole("button", { name: /^Image of .*, enlarge$/ }).first();
+  const request = s.page.getByRole("button", { name: /^Request: an image of/ }).first();
+  const requested = async () => (await s.page.locator(".exemplar .state").allInnerTexts()).some((text) => /Queued|On air|Receiving/.test(text));
+  await s.until("an image", async () => {
+    if (await received.isVisible()) return true;
+    if ((await requested()) || !(await request.isVisible())) return false;
+    const button = s.button(await request.getAttribute("aria-label"));
+    await button.click();
+    await s.until("the request in the state", async () => !(await button.isVisible()));
+    return false;
+  }, { ms: 300000, advance: 2 });
+  const name = await received.getAttribute("aria-label");
+  return s.page.getByRole("button", { name, exact: true });
 }
 
 export default [

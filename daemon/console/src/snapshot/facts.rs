@@ -48,7 +48,7 @@ impl MissionFacts {
 
 fn configured_origin(config: &Config) -> Option<Origin> {
     // At a pole there is no east.
-    let LatLon { lat_deg, lon_deg } = config::origin(config).ok()?.filter(|o| o.lat_deg.abs() < 90.0)?;
+    let LatLon { lat_deg, lon_deg } = config.mission.origin_deg.filter(|o| o.lat_deg.abs() < 90.0)?;
     Some(Origin { lat_deg, lon_deg })
 }
 

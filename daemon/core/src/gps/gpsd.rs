@@ -7,7 +7,7 @@ use crate::geodesy::LatLon;
 use crate::nmea::Sentence;
 use serde::Deserialize;
 
-/// What asks gpsd for reports.
+/// The request that makes gpsd send reports.
 pub const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
 
 /// Longest line that is taken: a sky view of many satellites has some kilobytes.
@@ -30,7 +30,7 @@ struct Report {
     heading: Option<f64>,
 }
 
-/// What a report says, and the standard deviation of its position in metres if it tells one.
+/// The content of a report, and the standard deviation of its position in metres if it has one.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Said {
     /// As sentences of NMEA 0183 would.
@@ -38,10 +38,10 @@ pub struct Said {
     pub sigma_m: Option<f64>,
 }
 
-/// gpsd tells errors with 95 % confidence: 1.96 standard deviations.
+/// gpsd gives errors with 95 % confidence: 1.96 standard deviations.
 const CONFIDENCE: f64 = 1.96;
 
-/// What a line says; `None` if it is no report or says what cannot be.
+/// Parses a line; `None` if it is no report or has impossible values.
 pub fn parse(line: &[u8]) -> Option<Said> {
     let report: Report = serde_json::from_slice(line).ok()?;
     match report.class.as_str() {

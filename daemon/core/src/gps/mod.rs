@@ -1,4 +1,4 @@
-//! What a receiver says, made into positions that can be believed.
+//! Positions from a receiver, checked for plausibility.
 
 use crate::geodesy::LatLon;
 use crate::nmea::Sentence;
@@ -16,7 +16,7 @@ pub enum GpsLanguage {
     Gpsd,
 }
 
-/// Why something that a receiver said is not used.
+/// Reasons to refuse a position of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GpsFault {
     /// A line with a wrong checksum.
@@ -25,11 +25,11 @@ pub enum GpsFault {
     Unreadable,
     /// A line longer than allowed.
     Overlong,
-    /// The receiver says that it has no position.
+    /// The receiver reports that it has no position.
     NoPosition,
     /// The same time of measurement, or the same place to the last digit while under way, again and again.
     Frozen,
-    /// The place that the receiver tells is too far from the last one for the speed of a vessel.
+    /// The position is too far from the last one for the speed of a vessel.
     Jump,
 }
 
@@ -62,7 +62,7 @@ pub struct Gps {
     lines: Lines,
     faults: BTreeMap<GpsFault, u64>,
     fix: Option<GpsFix>,
-    /// Last place told, its time of day, and since when nothing of it has changed.
+    /// The last position, its time of day, and the time since which neither has changed.
     told: Option<(LatLon, Option<f64>, Instant)>,
     utc_changed: Option<(f64, Instant)>,
     /// Places in a row that were too far from the last good one, and the last of them.
@@ -78,14 +78,14 @@ impl Gps {
     const PLAIN_SIGMA_M: f64 = 3.0;
     /// Faster is no vessel, m/s.
     const FASTEST_M_S: f64 = 30.0;
-    /// A place that stays the same to the last digit for so long is frozen, if the receiver says that it moves.
+    /// A position that keeps its last digit for this long is frozen if the receiver reports motion.
     const FROZEN: Duration = Duration::from_secs(5);
     /// So many places in a row, near each other, are believed however far they are from the last good one.
     const JUMPS_BELIEVED: u32 = 10;
     /// Slower than this the course over ground is noise, m/s.
     const COURSE_SPEED_M_S: f64 = 0.5;
 
-    /// A receiver that has said nothing.
+    /// A receiver without a report yet.
     pub fn new(language: GpsLanguage) -> Self {
         let longest = match language {
             GpsLanguage::Nmea => nmea::MAX_LINE,
@@ -105,7 +105,7 @@ impl Gps {
         }
     }
 
-    /// What was not used so far, by reason.
+    /// Refused reports, by reason.
     pub fn faults(&self) -> impl Iterator<Item = (GpsFault, u64)> + '_ {
         self.faults
             .iter()
@@ -125,7 +125,7 @@ impl Gps {
         compass.or_else(|| course().and_then(|(_, course, _)| course))
     }
 
-    /// A connection was opened: what to say to the receiver, and half a line is none.
+    /// Returns the request to send on a new connection, and drops a half line of the old one.
     pub fn handle_open(&mut self) -> &'static [u8] {
         self.lines.clear();
         match self.language {

@@ -1,4 +1,4 @@
-//! What is known of the settings of the scene model before a mission: how much each tells, and what its stream takes.
+//! Measured information and bit rate of settings of the scene model.
 
 mod fit;
 mod table;

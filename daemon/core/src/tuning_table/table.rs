@@ -1,4 +1,4 @@
-//! The table of `scenecast tune`: a line a setting, with what it reaches and what its stream takes.
+//! The table of `scenecast tune`: a line for each setting, with its information and bit rate.
 
 use crate::UserError;
 use scenecast_protocol::directive::CellBand;
@@ -25,7 +25,7 @@ pub struct Setting {
     pub refine_words_per_s: f64,
     /// Camera frames a second that the scene model sees.
     pub frames_per_s: f64,
-    /// Which cells are told: fine or coarse.
+    /// The published cells: fine or coarse.
     pub cells: CellBand,
 }
 
@@ -50,7 +50,7 @@ pub struct Measurement {
     pub mosaic_mutual_information_nats: f64,
     /// Different labels in the final map.
     pub labels: usize,
-    /// Bytes of all chunks that say the final map from nothing.
+    /// Bytes of all chunks that code the final map against an empty one.
     pub map_bytes: usize,
     /// Bits of all chunks of the survey over its time.
     pub stream_bps: f64,
@@ -66,7 +66,7 @@ pub struct Row {
 /// Settings with their figures, none twice, in order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TuningTable {
-    /// What the figures of each row were measured with.
+    /// The conditions under which each row was measured.
     rows: Vec<(String, Row)>,
 }
 
@@ -80,7 +80,7 @@ impl TuningTable {
     /// Reads the text of `file`.
     ///
     /// # Errors
-    /// The file, the line and what is wrong with it; a table without a row.
+    /// The file, the line and the fault; a table without a row.
     pub fn parse(file: &str, text: &str) -> Result<Self, UserError> {
         let table = Self::read(text).map_err(|(line, what)| UserError::Input(format!("{file}:{line}: {what}")))?;
         if table.rows.is_empty() {
@@ -89,7 +89,7 @@ impl TuningTable {
         Ok(table)
     }
 
-    /// Reads a table's text; the error is the line and what is wrong with it.
+    /// Reads the text of a table; the error is the line and its fault.
     pub fn read(text: &str) -> Result<Self, (usize, String)> {
         let mut lines = text.lines().enumerate();
         if lines.next().is_none_or(|(_, title)| title.trim_end() != TITLE) {

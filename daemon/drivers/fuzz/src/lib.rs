@@ -1,4 +1,4 @@
-//! Fuzz targets of the modem drivers: what must hold for any bytes of a port.
+//! Fuzz targets of the modem drivers, for any bytes of a port.
 
 use scenecast_core::MicromodemRate;
 use scenecast_drivers::modem::micromodem::{Micromodem, MicromodemConfig, SentenceParser};

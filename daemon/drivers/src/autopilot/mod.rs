@@ -1,4 +1,4 @@
-//! Autopilots: state machines between the vehicle's role and the bytes of what flies it.
+//! Autopilots: state machines between the vehicle's role and the bytes of its flight controller.
 //!
 //! Waypoints go out, steps of way come in, fixes go out. None of them does IO; [`crate::runtime`] moves their bytes.
 //!
@@ -50,19 +50,19 @@ pub struct Step {
     pub heading_rad: f64,
     /// Depth below the surface, metres.
     pub depth_m: f64,
-    /// Time in which it may have gone anywhere, for nothing credible was told; the way is that of the rest.
+    /// Time without a credible report, in which the motion is unknown; the step covers the rest.
     pub unseen: Duration,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Health {
-    /// Nothing was heard of it yet.
+    /// No message was received yet.
     Awaited,
     /// It answered once, and does not any more.
     Silent,
-    /// It answers, but does not do what it is told: disarmed, or in a mode of the pilot's.
+    /// It answers but does not follow waypoints: it is disarmed, or in a mode of the pilot's.
     NotInCommand,
-    /// It does what it is told.
+    /// It follows waypoints.
     InCommand,
 }
 
@@ -77,7 +77,7 @@ impl Health {
         }
     }
 
-    /// Whether nobody carries out what the vehicle decides.
+    /// Whether no autopilot carries out the vehicle's decisions.
     pub fn is_silent(self) -> bool {
         matches!(self, Self::Awaited | Self::Silent)
     }
@@ -88,7 +88,7 @@ pub type Counters = BTreeMap<&'static str, u64>;
 
 /// An autopilot. `now` never goes back.
 pub trait Autopilot: Send {
-    /// The way to it was opened; what was said before is forgotten.
+    /// The port was opened; earlier messages are forgotten.
     fn handle_open(&mut self, now: Instant);
 
     /// Bytes of it, in pieces of any size. Anything may be in them.
@@ -114,7 +114,7 @@ pub trait Autopilot: Send {
         self.tray().notes.pop_front()
     }
 
-    /// Go there; `None`: stay. Said anew every second or so, for the autopilot may have forgotten.
+    /// Sets the goal; `None`: hold position. The host repeats it about every second, as the autopilot may restart.
     fn set_goal(&mut self, goal: Option<Goal>, now: Instant);
 
     /// Where on the Earth the vehicle is, as known from fixes, with its standard deviation in metres.

@@ -35,7 +35,7 @@ pub struct Nmea {
 }
 
 impl Nmea {
-    /// `answers`: whether the vehicle tells where it is; silence of `silence` then counts.
+    /// `answers`: whether the vehicle reports its position; a silence of `silence` then counts.
     pub fn new(answers: bool, silence: Duration, now: Instant) -> Self {
         Self {
             gps: Gps::new(GpsLanguage::Nmea),

@@ -1,4 +1,4 @@
-//! What an autopilot has ready for its host.
+//! The outbox of an autopilot: bytes, steps and notes for its host.
 
 use super::{Counters, Step};
 use std::collections::VecDeque;
@@ -16,7 +16,7 @@ impl Tray {
     /// Most of each that waits.
     pub(super) const MAX: usize = 256;
 
-    /// Bytes for the autopilot; what nobody fetches is stale.
+    /// Queues bytes for the autopilot; the newest are dropped when the queue is full.
     pub(super) fn write(&mut self, bytes: Vec<u8>) {
         if self.outputs.len() < Self::MAX {
             self.outputs.push_back(bytes);

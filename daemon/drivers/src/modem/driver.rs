@@ -1,4 +1,4 @@
-//! What every driver of a modem is: bytes in, bytes out, no IO.
+//! The trait of every modem driver: bytes in, bytes out, no IO.
 
 use bytes::Bytes;
 use scenecast_core::{ModemAddress, UsblLine};
@@ -12,9 +12,9 @@ pub type Token = u64;
 /// How urgent a transmission is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
-    /// What somebody waits for: never behind bulk that the modem holds.
+    /// Urgent: never queued behind bulk in the modem.
     Command,
-    /// Acknowledgements: a later one replaces what it did not get to say.
+    /// Acknowledgements: a later one replaces an earlier one that was not sent.
     Service,
     /// The rest, in the order in which it was given.
     Bulk,
@@ -33,7 +33,7 @@ pub enum Refusal {
     /// It is larger than the modem carries.
     #[error("a frame of {bytes} bytes is larger than the modem's {most}")]
     TooLong { bytes: usize, most: usize },
-    /// There is nothing in it.
+    /// The frame is empty.
     #[error("a frame without bytes")]
     Empty,
     /// The modem cannot reach this destination.
@@ -46,18 +46,18 @@ pub enum Refusal {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reception {
-    /// Sender; `None` where the modem does not tell.
+    /// The sender; `None` where the modem does not report it.
     pub src: Option<ModemAddress>,
     pub bytes: Bytes,
-    /// How well, as the modem tells it: more is better.
+    /// Signal quality in the modem's unit; higher is better.
     pub quality: Option<i32>,
     /// Slant range to the sender, metres.
     pub range_m: Option<f64>,
 }
 
-/// What a driver tells.
+/// An event of a driver.
 ///
-/// Each token that was accepted gets one of `Sent` (for what is not acknowledged), `Delivered`, `Failed` and `Unknown`.
+/// Each accepted token gets one of `Sent` (if it is not acknowledged), `Delivered`, `Failed` and `Unknown`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     /// The modem is set up: it takes transmissions.
@@ -78,9 +78,9 @@ pub enum Event {
     Usbl(UsblLine),
     /// The modem asks for at most so many frames of a cycle ([`scenecast_protocol::mac::Access::Polled`]).
     Poll(u32),
-    /// The modem put so many bits on air beside what it was given: its own repeats.
+    /// Bits on air of the modem's own repeats.
     Repeated(u64),
-    /// The modem, or the way to it, was lost: what it held is gone. [`Self::Ready`] follows when it is back.
+    /// The modem or its port was lost, with all that it held. [`Self::Ready`] follows when it is back.
     Reset,
     /// Something that a person must change, in his words: a wrong address, a setting that is not taken.
     Refused(String),
@@ -88,7 +88,7 @@ pub enum Event {
 
 /// A driver: a state machine between the link and the bytes of a port.
 ///
-/// The host handles all events before it asks for output, for what the modem asks is answered with what the link gives.
+/// The host handles all events before it polls output: the link's frames answer the modem's requests.
 pub trait Driver: Send {
     /// How the medium is shared, and units of transmission.
     fn profile(&self) -> ModemProfile;
@@ -110,7 +110,7 @@ pub trait Driver: Send {
     /// The port was closed, or failed.
     fn handle_closed(&mut self, now: Instant);
 
-    /// Takes what came over the port.
+    /// Bytes from the port.
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
 
     fn handle_timeout(&mut self, now: Instant);
@@ -121,10 +121,10 @@ pub trait Driver: Send {
     /// Bytes for the port; to be asked until there are none, after everything else.
     fn poll_output(&mut self, now: Instant) -> Option<Vec<u8>>;
 
-    /// The next thing that it tells.
+    /// The next event.
     fn poll_event(&mut self) -> Option<Event>;
 
-    /// Whether the port has been silent for so long that it should be opened anew.
+    /// Whether the port has been silent for so long that it should be opened again.
     fn wants_reopening(&self, _now: Instant) -> bool {
         false
     }

@@ -42,7 +42,7 @@ impl Deframer {
         Self { collected: Vec::new(), most: most + most / 254 + 2, overlong: false }
     }
 
-    /// Takes bytes of the stream; calls `found` for each frame. What makes no sense is skipped up to the next delimiter.
+    /// Takes bytes of the stream; calls `found` for each frame. Invalid bytes are skipped up to the next delimiter.
     pub fn push(&mut self, bytes: &[u8], mut found: impl FnMut(Vec<u8>)) {
         for &byte in bytes {
             if byte != DELIMITER {

@@ -3,9 +3,9 @@
 use super::driver::Driver;
 use super::micromodem::{Micromodem, MicromodemConfig};
 use super::paced::Paced;
-use super::s2c::{BURST_FRAME_BYTES, S2c, S2cConfig, S2cMode};
+use super::s2c::{BURST_FRAME_BYTES, S2c, S2cConfig};
 use super::station::AddressBook;
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::MicromodemRate;
 use scenecast_core::ModemAddress;
 use scenecast_core::UserError;
@@ -14,7 +14,7 @@ use scenecast_protocol::wire::Address;
 
 /// Bytes of bulk that may be in an S2C modem: about a train on its way and another one that waits.
 const POOL_BYTES: usize = 16_384;
-/// Frames of the surface that may be in an S2C modem: what waits is written when its time has come.
+/// Frames of the surface in an S2C modem at most: later frames are written when the modem has room.
 const SURFACE_POOL_FRAMES: u32 = 1;
 
 pub fn address_book(config: &Config) -> AddressBook {
@@ -30,19 +30,19 @@ pub fn driver(config: &Config, end: Address, profile: ModemProfile) -> Result<Bo
         return Err(UserError::Failed("everybody has no modem".to_owned()));
     };
     let m = &config.modem;
-    Ok(match m.kind.as_str() {
-        "s2c" => Box::new(S2c::new(s2c_config(m, address, end))),
-        "micromodem" => {
+    Ok(match m.kind {
+        ModemKind::S2c => Box::new(S2c::new(s2c_config(m, address, end))),
+        ModemKind::Micromodem => {
             let baud = is_serial(m).then_some(m.baud);
             Box::new(Micromodem::new(MicromodemConfig { address, rate: MicromodemRate::of(m.rate), baud }))
         }
-        "udp" => Box::new(Paced::datagrams(profile, m.bit_rate)),
-        "transparent" => {
+        ModemKind::Udp => Box::new(Paced::datagrams(profile, m.bit_rate)),
+        ModemKind::Transparent => {
             // A serial byte takes ten bits. In a rehearsal that is faster than the world so is the cable.
             let cable_bps = if is_serial(m) { f64::from(m.baud) * 0.8 } else { f64::MAX };
             Box::new(Paced::stream(profile, m.bit_rate.min(cable_bps)))
         }
-        _ => Box::new(Paced::stream(profile, m.bit_rate)),
+        ModemKind::Tcp => Box::new(Paced::stream(profile, m.bit_rate)),
     })
 }
 
@@ -51,7 +51,7 @@ fn s2c_config(m: &scenecast_config::Modem, address: ModemAddress, end: Address) 
     let pool = (POOL_BYTES / BURST_FRAME_BYTES) as u32;
     S2cConfig {
         address,
-        mode: if m.s2c_mode == "im" { S2cMode::Instant } else { S2cMode::Burst },
+        mode: m.s2c_mode,
         source_level: m.source_level,
         highest_address: m.highest_address,
         cluster: m.cluster,
@@ -64,13 +64,13 @@ fn s2c_config(m: &scenecast_config::Modem, address: ModemAddress, end: Address) 
 }
 
 fn is_serial(m: &scenecast_config::Modem) -> bool {
-    !m.device.is_empty()
+    m.device.is_some()
 }
 
 /// The modem of an end's process.
 pub fn modem_of_process(config: &Config, end: Address) -> Result<ModemProfile, UserError> {
     let mut profile = scenecast_config::modem_profile(config, config.modem.bit_rate);
-    if config.modem.kind == "transparent" {
+    if config.modem.kind == ModemKind::Transparent {
         profile.overhead_bits += super::PIPE_FRAMING_BITS;
     }
     Ok(driver(config, end, profile)?.profile())

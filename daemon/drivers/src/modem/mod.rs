@@ -1,11 +1,11 @@
-//! Modems: drivers without IO, and the account of what goes on air.
+//! Modems: drivers without IO, and the account of bits on air.
 //!
 //! | module | is |
 //! |---|---|
-//! | [`Driver`] | what every driver is: bytes in, bytes out |
+//! | [`Driver`] | the trait of every driver: bytes in, bytes out |
 //! | [`s2c`], [`micromodem`], [`paced`] | the drivers; `paced` is for pipes, TCP and UDP |
 //! | [`framing`] | frames in a stream of bytes |
-//! | [`Station`] | a driver as the link sees it; what rehearsals and processes share |
+//! | [`Station`] | a driver as the link sees it, shared by rehearsals and processes |
 
 mod driver;
 pub mod framing;

@@ -1,6 +1,6 @@
-//! A modem that says nothing about itself: frames in a byte stream or in datagrams, at the pace of the water.
+//! A modem without reports: frames in a byte stream or in datagrams, at the pace of the channel.
 //!
-//! Kinds `transparent`, `tcp` and `udp`. Nobody tells when a transmission has ended, so the driver keeps the time.
+//! Kinds `transparent`, `tcp` and `udp`. No report marks the end of a transmission, so the driver keeps the time.
 
 use super::driver::{Class, Destination, Driver, Event, Reception, Refusal, Token, check_length};
 use super::framing::{Deframer, encode};
@@ -9,7 +9,7 @@ use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How frames are told from one another.
+/// How frames are delimited.
 #[derive(Debug)]
 enum Shape {
     Stream(Deframer),

@@ -1,4 +1,4 @@
-//! One end's modem without IO: a driver, the addresses of the mission, and the account of what goes on air.
+//! One end's modem without IO: a driver, the addresses of the mission, and the account of bits on air.
 
 use super::driver::{Class, Destination, Driver, Event, Token};
 use super::framing;
@@ -34,7 +34,7 @@ impl AddressBook {
     }
 }
 
-/// What a modem tells an end.
+/// An event of the modem for its end.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ModemEvent {
     /// A transmission has left the modem, or never will.
@@ -71,28 +71,28 @@ impl std::fmt::Debug for Station {
 }
 
 impl Station {
-    /// A station that counts what goes on air in windows of `audit`.
+    /// A station that audits bits on air in the windows of `audit`.
     pub fn new(driver: Box<dyn Driver>, book: AddressBook, audit: Audit) -> Self {
         let profile = driver.profile();
         Self { driver, profile, book, open: BTreeSet::new(), events: VecDeque::new(), audit, repeated_bits: 0 }
     }
 
-    /// What the link must know of the modem.
+    /// The modem's profile for the link.
     pub fn profile(&self) -> &ModemProfile {
         &self.profile
     }
 
-    /// Bits that the modem has put on air by itself, beside what it was given.
+    /// Bits on air of the modem's own repeats.
     pub fn repeated_bits(&self) -> u64 {
         self.repeated_bits
     }
 
-    /// What the link has put on air.
+    /// The audit of the link's bits on air.
     pub fn audit(&self) -> &Audit {
         &self.audit
     }
 
-    /// Whether the link may be asked for a frame. What waits for a modem that is not there would grow old.
+    /// Whether the link may be polled for a frame. Frames queued for an absent modem would grow stale.
     pub fn takes_frames(&self) -> bool {
         let alone = self.profile.access != scenecast_protocol::mac::Access::Shared;
         self.driver.is_ready() && (alone || self.open.is_empty())
@@ -112,7 +112,7 @@ impl Station {
     /// Puts a frame of the link on air.
     ///
     /// # Errors
-    /// The driver's reason; the link then hears that the frame has left, and repairs what is lost.
+    /// The driver's reason; the frame then counts as sent, and the link repairs the loss.
     pub fn send(&mut self, transmit: Transmit, now: Instant) -> Result<(), super::Refusal> {
         let bits = self.profile.bits_on_air(transmit.bytes.len());
         let (dst, class) = (self.book.modem_of(transmit.to), class_of(&transmit));
@@ -162,12 +162,12 @@ impl Station {
         self.driver.poll_output(now)
     }
 
-    /// Whether the port should be opened anew.
+    /// Whether the port should be opened again.
     pub fn wants_reopening(&self, now: Instant) -> bool {
         self.driver.wants_reopening(now)
     }
 
-    /// The next thing to tell the end.
+    /// The next event for the end.
     pub fn poll_event(&mut self) -> Option<ModemEvent> {
         self.events.pop_front()
     }
@@ -195,7 +195,7 @@ impl Station {
     }
 }
 
-/// What a frame is to the modem: what the surface commands goes before everything, what it acknowledges beside it.
+/// The class of a frame at the modem: directives first, acknowledgements beside them.
 fn class_of(transmit: &Transmit) -> Class {
     match (transmit.to, transmit.kind) {
         (Address::SURFACE, _) => Class::Bulk,

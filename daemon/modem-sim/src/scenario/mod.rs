@@ -1,4 +1,4 @@
-//! What `scenecast modem-sim` emulates: the water, the modems in it, and what goes wrong when.
+//! The scenario of `scenecast modem-sim`: the channel, its modems, and the schedule of faults.
 
 mod modem;
 mod reader;
@@ -31,12 +31,12 @@ pub struct Scenario {
     pub modems: Vec<Modem>,
     /// Others who talk on the same water.
     pub strangers: Vec<Stranger>,
-    /// When, to which modem, what.
+    /// Time, modem and fault.
     pub faults: Vec<(Duration, usize, Trouble)>,
 }
 
 impl Scenario {
-    /// Reads a file; whatever is wrong is told with file, line, key and what is allowed.
+    /// Reads a file; errors name the file, the line, the key and the allowed values.
     pub fn load(path: &Path) -> Result<Self, UserError> {
         let text = std::fs::read_to_string(path).map_err(|e| UserError::file(path, e))?;
         Self::read(Source { path, text: &text })

@@ -26,7 +26,7 @@ pub struct Modem {
     pub(super) at: usize,
 }
 
-/// The kind of a modem and what is set of it.
+/// The kind of a modem and its settings.
 #[derive(Debug, Clone)]
 pub enum Make {
     S2c(S2cConfig),

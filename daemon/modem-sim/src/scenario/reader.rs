@@ -16,7 +16,7 @@ pub struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// A problem at a byte of the text, as `FILE:LINE: what`.
+    /// An error at a byte of the text, as `FILE:LINE: cause`.
     pub fn problem(&self, at: usize, what: impl Display) -> UserError {
         let line = self.text.get(..at).map_or(1, |before| before.matches('\n').count() + 1);
         UserError::Input(format!("{}:{line}: {what}", self.path.display()))
@@ -60,7 +60,7 @@ impl<'a> Reader<'a> {
         found.map(|(name, value)| (value, name.span().start))
     }
 
-    /// Refuses what a key was given.
+    /// Refuses the value of a key.
     pub fn wrong(&self, key: &'static str, takes: impl Display) -> UserError {
         let at = self.value(key).map_or(self.at, |(_, at)| at);
         let given = self.value(key).map(|(value, _)| value.span());

@@ -6,7 +6,7 @@ use super::{index_of, seconds};
 use scenecast_core::UserError;
 use std::time::Duration;
 
-/// What can be made to go wrong with a modem.
+/// The faults of a modem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
     /// Every message is refused with BUSY for so long.
@@ -15,7 +15,7 @@ pub enum Trouble {
     Reboot,
     /// Noise on the line to the host for so long.
     Garbage(Duration),
-    /// What the host is being told ends in half a line.
+    /// The output to the host ends in half a line.
     HalfLine,
     /// The port neither reads nor writes for so long.
     Freeze(Duration),
@@ -23,13 +23,13 @@ pub enum Trouble {
     WrongAddress(u8),
     /// The supply fails in its next transmission, which is cut short, and it restarts.
     BrownOut,
-    /// It takes a megabyte of data before it says that it is full.
+    /// It accepts a megabyte of data before it reports a full buffer.
     BigBuffer,
     /// The device or the TCP port is gone for so long.
     Unplug(Duration),
 }
 
-/// Names, whether a number goes with them, what it is if it is not given, and what it means.
+/// Names, whether a number follows, its default, and its meaning.
 const TROUBLES: [(&str, Option<f64>, &str); 9] = [
     ("busy", Some(10.0), "s"),
     ("reboot", None, ""),
@@ -43,7 +43,7 @@ const TROUBLES: [(&str, Option<f64>, &str); 9] = [
 ];
 
 impl Trouble {
-    /// What may be written, for people.
+    /// The allowed faults, for people.
     pub fn names() -> String {
         TROUBLES.map(|(name, ..)| name).join(", ")
     }
@@ -79,7 +79,7 @@ impl Trouble {
     }
 }
 
-/// A fault of `[[fault]]`: when, to which modem, what.
+/// A fault of `[[fault]]`: time, modem, kind.
 pub(super) fn read(table: Reader<'_>, names: &[&str]) -> Result<(Duration, usize, Trouble), UserError> {
     let at = table.number("at_s", 0.0..=MAX_S, "s")?;
     let at = at.ok_or_else(|| table.missing("at_s", format!("a number from 0 to {MAX_S} s")))?;

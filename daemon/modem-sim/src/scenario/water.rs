@@ -1,4 +1,4 @@
-//! `[channel]`, `[[link]]`, `[[outage]]` and `[[stranger]]`: what the water does, and who else talks.
+//! `[channel]`, `[[link]]`, `[[outage]]` and `[[stranger]]`: the channel, and other transmitters.
 
 use super::reader::Reader;
 use super::{index_of, node, seconds};
@@ -23,7 +23,7 @@ pub(super) const MAX_S: f64 = 1e7;
 /// Farthest place from the origin, m.
 pub(super) const MAX_DISTANCE_M: f64 = 1e6;
 
-/// A preset, and what is said beside it.
+/// A preset, and the keys beside it.
 pub(super) fn read_channel(table: Reader<'_>) -> Result<ChannelConfig, UserError> {
     let mut channel = table.choice("preset", &presets::ALL)?.map_or_else(ChannelConfig::default, |preset| preset());
     if let Some(loss) = table.table("loss")? {

@@ -12,6 +12,7 @@ use scenecast_protocol::coordinates::WorldPoint;
 use scenecast_protocol::directive::Fix;
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::map::Cell;
+use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 use scenecast_surface::{Page, Wish};
@@ -118,7 +119,7 @@ impl Water {
     pub(super) fn new(setting: Setting, patches: &[RgbImage], seed: u64) -> Result<Self, UserError> {
         let mut config = Config::default();
         // Noise has nothing that the other coder could take: it need not be tried.
-        config.map.codec = "context".to_owned();
+        config.map.codec = Codec::Context;
         let now = Instant::ZERO;
         let modem = scenecast_config::modem_profile(&config, config.channel.bit_rate);
         let area = Area { west: 0.0, south: 0.0, east: 16.0, north: 16.0 };

@@ -81,7 +81,8 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
         Source::Reef(seed) => World::procedural(*seed, mpp),
         Source::Photo(path) => World::from_files(path, None, mpp)?,
     };
-    let mut mapper = Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?;
+    let mut mapper =
+        Mapper::new(&config, scenecast_files::configured_vocabulary(config.scene.vocabulary.as_deref())?, 0, seed)?;
     let (area, camera) = (world.area(), &config.camera);
     for i in 0..FRAMES.0 * FRAMES.1 {
         let along = |k: u32, n: u32, low: f64, high: f64| low + (high - low) * (f64::from(k) + 0.5) / f64::from(n);

@@ -2,7 +2,7 @@
 
 use crate::world::World;
 use image::RgbImage;
-use scenecast_config::Config;
+use scenecast_config::{CameraSource, Config};
 use scenecast_core::{Area, UserError};
 use scenecast_files::{RecordedFrame, Recorder, Recording};
 use scenecast_motion::Motion;
@@ -33,9 +33,9 @@ pub(crate) struct Camera {
 impl Camera {
     /// Plays the configured recording, or else looks at `world`.
     pub(super) fn new(config: &Config, world: World, record: Option<&Path>) -> Result<Self, UserError> {
-        let recording = match config.camera.source.as_str() {
-            "" => None,
-            source => Some(Recording::open(Recording::folder(source)?, config.camera.metres_per_pixel)?),
+        let recording = match &config.camera.source {
+            CameraSource::Rehearsal => None,
+            CameraSource::Frames(dir) => Some(Recording::open(dir, config.camera.metres_per_pixel)?),
         };
         Ok(Self { world, recording, next: 0, recorder: record.map(Recorder::new).transpose()? })
     }
@@ -51,7 +51,7 @@ impl Camera {
     /// A configured area outside of the image.
     pub(super) fn survey_area(&self, config: &Config) -> Result<Area, UserError> {
         let all = || self.recording.as_ref().map_or_else(|| self.world.area(), Recording::area);
-        let area = scenecast_config::survey_area(config).unwrap_or_else(all);
+        let area = config.survey.area_m.unwrap_or_else(all);
         if self.recording.is_none() && !overlap(&area, &self.world.area()) {
             let a = self.world.area();
             let limits = format!("{} to {} m east, {} to {} m north", a.west, a.east, a.south, a.north);

@@ -2,7 +2,7 @@
 
 use crate::frames_log::FramesLog;
 use crate::modem_rig::{ModemRig, SURFACE, VEHICLE};
-use scenecast_config::Config;
+use scenecast_config::{Config, ModemKind};
 use scenecast_core::UserError;
 use scenecast_drivers::modem::Station;
 use scenecast_host::{SurfaceHost, VehicleHost, channel_station};
@@ -32,13 +32,13 @@ impl Carrier {
     /// The medium that the configuration names, and the stations of vehicle and surface.
     pub(super) fn new(config: &Config, seed: u64, now: Instant) -> Result<(Self, [Station; 2]), UserError> {
         let channel = Channel::new(channel_config(config), seed);
-        let (medium, stations) = match config.modem.kind.as_str() {
-            "tcp" | "udp" => {
+        let (medium, stations) = match config.modem.kind {
+            ModemKind::Tcp | ModemKind::Udp => {
                 let profile = scenecast_config::modem_profile(config, config.channel.bit_rate);
                 let window = Duration::from_secs_f64(config.link.budget_window_s);
                 (Medium::Channel(channel), [(); 2].map(|()| channel_station(profile, window, now)))
             }
-            _ => {
+            ModemKind::S2c | ModemKind::Micromodem | ModemKind::Transparent => {
                 let (rig, stations) = ModemRig::new(config, channel, seed, now)?;
                 (Medium::Modems(rig), stations)
             }

@@ -22,7 +22,7 @@ use carrier::Carrier;
 pub use logbook::Leg;
 use logbook::Logbook;
 use meters::Meters;
-use scenecast_config::{Config, cell_m};
+use scenecast_config::{Config, OperatorScript, cell_m};
 use scenecast_core::{Area, UserError};
 use scenecast_drivers::modem::Station;
 use scenecast_host::{SurfaceHost, VehicleHost};
@@ -83,10 +83,15 @@ impl Mission {
         let middle = ((area.west + area.east) / 2.0, (area.south + area.north) / 2.0);
         let surface_place = NodePosition::new(middle.0 + config.channel.range_m, middle.1, anchored::HEAD_M);
         carrier.place(SURFACE, surface_place);
-        let (anchored, relay) = Anchored::new(&config, surface_place, scenecast_config::origin(&config)?, seed ^ 0x6B5);
+        let (anchored, relay) = Anchored::new(&config, surface_place, config.mission.origin_deg, seed ^ 0x6B5);
         surface.surface_mut().set_relay(relay);
         let mut mission = Self {
-            mapper: Mapper::new(&config, scenecast_files::configured_vocabulary(&config.scene.vocabulary)?, 0, seed)?,
+            mapper: Mapper::new(
+                &config,
+                scenecast_files::configured_vocabulary(config.scene.vocabulary.as_deref())?,
+                0,
+                seed,
+            )?,
             address: scenecast_config::vehicle_address(&config)?,
             script: script(&config, area),
             times: Timetable::new(&config, now),
@@ -259,9 +264,9 @@ fn surface_host(config: &Config, station: Station, seed: u64, now: Instant) -> R
 
 fn script(config: &Config, area: Area) -> Script {
     let survey = &config.survey;
-    match config.operator.script.as_str() {
-        "scripted" => Script::of_survey(survey.duration_s),
-        "fenced" => Script::fenced(survey.duration_s, area, survey.speed_m_s),
-        _ => Script::none(),
+    match config.operator.script {
+        OperatorScript::Scripted => Script::of_survey(survey.duration_s),
+        OperatorScript::Fenced => Script::fenced(survey.duration_s, area, survey.speed_m_s),
+        OperatorScript::None => Script::none(),
     }
 }

@@ -130,7 +130,7 @@ fn only_coarse_cells_are_told_until_all_are_wanted_again() {
 #[test]
 fn coarse_cells_need_far_fewer_bits() {
     let bytes = |cells: &str| {
-        let mut mission = mission(&["channel.loss=0", "map.planes=[]", cells]);
+        let mut mission = mission(&["channel.loss=0", "map.layers=[]", cells]);
         mission.fly_to(200.0);
         mission.drain();
         mission.surface().view(mission.address).unwrap().stats().received_by_class

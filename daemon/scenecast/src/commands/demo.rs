@@ -5,17 +5,17 @@ use clap::Args;
 use scenecast_core::UserError;
 use scenecast_rehearsal::{Mission, MissionOptions};
 
-/// Fly a simulated mission in real time and serve the operator's page.
+/// Run a simulated mission in real time, with the operator's page.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast demo --speed 4, then open http://127.0.0.1:8460")]
 pub(super) struct Demo {
     /// Port of the operator's page on 127.0.0.1
     #[arg(long, default_value_t = 8460)]
     port: u16,
-    /// Mission seconds a second
+    /// Mission seconds per second
     #[arg(long, default_value_t = 1.0)]
     speed: f64,
-    /// Serve no page
+    /// Do not serve the page
     #[arg(long)]
     no_console: bool,
     #[command(flatten)]
@@ -25,7 +25,7 @@ pub(super) struct Demo {
 impl Demo {
     pub(super) fn run(mut self) -> Result<(), UserError> {
         if !(0.01..=1000.0).contains(&self.speed) {
-            return Err(UserError::Input(format!("--speed {}: it takes 0.01 to 1000", self.speed)));
+            return Err(UserError::Input(format!("--speed {} is not allowed; allowed: 0.01 to 1000", self.speed)));
         }
         // The operator is the person at the page.
         self.world.sets.insert(0, "operator.script=none".to_owned());

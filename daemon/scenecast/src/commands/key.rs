@@ -11,15 +11,15 @@ use zeroize::Zeroizing;
 /// The mission key, and the token of the operator's page.
 #[derive(Debug, Subcommand)]
 pub(super) enum Key {
-    /// Write a fresh random key to a new file.
+    /// Write a new random key to a new file.
     New(New),
-    /// Print the fingerprint of a key, by which you see that both ends hold the same.
+    /// Print the fingerprint of a key. Equal keys have equal fingerprints.
     Show(Show),
-    /// Write a fresh random token for the operator's page to a new file.
+    /// Write a new random token for the operator's page to a new file.
     Token(Token),
 }
 
-/// Write a fresh random key to a new file, which only its owner may read.
+/// Write a new random key to a new file that only its owner may read.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key new --out reef-3.key")]
 pub(super) struct New {
@@ -28,7 +28,7 @@ pub(super) struct New {
     out: PathBuf,
 }
 
-/// Write a fresh random token to a new file, which only its owner may read. Whoever shows it may steer.
+/// Write a new random token to a new file that only its owner may read. Whoever has it may give orders.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key token --out console.token")]
 pub(super) struct Token {
@@ -37,7 +37,7 @@ pub(super) struct Token {
     out: PathBuf,
 }
 
-/// Print the fingerprint of a key, by which you see that both ends hold the same.
+/// Print the fingerprint of a key. Equal keys have equal fingerprints.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast key show mission.key")]
 pub(super) struct Show {
@@ -58,7 +58,9 @@ impl Key {
             Self::Token(token) => {
                 write_new(&token.out, &random_token()?)?;
                 println!("{}: a new token", token.out.display());
-                println!("Set console.token_file of the surface to its path, and give a copy to those who may steer.");
+                println!(
+                    "Set console.token_file of the surface to its path, and give a copy to those who may give orders."
+                );
             }
             Self::Show(show) => {
                 let (key, warning) = scenecast_config::read_key(&show.file)?;

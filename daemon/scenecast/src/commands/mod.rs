@@ -14,6 +14,7 @@ mod bench_localisation;
 mod bench_modem;
 #[cfg(feature = "rehearsal")]
 mod bench_planning;
+mod config;
 #[cfg(feature = "surface")]
 mod ctl;
 #[cfg(feature = "rehearsal")]
@@ -30,7 +31,7 @@ use scenecast_core::UserError;
 #[cfg(feature = "tools")]
 use scenecast_tools::commands as tools;
 
-/// Streams an underwater robot's scene map over an acoustic link to a scientist at the surface.
+/// Streams the scene map of an underwater robot over an acoustic link to a scientist at the surface.
 #[derive(Debug, Parser)]
 #[command(name = "scenecast", version, after_help = "Example: scenecast demo, then open http://127.0.0.1:8460")]
 pub struct Arguments {
@@ -41,31 +42,31 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     #[cfg(feature = "rehearsal")]
-    /// Fly a simulated mission in real time and serve the operator's page.
+    /// Run a simulated mission in real time, with the operator's page.
     Demo(demo::Demo),
     #[cfg(feature = "rehearsal")]
-    /// Fly a simulated mission in virtual time and write a report.
+    /// Run a simulated mission in virtual time, and write a report.
     Sim(sim::Sim),
     /// Run the vehicle.
     Auv(node::Node),
     #[cfg(feature = "surface")]
-    /// Run the surface: hold the operator's map, serve his page.
+    /// Run the surface, with the operator's map and page.
     Asv(node::Node),
     #[cfg(feature = "surface")]
-    /// Speak with a running surface: see what it has, give orders.
+    /// Show the state of a running surface, and give orders.
     Ctl(ctl::Ctl),
     #[cfg(feature = "rehearsal")]
-    /// Emulate modems in one water, each on a serial device or a TCP port of its own.
+    /// Emulate modems in one channel, each on a serial device or a TCP port of its own.
     ModemSim(modem_sim::ModemSim),
     #[cfg(feature = "rehearsal")]
-    /// Measure.
+    /// Measure the link, the modems, planners, localisation and images.
     #[command(subcommand)]
     Bench(bench::Bench),
-    /// Make or show the key by which both ends know each other's frames, or a token of the operator's page.
+    /// Make or show a mission key, or make a token for the operator's page.
     #[command(subcommand)]
     Key(key::Key),
     #[cfg(feature = "tools")]
-    /// Code label maps as the stream does, and measure it.
+    /// Encode label maps as the stream does, and measure the codecs.
     #[command(subcommand)]
     Map(tools::Map),
     #[cfg(feature = "tools")]
@@ -73,14 +74,14 @@ enum Command {
     #[command(subcommand)]
     Scene(tools::Scene),
     #[cfg(feature = "tools")]
-    /// Make the vocabularies that images are put into words with.
+    /// Train the vocabulary that turns images into visual words.
     #[command(subcommand)]
     Vocabulary(tools::Vocabulary),
     #[cfg(feature = "tools")]
-    /// Search the settings of the scene model that tell most about annotations of a similar site.
+    /// Find the settings of the scene model whose maps agree best with annotations of a similar site.
     Tune(Box<tools::Tune>),
-    /// Print a configuration file with every key explained.
-    Config(node::PrintConfig),
+    /// Print a configuration file with every key explained, or rewrite an old one.
+    Config(config::ConfigCommand),
 }
 
 /// Carries out a command.
@@ -108,6 +109,6 @@ pub fn run(arguments: Arguments) -> Result<(), UserError> {
         Command::Vocabulary(vocabulary) => vocabulary.run(),
         #[cfg(feature = "tools")]
         Command::Tune(tune) => tune.run(),
-        Command::Config(print) => print.run(),
+        Command::Config(config) => config.run(),
     }
 }

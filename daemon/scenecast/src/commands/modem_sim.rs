@@ -5,25 +5,25 @@ use scenecast_core::UserError;
 use scenecast_modem_sim::{Options, run};
 use std::path::PathBuf;
 
-/// Emulate modems in one water, each on a serial device or a TCP port of its own.
+/// Emulate modems in one channel, each on a serial device or a TCP port of its own.
 ///
-/// Prints one line a modem: its name, its device or TCP address, and its link. While it runs it takes lines on the
-/// standard input, as in "fault auv reboot" or "move auv 500 0 20"; "help" lists them. Ctrl-C ends it.
+/// Prints one line for each modem: its name, its device or TCP address, and its link. It reads commands from the standard
+/// input, such as "fault auv reboot" or "move auv 500 0 20"; "help" lists them. Ctrl-C ends it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast modem-sim --scenario config/scenarios/modems-s2c-1km.toml --link-dir /tmp/modems, then open /tmp/modems/auv at 19200 baud"
 )]
 pub(super) struct ModemSim {
-    /// Scenario: modems, water and faults (docs/modem-sim.md has every key)
+    /// Scenario: modems, channel and faults (docs/reference/modem-scenarios.md)
     #[arg(long, value_name = "FILE")]
     scenario: PathBuf,
-    /// Folder for symbolic links NAME to the devices, which stay while devices come and go
+    /// Folder for symbolic links NAME to the devices; they remain when devices are replaced
     #[arg(long, value_name = "DIR")]
     link_dir: Option<PathBuf>,
-    /// Seconds of the emulation a second, as runtime.time_scale of the daemons
+    /// Seconds of the emulation per second, as runtime.time_scale of the daemons
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true)]
     time_scale: f64,
-    /// Seed of everything random [default: the scenario's]
+    /// Seed of all random numbers [default: the scenario's]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }
@@ -31,7 +31,10 @@ pub(super) struct ModemSim {
 impl ModemSim {
     pub(super) fn run(self) -> Result<(), UserError> {
         if !(0.01..=1000.0).contains(&self.time_scale) {
-            return Err(UserError::Input(format!("--time-scale {}: it takes 0.01 to 1000", self.time_scale)));
+            return Err(UserError::Input(format!(
+                "--time-scale {} is not allowed; allowed: 0.01 to 1000",
+                self.time_scale
+            )));
         }
         let Self { scenario, link_dir, time_scale, seed } = self;
         run(Options { scenario, link_dir, time_scale, seed })

@@ -1,10 +1,10 @@
-//! `scenecast auv`, `scenecast asv`, `scenecast config`
+//! `scenecast auv`, `scenecast asv`
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use scenecast_core::UserError;
 use std::path::PathBuf;
 
-/// Run one end as a process.
+/// Run one end of the link as a process.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast asv --config config/asv.toml, and in another terminal: scenecast auv --config config/auv.toml"
@@ -38,32 +38,4 @@ fn simulator() -> Option<scenecast_runtime::SimulatedAutopilot> {
     return Some(scenecast_rehearsal::simulated_autopilot);
     #[cfg(not(feature = "rehearsal"))]
     None
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Role {
-    Auv,
-    Asv,
-    Scenario,
-}
-
-/// Print a configuration file with every key explained.
-#[derive(Debug, Args)]
-#[command(after_help = "Example: scenecast config --role auv > auv.toml")]
-pub(super) struct PrintConfig {
-    /// Whose file
-    #[arg(long, value_enum, default_value = "scenario")]
-    role: Role,
-}
-
-impl PrintConfig {
-    pub(super) fn run(self) -> Result<(), UserError> {
-        let role = match self.role {
-            Role::Auv => 'a',
-            Role::Asv => 's',
-            Role::Scenario => 'r',
-        };
-        print!("{}", scenecast_config::print(role));
-        Ok(())
-    }
 }

@@ -9,25 +9,25 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// The sea floor of a rehearsal and what to change of its configuration.
+/// The sea floor and the configuration of a rehearsal.
 #[derive(Debug, Args)]
 pub(super) struct WorldArguments {
-    /// Scenario: a configuration file; without one a scripted operator acts
+    /// Scenario: a configuration file [default: every key at its default]
     #[arg(long, value_name = "FILE")]
     pub scenario: Option<PathBuf>,
-    /// Image of a sea floor; without one a procedural reef is surveyed
+    /// Image of a sea floor [default: a procedural reef]
     #[arg(long, value_name = "IMG")]
     pub mosaic: Option<PathBuf>,
-    /// Classes of the image's pixels: a grey or indexed image of the same size, 255 = not annotated
+    /// Classes of the image's pixels: a grey or indexed image of the same size; 255 is not annotated
     #[arg(long, value_name = "LABELS", requires = "mosaic")]
     pub annotations: Option<PathBuf>,
     /// Size of the image's pixels on the sea floor [default: camera.metres_per_pixel]
     #[arg(long, value_name = "M", requires = "mosaic", allow_negative_numbers = true)]
     pub metres_per_pixel: Option<f64>,
-    /// Length of the survey in seconds
+    /// Duration of the survey in seconds
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub duration: Option<f64>,
-    /// Seed of everything random
+    /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Set a key of the configuration, as in link.budget_bps=2000 (scenecast config lists them)
@@ -43,7 +43,9 @@ impl WorldArguments {
         sets.extend(self.duration.map(|d| format!("survey.duration_s={d:?}")));
         let config = scenecast_config::load(self.scenario.as_deref(), &sets)?;
         if config.survey.duration_s <= 0.0 {
-            return Err(UserError::Input("a rehearsal needs an end: survey.duration_s must be above 0".to_owned()));
+            return Err(UserError::Input(
+                "survey.duration_s = 0 is not allowed in a rehearsal; allowed: more than 0 s".to_owned(),
+            ));
         }
         Ok(config)
     }
@@ -63,9 +65,9 @@ impl WorldArguments {
     }
 }
 
-/// Fly a simulated mission in virtual time and write a report.
+/// Run a simulated mission in virtual time, and write a report.
 ///
-/// The same arguments and seed give the same report.json byte for byte, apart from the members under "wall".
+/// The same arguments and seed give the same report.json, byte for byte, except for the members under "wall".
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast sim --set channel.loss=0.3 --set link.budget_bps=1000 --duration 600 --out run1"
@@ -73,10 +75,10 @@ impl WorldArguments {
 pub(super) struct Sim {
     #[command(flatten)]
     world: WorldArguments,
-    /// Record the camera frames and poses into a folder, to be used as camera.source=frames:DIR
+    /// Record the camera frames and poses into a folder, for camera.source=frames:DIR
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
-    /// Longest time in seconds for the link to carry what is left after the survey
+    /// Longest time in seconds for the link to send the rest after the survey
     #[arg(long, value_name = "SECONDS", default_value_t = 7200.0, allow_negative_numbers = true)]
     drain: f64,
     /// Folder for report.json, maps, images and frames.log
@@ -88,7 +90,7 @@ impl Sim {
     pub(super) fn run(self) -> Result<(), UserError> {
         let started = Instant::now();
         if !self.drain.is_finite() || self.drain < 0.0 {
-            return Err(UserError::Input(format!("--drain {}: it takes seconds, 0 or more", self.drain)));
+            return Err(UserError::Input(format!("--drain {} is not allowed; allowed: 0 s or more", self.drain)));
         }
         let config = self.world.config()?;
         let world = self.world.world(&config)?;

@@ -11,17 +11,18 @@ use scenecast_scoring::train_vocabulary;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-/// Make the vocabularies that images are put into words with.
+/// Train the vocabulary that turns images into visual words.
 #[derive(Debug, Subcommand)]
 pub enum Vocabulary {
     Train(Train),
 }
 
-/// Learn a vocabulary from a folder of images
+/// Train a vocabulary on a folder of images
 ///
-/// That is the tones and the spread of colours and textures that words are measured against. Take images of a site like the one to come, by the same camera and light. Words then mean the same in every mission,
-/// from its first frame on; with the vocabulary that ships, the first frames of a mission are learnt from instead. Use it as
-/// scene.vocabulary of a vehicle, or with scenecast scene run --vocabulary. Images named *_label are passed over.
+/// A vocabulary holds the typical tones and the spread of colours and textures, to which visual words are related. Use images
+/// of a similar site, with the same camera and light. Words then have the same meaning in every mission from its first frame.
+/// The built-in vocabulary adapts to the first frames of each mission instead. Set scene.vocabulary of the vehicle to the
+/// file, or use scenecast scene run --vocabulary. Images named *_label are skipped.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast vocabulary train --images last-dive --out reef.vocabulary")]
 pub struct Train {

@@ -25,7 +25,7 @@ pub struct Frame {
     pub payload: Vec<u8>,
 }
 
-/// What was not taken, by reason.
+/// Refused bytes, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Refused {
     /// Frames of a known message with a wrong check.
@@ -42,7 +42,7 @@ pub struct Deframer {
     refused: Refused,
 }
 
-/// What stands at the front of the bytes held.
+/// The frame at the front of the collected bytes.
 enum Front {
     Incomplete,
     /// A frame of so many bytes, `None` if its message is not known.
@@ -52,7 +52,7 @@ enum Front {
 }
 
 impl Deframer {
-    /// What was not taken so far.
+    /// Refused bytes so far, by reason.
     pub fn refused(&self) -> Refused {
         self.refused
     }

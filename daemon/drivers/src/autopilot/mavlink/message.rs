@@ -83,7 +83,7 @@ pub fn heard_extra(id: u32) -> Option<u8> {
     })
 }
 
-/// Fields of a payload, in order; what is missing at its end is zero.
+/// Fields of a payload, in order; fields missing at its end are zero.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -121,7 +121,7 @@ impl Fields<'_> {
 }
 
 impl Heard {
-    /// Reads a message; `None` if it is of no use, or says numbers that are none.
+    /// Parses a message; `None` if it is not used here, or has numbers that are not finite.
     pub fn read(id: u32, payload: &[u8]) -> Option<Self> {
         let mut f = Fields(payload);
         let read = match id {

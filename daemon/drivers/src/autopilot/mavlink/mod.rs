@@ -21,7 +21,7 @@ pub struct MavlinkConfig {
     pub silence: Duration,
 }
 
-/// What the autopilot said of itself last.
+/// The last heartbeat of the autopilot.
 #[derive(Debug, Clone, Copy)]
 struct Peer {
     component: u8,
@@ -37,10 +37,10 @@ impl Peer {
     }
 }
 
-/// What it told of its motion last.
+/// Its last reported motion.
 #[derive(Debug, Clone, Copy)]
 struct Pose {
-    /// Own frame, north, east, down, metres; nothing if it tells only where on the Earth it is.
+    /// North, east, down in its own frame, metres; `None` if it reports only global positions.
     local: Option<[f32; 3]>,
     place: Option<(i32, i32)>,
     depth_m: f64,
@@ -91,11 +91,11 @@ const OWN_COMPONENT: u8 = 191;
 const BRIDGED: Duration = Duration::from_secs(3);
 /// GPS_INPUT goes out so often, as ArduPilot expects of a receiver.
 const GPS_PERIOD: Duration = Duration::from_millis(200);
-/// A place on the Earth is passed on for so long after it was told.
+/// A global position is forwarded for this long.
 const PLACE_LASTS: Duration = Duration::from_secs(5);
 
 impl Mavlink {
-    /// Toward an autopilot that has said nothing yet.
+    /// For an autopilot that was never received.
     pub fn new(config: MavlinkConfig, now: Instant) -> Self {
         Self {
             config,

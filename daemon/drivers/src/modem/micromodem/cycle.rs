@@ -1,4 +1,4 @@
-//! Cycles: who fills the next packet, and what became of it.
+//! Cycles: who fills the next packet, and its outcome.
 
 use super::{EVERYBODY, Micromodem, Sentence, from_hex, to_hex};
 use crate::modem::driver::{Event, Reception, Token};
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// Farthest that an answer is waited for, one way.
 const TRAVEL: Duration = Duration::from_secs(2);
-/// What modems take to decode and to turn round, and hosts to answer.
+/// Time for modems to decode and turn around, and for hosts to answer.
 const SLACK: Duration = Duration::from_secs(2);
 /// A vehicle is never so fast that the way to it and back grows by more than a hundredth of the time (7.5 m/s).
 const RECEDES: u32 = 100;
@@ -25,7 +25,7 @@ pub(super) struct Given {
     pub bytes: Vec<u8>,
 }
 
-/// A cycle that our modem was told to begin.
+/// A cycle that our modem was ordered to begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Begun {
     from: ModemAddress,
@@ -49,11 +49,11 @@ struct Request {
 #[derive(Debug, Default)]
 pub(super) struct Cycles {
     begun: Option<Begun>,
-    /// What the modem did not do, to be begun again.
+    /// The cycle to begin again, after the modem refused it.
     again: Option<Begun>,
     paused: Option<Instant>,
     request: Option<Request>,
-    /// Frames that the link has to give, as the modem said; told once a cycle.
+    /// Frames that the modem requests of the link; reported once for each cycle.
     polled: bool,
     /// Given by the link, not yet asked for.
     pub offered: VecDeque<Given>,
@@ -97,7 +97,7 @@ impl Micromodem {
         self.start(from, to, frames.clamp(1, u32::from(self.config.rate.frames)) as u8, TRIES, now);
     }
 
-    /// What the modem refused, or forgot in a restart, is begun again.
+    /// Begins a cycle again that the modem refused, or lost in a restart.
     pub(super) fn start_again(&mut self, now: Instant) {
         if let Some(b) = self.cycles.again.take() {
             self.start(b.from, b.to, b.frames, b.tries - 1, now);
@@ -203,7 +203,7 @@ impl Micromodem {
         }
     }
 
-    /// What the modem did not ask for is not on air.
+    /// A frame that the modem never requested is not on air.
     fn drop_offered(&mut self) {
         let left = std::mem::take(&mut self.cycles.offered);
         self.events.extend(left.into_iter().map(|given| Event::Failed(given.token)));
@@ -231,7 +231,7 @@ impl Micromodem {
         }
     }
 
-    /// The modem complains: what it was told is not done.
+    /// The modem reports an error: the last command failed.
     pub(super) fn handle_cycle_refused(&mut self, now: Instant) {
         self.cycles.paused = Some(now + PAUSE);
         if self.cycles.taken.is_empty() {

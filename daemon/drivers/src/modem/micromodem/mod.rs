@@ -22,17 +22,17 @@ use std::time::Duration;
 const SETTLE: Duration = Duration::from_millis(300);
 /// Longest wait for the echo of a sentence.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(3);
-/// Longest wait however much else the modem has to say: it may never have heard the question.
+/// Longest wait for a reply while other sentences arrive: the modem may have missed the command.
 const MAX_WAIT: Duration = Duration::from_secs(9);
 /// Between two questions to a modem at work.
 const BEAT: Duration = Duration::from_secs(5);
 const AFTER_REFUSAL: Duration = Duration::from_secs(10);
-/// Silence after which the port is opened anew.
+/// Silence after which the port is opened again.
 const DEAF: Duration = Duration::from_secs(20);
 const HIGHEST: ModemAddress = 127;
 const EVERYBODY: ModemAddress = 0;
 
-/// What a Micromodem is to be.
+/// The configuration of a Micromodem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MicromodemConfig {
     /// The address that the modem must have.
@@ -106,7 +106,7 @@ impl Micromodem {
         self.output.clear();
     }
 
-    /// What was given to the modem is gone.
+    /// All frames in the modem are lost.
     fn forget_frames(&mut self) {
         let given = self.cycles.clear();
         self.events.extend(given.into_iter().map(Event::Unknown));

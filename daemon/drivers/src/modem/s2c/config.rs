@@ -1,16 +1,9 @@
-//! What an S2C modem is to be.
+//! The configuration of an S2C modem.
 
+pub use scenecast_config::S2cMode;
 use scenecast_core::ModemAddress;
 pub use scenecast_core::{S2C_BURST_FRAME_BYTES as BURST_FRAME_BYTES, S2C_INSTANT_BYTES as INSTANT_BYTES};
 use std::time::Duration;
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum S2cMode {
-    /// In records of bursts; the modem does half duplex and repeats by itself.
-    Burst,
-    /// In instant messages alone, in turns that the surface grants.
-    Instant,
-}
 
 /// Settings of an S2C modem and of the way to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,11 +24,11 @@ pub struct S2cConfig {
     pub baud: Option<u32>,
     /// Bit rate of bursts for plans, bit/s.
     pub burst_bps: f64,
-    /// Frames that may be in the modem: bulk, or what the surface has to say.
+    /// Frames in the modem at most.
     pub pool_frames: u32,
 }
 
-/// An instant message takes 161 ms and 10.9 ms a byte: bits a second, and what the beginning takes in bits.
+/// An instant message takes 161 ms and 10.9 ms a byte: bits a second, and the preamble in bits.
 ///
 /// Source: a fit to the table of measured durations shipped with a fielded driver.
 pub const INSTANT_BPS: f64 = 8.0 / 0.0109;
@@ -51,7 +44,7 @@ pub fn instant_airtime(bytes: usize) -> Duration {
 impl S2cConfig {
     /// Settings to write and to read back.
     ///
-    /// No retries of messages: what comes twice costs air, and the driver repeats by itself. Two retries of a connection:
+    /// No retries of messages: duplicates cost airtime, and the driver repeats by itself. Two retries of a connection:
     /// more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so that others get
     /// to speak.
     pub(super) fn settings(&self) -> [(&'static str, u32); 10] {

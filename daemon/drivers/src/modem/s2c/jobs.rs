@@ -1,4 +1,4 @@
-//! What waits for an S2C modem, and what it holds.
+//! The queues in front of an S2C modem, and its contents.
 
 use crate::modem::driver::{Class, Token};
 use scenecast_core::ModemAddress;
@@ -28,11 +28,11 @@ pub(super) struct Message {
     pub until: Instant,
 }
 
-/// What waits and what is under way.
+/// Queued transmissions, and those in the modem.
 #[derive(Debug, Default)]
 pub(super) struct Jobs {
     pub commands: VecDeque<Job>,
-    /// The newest acknowledgement; older ones have nothing to say beside it.
+    /// The newest acknowledgement, which replaces older ones.
     pub services: VecDeque<Job>,
     pub bulk: VecDeque<Job>,
     pub message: Option<Message>,
@@ -49,7 +49,7 @@ impl Jobs {
         (self.message_pause, self.record_pause) = (now, now);
     }
 
-    /// Whether nothing of the bulk is in the modem.
+    /// Whether the modem holds no bulk.
     pub(super) fn is_pool_empty(&self) -> bool {
         self.pool.is_empty()
     }

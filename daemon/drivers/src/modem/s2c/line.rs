@@ -1,10 +1,10 @@
-//! What an S2C modem says, cut out of its bytes: replies, notifications, and raw data between them.
+//! The lines of an S2C modem: replies, notifications, and raw data between them.
 //!
 //! Payload is counted, never searched. Memory is bounded, and after nonsense the next line that makes sense is found.
 
 use super::notice::{Notice, parse_notice, payload_length};
 
-/// One thing the modem said.
+/// A line of the modem.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Line {
     /// The answer to a command: the command's name where the modem repeats it, and the text.
@@ -21,7 +21,7 @@ const LIMIT: usize = 4096;
 const TEXT_LIMIT: usize = 512;
 const TIES: &[u8] = b"+++AT";
 
-/// Keeps what is not yet complete.
+/// Keeps an incomplete line.
 #[derive(Debug, Default)]
 pub struct LineParser {
     buffer: Vec<u8>,
@@ -35,7 +35,7 @@ impl LineParser {
         self.ties = ties;
     }
 
-    /// Drops what is not complete.
+    /// Drops an incomplete line.
     pub fn clear(&mut self) {
         self.buffer.clear();
     }
@@ -94,7 +94,7 @@ impl LineParser {
 
 enum Found {
     Line(Line, usize),
-    /// So many bytes mean nothing.
+    /// Skips bytes that belong to no line.
     Nonsense(usize),
     Incomplete,
 }
@@ -138,7 +138,7 @@ fn classify(text: &str) -> Line {
     }
 }
 
-/// Where `+++AT`, or what may become it, begins; the length if nowhere.
+/// The start of `+++AT` or of a prefix of it at the end; the length if there is none.
 fn ties_start(bytes: &[u8]) -> usize {
     let error = b"ERROR WRONG FORMAT";
     (0..bytes.len())

@@ -1,4 +1,4 @@
-//! EvoLogics S2C: bulk as bursts, commands as instant messages, acknowledgements with what the modem sends anyway.
+//! EvoLogics S2C: bulk as bursts, commands as instant messages, acknowledgements as piggybacks.
 //!
 //! The NET interpreter is preferred; a port of the AT interpreter is found out and spoken to by `+++AT`. Records of a burst
 //! are pieces of a framed stream ([`super::framing`]), so both interpreters understand each other and no payload holds a
@@ -32,9 +32,9 @@ use supervision::Supervision;
 
 /// Quiet before the modem is spoken to: half a line may be under way.
 const SETTLE: Duration = Duration::from_millis(300);
-/// Longest wait for a reply, beside what the line takes.
+/// Longest wait for a reply, beyond the transfer time of the line.
 const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
-/// Longest wait however much else the modem has to say: the reply may have been lost on the line.
+/// Longest wait for a reply while notices arrive: the reply may have been lost on the line.
 const MAX_REPLY_WAIT: Duration = Duration::from_secs(9);
 const DATA_MODE: Duration = Duration::from_millis(1500);
 /// After a wrong address, or a setting that was not taken.
@@ -83,7 +83,7 @@ impl S2c {
         }
     }
 
-    /// What the modem held is gone, or nobody knows: from the beginning, after `pause`.
+    /// Starts over after `pause`: the modem's contents are lost or unknown.
     fn start_over(&mut self, pause: Duration, now: Instant) {
         let tokens = self.jobs.clear();
         let pending = self.dialogue.clear();
@@ -96,7 +96,7 @@ impl S2c {
         self.phase = Phase::Settling(now + pause);
     }
 
-    /// Tells a person, once for each thing.
+    /// Reports a fault to a person, once for each text.
     fn refuse(&mut self, what: String) {
         self.events.extend(self.supervision.refuse(what).map(Event::Refused));
     }
@@ -174,7 +174,7 @@ impl S2c {
         }
     }
 
-    /// What is there: NET, AT in command mode, AT in data mode.
+    /// Handles the reply that names the interpreter: NET, AT in command mode, AT in data mode.
     fn handle_interpreter(&mut self, pending: &Pending, reply: &str, now: Instant) {
         match (pending, reply) {
             (Pending::Interpreter, "AT") => self.phase = Phase::SettingUp(0),

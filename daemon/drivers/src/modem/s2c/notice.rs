@@ -1,4 +1,4 @@
-//! What an S2C modem says without being asked.
+//! Unsolicited notices of an S2C modem.
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Notice {
@@ -24,7 +24,7 @@ pub enum Notice {
     LocalRate(u32),
     /// A position or a direction of another modem.
     Usbl(Position),
-    /// Whatever else it may say.
+    /// Any other notice.
     Other,
 }
 
@@ -57,7 +57,7 @@ pub struct Position {
     pub age_s: f64,
 }
 
-/// What a head found out.
+/// A position measured by the USBL head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Place {
     Enu([f64; 3], u32),
@@ -124,7 +124,7 @@ fn head(line: &[u8]) -> Option<Head<'_>> {
     Some(Head { row, fields, bytes: at })
 }
 
-/// A notification without its line end; `None` for what may be a reply.
+/// Parses a notification without its line end; `None` for a possible reply.
 pub(super) fn parse_notice(line: &[u8]) -> Option<Notice> {
     if let Some((bytes, length)) = payload_length(line) {
         let data = line.get(bytes..bytes + length)?.to_vec();
@@ -175,7 +175,7 @@ fn heard(head: &Head<'_>, data: Vec<u8>) -> Option<Heard> {
     })
 }
 
-/// Numbers that are none are refused: a head that says `nan` says nothing.
+/// Numbers that are not finite are refused: a head without a solution writes `nan`.
 fn finite(fields: &[&str], i: usize) -> Option<f64> {
     fields.get(i)?.parse().ok().filter(|x: &f64| x.is_finite())
 }

@@ -1,4 +1,4 @@
-//! What an S2C modem says, and what it means.
+//! Handling of the lines of an S2C modem.
 
 use super::dialogue::Pending;
 use super::notice::{Heard, Notice, Place, Position, Service};
@@ -8,7 +8,7 @@ use bytes::Bytes;
 use scenecast_core::{ModemAddress, UsblLine};
 use scenecast_protocol::time::Instant;
 
-/// Metres that sound makes in a second, where only its time is told.
+/// Speed of sound in m/s, for positions that carry only a travel time.
 const SOUND_SPEED_M_S: f64 = 1500.0;
 /// An accuracy of so much of the range means that only the range is good.
 const RANGE_ONLY: f64 = 0.8;
@@ -63,7 +63,7 @@ impl S2c {
         }
     }
 
-    /// Data was on air for so long: what exceeds what was given is the modem's own repeats.
+    /// Data was on air for `us` microseconds; bits beyond those given are the modem's own repeats.
     fn handle_aired(&mut self, us: u32) {
         self.events.extend(self.airtime.air(us, self.config.burst_bps).map(Event::Repeated));
     }

@@ -1,4 +1,4 @@
-//! What goes into an S2C modem next, and what it says to it.
+//! The next transmission for an S2C modem, and its reply.
 
 use super::config::{INSTANT_BYTES, S2cMode, instant_airtime};
 use super::dialogue::Pending;
@@ -9,11 +9,11 @@ use crate::modem::framing::encode;
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// Between two tries of what the modem refuses for now.
+/// Interval between two tries of a message that the modem refuses for now.
 const RETRY: Duration = Duration::from_millis(500);
 /// Between two tries of a record that the pool has no room for.
 const FULL: Duration = Duration::from_secs(1);
-/// What the modem refuses for longer is given up.
+/// A transmission refused for longer is given up.
 const MAX_REFUSAL: Duration = Duration::from_secs(60);
 /// Times that a command goes out.
 const TRIES: u32 = 3;
@@ -21,11 +21,11 @@ const TRIES: u32 = 3;
 const TURN: Duration = Duration::from_secs(45);
 /// Without connections it goes out at once, but for another one that is just heard.
 const AT_ONCE: Duration = Duration::from_secs(5);
-/// A record that the modem says nothing of for so long is lost from sight.
+/// A record without a report for this long counts as unknown.
 const RECORD_LIFE: Duration = Duration::from_secs(180);
 
 impl S2c {
-    /// Gives the modem what is most urgent of what it takes; says whether there was anything.
+    /// Gives the modem its most urgent transmission; returns whether there was one.
     pub(super) fn send_next(&mut self, now: Instant) -> bool {
         let slot = self.jobs.message.is_none() && now >= self.jobs.message_pause;
         if slot && let Some(job) = self.jobs.commands.pop_front() {
@@ -162,7 +162,7 @@ impl S2c {
         self.jobs.put_back(job);
     }
 
-    /// A message has left: what nobody acknowledges is done.
+    /// A message has left: one that needs no acknowledgement is done.
     pub(super) fn handle_message_sent(&mut self) {
         if let Some(message) = self.jobs.message.take_if(|m| !m.acked) {
             self.events.push_back(Event::Sent(message.job.token));
@@ -185,7 +185,7 @@ impl S2c {
         }
     }
 
-    /// What the modem has not said a word of for too long.
+    /// Gives up transmissions without a report for too long.
     pub(super) fn give_up_late(&mut self, now: Instant) {
         if let Some(message) = self.jobs.message.take_if(|m| m.until <= now) {
             self.events.push_back(Event::Unknown(message.job.token));
@@ -201,7 +201,7 @@ impl S2c {
         self.jobs.pool.iter().find(late).map(|(&count, &(token, _))| (count, token))
     }
 
-    /// When what waits may be tried again, if a pause is all that it waits for.
+    /// When queued transmissions may be tried again, if only a pause holds them back.
     pub(super) fn next_try(&self) -> Option<Instant> {
         let waits = !(self.jobs.commands.is_empty() && self.jobs.services.is_empty() && self.jobs.bulk.is_empty());
         let free = self.dialogue.is_idle() && self.jobs.message.is_none();

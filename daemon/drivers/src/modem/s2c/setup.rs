@@ -1,8 +1,8 @@
-//! What is asked of an S2C modem at the start, and again and again, for it does not say when it has restarted.
+//! Commands to an S2C modem at the start, and its regular queries: it does not report a restart.
 
 use super::config::S2cConfig;
 
-/// What a reply must be.
+/// The expected reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Expect {
     Ok,
@@ -15,7 +15,7 @@ pub(super) enum Expect {
     Counter,
 }
 
-/// A command with what is expected of it.
+/// A command with its expected reply.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Step {
     pub command: String,
@@ -28,7 +28,7 @@ pub(super) enum Verdict {
     Counter(u32),
     /// The modem has another address.
     WrongAddress(String),
-    /// It did not do what it was told, or has forgotten it.
+    /// The setting was refused or has been lost.
     Bad,
 }
 
@@ -36,7 +36,7 @@ fn step(command: impl Into<String>, expect: Expect) -> Step {
     Step { command: command.into(), expect }
 }
 
-/// From discovery to work; the `first` time what waits in the modem is that of another run.
+/// The start-up sequence; the `first` time, data in the modem belongs to another run.
 pub(super) fn start_up(config: &S2cConfig, first: bool) -> Vec<Step> {
     // Later it is still good, and throwing it away would end the connection.
     let drop = if first { "Z4" } else { "Z3" };
@@ -56,7 +56,7 @@ pub(super) fn start_up(config: &S2cConfig, first: bool) -> Vec<Step> {
     steps
 }
 
-/// What is asked of a modem at work: every other time the packet counter, which a restart begins anew.
+/// The regular query of a modem at work: every second time the packet counter, which a restart resets.
 pub(super) fn beat(config: &S2cConfig, number: usize) -> Step {
     if number.is_multiple_of(2) {
         return step("?PC", Expect::Counter);

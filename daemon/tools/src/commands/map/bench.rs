@@ -11,10 +11,10 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Measure a folder of numbered maps, each coded against the one before and the first against nothing.
+/// Measure a folder of numbered maps, each encoded against the one before, and the first against an empty map.
 ///
-/// Every step is decoded again and compared. Beside it stand the best PNG files: the whole map each step, and the
-/// smaller of delta image and dirty box. They are deflated by zopfli, which takes nearly all of the time.
+/// Each step is decoded and compared with its map. The output also has the sizes of the best PNG files: the whole map of
+/// each step, and the smaller of delta image and dirty box. Their compression by zopfli takes most of the time.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map bench --series steps --frame-bytes 256")]
 pub struct Bench {

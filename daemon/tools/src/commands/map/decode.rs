@@ -7,14 +7,14 @@ use scenecast_files::write_whole;
 use scenecast_protocol::map_codec::ChunkFile;
 use std::path::PathBuf;
 
-/// Read chunks back into a map: an indexed PNG, pixel value = label, 0 = unexplored.
+/// Decode chunks into a map: an indexed PNG, pixel value = label, 0 = unexplored.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map decode --base yesterday.png --in change.scmc --out today.png")]
 pub struct Decode {
-    /// The map that the chunks were made against; without it, nothing
+    /// Map against which the chunks were encoded [default: an empty map]
     #[arg(long, value_name = "B.png")]
     base: Option<PathBuf>,
-    /// File of chunks, as map encode writes it
+    /// File of chunks that map encode has written
     #[arg(long = "in", value_name = "FILE")]
     input: PathBuf,
     /// Map to write

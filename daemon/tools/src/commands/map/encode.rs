@@ -9,18 +9,18 @@ use scenecast_files::write_whole;
 use scenecast_protocol::map_codec::LabelRaster;
 use std::path::PathBuf;
 
-/// Write the chunks that turn one map into another, and print what they take as JSON.
+/// Write the chunks that turn one map into another, and print their sizes as JSON.
 ///
-/// Maps are indexed PNG files: pixel value = label, 0 = unexplored, at most 254. "bytes" counts every byte of every
-/// chunk with its head; "png_full_bytes" and "png_delta_bytes" are what the best PNG files take (zopfli; the delta as
-/// a whole image or cut to its box).
+/// Maps are indexed PNG files: pixel value = label, 0 = unexplored, at most 254. "bytes" counts all bytes of all
+/// chunks with their heads. "png_full_bytes" and "png_delta_bytes" are the sizes of the best PNG files (zopfli; the delta
+/// as a whole image or cut to its box).
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map encode --base yesterday.png --target today.png --out change.scmc")]
 pub struct Encode {
-    /// The map as it becomes
+    /// Map after the change
     #[arg(long, value_name = "T.png")]
     target: PathBuf,
-    /// The map that the receiver holds; without it, nothing
+    /// Map that the receiver has [default: an empty map]
     #[arg(long, value_name = "B.png")]
     base: Option<PathBuf>,
     #[command(flatten)]

@@ -12,14 +12,14 @@ use clap::{Args, Subcommand};
 use scenecast_core::UserError;
 use scenecast_protocol::map_codec::Codec;
 
-/// Code label maps as the stream does, and measure it.
+/// Encode label maps as the stream does, and measure the codecs.
 #[derive(Debug, Subcommand)]
 pub enum Map {
-    /// Write the chunks that turn one map into another, and print what they take.
+    /// Write the chunks that turn one map into another, and print their sizes.
     Encode(encode::Encode),
-    /// Read such chunks back into a map.
+    /// Decode such chunks into a map.
     Decode(decode::Decode),
-    /// Measure a folder of numbered maps, each coded against the one before.
+    /// Measure a folder of numbered maps, each encoded against the one before.
     Bench(bench::Bench),
     /// Train the table that the context coder starts from.
     TrainPrior(train::TrainPrior),
@@ -39,10 +39,10 @@ impl Map {
 /// How chunks are written.
 #[derive(Debug, Args)]
 struct Coding {
-    /// Coder: auto (the smaller of both for each chunk), png or context
+    /// Codec: auto (the smaller result for each chunk), png or context
     #[arg(long, default_value = "auto")]
     codec: Codec,
-    /// Most bytes of a chunk, 24 to 65535; as many make the room of a frame
+    /// Maximum bytes of a chunk, 24 to 65535; also the room in a frame
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u16).range(24..))]
     frame_bytes: u16,
 }

@@ -7,10 +7,10 @@ use scenecast_files::write_whole;
 use scenecast_training::{PRIOR_SCENES, train_prior};
 use std::path::PathBuf;
 
-/// Train the table that the context coder starts from, on maps drawn from the seed alone; it takes minutes.
+/// Train the table that the context coder starts from, on procedural maps. This takes minutes.
 ///
-/// Seed 1 and the default number of scenes give the table that ships, byte for byte: both ends of a link must have the
-/// same, so this is to check it, or to begin another wire format.
+/// Seed 1 and the default number of scenes give the built-in table, byte for byte. Both ends of a link must have the same
+/// table, so another one makes another wire format.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast map train-prior --seed 1 --out prior.bin")]
 pub struct TrainPrior {

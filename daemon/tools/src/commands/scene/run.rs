@@ -11,16 +11,16 @@ use scene_model::words::{WordConfig, WordExtractor};
 use scenecast_core::UserError;
 use std::path::{Path, PathBuf};
 
-/// Label words, a mosaic or a sequence of images, and print what it took as one line of JSON.
+/// Label words, a mosaic or a sequence of images, and print the measurements as one line of JSON.
 ///
-/// Writes labels.png (indexed, pixel = label, 0 = nothing seen, x to the right, y up; where cells stack, the label with
-/// most words in the column) and labels.csv (every cell: its middle in metres, label, confidence, perplexity; of stacked
-/// cells the one that the picture shows comes last). Labels are
-/// numbered from 1 by age. The same seed gives the same labels whatever the number of threads.
+/// Writes labels.png (indexed; pixel = label, 0 = unexplored; x to the right, y up; for stacked cells the label with most
+/// words in the column) and labels.csv (for each cell: its centre in metres, label, confidence and perplexity; of stacked
+/// cells, the one in the image comes last). Labels are numbered from 1 by age. The same seed gives the same labels with any
+/// number of threads.
 ///
 /// "seconds" and "cpu_seconds" are wall and CPU time of resampling, "words_per_cpu_second" is resampled / cpu_seconds.
-/// "labels" are in use, "labels_used" show in labels.csv. Mutual information is that of labels and annotated classes cell by
-/// cell, its null that of the same labels displaced; without annotations they are null.
+/// "labels" counts the labels in use, "labels_used" those in labels.csv. The mutual information of labels and annotated
+/// classes is taken cell by cell, and its null value is that of the displaced labels. Without annotations both are null.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene run --mosaic reef.jpg --annotations classes.png --out run1
 Example: scenecast scene run --words words.csv --cell-size 0.5 --refine-rate 100000 --out run2
@@ -28,22 +28,22 @@ Example: scenecast scene run --source tum:rgbd_dataset_freiburg1_desk --cell-siz
 pub struct Run {
     #[command(flatten)]
     input: Input,
-    /// Classes. For a mosaic a grey or indexed image of its size, pixel = class; otherwise lines x,y,z,class. 255 does not
-    /// count
+    /// Classes. For a mosaic a grey or indexed image of its size, pixel = class; otherwise lines x,y,z,class. Class 255 is
+    /// ignored
     #[arg(long, value_name = "LABELS")]
     annotations: Option<PathBuf>,
-    /// Further classes that do not count
+    /// Other classes that are ignored
     #[arg(long, value_name = "CLASS,..", value_delimiter = ',', requires = "annotations")]
     ignore: Vec<u8>,
-    /// Edge of a cell in metres, or three edges: x,y,z [default: 1 for words, 0.25 for tum, else 25 pixels]
+    /// Edge of a cell in metres, or three edges: x,y,z [default: 1 for words, 0.25 for tum, and otherwise 25 pixels]
     #[arg(long, value_name = "M", value_parser = edges, allow_negative_numbers = true)]
     cell_size: Option<Edges>,
     #[command(flatten)]
     parameters: Parameters,
-    /// Resample every word so many times, when everything was read
+    /// Number of times that each word is resampled after all input has been read
     #[arg(long, value_name = "N", default_value_t = 30, conflicts_with = "refine_rate")]
     sweeps: u32,
-    /// Instead: resample so many words a second of the input's time, while it is read in order of time
+    /// Number of words that are resampled per second of the input's time, while the input is read in order of time
     #[arg(long, value_name = "WORDS_PER_S", allow_negative_numbers = true)]
     refine_rate: Option<f64>,
     /// Sampling threads
@@ -71,7 +71,7 @@ struct Input {
     /// Camera of a tum source, pixels [default: 525,525,319.5,239.5 at a width of 640]
     #[arg(long, value_name = "FX,FY,CX,CY", requires = "source")]
     intrinsics: Option<Intrinsics>,
-    /// Depth units a metre of a tum source
+    /// Depth units per metre of a tum source
     #[arg(long, value_name = "N", default_value_t = 5000.0, allow_negative_numbers = true)]
     depth_scale: f64,
 }
@@ -85,7 +85,7 @@ struct Which {
     /// Image of the ground; its top left corner is the origin
     #[arg(long, value_name = "IMG")]
     mosaic: Option<PathBuf>,
-    /// tum:DIR, an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt, or frames:DIR, images from above with
+    /// tum:DIR: an RGB-D sequence with rgb.txt, depth.txt and groundtruth.txt; frames:DIR: images from above with
     /// poses.csv
     #[arg(long, value_name = "KIND:DIR")]
     source: Option<String>,
@@ -103,10 +103,10 @@ struct Parameters {
     /// Weight of a new label
     #[arg(long, default_value_t = 1e-4, allow_negative_numbers = true)]
     gamma: f64,
-    /// Reading of gamma: literal (gamma), collapsed (gamma / V) or rost (alpha gamma / V)
+    /// Interpretation of gamma: literal (gamma), collapsed (gamma / V) or rost (alpha gamma / V)
     #[arg(long, default_value = "literal", value_parser = ["literal", "collapsed", "rost"])]
     birth: String,
-    /// Most labels at a time
+    /// Maximum number of labels at a time
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=254))]
     max_labels: u32,
     /// Seed of every random choice

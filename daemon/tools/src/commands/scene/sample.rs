@@ -16,25 +16,25 @@ const MAX_PIXELS: u64 = 1 << 24;
 /// Palette index of the space between worlds; labels have 1 to 254.
 const PAPER: u8 = 255;
 
-/// Draw random worlds of the model's prior, to see what maps alpha and gamma expect
+/// Draw random worlds from the model's prior, to show the maps that alpha and gamma favour
 ///
-/// Each world has a seed of its own. A colour is a label; the oldest label of each world has the first colour. With more
-/// than 254 labels in a world colours repeat.
+/// Each world has a seed of its own. Each colour is a label, and the oldest label of each world has the first colour. Colours
+/// repeat in worlds with more than 254 labels.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast scene sample --alpha 0.001 --gamma 0.3 --size 64x64 --grid 3x3 --seed 1 --out worlds.png"
 )]
 pub struct Sample {
-    /// Weight of each label that exists, anywhere: 0 or above
+    /// Weight of each existing label in each cell: 0 or more
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: f64,
-    /// Weight of a new label: 0 or above
+    /// Weight of a new label: 0 or more
     #[arg(long, value_name = "G", allow_negative_numbers = true)]
     gamma: f64,
-    /// Cells of a world, across x down
+    /// Columns x rows of a world, in cells
     #[arg(long, value_name = "WxH", default_value = "64x64", value_parser = pair)]
     size: (u32, u32),
-    /// Worlds in the picture, across x down
+    /// Columns x rows of worlds in the image
     #[arg(long, value_name = "WxH", default_value = "3x3", value_parser = pair)]
     grid: (u32, u32),
     /// Seed of the first world; the others follow from it

@@ -17,18 +17,18 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Score the scene model and two baselines on annotated images of the sea floor.
 ///
 /// Each NAME_label.png (grey or indexed, pixel value = class) belongs to the image NAME.jpg, .png or .tif of the same
-/// size. The spatial null is the mean mutual information of a method's map after 3 flips and 12 torus shifts: what any
-/// map with such patches shares with such annotations. The excess over it is what the map owes to the image.
+/// size. The spatial null value is the mean mutual information of a method's map after 3 flips and 12 torus shifts: that of
+/// any map with such patches. The excess over it measures the information that the map takes from the image.
 #[derive(Debug, Args)]
 #[command(after_help = "Example: scenecast scene score --dir reefs --seeds 3 --json")]
 pub struct Score {
     /// Folder of images with NAME_label.png beside them
     #[arg(long, value_name = "DIR")]
     dir: PathBuf,
-    /// Seeds that each figure is the mean of
+    /// Number of seeds over which each value is averaged
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
-    /// Most labels of each method
+    /// Maximum number of labels of each method
     #[arg(long, value_name = "K", default_value_t = 16, value_parser = clap::value_parser!(u32).range(2..=254))]
     max_labels: u32,
     /// Cells across an image
@@ -37,7 +37,7 @@ pub struct Score {
     /// Sweeps of the scene model over all words
     #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     sweeps: u32,
-    /// Classes that do not count
+    /// Classes that are ignored
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
     /// Print JSON

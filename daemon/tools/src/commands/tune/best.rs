@@ -29,6 +29,7 @@ pub fn toml(row: &Row, config: &Config, budget_bps: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_config::MapCells;
     use scenecast_core::tuning_table::TuningTable;
     use scenecast_protocol::directive::CellBand;
 
@@ -41,6 +42,6 @@ mod tests {
         let config = scenecast_config::load(Some(&path), &[]).unwrap();
         let (found, setting) = (&config.scene, row.setting);
         assert_eq!((found.alpha, found.gamma, found.cell_m), (setting.alpha, setting.gamma, setting.cell_m));
-        assert_eq!((found.frames_per_s, config.map.cells.as_str()), (setting.frames_per_s, "coarse"));
+        assert_eq!((found.frames_per_s, config.map.cells), (setting.frames_per_s, MapCells::Coarse));
     }
 }

@@ -5,7 +5,8 @@ use scenecast_config::cell_m;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_protocol::directive::CellBand;
-use serde::Deserialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
 /// The values of each parameter.
@@ -19,7 +20,8 @@ pub struct Grid {
     cell_m: Vec<f64>,
     refine_words_per_s: Vec<f64>,
     frames_per_s: Vec<f64>,
-    cells: Vec<String>,
+    #[serde(deserialize_with = "bands")]
+    cells: Vec<CellBand>,
 }
 
 impl Default for Grid {
@@ -63,7 +65,7 @@ impl Grid {
             }
         }
         if grid.cells.is_empty() {
-            grid.cells.push(config.map.cells.clone());
+            grid.cells.push(config.map.cells.into());
         }
         Ok(grid)
     }
@@ -92,9 +94,6 @@ impl Grid {
             if let Some(value) = values.iter().find(|value| !(low..=high).contains(*value)) {
                 return Err(format!(": {name} has {value}; it takes numbers from {low} to {high}"));
             }
-        }
-        if let Some(name) = grid.cells.iter().find(|name| band(name).is_none()) {
-            return Err(format!(": cells has {name:?}; it takes fine and coarse"));
         }
         let count = ranges.iter().map(|(_, values, ..)| values.len()).chain([grid.cells.len()]);
         let count = count.map(|n| n.max(1)).fold(1usize, usize::saturating_mul);
@@ -145,23 +144,31 @@ impl Grid {
             gamma: 0.0,
             refine_words_per_s: of(&self.refine_words_per_s),
             frames_per_s: of(&self.frames_per_s),
-            cells: self.cells.first().and_then(|name| band(name)).unwrap_or(CellBand::Fine),
+            cells: self.cells.first().copied().unwrap_or(CellBand::Fine),
         }
     }
 
     fn at_each_pace(&self, priors: Setting, settings: &mut Vec<Setting>) {
         for &refine_words_per_s in &self.refine_words_per_s {
             for &frames_per_s in &self.frames_per_s {
-                let bands = self.cells.iter().filter_map(|name| band(name));
-                settings.extend(bands.map(|cells| Setting { refine_words_per_s, frames_per_s, cells, ..priors }));
+                settings.extend(self.cells.iter().map(|&cells| Setting {
+                    refine_words_per_s,
+                    frames_per_s,
+                    cells,
+                    ..priors
+                }));
             }
         }
     }
 }
 
-/// The bands of cells that a setting may have; coarse to fine ends with every cell told, as fine does.
-fn band(name: &str) -> Option<CellBand> {
-    CellBand::from_name(name).filter(|&band| band != CellBand::CoarseToFine)
+/// The bands of cells that a setting may have. Coarse to fine is none of them: it ends with every cell sent, as fine does.
+fn bands<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<CellBand>, D::Error> {
+    let band = |name: String| {
+        let band = CellBand::from_name(&name).filter(|&band| band != CellBand::CoarseToFine);
+        band.ok_or_else(|| D::Error::custom(format!("cells has {name:?}; it takes fine and coarse")))
+    };
+    Vec::<String>::deserialize(deserializer)?.into_iter().map(band).collect()
 }
 
 #[cfg(test)]

@@ -7,14 +7,14 @@ use scenecast_core::UserError;
 use scenecast_core::tuning_table::{Measurement, Setting};
 use scenecast_protocol::directive::CellBand;
 use scenecast_protocol::map::{self, Cell};
-use scenecast_protocol::map_codec::{Codec, Stride, encode_all};
+use scenecast_protocol::map_codec::{Stride, encode_all};
 use scenecast_scoring::{LabelGrid, score};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Flies the survey with a setting, then sweeps over all words.
 pub fn measure(survey: &Survey<'_>, setting: &Setting, sweeps: u32, seed: u64) -> Result<Measurement, UserError> {
     let config = survey.config;
-    let codec: Codec = config.map.codec.parse().map_err(|_| UserError::Input("map.codec is unknown".to_owned()))?;
+    let codec = config.map.codec;
     let room = config.link.frame_bytes as usize;
     let bytes = |base: &map::LabelGrid, target: &map::LabelGrid| {
         let chunks = encode_all(codec, base, target, room);

@@ -19,11 +19,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use survey::{Site, Survey};
 
-/// Search the settings of the scene model whose labels tell most about annotations of a similar site.
+/// Find the settings of the scene model whose maps agree best with annotations of a similar site.
 ///
-/// Each setting flies a virtual survey over the mosaic: the camera crosses it line by line, the scene model refines as
-/// at sea, and every change of the map is coded as the stream does (map chunks alone, nothing lost). Then the model
-/// sweeps over all words and the map is compared with the annotations. A run that was interrupted goes on where it was.
+/// For each setting, a virtual camera surveys the mosaic line by line, the scene model refines as at sea, and each change of
+/// the map is encoded as in the stream (map chunks only, without loss). Then the model sweeps over all words, and the map is
+/// compared with the annotations. An interrupted run resumes.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: scenecast tune --mosaic reef.jpg --metres-per-pixel 0.002 --annotations labels.png --ignore 0,255 --budget 1000 --out tuning
@@ -39,16 +39,16 @@ pub struct Tune {
     /// Classes of the image's pixels: a grey or indexed image of the same size
     #[arg(long, value_name = "LABELS", requires = "mosaic")]
     annotations: Option<PathBuf>,
-    /// Instead of an image: sea floors drawn from these seeds; the figures are their means
+    /// Seeds of procedural sea floors, instead of an image; the results are means over them
     #[arg(long, value_name = "SEEDS", value_delimiter = ',', conflicts_with_all = ["mosaic", "annotations"])]
     procedural: Vec<u64>,
-    /// Classes that do not count
+    /// Classes that are ignored
     #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_value = "255")]
     ignore: Vec<u8>,
     /// TOML file with lists alpha, beta, gamma, cell_m (metres), refine_words_per_s, frames_per_s and cells ("fine", "coarse"), each optional [default: the paper's grid: alpha 1, .1, .01, .001; beta 10, 1, .1; gamma 1e-3, 1e-4, 1e-5; the rest as configured]
     #[arg(long, value_name = "FILE")]
     grid: Option<PathBuf>,
-    /// Most bits a second that the stream of the best setting may take [default: link.budget_bps]
+    /// Maximum rate of the stream of the best setting, bit/s [default: link.budget_bps]
     #[arg(long, value_name = "BPS", allow_negative_numbers = true)]
     budget: Option<f64>,
     /// Sweeps over all words after the survey
@@ -57,7 +57,7 @@ pub struct Tune {
     /// Seed of the scene model
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Settings measured side by side [default: one a core]
+    /// Number of settings that are measured in parallel [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
     /// Configuration file

@@ -4,7 +4,7 @@ use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Observation, Pose};
 use scene_model::topics::{Birth, SceneConfig};
 use scene_model::words::{Word, WordConfig, WordExtractor};
-use scenecast_config::Config;
+use scenecast_config::{BirthRule, Config};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::Setting;
 use scenecast_files::{read_classes, read_image};
@@ -151,10 +151,10 @@ impl<'a> Survey<'a> {
     /// The scene model with a setting.
     pub fn scene(&self, setting: &Setting, seed: u64) -> SceneConfig {
         let scene = &self.config.scene;
-        let birth = match scene.birth.as_str() {
-            "collapsed" => Birth::Collapsed,
-            "rost" => Birth::Rost,
-            _ => Birth::Literal,
+        let birth = match scene.birth {
+            BirthRule::Literal => Birth::Literal,
+            BirthRule::Collapsed => Birth::Collapsed,
+            BirthRule::Rost => Birth::Rost,
         };
         SceneConfig {
             cell_m: [setting.cell_m, setting.cell_m, 1e4],

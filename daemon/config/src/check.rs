@@ -1,0 +1,107 @@
+//! Conditions that several keys must satisfy together.
+
+use crate::key::Key;
+use crate::{Authenticate, AutopilotKind, Config, ModemKind};
+use scenecast_core::{PortAddress, UserError};
+
+/// The longest time on air of a frame, seconds.
+const MAX_FRAME_S: f64 = 55.0;
+
+/// # Errors
+/// One line that names a key, its value and the allowed values.
+pub(crate) fn check_together(config: &Config) -> Result<(), UserError> {
+    check_shares("link.shares", config.link.shares.0.iter().copied(), config)?;
+    check_shares("map.layer_shares", config.map.layer_shares.values().copied(), config)?;
+    let link = &config.link;
+    let is_all = link.authenticate == Authenticate::All;
+    if link.key_file.is_none() && (link.encrypt || is_all) {
+        let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
+        let advice = "it needs a key; set link.key_file to a file that scenecast key new has written";
+        return Err(UserError::Input(format!("{given} is not allowed with an empty link.key_file: {advice}")));
+    }
+    crate::modem::check(config)?;
+    check_ports(config)?;
+    check_frame(config)?;
+    check_airtime(config)
+}
+
+fn check_shares(name: &str, shares: impl Iterator<Item = u8>, config: &Config) -> Result<(), UserError> {
+    let sum: u32 = shares.map(u32::from).sum();
+    if sum <= 100 {
+        return Ok(());
+    }
+    let value = Key::find(name).map(|key| key.value(config).to_string()).unwrap_or_default();
+    Err(UserError::Input(format!("{name} = {value} is not allowed: the sum is {sum} %; allowed: 100 % or less")))
+}
+
+/// An autopilot has a port of its kind, and following has what it needs.
+fn check_ports(config: &Config) -> Result<(), UserError> {
+    let autopilot = &config.autopilot;
+    let is_file = matches!(autopilot.port, Some(PortAddress::File(_)));
+    let allowed = match autopilot.kind {
+        AutopilotKind::Mavlink | AutopilotKind::Nmea if autopilot.port.is_none() || is_file => {
+            "serial:DEVICE:BAUD, udp:ADDRESS:PORT, udp-to:HOST:PORT, tcp:HOST:PORT"
+        }
+        AutopilotKind::Log if !is_file => "file:PATH",
+        _ => return check_follow(config),
+    };
+    let port = Key::find("autopilot.port").map(|key| key.value(config).to_string()).unwrap_or_default();
+    let given = format!("autopilot.port = {port} is not allowed with autopilot.kind = \"{}\"", autopilot.kind);
+    Err(UserError::Input(format!("{given}; allowed: {allowed}")))
+}
+
+fn check_follow(config: &Config) -> Result<(), UserError> {
+    if config.position.follow && (config.position.gps.is_none() || config.autopilot.kind == AutopilotKind::None) {
+        let text = "position.follow = true is not allowed without position.gps and an autopilot.kind";
+        return Err(UserError::Input(text.to_owned()));
+    }
+    Ok(())
+}
+
+/// Under a key a frame ends in a tag, beside which the longest indivisible chunk must fit.
+fn check_frame(config: &Config) -> Result<(), UserError> {
+    let link = &config.link;
+    let (least, with, chunk) = match (&link.key_file, link.authenticate) {
+        (None, _) => return Ok(()),
+        (Some(_), Authenticate::All) => (48, "link.authenticate = \"all\"", "the vehicle's report"),
+        (Some(_), Authenticate::Down) => (36, "a link.key_file", "a position fix"),
+    };
+    let frame_bytes = crate::full_frame_bytes(config);
+    if frame_bytes >= least {
+        return Ok(());
+    }
+    let given = match config.modem.kind {
+        ModemKind::Micromodem => format!("modem.rate = {} with frames of {frame_bytes} bytes", config.modem.rate),
+        _ => format!("link.frame_bytes = {frame_bytes}"),
+    };
+    let why = format!("{chunk} does not fit a smaller frame beside the tag");
+    Err(UserError::Input(format!("{given} is not allowed with {with}; allowed: {least} to 1024 bytes, because {why}")))
+}
+
+fn check_airtime(config: &Config) -> Result<(), UserError> {
+    let bits = f64::from(config.link.frame_bytes * 8 + config.modem.overhead_bits);
+    for (key, rate) in [("channel.bit_rate", config.channel.bit_rate), ("modem.bit_rate", config.modem.bit_rate)] {
+        if bits / rate > MAX_FRAME_S {
+            let least = (bits / MAX_FRAME_S).ceil();
+            let frame = config.link.frame_bytes;
+            let given =
+                format!("{key} = {rate}: a frame of link.frame_bytes = {frame} takes longer than {MAX_FRAME_S} s");
+            return Err(UserError::Input(format!("{given}; allowed: {least} bit/s or more, or a smaller frame")));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn an_autopilot_needs_a_port_of_its_kind() {
+        let load = |sets: &[&str]| crate::load(None, &sets.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>());
+        let refused = |sets: &[&str]| load(sets).unwrap_err().to_string();
+        assert!(refused(&["autopilot.kind=nmea"]).contains("autopilot.port = \"\""));
+        assert!(refused(&["autopilot.kind=log", "autopilot.port=udp:0.0.0.0:1"]).ends_with("allowed: file:PATH"));
+        assert!(load(&["autopilot.kind=log", "autopilot.port=file:x"]).is_ok());
+        assert!(load(&["autopilot.kind=rehearsal"]).is_ok());
+        assert!(refused(&["position.follow=true"]).contains("position.gps"));
+    }
+}

@@ -1,0 +1,85 @@
+//! The map's stream, the camera and the scene model.
+
+use crate::key::{ANY, range, section};
+use crate::setting::{BirthRule, CameraSource, LayerName, MapCells, MapStream};
+use scenecast_protocol::map_codec::Codec;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+section! {
+    /// The stream of the map to the surface.
+    map: Map {
+        /// Codec of map chunks. auto takes the smaller result for each chunk.
+        codec: Codec = Codec::Auto, ANY, [Auv Scenario];
+        /// delta sends changes. whole-png sends the whole map again whenever it has changed, for comparison only.
+        stream: MapStream = MapStream::Delta, ANY, [Auv Scenario];
+        /// Time that a new value of a cell must be stable before it is sent, if the operator already has a value of
+        /// that cell. A cell that changes again and again must be stable for up to eight times as long. 0: no delay.
+        debounce_s: f64 = 0.0, range(0.0, 600.0, "s"), [Auv Scenario];
+        /// Longest backlog, in seconds of the budget, that is sent in plain order. A longer one is sent coarse to fine:
+        /// every fourth cell in both directions first. 0: never coarse to fine.
+        coarse_after_s: f64 = 0.0, range(0.0, 86_400.0, "s"), [Auv Scenario];
+        /// Cells that are sent. fine: every cell; coarse: every fourth cell in both directions. The scene model's
+        /// cells stay the same, and the operator may choose otherwise.
+        cells: MapCells = MapCells::Fine, ANY, [Auv Scenario];
+        /// Layers that may be sent beside the labels. confidence: the share of a cell's words that carry its label, in
+        /// quarters; depth: depth of the sea floor; curiosity: how badly the model explains a cell, in whole bits per
+        /// word. A layer without a share is sent as a background stream, if link.background lists it.
+        layers: Vec<LayerName> = LayerName::all().collect(), ANY, [Auv Scenario];
+        /// Least share of each layer within the map's share of link.shares while labels wait too. The shares add up
+        /// to 100 % or less. 0: spare capacity only.
+        layer_shares: BTreeMap<LayerName, u8> = BTreeMap::new(), range(0.0, 100.0, "%"), [Auv Scenario];
+        /// Step of the depth layer, rounded to tenths of a metre. The layer has 254 steps around survey.depth_m.
+        depth_step_m: f64 = 0.5, range(0.1, 25.5, "m"), [Auv Scenario];
+    }
+}
+
+section! {
+    /// The camera.
+    camera: Camera {
+        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal.
+        source: CameraSource = CameraSource::Rehearsal, ANY, [Auv Scenario];
+        /// Frames per second.
+        rate_hz: f64 = 0.5, range(0.01, 30.0, "1/s"), [Scenario];
+        /// Columns of a frame.
+        width_px: u32 = 640, range(64.0, 4096.0, "pixel"), [Scenario];
+        /// Rows of a frame.
+        height_px: u32 = 480, range(64.0, 4096.0, "pixel"), [Scenario];
+        /// Size of a pixel on the sea floor.
+        metres_per_pixel: f64 = 0.01, range(0.0001, 10.0, "m"), [Auv Scenario];
+    }
+}
+
+section! {
+    /// The scene model.
+    scene: Scene {
+        /// Edge of a map cell, the same at both ends. 0: 25 pixels of the camera.
+        cell_m: f64 = 0.0, range(0.0, 1000.0, "m"), [Auv Asv Scenario];
+        /// Weight of labels that are common elsewhere in the map, against those of the neighbouring cells.
+        alpha: f64 = 0.01, range(1e-9, 1e3, ""), [Auv Scenario];
+        /// Prior count of each visual word in each label.
+        beta: f64 = 0.1, range(1e-9, 1e3, ""), [Auv Scenario];
+        /// Weight of a new label.
+        gamma: f64 = 1e-4, range(1e-12, 1e3, ""), [Auv Scenario];
+        /// Interpretation of gamma. literal: gamma, as in the paper; collapsed: gamma divided by the size of the
+        /// vocabulary; rost: alpha times gamma divided by the size of the vocabulary, as in the program ROST.
+        birth: BirthRule = BirthRule::Literal, ANY, [Auv Scenario];
+        /// Maximum number of labels at a time.
+        max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
+        /// Words that are resampled per second of mission time.
+        refine_words_per_s: u32 = 50_000, range(0.0, 1e8, "1/s"), [Auv Scenario];
+        /// Maximum rate of camera frames into the scene model. Of each interval the first frame is used. 0: every
+        /// frame.
+        frames_per_s: f64 = 0.0, range(0.0, 30.0, "1/s"), [Auv Scenario];
+        /// Maximum number of words that are kept in a cell.
+        max_words_per_cell: u32 = 200, range(8.0, 60_000.0, ""), [Auv Scenario];
+        /// File of a vocabulary (scenecast vocabulary train). Empty: the built-in vocabulary.
+        vocabulary: Option<PathBuf> = None, ANY, [Auv Scenario];
+        /// Mission time between two checkpoints of the scene model. A restarted vehicle continues from the last one.
+        /// 0: no checkpoints.
+        checkpoint_s: f64 = 60.0, range(0.0, 86_400.0, "s"), [Auv];
+        /// Table of scenecast tune, from which "fit to budget" takes settings of the scene model. Empty: the built-in
+        /// table, measured on procedural sea floors.
+        tuning_table: Option<PathBuf> = None, ANY, [Asv];
+    }
+}

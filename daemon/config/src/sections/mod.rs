@@ -1,0 +1,59 @@
+//! The description of every key: type, default, bounds, unit, readers and meaning.
+//!
+//! The structs, `scenecast config`, the files in `config/`, the reference in `docs/` and the JSON Schema are made from
+//! these tables.
+
+mod link;
+mod map;
+mod modem;
+mod node;
+mod survey;
+
+pub use link::Link;
+pub use map::{Camera, Map, Scene};
+pub use modem::{Channel, Modem};
+pub use node::{Console, Mission, Operator, Runtime, VehicleSection};
+pub use survey::{Autopilot, Navigation, Position, Survey};
+
+use crate::key::Section;
+
+/// Every setting.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Config {
+    pub mission: Mission,
+    pub vehicle: VehicleSection,
+    pub link: Link,
+    pub modem: Modem,
+    pub channel: Channel,
+    pub map: Map,
+    pub camera: Camera,
+    pub scene: Scene,
+    pub survey: Survey,
+    pub navigation: Navigation,
+    pub autopilot: Autopilot,
+    pub position: Position,
+    pub operator: Operator,
+    pub console: Console,
+    pub runtime: Runtime,
+}
+
+impl Section {
+    /// Every section, in the order of the files.
+    pub const ALL: &'static [Self] = &[
+        Mission::SECTION,
+        VehicleSection::SECTION,
+        Link::SECTION,
+        Modem::SECTION,
+        Channel::SECTION,
+        Map::SECTION,
+        Camera::SECTION,
+        Scene::SECTION,
+        Survey::SECTION,
+        Navigation::SECTION,
+        Autopilot::SECTION,
+        Position::SECTION,
+        Operator::SECTION,
+        Console::SECTION,
+        Runtime::SECTION,
+    ];
+}

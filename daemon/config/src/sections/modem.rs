@@ -1,0 +1,67 @@
+//! The modem, and the simulated channel between modems.
+
+use crate::key::{ANY, range, section};
+use crate::setting::{HostPort, ModemKind, S2cMode};
+use std::path::PathBuf;
+
+section! {
+    /// The modem of this end.
+    modem: Modem {
+        /// Kind of modem. s2c: EvoLogics S2C; micromodem: WHOI Micromodem; transparent: a modem that passes bytes on;
+        /// tcp, udp: frames go to the other end over a network, and in a rehearsal through the simulated channel
+        /// without modems.
+        kind: ModemKind = ModemKind::Tcp, ANY, [Auv Asv Scenario];
+        /// Serial device of the modem, preferably from /dev/serial/by-id. Empty: the modem is reached over the
+        /// network, by modem.connect or modem.listen.
+        device: Option<PathBuf> = None, ANY, [Auv Asv];
+        /// Speed of the serial device.
+        baud: u32 = 19_200, range(300.0, 4_000_000.0, "bit/s"), [Auv Asv Scenario];
+        /// Address and port to listen on, or to receive datagrams at.
+        listen: Option<HostPort> = None, ANY, [Auv Asv];
+        /// Address and port to connect to, or to send datagrams to.
+        connect: Option<HostPort> = None, ANY, [Auv Asv];
+        /// Bit rate of the modem on air. The rates of S2C instant messages and of Micromodem packets are built in.
+        bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Auv Asv];
+        /// Bits on air that each transmission needs besides its bytes. Those of s2c and micromodem are built in.
+        overhead_bits: u32 = 0, range(0.0, 100_000.0, "bit"), [Auv Asv Scenario];
+        /// Address of the surface's modem (s2c, micromodem), the same at both ends. A vehicle's modem has
+        /// vehicle.address. A modem with another address is refused.
+        surface_address: u8 = 10, range(1.0, 127.0, ""), [Auv Asv Scenario];
+        /// Transfer mode of an S2C modem, the same at both ends. burst: bulk data in bursts, commands in instant
+        /// messages; im: all data in instant messages, about 500 bit/s.
+        s2c_mode: S2cMode = S2cMode::Burst, ANY, [Auv Asv Scenario];
+        /// Source level of an S2C modem. 0 is the loudest. 3 is the quietest, and the only one that is safe in air.
+        source_level: u8 = 3, range(0.0, 3.0, ""), [Auv Asv];
+        /// Highest address of an S2C network, the same on all modems: 2, 6, 14, 30, 62, 126 or 254.
+        highest_address: u8 = 14, range(2.0, 254.0, ""), [Auv Asv];
+        /// Data packets in one packet train of an S2C modem. Fewer packets let commands through sooner, at a lower
+        /// throughput.
+        cluster: u8 = 10, range(1.0, 32.0, ""), [Auv Asv Scenario];
+        /// Longest data packet of an S2C modem, the same on all modems.
+        packet_ms: u16 = 750, range(50.0, 1000.0, "ms"), [Auv Asv Scenario];
+        /// Packet rate of a Micromodem, the same at both ends.
+        rate: u8 = 1, range(0.0, 5.0, ""), [Auv Asv Scenario];
+    }
+}
+
+section! {
+    /// The simulated channel of a rehearsal.
+    channel: Channel {
+        /// Bit rate of the simulated modems on air.
+        bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Scenario];
+        /// Horizontal distance between the surface vehicle and the middle of the survey.
+        range_m: f64 = 500.0, range(1.0, 20_000.0, "m"), [Scenario];
+        /// Probability that a frame is lost.
+        loss: f64 = 0.1, range(0.0, 0.99, ""), [Scenario];
+        /// Probability that a frame arrives twice.
+        duplication: f64 = 0.0, range(0.0, 1.0, ""), [Scenario];
+        /// Probability that a frame arrives late.
+        reordering: f64 = 0.0, range(0.0, 1.0, ""), [Scenario];
+        /// Probability that a frame arrives with flipped bits.
+        corruption: f64 = 0.0, range(0.0, 1.0, ""), [Scenario];
+        /// Whether a modem cannot receive while it transmits.
+        half_duplex: bool = true, ANY, [Scenario];
+        /// Speed of sound.
+        sound_speed_m_s: f64 = 1500.0, range(1300.0, 1700.0, "m/s"), [Scenario];
+    }
+}

@@ -1,0 +1,63 @@
+//! The mission, the vehicle and the processes.
+
+use crate::key::{ANY, range, section};
+use crate::setting::{HostPort, OperatorScript};
+use scenecast_core::LatLon;
+use std::path::PathBuf;
+
+section! {
+    /// The mission, the same at both ends.
+    mission: Mission {
+        /// Name of the mission, for people.
+        name: String = "rehearsal".into(), ANY, [Auv Asv Scenario];
+        /// Number of the mission, the same at both ends. Frames of another mission are dropped.
+        id: u32 = 1, range(0.0, 4_294_967_295.0, ""), [Auv Asv Scenario];
+        /// Latitude and longitude of the world's origin (x = y = 0), the same at both ends. With [0.0, 0.0] the
+        /// vehicle does not know the origin, and the surface puts it where its GPS receiver has its first fix.
+        origin_deg: Option<LatLon> = None, range(-180.0, 180.0, "deg"), [Auv Asv Scenario];
+    }
+}
+
+section! {
+    /// The vehicle of this file, or the vehicle that the surface works with.
+    vehicle: VehicleSection {
+        /// Acoustic address of the vehicle. The surface has address 0.
+        address: u8 = 1, range(1.0, 14.0, ""), [Auv Asv Scenario];
+        /// Name of the vehicle, for people.
+        name: String = "auv-1".into(), ANY, [Auv Asv Scenario];
+    }
+}
+
+section! {
+    /// The operator of a rehearsal.
+    operator: Operator {
+        /// Orders that the rehearsal gives. scripted: two utilities and some exemplar requests at fixed times;
+        /// fenced: the same orders, within a fence and limits.
+        script: OperatorScript = OperatorScript::Scripted, ANY, [Scenario];
+    }
+}
+
+section! {
+    /// The operator's page.
+    console: Console {
+        /// Address and port that the page is served at. Empty: no page.
+        listen: Option<HostPort> = HostPort::parse("127.0.0.1:8460"), ANY, [Asv];
+        /// File of the token that the page and scripts must present (scenecast key token). It is required for every
+        /// listen address except loopback addresses.
+        token_file: Option<PathBuf> = None, ANY, [Asv];
+        /// Host name under which other machines open the page. Empty: they use the address.
+        host: String = String::new(), ANY, [Asv];
+    }
+}
+
+section! {
+    /// The processes.
+    runtime: Runtime {
+        /// Folder for the state that must survive a restart, and for the operator's map.
+        state_dir: PathBuf = "state".into(), ANY, [Auv Asv];
+        /// Seed of the scene model. The same recording with the same seed gives the same map.
+        seed: u64 = 1, range(0.0, 9e15, ""), [Auv];
+        /// Mission seconds per wall-clock second, for rehearsals with processes.
+        time_scale: f64 = 1.0, range(0.01, 1000.0, ""), [Auv Asv];
+    }
+}

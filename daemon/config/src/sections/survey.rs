@@ -1,0 +1,102 @@
+//! The survey, the vehicle's navigation, autopilots and the localisation relay.
+
+use crate::key::{ANY, ports, range, section};
+use crate::setting::{AutopilotKind, GpsPort};
+use scenecast_core::{Area, PortAddress};
+use scenecast_protocol::directive::{PlannerKind, Reaction};
+
+section! {
+    /// The survey.
+    survey: Survey {
+        /// Time at which the survey ends. 0: never.
+        duration_s: f64 = 1200.0, range(0.0, 1e7, "s"), [Auv Scenario];
+        /// Speed over ground.
+        speed_m_s: f64 = 0.5, range(0.01, 10.0, "m/s"), [Auv Scenario];
+        /// Height of the camera above the sea floor.
+        altitude_m: f64 = 4.0, range(0.1, 100.0, "m"), [Auv Scenario];
+        /// Depth of the sea floor.
+        depth_m: f64 = 20.0, range(0.0, 11_000.0, "m"), [Auv Scenario];
+        /// West, south, east and north limits in the world. All 0: the limits of the recording or of the rehearsal's
+        /// image.
+        area_m: Option<Area> = None, range(-1e6, 1e6, "m"), [Auv Scenario];
+        /// Planner of the vehicle's path once the operator has sent a utility. The operator may choose another.
+        planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Scenario];
+        /// Distance that planned paths keep from the fence and from keep-outs, to allow for the vehicle's size, turns
+        /// and drift.
+        clearance_m: f64 = 1.0, range(0.0, 1000.0, "m"), [Auv Scenario];
+        /// Longest silence of the surface before the vehicle does as survey.on_silence says, unless the operator sets
+        /// another. 0: no limit.
+        max_silence_s: f64 = 0.0, range(0.0, 1e6, "s"), [Auv Scenario];
+        /// Reaction to the surface's silence, unless the operator sets another.
+        on_silence: Reaction = Reaction::Return, ANY, [Auv Scenario];
+        /// Reaction outside the fence, in a keep-out or outside a depth band, unless the operator sets another.
+        on_breach: Reaction = Reaction::Return, ANY, [Auv Scenario];
+        /// Reaction to an abort, unless the operator sets another.
+        on_abort: Reaction = Reaction::Surface, ANY, [Auv Scenario];
+    }
+}
+
+section! {
+    /// The vehicle's navigation.
+    navigation: Navigation {
+        /// Drift of dead reckoning, in percent of the distance travelled.
+        drift_percent: f64 = 1.0, range(0.0, 50.0, "%"), [Auv Scenario];
+        /// Standard deviation of the start of the survey. It bounds how far the first fixes may move the map.
+        start_sigma_m: f64 = 1.0, range(0.0, 100_000.0, "m"), [Auv Scenario];
+        /// Time between two position fixes. 0: no fixes.
+        fix_period_s: f64 = 10.0, range(0.0, 3600.0, "s"), [Scenario];
+        /// Standard deviation of a fix.
+        fix_sigma_m: f64 = 0.5, range(0.0, 100.0, "m"), [Scenario];
+    }
+}
+
+section! {
+    /// The autopilot of the vehicle or of the surface vehicle.
+    autopilot: Autopilot {
+        /// Kind of autopilot. none: waypoints are logged only; rehearsal: a simulated vehicle; mavlink: ArduSub or
+        /// ArduRover; nmea: NMEA 0183 sentences; log: the same sentences, appended to a file.
+        kind: AutopilotKind = AutopilotKind::None, ANY, [Auv Asv];
+        /// Port of the autopilot. udp listens, udp-to and tcp connect, and file is for kind log.
+        port: Option<PortAddress> = None, ports(&["serial", "udp", "udp-to", "tcp", "file"]), [Auv Asv];
+        /// MAVLink system number of the autopilot (mavlink).
+        system: u8 = 1, range(1.0, 255.0, ""), [Auv Asv];
+        /// Whether to arm the autopilot and to switch it to guided mode, once (mavlink). Otherwise a pilot does so.
+        arm: bool = false, ANY, [Auv Asv];
+        /// Silence after which the autopilot is taken for disconnected.
+        timeout_s: f64 = 5.0, range(1.0, 600.0, "s"), [Auv Asv];
+        /// Turn rate of a simulated vehicle. 0: it turns on the spot.
+        turn_rate_deg_s: f64 = 0.0, range(0.0, 360.0, "deg/s"), [Auv];
+        /// East and north components of a current that a simulated vehicle's sensors do not measure.
+        current_m_s: [f64; 2] = [0.0, 0.0], range(-5.0, 5.0, "m/s"), [Auv];
+    }
+}
+
+section! {
+    /// The localisation relay: the surface measures the vehicle's position and sends it fixes.
+    position: Position {
+        /// Port of a GPS receiver with NMEA 0183, or of a gpsd. Empty: no fixes.
+        gps: Option<GpsPort> = None, ports(&["serial", "tcp", "gpsd"]), [Asv];
+        /// Port of a compass with HDT or THS sentences. Empty: the heading of the GPS receiver.
+        compass: Option<PortAddress> = None, ports(&["serial", "tcp"]), [Asv];
+        /// Position of the USBL head relative to the GPS antenna: forward, starboard, down.
+        usbl_lever_m: [f64; 3] = [0.0, 0.0, 0.0], range(-200.0, 200.0, "m"), [Asv];
+        /// Depth of the USBL head.
+        usbl_depth_m: f64 = 1.0, range(0.0, 100.0, "m"), [Asv];
+        /// Whether the USBL head has no compass, so that its bearings are relative to the bow.
+        usbl_from_bow: bool = false, ANY, [Asv];
+        /// Rotation of the USBL head relative to the bow, or the error of its compass; clockwise.
+        usbl_rotation_deg: f64 = 0.0, range(-360.0, 360.0, "deg"), [Asv];
+        /// Speed of sound to which ranges are corrected; modems calculate with 1500 m/s. 0: no correction.
+        sound_speed_m_s: f64 = 0.0, range(0.0, 1700.0, "m/s"), [Asv];
+        /// Shortest time between two fixes of a vehicle.
+        fix_period_s: f64 = 10.0, range(1.0, 3600.0, "s"), [Asv];
+        /// Largest standard deviation of a fix that is sent.
+        max_sigma_m: f64 = 30.0, range(0.5, 63.0, "m"), [Asv];
+        /// Whether the surface vehicle follows the vehicle by its autopilot.
+        follow: bool = false, ANY, [Asv];
+        /// Horizontal distance at which the surface vehicle follows.
+        stand_off_m: f64 = 30.0, range(0.0, 5000.0, "m"), [Asv];
+        /// Deviation from that distance before the surface vehicle moves.
+        dead_band_m: f64 = 15.0, range(1.0, 5000.0, "m"), [Asv];
+    }
+}

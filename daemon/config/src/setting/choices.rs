@@ -1,0 +1,176 @@
+//! Values that are one of some words.
+
+use super::{Setting, one_of};
+use crate::key::Rule;
+use scenecast_protocol::directive::{CellBand, PlannerKind, Reaction};
+use scenecast_protocol::map_codec::Codec;
+use strum::{Display, IntoStaticStr, VariantArray};
+use toml::Value;
+
+/// One of some words.
+pub(super) trait Choice: Copy + 'static {
+    const CHOICES: &'static [Self];
+
+    fn word(self) -> &'static str;
+}
+
+impl<T: Choice> Setting for T {
+    fn read(value: &Value, _: &Rule) -> Option<Self> {
+        let word = value.as_str()?;
+        Self::CHOICES.iter().copied().find(|choice| choice.word() == word)
+    }
+
+    fn write(&self) -> Value {
+        Value::String(self.word().to_owned())
+    }
+
+    fn allowed(_: &Rule) -> String {
+        format!("one of {}", words::<Self>().join(", "))
+    }
+
+    fn schema(_: &Rule) -> serde_json::Value {
+        one_of(&words::<Self>())
+    }
+}
+
+fn words<T: Choice>() -> Vec<&'static str> {
+    T::CHOICES.iter().map(|choice| choice.word()).collect()
+}
+
+impl Choice for Codec {
+    const CHOICES: &'static [Self] = &[Self::Auto, Self::Png, Self::Context];
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Png => "png",
+            Self::Context => "context",
+        }
+    }
+}
+
+impl Choice for PlannerKind {
+    const CHOICES: &'static [Self] = &Self::ALL;
+
+    fn word(self) -> &'static str {
+        self.name()
+    }
+}
+
+impl Choice for Reaction {
+    const CHOICES: &'static [Self] = &Self::ALL;
+
+    fn word(self) -> &'static str {
+        self.name()
+    }
+}
+
+/// Makes enums whose words are their variants' names.
+macro_rules! choices {
+    ($($(#[$doc:meta])* $name:ident $case:literal { $($(#[$variant_doc:meta])* $variant:ident,)* })*) => { $(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Display, IntoStaticStr, VariantArray)]
+        #[strum(serialize_all = $case)]
+        pub enum $name { $($(#[$variant_doc])* $variant,)* }
+
+        impl Choice for $name {
+            const CHOICES: &'static [Self] = Self::VARIANTS;
+
+            fn word(self) -> &'static str {
+                self.into()
+            }
+        }
+    )* };
+}
+
+choices! {
+    /// Which frames the mission key authenticates.
+    Authenticate "lowercase" {
+        /// Frames from the surface to the vehicle.
+        Down,
+        /// Frames of both directions.
+        All,
+    }
+
+    /// The make of modem, or the network that stands for one.
+    ModemKind "lowercase" {
+        /// EvoLogics S2C.
+        S2c,
+        /// WHOI Micromodem.
+        Micromodem,
+        /// A modem that passes bytes on as they are.
+        Transparent,
+        /// Frames in a TCP stream.
+        Tcp,
+        /// Frames in UDP datagrams.
+        Udp,
+    }
+
+    /// How an S2C modem carries bulk data.
+    S2cMode "lowercase" {
+        /// In bursts; the modem does half duplex and retransmits by itself.
+        Burst,
+        /// In instant messages alone, in turns that the surface grants.
+        #[strum(serialize = "im")]
+        Instant,
+    }
+
+    /// How the map is sent.
+    MapStream "kebab-case" {
+        /// Changes since the last acknowledged state.
+        Delta,
+        /// The whole map as a PNG whenever it has changed, for comparison.
+        WholePng,
+    }
+
+    /// Which cells of the map are sent.
+    MapCells "lowercase" {
+        /// Every cell.
+        Fine,
+        /// Every fourth cell in both directions.
+        Coarse,
+    }
+
+    /// How the weight of a new label enters the sampler.
+    BirthRule "lowercase" {
+        /// As the paper's equation is written.
+        Literal,
+        /// Divided by the size of the vocabulary.
+        Collapsed,
+        /// As in the program ROST.
+        Rost,
+    }
+
+    /// The driver of the autopilot.
+    AutopilotKind "lowercase" {
+        /// No autopilot.
+        None,
+        /// A simulated vehicle.
+        Rehearsal,
+        /// ArduSub or ArduRover.
+        Mavlink,
+        /// NMEA 0183 sentences.
+        Nmea,
+        /// NMEA 0183 sentences that are appended to a file.
+        Log,
+    }
+
+    /// What the operator of a rehearsal does.
+    OperatorScript "lowercase" {
+        /// Orders at fixed times.
+        Scripted,
+        /// The same orders within a fence and limits.
+        Fenced,
+        /// No orders.
+        None,
+    }
+}
+
+impl From<MapCells> for CellBand {
+    fn from(cells: MapCells) -> Self {
+        match cells {
+            MapCells::Fine => Self::Fine,
+            MapCells::Coarse => Self::Coarse,
+        }
+    }
+}

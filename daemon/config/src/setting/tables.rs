@@ -1,0 +1,91 @@
+//! Shares by class, and the order of the background streams.
+
+use super::{Setting, different, read_different, unit};
+use crate::key::Rule;
+use scenecast_protocol::map::LayerSet;
+use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class, Shares};
+use serde_json::json;
+use toml::{Table, Value};
+
+pub(super) fn write<'a>(members: impl Iterator<Item = (&'a str, u8)>) -> Value {
+    Value::Table(members.map(|(name, percent)| (name.to_owned(), percent.write())).collect::<Table>())
+}
+
+pub(super) fn allowed(names: &[&str], rule: &Rule) -> String {
+    let (low, high) = rule.range;
+    format!("a whole number from {low} to {high}{} for each of {}", unit(rule), names.join(", "))
+}
+
+pub(super) fn schema(names: &[&str], rule: &Rule) -> serde_json::Value {
+    let members: serde_json::Map<String, serde_json::Value> =
+        names.iter().map(|name| ((*name).to_owned(), u8::schema(rule))).collect();
+    json!({ "type": "object", "properties": members, "additionalProperties": false })
+}
+
+/// A class that is not in the table keeps its share.
+impl Setting for Shares {
+    fn read(value: &Value, rule: &Rule) -> Option<Self> {
+        let mut shares = Self::default();
+        for (name, percent) in value.as_table()? {
+            shares.set(Some(name), percent, rule)?;
+        }
+        Some(shares)
+    }
+
+    fn write(&self) -> Value {
+        write(Class::SHARED.map(Class::name).into_iter().zip(self.0))
+    }
+
+    fn allowed(rule: &Rule) -> String {
+        allowed(&Self::members(), rule)
+    }
+
+    fn schema(rule: &Rule) -> serde_json::Value {
+        schema(&Self::members(), rule)
+    }
+
+    fn members() -> Vec<&'static str> {
+        Class::SHARED.map(Class::name).to_vec()
+    }
+
+    fn set(&mut self, member: Option<&str>, value: &Value, rule: &Rule) -> Option<()> {
+        match member {
+            Some(name) => {
+                let at = Class::SHARED.iter().position(|class| class.name() == name)?;
+                *self.0.get_mut(at)? = u8::read(value, rule)?;
+            }
+            None => *self = Self::read(value, rule)?,
+        }
+        Some(())
+    }
+}
+
+/// The streams that vehicles have, by their names.
+fn streams() -> Vec<(BackgroundStream, String)> {
+    let layers = LayerSet::default();
+    BackgroundStream::all(&layers).map(|stream| (stream, stream.name_in(&layers))).collect()
+}
+
+fn stream_names() -> Vec<String> {
+    streams().into_iter().map(|(_, name)| name).collect()
+}
+
+impl Setting for BackgroundOrder {
+    fn read(value: &Value, _: &Rule) -> Option<Self> {
+        let streams = streams();
+        let stream = |v: &Value| streams.iter().find(|(_, name)| Some(name.as_str()) == v.as_str()).map(|&(s, _)| s);
+        Self::new(&read_different(value, stream)?)
+    }
+
+    fn write(&self) -> Value {
+        Value::Array(self.names(&LayerSet::default()).into_iter().map(Value::String).collect())
+    }
+
+    fn allowed(_: &Rule) -> String {
+        format!("a list of different words of {}", stream_names().join(", "))
+    }
+
+    fn schema(_: &Rule) -> serde_json::Value {
+        different(json!({ "enum": stream_names() }))
+    }
+}
