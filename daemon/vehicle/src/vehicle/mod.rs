@@ -223,6 +223,7 @@ impl Vehicle {
                     self.publisher.handle_delivered(id);
                 }
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
+                VehicleEvent::Oversized(fault) => tracing::error!("{fault}: it is left out of this frame"),
             }
         }
     }
