@@ -2,15 +2,14 @@
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
-use scene_model::exemplars::ExemplarPatch;
 use scenecast_core::TangentPlane;
 use scenecast_drivers::autopilot::{Autopilot, Goal};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle, VehicleOutput};
-use std::collections::{BTreeMap, VecDeque};
+use scenecast_vehicle::{AppliedSlot, MapUpdate, SharedExemplars, Vehicle, VehicleOutput};
+use std::collections::VecDeque;
 
 /// An older fix does not tell the autopilot where it is, seconds.
 const MAX_FIX_AGE_S: f64 = 60.0;
@@ -212,7 +211,7 @@ impl VehicleHost {
         &mut self,
         pose: Option<CameraPose>,
         update: &MapUpdate,
-        exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
+        exemplars: SharedExemplars,
         now: Instant,
     ) {
         if let Some(pose) = pose {
@@ -236,7 +235,7 @@ impl VehicleHost {
     }
 
     /// The mapper has the best exemplars of each label, the best first.
-    pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<ExemplarPatch>>) {
+    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
         self.link.end_mut().handle_exemplars(exemplars);
     }
 

@@ -3,13 +3,11 @@
 use super::checkpoint::CheckpointFile;
 use super::clock::Clock;
 use super::journal::Folder;
-use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
-use scenecast_vehicle::{MapUpdate, Mapper};
-use std::collections::BTreeMap;
+use scenecast_vehicle::{MapUpdate, Mapper, SharedExemplars};
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
@@ -37,7 +35,7 @@ pub(super) struct Seen {
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
-    pub(super) exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
+    pub(super) exemplars: SharedExemplars,
 }
 
 /// The thread's two ends.
@@ -113,7 +111,7 @@ impl Work {
     fn run(mut self, mut incoming: mpsc::UnboundedReceiver<ToMapper>) {
         let mut is_heard = true;
         if self.mapper.last_s().is_some() {
-            is_heard = self.tell(FromMapper::Seen(self.seen(None)));
+            is_heard = self.tell_current(None);
         }
         while is_heard && let Some(order) = incoming.blocking_recv() {
             match order {
@@ -121,7 +119,7 @@ impl Work {
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
                 // A frame that the frame rate leaves out changes nothing but where the vehicle is.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_heard = self.tell(FromMapper::Seen(self.seen(Some(*frame))));
+                    is_heard = self.tell_current(Some(*frame));
                 }
                 ToMapper::Frame(frame) => {
                     let told = self.see(*frame);
@@ -138,19 +136,26 @@ impl Work {
         self.outgoing.blocking_send(what).is_ok()
     }
 
+    /// Sends the map as it is, without a new frame in it.
+    fn tell_current(&mut self, frame: Option<RecordedFrame>) -> bool {
+        let update = self.mapper.current();
+        let seen = self.seen(frame, update);
+        self.tell(FromMapper::Seen(seen))
+    }
+
     fn see(&mut self, frame: RecordedFrame) -> FromMapper {
         match frame.image() {
             Ok(image) => {
                 let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
-                self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
-                FromMapper::Seen(self.seen(Some(frame)))
+                let update = self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
+                FromMapper::Seen(self.seen(Some(frame), update))
             }
             Err(problem) => FromMapper::Missed(problem),
         }
     }
 
-    fn seen(&self, frame: Option<RecordedFrame>) -> Seen {
-        Seen { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
+    fn seen(&mut self, frame: Option<RecordedFrame>, update: MapUpdate) -> Seen {
+        Seen { frame, update, exemplars: self.mapper.shared_exemplars() }
     }
 }
 

@@ -18,7 +18,7 @@ mod vehicle;
 pub use assemble::assemble;
 pub use checkpoint::{NoCheckpoint, Restored};
 pub use guard::{Guard, Habits};
-pub use mapper::{MapUpdate, Mapper};
+pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, Navigator};
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, LastPlace, Vehicle, VehicleOutput};

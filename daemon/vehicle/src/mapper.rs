@@ -13,9 +13,13 @@ use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Figure, Settings};
 use scenecast_protocol::map::{Cell, LayerId};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Representative images kept a label.
 const EXEMPLARS_KEPT: usize = 4;
+
+/// The best exemplars of each label that has any, the best first.
+pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
 
 /// The label map after a camera frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +45,8 @@ pub struct Mapper {
     pub(super) model: SceneModel,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
+    /// The exemplars that were given out last.
+    shared: SharedExemplars,
     pub(super) relief: Relief,
     refine_words_per_s: f64,
     /// Camera frames a second that are taken at most; none: every one.
@@ -96,6 +102,7 @@ impl Mapper {
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
+            shared: SharedExemplars::default(),
             relief: Relief::default(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
@@ -149,17 +156,20 @@ impl Mapper {
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.model.label_map();
-        self.book.publish(&self.flat);
+        let published = self.book.publish(&self.flat);
         let (cell_m, metres_per_pixel) = (self.cell_m, camera.metres_per_pixel);
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
         judge.review(&mut self.exemplars);
         judge.offer(&mut self.exemplars, image, pose, t_s);
-        self.current()
+        self.update(&published)
     }
 
     /// The map as it was published last.
     pub fn current(&self) -> MapUpdate {
-        let published = self.book.published(&self.flat);
+        self.update(&self.book.published(&self.flat))
+    }
+
+    fn update(&self, published: &[PublishedCell]) -> MapUpdate {
         let place = |c: &PublishedCell| Cell::new(c.x, c.y);
         let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
         let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
@@ -198,11 +208,19 @@ impl Mapper {
         self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
     }
 
-    /// The images of all labels that have some.
-    pub fn gallery(&self) -> BTreeMap<u8, Vec<ExemplarPatch>> {
-        let labels = self.book.labels();
-        let images = labels.map(|label| (label, self.exemplars(label).to_vec()));
-        images.filter(|(_, images)| !images.is_empty()).collect()
+    /// The best exemplars of all labels. The same map is given out until an exemplar comes, goes or changes its rank;
+    /// scores are as they were then.
+    pub fn shared_exemplars(&mut self) -> SharedExemplars {
+        let now = || self.book.labels().map(|l| (l, self.exemplars(l))).filter(|(_, patches)| !patches.is_empty());
+        let is_same = |a: &[ExemplarPatch], b: &[ExemplarPatch]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(&a.patch, &b.patch))
+        };
+        let is_current = now().count() == self.shared.len()
+            && now().zip(self.shared.iter()).all(|((l, patches), (k, last))| l == *k && is_same(patches, last));
+        if !is_current {
+            self.shared = Arc::new(now().map(|(label, patches)| (label, patches.to_vec())).collect());
+        }
+        self.shared.clone()
     }
 
     /// Epoch of the label ids.

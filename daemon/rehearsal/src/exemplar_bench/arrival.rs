@@ -152,7 +152,7 @@ impl Water {
         )?;
         let window = Duration::from_secs_f64(config.link.budget_window_s);
         let mut vehicle = VehicleHost::new(vehicle, channel_station(modem, window, now), None);
-        vehicle.handle_exemplars(gallery(patches));
+        vehicle.handle_exemplars(Arc::new(gallery(patches)));
         Ok(Self {
             setting,
             now,

@@ -13,6 +13,7 @@ use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Frames across and along an image.
 const FRAMES: (u32, u32) = (4, 3);
@@ -93,7 +94,7 @@ pub fn patches(source: &Source, seed: u64) -> Result<Vec<RgbImage>, UserError> {
         mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
     }
     let of_label = |images: Vec<ExemplarPatch>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
-    Ok(mapper.gallery().into_values().flat_map(of_label).collect())
+    Ok(Arc::unwrap_or_clone(mapper.shared_exemplars()).into_values().flat_map(of_label).collect())
 }
 
 /// Measures the patches of all sources; the patches too.

@@ -1,5 +1,6 @@
 //! Pictures of labels: what the vehicle has, what the surface was shown of it, and what is asked for.
 
+use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use image::RgbImage;
 use scene_model::exemplars::ExemplarPatch as Picture;
@@ -43,7 +44,7 @@ struct Unasked {
 #[derive(Debug, Default)]
 pub(super) struct Gallery {
     /// By label, the best first.
-    pictures: BTreeMap<u8, Vec<Picture>>,
+    pictures: SharedExemplars,
     requests: ExemplarRequests,
     /// The run of the surface that asks.
     series: Option<u16>,
@@ -60,11 +61,11 @@ impl Gallery {
     pub(super) const MAX_REQUESTS: usize = 8;
 
     /// The pictures of each label from now on, the best first.
-    pub(super) fn set_pictures(&mut self, pictures: BTreeMap<u8, Vec<Picture>>) {
+    pub(super) fn set_exemplars(&mut self, pictures: SharedExemplars) {
         self.pictures = pictures;
     }
 
-    pub(super) fn pictures(&self) -> &BTreeMap<u8, Vec<Picture>> {
+    pub(super) fn exemplars(&self) -> &SharedExemplars {
         &self.pictures
     }
 

@@ -18,19 +18,18 @@ pub use durable::Durable;
 pub use last_place::LastPlace;
 
 use super::guard::Habits;
-use super::mapper::MapUpdate;
+use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::steering::Steering;
 use gallery::Gallery;
 use guidance::{Guidance, Situation};
 use publisher::MapPublisher;
-use scene_model::exemplars::ExemplarPatch;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
 use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
 use scenecast_protocol::map::LayerMask;
 use scenecast_protocol::time::Instant;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::time::Duration;
 
 /// Metres and seconds of use of the limits after which they are stored again.
@@ -198,8 +197,8 @@ impl Vehicle {
     }
 
     /// Takes the best exemplars of each label, the best first.
-    pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<ExemplarPatch>>) {
-        self.gallery.set_pictures(exemplars);
+    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
+        self.gallery.set_exemplars(exemplars);
         self.tend_gallery();
     }
 

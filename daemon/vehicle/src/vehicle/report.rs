@@ -1,15 +1,13 @@
 //! Read access to the vehicle: for its host, for reports, and for the status that it sends.
 
 use super::{Durable, Vehicle};
-use crate::Navigator;
-use scene_model::exemplars::ExemplarPatch;
+use crate::{Navigator, SharedExemplars};
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Settings, Utility};
 use scenecast_protocol::link::LinkStats;
 use scenecast_protocol::map::{Cell, LabelGrid, LayerSource};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode, VehicleStatus};
-use std::collections::BTreeMap;
 
 impl Vehicle {
     /// The state that the host stores at [`super::VehicleOutput::Persist`].
@@ -66,8 +64,8 @@ impl Vehicle {
     }
 
     /// The best patches of each label, as [`Self::handle_exemplars`] got them.
-    pub fn exemplars(&self) -> &BTreeMap<u8, Vec<ExemplarPatch>> {
-        self.gallery.pictures()
+    pub fn exemplars(&self) -> &SharedExemplars {
+        self.gallery.exemplars()
     }
 
     pub fn navigator(&self) -> &Navigator {
