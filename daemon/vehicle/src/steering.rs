@@ -183,7 +183,7 @@ impl Steering {
     /// The last place that lies straight ahead, at most `most` steps away.
     fn waypoint(&mut self, from: Point, at: Node, most: usize, left_m: f64) -> Course {
         let Some(&first) = self.plan.front() else {
-            return if left_m.is_finite() { Course::UsedUp } else { Course::There };
+            return self.without_plan(at, left_m);
         };
         let entry = self.grounds.lattice().place(at);
         if distance(from, entry) > self.grounds.lattice().step_m()
@@ -210,6 +210,16 @@ impl Steering {
         // It is popped when it is reached, so that the rest of the plan follows it.
         self.plan.push_front(ahead);
         Course::Go(self.grounds.lattice().place(ahead))
+    }
+
+    /// The course where the planner has no waypoint.
+    fn without_plan(&self, at: Node, left_m: f64) -> Course {
+        let has_return = self.grounds.return_paths().is_some_and(|paths| paths.metres[at].is_finite());
+        match (left_m.is_finite(), has_return) {
+            (true, _) => Course::UsedUp,
+            (false, true) => Course::There,
+            (false, false) => Course::NoWay,
+        }
     }
 
     /// The next waypoint on the way home.

@@ -153,6 +153,9 @@ fn activity(s: &VehicleStatus) -> String {
         VehicleMode::Abort => "aborted",
         VehicleMode::Done => "done",
     };
+    if s.has_arrived() {
+        return format!("{mode}: arrived");
+    }
     s.reason.name().map_or(mode.to_owned(), |reason| format!("{mode}: {reason}"))
 }
 

@@ -245,7 +245,7 @@ impl Guidance {
                 Some(self.go((to, path), VehicleMode::Survey, ModeReason::Survey, known.navigator))
             }
             Course::UsedUp => self.go_back(at, self.guard.tighter(), known.navigator),
-            Course::There => self.stay(VehicleMode::Hold, ModeReason::NoPath),
+            Course::There => self.stay(VehicleMode::Hold, ModeReason::Survey),
             Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
         }
     }

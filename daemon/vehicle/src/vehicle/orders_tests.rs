@@ -187,6 +187,19 @@ proptest! {
     }
 }
 
+#[test]
+fn a_survey_of_one_place_ends_as_arrived() {
+    let mut config = Config::default();
+    (config.camera.width_px, config.camera.height_px) = (400, 400);
+    let width = 400.0 * config.camera.metres_per_pixel;
+    let area = Area { west: 0.0, south: 0.0, east: width, north: 1.5 * width };
+    let profile = profile(&config);
+    let mut vehicle = crate::assemble(&config, None, profile, area, Durable::default(), 1, Instant::ZERO).unwrap();
+    vehicle.steer(Instant::ZERO);
+    assert_eq!(vehicle.mode(), (VehicleMode::Hold, ModeReason::Survey));
+    assert!(vehicle.status(Instant::ZERO).has_arrived());
+}
+
 /// A fence from the origin to (20, 20) m with a return point at (5, 5) m.
 fn small_fence() -> Fence {
     let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
