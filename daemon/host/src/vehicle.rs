@@ -75,7 +75,7 @@ impl VehiclePilot {
         let autopilot = &mut self.pilot.autopilot;
         while let Some(step) = autopilot.poll_step() {
             vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
-            vehicle.handle_unseen(step.unseen);
+            vehicle.handle_unmeasured(step.unseen);
         }
         vehicle.set_autopilot_silent(autopilot.health(now).is_silent());
         let navigator = vehicle.navigator();

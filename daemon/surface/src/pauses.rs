@@ -6,7 +6,7 @@ use std::time::Duration;
 /// The longest pause between two frames of a vehicle lately, whatever the frames of one turn do in between.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pauses {
-    heard: Option<Instant>,
+    last_frame: Option<Instant>,
     longest: Option<Duration>,
 }
 
@@ -16,8 +16,8 @@ impl Pauses {
     /// A pause up to this length is as usual as it is long.
     const SHORT: Duration = Duration::from_secs(60);
 
-    pub fn hear(&mut self, now: Instant) {
-        let Some(last) = self.heard.replace(now) else { return };
+    pub fn handle_frame(&mut self, now: Instant) {
+        let Some(last) = self.last_frame.replace(now) else { return };
         let pause = now.since(last);
         self.longest = Some(match self.longest {
             // What is long and far beyond the usual was an outage, and makes the next one hardly more usual.
@@ -42,7 +42,7 @@ mod tests {
         for turn in 0..50 {
             for _ in 0..frames {
                 now = now + frame;
-                pauses.hear(now);
+                pauses.handle_frame(now);
             }
             let expected = pauses.expected().unwrap().as_secs_f64();
             if turn > 10 {
@@ -64,8 +64,8 @@ mod tests {
     #[test]
     fn an_outage_does_not_make_silence_usual() {
         let mut pauses = Pauses::default();
-        (1..=20).for_each(|i| pauses.hear(Instant::ZERO + Duration::from_secs(10) * i));
-        pauses.hear(Instant::ZERO + Duration::from_secs(4000));
+        (1..=20).for_each(|i| pauses.handle_frame(Instant::ZERO + Duration::from_secs(10) * i));
+        pauses.handle_frame(Instant::ZERO + Duration::from_secs(4000));
         assert_eq!(pauses.expected(), Some(Duration::from_secs(60)));
     }
 }

@@ -35,7 +35,7 @@ impl Surface {
     }
 
     /// A vehicle that has restarted does not know what it was asked.
-    pub(super) fn ask_again(&mut self, vehicle: Address, now: Instant) {
+    pub(super) fn request_again(&mut self, vehicle: Address, now: Instant) {
         let wanted = self.desks.get(&vehicle).map(Desk::wanted).filter(|r| !r.wanted.is_empty());
         if let Some(requests) = wanted {
             // It was taken before.
@@ -43,7 +43,7 @@ impl Surface {
         }
     }
 
-    pub(super) fn handle_settled(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
+    pub(super) fn handle_decision(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
         let refused = |s: &SlotProgress| s.id == slot && matches!(s.status, OrderStatus::Refused(_));
         let is_refused = self.link.vehicle(vehicle).is_some_and(|v| v.slots().any(refused));
         if let Some(desk) = self.desks.get_mut(&vehicle).filter(|_| slot == SlotId::Requests && is_refused) {

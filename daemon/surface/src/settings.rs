@@ -93,19 +93,19 @@ fn choice<T>(
 impl SettingsOrder {
     /// Settings as they would be typed, with the names of these layers.
     pub fn of(settings: &Settings, layers: &LayerSet) -> Self {
-        fn told<T, U>(change: Change<T>, configured: U, tell: impl FnOnce(T) -> U) -> Option<U> {
+        fn typed<T, U>(change: Change<T>, configured: U, format: impl FnOnce(T) -> U) -> Option<U> {
             match change {
                 Change::Keep => None,
                 Change::Configured => Some(configured),
-                Change::To(value) => Some(tell(value)),
+                Change::To(value) => Some(format(value)),
             }
         }
         let text = |name: &str| name.to_owned();
-        let figure = |change| told(change, 0.0, Figure::value);
+        let figure = |change| typed(change, 0.0, Figure::value);
         Self {
-            planner: told(settings.planner, String::new(), |p| text(p.name())),
-            cells: told(settings.cells, String::new(), |c| text(c.name())),
-            layers: told(settings.layers, String::new(), |mask| layer_names(mask, layers)),
+            planner: typed(settings.planner, String::new(), |p| text(p.name())),
+            cells: typed(settings.cells, String::new(), |c| text(c.name())),
+            layers: typed(settings.layers, String::new(), |mask| layer_names(mask, layers)),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -149,8 +149,8 @@ impl SettingsDesk {
     }
 
     /// The vehicle has decided about the last order.
-    pub(super) fn handle_settled(&mut self, life: OrderStatus) {
-        if life == OrderStatus::Applied {
+    pub(super) fn handle_decision(&mut self, status: OrderStatus) {
+        if status == OrderStatus::Applied {
             (self.in_force, self.is_unsure) = (self.asked, false);
         }
     }
@@ -224,16 +224,16 @@ mod tests {
         send(&mut desk, r#"{"alpha": 0.5}"#, None);
         assert_eq!(desk.in_force(), Some(&Settings::default()));
         send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
-        desk.handle_settled(OrderStatus::Applied);
+        desk.handle_decision(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
         send(&mut desk, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
         send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
         assert_eq!(desk.in_force(), None, "the vehicle may follow the layers already");
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
-        desk.handle_settled(refused);
+        desk.handle_decision(refused);
         send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
         assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        desk.handle_settled(OrderStatus::Applied);
+        desk.handle_decision(OrderStatus::Applied);
         assert_eq!(desk.in_force(), Some(desk.asked()));
     }
 }

@@ -97,7 +97,7 @@ impl Surface {
     }
 
     /// Frames that no known vehicle has sent, or that could not be read.
-    pub fn strangers(&self) -> u64 {
+    pub fn unknown_senders(&self) -> u64 {
         self.link.unknown_senders()
     }
 
@@ -106,7 +106,7 @@ impl Surface {
         self.link.assume_budget_spent(now);
     }
 
-    /// The next thing to tell the host.
+    /// The next thing to format the host.
     pub fn poll_output(&mut self) -> Option<SurfaceOutput> {
         self.outputs.pop_front()
     }
@@ -174,7 +174,7 @@ impl Surface {
     pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
         let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
         let order = order.read(view.layers())?;
-        let last = self.life_of(vehicle, SlotId::Settings);
+        let last = self.order_status(vehicle, SlotId::Settings);
         let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
         self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
@@ -188,7 +188,7 @@ impl Surface {
         f64::from(said.unwrap_or(self.link.budget_bps())) * f64::from(map) / 100.0
     }
 
-    /// The settings of the scene model that tell most of those whose stream takes at most `bits_per_s`.
+    /// The settings of the scene model that format most of those whose stream takes at most `bits_per_s`.
     pub fn fit(&self, cell_m: f64, bits_per_s: f64) -> Result<Fit, NoRow> {
         self.tuning.fit(cell_m, bits_per_s)
     }
@@ -206,7 +206,7 @@ impl Surface {
     }
 
     /// How far the last order of a slot has come.
-    fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
+    fn order_status(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
         self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
@@ -314,7 +314,7 @@ impl Surface {
         }
         let link = &self.link;
         let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
-        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.hear(now));
+        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.handle_frame(now));
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
@@ -325,20 +325,20 @@ impl Surface {
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => {
-                self.ask_again(vehicle, now);
+                self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
             SurfaceEvent::SlotDecided(vehicle, slot) => {
-                let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
-                let (life, version) = (settled.status, settled.version);
+                let decided = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
+                let (status, version) = (decided.status, decided.version);
                 let desk = self.desks.get_mut(&vehicle)?;
                 if slot == SlotId::Settings {
-                    desk.settings.handle_settled(life);
+                    desk.settings.handle_decision(status);
                 }
-                if life == OrderStatus::Applied {
+                if status == OrderStatus::Applied {
                     desk.handle_applied(slot, version);
                 }
-                self.handle_settled(vehicle, slot, now);
+                self.handle_decision(vehicle, slot, now);
                 Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {

@@ -15,7 +15,7 @@ const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
 
 /// Why a checkpoint is not gone on from.
 #[derive(Debug, thiserror::Error)]
-pub enum NoCheckpoint {
+pub enum RestoreError {
     /// Not a checkpoint, of another version, or damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
@@ -34,7 +34,7 @@ pub enum NoCheckpoint {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Kept<M, B, W, E, R> {
+struct Content<M, B, W, E, R> {
     lineage: u64,
     last_s: Option<f64>,
     model: M,
@@ -53,7 +53,7 @@ pub struct Restored {
 impl Mapper {
     /// Everything as bytes, for [`Mapper::restore`]; `lineage` says which mission it belongs to.
     pub fn save(&self, lineage: u64) -> Vec<u8> {
-        let kept = Kept {
+        let kept = Content {
             lineage,
             last_s: self.last_s,
             model: self.model.save(),
@@ -67,20 +67,20 @@ impl Mapper {
 
     /// Goes on from a checkpoint, if it was made with the parameters that are configured. Priors may differ: they are those
     /// of the checkpoint until [`Mapper::tune`] says which are in force.
-    pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
+    pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, RestoreError> {
         let content = ENVELOPE.open(bytes)?;
-        let kept: Kept<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
-            postcard::from_bytes(content).map_err(|_| NoCheckpoint::Inconsistent)?;
+        let kept: Content<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
+            postcard::from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
         let (words, configured_words) = (kept.words.config(), fresh.extractor.measures());
         if *model.config() != configured || words != configured_words.config() {
-            return Err(NoCheckpoint::OtherParameters);
+            return Err(RestoreError::OtherParameters);
         }
         if config.scene.vocabulary.is_some() && !is_same(&kept.words, &configured_words) {
-            return Err(NoCheckpoint::OtherParameters);
+            return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
         mapper.extractor = WordExtractor::from_measures(kept.words);
@@ -148,9 +148,9 @@ mod tests {
             assert_eq!((again.priors(), again.current()), (whole.priors(), whole.current()));
             again.tune(&settings);
             assert_eq!(again.current(), whole.current());
-            let mut went_on = Mapper::restore(&config(&[]), None, &whole.save(7)).unwrap().mapper;
-            went_on.tune(&settings);
-            assert_eq!(frame(&mut again, 9), frame(&mut went_on, 9));
+            let mut continued = Mapper::restore(&config(&[]), None, &whole.save(7)).unwrap().mapper;
+            continued.tune(&settings);
+            assert_eq!(frame(&mut again, 9), frame(&mut continued, 9));
         }
         let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), None, &whole.save(7)).unwrap().mapper;
         other.tune(&Settings::default());
@@ -177,14 +177,14 @@ mod tests {
         let mut mapper = Mapper::new(&config(&[]), None, 0, 1).unwrap();
         frame(&mut mapper, 0);
         let bytes = mapper.save(1);
-        let said =
+        let error =
             |sets: &[&str], bytes: &[u8]| Mapper::restore(&config(sets), None, bytes).err().map(|e| e.to_string());
-        assert_eq!(said(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
+        assert_eq!(error(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
         let other = Some("it was made with other parameters of the scene model".to_owned());
-        assert_eq!(said(&["scene.max_labels=20"], &bytes), other);
-        assert_eq!(said(&["scene.cell_m=0.5"], &bytes), other);
-        assert_eq!(said(&[], &bytes[..bytes.len() / 2]), Some("cut off or damaged".to_owned()));
-        assert_eq!(said(&[], b"hello"), Some("a file of another kind".to_owned()));
+        assert_eq!(error(&["scene.max_labels=20"], &bytes), other);
+        assert_eq!(error(&["scene.cell_m=0.5"], &bytes), other);
+        assert_eq!(error(&[], &bytes[..bytes.len() / 2]), Some("cut off or damaged".to_owned()));
+        assert_eq!(error(&[], b"hello"), Some("a file of another kind".to_owned()));
         for at in (20..bytes.len() - 4).step_by(bytes.len() / 200) {
             let mut content = bytes[20..bytes.len() - 4].to_vec();
             content[at - 20] ^= 0x41;

@@ -46,7 +46,7 @@ pub struct Guard {
     pub used_s: f64,
     /// A breach, until the operator's next order or fence; silence that made the vehicle come up.
     pub latched: ModeReason,
-    heard: Instant,
+    last_received: Instant,
     now: Instant,
 }
 
@@ -54,10 +54,10 @@ pub struct Guard {
 const RESERVE: f64 = 0.03;
 
 impl Guard {
-    /// Watches from `now`; the surface counts as heard then.
+    /// Watches from `now`; the surface counts as last_received then.
     pub fn new(habits: Habits, now: Instant) -> Self {
         let (limits, order, latched) = (Limits::default(), Constraints::default(), ModeReason::Survey);
-        Self { habits, limits, order, used_m: 0.0, used_s: 0.0, latched, heard: now, now }
+        Self { habits, limits, order, used_m: 0.0, used_s: 0.0, latched, last_received: now, now }
     }
 
     pub fn handle_time(&mut self, now: Instant) {
@@ -66,7 +66,7 @@ impl Guard {
     }
 
     /// The vehicle went so far.
-    pub fn handle_way(&mut self, metres: f64) {
+    pub fn handle_travel(&mut self, metres: f64) {
         self.used_m += metres;
     }
 
@@ -76,8 +76,8 @@ impl Guard {
     }
 
     /// A frame of the surface was taken.
-    pub fn handle_surface_heard(&mut self, at: Instant) {
-        self.heard = self.heard.max(at);
+    pub fn handle_received(&mut self, at: Instant) {
+        self.last_received = self.last_received.max(at);
     }
 
     /// The vehicle is outside of where it may be.
@@ -88,7 +88,7 @@ impl Guard {
     }
 
     /// The operator has decided anew.
-    pub fn forgive(&mut self) {
+    pub fn clear_breach(&mut self) {
         self.latched = ModeReason::Survey;
     }
 
@@ -131,9 +131,9 @@ impl Guard {
     pub fn stop(&mut self, home_m: f64) -> Option<Stop> {
         let silence_s = self.limits.silence_s.map_or(self.habits.silence_s, f64::from);
         let on_silence = self.limits.on_silence.unwrap_or(self.habits.on_silence);
-        let silent = self.now.since(self.heard).as_secs_f64() > silence_s;
+        let silent = self.now.since(self.last_received).as_secs_f64() > silence_s;
         if silent && on_silence == Reaction::Surface {
-            // It does not dive again because somebody is heard: up there are ships.
+            // It does not dive again because somebody is last_received: up there are ships.
             self.handle_breach(ModeReason::Silence);
         }
         if self.order.abort {
@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(guard.stop(0.0), None);
         guard.handle_time(at(61.0));
         assert_eq!(guard.stop(0.0), Some((Reaction::Hold, ModeReason::Silence)));
-        guard.handle_surface_heard(at(61.0));
+        guard.handle_received(at(61.0));
         assert_eq!(guard.stop(0.0), None);
     }
 
@@ -180,9 +180,9 @@ mod tests {
             Guard::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
         guard.handle_time(at(61.0));
         assert_eq!(guard.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
-        guard.handle_surface_heard(at(62.0));
+        guard.handle_received(at(62.0));
         assert_eq!(guard.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
-        guard.forgive();
+        guard.clear_breach();
         assert_eq!(guard.stop(0.0), None);
     }
 
@@ -202,7 +202,7 @@ mod tests {
         let mut guard = Guard::new(Habits::default(), at(0.0));
         guard.set_limits(Limits { distance_m: Some(1000), time_s: Some(1000), ..Limits::default() });
         assert_eq!(guard.tighter(), ModeReason::Time, "a thousand seconds are five hundred metres");
-        guard.handle_way(900.0);
+        guard.handle_travel(900.0);
         assert_eq!(guard.stop(80.0), Some((Reaction::Return, ModeReason::Distance)));
         assert_eq!(guard.stop(10.0), None);
         guard.handle_time(at(960.0));

@@ -16,7 +16,7 @@ mod steering;
 mod vehicle;
 
 pub use assemble::assemble;
-pub use checkpoint::{NoCheckpoint, Restored};
+pub use checkpoint::{RestoreError, Restored};
 pub use guard::{Guard, Habits};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, Navigator};

@@ -186,9 +186,9 @@ impl Mapper {
     }
 
     /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.
-    pub fn resume(&mut self, epoch: u8, told: u8) {
+    pub fn resume(&mut self, epoch: u8, published: u8) {
         if self.book.epoch() == epoch {
-            self.book.resume(told);
+            self.book.resume(published);
         } else {
             self.book.begin_epoch(epoch);
         }

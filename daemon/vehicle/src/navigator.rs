@@ -26,7 +26,7 @@ pub struct Navigator {
     placement: Option<Placement>,
     last_fix: Option<Instant>,
     /// Whether it has been elsewhere than it knows: the first fix tells where on its map it is.
-    is_lost: bool,
+    is_displaced: bool,
     /// Fixes that were refused though each agreed with the one before, and by how much the last one was off.
     refused: (u32, (f64, f64)),
 }
@@ -38,7 +38,7 @@ pub enum FixVerdict {
     /// It is of a time that the vehicle does not remember.
     TooOld,
     /// It says what cannot be: no number, a place beyond every mission.
-    Absurd,
+    Invalid,
     /// It is too far from where the vehicle can be.
     Outlier,
 }
@@ -56,15 +56,15 @@ impl Navigator {
     /// Mahalanobis distance squared, two degrees of freedom, that one of a thousand good fixes exceeds.
     const GATE: f64 = 13.8;
     /// So many refused fixes in a row that agree with each other are believed.
-    const AGREEING: u32 = 4;
+    const MIN_AGREEING: u32 = 4;
     /// The placement is told anew when it has moved by so much, metres.
-    const WORTH_TELLING_M: f64 = 0.2;
+    const MIN_SHIFT_M: f64 = 0.2;
     /// How far it may have drifted while it was off, metres.
     const RESUMED_SIGMA_M: f64 = 50.0;
     /// Farther from the origin is no mission, metres.
     const MAX_DISTANCE_M: f64 = 800_000.0;
 
-    /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of way.
+    /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of path.
     pub fn new(x_m: f64, y_m: f64, depth_m: f64, drift: f64) -> Self {
         Self {
             at: MapPoint { x_m, y_m },
@@ -74,7 +74,7 @@ impl Navigator {
             odometer: Odometer::default(),
             placement: None,
             last_fix: None,
-            is_lost: false,
+            is_displaced: false,
             refused: (0, (0.0, 0.0)),
         }
     }
@@ -85,13 +85,13 @@ impl Navigator {
         let mut navigator = Self::new(at.x_m, at.y_m, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
         let world = Placement::map_to_world(last.placement(), at);
         navigator.filter.shift(world.east_m - at.x_m, world.north_m - at.y_m);
-        (navigator.placement, navigator.is_lost) = (last.placement(), true);
+        (navigator.placement, navigator.is_displaced) = (last.placement(), true);
         navigator
     }
 
     /// At its start within a standard deviation, metres.
     pub fn with_start_sigma(mut self, sigma_m: f64) -> Self {
-        self.filter.doubt(sigma_m);
+        self.filter.add_uncertainty(sigma_m);
         self
     }
 
@@ -147,24 +147,24 @@ impl Navigator {
             return;
         }
         (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
-        let (x, y) = self.filter.handle_way(dx_m, dy_m);
+        let (x, y) = self.filter.handle_travel(dx_m, dy_m);
         self.at = MapPoint { x_m: self.at.x_m + x, y_m: self.at.y_m + y };
-        self.odometer.handle_way(dx_m, dy_m, now, Self::MEMORY_S);
+        self.odometer.handle_travel(dx_m, dy_m, now, Self::MEMORY_S);
     }
 
     /// It may have gone so far in any direction without a word of its sensors.
-    pub fn handle_unseen_way(&mut self, metres: f64) {
+    pub fn handle_unmeasured(&mut self, metres: f64) {
         // A standard deviation in each of two directions, of which the distance is the mean square.
-        self.filter.doubt(metres.max(0.0) / std::f64::consts::SQRT_2);
+        self.filter.add_uncertainty(metres.max(0.0) / std::f64::consts::SQRT_2);
     }
 
     /// The position in the map's frame is known from elsewhere, as in a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        self.is_lost = false;
+        self.is_displaced = false;
         let (dx, dy) = (x_m - self.at.x_m, y_m - self.at.y_m);
         (self.at, self.heading_rad, self.depth_m) = (MapPoint { x_m, y_m }, heading_rad, depth_m);
         self.filter.shift(dx, dy);
-        self.odometer.handle_way(dx, dy, now, Self::MEMORY_S);
+        self.odometer.handle_travel(dx, dy, now, Self::MEMORY_S);
     }
 
     /// A fix of where in the world the vehicle was at `taken`.
@@ -172,42 +172,42 @@ impl Navigator {
         let (x_m, y_m) = at.xy();
         let is_place = x_m.abs() <= Self::MAX_DISTANCE_M && y_m.abs() <= Self::MAX_DISTANCE_M;
         if !is_place || !sigma_m.is_finite() || sigma_m < 0.0 {
-            return FixVerdict::Absurd;
+            return FixVerdict::Invalid;
         }
         let Some(since) = self.odometer.since(taken.min(now), now, Self::MEMORY_S) else { return FixVerdict::TooOld };
         let sigma = sigma_m.clamp(0.1, 1e4);
         let expected = self.filter.expect(&since, sigma);
         let off = (x_m - expected.at.0, y_m - expected.at.1);
-        if expected.distance2(off) > Self::GATE && !self.believes_anyway(off, sigma) {
+        if expected.distance2(off) > Self::GATE && !self.confirms_refused(off, sigma) {
             return FixVerdict::Outlier;
         }
         self.refused = (0, (0.0, 0.0));
         self.filter.correct(&since, (x_m, y_m), sigma);
         self.last_fix = Some(now);
-        if std::mem::take(&mut self.is_lost) {
+        if std::mem::take(&mut self.is_displaced) {
             self.at = self.to_map(self.world());
         }
         self.place();
         FixVerdict::Used
     }
 
-    /// Fixes that are all off by the same are right, and the estimate was wrong: it is put in doubt.
-    fn believes_anyway(&mut self, off: (f64, f64), sigma: f64) -> bool {
+    /// Fixes that are all off by the same are right, and the estimate was wrong: it is put in add_uncertainty.
+    fn confirms_refused(&mut self, off: (f64, f64), sigma: f64) -> bool {
         let (row, before) = self.refused;
         let agrees = row > 0 && (off.0 - before.0).hypot(off.1 - before.1) < 4.0 * sigma + 1.0;
         let row = if agrees { row + 1 } else { 1 };
         self.refused = (row, off);
-        if row >= Self::AGREEING {
-            self.filter.doubt(off.0.hypot(off.1));
+        if row >= Self::MIN_AGREEING {
+            self.filter.add_uncertainty(off.0.hypot(off.1));
         }
-        row >= Self::AGREEING
+        row >= Self::MIN_AGREEING
     }
 
     fn place(&mut self) {
         let world = self.world();
         let origin = WorldPoint { east_m: world.east_m - self.at.x_m, north_m: world.north_m - self.at.y_m };
         let before = self.placement.map_or(WorldPoint::default(), |p| p.origin);
-        if before.distance_m(origin) >= Self::WORTH_TELLING_M {
+        if before.distance_m(origin) >= Self::MIN_SHIFT_M {
             self.placement = Some(Placement::moved_to(self.placement, origin));
         }
     }
@@ -285,10 +285,10 @@ mod tests {
         nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.world();
         for (x, y, sigma, verdict) in [
-            (f64::NAN, 0.0, 1.0, FixVerdict::Absurd),
-            (0.0, f64::INFINITY, 1.0, FixVerdict::Absurd),
-            (60.0, 0.0, f64::NAN, FixVerdict::Absurd),
-            (1e7, 0.0, 1.0, FixVerdict::Absurd),
+            (f64::NAN, 0.0, 1.0, FixVerdict::Invalid),
+            (0.0, f64::INFINITY, 1.0, FixVerdict::Invalid),
+            (60.0, 0.0, f64::NAN, FixVerdict::Invalid),
+            (1e7, 0.0, 1.0, FixVerdict::Invalid),
             (60.0, 90.0, 1.0, FixVerdict::Outlier),
             (-40.0, 0.0, 1.0, FixVerdict::Outlier),
         ] {
@@ -302,7 +302,7 @@ mod tests {
         let mut nav = under_way();
         nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.sigma_m();
-        nav.handle_unseen_way(30.0);
+        nav.handle_unmeasured(30.0);
         assert!((20.0..25.0).contains(&nav.sigma_m()), "{} m, {before} m before", nav.sigma_m());
         assert_eq!(
             nav.handle_fix(WorldPoint::new(60.0, 25.0), 1.0, at(61.0), at(61.0)),

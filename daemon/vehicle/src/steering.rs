@@ -9,7 +9,7 @@ pub use ahead::PathAhead;
 use choice::PlannerChoice;
 use grounds::Grounds;
 
-use super::planning::{Bounds, Knowledge, Node, Point, Question, Window, Worth, distance};
+use super::planning::{BlockValues, Bounds, CellWindow, Knowledge, Node, PlanRequest, Point, distance};
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -33,12 +33,12 @@ impl Footprint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
     Go(Point),
-    /// What is left of distance or time is the way home.
-    UsedUp,
+    /// What is left of distance or time is the path home.
+    LimitReached,
     /// It is where it was to go.
-    There,
-    /// There is nowhere that it may go.
-    NoWay,
+    Arrived,
+    /// Arrived is nowhere that it may go.
+    NoPath,
 }
 
 /// Chooses waypoints: a lawnmower until the operator has said what matters, then by the planner that is set.
@@ -49,16 +49,16 @@ pub enum Course {
 pub struct Steering {
     grounds: Grounds,
     choice: PlannerChoice,
-    window: Window,
+    window: CellWindow,
     known: Knowledge,
     /// East and north of the map's frame in the world, metres.
-    placed: Point,
+    map_origin: Point,
     plan: VecDeque<Node>,
     /// The version of the map that the plan is for.
     planned_for: u64,
 }
 
-/// Steps to one waypoint while the way may change with the map: with two, `horizon` collects 2 % less, for each step shows
+/// Steps to one waypoint while the path may change with the map: with two, `horizon` collects 2 % less, for each step shows
 /// something new.
 const STEPS_AHEAD: usize = 1;
 
@@ -68,9 +68,9 @@ impl Steering {
         let mut steering = Self {
             grounds: Grounds::new(area, footprint.reach(), clearance_m),
             choice: PlannerChoice::new(configured),
-            window: Window::new(area, cell_m),
+            window: CellWindow::new(area, cell_m),
             known: Knowledge::default(),
-            placed: (0.0, 0.0),
+            map_origin: (0.0, 0.0),
             plan: VecDeque::new(),
             planned_for: 0,
         };
@@ -84,26 +84,26 @@ impl Steering {
     }
 
     /// Where the vehicle goes on its return.
-    pub fn home(&self) -> Point {
-        self.grounds.home()
+    pub fn return_place(&self) -> Point {
+        self.grounds.return_place()
     }
 
     pub fn bounds(&self) -> &Bounds {
         self.grounds.bounds()
     }
 
-    /// A fix has moved the map to there in the world: ways are planned anew, from where the vehicle now believes to be.
+    /// A fix has moved the map to there in the world: paths are planned anew, from where the vehicle now believes to be.
     pub fn set_placement(&mut self, east_m: f64, north_m: f64) {
-        if self.placed != (east_m, north_m) {
-            self.placed = (east_m, north_m);
-            self.window = Window::new(self.grounds.area().moved(-east_m, -north_m), self.window.cell_m);
+        if self.map_origin != (east_m, north_m) {
+            self.map_origin = (east_m, north_m);
+            self.window = CellWindow::new(self.grounds.area().moved(-east_m, -north_m), self.window.cell_m);
             self.plan.clear();
         }
     }
 
     /// Where the map's frame lies in the world.
-    pub fn placed(&self) -> Point {
-        self.placed
+    pub fn map_origin(&self) -> Point {
+        self.map_origin
     }
 
     /// Puts a fence that was checked in force.
@@ -119,7 +119,7 @@ impl Steering {
         self.plan.clear();
     }
 
-    /// Forgets the way that was planned.
+    /// Forgets the path that was planned.
     pub fn replan(&mut self) {
         self.plan.clear();
     }
@@ -148,7 +148,7 @@ impl Steering {
             self.plan.clear();
         }
         let left_m = left_m - self.grounds.last_leg_m();
-        let Some(at) = self.grounds.entry(from) else { return Course::NoWay };
+        let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
         let approach = distance(from, self.grounds.lattice().place(at));
         let adapts = self.choice.adapts();
         let changed = adapts && self.planned_for != map.1;
@@ -159,25 +159,30 @@ impl Steering {
         let follows = self.plan.front().is_some_and(is_next);
         if changed || !follows || !self.can_go(at, &self.plan, left_m - approach) {
             self.planned_for = map.1;
-            self.plan = self.ask(at, map.0, utility, left_m - approach).into();
+            self.plan = self.make_plan(at, map.0, utility, left_m - approach).into();
         }
         self.waypoint(from, at, if adapts { STEPS_AHEAD } else { usize::MAX }, left_m)
     }
 
-    fn ask(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
-        let Some(home) = self.grounds.return_paths() else { return Vec::new() };
+    fn make_plan(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
+        let Some(return_paths) = self.grounds.return_paths() else { return Vec::new() };
         let none = Utility::default();
-        let worth =
-            Worth::new(self.grounds.lattice(), (&self.window, self.placed), map, &self.known, utility.unwrap_or(&none));
-        let question = Question { lattice: self.grounds.lattice(), worth: &worth, from, home, left_m };
-        self.choice.planner_mut().plan(&question)
+        let values = BlockValues::new(
+            self.grounds.lattice(),
+            (&self.window, self.map_origin),
+            map,
+            &self.known,
+            utility.unwrap_or(&none),
+        );
+        let request = PlanRequest { lattice: self.grounds.lattice(), values: &values, from, return_paths, left_m };
+        self.choice.planner_mut().plan(&request)
     }
 
-    /// Whether the first place of a plan still leaves the way home.
+    /// Whether the first place of a plan still leaves the path home.
     fn can_go(&self, from: Node, plan: &VecDeque<Node>, left_m: f64) -> bool {
-        let Some(home) = self.grounds.return_paths() else { return false };
+        let Some(return_paths) = self.grounds.return_paths() else { return false };
         let first = plan.front().and_then(|&to| self.grounds.lattice().around(from).find(|(n, _)| *n == to));
-        first.is_some_and(|(n, step)| !left_m.is_finite() || step + home.metres[n] <= left_m)
+        first.is_some_and(|(n, step)| !left_m.is_finite() || step + return_paths.metres[n] <= left_m)
     }
 
     /// The last place that lies straight ahead, at most `most` steps away.
@@ -216,35 +221,35 @@ impl Steering {
     fn without_plan(&self, at: Node, left_m: f64) -> Course {
         let has_return = self.grounds.return_paths().is_some_and(|paths| paths.metres[at].is_finite());
         match (left_m.is_finite(), has_return) {
-            (true, _) => Course::UsedUp,
-            (false, true) => Course::There,
-            (false, false) => Course::NoWay,
+            (true, _) => Course::LimitReached,
+            (false, true) => Course::Arrived,
+            (false, false) => Course::NoPath,
         }
     }
 
-    /// The next waypoint on the way home.
-    pub fn next_home(&mut self, from: Point) -> Course {
+    /// The next waypoint on the path home.
+    pub fn next_return(&mut self, from: Point) -> Course {
         self.plan.clear();
-        let home = self.home();
+        let home = self.return_place();
         if distance(from, home) <= self.arrival_m() {
-            return Course::There;
+            return Course::Arrived;
         }
-        let Some((at, end, way)) = self.grounds.return_path(from) else { return Course::NoWay };
-        if at != end && way.is_empty() {
-            return Course::NoWay;
+        let Some((at, end, path)) = self.grounds.return_path(from) else { return Course::NoPath };
+        if at != end && path.is_empty() {
+            return Course::NoPath;
         }
         let entry = self.grounds.lattice().place(at);
-        match way.first().map(|&n| self.grounds.lattice().place(n)) {
+        match path.first().map(|&n| self.grounds.lattice().place(n)) {
             None if distance(from, entry) > self.arrival_m() => Course::Go(entry),
             None if self.grounds.bounds().allows_exit(home, entry) => Course::Go(home),
-            None => Course::There,
+            None => Course::Arrived,
             Some(next) if self.grounds.bounds().allows_leg(from, next) => Course::Go(next),
             Some(_) => Course::Go(entry),
         }
     }
 
     /// Metres of the return path from a place, infinite if there is none.
-    pub fn way_home_m(&self, from: Point) -> f64 {
+    pub fn return_path_m(&self, from: Point) -> f64 {
         self.grounds.return_path_m(from)
     }
 

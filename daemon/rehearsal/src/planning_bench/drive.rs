@@ -117,7 +117,7 @@ pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -
         let left_m = task.limit_m - drive.metres();
         let known = if told == Told::All { &scene.labels } else { &map };
         let course = match is_back {
-            true => steering.next_home(at),
+            true => steering.next_return(at),
             false => steering.next(at, (known, version), Some(&scene.utility), left_m),
         };
         match course {
@@ -126,7 +126,7 @@ pub(crate) fn drive(scene: &Scene, task: &Task, kind: PlannerKind, told: Told) -
                 drive.track.push(to);
                 (at, version) = (to, version + 1);
             }
-            Course::UsedUp if !is_back => is_back = true,
+            Course::LimitReached if !is_back => is_back = true,
             _ => break,
         }
     }

@@ -9,7 +9,7 @@ mod follow;
 mod relay;
 mod usbl;
 
-pub use filter::{Estimate, PlaneFilter, Verdict};
+pub use filter::{Estimate, MeasurementVerdict, PlaneFilter};
 pub use follow::Follow;
 pub use relay::{Relay, RelayConfig, RelayFault};
 pub use usbl::{Mounting, UsblFault, UsblSighting};

@@ -1,6 +1,6 @@
 //! The relay: where the surface is, and where it sees the vehicles.
 
-use super::filter::{Estimate, PlaneFilter, Verdict};
+use super::filter::{Estimate, MeasurementVerdict, PlaneFilter};
 use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, TangentPlane};
@@ -19,7 +19,7 @@ pub struct RelayConfig {
     /// How the USBL head is mounted.
     pub mounting: Mounting,
     /// Fixes of less are not sent, metres: a standard deviation.
-    pub most_sigma_m: f64,
+    pub max_sigma_m: f64,
     /// At most one fix of a vehicle in so long.
     pub period: Duration,
 }
@@ -52,7 +52,7 @@ impl RelayFault {
 
 /// A vehicle as the head sees it.
 #[derive(Debug)]
-struct Seen {
+struct TrackedVehicle {
     filter: PlaneFilter,
     depth: Option<(f64, Instant)>,
     sighted: Option<Instant>,
@@ -69,18 +69,18 @@ pub struct Relay {
     own: PlaneFilter,
     own_at: Option<Instant>,
     gps_outliers: u64,
-    vehicles: BTreeMap<Address, Seen>,
+    vehicles: BTreeMap<Address, TrackedVehicle>,
     faults: BTreeMap<RelayFault, u64>,
     fixes: u64,
 }
 
 impl Relay {
     /// A surface without GPS for longer gives no fixes.
-    const GPS_LASTS: Duration = Duration::from_secs(10);
+    const GPS_TIMEOUT: Duration = Duration::from_secs(10);
     /// The vehicle refuses what is older than 120 s; what is nearly as old is not worth its bits.
-    const OLDEST: Duration = Duration::from_secs(60);
+    const MAX_AGE: Duration = Duration::from_secs(60);
     /// A depth that the vehicle told before so long says little of its depth now.
-    const DEPTH_LASTS: Duration = Duration::from_secs(60);
+    const DEPTH_TIMEOUT: Duration = Duration::from_secs(60);
 
     /// A relay that knows nothing yet.
     pub fn new(config: RelayConfig) -> Self {
@@ -125,7 +125,7 @@ impl Relay {
     /// Where the surface is in the world frame; nothing without a fresh GPS.
     pub fn own(&self, at: Instant) -> Option<Estimate> {
         let last = self.own_at?;
-        let is_fresh = at.since(last) < Self::GPS_LASTS;
+        let is_fresh = at.since(last) < Self::GPS_TIMEOUT;
         is_fresh.then(|| self.own.predict(at.as_secs_f64())).flatten()
     }
 
@@ -137,7 +137,7 @@ impl Relay {
     /// Where the head sees a vehicle, and its way east and north in m/s; nothing if it has not seen it for a minute.
     pub fn vehicle(&self, vehicle: Address, now: Instant) -> Option<(Estimate, (f64, f64))> {
         let seen = self.vehicles.get(&vehicle)?;
-        let is_fresh = now.since(seen.sighted?) < Self::OLDEST;
+        let is_fresh = now.since(seen.sighted?) < Self::MAX_AGE;
         let estimate = seen.filter.predict(now.as_secs_f64()).filter(|_| is_fresh)?;
         Some((estimate, seen.filter.velocity()?))
     }
@@ -152,8 +152,8 @@ impl Relay {
             let plane = self.plane.get_or_insert_with(|| TangentPlane::new(fix.place));
             let (x, y) = plane.to_plane(fix.place);
             match self.own.update(&Estimate::round(x, y, fix.sigma_m), now.as_secs_f64()) {
-                Verdict::Outlier => self.gps_outliers += 1,
-                Verdict::Used | Verdict::BeganAnew => self.own_at = Some(now),
+                MeasurementVerdict::Outlier => self.gps_outliers += 1,
+                MeasurementVerdict::Used | MeasurementVerdict::Restarted => self.own_at = Some(now),
             }
         }
     }
@@ -166,12 +166,12 @@ impl Relay {
     /// The vehicle said how deep it is.
     pub fn handle_depth(&mut self, vehicle: Address, depth_m: f64, now: Instant) {
         if depth_m.is_finite() {
-            self.seen(vehicle).depth = Some((depth_m, now));
+            self.tracked(vehicle).depth = Some((depth_m, now));
         }
     }
 
-    fn seen(&mut self, vehicle: Address) -> &mut Seen {
-        let new = || Seen { filter: PlaneFilter::new(0.05), depth: None, sighted: None, fixed: None };
+    fn tracked(&mut self, vehicle: Address) -> &mut TrackedVehicle {
+        let new = || TrackedVehicle { filter: PlaneFilter::new(0.05), depth: None, sighted: None, fixed: None };
         self.vehicles.entry(vehicle).or_insert_with(new)
     }
 
@@ -195,7 +195,7 @@ impl Relay {
 
     fn fuse(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) -> Result<Option<Fix>, RelayFault> {
         let age_s = if sighting.age_s.is_finite() { sighting.age_s.max(0.0) } else { f64::MAX };
-        if age_s > Self::OLDEST.as_secs_f64() {
+        if age_s > Self::MAX_AGE.as_secs_f64() {
             return Err(RelayFault::TooOld);
         }
         let taken = now - Duration::from_secs_f64(age_s);
@@ -203,8 +203,8 @@ impl Relay {
         let (vx, vy) = self.own.velocity().unwrap_or_default();
         let heading = self.heading_rad(now);
         let mounting = self.config.mounting;
-        let seen = self.seen(vehicle);
-        let depth = seen.depth.filter(|(_, at)| now.since(*at) < Self::DEPTH_LASTS).map(|(d, _)| d);
+        let seen = self.tracked(vehicle);
+        let depth = seen.depth.filter(|(_, at)| now.since(*at) < Self::DEPTH_TIMEOUT).map(|(d, _)| d);
         let away = offset(sighting, &mounting, heading, depth).map_err(RelayFault::Usbl)?;
         let [xx, xy, yy] = away.cov_m2;
         let [own_xx, _, own_yy] = own.cov_m2;
@@ -213,18 +213,18 @@ impl Relay {
             y_m: own.y_m - vy * age_s + away.y_m,
             cov_m2: [xx + own_xx, xy, yy + own_yy],
         };
-        if seen.filter.update(&place, taken.as_secs_f64()) == Verdict::Outlier {
+        if seen.filter.update(&place, taken.as_secs_f64()) == MeasurementVerdict::Outlier {
             return Err(RelayFault::Outlier);
         }
         seen.sighted = Some(now);
         let is_due = seen.fixed.is_none_or(|at| now.since(at) + Duration::from_millis(100) >= self.config.period);
-        if place.sigma_m() > self.config.most_sigma_m {
+        if place.sigma_m() > self.config.max_sigma_m {
             return Err(RelayFault::TooVague);
         }
         if !is_due {
             return Ok(None);
         }
-        self.seen(vehicle).fixed = Some(now);
+        self.tracked(vehicle).fixed = Some(now);
         let position = WorldPoint { east_m: place.x_m, north_m: place.y_m };
         Ok(Some(Fix { position, sigma_m: place.sigma_m(), age_s }))
     }
@@ -243,7 +243,7 @@ mod tests {
             origin: Some(ORIGIN),
             language: GpsLanguage::Nmea,
             mounting: Mounting::default(),
-            most_sigma_m: 50.0,
+            max_sigma_m: 50.0,
             period: Duration::from_secs(10),
         })
     }

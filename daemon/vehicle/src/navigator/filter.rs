@@ -1,6 +1,6 @@
 //! The Kalman filter of the vehicle's place and of what is wrong with its sensors.
 
-use super::odometer::Way;
+use super::odometer::Displacement;
 
 /// Numbers of the state: place (2, metres), log too short by (1, a metre), compass off by (1, radians), and what is not
 /// along the way, as by a current (2, metres a metre of way).
@@ -33,12 +33,12 @@ impl Expected {
 }
 
 impl Filter {
-    /// Way after which a drift has become another, metres.
+    /// Displacement after which a drift has become another, metres.
     const MEMORY_M: f64 = 500.0;
     /// Of the drift, what is random from metre to metre: standard deviation after a metre over the drift.
     const RANDOM: f64 = 0.5;
 
-    /// At a place for certain; `drift` is the expected error a metre of way.
+    /// At a place for certain; `drift` is the expected error a metre of path.
     pub(super) fn new((x_m, y_m): (f64, f64), drift: f64) -> Self {
         let mut p = [[0.0; N]; N];
         for (i, row) in p.iter_mut().enumerate().skip(2) {
@@ -56,7 +56,7 @@ impl Filter {
     }
 
     /// The place may be off by about so much more.
-    pub(super) fn doubt(&mut self, sigma_m: f64) {
+    pub(super) fn add_uncertainty(&mut self, sigma_m: f64) {
         self.p[0][0] += sigma_m * sigma_m;
         self.p[1][1] += sigma_m * sigma_m;
     }
@@ -68,26 +68,26 @@ impl Filter {
     }
 
     /// What a stretch of way is, by what is known of the sensors.
-    fn corrected(&self, way: &Way) -> (f64, f64) {
+    fn corrected(&self, path: &Displacement) -> (f64, f64) {
         let [_, _, scale, turn, cx, cy] = self.state;
         let (sin, cos) = turn.sin_cos();
-        let (dx, dy) = (way.dx_m * (1.0 + scale), way.dy_m * (1.0 + scale));
-        (dx * cos - dy * sin + cx * way.length_m, dx * sin + dy * cos + cy * way.length_m)
+        let (dx, dy) = (path.dx_m * (1.0 + scale), path.dy_m * (1.0 + scale));
+        (dx * cos - dy * sin + cx * path.length_m, dx * sin + dy * cos + cy * path.length_m)
     }
 
     /// Derivatives of the corrected way by the last four numbers of the state: of x and of y.
-    fn slopes(way: &Way) -> [[f64; 4]; 2] {
+    fn slopes(path: &Displacement) -> [[f64; 4]; 2] {
         // Taken at no correction: the corrections are some percent, so these are right to some percent.
-        [[way.dx_m, -way.dy_m, way.length_m, 0.0], [way.dy_m, way.dx_m, 0.0, way.length_m]]
+        [[path.dx_m, -path.dy_m, path.length_m, 0.0], [path.dy_m, path.dx_m, 0.0, path.length_m]]
     }
 
     /// The sensors told a step; returns it corrected.
-    pub(super) fn handle_way(&mut self, dx_m: f64, dy_m: f64) -> (f64, f64) {
-        let way = Way { dx_m, dy_m, length_m: dx_m.hypot(dy_m) };
-        let (x, y) = self.corrected(&way);
+    pub(super) fn handle_travel(&mut self, dx_m: f64, dy_m: f64) -> (f64, f64) {
+        let path = Displacement { dx_m, dy_m, length_m: dx_m.hypot(dy_m) };
+        let (x, y) = self.corrected(&path);
         self.shift(x, y);
         // P = F P F' + Q, F being the identity with the slopes in its upper right.
-        let slopes = Self::slopes(&way);
+        let slopes = Self::slopes(&path);
         for (row, slope) in slopes.iter().enumerate() {
             for column in 0..N {
                 self.p[row][column] += (0..4).map(|k| slope[k] * self.p[k + 2][column]).sum::<f64>();
@@ -98,7 +98,7 @@ impl Filter {
                 self.p[row][column] += (0..4).map(|k| slope[k] * self.p[row][k + 2]).sum::<f64>();
             }
         }
-        let per_metre = self.drift * self.drift * way.length_m;
+        let per_metre = self.drift * self.drift * path.length_m;
         for i in 0..2 {
             self.p[i][i] += Self::RANDOM * Self::RANDOM * per_metre;
         }
@@ -111,7 +111,7 @@ impl Filter {
     }
 
     /// What a fix measures, as sums of the state: for x and for y.
-    fn measures(since: &Way) -> [Vector; 2] {
+    fn measures(since: &Displacement) -> [Vector; 2] {
         let [x, y] = Self::slopes(since);
         [[1.0, 0.0, -x[0], -x[1], -x[2], -x[3]], [0.0, 1.0, -y[0], -y[1], -y[2], -y[3]]]
     }
@@ -121,7 +121,7 @@ impl Filter {
     }
 
     /// Where the vehicle was before the way `since`, and how far from it a fix of `sigma` metres may lie.
-    pub(super) fn expect(&self, since: &Way, sigma: f64) -> Expected {
+    pub(super) fn expect(&self, since: &Displacement, sigma: f64) -> Expected {
         let (back_x, back_y) = self.corrected(since);
         let [hx, hy] = Self::measures(since);
         let dot = |a: &Vector, b: &Vector| (0..N).map(|k| a[k] * b[k]).sum::<f64>();
@@ -132,12 +132,12 @@ impl Filter {
     }
 
     /// What was random on the way since a fix was taken is noise of that fix.
-    fn noise_since(&self, since: &Way) -> f64 {
+    fn noise_since(&self, since: &Displacement) -> f64 {
         (Self::RANDOM * self.drift).powi(2) * since.length_m
     }
 
     /// Takes a fix of where the vehicle was before the way `since`.
-    pub(super) fn correct(&mut self, since: &Way, fix: (f64, f64), sigma: f64) {
+    pub(super) fn correct(&mut self, since: &Displacement, fix: (f64, f64), sigma: f64) {
         let noise = sigma * sigma + self.noise_since(since);
         let measures = Self::measures(since);
         for (axis, h) in measures.iter().enumerate() {

@@ -39,7 +39,7 @@ impl Bounds {
         self.holds(from) && self.holds(to) && self.is_clear(from, to)
     }
 
-    /// Whether a straight way out of the margin meets no outline.
+    /// Whether a straight path out of the margin meets no outline.
     pub fn allows_exit(&self, from: Point, to: Point) -> bool {
         self.holds(from) && self.allows(to) && !self.edges().any(|(a, b)| segments_meet(from, to, a, b))
     }

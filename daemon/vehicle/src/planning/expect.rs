@@ -2,7 +2,7 @@
 
 /// Labels of a rectangle of cells, row by row from the south-west; 0 = not seen.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct SeenLabels<'a> {
     pub labels: &'a [u8],
     pub width: usize,
 }
@@ -10,13 +10,13 @@ pub struct Seen<'a> {
 /// How a label fades with the distance from where it was seen: the spatial Chinese Restaurant Process, carried beyond the
 /// Von Neumann neighbourhood of a cell.
 ///
-/// In an unseen cell label k weighs `n q_k + alpha p_k`: n counts the seen cells, each worth `fade` to the power of the
+/// In an unseen cell label k weighs `n q_k + alpha p_k`: n counts the seen cells, each values `fade` to the power of the
 /// steps (east-west plus north-south) to it; q_k is the label's share among them by a `fade` that is steeper, so that of many
 /// seen cells the next ones tell which label it is; p_k is its share of the whole map; a new label weighs `gamma`. Next to
 /// seen cells their labels decide, far from all the mix of the map.
 #[derive(Debug, Clone)]
 pub struct Expectation<'a> {
-    seen: Seen<'a>,
+    seen: SeenLabels<'a>,
     /// The steeper fade, by which near labels are told apart.
     steep: f32,
     alpha: f32,
@@ -39,11 +39,11 @@ const MIX: f32 = 0.05;
 const NEW: f32 = 0.05;
 
 impl<'a> Expectation<'a> {
-    pub fn new(seen: Seen<'a>) -> Self {
+    pub fn new(seen: SeenLabels<'a>) -> Self {
         Self::with(seen, REACH, MIX)
     }
 
-    fn with(seen: Seen<'a>, reach: f32, mix: f32) -> Self {
+    fn with(seen: SeenLabels<'a>, reach: f32, mix: f32) -> Self {
         let length = likeness_length(seen);
         let fade = (-1.0 / (reach * length).clamp(0.5, 40.0)).exp();
         let steep = (-1.0 / (NEXT * length).clamp(0.7, 40.0)).exp();
@@ -81,7 +81,7 @@ impl<'a> Expectation<'a> {
 }
 
 /// Cells over which labels stay alike: the length of the exponential through the agreement of pairs two and eight cells apart.
-fn likeness_length(seen: Seen<'_>) -> f32 {
+fn likeness_length(seen: SeenLabels<'_>) -> f32 {
     let mut counts = [0f32; 256];
     seen.labels.iter().for_each(|&l| counts[usize::from(l)] += 1.0);
     let cells: f32 = counts[1..].iter().sum();
@@ -155,7 +155,7 @@ mod tests {
                 seen[cells.clone()].copy_from_slice(&truth[cells]);
             }
         }
-        let expectation = Expectation::new(Seen { labels: &seen, width });
+        let expectation = Expectation::new(SeenLabels { labels: &seen, width });
         let labels: std::collections::BTreeSet<u8> = seen.iter().copied().filter(|&l| l != 0).collect();
         let shares: Vec<(u8, Vec<f32>)> = labels.iter().map(|&l| (l, expectation.share_of(l))).collect();
         let cells = seen.iter().filter(|&&l| l != 0).count() as f64;
@@ -187,7 +187,7 @@ mod tests {
                 labels[y * 200 + x] = if y < 50 { 1 } else { 2 };
             }
         }
-        let expectation = Expectation::new(Seen { labels: &labels, width: 200 });
+        let expectation = Expectation::new(SeenLabels { labels: &labels, width: 200 });
         let (one, new) = (expectation.share_of(1), expectation.share_of_new());
         assert!(one[10 * 200 + 21] > 0.7 && one[90 * 200 + 21] < 0.3, "{} {}", one[10 * 200 + 21], one[90 * 200 + 21]);
         assert!((one[10 * 200 + 199] - 0.5).abs() < 0.25, "{}", one[10 * 200 + 199]);
@@ -199,8 +199,8 @@ mod tests {
     #[test]
     fn nothing_seen_lets_expect_only_what_is_new() {
         let labels = [0u8; 12];
-        let expectation = Expectation::new(Seen { labels: &labels, width: 4 });
+        let expectation = Expectation::new(SeenLabels { labels: &labels, width: 4 });
         assert!(expectation.of(|_| 1.0, 0.25).iter().all(|&e| (e - 0.25).abs() < 1e-6));
-        assert!(Expectation::new(Seen { labels: &[], width: 0 }).of(|_| 1.0, 0.0).is_empty());
+        assert!(Expectation::new(SeenLabels { labels: &[], width: 0 }).of(|_| 1.0, 0.0).is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! Places to plan over, and the ways between them.
+//! Places to plan over, and the paths between them.
 
 use super::bounds::{Bounds, Point, distance};
 use scenecast_core::Area;
@@ -9,7 +9,7 @@ const MAX_SIDE: usize = 192;
 /// Steps to the eight places around, in the order of the bits of a move mask.
 const MOVES: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// A square lattice of places that the vehicle may be at, each joined with those around it where the straight way is allowed.
+/// A square lattice of places that the vehicle may be at, each joined with those around it where the straight path is allowed.
 #[derive(Debug, Clone)]
 pub struct Lattice {
     origin: Point,
@@ -23,10 +23,10 @@ pub struct Lattice {
 /// A place of the lattice: row times columns plus column.
 pub type Node = usize;
 
-/// Ways from one place to all others.
+/// Paths from one place to all others.
 #[derive(Debug, Clone)]
-pub struct Ways {
-    /// Metres to each place; infinite where no way leads.
+pub struct Paths {
+    /// Metres to each place; infinite where no path leads.
     pub metres: Vec<f64>,
     before: Vec<Node>,
 }
@@ -118,49 +118,49 @@ impl Lattice {
         let (x, y) = (steps(from % self.columns, to % self.columns), steps(from / self.columns, to / self.columns));
         let m = MOVES.iter().position(|&step| step == (x.signum(), y.signum()))?;
         let count = x.abs().max(y.abs());
-        let mut way = Vec::with_capacity(count as usize);
+        let mut path = Vec::with_capacity(count as usize);
         for _ in 0..count {
-            let at = way.last().copied().unwrap_or(from);
+            let at = path.last().copied().unwrap_or(from);
             let next = self.moved(at, m).filter(|_| self.moves[at] & 1 << m != 0)?;
-            way.push(next);
+            path.push(next);
         }
-        (way.last() == Some(&to)).then_some(way)
+        (path.last() == Some(&to)).then_some(path)
     }
 
-    /// Shortest ways from a place to all others.
-    pub fn ways(&self, from: Node) -> Ways {
-        let mut ways = Ways { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
-        ways.metres[from] = 0.0;
+    /// Shortest paths from a place to all others.
+    pub fn paths(&self, from: Node) -> Paths {
+        let mut paths = Paths { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
+        paths.metres[from] = 0.0;
         // Lengths in micrometres order like numbers and tie by place, so the tree is the same everywhere.
         let key = |metres: f64| (metres * 1e6) as u64;
         let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
         while let Some(Reverse((length, node))) = queue.pop() {
-            if length > key(ways.metres[node]) {
+            if length > key(paths.metres[node]) {
                 continue;
             }
             for (to, step) in self.around(node) {
-                let metres = ways.metres[node] + step;
-                if metres + 1e-6 < ways.metres[to] {
-                    (ways.metres[to], ways.before[to]) = (metres, node);
+                let metres = paths.metres[node] + step;
+                if metres + 1e-6 < paths.metres[to] {
+                    (paths.metres[to], paths.before[to]) = (metres, node);
                     queue.push(Reverse((key(metres), to)));
                 }
             }
         }
-        ways
+        paths
     }
 }
 
-impl Ways {
-    /// The places from the one after the start to `to`; empty if no way leads there, or if it is the start.
+impl Paths {
+    /// The places from the one after the start to `to`; empty if no path leads there, or if it is the start.
     pub fn to(&self, to: Node) -> Vec<Node> {
-        let mut way = Vec::new();
+        let mut path = Vec::new();
         let mut node = to;
         while self.metres[to].is_finite() && self.before[node] != node {
-            way.push(node);
+            path.push(node);
             node = self.before[node];
         }
-        way.reverse();
-        way
+        path.reverse();
+        path
     }
 }
 
@@ -186,12 +186,12 @@ mod tests {
         let (bounds, lattice) = walled();
         let from = lattice.entry((5.0, 2.2), &bounds).unwrap();
         let to = lattice.entry((15.0, 2.0), &bounds).unwrap();
-        let ways = lattice.ways(from);
-        assert!(ways.metres[to] > 14.0, "{}", ways.metres[to]);
-        let way = ways.to(to);
-        assert_eq!(way.last(), Some(&to));
+        let paths = lattice.paths(from);
+        assert!(paths.metres[to] > 14.0, "{}", paths.metres[to]);
+        let path = paths.to(to);
+        assert_eq!(path.last(), Some(&to));
         let mut at = lattice.place(from);
-        for node in way {
+        for node in path {
             assert!(bounds.allows_leg(at, lattice.place(node)));
             at = lattice.place(node);
         }
@@ -203,10 +203,10 @@ mod tests {
         let (columns, _) = lattice.size();
         let mut straight = 0;
         for from in [0, 2 * columns + 5, 9 * columns, 5 * columns + 15] {
-            let ways = lattice.ways(from);
+            let paths = lattice.paths(from);
             for to in 0..lattice.places() {
-                let Some(way) = lattice.straight(from, to) else { continue };
-                assert_eq!(way, ways.to(to), "{from} to {to}");
+                let Some(path) = lattice.straight(from, to) else { continue };
+                assert_eq!(path, paths.to(to), "{from} to {to}");
                 straight += 1;
             }
         }

@@ -1,4 +1,4 @@
-//! Which way to go: places, what they are worth, and the planners that choose among them.
+//! Which path to go: places, what they are values, and the planners that choose among them.
 
 mod bounds;
 mod expect;
@@ -6,51 +6,51 @@ mod greedy;
 mod horizon;
 mod lattice;
 mod lawnmower;
-mod way_back;
-mod worth;
+mod return_gain;
+mod value;
 
 pub use bounds::{Bounds, Point, distance};
-pub use expect::{Expectation, Seen};
+pub use expect::{Expectation, SeenLabels};
 pub use greedy::Greedy;
 pub use horizon::Horizon;
-pub use lattice::{Lattice, Node, Ways};
+pub use lattice::{Lattice, Node, Paths};
 pub use lawnmower::Lawnmower;
-pub use worth::{Knowledge, Shown, Window, Worth};
+pub use value::{BlockValues, CellWindow, Knowledge, ShownBlocks};
 
 use scenecast_protocol::directive::PlannerKind;
 
 /// Where the vehicle is, what is left to it, and what there is to gain.
 #[derive(Debug)]
-pub struct Question<'a> {
-    /// Places and ways that are allowed.
+pub struct PlanRequest<'a> {
+    /// Places and paths that are allowed.
     pub lattice: &'a Lattice,
     /// What is to be gained.
-    pub worth: &'a Worth,
+    pub values: &'a BlockValues,
     pub from: Node,
-    /// Ways from the place where it must be able to end.
-    pub home: &'a Ways,
-    /// Metres that may be gone from `from`, the way home included; infinite if there is no limit.
+    /// Paths from the place where it must be able to end.
+    pub return_paths: &'a Paths,
+    /// Metres that may be gone from `from`, the path home included; infinite if there is no limit.
     pub left_m: f64,
 }
 
-impl Question<'_> {
-    /// Whether the way home from `node` can still be gone after `gone_m` metres.
+impl PlanRequest<'_> {
+    /// Whether the path home from `node` can still be gone after `gone_m` metres.
     pub fn can_return(&self, node: Node, gone_m: f64) -> bool {
-        // A way that begins where no way home is known may go on: it is lost either way.
-        !self.left_m.is_finite() || gone_m + self.home.metres[node] <= self.left_m + 1e-6
+        // A path that begins where no path home is known may go on: it is lost either path.
+        !self.left_m.is_finite() || gone_m + self.return_paths.metres[node] <= self.left_m + 1e-6
     }
 }
 
-/// Chooses a way.
+/// Chooses a path.
 ///
-/// The answer's places are neighbours on the lattice, the first next to [`Question::from`], and the way home from each is
+/// The answer's places are neighbours on the lattice, the first next to [`PlanRequest::from`], and the path home from each is
 /// within what is left. Empty: there is nothing to gain, or nothing left. The same questions in the same order get the same
 /// answers.
 pub trait Planner: std::fmt::Debug + Send {
-    /// The way to go next.
-    fn plan(&mut self, question: &Question<'_>) -> Vec<Node>;
+    /// The path to go next.
+    fn plan(&mut self, request: &PlanRequest<'_>) -> Vec<Node>;
 
-    /// Places that it will go to after its last answer, the next one first, each by the shortest way; empty where it decides
+    /// Places that it will go to after its last answer, the next one first, each by the shortest path; empty where it decides
     /// when it is there.
     fn beyond(&self) -> Vec<Node> {
         Vec::new()
@@ -91,18 +91,24 @@ mod tests {
         let map: LabelGrid = seen.map(|(x, y)| (Cell::new(x, y), ((x / 9 + y / 7) % 3 + 1) as u8)).collect();
         let weights = [(1, weights.0), (2, weights.1)].into_iter().collect();
         let utility = Utility { exploration: 5, weights, ..Utility::default() };
-        let worth = Worth::new(&lattice, (&Window::new(AREA, 0.25), (0.0, 0.0)), &map, &Knowledge::default(), &utility);
+        let values = BlockValues::new(
+            &lattice,
+            (&CellWindow::new(AREA, 0.25), (0.0, 0.0)),
+            &map,
+            &Knowledge::default(),
+            &utility,
+        );
         let open: Vec<Node> = (0..lattice.places()).filter(|&n| lattice.is_open(n)).collect();
-        let (from, home) = (open[start % open.len()], lattice.ways(open[(start / 7) % open.len()]));
-        let question = Question { lattice: &lattice, worth: &worth, from, home: &home, left_m };
-        let way = planner(kind).plan(&question);
+        let (from, home) = (open[start % open.len()], lattice.paths(open[(start / 7) % open.len()]));
+        let request = PlanRequest { lattice: &lattice, values: &values, from, return_paths: &home, left_m };
+        let path = planner(kind).plan(&request);
         let (mut at, mut gone_m, mut is_allowed) = (from, 0.0, true);
-        for &node in &way {
+        for &node in &path {
             let step = lattice.around(at).find(|(n, _)| *n == node).map_or(f64::INFINITY, |(_, step)| step);
             (at, gone_m) = (node, gone_m + step);
             is_allowed &= bounds.allows(lattice.place(node)) && gone_m + home.metres[node] <= left_m + 1e-6;
         }
-        (way, is_allowed)
+        (path, is_allowed)
     }
 
     proptest! {
@@ -113,9 +119,9 @@ mod tests {
             weights in (-100i8..=100, -100i8..=100),
         ) {
             for kind in PlannerKind::ALL {
-                let (way, is_allowed) = ask(kind, corner, start, left_m, weights);
-                prop_assert!(is_allowed, "{kind:?}: {way:?}");
-                prop_assert_eq!(&way, &ask(kind, corner, start, left_m, weights).0);
+                let (path, is_allowed) = ask(kind, corner, start, left_m, weights);
+                prop_assert!(is_allowed, "{kind:?}: {path:?}");
+                prop_assert_eq!(&path, &ask(kind, corner, start, left_m, weights).0);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Where the vehicle may go: the survey area within the fence, and the return path from each place of it.
 
-use crate::planning::{Bounds, Lattice, Node, Point, Ways, distance};
+use crate::planning::{Bounds, Lattice, Node, Paths, Point, distance};
 use scenecast_core::Area;
 use scenecast_protocol::directive::Fence;
 
@@ -18,7 +18,7 @@ pub(super) struct Grounds {
     start: Point,
     return_point: Option<Point>,
     lattice: Lattice,
-    return_paths: Option<Ways>,
+    return_paths: Option<Paths>,
     /// Metres from the end of those paths to the return point itself.
     last_leg_m: f64,
 }
@@ -51,7 +51,7 @@ impl Grounds {
         &self.lattice
     }
 
-    pub(super) fn return_paths(&self) -> Option<&Ways> {
+    pub(super) fn return_paths(&self) -> Option<&Paths> {
         self.return_paths.as_ref()
     }
 
@@ -60,7 +60,7 @@ impl Grounds {
     }
 
     /// The end of every return path.
-    pub(super) fn home(&self) -> Point {
+    pub(super) fn return_place(&self) -> Point {
         self.return_point.unwrap_or(self.start)
     }
 
@@ -72,10 +72,10 @@ impl Grounds {
 
     fn lay_out(&mut self) {
         let inner = self.area.shrunk(self.reach_m);
-        self.lattice = Lattice::new(inner, &[self.home()], STEP * self.reach_m, &self.bounds);
-        let end = self.entry(self.home());
-        self.return_paths = end.map(|n| self.lattice.ways(n));
-        self.last_leg_m = end.map_or(0.0, |n| distance(self.home(), self.lattice.place(n)));
+        self.lattice = Lattice::new(inner, &[self.return_place()], STEP * self.reach_m, &self.bounds);
+        let end = self.entry(self.return_place());
+        self.return_paths = end.map(|n| self.lattice.paths(n));
+        self.last_leg_m = end.map_or(0.0, |n| distance(self.return_place(), self.lattice.place(n)));
     }
 
     /// The place at which a path from `from` enters the lattice.
@@ -90,8 +90,8 @@ impl Grounds {
 
     /// The place where a return path enters the lattice, the place where it leaves it, and the places after the first.
     pub(super) fn return_path(&self, from: Point) -> Option<(Node, Node, Vec<Node>)> {
-        let (at, end) = (self.entry(from)?, self.entry(self.home())?);
-        Some((at, end, self.lattice.ways(at).to(end)))
+        let (at, end) = (self.entry(from)?, self.entry(self.return_place())?);
+        Some((at, end, self.lattice.paths(at).to(end)))
     }
 
     /// Metres of the return path from a place, infinite if there is none.

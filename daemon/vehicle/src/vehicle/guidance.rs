@@ -118,12 +118,12 @@ impl Guidance {
 
     /// Counts metres against the limits.
     pub(super) fn handle_travel(&mut self, metres: f64) {
-        self.guard.handle_way(metres);
+        self.guard.handle_travel(metres);
     }
 
     /// The link received a frame of the surface.
     pub(super) fn handle_received(&mut self, at: Instant) {
-        self.guard.handle_surface_heard(at);
+        self.guard.handle_received(at);
     }
 
     /// The camera saw the sea floor around `at`, in metres in the map frame, and the scene model explains each cell with
@@ -136,7 +136,7 @@ impl Guidance {
     /// Puts hold and abort in force, and takes the order as the operator's answer to a breach.
     pub(super) fn set_constraints(&mut self, order: Constraints) {
         self.guard.order = order;
-        self.forgive();
+        self.clear_breach();
     }
 
     /// Whether the vehicle keeps these limits at the depth and the altitude that it travels at.
@@ -153,7 +153,7 @@ impl Guidance {
     /// Puts a fence in force that was checked, and takes it as the operator's answer to a breach.
     pub(super) fn set_fence(&mut self, fence: &Fence) {
         self.steering.set_fence(fence);
-        self.forgive();
+        self.clear_breach();
     }
 
     /// Sets the planner that the operator ordered; `None`: the configured one.
@@ -168,8 +168,8 @@ impl Guidance {
         self.steering.replan();
     }
 
-    fn forgive(&mut self) {
-        self.guard.forgive();
+    fn clear_breach(&mut self) {
+        self.guard.clear_breach();
         self.replan();
     }
 
@@ -196,7 +196,7 @@ impl Guidance {
         let navigator = known.navigator;
         let at = self.follow_placement(navigator);
         self.watch(at, navigator.depth_m());
-        let return_m = if self.is_limited() { self.steering.way_home_m(at) } else { 0.0 };
+        let return_m = if self.is_limited() { self.steering.return_path_m(at) } else { 0.0 };
         match self.guard.stop(return_m) {
             None => self.survey(at, known),
             Some((Reaction::Hold, why)) => self.stay(VehicleMode::Hold, why),
@@ -209,7 +209,7 @@ impl Guidance {
     /// could cross an outline.
     fn follow_placement(&mut self, navigator: &Navigator) -> Point {
         let (east, north) = navigator.to_world(MapPoint::default()).xy();
-        if (east, north) != self.steering.placed() {
+        if (east, north) != self.steering.map_origin() {
             self.steering.set_placement(east, north);
             self.drop_path();
         }
@@ -241,12 +241,12 @@ impl Guidance {
         let left_m = self.guard.left_m();
         match self.steering.next(at, known.map, known.utility, left_m) {
             Course::Go(to) => {
-                let path = self.steering.ahead(to, left_m - distance(at, to));
+                let path = self.steering.path_after(to, left_m - distance(at, to));
                 Some(self.go((to, path), VehicleMode::Survey, ModeReason::Survey, known.navigator))
             }
-            Course::UsedUp => self.go_back(at, self.guard.tighter(), known.navigator),
-            Course::There => self.stay(VehicleMode::Hold, ModeReason::Survey),
-            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
+            Course::LimitReached => self.go_back(at, self.guard.tighter(), known.navigator),
+            Course::Arrived => self.stay(VehicleMode::Hold, ModeReason::Survey),
+            Course::NoPath => self.stay(VehicleMode::Hold, ModeReason::NoPath),
         }
     }
 
@@ -254,10 +254,12 @@ impl Guidance {
         if self.is_under_way(VehicleMode::Return, navigator) {
             return None;
         }
-        match self.steering.next_home(at) {
-            Course::Go(to) => Some(self.go((to, self.steering.ahead_home(to)), VehicleMode::Return, why, navigator)),
-            Course::NoWay => self.stay(VehicleMode::Hold, ModeReason::NoPath),
-            Course::There | Course::UsedUp => self.stay(VehicleMode::Hold, why),
+        match self.steering.next_return(at) {
+            Course::Go(to) => {
+                Some(self.go((to, self.steering.path_after_return(to)), VehicleMode::Return, why, navigator))
+            }
+            Course::NoPath => self.stay(VehicleMode::Hold, ModeReason::NoPath),
+            Course::Arrived | Course::LimitReached => self.stay(VehicleMode::Hold, why),
         }
     }
 

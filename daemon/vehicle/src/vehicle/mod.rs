@@ -165,9 +165,9 @@ impl Vehicle {
 
     /// No sensor measured the vehicle's motion for `time`. The distance that it could have gone adds to the position's
     /// uncertainty and counts against the limits.
-    pub fn handle_unseen(&mut self, time: Duration) {
+    pub fn handle_unmeasured(&mut self, time: Duration) {
         let metres = time.as_secs_f64() * self.guidance.speed_m_s();
-        self.navigator.handle_unseen_way(metres);
+        self.navigator.handle_unmeasured(metres);
         self.guidance.handle_travel(metres);
     }
 
@@ -199,13 +199,13 @@ impl Vehicle {
     /// Takes the best exemplars of each label, the best first.
     pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
         self.gallery.set_exemplars(exemplars);
-        self.tend_gallery();
+        self.serve_exemplars();
     }
 
-    fn tend_gallery(&mut self) {
+    fn serve_exemplars(&mut self) {
         let Self { utility, gallery, link, durable, .. } = self;
         let weight = |label| utility.as_ref().map_or(0.0, |u| u.weight(label));
-        gallery.tend(durable.epoch, weight, link);
+        gallery.serve(durable.epoch, weight, link);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -218,7 +218,7 @@ impl Vehicle {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
                 VehicleEvent::ObjectDelivered(id) => {
                     self.gallery.handle_delivered(id);
-                    self.tend_gallery();
+                    self.serve_exemplars();
                     self.publisher.handle_delivered(id);
                 }
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
@@ -232,7 +232,7 @@ impl Vehicle {
         self.gallery.handle_restart(&mut self.link);
         self.link.cancel_objects();
         self.publisher.handle_surface_restart();
-        self.tend_gallery();
+        self.serve_exemplars();
     }
 
     /// Chooses a waypoint if there is none or the last one is reached, or carries out the reaction of the failsafe.

@@ -303,7 +303,7 @@ fn the_last_good_fence_survives_a_refusal_and_a_restart() {
     let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
     assert!(!again.guidance.steering().bounds().holds((25.0, 5.0)));
     assert!(again.guidance.steering().bounds().holds((15.0, 5.0)));
-    assert_eq!(again.guidance.steering().home(), (5.0, 5.0));
+    assert_eq!(again.guidance.steering().return_place(), (5.0, 5.0));
 }
 
 #[test]

@@ -57,7 +57,7 @@ impl Vehicle {
         }
         let series = self.link.persistent_state().series;
         self.gallery.replace_requests(requests, series, &mut self.link);
-        self.tend_gallery();
+        self.serve_exemplars();
         Ok(())
     }
 
@@ -71,7 +71,7 @@ impl Vehicle {
                 Ok(())
             }
             FixVerdict::TooOld => Err(RefusalReason::TooOld),
-            FixVerdict::Absurd | FixVerdict::Outlier => Err(RefusalReason::OutOfRange),
+            FixVerdict::Invalid | FixVerdict::Outlier => Err(RefusalReason::OutOfRange),
         }
     }
 
@@ -164,7 +164,7 @@ impl Vehicle {
         self.publisher.select(&mut self.link);
         self.link.set_shares(budget.shares);
         self.link.set_background(budget.background);
-        self.tend_gallery();
+        self.serve_exemplars();
         self.durable.budget_bps = Some(budget.bits_per_s);
         self.durable.shares = Some(budget.shares.0);
         self.durable.background = Some(budget.background.code());

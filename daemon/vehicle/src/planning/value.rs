@@ -1,7 +1,7 @@
-//! What it is worth to see each part of the sea floor next.
+//! What it is values to see each part of the sea floor next.
 
 use super::bounds::Point;
-use super::expect::{Expectation, Seen};
+use super::expect::{Expectation, SeenLabels};
 use super::lattice::{Lattice, Node};
 use scenecast_protocol::directive::Utility;
 use scenecast_protocol::map::{Cell, LabelGrid};
@@ -29,36 +29,36 @@ impl Knowledge {
     }
 }
 
-/// Worth of the next look at a cell that was looked at before, against the look before that.
+/// BlockValues of the next look at a cell that was looked at before, against the look before that.
 const REPEATED_LOOK: f32 = 0.2;
 
-/// Worth of the next look at each block, the square between four places of a lattice. A place shows the four blocks around it.
+/// BlockValues of the next look at each block, the square between four places of a lattice. A place shows the four blocks around it.
 #[derive(Debug, Clone)]
-pub struct Worth {
+pub struct BlockValues {
     /// Blocks of a row: one more than places.
     columns: usize,
     blocks: Vec<f32>,
 }
 
 /// The blocks of a place, as places in the rows of blocks.
-pub type Shown = [usize; 4];
+pub type ShownBlocks = [usize; 4];
 
-impl Worth {
-    /// Worth by the operator's utility, in whole cells of weight 1. Beyond the cells of the window nothing is worth anything;
+impl BlockValues {
+    /// BlockValues by the operator's utility, in whole cells of weight 1. Beyond the cells of the window nothing is values anything;
     /// with it goes where its cells lie in the world.
     pub fn new(
         lattice: &Lattice,
-        (window, placed): (&Window, Point),
+        (window, placed): (&CellWindow, Point),
         map: &LabelGrid,
         known: &Knowledge,
         utility: &Utility,
     ) -> Self {
         let (places, rows) = lattice.size();
         let columns = places + 1;
-        let mut worth = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
+        let mut values = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
         let (south_west, step) = (lattice.place(0), lattice.step_m());
         let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
-        let cells = window.worth_of_cells(map, known, utility);
+        let cells = window.cell_values(map, known, utility);
         for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
             let y = block(window.centre(row, window.y) + placed.1, south_west.1);
             if !(0..=rows as i64).contains(&y) {
@@ -67,15 +67,15 @@ impl Worth {
             for (column, value) in (0..).zip(line) {
                 let x = block(window.centre(column, window.x) + placed.0, south_west.0);
                 if (0..columns as i64).contains(&x) {
-                    worth.blocks[y as usize * columns + x as usize] += value;
+                    values.blocks[y as usize * columns + x as usize] += value;
                 }
             }
         }
-        worth
+        values
     }
 
     /// The blocks that a place shows.
-    pub fn shown(&self, node: Node) -> Shown {
+    pub fn shown(&self, node: Node) -> ShownBlocks {
         let first = node + node / (self.columns - 1);
         [first, first + 1, first + self.columns, first + self.columns + 1]
     }
@@ -89,9 +89,9 @@ impl Worth {
     }
 }
 
-/// The cells whose worth counts.
+/// The cells whose values counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
+pub struct CellWindow {
     pub x: i32,
     pub y: i32,
     pub width: usize,
@@ -100,10 +100,10 @@ pub struct Window {
     pub cell_m: f64,
 }
 
-/// Most cells whose worth is reckoned one by one.
+/// Most cells whose values is reckoned one by one.
 const MAX_CELLS: f64 = 4e6;
 
-impl Window {
+impl CellWindow {
     /// The cells of an area; fewer where that would be too many.
     pub fn new(area: scenecast_core::Area, cell_m: f64) -> Self {
         let cell = |metres: f64| (metres / cell_m + 1e-9).floor().clamp(-1e9, 1e9) as i32;
@@ -124,23 +124,23 @@ impl Window {
         grid.copy_area(i64::from(self.x), i64::from(self.y), self.width, self.height)
     }
 
-    fn worth_of_cells(&self, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Vec<f32> {
+    fn cell_values(&self, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Vec<f32> {
         let labels = self.copy(map);
-        let seen = Seen { labels: &labels, width: self.width };
+        let seen = SeenLabels { labels: &labels, width: self.width };
         let weight: Vec<f32> = (0..=255).map(|l| utility.weight(l) as f32).collect();
         let (exploration, curiosity) = (f32::from(utility.exploration) / 100.0, f32::from(utility.curiosity) / 100.0);
         let expectation = Expectation::new(seen);
-        let mut worth = expectation.of(|label| weight[usize::from(label)], 0.0);
-        for (w, &label) in worth.iter_mut().zip(&labels) {
+        let mut values = expectation.of(|label| weight[usize::from(label)], 0.0);
+        for (w, &label) in values.iter_mut().zip(&labels) {
             *w = if label == 0 { *w + exploration } else { weight[usize::from(label)] };
         }
         if curiosity != 0.0 {
             let odd = oddness(&self.copy(&known.surprise));
-            worth.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
+            values.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
         }
         let looks = self.copy(&known.looks);
-        worth.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
-        worth
+        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
+        values
     }
 }
 
