@@ -1,4 +1,4 @@
-//! Images of a vehicle's labels: those that are here, and those that are asked for.
+//! The exemplars of a vehicle's labels that have arrived, and the requests for more.
 
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::Exemplar;
@@ -6,89 +6,87 @@ use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 
-/// Which image of a label is wanted.
+/// The kind of exemplar that the operator requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wish {
-    /// The best one that is not here.
+    /// The best one that has not arrived yet.
     Another,
-    /// One that is here with twice its edge: the one of this number, or the one that came last.
+    /// An exemplar that has arrived, with twice its edge: the one of this number, or the latest.
     Larger(Option<u8>),
 }
 
-/// How far a request is.
+/// The progress of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AskState {
-    /// Asked for; how far the request is, the directive's slot knows.
+    /// The request was ordered. Its order status is that of the directive's slot.
     Asked,
-    /// The vehicle has no such image yet, and sends it when it has.
+    /// The vehicle has no such exemplar yet and sends it later.
     NoneYet,
-    /// Bytes held of bytes in all.
+    /// Bytes received, of bytes in all.
     Coming(usize, usize),
-    /// The vehicle refused the request.
     Refused,
 }
 
-/// A request that is not met.
+/// A request that has no exemplar yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
-    /// What the vehicle is asked.
+    /// The request as it is sent.
     pub request: ExemplarRequest,
     pub state: AskState,
     pub changed: Instant,
 }
 
-/// An image that is here.
+/// An exemplar that has arrived.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// Its number among those of the label.
+    /// The number by which the vehicle knows it among those of the label.
     pub number: u8,
-    /// Its size: an edge of 64 << `size` pixels.
+    /// The size class: an edge of 64 << `size` pixels.
     pub size: u8,
     pub webp: Vec<u8>,
-    /// Bytes of it that came over the water.
+    /// Bytes that the link carried for it.
     pub sent_bytes: usize,
     pub came: Instant,
-    /// Whether somebody had asked for it.
     pub asked: bool,
 }
 
-/// What there is of a label.
+/// The exemplars of a label.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Page {
-    /// Images, the last one last.
+    /// In the order of arrival.
     pub pictures: Vec<Picture>,
-    /// The request that is not met, if there is one.
+    /// The open request, if there is one.
     pub asked: Option<Asked>,
     serial: u8,
 }
 
-/// The images of a vehicle's labels in one epoch.
+/// The exemplars of a vehicle's labels in one epoch.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Album {
     pages: BTreeMap<u8, Page>,
 }
 
 impl Album {
-    /// Requests at a time: as many as a vehicle takes.
+    /// Maximum number of open requests; a vehicle takes no more.
     const MAX_ASKED: usize = 8;
-    /// Images that are kept of a label.
+    /// Maximum number of exemplars of a label.
     const MAX_OF_LABEL: usize = 8;
-    /// Bytes that are kept; the oldest images go.
+    /// Maximum number of bytes. Beyond it the oldest exemplar is dropped.
     const MAX_BYTES: usize = 1 << 20;
-    /// The largest size that is asked for.
+    /// The largest size class that can be requested.
     pub const MAX_SIZE: u8 = 1;
 
-    /// What there is of a label.
+    /// The exemplars of a label and its request.
     pub fn page(&self, label: u8) -> Option<&Page> {
         self.pages.get(&label)
     }
 
-    /// Labels that were asked for or shown.
+    /// Labels that have an exemplar or a request.
     pub fn pages(&self) -> impl Iterator<Item = (u8, &Page)> {
         self.pages.iter().map(|(&label, page)| (label, page))
     }
 
-    /// Asks for an image of a label in place of what was asked of it before. The error is one line for the operator.
+    /// Requests an exemplar of a label. It replaces the label's open request. The error is one line for the operator.
     pub fn ask(&mut self, label: u8, wish: Wish, now: Instant) -> Result<(), String> {
         let others = self.pages.iter().filter(|(l, p)| **l != label && p.is_open()).count();
         if others >= Self::MAX_ASKED {
@@ -117,25 +115,25 @@ impl Album {
         Ok(())
     }
 
-    /// Nobody wants what was asked of a label any more. The error is one line for the operator.
+    /// Withdraws the request of a label. The error is one line for the operator.
     pub fn cancel(&mut self, label: u8) -> Result<(), String> {
         let asked = self.pages.get_mut(&label).and_then(|page| page.asked.take());
         asked.map(drop).ok_or_else(|| format!("no image of label {label} is asked for"))
     }
 
-    /// Requests that are not met yet.
+    /// The open requests, as they are sent.
     pub fn wanted(&self, epoch: u8) -> ExemplarRequests {
         let open = self.pages.values().filter(|page| page.is_open());
         ExemplarRequests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
     }
 
-    /// The vehicle refused what is asked for.
+    /// The vehicle has refused the requests.
     pub fn handle_refusal(&mut self, now: Instant) {
         let asked = self.pages.values_mut().filter_map(|page| page.asked.as_mut());
         asked.filter(|a| a.state == AskState::Asked).for_each(|a| (a.state, a.changed) = (AskState::Refused, now));
     }
 
-    /// Part of an image came in; `head` are its first bytes.
+    /// Part of an exemplar came in. `head` are its first bytes.
     pub fn handle_progress(&mut self, head: [u8; 4], (held, total): (usize, usize), now: Instant) {
         let [_, label, serial, _] = head;
         let asked = self.pages.get_mut(&label).and_then(|page| page.asked.as_mut());
@@ -144,7 +142,7 @@ impl Album {
         }
     }
 
-    /// An image is complete; says whether there is something new to show.
+    /// Takes a complete object. Returns whether the operator has something new to see.
     pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
         let is_meant = |asked: &Asked| asked.request.serial == exemplar.serial;
         let page = self.pages.entry(exemplar.label).or_default();
@@ -180,7 +178,7 @@ impl Album {
 }
 
 impl Page {
-    /// The picture of a number, or the one that came last.
+    /// The exemplar of a number, or the latest one.
     pub fn picture(&self, number: Option<u8>) -> Option<&Picture> {
         match number {
             Some(number) => self.pictures.iter().find(|p| p.number == number),
@@ -248,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_that_has_no_image_says_so_and_is_still_asked() {
+    fn a_request_without_an_image_stays_open() {
         let mut album = Album::default();
         album.ask(5, Wish::Another, NOW).unwrap();
         let none = Exemplar { bytes: Vec::new(), ..come(5, 1, 0, 0) };

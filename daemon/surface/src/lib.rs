@@ -1,4 +1,4 @@
-//! The surface: holds the operator's map of each vehicle, sends each its directive.
+//! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
 mod album;
 mod assemble;

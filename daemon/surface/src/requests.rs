@@ -1,4 +1,4 @@
-//! Images of labels: what the surface asks its vehicles for.
+//! The surface requests exemplars of its vehicles.
 
 use super::album::{Album, Wish};
 use super::{Desk, Surface};
@@ -7,7 +7,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 
 impl Surface {
-    /// Asks for an image of a label. The error is one line for the operator.
+    /// Requests an exemplar of a label. The error is one line for the operator.
     pub fn request_exemplar(&mut self, vehicle: Address, label: u8, wish: Wish, now: Instant) -> Result<u16, String> {
         if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
             return Err(format!("label {label} is not on the map"));
@@ -15,7 +15,7 @@ impl Surface {
         self.change_requests(vehicle, |album| album.ask(label, wish, now), now)
     }
 
-    /// Nobody wants the image of a label any more that was asked for.
+    /// Withdraws the request for an exemplar of a label. The error is one line for the operator.
     pub fn cancel_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
         self.change_requests(vehicle, |album| album.cancel(label), now)
     }
@@ -34,11 +34,11 @@ impl Surface {
         Ok(version)
     }
 
-    /// A vehicle that has restarted does not know what it was asked.
+    /// A restarted vehicle has lost the requests, so they are sent again.
     pub(super) fn request_again(&mut self, vehicle: Address, now: Instant) {
         let wanted = self.desks.get(&vehicle).map(Desk::wanted).filter(|r| !r.wanted.is_empty());
         if let Some(requests) = wanted {
-            // It was taken before.
+            // The same order was valid before.
             let _ = self.issue(vehicle, Slot::Requests(requests), now);
         }
     }

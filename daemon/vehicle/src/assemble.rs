@@ -1,4 +1,4 @@
-//! From a configuration to a vehicle.
+//! Builds a vehicle from a configuration.
 
 use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
@@ -12,7 +12,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::MissionId;
 use std::time::Duration;
 
-/// A vehicle that surveys `area`; `seed` is random for each run.
+/// Builds a vehicle that surveys `area`. `seed` is random for each run.
 pub fn assemble(
     config: &Config,
     authenticity: Option<Authenticity>,
@@ -61,7 +61,6 @@ fn footprint(config: &Config) -> Footprint {
     Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }
 }
 
-/// What the vehicle does of its own accord.
 fn habits(config: &Config) -> Habits {
     let survey = &config.survey;
     Habits {
@@ -79,7 +78,7 @@ fn selected_layers(config: &Config) -> LayerMask {
     config.map.layers.iter().map(|layer| layer.id()).collect()
 }
 
-/// Every layer that the operator could request, with its part of the map's share.
+/// Every layer that the operator can select, with its part of the map's share.
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
     let debounce = Duration::from_secs_f64(map.debounce_s);

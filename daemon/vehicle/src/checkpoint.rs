@@ -1,4 +1,4 @@
-//! A mapper as bytes: the model with all that its labels and words mean.
+//! The checkpoint of a mapper: the scene model, its labels, its vocabulary and its exemplars as bytes.
 
 use super::mapper::Mapper;
 use super::relief::Relief;
@@ -13,28 +13,26 @@ use serde::{Deserialize, Serialize};
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
 
-/// Why a checkpoint is not gone on from.
+/// The reason why a checkpoint cannot be restored.
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
-    /// Not a checkpoint, of another version, or damaged.
+    /// The bytes are no checkpoint, of another version, or damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The model in it is none to go on from.
+    /// The scene model in it is invalid.
     #[error(transparent)]
     Model(#[from] CheckpointError),
-    /// The checksum is right but the content cannot be.
+    /// The checksum is right, but the content contradicts itself.
     #[error("its content is inconsistent")]
     Inconsistent,
-    /// It was made with other parameters.
     #[error("it was made with other parameters of the scene model")]
     OtherParameters,
-    /// The configuration itself is wrong.
     #[error(transparent)]
     Config(#[from] UserError),
 }
 
 #[derive(Serialize, Deserialize)]
-struct Content<M, B, W, E, R> {
+struct CheckpointContent<M, B, W, E, R> {
     lineage: u64,
     last_s: Option<f64>,
     model: M,
@@ -44,16 +42,16 @@ struct Content<M, B, W, E, R> {
     relief: R,
 }
 
-/// A mapper that goes on where a checkpoint left it, and the mission that it belongs to.
+/// A mapper that continues from a checkpoint, and the mission that it belongs to.
 pub struct Restored {
     pub mapper: Mapper,
     pub lineage: u64,
 }
 
 impl Mapper {
-    /// Everything as bytes, for [`Mapper::restore`]; `lineage` says which mission it belongs to.
+    /// Encodes the mapper for [`Mapper::restore`]. `lineage` is the number of the mission.
     pub fn save(&self, lineage: u64) -> Vec<u8> {
-        let kept = Content {
+        let kept = CheckpointContent {
             lineage,
             last_s: self.last_s,
             model: self.model.save(),
@@ -65,11 +63,11 @@ impl Mapper {
         ENVELOPE.seal(&postcard::to_allocvec(&kept).unwrap_or_default())
     }
 
-    /// Goes on from a checkpoint, if it was made with the parameters that are configured. Priors may differ: they are those
-    /// of the checkpoint until [`Mapper::tune`] says which are in force.
+    /// Restores a mapper if its parameters are those of the configuration. Priors may differ: those of the checkpoint
+    /// apply until [`Mapper::tune`] sets others.
     pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, RestoreError> {
         let content = ENVELOPE.open(bytes)?;
-        let kept: Content<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
+        let kept: CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
             postcard::from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
@@ -117,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restored_mapper_goes_on_as_the_one_that_was_saved() {
+    fn a_restored_mapper_continues_like_the_saved_one() {
         let config = config(&[]);
         let mut whole = Mapper::new(&config, None, 3, 1).unwrap();
         (0..12).for_each(|at| drop(frame(&mut whole, at)));
@@ -154,7 +152,7 @@ mod tests {
         }
         let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), None, &whole.save(7)).unwrap().mapper;
         other.tune(&Settings::default());
-        assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured where nobody says otherwise");
+        assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured without an order");
         assert_eq!(frame(&mut other, 9).epoch, 3);
     }
 

@@ -1,21 +1,21 @@
-//! When the vehicle stops following its survey, of its own accord or because it is told to.
+//! The conditions under which the vehicle leaves its survey: by an order, or by itself.
 
 use scenecast_protocol::directive::{Constraints, Limits, Reaction};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::ModeReason;
 
-/// What the vehicle does where the operator's limits say nothing.
+/// The configured policy, which applies where the operator's limits have no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Habits {
     pub on_silence: Reaction,
-    /// Outside the fence or a band.
+    /// Outside the fence or the depth band.
     pub on_breach: Reaction,
     pub on_abort: Reaction,
-    /// Seconds of silence that are allowed; infinite: any.
+    /// Allowed silence of the surface, seconds; infinite: any.
     pub silence_s: f64,
-    /// Speed over ground, metres a second, to reckon the time of a way.
+    /// Speed over ground in metres a second, by which a time becomes a distance.
     pub speed_m_s: f64,
-    /// Height at which it flies, metres above the sea floor.
+    /// Altitude above the sea floor that the vehicle keeps, metres.
     pub altitude_m: f64,
 }
 
@@ -32,29 +32,29 @@ impl Default for Habits {
     }
 }
 
-/// What is done instead of the survey, and why.
+/// The reaction that takes the place of the survey, and its reason.
 pub type Stop = (Reaction, ModeReason);
 
-/// Watches over limits, silence and breaches.
+/// Watches limits, silence and breaches.
 #[derive(Debug)]
 pub struct Guard {
     habits: Habits,
     pub limits: Limits,
     pub order: Constraints,
-    /// Metres gone since the limits are in force.
+    /// Metres travelled since the limits were put in force.
     pub used_m: f64,
     pub used_s: f64,
-    /// A breach, until the operator's next order or fence; silence that made the vehicle come up.
+    /// A breach until the operator's next order or fence, or a silence after which the vehicle has surfaced.
     pub latched: ModeReason,
     last_received: Instant,
     now: Instant,
 }
 
-/// Part of the limits kept back for what the reckoning misses.
+/// The share of the limits that is kept in reserve for errors of the estimate.
 const RESERVE: f64 = 0.03;
 
 impl Guard {
-    /// Watches from `now`; the surface counts as last_received then.
+    /// Starts at `now`, as if a frame of the surface had been received then.
     pub fn new(habits: Habits, now: Instant) -> Self {
         let (limits, order, latched) = (Limits::default(), Constraints::default(), ModeReason::Survey);
         Self { habits, limits, order, used_m: 0.0, used_s: 0.0, latched, last_received: now, now }
@@ -65,34 +65,33 @@ impl Guard {
         self.now = now;
     }
 
-    /// The vehicle went so far.
     pub fn handle_travel(&mut self, metres: f64) {
         self.used_m += metres;
     }
 
-    /// Speed over ground at which it flies, metres a second.
+    /// Speed over ground that the vehicle keeps, metres a second.
     pub fn speed_m_s(&self) -> f64 {
         self.habits.speed_m_s
     }
 
-    /// A frame of the surface was taken.
+    /// The link received a frame of the surface.
     pub fn handle_received(&mut self, at: Instant) {
         self.last_received = self.last_received.max(at);
     }
 
-    /// The vehicle is outside of where it may be.
+    /// The vehicle is outside its fence or depth band.
     pub fn handle_breach(&mut self, why: ModeReason) {
         if self.latched == ModeReason::Survey {
             self.latched = why;
         }
     }
 
-    /// The operator has decided anew.
+    /// The operator has answered a breach.
     pub fn clear_breach(&mut self) {
         self.latched = ModeReason::Survey;
     }
 
-    /// New limits: distance and time count afresh.
+    /// Puts limits in force; distance and time count from zero.
     pub fn set_limits(&mut self, limits: Limits) {
         (self.limits, self.used_m, self.used_s) = (limits, 0.0, 0.0);
     }
@@ -102,13 +101,13 @@ impl Guard {
         self.limits.depth.is_some_and(|band| !band.contains(depth_m))
     }
 
-    /// Whether the vehicle flies as these limits demand.
+    /// Whether the vehicle keeps these limits at its depth and altitude.
     pub fn is_able(&self, limits: &Limits, depth_m: f64) -> bool {
         limits.depth.is_none_or(|b| b.contains(depth_m))
             && limits.altitude.is_none_or(|b| b.contains(self.habits.altitude_m))
     }
 
-    /// Metres that may still be gone, the way home included.
+    /// Metres that may still be travelled, the return path included.
     pub fn left_m(&self) -> f64 {
         self.left_of_distance().min(self.left_of_time())
     }
@@ -122,18 +121,19 @@ impl Guard {
         self.limits.time_s.map_or(f64::INFINITY, |s| left_s(s) * self.habits.speed_m_s)
     }
 
-    /// Which of the limits is the tighter one.
+    /// The reason to report when the tighter of the two limits is used up.
     pub fn tighter(&self) -> ModeReason {
         if self.left_of_time() < self.left_of_distance() { ModeReason::Time } else { ModeReason::Distance }
     }
 
-    /// What is to be done instead of the survey, if anything; `home_m` is the way home.
+    /// The reaction that takes the place of the survey, if one is due. `home_m` is the length
+    /// of the return path, metres.
     pub fn stop(&mut self, home_m: f64) -> Option<Stop> {
         let silence_s = self.limits.silence_s.map_or(self.habits.silence_s, f64::from);
         let on_silence = self.limits.on_silence.unwrap_or(self.habits.on_silence);
         let silent = self.now.since(self.last_received).as_secs_f64() > silence_s;
         if silent && on_silence == Reaction::Surface {
-            // It does not dive again because somebody is last_received: up there are ships.
+            // It stays at the surface when frames are received again, because ships may be above.
             self.handle_breach(ModeReason::Silence);
         }
         if self.order.abort {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_home_is_kept_of_distance_and_time() {
+    fn distance_and_time_are_reserved_for_the_return_path() {
         let mut guard = Guard::new(Habits::default(), at(0.0));
         guard.set_limits(Limits { distance_m: Some(1000), time_s: Some(1000), ..Limits::default() });
         assert_eq!(guard.tighter(), ModeReason::Time, "a thousand seconds are five hundred metres");

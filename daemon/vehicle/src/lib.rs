@@ -1,7 +1,7 @@
-//! The vehicle: sees, maps, tells, obeys.
+//! The vehicle: it maps the sea floor, sends the map to the surface and carries out orders.
 //!
-//! [`Mapper`] turns camera frames into labels and may live on a thread of its own; [`Vehicle`] speaks with the surface,
-//! keeps the position estimate and chooses waypoints. Neither does IO.
+//! [`Mapper`] turns camera frames into a label map and may run on a thread of its own. [`Vehicle`] holds the link to
+//! the surface, estimates the position and chooses waypoints. Neither does IO.
 
 mod assemble;
 mod checkpoint;

@@ -1,4 +1,4 @@
-//! Camera frames to label map.
+//! The mapper: from camera frames to the label map.
 
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
@@ -15,7 +15,7 @@ use scenecast_protocol::map::{Cell, LayerId};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Representative images kept a label.
+/// Exemplars that are kept of each label.
 const EXEMPLARS_KEPT: usize = 4;
 
 /// The best exemplars of each label that has any, the best first.
@@ -26,14 +26,13 @@ pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
 pub struct MapUpdate {
     /// Mission time of the frame, seconds.
     pub t_s: f64,
-    /// Epoch of the label ids.
     pub epoch: u8,
-    /// Labels of every explored cell.
+    /// The label of every explored cell.
     pub cells: Vec<(Cell, u8)>,
-    /// How sure the model is of these labels, 0 to 1, depths of the sea floor there, metres, and mean surprise of a word, bits.
+    /// Confidence of the labels (0 to 1), depth of the sea floor (metres), and mean surprise of a word (bits).
     pub layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     pub labels: u8,
-    /// How badly the model explains each cell.
+    /// The perplexity of each cell under the model.
     pub perplexity: Vec<(Cell, f32)>,
 }
 
@@ -45,31 +44,31 @@ pub struct Mapper {
     pub(super) model: SceneModel,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
-    /// The exemplars that were given out last.
+    /// The exemplars of the last [`Mapper::shared_exemplars`].
     shared: SharedExemplars,
     pub(super) relief: Relief,
     refine_words_per_s: f64,
-    /// Camera frames a second that are taken at most; none: every one.
+    /// Maximum rate of camera frames, 1/s; `None`: every frame.
     frames_per_s: Option<f64>,
     configured: Configured,
     pub(super) last_s: Option<f64>,
     pub(super) flat: Vec<FlatCell>,
 }
 
-/// What the settings of the operator take the place of.
+/// The configured values that the operator's settings override.
 struct Configured {
     priors: [f64; 3],
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
 }
 
-/// A frame rate as it is configured, where 0 is every frame.
+/// A configured frame rate, where 0 stands for every frame.
 fn every_frame_or(rate: f64) -> Option<f64> {
     (rate > 0.0).then_some(rate)
 }
 
 impl Mapper {
-    /// A mapper that has seen nothing; its label ids begin at `epoch`.
+    /// An empty mapper. Its labels belong to `epoch`.
     pub fn new(config: &Config, vocabulary: Option<Measures>, epoch: u8, seed: u64) -> Result<Self, UserError> {
         let extractor =
             vocabulary.map_or_else(|| WordExtractor::new(&WordConfig::default()), WordExtractor::from_measures);
@@ -116,35 +115,36 @@ impl Mapper {
         })
     }
 
-    /// Follows settings that were checked; what they do not name is as configured. Topics and their labels stay.
+    /// Puts settings in force that were checked; those without a value are as configured. Topics and their labels stay.
     pub fn tune(&mut self, settings: &Settings) {
         let or = |change: Change<Figure>, configured: f64| change.value().map_or(configured, Figure::value);
         let [alpha, beta, gamma] = self.configured.priors;
         let priors = (or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma));
         if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
-            // What a vehicle accepts lies within what the model takes.
+            // The range of the settings lies within the range of the model.
             tracing::error!("the scene model keeps its priors: {e}");
         }
         self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
         self.frames_per_s = settings.frames_per_s.value().map(Figure::value).or(self.configured.frames_per_s);
     }
 
-    /// Whether a frame taken at mission time `t_s` is to be seen: of each interval of the frame rate the first one is.
+    /// Whether the frame of mission time `t_s` is to be mapped. Each interval of the frame rate takes its first frame.
     pub fn takes(&self, t_s: f64) -> bool {
         let Some(rate) = self.frames_per_s else { return true };
         let interval = |t_s: f64| (t_s * rate + 1e-6).floor();
         self.last_s.is_none_or(|last_s| interval(last_s) != interval(t_s))
     }
 
-    /// Priors in force: alpha, beta, gamma.
+    /// The priors in force: alpha, beta, gamma.
     pub fn priors(&self) -> [f64; 3] {
         let config = self.model.config();
         [config.alpha, config.beta, config.gamma]
     }
 
-    /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.
+    /// Maps a frame that was taken at `pose` at mission time `t_s`, and refines the model in proportion to the time
+    /// since the last frame.
     ///
-    /// Its pixels are `scale` times as large on the sea floor as the configured ones.
+    /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
         let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
         let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
@@ -164,7 +164,7 @@ impl Mapper {
         self.update(&published)
     }
 
-    /// The map as it was published last.
+    /// The map after the last frame.
     pub fn current(&self) -> MapUpdate {
         self.update(&self.book.published(&self.flat))
     }
@@ -185,7 +185,7 @@ impl Mapper {
         }
     }
 
-    /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.
+    /// Continues after a restart in `epoch`. Labels up to `published` may be known at the surface.
     pub fn resume(&mut self, epoch: u8, published: u8) {
         if self.book.epoch() == epoch {
             self.book.resume(published);
@@ -203,7 +203,7 @@ impl Mapper {
         (metres / self.cell_m).floor() as i32
     }
 
-    /// The images that represent a label best so far, the best first.
+    /// The best exemplars of a label, the best first.
     pub fn exemplars(&self, label: u8) -> &[ExemplarPatch] {
         self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
     }
@@ -223,7 +223,6 @@ impl Mapper {
         self.shared.clone()
     }
 
-    /// Epoch of the label ids.
     pub fn epoch(&self) -> u8 {
         self.book.epoch()
     }
@@ -236,7 +235,7 @@ impl Mapper {
         self.model.words()
     }
 
-    /// Perplexity of the words under the model.
+    /// Perplexity of all words under the model.
     pub fn perplexity(&self) -> f64 {
         self.model.perplexity()
     }

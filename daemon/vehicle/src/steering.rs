@@ -1,4 +1,4 @@
-//! Where to go next.
+//! The choice of waypoints.
 
 mod ahead;
 mod choice;
@@ -15,7 +15,7 @@ use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::VecDeque;
 
-/// What the camera sees, metres.
+/// The extent of a camera frame on the sea floor, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
     pub across: f64,
@@ -23,47 +23,48 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Metres from the middle that are seen at any heading.
+    /// Metres around the centre that are visible at any heading.
     fn reach(&self) -> f64 {
         self.across.min(self.along) / 2.0
     }
 }
 
-/// What the vehicle is to do next.
+/// The next step of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
     Go(Point),
-    /// What is left of distance or time is the path home.
+    /// The rest of the distance or time is needed for the return path.
     LimitReached,
-    /// It is where it was to go.
+    /// The vehicle is at its goal, or its plan is complete.
     Arrived,
-    /// Arrived is nowhere that it may go.
+    /// There is no allowed path to any goal.
     NoPath,
 }
 
-/// Chooses waypoints: a lawnmower until the operator has said what matters, then by the planner that is set.
+/// Chooses waypoints: by a lawnmower until the operator has sent a utility, then by the planner in force.
 ///
-/// Places are of the world, as fence and area are: when a fix moves the map, neither they nor the lattice move with it. Only
-/// cells are of the map's frame.
+/// Places are points of the world frame, as fence and area are, so that neither they nor the lattice move when a fix
+/// moves the map. Only cells belong to the map frame.
 #[derive(Debug)]
 pub struct Steering {
     grounds: Grounds,
     choice: PlannerChoice,
     window: CellWindow,
     known: Knowledge,
-    /// East and north of the map's frame in the world, metres.
+    /// The origin of the map frame in the world frame: metres east and north.
     map_origin: Point,
     plan: VecDeque<Node>,
-    /// The version of the map that the plan is for.
+    /// The version of the map for which the plan was made.
     planned_for: u64,
 }
 
-/// Steps to one waypoint while the path may change with the map: with two, `horizon` collects 2 % less, for each step shows
-/// something new.
+/// Steps up to one waypoint where the plan depends on the map. With two, `horizon` collects 2 % less, because
+/// each step shows new cells.
 const STEPS_AHEAD: usize = 1;
 
 impl Steering {
-    /// Steers within `area`; cells have edges of `cell_m` metres. The vehicle stays `clearance_m` clear of every outline.
+    /// Steers within `area`. Cells have edges of `cell_m` metres, and the vehicle keeps
+    /// `clearance_m` metres from every outline.
     pub fn new(area: Area, footprint: Footprint, cell_m: f64, configured: PlannerKind, clearance_m: f64) -> Self {
         let mut steering = Self {
             grounds: Grounds::new(area, footprint.reach(), clearance_m),
@@ -78,12 +79,12 @@ impl Steering {
         steering
     }
 
-    /// Where the survey begins, metres.
+    /// The first place of the survey.
     pub fn start(&self) -> Point {
         self.grounds.lattice().place(0)
     }
 
-    /// Where the vehicle goes on its return.
+    /// The end of the return path.
     pub fn return_place(&self) -> Point {
         self.grounds.return_place()
     }
@@ -92,7 +93,7 @@ impl Steering {
         self.grounds.bounds()
     }
 
-    /// A fix has moved the map to there in the world: paths are planned anew, from where the vehicle now believes to be.
+    /// A fix has moved the origin of the map frame. The path is planned again from the new position.
     pub fn set_placement(&mut self, east_m: f64, north_m: f64) {
         if self.map_origin != (east_m, north_m) {
             self.map_origin = (east_m, north_m);
@@ -101,33 +102,32 @@ impl Steering {
         }
     }
 
-    /// Where the map's frame lies in the world.
+    /// The origin of the map frame in the world frame, metres.
     pub fn map_origin(&self) -> Point {
         self.map_origin
     }
 
-    /// Puts a fence that was checked in force.
+    /// Puts a fence in force that was checked.
     pub fn set_fence(&mut self, fence: &Fence) {
         self.grounds.set_fence(fence);
         self.choice.planner_mut().handle_change();
         self.plan.clear();
     }
 
-    /// The operator's choice of a planner; `None`: as configured.
+    /// Sets the planner that the operator ordered; `None`: the configured one.
     pub fn set_planner(&mut self, chosen: Option<PlannerKind>) {
         self.choice.choose(chosen);
         self.plan.clear();
     }
 
-    /// Forgets the path that was planned.
     pub fn replan(&mut self) {
         self.plan.clear();
     }
 
-    /// The camera saw the sea floor around `at`, of the map's frame.
+    /// The camera saw the sea floor around `at`, a point of the map frame.
     pub fn handle_view(&mut self, at: Point) {
         let reach = self.grounds.reach_m();
-        // Cells whose middle was in sight.
+        // The cells whose centre was visible.
         let cells = |middle: f64| {
             let edge = |metres: f64| metres / self.window.cell_m - 0.5;
             edge(middle - reach).ceil() as i32..=edge(middle + reach).floor() as i32
@@ -137,12 +137,13 @@ impl Steering {
         }
     }
 
-    /// How badly the scene model explains a cell.
+    /// Takes the scene model's perplexity of a cell.
     pub fn handle_perplexity(&mut self, cell: Cell, perplexity: f32) {
         self.known.set_perplexity(cell, perplexity);
     }
 
-    /// The next waypoint from `from`, of which version `version` of the map is known, with `left_m` metres to go in all.
+    /// The next waypoint from `from`. `map` is the label map with its version, `left_m` the distance that may
+    /// still be travelled in metres.
     pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
         if self.choice.follow(utility.is_some()) {
             self.plan.clear();
@@ -178,7 +179,7 @@ impl Steering {
         self.choice.planner_mut().plan(&request)
     }
 
-    /// Whether the first place of a plan still leaves the path home.
+    /// Whether the first place of a plan leaves enough distance for the return path.
     fn can_go(&self, from: Node, plan: &VecDeque<Node>, left_m: f64) -> bool {
         let Some(return_paths) = self.grounds.return_paths() else { return false };
         let first = plan.front().and_then(|&to| self.grounds.lattice().around(from).find(|(n, _)| *n == to));
@@ -212,7 +213,7 @@ impl Steering {
             count += 1;
             self.plan.pop_front();
         }
-        // It is popped when it is reached, so that the rest of the plan follows it.
+        // The place stays in the plan until it is reached, so that the rest of the plan follows it.
         self.plan.push_front(ahead);
         Course::Go(self.grounds.lattice().place(ahead))
     }
@@ -227,7 +228,7 @@ impl Steering {
         }
     }
 
-    /// The next waypoint on the path home.
+    /// The next waypoint of the return path.
     pub fn next_return(&mut self, from: Point) -> Course {
         self.plan.clear();
         let home = self.return_place();
@@ -248,12 +249,12 @@ impl Steering {
         }
     }
 
-    /// Metres of the return path from a place, infinite if there is none.
+    /// Metres of the return path from a place; infinite if there is none.
     pub fn return_path_m(&self, from: Point) -> f64 {
         self.grounds.return_path_m(from)
     }
 
-    /// Metres from a waypoint at which it counts as reached.
+    /// The distance in metres at which a waypoint counts as reached.
     pub fn arrival_m(&self) -> f64 {
         self.grounds.arrival_m()
     }
@@ -270,7 +271,7 @@ mod tests {
         Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
     }
 
-    /// Drives to waypoint after waypoint; the places that it came to.
+    /// Steers from waypoint to waypoint, and returns them.
     fn drive(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, legs: usize) -> Vec<Point> {
         let mut at = steering.start();
         let mut track = vec![at];

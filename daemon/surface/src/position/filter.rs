@@ -1,6 +1,6 @@
-//! A Kalman filter of a place in the plane that moves about steadily.
+//! A Kalman filter of a position in the plane, with nearly constant velocity.
 
-/// A place with its uncertainty: covariance in m2, xx, xy, yy.
+/// A position with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     pub x_m: f64,
@@ -10,39 +10,40 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// A place that is as uncertain in every direction.
+    /// A position with the same uncertainty in every direction.
     pub fn round(x_m: f64, y_m: f64, sigma_m: f64) -> Self {
         Self { x_m, y_m, cov_m2: [sigma_m * sigma_m, 0.0, sigma_m * sigma_m] }
     }
 
-    /// Standard deviation of one coordinate, the mean of all directions, metres.
+    /// Standard deviation of one coordinate in metres, averaged over all directions.
     pub fn sigma_m(&self) -> f64 {
         ((self.cov_m2[0] + self.cov_m2[2]) / 2.0).max(0.0).sqrt()
     }
 
-    /// Whether every number is one.
+    /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
         [self.x_m, self.y_m].into_iter().chain(self.cov_m2).all(f64::is_finite)
     }
 }
 
-/// What became of a measurement.
+/// The decision about a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeasurementVerdict {
     Used,
-    /// It is too far from what was expected.
+    /// It is too far from the prediction.
     Outlier,
-    /// It was far from what was expected, but so were the ones before, at the same place: the filter began anew there.
+    /// It is far from the prediction, but so were those before it, at the same place. The
+    /// filter has started again there.
     Restarted,
 }
 
-/// Constant velocity with random acceleration; gates what cannot be.
+/// A filter with constant velocity and random acceleration, which refuses outliers.
 #[derive(Debug, Clone)]
 pub struct PlaneFilter {
-    /// Metres a second squared, over a second.
+    /// Standard deviation of the acceleration, metres a second squared over a second.
     acceleration: f64,
     state: Option<FilterState>,
-    /// Measurements in a row that were refused though each was near the one before, and the last one.
+    /// The number of refused measurements in a row that agreed with each other, and the last one with its time.
     refused: (u32, Option<(f64, Estimate)>),
 }
 
@@ -51,26 +52,27 @@ struct FilterState {
     at_s: f64,
     place: [f64; 2],
     velocity: [f64; 2],
-    /// Covariance of one axis: place, place-velocity, velocity; both axes have the noise of the rounder measurement.
+    /// Covariance of each axis: position, position and velocity, velocity. An elliptical measurement
+    /// is taken axis by axis.
     p: [[f64; 3]; 2],
 }
 
 impl PlaneFilter {
-    /// Mahalanobis distance squared, two degrees of freedom, that one of a thousand good measurements exceeds.
+    /// The squared Mahalanobis distance with two degrees of freedom that one of a thousand good measurements exceeds.
     pub const GATE: f64 = 13.8;
-    /// So many refused measurements that agree with each other are believed.
+    /// The number of refused measurements in a row that agree with each other after which they are trusted.
     const MIN_AGREEING: u32 = 4;
-    /// Standard deviation of the speed at first, m/s.
+    /// Standard deviation of the initial velocity, m/s.
     const FIRST_SPEED: f64 = 1.0;
-    /// Longer without a measurement, and the filter begins anew, s.
+    /// The filter starts again after this many seconds without a measurement.
     const TIMEOUT_S: f64 = 600.0;
 
-    /// A filter of something that speeds up or turns by about `acceleration` m/s2 over a second.
+    /// A filter of a body that accelerates by about `acceleration` m/s2 over a second.
     pub fn new(acceleration: f64) -> Self {
         Self { acceleration, state: None, refused: (0, None) }
     }
 
-    /// Where it is at `at_s`.
+    /// The position at `at_s`, seconds.
     pub fn predict(&self, at_s: f64) -> Option<Estimate> {
         let s = self.state?.moved(at_s, self.acceleration);
         Some(Estimate { x_m: s.place[0], y_m: s.place[1], cov_m2: [s.p[0][0], 0.0, s.p[1][0]] })
@@ -81,7 +83,8 @@ impl PlaneFilter {
         self.state.map(|s| (s.velocity[0], s.velocity[1]))
     }
 
-    /// Takes a measurement of `at_s`; one that is older than the last counts as of the last, with what it may have moved.
+    /// Takes a measurement of the time `at_s`. One from before the last is moved to the
+    /// last, with a larger uncertainty.
     pub fn update(&mut self, seen: &Estimate, at_s: f64) -> MeasurementVerdict {
         let state = self.state.filter(|s| at_s - s.at_s < Self::TIMEOUT_S);
         let Some(state) = state else {
@@ -89,7 +92,7 @@ impl PlaneFilter {
             return MeasurementVerdict::Used;
         };
         let late_s = (state.at_s - at_s).max(0.0);
-        // Back along its own way: what it may have turned in the meantime adds to the uncertainty.
+        // The measurement is moved along the velocity. A turn in the meantime adds to the uncertainty.
         let seen_now = Estimate {
             x_m: seen.x_m + state.velocity[0] * late_s,
             y_m: seen.y_m + state.velocity[1] * late_s,
@@ -176,7 +179,7 @@ mod tests {
     use sim_channel::RandomStream;
 
     #[test]
-    fn a_steady_way_becomes_known_better_than_it_is_measured() {
+    fn a_steady_motion_is_filtered_below_measurement_noise() {
         let mut rng = RandomStream::new(1, &[]);
         let mut filter = PlaneFilter::new(0.02);
         let mut worst: f64 = 0.0;

@@ -1,9 +1,9 @@
-//! The way so far, as the sensors told it.
+//! The path of the last minutes, as the sensors measured it.
 
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 
-/// What the sensors told of a stretch of way, uncorrected.
+/// A measured displacement without correction, and the length of its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Displacement {
     pub(super) dx_m: f64,
@@ -11,15 +11,15 @@ pub(super) struct Displacement {
     pub(super) length_m: f64,
 }
 
-/// Remembers the way of the last minutes, so that a late fix counts where the vehicle was.
+/// Remembers the path of the last minutes, so that a late fix is compared with the position at its time.
 #[derive(Debug, Default)]
 pub(super) struct Odometer {
-    /// Sums since the beginning, by time.
+    /// Sums since the start, with their times.
     track: VecDeque<(Instant, Displacement)>,
 }
 
 impl Odometer {
-    /// Most steps that are kept, whatever their rate.
+    /// Maximum number of steps that are kept.
     const MAX: usize = 20_000;
 
     fn last(&self) -> Displacement {
@@ -32,13 +32,13 @@ impl Odometer {
             Displacement { dx_m: last.dx_m + dx_m, dy_m: last.dy_m + dy_m, length_m: last.length_m + dx_m.hypot(dy_m) };
         self.track.push_back((now, path));
         let is_old = |at: Instant| now.since(at).as_secs_f64() > memory_s;
-        // One entry that is older stays: what is younger lies between it and the next.
+        // One older entry stays, so that times after it can be interpolated.
         while self.track.len() > Self::MAX || self.track.get(1).is_some_and(|(at, _)| is_old(*at)) {
             self.track.pop_front();
         }
     }
 
-    /// The way from `taken` to now; `None` if that is too long ago to remember.
+    /// The displacement from `taken` to now; `None` if `taken` is further back than `memory_s`.
     pub(super) fn since(&self, taken: Instant, now: Instant, memory_s: f64) -> Option<Displacement> {
         if now.since(taken).as_secs_f64() > memory_s {
             return None;
@@ -57,7 +57,7 @@ impl Odometer {
                 }
             }
             (Some((_, last)), None) => *last,
-            // Before the first step it was where it began.
+            // Before the first step the vehicle was at its start.
             (None, Some(_)) if self.track.len() < Self::MAX => Displacement::default(),
             (None, Some(_)) => return None,
             (None, None) => Displacement::default(),
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_way_since_a_moment_is_interpolated_and_forgotten_in_time() {
+    fn the_path_since_a_time_is_interpolated_and_forgotten() {
         let at = Instant::from_secs_f64;
         let mut odometer = Odometer::default();
         for s in 1..=300 {

@@ -1,9 +1,10 @@
-//! The best gain a metre, again and again.
+//! The planner that always takes the best gain a metre.
 
 use super::lattice::{Node, Paths};
 use super::{PlanRequest, Planner};
 
-/// Goes to the place with the greatest gain a metre of path, what is seen on the path included.
+/// Goes to the place with the greatest gain for each metre of path. The gain includes everything that
+/// is seen along the path.
 #[derive(Debug)]
 pub struct Greedy;
 
@@ -13,7 +14,7 @@ impl Planner for Greedy {
     }
 }
 
-/// The path with the best gain a metre, and that rate.
+/// The path with the best gain a metre, and this rate.
 pub(super) fn best(q: &PlanRequest<'_>) -> (Vec<Node>, f64) {
     let paths = q.lattice.paths(q.from);
     let mut mark = vec![usize::MAX; q.values.blocks()];
@@ -22,7 +23,7 @@ pub(super) fn best(q: &PlanRequest<'_>) -> (Vec<Node>, f64) {
         if !q.can_return(node, paths.metres[node]) {
             continue;
         }
-        // To turn and settle costs as much as half a camera's width.
+        // A stop and a turn cost as much as one step of the lattice.
         let rate = gain_on_way(q, &paths, node, &mut mark) / (paths.metres[node] + q.lattice.step_m());
         if rate > best.0 {
             best = (rate, Some(node));
@@ -32,7 +33,8 @@ pub(super) fn best(q: &PlanRequest<'_>) -> (Vec<Node>, f64) {
     (path.into_iter().take_while(|&n| q.can_return(n, paths.metres[n])).collect(), best.0)
 }
 
-/// BlockValues of every block that is shown on the path to a place, each once; `mark` says by which call a block was counted.
+/// The sum of the values of all blocks that are shown along the path to a place, each block once. `mark` holds the
+/// place by which a block was counted last.
 fn gain_on_way(q: &PlanRequest<'_>, paths: &Paths, to: Node, mark: &mut [usize]) -> f64 {
     let mut gain = 0.0;
     for node in paths.to(to) {

@@ -1,24 +1,24 @@
-//! The best path over a horizon.
+//! The planner that searches the best path over a horizon of many steps.
 
 use super::lattice::Node;
 use super::return_gain::ReturnGains;
 use super::{PlanRequest, Planner, greedy};
 
-/// A beam search over paths of many steps: orienteering with a gain that each block gives once.
+/// A beam search over long paths. It is an orienteering problem in which each block gives its gain once.
 ///
-/// A path's score is its gain less what its metres would bring elsewhere; that rate is the best one that a search has found
-/// (Dinkelbach's method for ratios). Near the end of what may be gone, paths are searched to their end at home, with all that
-/// is shown on the path back.
+/// The score of a path is its gain minus the gain that its metres would bring elsewhere. That rate is the best one that
+/// an earlier search has found (Dinkelbach's method for ratios). Near the end of the allowed distance, paths are
+/// searched up to the return point, with everything that is shown along the return path.
 #[derive(Debug)]
 pub struct Horizon {
     pub steps: usize,
-    /// Paths kept after each step.
+    /// Paths that are kept after each step.
     pub beam: usize,
-    /// Paths kept that end at the same place.
+    /// Paths that are kept of those that end at the same place.
     pub alike: usize,
-    /// Searches, each with the rate of the last.
+    /// Searches; each takes the rate of the one before.
     pub rounds: usize,
-    /// Horizons from the end at which all that is left is planned at once.
+    /// Number of horizons before the end of the allowed distance at which the rest is planned at once.
     pub closing: f64,
 }
 
@@ -28,7 +28,7 @@ impl Default for Horizon {
     }
 }
 
-/// A path that ends at `node`; the paths are a tree.
+/// A path that ends at `node`. All paths form a tree.
 #[derive(Debug, Clone, Copy)]
 struct PathEnd {
     node: Node,
@@ -54,21 +54,21 @@ impl Planner for Horizon {
             }
             rate = found;
         }
-        // Where all around is seen, every path of the beam turns on the spot: the greedy one leads out.
+        // Where everything around is seen, every path of the beam turns on the spot; the greedy path leads out.
         let (path, found) = greedy::best(q);
         if found > own { path } else { best }
     }
 }
 
 impl Horizon {
-    /// The best path at a cost of `rate` a metre, and its own gain a metre.
+    /// The best path at a cost of `rate` a metre, and its gain a metre.
     fn search(&self, q: &PlanRequest<'_>, rate: f64) -> (Vec<Node>, f64) {
         let (paths, last) = self.grow(q, self.steps, |w| w.gain - rate * w.metres);
         let end = paths[last];
         (nodes(&paths, last), if end.metres > 0.0 { end.gain / end.metres } else { 0.0 })
     }
 
-    /// The best path for all that is left, the path home included.
+    /// The best path for the rest of the allowed distance, with the return path in it.
     fn close(&self, q: &PlanRequest<'_>) -> Vec<Node> {
         let back = ReturnGains::new(q);
         let steps = (q.left_m / q.lattice.step_m()).ceil() as usize;
@@ -95,7 +95,8 @@ impl Horizon {
         best.1
     }
 
-    /// Paths of up to so many steps that may be gone, the best by `score` of each number of steps; and the best of the longest.
+    /// Grows allowed paths of up to `steps` steps and keeps the best by `score` at each length. Also returns
+    /// the best of the longest.
     fn grow(&self, q: &PlanRequest<'_>, steps: usize, score: impl Fn(&PathEnd) -> f64) -> (Vec<PathEnd>, usize) {
         let mut paths = vec![PathEnd { node: q.from, before: 0, gain: 0.0, metres: 0.0 }];
         let mut beam = vec![0usize];
@@ -123,7 +124,7 @@ impl Horizon {
         (paths, best)
     }
 
-    /// Keeps the first paths, and not too many that end at the same place.
+    /// Keeps the first paths, and a limited number of those that end at the same place.
     fn thin(&self, paths: &mut Vec<PathEnd>) {
         let mut ends: std::collections::BTreeMap<Node, usize> = std::collections::BTreeMap::new();
         paths.retain(|w| {
@@ -135,20 +136,20 @@ impl Horizon {
     }
 }
 
-/// The places of a path, from the one after the start to its end.
+/// The places of a path without its start.
 fn nodes(paths: &[PathEnd], end: usize) -> Vec<Node> {
     let mut nodes: Vec<Node> = back_to_start(paths, end).map(|w| w.node).collect();
     nodes.reverse();
     nodes
 }
 
-/// The path's places from its end to the one after the start.
+/// The steps of a path from its end to the first one after the start.
 fn back_to_start(paths: &[PathEnd], end: usize) -> impl Iterator<Item = PathEnd> + '_ {
     std::iter::successors(Some(end).filter(|&e| e > 0), |&at| Some(paths[at].before).filter(|&b| b > 0))
         .map(|at| paths[at])
 }
 
-/// BlockValues of the blocks that a place shows and no place of the path before it has shown.
+/// The sum of the values of the blocks that a place shows and that no earlier place of the path has shown.
 fn fresh(q: &PlanRequest<'_>, paths: &[PathEnd], at: usize, node: Node) -> f64 {
     let mut blocks = q.values.shown(node).map(Some);
     for path in back_to_start(paths, at) {

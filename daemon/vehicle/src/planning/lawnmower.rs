@@ -1,12 +1,13 @@
-//! Parallel legs over all that may be seen.
+//! The planner that covers the whole area in parallel legs.
 
 use super::lattice::Node;
 use super::{PlanRequest, Planner};
 
-/// East-west legs from the south, each a camera's width from the last; at the end from the north again.
+/// East-west legs from the south, each one camera width from the last. After the last leg it
+/// begins again from the north.
 #[derive(Debug, Default)]
 pub struct Lawnmower {
-    /// Places still to come, the next one last.
+    /// Places still to visit, the next one last.
     coming: Vec<Node>,
 }
 
@@ -14,11 +15,11 @@ impl Planner for Lawnmower {
     fn plan(&mut self, q: &PlanRequest<'_>) -> Vec<Node> {
         if self.coming.is_empty() {
             self.coming = legs(q);
-            // From the end that is nearer.
+            // Begins at the nearer end.
             let paths = q.lattice.paths(q.from);
             let metres = |node: Option<&Node>| node.map_or(f64::INFINITY, |&n| paths.metres[n]);
             if metres(self.coming.first()) > metres(self.coming.last()) {
-                // As it is: the last comes first.
+                // The order stays, because the list is taken from its end.
             } else {
                 self.coming.reverse();
             }
@@ -49,7 +50,7 @@ impl Planner for Lawnmower {
     }
 }
 
-/// Ends of the open stretches of every other row, there and back.
+/// The ends of the open stretches of every other row, in alternating direction.
 fn legs(q: &PlanRequest<'_>) -> Vec<Node> {
     let (columns, rows) = q.lattice.size();
     let mut legs = Vec::new();

@@ -1,4 +1,4 @@
-//! Which path to go: places, what they are values, and the planners that choose among them.
+//! The planners: the value of each part of the sea floor, the lattice, and the choice of a path over it.
 
 mod bounds;
 mod expect;
@@ -19,48 +19,46 @@ pub use value::{BlockValues, CellWindow, Knowledge, ShownBlocks};
 
 use scenecast_protocol::directive::PlannerKind;
 
-/// Where the vehicle is, what is left to it, and what there is to gain.
+/// The situation that a planner is given.
 #[derive(Debug)]
 pub struct PlanRequest<'a> {
-    /// Places and paths that are allowed.
     pub lattice: &'a Lattice,
-    /// What is to be gained.
+    /// The value of the next look at each block.
     pub values: &'a BlockValues,
     pub from: Node,
-    /// Paths from the place where it must be able to end.
+    /// The paths from the place where the survey must be able to end.
     pub return_paths: &'a Paths,
-    /// Metres that may be gone from `from`, the path home included; infinite if there is no limit.
+    /// Metres that may still be travelled from `from`, the return path included; infinite without a limit.
     pub left_m: f64,
 }
 
 impl PlanRequest<'_> {
-    /// Whether the path home from `node` can still be gone after `gone_m` metres.
+    /// Whether the return path from `node` is still allowed after `gone_m` metres.
     pub fn can_return(&self, node: Node, gone_m: f64) -> bool {
-        // A path that begins where no path home is known may go on: it is lost either path.
+        // Without a limit, a place without a return path is allowed too: the vehicle is cut off in either case.
         !self.left_m.is_finite() || gone_m + self.return_paths.metres[node] <= self.left_m + 1e-6
     }
 }
 
 /// Chooses a path.
 ///
-/// The answer's places are neighbours on the lattice, the first next to [`PlanRequest::from`], and the path home from each is
-/// within what is left. Empty: there is nothing to gain, or nothing left. The same questions in the same order get the same
-/// answers.
+/// The places of a plan are neighbours on the lattice, the first one next to [`PlanRequest::from`], and the return path
+/// from each fits into the remaining distance. An empty plan means that there is no gain, or no distance left. The same
+/// requests in the same order get the same plans.
 pub trait Planner: std::fmt::Debug + Send {
-    /// The path to go next.
+    /// The next places of the path.
     fn plan(&mut self, request: &PlanRequest<'_>) -> Vec<Node>;
 
-    /// Places that it will go to after its last answer, the next one first, each by the shortest path; empty where it decides
-    /// when it is there.
+    /// The places to visit after the last plan, the next one first, each by the shortest path. Empty where the
+    /// planner decides only on arrival.
     fn beyond(&self) -> Vec<Node> {
         Vec::new()
     }
 
-    /// The lattice has changed: places have other numbers.
+    /// The lattice has changed, and with it the numbers of the places.
     fn handle_change(&mut self) {}
 }
 
-/// The planner of a kind.
 pub fn planner(kind: PlannerKind) -> Box<dyn Planner> {
     match kind {
         PlannerKind::Lawnmower => Box::new(Lawnmower::default()),
@@ -80,7 +78,7 @@ mod tests {
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
 
-    /// The answer of a planner on a patchy map with a keep-out, and whether each of its places may be gone to.
+    /// The plan on a patchy map with a keep-out, and whether each of its places is allowed.
     fn ask(kind: PlannerKind, corner: (i32, i32), start: usize, left_m: f64, weights: (i8, i8)) -> (Vec<Node>, bool) {
         let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
         let (x, y) = corner;

@@ -1,22 +1,22 @@
-//! What the path home shows.
+//! The gain along the return path.
 
 use super::PlanRequest;
 use super::lattice::Node;
 
-/// Of the shortest paths home from each place the one that gains most.
+/// For each place, the shortest return path with the greatest gain.
 #[derive(Debug)]
 pub struct ReturnGains {
-    /// BlockValues of what is shown behind each place and not at it.
+    /// The sum of the values of the blocks that the return path shows and the place itself does not.
     gains: Vec<f64>,
-    /// The next place of each; itself where the path ends.
+    /// The next place of the return path; the place itself where the path ends.
     next: Vec<Node>,
 }
 
-/// Metres by which two paths of the same length may differ in reckoning.
+/// Difference in metres below which two paths count as equally long.
 const SAME_M: f64 = 1e-6;
 
 impl ReturnGains {
-    /// From every place from which there is a path home.
+    /// Covers every place whose return path fits into the remaining distance.
     pub fn new(q: &PlanRequest<'_>) -> Self {
         let metres = &q.return_paths.metres;
         let mut nodes: Vec<Node> = (0..q.lattice.places()).filter(|&n| metres[n] <= q.left_m).collect();
@@ -39,12 +39,12 @@ impl ReturnGains {
         back
     }
 
-    /// BlockValues of what the path home from a place shows.
+    /// The gain along the return path from a place.
     pub fn gain(&self, node: Node) -> f64 {
         self.gains[node]
     }
 
-    /// The places of the path home behind a place.
+    /// The places of the return path after a place.
     pub fn nodes(&self, node: Node) -> impl Iterator<Item = Node> + '_ {
         let next = |&at: &Node| Some(self.next[at]).filter(|&next| next != at);
         std::iter::successors(next(&node), move |at| next(at))
@@ -61,7 +61,7 @@ mod tests {
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
 
-    /// Cells of label 1 within so many metres of a place, on a floor of label 2.
+    /// Cells of label 1 within 1.5 m of a place, on a floor of label 2.
     fn values(lattice: &Lattice, at: (f64, f64)) -> BlockValues {
         let cell = |x: i32, y: i32| {
             let (east, north) = (0.25 * (f64::from(x) + 0.5), 0.25 * (f64::from(y) + 0.5));

@@ -1,10 +1,10 @@
-//! What is planned after the waypoint, as people are finish it.
+//! The planned path after the waypoint, in the form that is reported.
 
 use super::Steering;
 use crate::planning::{Point, distance};
 use scenecast_protocol::wire::PlannedPath;
 
-/// A path as its corners.
+/// A path, reduced to its corners.
 struct Corners {
     start: Point,
     places: Vec<Point>,
@@ -20,7 +20,7 @@ impl Corners {
         self.places.last().copied().unwrap_or(self.start)
     }
 
-    /// Straight on to there; a place on a straight stretch is no corner.
+    /// Adds a straight leg. A place in the middle of a straight stretch is no corner.
     fn go(&mut self, to: Point) {
         let (end, leg) = (self.end(), distance(self.end(), to));
         if leg < 1e-6 {
@@ -34,7 +34,7 @@ impl Corners {
         }
     }
 
-    /// Whether more corners would not be finish.
+    /// Whether the report has no room for more corners.
     fn is_full(&self) -> bool {
         self.places.len() > PlannedPath::MAX_POINTS
     }
@@ -51,17 +51,17 @@ fn is_straight(a: Point, b: Point, c: Point) -> bool {
     x * u + y * v > 0.0 && (x * v - y * u).abs() < 1e-3 * x.hypot(y) * u.hypot(v)
 }
 
-/// The path that is planned after a waypoint, in the world frame.
+/// The planned path after a waypoint, in the world frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathAhead {
-    /// East and north of each further waypoint in metres.
+    /// Each further waypoint: metres east and north.
     pub points: Vec<Point>,
     /// Whether the plan has more waypoints than these.
     pub continues: bool,
 }
 
 impl Steering {
-    /// The plan after the waypoint that [`Self::next`] gave last, from which `left_m` metres may be gone.
+    /// The plan after the last waypoint of [`Self::next`], from which `left_m` metres may be travelled.
     pub fn path_after(&self, waypoint: Point, left_m: f64) -> PathAhead {
         let left_m = left_m - self.grounds.last_leg_m();
         let mut path = Corners::new(waypoint);
@@ -84,7 +84,7 @@ impl Steering {
         path.finish()
     }
 
-    /// The path home after a waypoint of it.
+    /// The return path after one of its waypoints.
     pub fn path_after_return(&self, waypoint: Point) -> PathAhead {
         let mut path = Corners::new(waypoint);
         let home = self.return_place();
@@ -114,7 +114,7 @@ mod tests {
         Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
     }
 
-    /// The waypoint from the start, and what is finish to come after it.
+    /// The first waypoint, and the planned path after it.
     fn first(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> (Point, PathAhead) {
         let from = steering.start();
         let Course::Go(to) = steering.next(from, (map, 1), utility, left_m) else { panic!("nowhere to go") };
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_is_told_by_its_corners_and_that_it_goes_on() {
+    fn a_path_is_reported_by_its_corners() {
         let mut path = Corners::new((0.0, 0.0));
         for to in [(0.0, 0.0), (1.8, 0.0), (3.6, 0.0), (5.4, 1.8), (7.2, 3.6), (7.2, 3.6), (5.4, 1.8)] {
             path.go(to);
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lawnmower_tells_the_legs_that_it_then_goes() {
+    fn the_lawnmower_reports_the_legs_that_it_takes() {
         let mut steering = steering(PlannerKind::Horizon);
         let (mut at, finish) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
         assert_eq!((finish.points.len(), finish.continues), (4, false));
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn no_leg_is_told_that_would_leave_no_way_home() {
+    fn no_reported_leg_prevents_the_return() {
         let metres = |left_m: f64| {
             let mut steering = steering(PlannerKind::Lawnmower);
             let (to, finish) = first(&mut steering, &LabelGrid::default(), None, left_m);
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_horizon_is_told_as_it_is_planned_and_anew_when_the_plan_is() {
+    fn the_reported_path_follows_each_new_plan() {
         let label = |x: i32, y: i32, east: bool| if (x > 40) == east && y > 10 { 2 } else { 1 };
         let map = |east: bool| -> LabelGrid {
             (0..48 * 80).map(|i| (i % 80, i / 80)).map(|(x, y)| (Cell::new(x, y), label(x, y, east))).collect()
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_home_is_told_round_what_is_kept_out() {
+    fn the_reported_return_path_avoids_keep_outs() {
         let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         let wall = Polygon(vec![place(9, -5), place(11, -5), place(11, 8), place(9, 8)]);
         let mut steering = steering(PlannerKind::Lawnmower);

@@ -1,4 +1,4 @@
-//! Pictures of labels: what the vehicle has, what the surface was shown of it, and what is asked for.
+//! The exemplars of the vehicle: those that it has, those that it has sent, and those that the surface requests.
 
 use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
@@ -12,27 +12,27 @@ use scenecast_protocol::schedule::BackgroundStream;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Pictures of a label that were shown and are remembered.
+/// Sent exemplars of a label that are remembered.
 const MAX_SHOWN: usize = 8;
 
-/// A picture that the surface was shown.
+/// An exemplar that was sent to the surface.
 #[derive(Debug)]
 struct Shown {
     number: u8,
     picture: ExemplarPatch,
 }
 
-/// What was answered to a request.
+/// The reply to a request.
 #[derive(Debug)]
 struct Reply {
     request: ExemplarRequest,
-    /// The number of the picture; 0: that there is none.
+    /// The number of the exemplar; 0: there is none.
     number: u8,
-    /// While it is on its way.
+    /// The object that carries it, while it is in flight.
     object: Option<ObjectId>,
 }
 
-/// A picture that nobody asked for, on its way.
+/// An exemplar in flight that was not requested.
 #[derive(Debug, Clone, Copy)]
 struct Unrequested {
     label: u8,
@@ -40,27 +40,27 @@ struct Unrequested {
     object: ObjectId,
 }
 
-/// Pictures of labels of one epoch.
+/// The exemplars of the labels of one epoch.
 #[derive(Debug, Default)]
 pub(super) struct Gallery {
-    /// By label, the best first.
+    /// For each label, the best first.
     exemplars: SharedExemplars,
     requests: ExemplarRequests,
-    /// The run of the surface that asks.
+    /// The run of the surface that sent the requests.
     series: Option<u16>,
     replies: Vec<Reply>,
-    /// By label, the last shown last.
+    /// For each label, the latest last.
     shown: BTreeMap<u8, Vec<Shown>>,
-    /// Labels of which the surface was shown a picture in this run of the link.
+    /// Labels of which an exemplar was sent in this run of the link.
     seen: BTreeSet<u8>,
     unrequested: Option<Unrequested>,
 }
 
 impl Gallery {
-    /// Most requests at a time.
+    /// Maximum number of requests at a time.
     pub(super) const MAX_REQUESTS: usize = 8;
 
-    /// The exemplars of each label from now on, the best first.
+    /// Replaces the exemplars of all labels, the best first.
     pub(super) fn set_exemplars(&mut self, exemplars: SharedExemplars) {
         self.exemplars = exemplars;
     }
@@ -69,11 +69,11 @@ impl Gallery {
         &self.exemplars
     }
 
-    /// What is wanted from now on, by the surface's run `series`; what is not wanted any more is not sent to its end, and what
-    /// nobody asked for gives way.
+    /// Replaces the requests by those of the surface's run `series`. Replies in flight that are no longer requested are
+    /// cancelled, and an unrequested exemplar gives way.
     pub(super) fn replace_requests(&mut self, requests: ExemplarRequests, series: Option<u16>, link: &mut VehicleLink) {
         if self.series.is_some() && series != self.series {
-            // Another run of the surface was shown nothing.
+            // A new run of the surface has no exemplar yet.
             self.shown.clear();
             self.seen.clear();
         }
@@ -92,7 +92,7 @@ impl Gallery {
         }
     }
 
-    /// What was on its way was never shown.
+    /// Cancels an object in flight, and forgets that its exemplar was sent.
     fn withdraw(&mut self, label: u8, number: u8, object: Option<ObjectId>, link: &mut VehicleLink) {
         let Some(object) = object else { return };
         link.cancel_object(object);
@@ -104,14 +104,14 @@ impl Gallery {
         }
     }
 
-    /// Whether something is asked for that the surface does not have.
+    /// Whether a request is open, so that its exemplar has not arrived yet.
     fn has_open_request(&self) -> bool {
         let is_met = |r: &ExemplarRequest| self.replies.iter().any(|a| a.request == *r && a.object.is_none());
         !self.requests.wanted.iter().all(is_met)
     }
 
-    /// Sends what is asked for and can be had, or else a picture of a label of which the surface has none, those that weigh
-    /// most first.
+    /// Sends the requested exemplars that exist. Without a request it sends one of a label of which the surface has
+    /// none, the label with the greatest weight first.
     pub(super) fn serve(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
         for request in self.requests.wanted.clone() {
             self.reply(request, epoch, link);
@@ -158,7 +158,7 @@ impl Gallery {
         self.unrequested = object.map(|object| Unrequested { label, number, object });
     }
 
-    /// The picture that a request means: the one that it names while it is known, else the best that was not shown.
+    /// The exemplar that a request asks for: the named one while it is known, otherwise the best one that was not sent.
     fn choose(&self, request: ExemplarRequest) -> Option<(u8, ExemplarPatch)> {
         let shown = self.shown.get(&request.label).map_or(&[][..], Vec::as_slice);
         let exemplars = self.exemplars.get(&request.label).map_or(&[][..], Vec::as_slice);
@@ -187,13 +187,13 @@ impl Gallery {
         }
     }
 
-    /// The surface has all of an object.
+    /// The surface has an object completely.
     pub(super) fn handle_delivered(&mut self, id: ObjectId) {
         self.replies.iter_mut().filter(|a| a.object == Some(id)).for_each(|a| a.object = None);
         self.unrequested = self.unrequested.filter(|u| u.object != id);
     }
 
-    /// A new run of the link: what is on its way is to be sent again, and the surface may have no picture any more.
+    /// A new run of the link has begun: objects in flight are cancelled, and the surface may have lost every exemplar.
     pub(super) fn handle_restart(&mut self, link: &mut VehicleLink) {
         let (met, open) = std::mem::take(&mut self.replies).into_iter().partition(|a| a.object.is_none());
         self.replies = met;
@@ -207,7 +207,7 @@ impl Gallery {
     }
 }
 
-/// A name for a picture that outlives a restart: of the place and time it was taken at.
+/// The number of an exemplar, from 1. It depends on place and time of the frame only, so that it survives a restart.
 fn number_of(picture: &ExemplarPatch) -> u8 {
     let bits =
         picture.t_s.to_bits() ^ picture.place.0.to_bits().rotate_left(21) ^ picture.place.1.to_bits().rotate_left(42);
@@ -219,7 +219,7 @@ fn is_same(a: &ExemplarPatch, b: &ExemplarPatch) -> bool {
     (a.t_s, a.place) == (b.t_s, b.place)
 }
 
-/// The object of a picture, as large as asked for and there is; `None` if it cannot be compressed.
+/// The object of an exemplar in at most the requested size class; `None` if it cannot be compressed.
 fn fill(head: Exemplar, picture: u8, patch: &Arc<RgbImage>, size: u8) -> Option<Exemplar> {
     let (size, image) = middle(patch, size)?;
     let bytes = compress_to(&image, GOOD_SSIM, max_bytes(size))?.bytes;

@@ -126,8 +126,8 @@ impl Guidance {
         self.guard.handle_received(at);
     }
 
-    /// The camera saw the sea floor around `at`, in metres in the map frame, and the scene model explains each cell with
-    /// a perplexity.
+    /// The camera saw the sea floor around `at`, in metres in the map frame, and the scene model explains
+    /// each cell with a perplexity.
     pub(super) fn handle_view(&mut self, at: Point, perplexity: &[(Cell, f32)]) {
         self.steering.handle_view(at);
         perplexity.iter().for_each(|&(cell, p)| self.steering.handle_perplexity(cell, p));
@@ -205,8 +205,8 @@ impl Guidance {
         }
     }
 
-    /// The position in the world frame. A new placement of the map voids the path, because the rest of the last leg
-    /// could cross an outline.
+    /// The position in the world frame. A new placement of the map voids the path, because the rest of the last
+    /// leg could cross an outline.
     fn follow_placement(&mut self, navigator: &Navigator) -> Point {
         let (east, north) = navigator.to_world(MapPoint::default()).xy();
         if (east, north) != self.steering.map_origin() {

@@ -38,15 +38,15 @@ const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);
 /// A request of the vehicle to its host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleOutput {
-    /// Store [`Vehicle::durable`], then call [`Vehicle::handle_persisted`]. If that fails, ignore all later requests and
-    /// transmit no more.
+    /// Store [`Vehicle::durable`], then call [`Vehicle::handle_persisted`]. If that fails, ignore all later
+    /// requests and transmit no more.
     Persist,
     /// Go to this point of the map frame.
     Waypoint(MapPoint),
     Hold,
     Surface,
-    /// Have the scene model use these settings; those that have no value are as configured. A run begins with
-    /// [`Vehicle::settings`].
+    /// Have the scene model use these settings; those that have no value are as configured.
+    /// A run begins with [`Vehicle::settings`].
     Tune(Settings),
     /// The vehicle has decided about a slot.
     Applied(AppliedSlot),

@@ -10,8 +10,8 @@ use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 
-/// The limit of the backlog, in seconds of the budget, where the operator orders coarse to fine and the configuration
-/// has no such limit.
+/// The limit of the backlog, in seconds of the budget, where the operator orders coarse to fine and the
+/// configuration has no such limit.
 const DEFAULT_COARSE_AFTER_S: f64 = 30.0;
 
 /// The cells and layers that are sent unless the operator orders others.
