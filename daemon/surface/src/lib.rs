@@ -1,18 +1,18 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
-mod album;
 mod assemble;
-mod desk;
+mod exemplar_cache;
 mod orders;
 mod pauses;
 pub mod position;
 mod requests;
 mod settings;
 mod surface;
+mod vehicle_record;
 
-pub use album::{Album, AskState, Asked, Page, Picture, Wish};
 pub use assemble::assemble;
-pub use desk::Desk;
+pub use exemplar_cache::{AskState, Asked, ExemplarCache, Page, Picture, Wish};
 pub use orders::{FenceOrder, LimitsOrder};
-pub use settings::{SettingsDesk, SettingsOrder};
+pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
+pub use vehicle_record::VehicleRecord;

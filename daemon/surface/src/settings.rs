@@ -15,8 +15,7 @@ pub struct SettingsOrder {
     /// The cells of the map that are sent: fine (all), coarse (every fourth in both directions), or coarse-to-fine (the
     /// coarse ones first where the backlog is large). The scene model keeps all cells.
     pub cells: Option<String>,
-    /// The layers that are sent in addition to the labels: none, or different ones of confidence,
-    /// depth, curiosity, separated by commas.
+    /// The layers that are sent in addition to the labels: none, or names of layers in any order, separated by commas.
     pub layers: Option<String>,
     /// Preference for labels that are common elsewhere in the map, 1e-9 to 1e3.
     pub alpha: Option<f64>,
@@ -119,14 +118,14 @@ impl SettingsOrder {
 /// The ordered settings of a vehicle. Each order contains everything that this surface has ordered, so that a newer one
 /// can replace one that the vehicle never received.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SettingsDesk {
+pub struct SettingsRecord {
     asked: Settings,
     in_force: Settings,
     /// An order was replaced before its fate was known.
     is_unsure: bool,
 }
 
-impl SettingsDesk {
+impl SettingsRecord {
     /// Everything that this surface has ordered.
     pub fn asked(&self) -> &Settings {
         &self.asked
@@ -217,24 +216,28 @@ mod tests {
     #[test]
     fn settings_in_force_are_those_that_the_vehicle_applied() {
         let order = |json: &str| read(json).unwrap();
-        let mut desk = SettingsDesk::default();
-        let send = |desk: &mut SettingsDesk, json: &str, last| {
-            let settings = desk.next_order(&order(json), last);
-            desk.handle_sent(settings, last);
+        let mut record = SettingsRecord::default();
+        let send = |record: &mut SettingsRecord, json: &str, last| {
+            let settings = record.next_order(&order(json), last);
+            record.handle_sent(settings, last);
         };
-        send(&mut desk, r#"{"alpha": 0.5}"#, None);
-        assert_eq!(desk.in_force(), Some(&Settings::default()));
-        send(&mut desk, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
-        desk.handle_decision(OrderStatus::Applied);
-        assert_eq!(desk.in_force(), Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)), "the first was never sent alone");
-        send(&mut desk, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
-        send(&mut desk, r#"{"beta": 1}"#, Some(OrderStatus::Received));
-        assert_eq!(desk.in_force(), None, "the vehicle may follow the layers already");
+        send(&mut record, r#"{"alpha": 0.5}"#, None);
+        assert_eq!(record.in_force(), Some(&Settings::default()));
+        send(&mut record, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
+        record.handle_decision(OrderStatus::Applied);
+        assert_eq!(
+            record.in_force(),
+            Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)),
+            "the first was never sent alone"
+        );
+        send(&mut record, r#"{"layers": "confidence,depth"}"#, Some(OrderStatus::Applied));
+        send(&mut record, r#"{"beta": 1}"#, Some(OrderStatus::Received));
+        assert_eq!(record.in_force(), None, "the vehicle may follow the layers already");
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
-        desk.handle_decision(refused);
-        send(&mut desk, r#"{"alpha": 0}"#, Some(refused));
-        assert_eq!(desk.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        desk.handle_decision(OrderStatus::Applied);
-        assert_eq!(desk.in_force(), Some(desk.asked()));
+        record.handle_decision(refused);
+        send(&mut record, r#"{"alpha": 0}"#, Some(refused));
+        assert_eq!(record.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
+        record.handle_decision(OrderStatus::Applied);
+        assert_eq!(record.in_force(), Some(record.asked()));
     }
 }

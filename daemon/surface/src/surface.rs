@@ -1,9 +1,9 @@
 //! The surface's role: the link and the operator's data in one state machine without IO.
 
-use super::desk::Desk;
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
 use super::settings::SettingsOrder;
+use super::vehicle_record::VehicleRecord;
 use scenecast_core::UsblLine;
 use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
@@ -33,7 +33,7 @@ pub enum SurfaceOutput {
 
 pub struct Surface {
     pub(super) link: SurfaceLink,
-    pub(super) desks: BTreeMap<Address, Desk>,
+    pub(super) records: BTreeMap<Address, VehicleRecord>,
     outputs: VecDeque<SurfaceOutput>,
     background: BackgroundOrder,
     /// The localisation relay, if the surface has a GPS.
@@ -44,9 +44,9 @@ pub struct Surface {
 impl Surface {
     /// A surface for these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
-        let desks = vehicles.into_iter().map(|(address, name)| (address, Desk::new(name))).collect();
+        let records = vehicles.into_iter().map(|(address, name)| (address, VehicleRecord::new(name))).collect();
         let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
-        Self { link, desks, outputs: VecDeque::new(), background, relay: None, tuning }
+        Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning }
     }
 
     /// Sets the tuning table, which predicts the bit rate of settings of the scene model.
@@ -60,12 +60,12 @@ impl Surface {
         format!("vehicle {}", vehicle.number())
     }
 
-    pub fn vehicles(&self) -> impl Iterator<Item = (Address, &Desk)> {
-        self.desks.iter().map(|(&a, d)| (a, d))
+    pub fn vehicles(&self) -> impl Iterator<Item = (Address, &VehicleRecord)> {
+        self.records.iter().map(|(&a, d)| (a, d))
     }
 
-    pub fn desk(&self, vehicle: Address) -> Option<&Desk> {
-        self.desks.get(&vehicle)
+    pub fn record(&self, vehicle: Address) -> Option<&VehicleRecord> {
+        self.records.get(&vehicle)
     }
 
     pub fn view(&self, vehicle: Address) -> Option<PeerView<'_>> {
@@ -73,13 +73,13 @@ impl Surface {
     }
 
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
-        let whole = self.desks.get(&vehicle).and_then(|d| d.whole.as_ref());
+        let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
     /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
     pub fn map_version(&self, vehicle: Address) -> u64 {
-        let wholes = self.desks.get(&vehicle).map_or(0, |d| d.wholes);
+        let wholes = self.records.get(&vehicle).map_or(0, |d| d.wholes);
         wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
     }
 
@@ -135,9 +135,9 @@ impl Surface {
                 utility.weights.insert(label, weight);
             }
         }
-        let desk = self.desks.get_mut(&vehicle).ok_or("no such vehicle")?;
-        utility.epoch = desk.epoch;
-        desk.utility = utility.clone();
+        let record = self.records.get_mut(&vehicle).ok_or("no such vehicle")?;
+        utility.epoch = record.epoch;
+        record.utility = utility.clone();
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 
@@ -155,7 +155,7 @@ impl Surface {
     pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
         let fence = order.read()?;
         let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.fence = Some(fence);
         Ok(version)
     }
 
@@ -163,7 +163,7 @@ impl Surface {
     pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.limits = Some(limits);
         Ok(version)
     }
 
@@ -172,9 +172,9 @@ impl Surface {
         let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
         let order = order.read(view.layers())?;
         let last = self.order_status(vehicle, SlotId::Settings);
-        let settings = self.desks.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
+        let settings = self.records.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
-        self.desks.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
+        self.records.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
         Ok(version)
     }
 
@@ -236,7 +236,7 @@ impl Surface {
             let sum: u32 = shares.0.iter().map(|&s| u32::from(s)).sum();
             return Err(format!("shares add up to {sum} percent: allowed is 100 or less"));
         }
-        let vehicles: Vec<Address> = self.desks.keys().copied().collect();
+        let vehicles: Vec<Address> = self.records.keys().copied().collect();
         let background = background.unwrap_or(self.background);
         let slot = Slot::Budget(Budget { bits_per_s, shares, background });
         vehicles.into_iter().try_for_each(|v| self.issue(v, slot.clone(), now).map(drop))?;
@@ -313,13 +313,13 @@ impl Surface {
         }
         let link = &self.link;
         let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
-        self.desks.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, desk)| desk.pauses.handle_frame(now));
+        self.records.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, record)| record.pauses.handle_frame(now));
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
         match event {
             SurfaceEvent::VehicleFound(vehicle) => {
-                self.desks.entry(vehicle).or_insert_with(|| Desk::new(Self::name_of(vehicle)));
+                self.records.entry(vehicle).or_insert_with(|| VehicleRecord::new(Self::name_of(vehicle)));
                 Some(SurfaceOutput::VehicleFound(vehicle))
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
@@ -330,35 +330,35 @@ impl Surface {
             SurfaceEvent::SlotDecided(vehicle, slot) => {
                 let decided = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
                 let (status, version) = (decided.status, decided.version);
-                let desk = self.desks.get_mut(&vehicle)?;
+                let record = self.records.get_mut(&vehicle)?;
                 if slot == SlotId::Settings {
-                    desk.settings.handle_decision(status);
+                    record.settings.handle_decision(status);
                 }
                 if status == OrderStatus::Applied {
-                    desk.handle_applied(slot, version);
+                    record.handle_applied(slot, version);
                 }
                 self.handle_decision(vehicle, slot, now);
                 Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
                 let (status, _) = self.link.vehicle(vehicle)?.status()?;
-                self.desks.get_mut(&vehicle)?.handle_status(status, now);
+                self.records.get_mut(&vehicle)?.handle_status(status, now);
                 self.relay.iter_mut().for_each(|relay| relay.handle_depth(vehicle, status.depth_m, now));
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::ObjectProgress { vehicle, head, held, total } => {
-                self.desks.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
+                self.records.get_mut(&vehicle)?.handle_progress(head.as_deref(), held, total, now);
                 Some(SurfaceOutput::Changed(vehicle))
             }
             SurfaceEvent::Object(vehicle, bytes) => {
-                let desk = self.desks.get_mut(&vehicle)?;
+                let record = self.records.get_mut(&vehicle)?;
                 if let Some(whole) = label_picture::read_whole(&bytes) {
-                    desk.whole = Some(whole);
-                    desk.wholes += 1;
+                    record.whole = Some(whole);
+                    record.wholes += 1;
                     return Some(SurfaceOutput::MapChanged(vehicle));
                 }
                 let exemplar = Exemplar::decode(&bytes)?;
-                let is_new = desk.handle_exemplar(&exemplar, now);
+                let is_new = record.handle_exemplar(&exemplar, now);
                 is_new.then_some(SurfaceOutput::ExemplarHere(vehicle, exemplar.label))
             }
         }
@@ -386,8 +386,8 @@ impl Surface {
 
     /// The modem has measured the range or the direction of a vehicle.
     pub fn handle_range(&mut self, vehicle: Address, line: &UsblLine, now: Instant) {
-        if let Some(desk) = self.desks.get_mut(&vehicle) {
-            desk.found = Some((*line, now));
+        if let Some(record) = self.records.get_mut(&vehicle) {
+            record.found = Some((*line, now));
             self.outputs.push_back(SurfaceOutput::Changed(vehicle));
         }
         if let (Some(range_m), Some((bearing_rad, elevation_rad))) = (line.range_m, line.direction_rad) {

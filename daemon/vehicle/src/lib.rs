@@ -6,7 +6,7 @@
 mod assemble;
 mod checkpoint;
 pub mod exemplar;
-mod guard;
+mod failsafe;
 mod mapper;
 mod navigator;
 mod picker;
@@ -17,7 +17,7 @@ mod vehicle;
 
 pub use assemble::assemble;
 pub use checkpoint::{RestoreError, Restored};
-pub use guard::{Guard, Habits};
+pub use failsafe::{Failsafe, Habits};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, Navigator};
 pub use steering::{Course, Footprint, Steering};

@@ -2,7 +2,7 @@
 
 use super::{Durable, VehicleOutput};
 use crate::Navigator;
-use crate::guard::{Guard, Habits};
+use crate::failsafe::{Failsafe, Habits};
 use crate::planning::{Point, distance};
 use crate::steering::{Course, PathAhead, Steering};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
@@ -44,7 +44,7 @@ pub(super) struct Situation<'a> {
 #[derive(Debug)]
 pub(super) struct Guidance {
     steering: Steering,
-    guard: Guard,
+    failsafe: Failsafe,
     activity: Activity,
     waypoint: Option<MapPoint>,
     /// The plan after the waypoint.
@@ -61,16 +61,16 @@ impl Guidance {
         planner: Option<PlannerKind>,
         now: Instant,
     ) -> Self {
-        let (guard, activity, path) = (Guard::new(habits, now), Activity::default(), PlannedPath::default());
-        let mut guidance = Self { steering, guard, activity, waypoint: None, path, is_finished: false };
-        let guard = &mut guidance.guard;
-        guard.order = Constraints { hold: durable.hold, abort: durable.abort };
+        let (failsafe, activity, path) = (Failsafe::new(habits, now), Activity::default(), PlannedPath::default());
+        let mut guidance = Self { steering, failsafe, activity, waypoint: None, path, is_finished: false };
+        let failsafe = &mut guidance.failsafe;
+        failsafe.order = Constraints { hold: durable.hold, abort: durable.abort };
         if let Some(limits) = Limits::from_bytes(&durable.limits) {
-            guard.set_limits(limits);
-            (guard.used_m, guard.used_s) = (f64::from(durable.used.0), f64::from(durable.used.1));
+            failsafe.set_limits(limits);
+            (failsafe.used_m, failsafe.used_s) = (f64::from(durable.used.0), f64::from(durable.used.1));
         }
         if let Some(reason) = ModeReason::from_code(durable.breach) {
-            guard.handle_breach(reason);
+            failsafe.handle_breach(reason);
         }
         guidance.steering.set_planner(planner);
         if let Some(fence) = Fence::from_bytes(&durable.fence).filter(|f| f.check().is_ok()) {
@@ -98,32 +98,32 @@ impl Guidance {
 
     /// Metres and seconds since the limits were put in force.
     pub(super) fn used(&self) -> (f64, f64) {
-        (self.guard.used_m, self.guard.used_s)
+        (self.failsafe.used_m, self.failsafe.used_s)
     }
 
     /// Whether distance or time is limited.
     pub(super) fn is_limited(&self) -> bool {
-        self.guard.left_m().is_finite()
+        self.failsafe.left_m().is_finite()
     }
 
     /// The number on the wire of the breach that the operator has not answered; 0 if there is none.
     pub(super) fn breach(&self) -> u8 {
-        self.guard.latched as u8
+        self.failsafe.latched as u8
     }
 
     /// Speed over ground that the vehicle keeps, metres a second.
     pub(super) fn speed_m_s(&self) -> f64 {
-        self.guard.speed_m_s()
+        self.failsafe.speed_m_s()
     }
 
     /// Counts metres against the limits.
     pub(super) fn handle_travel(&mut self, metres: f64) {
-        self.guard.handle_travel(metres);
+        self.failsafe.handle_travel(metres);
     }
 
     /// The link received a frame of the surface.
     pub(super) fn handle_received(&mut self, at: Instant) {
-        self.guard.handle_received(at);
+        self.failsafe.handle_received(at);
     }
 
     /// The camera saw the sea floor around `at`, in metres in the map frame, and the scene model explains
@@ -135,18 +135,18 @@ impl Guidance {
 
     /// Puts hold and abort in force, and takes the order as the operator's answer to a breach.
     pub(super) fn set_constraints(&mut self, order: Constraints) {
-        self.guard.order = order;
+        self.failsafe.order = order;
         self.clear_breach();
     }
 
     /// Whether the vehicle keeps these limits at the depth and the altitude that it travels at.
     pub(super) fn is_able(&self, limits: &Limits, depth_m: f64) -> bool {
-        self.guard.is_able(limits, depth_m)
+        self.failsafe.is_able(limits, depth_m)
     }
 
     /// Puts limits in force; distance and time count from zero.
     pub(super) fn set_limits(&mut self, limits: Limits) {
-        self.guard.set_limits(limits);
+        self.failsafe.set_limits(limits);
         self.replan();
     }
 
@@ -169,7 +169,7 @@ impl Guidance {
     }
 
     fn clear_breach(&mut self) {
-        self.guard.clear_breach();
+        self.failsafe.clear_breach();
         self.replan();
     }
 
@@ -187,7 +187,7 @@ impl Guidance {
 
     /// Counts time against the limits. Returns whether the survey goes on.
     pub(super) fn handle_time(&mut self, now: Instant) -> bool {
-        self.guard.handle_time(now);
+        self.failsafe.handle_time(now);
         !self.is_finished
     }
 
@@ -197,7 +197,7 @@ impl Guidance {
         let at = self.follow_placement(navigator);
         self.watch(at, navigator.depth_m());
         let return_m = if self.is_limited() { self.steering.return_path_m(at) } else { 0.0 };
-        match self.guard.stop(return_m) {
+        match self.failsafe.stop(return_m) {
             None => self.survey(at, known),
             Some((Reaction::Hold, why)) => self.stay(VehicleMode::Hold, why),
             Some((Reaction::Surface, why)) => self.come_up(why),
@@ -218,11 +218,11 @@ impl Guidance {
 
     fn watch(&mut self, at: Point, depth_m: f64) {
         if !self.steering.bounds().holds(at) {
-            self.guard.handle_breach(ModeReason::Fence);
+            self.failsafe.handle_breach(ModeReason::Fence);
         }
-        let is_broken = self.guard.is_band_broken(depth_m);
+        let is_broken = self.failsafe.is_band_broken(depth_m);
         if is_broken && self.activity.was_in_band && self.activity.motion != Motion::Rising {
-            self.guard.handle_breach(ModeReason::Band);
+            self.failsafe.handle_breach(ModeReason::Band);
         }
         self.activity.was_in_band = (self.activity.was_in_band || !is_broken) && self.activity.motion != Motion::Rising;
     }
@@ -238,13 +238,13 @@ impl Guidance {
         if self.is_under_way(VehicleMode::Survey, known.navigator) {
             return None;
         }
-        let left_m = self.guard.left_m();
+        let left_m = self.failsafe.left_m();
         match self.steering.next(at, known.map, known.utility, left_m) {
             Course::Go(to) => {
                 let path = self.steering.path_after(to, left_m - distance(at, to));
                 Some(self.go((to, path), VehicleMode::Survey, ModeReason::Survey, known.navigator))
             }
-            Course::LimitReached => self.go_back(at, self.guard.tighter(), known.navigator),
+            Course::LimitReached => self.go_back(at, self.failsafe.tighter(), known.navigator),
             Course::Arrived => self.stay(VehicleMode::Hold, ModeReason::Survey),
             Course::NoPath => self.stay(VehicleMode::Hold, ModeReason::NoPath),
         }
@@ -280,7 +280,7 @@ impl Guidance {
     }
 
     fn stay(&mut self, mode: VehicleMode, reason: ModeReason) -> Option<VehicleOutput> {
-        let mode = if self.guard.order.abort { VehicleMode::Abort } else { mode };
+        let mode = if self.failsafe.order.abort { VehicleMode::Abort } else { mode };
         let is_new = self.activity.motion != Motion::Still;
         self.activity = Activity { motion: Motion::Still, mode, reason, ..self.activity };
         self.drop_path();

@@ -17,7 +17,7 @@ mod whole_png;
 pub use durable::Durable;
 pub use last_place::LastPlace;
 
-use super::guard::Habits;
+use super::failsafe::Habits;
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::steering::Steering;

@@ -1,8 +1,8 @@
 //! The operator's data about one vehicle.
 
-use super::album::Album;
+use super::exemplar_cache::ExemplarCache;
 use super::pauses::Pauses;
-use super::settings::SettingsDesk;
+use super::settings::SettingsRecord;
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 
 /// The last orders to a vehicle, and its last reports.
 #[derive(Debug)]
-pub struct Desk {
+pub struct VehicleRecord {
     pub name: String,
     /// The last utility that was sent.
     pub utility: Utility,
@@ -26,8 +26,8 @@ pub struct Desk {
     /// The limits that the vehicle has applied, with their version.
     pub limits_in_force: Option<(u16, Limits)>,
     /// The settings that were ordered, and those in force.
-    pub settings: SettingsDesk,
-    pub album: Album,
+    pub settings: SettingsRecord,
+    pub exemplars: ExemplarCache,
     /// Reported positions in the map frame: time, metres east, metres north.
     pub track: VecDeque<(Instant, f64, f64)>,
     pub epoch: u8,
@@ -41,7 +41,7 @@ pub struct Desk {
     pub found: Option<(UsblLine, Instant)>,
 }
 
-impl Desk {
+impl VehicleRecord {
     /// Maximum number of positions in the track.
     const TRACK: usize = 500;
 
@@ -53,8 +53,8 @@ impl Desk {
             limits: None,
             fence_in_force: None,
             limits_in_force: None,
-            settings: SettingsDesk::default(),
-            album: Album::default(),
+            settings: SettingsRecord::default(),
+            exemplars: ExemplarCache::default(),
             track: VecDeque::new(),
             epoch: 0,
             whole: None,
@@ -69,7 +69,7 @@ impl Desk {
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
             self.utility = Utility { epoch: status.epoch, ..Utility::default() };
-            self.album = Album::default();
+            self.exemplars = ExemplarCache::default();
         }
         self.track.push_back((now, status.position.x_m, status.position.y_m));
         if self.track.len() > Self::TRACK {
@@ -89,16 +89,16 @@ impl Desk {
     /// Part of an exemplar came in. `head` are its first bytes, once they have arrived.
     pub fn handle_progress(&mut self, head: Option<&[u8]>, held: usize, total: usize, now: Instant) {
         let head = head.and_then(|h| h.first_chunk::<4>()).filter(|h| h[0] == self.epoch);
-        head.into_iter().for_each(|head| self.album.handle_progress(*head, (held, total), now));
+        head.into_iter().for_each(|head| self.exemplars.handle_progress(*head, (held, total), now));
     }
 
     /// Takes a complete exemplar. Returns whether the operator has something new to see.
     pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
-        exemplar.epoch == self.epoch && self.album.handle_exemplar(exemplar, now)
+        exemplar.epoch == self.epoch && self.exemplars.handle_exemplar(exemplar, now)
     }
 
     /// The open requests for exemplars.
     pub fn wanted(&self) -> ExemplarRequests {
-        self.album.wanted(self.epoch)
+        self.exemplars.wanted(self.epoch)
     }
 }

@@ -62,11 +62,11 @@ pub struct Page {
 
 /// The exemplars of a vehicle's labels in one epoch.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Album {
+pub struct ExemplarCache {
     pages: BTreeMap<u8, Page>,
 }
 
-impl Album {
+impl ExemplarCache {
     /// Maximum number of open requests; a vehicle takes no more.
     const MAX_ASKED: usize = 8;
     /// Maximum number of exemplars of a label.
@@ -203,77 +203,77 @@ mod tests {
 
     #[test]
     fn a_request_takes_its_own_reply_and_a_larger_image_replaces() {
-        let mut album = Album::default();
+        let mut cache = ExemplarCache::default();
         assert_eq!(
-            album.ask(5, Wish::Larger(None), NOW).unwrap_err(),
+            cache.ask(5, Wish::Larger(None), NOW).unwrap_err(),
             "no image of label 5 is here yet: ask for one first"
         );
-        album.ask(5, Wish::Another, NOW).unwrap();
+        cache.ask(5, Wish::Another, NOW).unwrap();
         assert_eq!(
-            album.wanted(3),
+            cache.wanted(3),
             ExemplarRequests { epoch: 3, wanted: vec![ExemplarRequest { label: 5, serial: 1, size: 0, picture: 0 }] }
         );
-        album.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
-        assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
-        assert!(album.handle_exemplar(&come(5, 1, 0, 9), NOW));
-        assert!(album.wanted(3).wanted.is_empty());
-        album.ask(5, Wish::Larger(None), NOW).unwrap();
-        assert_eq!(album.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
-        assert!(album.handle_exemplar(&come(5, 2, 1, 9), NOW));
-        let sizes: Vec<(u8, u8)> = album.page(5).unwrap().pictures.iter().map(|p| (p.number, p.size)).collect();
+        cache.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
+        assert_eq!(cache.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
+        assert!(cache.handle_exemplar(&come(5, 1, 0, 9), NOW));
+        assert!(cache.wanted(3).wanted.is_empty());
+        cache.ask(5, Wish::Larger(None), NOW).unwrap();
+        assert_eq!(cache.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
+        assert!(cache.handle_exemplar(&come(5, 2, 1, 9), NOW));
+        let sizes: Vec<(u8, u8)> = cache.page(5).unwrap().pictures.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
-        let said = album.ask(5, Wish::Larger(Some(9)), NOW).unwrap_err();
+        let said = cache.ask(5, Wish::Larger(Some(9)), NOW).unwrap_err();
         assert_eq!(said, "picture 9 of label 5 is as large as they come: 128 pixels");
-        assert_eq!(album.ask(5, Wish::Larger(Some(4)), NOW).unwrap_err(), "picture 4 of label 5 is not here");
+        assert_eq!(cache.ask(5, Wish::Larger(Some(4)), NOW).unwrap_err(), "picture 4 of label 5 is not here");
     }
 
     #[test]
     fn cancelled_and_refused_requests_end_and_images_stay() {
-        let mut album = Album::default();
-        assert!(album.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
-        assert!(!album.page(5).unwrap().pictures[0].asked);
-        album.ask(5, Wish::Another, NOW).unwrap();
-        album.cancel(5).unwrap();
-        assert!(album.wanted(0).wanted.is_empty() && album.page(5).unwrap().pictures.len() == 1);
-        assert_eq!(album.cancel(5).unwrap_err(), "no image of label 5 is asked for");
-        album.handle_progress([0, 5, 1, 0], (1, 2), NOW);
-        assert_eq!(album.page(5).unwrap().asked, None, "a late part of what was cancelled");
-        album.ask(6, Wish::Another, NOW).unwrap();
-        album.handle_refusal(NOW);
-        assert!(album.wanted(0).wanted.is_empty());
-        album.ask(6, Wish::Another, NOW).unwrap();
-        assert_eq!(album.wanted(0).wanted[0].serial, 2);
+        let mut cache = ExemplarCache::default();
+        assert!(cache.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
+        assert!(!cache.page(5).unwrap().pictures[0].asked);
+        cache.ask(5, Wish::Another, NOW).unwrap();
+        cache.cancel(5).unwrap();
+        assert!(cache.wanted(0).wanted.is_empty() && cache.page(5).unwrap().pictures.len() == 1);
+        assert_eq!(cache.cancel(5).unwrap_err(), "no image of label 5 is asked for");
+        cache.handle_progress([0, 5, 1, 0], (1, 2), NOW);
+        assert_eq!(cache.page(5).unwrap().asked, None, "a late part of what was cancelled");
+        cache.ask(6, Wish::Another, NOW).unwrap();
+        cache.handle_refusal(NOW);
+        assert!(cache.wanted(0).wanted.is_empty());
+        cache.ask(6, Wish::Another, NOW).unwrap();
+        assert_eq!(cache.wanted(0).wanted[0].serial, 2);
     }
 
     #[test]
     fn a_request_without_an_image_stays_open() {
-        let mut album = Album::default();
-        album.ask(5, Wish::Another, NOW).unwrap();
+        let mut cache = ExemplarCache::default();
+        cache.ask(5, Wish::Another, NOW).unwrap();
         let none = Exemplar { bytes: Vec::new(), ..come(5, 1, 0, 0) };
-        assert!(album.handle_exemplar(&none, NOW));
-        assert_eq!(album.page(5).unwrap().asked.unwrap().state, AskState::NoneYet);
-        assert_eq!(album.wanted(0).wanted.len(), 1);
-        assert!(!album.handle_exemplar(&Exemplar { serial: 7, ..none }, NOW), "an answer to what was not asked");
+        assert!(cache.handle_exemplar(&none, NOW));
+        assert_eq!(cache.page(5).unwrap().asked.unwrap().state, AskState::NoneYet);
+        assert_eq!(cache.wanted(0).wanted.len(), 1);
+        assert!(!cache.handle_exemplar(&Exemplar { serial: 7, ..none }, NOW), "an answer to what was not asked");
     }
 
     #[test]
     fn requests_and_images_are_bounded() {
-        let mut album = Album::default();
-        (1..=8).for_each(|label| album.ask(label, Wish::Another, NOW).unwrap());
-        assert!(album.ask(9, Wish::Another, NOW).unwrap_err().contains("8 images are on their way"));
-        album.ask(8, Wish::Another, NOW).unwrap();
+        let mut cache = ExemplarCache::default();
+        (1..=8).for_each(|label| cache.ask(label, Wish::Another, NOW).unwrap());
+        assert!(cache.ask(9, Wish::Another, NOW).unwrap_err().contains("8 images are on their way"));
+        cache.ask(8, Wish::Another, NOW).unwrap();
         let large = |label, picture| Exemplar {
             bytes: [vec![0x10, 0, 0], vec![9; 16_000]].concat(),
             ..come(label, 0, 0, picture)
         };
         for picture in 1..=20 {
             for label in 1..=20 {
-                album.handle_exemplar(&large(label, picture), Instant::from_secs_f64(f64::from(picture)));
+                cache.handle_exemplar(&large(label, picture), Instant::from_secs_f64(f64::from(picture)));
             }
         }
-        let kept: Vec<&Picture> = album.pages().flat_map(|(_, page)| &page.pictures).collect();
-        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= Album::MAX_BYTES);
+        let kept: Vec<&Picture> = cache.pages().flat_map(|(_, page)| &page.pictures).collect();
+        assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= ExemplarCache::MAX_BYTES);
         assert!(kept.len() > 60 && kept.iter().all(|p| p.number > 15), "the newest are kept");
-        assert!(album.pages().all(|(_, page)| page.pictures.len() <= Album::MAX_OF_LABEL));
+        assert!(cache.pages().all(|(_, page)| page.pictures.len() <= ExemplarCache::MAX_OF_LABEL));
     }
 }

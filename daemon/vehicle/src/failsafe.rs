@@ -37,7 +37,7 @@ pub type Stop = (Reaction, ModeReason);
 
 /// Watches limits, silence and breaches.
 #[derive(Debug)]
-pub struct Guard {
+pub struct Failsafe {
     habits: Habits,
     pub limits: Limits,
     pub order: Constraints,
@@ -53,7 +53,7 @@ pub struct Guard {
 /// The share of the limits that is kept in reserve for errors of the estimate.
 const RESERVE: f64 = 0.03;
 
-impl Guard {
+impl Failsafe {
     /// Starts at `now`, as if a frame of the surface had been received then.
     pub fn new(habits: Habits, now: Instant) -> Self {
         let (limits, order, latched) = (Limits::default(), Constraints::default(), ModeReason::Survey);
@@ -164,48 +164,48 @@ mod tests {
 
     #[test]
     fn silence_triggers_the_policy_until_the_surface_is_received() {
-        let mut guard = Guard::new(Habits::default(), at(0.0));
-        guard.set_limits(Limits { silence_s: Some(60), on_silence: Some(Reaction::Hold), ..Limits::default() });
-        guard.handle_time(at(60.0));
-        assert_eq!(guard.stop(0.0), None);
-        guard.handle_time(at(61.0));
-        assert_eq!(guard.stop(0.0), Some((Reaction::Hold, ModeReason::Silence)));
-        guard.handle_received(at(61.0));
-        assert_eq!(guard.stop(0.0), None);
+        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        failsafe.set_limits(Limits { silence_s: Some(60), on_silence: Some(Reaction::Hold), ..Limits::default() });
+        failsafe.handle_time(at(60.0));
+        assert_eq!(failsafe.stop(0.0), None);
+        failsafe.handle_time(at(61.0));
+        assert_eq!(failsafe.stop(0.0), Some((Reaction::Hold, ModeReason::Silence)));
+        failsafe.handle_received(at(61.0));
+        assert_eq!(failsafe.stop(0.0), None);
     }
 
     #[test]
     fn a_vehicle_surfaced_by_silence_waits_for_an_order() {
-        let mut guard =
-            Guard::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
-        guard.handle_time(at(61.0));
-        assert_eq!(guard.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
-        guard.handle_received(at(62.0));
-        assert_eq!(guard.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
-        guard.clear_breach();
-        assert_eq!(guard.stop(0.0), None);
+        let mut failsafe =
+            Failsafe::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
+        failsafe.handle_time(at(61.0));
+        assert_eq!(failsafe.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
+        failsafe.handle_received(at(62.0));
+        assert_eq!(failsafe.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
+        failsafe.clear_breach();
+        assert_eq!(failsafe.stop(0.0), None);
     }
 
     #[test]
     fn an_abort_goes_before_a_breach_and_a_breach_before_a_hold() {
-        let mut guard = Guard::new(Habits::default(), at(0.0));
-        guard.order = Constraints { hold: true, abort: false };
-        assert_eq!(guard.stop(0.0), Some((Reaction::Hold, ModeReason::Order)));
-        guard.handle_breach(ModeReason::Fence);
-        assert_eq!(guard.stop(0.0), Some((Reaction::Return, ModeReason::Fence)));
-        guard.order.abort = true;
-        assert_eq!(guard.stop(0.0), Some((Reaction::Surface, ModeReason::Order)));
+        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        failsafe.order = Constraints { hold: true, abort: false };
+        assert_eq!(failsafe.stop(0.0), Some((Reaction::Hold, ModeReason::Order)));
+        failsafe.handle_breach(ModeReason::Fence);
+        assert_eq!(failsafe.stop(0.0), Some((Reaction::Return, ModeReason::Fence)));
+        failsafe.order.abort = true;
+        assert_eq!(failsafe.stop(0.0), Some((Reaction::Surface, ModeReason::Order)));
     }
 
     #[test]
     fn distance_and_time_are_reserved_for_the_return_path() {
-        let mut guard = Guard::new(Habits::default(), at(0.0));
-        guard.set_limits(Limits { distance_m: Some(1000), time_s: Some(1000), ..Limits::default() });
-        assert_eq!(guard.tighter(), ModeReason::Time, "a thousand seconds are five hundred metres");
-        guard.handle_travel(900.0);
-        assert_eq!(guard.stop(80.0), Some((Reaction::Return, ModeReason::Distance)));
-        assert_eq!(guard.stop(10.0), None);
-        guard.handle_time(at(960.0));
-        assert_eq!(guard.stop(10.0), Some((Reaction::Return, ModeReason::Time)));
+        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        failsafe.set_limits(Limits { distance_m: Some(1000), time_s: Some(1000), ..Limits::default() });
+        assert_eq!(failsafe.tighter(), ModeReason::Time, "a thousand seconds are five hundred metres");
+        failsafe.handle_travel(900.0);
+        assert_eq!(failsafe.stop(80.0), Some((Reaction::Return, ModeReason::Distance)));
+        assert_eq!(failsafe.stop(10.0), None);
+        failsafe.handle_time(at(960.0));
+        assert_eq!(failsafe.stop(10.0), Some((Reaction::Return, ModeReason::Time)));
     }
 }
