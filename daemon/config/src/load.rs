@@ -261,7 +261,8 @@ mod tests {
     #[test]
     fn layers_are_named_each_once_and_their_shares_leave_something_to_labels() {
         let said = message(&["map.layers=[\"colour\"]"]);
-        assert!(said.ends_with("a list of different words of depth, confidence, curiosity"), "{said}");
+        let names: Vec<&str> = LayerName::all().map(LayerName::as_str).collect();
+        assert!(said.ends_with(&format!("a list of different words of {}", names.join(", "))), "{said}");
         assert!(message(&["map.layers=[\"depth\", \"depth\"]"]).contains("different words"));
         assert!(message(&["map.layers=depth"]).contains("a list"));
         let said = message(&["map.layer_shares={ confidence = 60, curiosity = 50 }"]);

@@ -63,12 +63,12 @@ pub fn handle_request(surface: &mut Surface, request: SurfaceRequest, cell_m: f6
 }
 
 fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Option<Reply> {
-    let known = |surface: &Surface, id: u8| Address::vehicle(id).filter(|&a| surface.desk(a).is_some());
+    let known = |surface: &Surface, id: u8| Address::vehicle(id).filter(|&a| surface.record(a).is_some());
     Some(match request {
         SurfaceRequest::Map(id) => map(surface, known(surface, id)?, cell_m, now)?,
         SurfaceRequest::Exemplar(id, label, number) => {
-            let desk = surface.desk(known(surface, id)?)?;
-            Reply::File("image/webp", desk.album.page(label)?.picture(number)?.webp.clone())
+            let record = surface.record(known(surface, id)?)?;
+            Reply::File("image/webp", record.exemplars.page(label)?.picture(number)?.webp.clone())
         }
         SurfaceRequest::Fit(id, bits_per_s) => match fit::fit(surface, known(surface, id)?, cell_m, bits_per_s) {
             Ok(fit) => Reply::Fit(Box::new(fit)),

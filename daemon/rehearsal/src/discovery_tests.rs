@@ -52,7 +52,7 @@ fn a_vehicle_that_answers_a_discovery_call_gets_a_record() {
         }
     }
     let surface = surface.surface();
-    assert_eq!(surface.desk(third).unwrap().name, "vehicle 3");
+    assert_eq!(surface.record(third).unwrap().name, "vehicle 3");
     assert!(surface.view(third).unwrap().status().is_some());
     assert!(surface.view(Address::vehicle(1).unwrap()).unwrap().last_received().is_none());
 }
@@ -70,6 +70,6 @@ fn a_surface_speaks_with_all_configured_vehicles_by_their_names() {
         Instant::ZERO,
     )
     .unwrap();
-    let names: Vec<(u8, &str)> = surface.vehicles().map(|(a, desk)| (a.number(), desk.name.as_str())).collect();
+    let names: Vec<(u8, &str)> = surface.vehicles().map(|(a, record)| (a.number(), record.name.as_str())).collect();
     assert_eq!(names, [(1, "nereus"), (4, "vehicle 4")]);
 }

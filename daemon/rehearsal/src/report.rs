@@ -186,7 +186,7 @@ fn directives(m: &Mission) -> Value {
 }
 
 fn exemplars(m: &Mission) -> Value {
-    let pages = || m.surface().desk(m.address()).into_iter().flat_map(|d| d.album.pages()).map(|(_, page)| page);
+    let pages = || m.surface().record(m.address()).into_iter().flat_map(|d| d.exemplars.pages()).map(|(_, page)| page);
     let pictures = || pages().flat_map(|page| &page.pictures);
     let delivered = pictures().filter(|p| p.asked).count();
     json!({
@@ -211,15 +211,15 @@ fn survey(m: &Mission) -> Value {
 impl Mission {
     /// The newest image of each label of which the surface has one: WebP files.
     pub fn exemplars(&self) -> impl Iterator<Item = (u8, &[u8])> {
-        let desk = self.surface().desk(self.address());
-        let pages = desk.into_iter().flat_map(|d| d.album.pages());
+        let record = self.surface().record(self.address());
+        let pages = record.into_iter().flat_map(|d| d.exemplars.pages());
         pages.filter_map(|(label, page)| Some((label, page.picture(None)?.webp.as_slice())))
     }
 
     /// Legs toward waypoints, given after the fence was in force, that leave it or cross a keep-out, or do not lead back
     /// where a fix has shown the vehicle to be outside.
     pub fn legs_outside_fence(&self) -> usize {
-        let Some(fence) = self.surface().desk(self.address()).and_then(|d| d.fence.as_ref()) else { return 0 };
+        let Some(fence) = self.surface().record(self.address()).and_then(|d| d.fence.as_ref()) else { return 0 };
         let outside = |from, to| scenecast_motion::stretches_outside(&[from, to], fence) > 0;
         let is_out = |&&(from, to): &&super::mission::Leg| {
             if outside(from, from) { outside(to, to) } else { outside(from, to) }

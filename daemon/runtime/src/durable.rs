@@ -97,6 +97,7 @@ mod tests {
     use super::super::journal::disk::Disk;
     use super::*;
     use scenecast_protocol::link::SlotInboxState;
+    use scenecast_protocol::schedule::BackgroundOrder;
 
     fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), UserError> {
         Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))
@@ -166,6 +167,24 @@ mod tests {
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
         assert_eq!(decode(&golden.concat()), Some(durable));
+    }
+
+    #[test]
+    fn a_state_with_two_bytes_of_background_order_reads_as_before() {
+        let stored = |background: &[u8]| [&[0; 26][..], background, &[0; 7]].concat();
+        let zeros = Durable::default();
+        assert_eq!(decode(&stored(&[0])), Some(zeros.clone()));
+        let codes = (0..0x8000u16).filter(|&code| BackgroundOrder::from_code(u128::from(code)).is_some());
+        for code in codes {
+            // Earlier builds held the order as a `u16`, because it had no long form.
+            let bytes = stored(&postcard::to_allocvec(&Some(code)).unwrap());
+            let durable = Durable { background: Some(u128::from(code)), ..zeros.clone() };
+            assert_eq!(
+                (decode(&bytes), postcard::to_allocvec(&durable).unwrap()),
+                (Some(durable), bytes),
+                "{code:04x}"
+            );
+        }
     }
 
     #[test]

@@ -41,7 +41,7 @@ export class Grid {
       ages.writeUInt16LE(Math.min(65534, Math.max(0, Math.round(nowS - c.atS))), at * 2);
       for (const p of extra) {
         const value = p.at((c.x + 0.5) * this.cellM, (c.y + 0.5) * this.cellM);
-        p.bytes[at] = Math.min(p.levels, Math.max(1, Math.floor((value - p.low) / p.step) + 1));
+        p.bytes[at] = Math.max(1, p.edges.slice(0, -1).findLastIndex((edge) => edge <= value) + 1);
       }
     }
     const map = { version: this.version, x0, y0, width, height, cell_m: this.cellM };
@@ -49,7 +49,7 @@ export class Grid {
     map.age_s = ages.toString("base64");
     map.layers = extra.map((p) => ({
       name: p.name, unit: p.unit, palette: p.palette, spread: p.spread, is_depth: p.is_depth,
-      lowest: 1, edges: Array.from({ length: p.levels + 1 }, (_, i) => p.low + i * p.step),
+      lowest: 1, edges: p.edges,
       data: p.bytes.toString("base64"), age_s: map.age_s,
     }));
     return map;

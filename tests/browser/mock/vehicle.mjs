@@ -6,10 +6,13 @@ import { Direction } from "./link.mjs";
 import { Directive } from "./directive.mjs";
 import { Settings } from "./settings.mjs";
 
+/** The bounds of levels of equal width. */
+const equal = (low, step, levels) => Array.from({ length: levels + 1 }, (_, i) => low + i * step);
+
 export const LAYERS = [
-  { name: "depth", unit: "m", low: 10, step: 0.5, levels: 30, palette: "cividis", spread: "scale", is_depth: true, at: floorDepth },
-  { name: "confidence", unit: "", low: 0, step: 0.25, levels: 4, palette: "cividis", spread: "scale", is_depth: false, at: confidence },
-  { name: "curiosity", unit: "bit", low: 2, step: 1, levels: 9, palette: "inferno", spread: "common", is_depth: false, at: surprise },
+  { name: "depth", unit: "m", edges: equal(10, 0.5, 30), palette: "cividis", spread: "scale", is_depth: true, at: floorDepth },
+  { name: "confidence", unit: "", edges: equal(0, 0.25, 4), palette: "cividis", spread: "scale", is_depth: false, at: confidence },
+  { name: "curiosity", unit: "bit", edges: equal(2, 1, 9), palette: "inferno", spread: "common", is_depth: false, at: surprise },
 ];
 
 export class Vehicle {

@@ -1,5 +1,6 @@
 import assert from "node:assert/strict";
 import { PHONE } from "../stage.mjs";
+import { LAYERS } from "../mock/vehicle.mjs";
 
 const view = (s) => s.inPage(({ view: v }) => ({ east: v.east, north: v.north, scale: v.scale, mode: v.mode, width: v.width, height: v.height }));
 
@@ -278,6 +279,21 @@ export default [
       await s.shows("#legend", /depth.*10 m.*25 m/s);
       await s.page.selectOption("#layer", "confidence");
       await s.shows("#legend", /confidence.*0.%.*100.%/s);
+    },
+  },
+  {
+    name: "every layer of the server is painted on a scale in its unit",
+    scenario: "start",
+    async run(s) {
+      await s.steer({ layers: true, advance: 30 });
+      const streams = s.page.getByRole("group", { name: "Use of spare capacity" });
+      const names = () => s.page.locator("#layer option").allInnerTexts();
+      for (const { name, unit } of LAYERS) {
+        await streams.getByRole("checkbox", { name }).check();
+        await s.until(`the layer ${name}`, async () => (await names()).includes(name), { advance: 2 });
+        await s.page.selectOption("#layer", name);
+        await s.shows("#legend", new RegExp(`${name}.*\\d.?${unit || "%"}`, "s"));
+      }
     },
   },
   {

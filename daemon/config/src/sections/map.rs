@@ -22,9 +22,7 @@ section! {
         /// Cells that are sent. fine: every cell; coarse: every fourth cell in both directions. The scene model's
         /// cells stay the same, and the operator may choose otherwise.
         cells: MapCells = MapCells::Fine, ANY, [Auv Scenario];
-        /// Layers that may be sent beside the labels. confidence: the share of a cell's words that carry its label, in
-        /// quarters; depth: depth of the sea floor; curiosity: how badly the model explains a cell, in whole bits per
-        /// word. A layer without a share is sent as a background stream, if link.background lists it.
+        /// Layers that may be sent beside the labels; the glossary defines each. A layer without a share is sent as a background stream, if link.background lists it.
         layers: Vec<LayerName> = LayerName::all().collect(), ANY, [Auv Scenario];
         /// Least share of each layer within the map's share of link.shares while labels wait too. The shares add up
         /// to 100 % or less. 0: spare capacity only.

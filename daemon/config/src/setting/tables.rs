@@ -82,7 +82,11 @@ impl Setting for BackgroundOrder {
     }
 
     fn allowed(_: &Rule) -> String {
-        format!("a list of different words of {}", stream_names().join(", "))
+        let layers = LayerSet::default();
+        let is_layer = |stream: &BackgroundStream| matches!(stream, BackgroundStream::Layer(_));
+        let others = BackgroundStream::all(&layers).filter(|stream| !is_layer(stream));
+        let names: Vec<String> = others.map(|stream| stream.name_in(&layers)).collect();
+        format!("a list of different words of {} and the layers of map.layers", names.join(", "))
     }
 
     fn schema(_: &Rule) -> serde_json::Value {

@@ -6,10 +6,10 @@ use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{Album, AskState, Desk, Picture};
+use scenecast_surface::{AskState, ExemplarCache, Picture, VehicleRecord};
 
-pub(super) fn progress(label: u8, desk: &Desk, view: &PeerView<'_>, address: Address) -> ExemplarProgress {
-    let page = desk.album.page(label);
+pub(super) fn progress(label: u8, record: &VehicleRecord, view: &PeerView<'_>, address: Address) -> ExemplarProgress {
+    let page = record.exemplars.page(label);
     let request = page.and_then(|page| page.asked);
     let base = format!("/api/v2/vehicles/{}/exemplars/{label}", address.number());
     let images: Vec<ExemplarImage> =
@@ -40,7 +40,7 @@ fn image(p: &Picture, base: &str) -> ExemplarImage {
     ExemplarImage {
         number: p.number,
         edge_px: edge_px(p.size),
-        can_enlarge: p.size < Album::MAX_SIZE,
+        can_enlarge: p.size < ExemplarCache::MAX_SIZE,
         bytes: p.sent_bytes,
         url: format!("{base}-{}.webp", p.number),
         at_s: seconds(p.came),

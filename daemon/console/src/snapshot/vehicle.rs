@@ -11,17 +11,17 @@ use scenecast_protocol::directive::{self, PlannerKind, SlotProgress};
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, VehicleMode, VehicleStatus};
-use scenecast_surface::{Desk, SettingsOrder, Surface};
+use scenecast_surface::{SettingsOrder, Surface, VehicleRecord};
 
 pub(super) fn vehicles(surface: &Surface, facts: &MissionFacts, now: Instant) -> Vec<VehicleState> {
     let all = surface.vehicles();
-    all.filter_map(|(address, desk)| vehicle(surface, address, desk, facts, now)).collect()
+    all.filter_map(|(address, record)| vehicle(surface, address, record, facts, now)).collect()
 }
 
 fn vehicle(
     surface: &Surface,
     address: Address,
-    desk: &Desk,
+    record: &VehicleRecord,
     facts: &MissionFacts,
     now: Instant,
 ) -> Option<VehicleState> {
@@ -29,40 +29,40 @@ fn vehicle(
     let labels = surface.labels(address).unwrap_or_default();
     Some(VehicleState {
         id: address.number(),
-        name: desk.name.clone(),
+        name: record.name.clone(),
         last_received_s: view.last_received().map(seconds),
-        expected_interval_s: expected_interval_s(surface, &view, desk, facts),
+        expected_interval_s: expected_interval_s(surface, &view, record, facts),
         next_contact_s: view.next_contact(now).map(seconds),
         status: view.status().map(|(s, at)| status(s, *at)),
-        track: desk.track.iter().map(|&(at, x, y)| (seconds(at), x, y)).collect(),
-        map: map(surface, address, desk, &view, labels.values().sum(), facts),
-        labels: labels.iter().map(|(&l, &n)| label(l, n, desk, &view, address, facts)).collect(),
+        track: record.track.iter().map(|&(at, x, y)| (seconds(at), x, y)).collect(),
+        map: map(surface, address, record, &view, labels.values().sum(), facts),
+        labels: labels.iter().map(|(&l, &n)| label(l, n, record, &view, address, facts)).collect(),
         link: link::channel(&view, now),
-        usbl: desk.found.as_ref().map(|(line, at)| UsblMeasurement {
+        usbl: record.found.as_ref().map(|(line, at)| UsblMeasurement {
             at_s: seconds(*at) - line.age_s,
             range_m: line.range_m,
             bearing_rad: line.direction_rad.map(|(bearing, _)| bearing),
             elevation_rad: line.direction_rad.map(|(_, elevation)| elevation),
             accuracy: line.accuracy,
         }),
-        orders: orders(desk, &view),
+        orders: orders(record, &view),
     })
 }
 
-fn orders(desk: &Desk, view: &PeerView<'_>) -> VehicleOrders {
+fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
     VehicleOrders {
         utility: UtilityTerms {
-            exploration: f64::from(desk.utility.exploration) / 100.0,
-            curiosity: f64::from(desk.utility.curiosity) / 100.0,
+            exploration: f64::from(record.utility.exploration) / 100.0,
+            curiosity: f64::from(record.utility.curiosity) / 100.0,
         },
-        fence: desk.fence.as_ref().map(Into::into),
-        limits: desk.limits.as_ref().map(Into::into),
-        fence_in_force: in_force(&desk.fence_in_force),
-        limits_in_force: in_force(&desk.limits_in_force),
-        planner: desk.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
+        fence: record.fence.as_ref().map(Into::into),
+        limits: record.limits.as_ref().map(Into::into),
+        fence_in_force: in_force(&record.fence_in_force),
+        limits_in_force: in_force(&record.limits_in_force),
+        planner: record.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: VehicleSettings {
-            requested: SettingsOrder::of(desk.settings.asked(), view.layers()),
-            in_force: desk.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
+            requested: SettingsOrder::of(record.settings.asked(), view.layers()),
+            in_force: record.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
         },
         directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
     }
@@ -71,7 +71,7 @@ fn orders(desk: &Desk, view: &PeerView<'_>) -> VehicleOrders {
 fn map(
     surface: &Surface,
     address: Address,
-    desk: &Desk,
+    record: &VehicleRecord,
     view: &PeerView<'_>,
     explored_cells: u32,
     facts: &MissionFacts,
@@ -86,18 +86,18 @@ fn map(
         height: bounds.map_or(0, |b| b.height),
         explored_cells,
         updated_s: view.replica().updated().map(seconds),
-        epoch: desk.epoch,
+        epoch: record.epoch,
         placement: view.status().and_then(|(s, _)| s.placement).map(position::placement),
     }
 }
 
 /// The longest usual pause between two frames. An idle link or the smaller of both budgets can make it longer than the
 /// measured pauses.
-fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, desk: &Desk, facts: &MissionFacts) -> f64 {
+fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, record: &VehicleRecord, facts: &MissionFacts) -> f64 {
     let vehicle_bps = view.status().map_or(u32::MAX, |(s, _)| s.budget_bps);
     let budget_bps = surface.budget_bps().min(vehicle_bps).max(1);
     let idle_s = facts.idle_s + facts.frame_bits as f64 / f64::from(budget_bps);
-    desk.pauses.expected().map_or(facts.first_interval_s, |d| d.as_secs_f64()).max(idle_s)
+    record.pauses.expected().map_or(facts.first_interval_s, |d| d.as_secs_f64()).max(idle_s)
 }
 
 fn in_force<T, O: for<'a> From<&'a T>>(applied: &Option<(u16, T)>) -> Option<AppliedOrder<O>> {
@@ -159,13 +159,20 @@ fn activity(s: &VehicleStatus) -> String {
     s.reason.name().map_or(mode.to_owned(), |reason| format!("{mode}: {reason}"))
 }
 
-fn label(id: u8, cells: u32, desk: &Desk, view: &PeerView<'_>, address: Address, facts: &MissionFacts) -> MapLabel {
+fn label(
+    id: u8,
+    cells: u32,
+    record: &VehicleRecord,
+    view: &PeerView<'_>,
+    address: Address,
+    facts: &MissionFacts,
+) -> MapLabel {
     MapLabel {
         id,
         cells,
         area_m2: f64::from(cells) * facts.cell_m * facts.cell_m,
-        weight: desk.utility.weight(id),
-        exemplar: exemplar::progress(id, desk, view, address),
+        weight: record.utility.weight(id),
+        exemplar: exemplar::progress(id, record, view, address),
     }
 }
 

@@ -190,7 +190,7 @@ impl Water {
     }
 
     pub(super) fn page(&self, label: u8) -> Option<&Page> {
-        self.surface.surface().desk(self.address)?.album.page(label)
+        self.surface.surface().record(self.address)?.exemplars.page(label)
     }
 
     fn is_met(&self, label: u8) -> bool {

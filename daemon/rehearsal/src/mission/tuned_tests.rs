@@ -38,14 +38,14 @@ impl Mission {
         self.surface_mut().set_settings(address, &order, now).unwrap();
         let give_up = now + Duration::from_secs(120);
         let is_in_force = |m: &Self| {
-            let desk = &m.surface().desk(address).unwrap().settings;
-            desk.in_force() == Some(desk.asked())
+            let record = &m.surface().record(address).unwrap().settings;
+            record.in_force() == Some(record.asked())
         };
         while !is_in_force(self) {
             assert!(self.now() < give_up, "not in force after two minutes");
             self.advance(self.now() + Duration::from_secs(1)).unwrap();
         }
-        assert_eq!(self.vehicle().settings(), self.surface().desk(address).unwrap().settings.asked());
+        assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().settings.asked());
     }
 
     /// Ends the survey and lets the link say what it has.

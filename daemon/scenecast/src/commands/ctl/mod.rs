@@ -171,7 +171,7 @@ struct SettingsArgs {
     /// Cells to send: fine, coarse-to-fine, coarse (every fourth in both directions); "": as configured
     #[arg(long, value_name = "BAND")]
     cells: Option<String>,
-    /// Layers to send: none, or different ones of confidence, depth, curiosity, separated by commas; "": as configured
+    /// Layers to send: none, or names of layers as in map.layers, separated by commas; "": as configured
     #[arg(long, value_name = "LAYERS")]
     layers: Option<String>,
     /// lawnmower, greedy, horizon; "": as configured
@@ -230,8 +230,8 @@ enum BudgetCommand {
         /// Minimum shares in percent by class, in total at most 100; other classes stay unchanged
         #[arg(long, value_name = "CLASS=PERCENT,..", value_delimiter = ',', value_parser = class_percent)]
         shares: Vec<(String, u8)>,
-        /// Background streams that use spare capacity, in this order: different ones of finer, depth, exemplars, confidence,
-        /// curiosity, or none
+        /// Background streams that use spare capacity, in this order: none, or different ones of finer, exemplars and the names
+        /// of layers
         #[arg(long, value_name = "STREAM,..", value_delimiter = ',')]
         background: Option<Vec<String>>,
     },
