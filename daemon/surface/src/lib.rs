@@ -11,7 +11,7 @@ mod surface;
 mod vehicle_record;
 
 pub use assemble::assemble;
-pub use exemplar_cache::{AskState, Asked, ExemplarCache, Page, Picture, Wish};
+pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use orders::{FenceOrder, LimitsOrder};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};

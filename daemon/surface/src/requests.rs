@@ -1,6 +1,6 @@
 //! The surface requests exemplars of its vehicles.
 
-use super::exemplar_cache::{ExemplarCache, Wish};
+use super::exemplar_cache::{ExemplarCache, RequestKind};
 use super::{Surface, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, Slot, SlotId, SlotProgress};
 use scenecast_protocol::time::Instant;
@@ -8,11 +8,17 @@ use scenecast_protocol::wire::Address;
 
 impl Surface {
     /// Requests an exemplar of a label. The error is one line for the operator.
-    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, wish: Wish, now: Instant) -> Result<u16, String> {
+    pub fn request_exemplar(
+        &mut self,
+        vehicle: Address,
+        label: u8,
+        kind: RequestKind,
+        now: Instant,
+    ) -> Result<u16, String> {
         if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
             return Err(format!("label {label} is not on the map"));
         }
-        self.change_requests(vehicle, |cache| cache.ask(label, wish, now), now)
+        self.change_requests(vehicle, |cache| cache.request(label, kind, now), now)
     }
 
     /// Withdraws the request for an exemplar of a label. The error is one line for the operator.

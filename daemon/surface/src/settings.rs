@@ -119,7 +119,7 @@ impl SettingsOrder {
 /// can replace one that the vehicle never received.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SettingsRecord {
-    asked: Settings,
+    requested: Settings,
     in_force: Settings,
     /// An order was replaced before its fate was known.
     is_unsure: bool,
@@ -127,8 +127,8 @@ pub struct SettingsRecord {
 
 impl SettingsRecord {
     /// Everything that this surface has ordered.
-    pub fn asked(&self) -> &Settings {
-        &self.asked
+    pub fn requested(&self) -> &Settings {
+        &self.requested
     }
 
     /// The settings that the vehicle has applied, as far as this surface ordered them; `None` while that is unknown.
@@ -138,20 +138,20 @@ impl SettingsRecord {
 
     /// The complete settings to send for an order: the earlier orders, unless they were refused, and the new one.
     pub(super) fn next_order(&self, order: &Settings, last: Option<OrderStatus>) -> Settings {
-        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.asked };
+        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.requested };
         base.then(order)
     }
 
     /// The settings were sent. `last` is the status of the order that they replace.
     pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<OrderStatus>) {
         self.is_unsure |= matches!(last, Some(OrderStatus::OnAir | OrderStatus::Received));
-        self.asked = settings;
+        self.requested = settings;
     }
 
     /// The vehicle has decided about the last order.
     pub(super) fn handle_decision(&mut self, status: OrderStatus) {
         if status == OrderStatus::Applied {
-            (self.in_force, self.is_unsure) = (self.asked, false);
+            (self.in_force, self.is_unsure) = (self.requested, false);
         }
     }
 }
@@ -239,8 +239,12 @@ mod tests {
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
         record.handle_decision(refused);
         send(&mut record, r#"{"alpha": 0}"#, Some(refused));
-        assert_eq!(record.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
+        assert_eq!(
+            record.requested(),
+            &order(r#"{"alpha": 0, "gamma": 0.1}"#),
+            "what was refused is not asked for again"
+        );
         record.handle_decision(OrderStatus::Applied);
-        assert_eq!(record.in_force(), Some(record.asked()));
+        assert_eq!(record.in_force(), Some(record.requested()));
     }
 }

@@ -1,6 +1,6 @@
 //! Builds a vehicle from a configuration.
 
-use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
+use crate::{Durable, FailsafePolicy, Footprint, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
@@ -48,7 +48,7 @@ pub fn assemble(
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
     link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
-    let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
+    let mut vehicle = Vehicle::new(link, navigator, steering, policy(config), durable, now);
     vehicle.configure_map(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, selected_layers(config));
     if config.map.stream == MapStream::WholePng {
         vehicle.send_whole_png();
@@ -61,9 +61,9 @@ fn footprint(config: &Config) -> Footprint {
     Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }
 }
 
-fn habits(config: &Config) -> Habits {
+fn policy(config: &Config) -> FailsafePolicy {
     let survey = &config.survey;
-    Habits {
+    FailsafePolicy {
         on_silence: survey.on_silence,
         on_breach: survey.on_breach,
         on_abort: survey.on_abort,

@@ -6,7 +6,7 @@ use scenecast_protocol::wire::ModeReason;
 
 /// The configured policy, which applies where the operator's limits have no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Habits {
+pub struct FailsafePolicy {
     pub on_silence: Reaction,
     /// Outside the fence or the depth band.
     pub on_breach: Reaction,
@@ -19,7 +19,7 @@ pub struct Habits {
     pub altitude_m: f64,
 }
 
-impl Default for Habits {
+impl Default for FailsafePolicy {
     fn default() -> Self {
         Self {
             on_silence: Reaction::Return,
@@ -38,7 +38,7 @@ pub type Stop = (Reaction, ModeReason);
 /// Watches limits, silence and breaches.
 #[derive(Debug)]
 pub struct Failsafe {
-    habits: Habits,
+    policy: FailsafePolicy,
     pub limits: Limits,
     pub order: Constraints,
     /// Metres travelled since the limits were put in force.
@@ -55,9 +55,9 @@ const RESERVE: f64 = 0.03;
 
 impl Failsafe {
     /// Starts at `now`, as if a frame of the surface had been received then.
-    pub fn new(habits: Habits, now: Instant) -> Self {
+    pub fn new(policy: FailsafePolicy, now: Instant) -> Self {
         let (limits, order, latched) = (Limits::default(), Constraints::default(), ModeReason::Survey);
-        Self { habits, limits, order, used_m: 0.0, used_s: 0.0, latched, last_received: now, now }
+        Self { policy, limits, order, used_m: 0.0, used_s: 0.0, latched, last_received: now, now }
     }
 
     pub fn handle_time(&mut self, now: Instant) {
@@ -71,7 +71,7 @@ impl Failsafe {
 
     /// Speed over ground that the vehicle keeps, metres a second.
     pub fn speed_m_s(&self) -> f64 {
-        self.habits.speed_m_s
+        self.policy.speed_m_s
     }
 
     /// The link received a frame of the surface.
@@ -104,7 +104,7 @@ impl Failsafe {
     /// Whether the vehicle keeps these limits at its depth and altitude.
     pub fn is_able(&self, limits: &Limits, depth_m: f64) -> bool {
         limits.depth.is_none_or(|b| b.contains(depth_m))
-            && limits.altitude.is_none_or(|b| b.contains(self.habits.altitude_m))
+            && limits.altitude.is_none_or(|b| b.contains(self.policy.altitude_m))
     }
 
     /// Metres that may still be travelled, the return path included.
@@ -118,7 +118,7 @@ impl Failsafe {
 
     fn left_of_time(&self) -> f64 {
         let left_s = |s: u32| f64::from(s) * (1.0 - RESERVE) - self.used_s;
-        self.limits.time_s.map_or(f64::INFINITY, |s| left_s(s) * self.habits.speed_m_s)
+        self.limits.time_s.map_or(f64::INFINITY, |s| left_s(s) * self.policy.speed_m_s)
     }
 
     /// The reason to report when the tighter of the two limits is used up.
@@ -129,20 +129,20 @@ impl Failsafe {
     /// The reaction that takes the place of the survey, if one is due. `home_m` is the length
     /// of the return path, metres.
     pub fn stop(&mut self, home_m: f64) -> Option<Stop> {
-        let silence_s = self.limits.silence_s.map_or(self.habits.silence_s, f64::from);
-        let on_silence = self.limits.on_silence.unwrap_or(self.habits.on_silence);
+        let silence_s = self.limits.silence_s.map_or(self.policy.silence_s, f64::from);
+        let on_silence = self.limits.on_silence.unwrap_or(self.policy.on_silence);
         let silent = self.now.since(self.last_received).as_secs_f64() > silence_s;
         if silent && on_silence == Reaction::Surface {
             // It stays at the surface when frames are received again, because ships may be above.
             self.handle_breach(ModeReason::Silence);
         }
         if self.order.abort {
-            return Some((self.limits.on_abort.unwrap_or(self.habits.on_abort), ModeReason::Order));
+            return Some((self.limits.on_abort.unwrap_or(self.policy.on_abort), ModeReason::Order));
         }
         match self.latched {
             ModeReason::Survey => {}
             ModeReason::Silence => return Some((Reaction::Surface, ModeReason::Silence)),
-            why => return Some((self.limits.on_breach.unwrap_or(self.habits.on_breach), why)),
+            why => return Some((self.limits.on_breach.unwrap_or(self.policy.on_breach), why)),
         }
         if silent {
             return Some((on_silence, ModeReason::Silence));
@@ -164,7 +164,7 @@ mod tests {
 
     #[test]
     fn silence_triggers_the_policy_until_the_surface_is_received() {
-        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.set_limits(Limits { silence_s: Some(60), on_silence: Some(Reaction::Hold), ..Limits::default() });
         failsafe.handle_time(at(60.0));
         assert_eq!(failsafe.stop(0.0), None);
@@ -176,8 +176,10 @@ mod tests {
 
     #[test]
     fn a_vehicle_surfaced_by_silence_waits_for_an_order() {
-        let mut failsafe =
-            Failsafe::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
+        let mut failsafe = Failsafe::new(
+            FailsafePolicy { silence_s: 60.0, on_silence: Reaction::Surface, ..FailsafePolicy::default() },
+            at(0.0),
+        );
         failsafe.handle_time(at(61.0));
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
         failsafe.handle_received(at(62.0));
@@ -188,7 +190,7 @@ mod tests {
 
     #[test]
     fn an_abort_goes_before_a_breach_and_a_breach_before_a_hold() {
-        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.order = Constraints { hold: true, abort: false };
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Hold, ModeReason::Order)));
         failsafe.handle_breach(ModeReason::Fence);
@@ -199,7 +201,7 @@ mod tests {
 
     #[test]
     fn distance_and_time_are_reserved_for_the_return_path() {
-        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.set_limits(Limits { distance_m: Some(1000), time_s: Some(1000), ..Limits::default() });
         assert_eq!(failsafe.tighter(), ModeReason::Time, "a thousand seconds are five hundred metres");
         failsafe.handle_travel(900.0);

@@ -17,7 +17,7 @@ mod vehicle;
 
 pub use assemble::assemble;
 pub use checkpoint::{RestoreError, Restored};
-pub use failsafe::{Failsafe, Habits};
+pub use failsafe::{Failsafe, FailsafePolicy};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, Navigator};
 pub use steering::{Course, Footprint, Steering};

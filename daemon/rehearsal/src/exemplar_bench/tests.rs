@@ -6,7 +6,7 @@ use image::RgbImage;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_surface::{AskState, Wish};
+use scenecast_surface::{RequestKind, RequestState};
 
 const IDLE: Setting = Setting { requests: 0, loss: 0.1, loaded: false, larger: false };
 
@@ -45,22 +45,22 @@ fn exemplar_bytes(water: &Water) -> u64 {
     water.vehicle.vehicle().stats().bytes_by_class.get(&Class::Exemplar).copied().unwrap_or(0)
 }
 
-fn state(water: &Water, label: u8) -> Option<AskState> {
-    Some(water.page(label)?.asked?.state)
+fn state(water: &Water, label: u8) -> Option<RequestState> {
+    Some(water.page(label)?.request?.state)
 }
 
 #[test]
 fn a_small_image_grows_and_another_follows_after_the_survey() {
     let mut water = water(IDLE, 1);
-    let (_, small) = water.get(3, Wish::Another).unwrap().unwrap();
-    let first = water.page(3).unwrap().picture(None).unwrap().clone();
-    assert!(small <= 700 && first.size == 0 && first.asked, "{small} bytes");
-    let (_, large) = water.get(3, Wish::Larger(None)).unwrap().unwrap();
-    let pictures = &water.page(3).unwrap().pictures;
+    let (_, small) = water.get(3, RequestKind::Another).unwrap().unwrap();
+    let first = water.page(3).unwrap().exemplar(None).unwrap().clone();
+    assert!(small <= 700 && first.size == 0 && first.requested, "{small} bytes");
+    let (_, large) = water.get(3, RequestKind::Larger(None)).unwrap().unwrap();
+    let pictures = &water.page(3).unwrap().stored;
     assert!(large <= 2800 && large > small, "{large} bytes");
     assert_eq!(pictures.iter().map(|p| (p.number, p.size)).collect::<Vec<_>>(), [(first.number, 1)]);
-    water.get(3, Wish::Another).unwrap().unwrap();
-    let numbers: Vec<u8> = water.page(3).unwrap().pictures.iter().map(|p| p.number).collect();
+    water.get(3, RequestKind::Another).unwrap().unwrap();
+    let numbers: Vec<u8> = water.page(3).unwrap().stored.iter().map(|p| p.number).collect();
     assert!(numbers.len() == 2 && numbers[0] != numbers[1], "{numbers:?}");
 }
 
@@ -68,10 +68,10 @@ fn a_small_image_grows_and_another_follows_after_the_survey() {
 fn what_is_cancelled_costs_no_more_bits() {
     let loaded = Setting { loaded: true, ..IDLE };
     let mut water = water(loaded, 2);
-    water.get(4, Wish::Another).unwrap().unwrap();
-    water.surface.surface_mut().request_exemplar(water.address, 4, Wish::Larger(None), water.now).unwrap();
+    water.get(4, RequestKind::Another).unwrap().unwrap();
+    water.surface.surface_mut().request_exemplar(water.address, 4, RequestKind::Larger(None), water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
+    assert!(water.run_until(until, |w| matches!(state(w, 4), Some(RequestState::Arriving(..)))));
     let version = water.surface.surface_mut().cancel_exemplar(water.address, 4, water.now).unwrap();
     let heard = |w: &Water| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
     assert!(water.run_until(until, heard), "the vehicle hears of it");
@@ -79,7 +79,7 @@ fn what_is_cancelled_costs_no_more_bits() {
     wait(&mut water, 120.0);
     assert_eq!(exemplar_bytes(&water), then);
     let page = water.page(4).unwrap();
-    assert_eq!((page.asked, page.pictures.len()), (None, 1), "the small one stays");
+    assert_eq!((page.request, page.stored.len()), (None, 1), "the small one stays");
 }
 
 #[test]
@@ -87,13 +87,13 @@ fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
     let mut water = water(IDLE, 3);
     let gallery = water.vehicle.vehicle().exemplars().clone();
     water.vehicle.handle_exemplars(Default::default());
-    water.surface.surface_mut().request_exemplar(water.address, 2, Wish::Another, water.now).unwrap();
+    water.surface.surface_mut().request_exemplar(water.address, 2, RequestKind::Another, water.now).unwrap();
     let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));
+    assert!(water.run_until(until, |w| state(w, 2) == Some(RequestState::NoneYet)));
     wait(&mut water, 60.0);
-    assert_eq!(state(&water, 2), Some(AskState::NoneYet));
+    assert_eq!(state(&water, 2), Some(RequestState::NoneYet));
     water.vehicle.handle_exemplars(gallery);
-    assert!(water.run_until(until, |w| w.page(2).unwrap().pictures.len() == 1));
+    assert!(water.run_until(until, |w| w.page(2).unwrap().stored.len() == 1));
     assert_eq!(state(&water, 2), None);
 }
 
@@ -102,11 +102,11 @@ fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut water = water(IDLE, 4);
     background(&mut water, &["exemplars"]);
     let until = water.now + std::time::Duration::from_secs(120);
-    assert!(water.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
-    let (seconds, _) = water.get(LABELS, Wish::Another).unwrap().unwrap();
+    assert!(water.run_until(until, |w| w.page(1).is_some_and(|p| !p.stored.is_empty())));
+    let (seconds, _) = water.get(LABELS, RequestKind::Another).unwrap().unwrap();
     assert!(seconds < 30.0, "{seconds} s");
     wait(&mut water, 300.0);
-    let shown = |label: u8| water.page(label).unwrap().pictures.iter().map(|p| p.asked).collect::<Vec<_>>();
+    let shown = |label: u8| water.page(label).unwrap().stored.iter().map(|p| p.requested).collect::<Vec<_>>();
     assert!((1..LABELS).all(|label| shown(label) == [false]), "{:?}", (1..LABELS).map(shown).collect::<Vec<_>>());
     assert_eq!(shown(LABELS), [true]);
     let then = exemplar_bytes(&water);

@@ -2,7 +2,7 @@
 
 use super::{Durable, VehicleOutput};
 use crate::Navigator;
-use crate::failsafe::{Failsafe, Habits};
+use crate::failsafe::{Failsafe, FailsafePolicy};
 use crate::planning::{Point, distance};
 use crate::steering::{Course, PathAhead, Steering};
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
@@ -56,12 +56,12 @@ impl Guidance {
     /// Starts with the limits, the fence and the unanswered breach of the last run. `planner` is the ordered one, if any.
     pub(super) fn new(
         steering: Steering,
-        habits: Habits,
+        policy: FailsafePolicy,
         durable: &Durable,
         planner: Option<PlannerKind>,
         now: Instant,
     ) -> Self {
-        let (failsafe, activity, path) = (Failsafe::new(habits, now), Activity::default(), PlannedPath::default());
+        let (failsafe, activity, path) = (Failsafe::new(policy, now), Activity::default(), PlannedPath::default());
         let mut guidance = Self { steering, failsafe, activity, waypoint: None, path, is_finished: false };
         let failsafe = &mut guidance.failsafe;
         failsafe.order = Constraints { hold: durable.hold, abort: durable.abort };

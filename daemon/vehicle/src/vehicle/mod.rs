@@ -17,7 +17,7 @@ mod whole_png;
 pub use durable::Durable;
 pub use last_place::LastPlace;
 
-use super::failsafe::Habits;
+use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::steering::Steering;
@@ -85,7 +85,7 @@ impl Vehicle {
         link: VehicleLink,
         navigator: Navigator,
         steering: Steering,
-        habits: Habits,
+        policy: FailsafePolicy,
         durable: Durable,
         now: Instant,
     ) -> Self {
@@ -99,7 +99,7 @@ impl Vehicle {
         let mut vehicle = Self {
             link,
             navigator,
-            guidance: Guidance::new(steering, habits, &durable, settings.planner.value(), now),
+            guidance: Guidance::new(steering, policy, &durable, settings.planner.value(), now),
             publisher: MapPublisher::default(),
             gallery: Gallery::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
