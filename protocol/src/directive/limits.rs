@@ -94,7 +94,6 @@ pub struct Limits {
 
 /// Why limits are refused; the name of the limit comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum LimitsFault {
     /// The lowest value is not below the highest.
     #[error("{0}: the lowest value must be below the highest")]
