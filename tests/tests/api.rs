@@ -222,6 +222,46 @@ fn other_machines_need_a_token() {
     assert!(without.status.code() == Some(1) && text(&without).contains("--token-file"), "{}", text(&without));
 }
 
+#[test]
+fn last_seen_reaches_the_surface_and_its_exports_if_requested() {
+    let out = scratch("last-seen");
+    let report = |sets: &[&str]| -> Value {
+        let sim = ["sim", "--duration", "300", "--seed", "3", "--out", out.to_str().unwrap()];
+        let ran = run(&[&sim[..], sets].concat());
+        assert_eq!(ran.status.code(), Some(0), "{}", text(&ran));
+        serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap()
+    };
+    let without = report(&[]);
+    let bytes = &without["link"]["bytes_by_class"]["last_seen"];
+    assert_eq!((&without["map"]["layers"]["last_seen"], bytes), (&Value::Null, &0.into()));
+    for sets in [r#"link.background=["last_seen"]"#, "map.layer_shares.last_seen=10"] {
+        let with = report(&["--set", sets]);
+        let layer = &with["map"]["layers"]["last_seen"];
+        assert_eq!((&layer["agreement_final"], &layer["cells"]), (&1.0.into(), &with["survey"]["explored_cells"]));
+        assert!(layer["agreement_mean"].as_f64() > Some(0.8), "{layer}");
+    }
+
+    let port = free_port();
+    let _demo = demo(port, &["--duration", "3000"]);
+    let minutes = || {
+        let (_, file) = http(port, "GET", "/api/v2/vehicles/1/map.csv", "", "").unwrap();
+        let file = String::from_utf8(file).unwrap();
+        let at = file.lines().next()?.split(',').position(|name| name == "last_seen")?;
+        let values = file.lines().skip(1).filter_map(|line| line.split(',').nth(at)?.parse().ok());
+        Some(values.collect::<Vec<f64>>())
+    };
+    assert_eq!(minutes(), None);
+    let order = ctl(port, &["budget", "set", "--background", "last_seen", "--wait", "80"]);
+    assert_eq!(order.status.code(), Some(0), "{}", text(&order));
+    wait_until("cells that were seen within 2, and within 4 minutes", LIMIT, || {
+        minutes().is_some_and(|minutes| minutes.contains(&1.0) && minutes.contains(&3.0))
+    });
+    let (_, map) = http(port, "GET", "/api/v2/vehicles/1/map", "", "").unwrap();
+    let map: Value = serde_json::from_slice(&map).unwrap();
+    let layer = map["layers"].as_array().unwrap().iter().find(|layer| layer["name"] == "last_seen").unwrap();
+    assert_eq!((&layer["unit"], &layer["edges"][0], &layer["edges"][1]), (&"min".into(), &0.0.into(), &2.0.into()));
+}
+
 /// Exports the map of an ended mission in all formats, and opens the files with other programs.
 fn assert_exports_open(name: &str, origin: &[&str]) {
     let Some(python) = python() else { return };

@@ -10,6 +10,7 @@ use scene_model::words::{Measures, WordExtractor};
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
 
@@ -60,15 +61,19 @@ impl Mapper {
             exemplars: &self.exemplars,
             relief: &self.relief,
         };
-        ENVELOPE.seal(&postcard::to_allocvec(&kept).unwrap_or_default())
+        let mut content = postcard::to_allocvec(&kept).unwrap_or_default();
+        content.extend(postcard::to_allocvec(&self.last_seen_s).unwrap_or_default());
+        ENVELOPE.seal(&content)
     }
 
     /// Restores a mapper if its parameters are those of the configuration. Priors may differ: those of the checkpoint
     /// apply until [`Mapper::tune`] sets others.
     pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, RestoreError> {
         let content = ENVELOPE.open(bytes)?;
-        let kept: CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief> =
-            postcard::from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
+        let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
+            postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
+        // A checkpoint of an earlier build ends here.
+        let last_seen_s = if rest.is_empty() { Ok(BTreeMap::new()) } else { postcard::from_bytes(rest) };
         let model = SceneModel::load(&kept.model)?;
         let fresh = Mapper::new(config, vocabulary, kept.book.epoch(), config.runtime.seed)?;
         let &SceneConfig { alpha, beta, gamma, seed, .. } = model.config();
@@ -81,6 +86,7 @@ impl Mapper {
             return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
+        mapper.last_seen_s = last_seen_s.map_err(|_| RestoreError::Inconsistent)?;
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
@@ -96,9 +102,11 @@ fn is_same(a: &Measures, b: &Measures) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::MapUpdate;
     use image::{Rgb, RgbImage};
     use scene_model::project::Pose;
     use scenecast_protocol::directive::{Change, Figure, Settings};
+    use scenecast_protocol::map::LayerId;
 
     fn config(sets: &[&str]) -> Config {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
@@ -130,6 +138,37 @@ mod tests {
         for at in 12..20 {
             assert_eq!(frame(&mut restored, at), frame(&mut whole, at));
         }
+    }
+
+    #[test]
+    fn the_last_sight_of_a_cell_ages_until_it_is_seen_again() {
+        let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
+        (0..3).for_each(|_| drop(frame(&mut mapper, 0)));
+        let first = frame(&mut mapper, 0).layers.remove(&LayerId::LAST_SEEN).unwrap();
+        assert!(first.len() > 3 && first.iter().all(|&(_, minutes)| minutes == 0.0));
+        let (seen, _) = first[0];
+        let age = |update: &MapUpdate| update.layers[&LayerId::LAST_SEEN].iter().find(|(c, _)| *c == seen).unwrap().1;
+        assert_eq!(age(&frame(&mut mapper, 30)), 1.0);
+        let later = frame(&mut mapper, 60);
+        assert_eq!((age(&later), later.cells.len()), (2.0, later.layers[&LayerId::LAST_SEEN].len()));
+        let image = RgbImage::from_pixel(160, 120, Rgb([90, 120, 60]));
+        let again = mapper.handle_frame(&image, &Pose { x: 0.0, y: 0.0, z: -4.0, yaw_rad: 0.0 }, 1.0, 150.0);
+        assert_eq!(age(&again), 0.0);
+    }
+
+    #[test]
+    fn a_checkpoint_of_an_earlier_build_lacks_only_the_times_of_sights() {
+        let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
+        (0..5).for_each(|at| drop(frame(&mut mapper, at)));
+        let bytes = mapper.save(7);
+        let times = postcard::to_allocvec(&mapper.last_seen_s).unwrap();
+        let earlier = ENVELOPE.open(&bytes).unwrap().strip_suffix(times.as_slice()).unwrap();
+        let restored = Mapper::restore(&config(&[]), None, &ENVELOPE.seal(earlier)).unwrap().mapper;
+        let mut expected = mapper.current();
+        expected.layers.insert(LayerId::LAST_SEEN, Vec::new());
+        assert_eq!(restored.current(), expected);
+        let damaged = ENVELOPE.seal(&[earlier, &[3]].concat());
+        assert!(matches!(Mapper::restore(&config(&[]), None, &damaged), Err(RestoreError::Inconsistent)));
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub struct MapUpdate {
     pub epoch: u8,
     /// The label of every explored cell.
     pub cells: Vec<(Cell, u8)>,
-    /// Confidence of the labels (0 to 1), depth of the sea floor (metres), and mean surprise of a word (bits).
+    /// The quantities of each layer, in the unit of its descriptor.
     pub layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     pub labels: u8,
     /// The perplexity of each cell under the model.
@@ -47,6 +47,8 @@ pub struct Mapper {
     /// The exemplars of the last [`Mapper::shared_exemplars`].
     shared: SharedExemplars,
     pub(super) relief: Relief,
+    /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
+    pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
     refine_words_per_s: f64,
     /// Maximum rate of camera frames, 1/s; `None`: every frame.
     frames_per_s: Option<f64>,
@@ -103,6 +105,7 @@ impl Mapper {
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
             shared: SharedExemplars::default(),
             relief: Relief::default(),
+            last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
             frames_per_s: every_frame_or(config.scene.frames_per_s),
             configured: Configured {
@@ -151,7 +154,9 @@ impl Mapper {
         let observations = camera.project(image.width(), image.height(), pose, &words);
         self.model.insert(t_s, &observations);
         for seen in &observations {
-            self.relief.add(Cell::new(self.cell(seen.x), self.cell(seen.y)), -seen.z);
+            let cell = Cell::new(self.cell(seen.x), self.cell(seen.y));
+            self.relief.add(cell, -seen.z);
+            self.last_seen_s.insert((cell.x, cell.y), t_s);
         }
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
@@ -174,9 +179,17 @@ impl Mapper {
         let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
         let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
         let curiosity = published.iter().map(|c| (place(c), f64::from(c.perplexity.max(1.0)).log2())).collect();
-        let layers = [(LayerId::CONFIDENCE, confidence), (LayerId::DEPTH, depth), (LayerId::CURIOSITY, curiosity)];
+        let t_s = self.last_s.unwrap_or(0.0);
+        let minutes = |c: &PublishedCell| Some((t_s - self.last_seen_s.get(&(c.x, c.y))?).max(0.0) / 60.0);
+        let last_seen = published.iter().filter_map(|c| Some((place(c), minutes(c)?))).collect();
+        let layers = [
+            (LayerId::CONFIDENCE, confidence),
+            (LayerId::DEPTH, depth),
+            (LayerId::CURIOSITY, curiosity),
+            (LayerId::LAST_SEEN, last_seen),
+        ];
         MapUpdate {
-            t_s: self.last_s.unwrap_or(0.0),
+            t_s,
             epoch: self.book.epoch(),
             cells: published.iter().map(|c| (place(c), c.label)).collect(),
             layers: BTreeMap::from(layers),

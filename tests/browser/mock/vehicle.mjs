@@ -12,6 +12,7 @@ const equal = (low, step, levels) => Array.from({ length: levels + 1 }, (_, i) =
 export const LAYERS = [
   { name: "depth", unit: "m", edges: equal(10, 0.5, 30), palette: "cividis", spread: "scale", is_depth: true, at: floorDepth },
   { name: "confidence", unit: "", edges: equal(0, 0.25, 4), palette: "cividis", spread: "scale", is_depth: false, at: confidence },
+  { name: "last_seen", unit: "min", edges: [0, 2, 4, 8, 16, 32], palette: "cividis", spread: "present", is_depth: false, at: Math.hypot },
   { name: "curiosity", unit: "bit", edges: equal(2, 1, 9), palette: "inferno", spread: "common", is_depth: false, at: surprise },
 ];
 

@@ -54,9 +54,21 @@ pub(super) const CURIOSITY: LayerDescriptor = LayerDescriptor {
     ..DEPTH
 };
 
+/// How long ago the vehicle last saw a cell.
+pub(super) const LAST_SEEN: LayerDescriptor = LayerDescriptor {
+    name: Cow::Borrowed("last_seen"),
+    unit: Cow::Borrowed("min"),
+    quantity: Quantity::Plain,
+    scale: Decimal::new(2, 0),
+    steps: Steps::Doubling,
+    levels: 10,
+    upper_end: UpperEnd::Unbounded,
+    ..DEPTH
+};
+
 /// The built-in layers by their indexes. Of two that may be sent the one with the lower index goes first: depths change
 /// seldom, so they go before confidences. An index is never given to another layer, because settings in a journal name it.
-pub static BUILT_IN_LAYERS: [BuiltInLayer; 3] = [
+pub static BUILT_IN_LAYERS: [BuiltInLayer; 4] = [
     BuiltInLayer { id: LayerId::DEPTH, descriptor: DEPTH, summary: "Depth of the sea floor below the surface" },
     BuiltInLayer {
         id: LayerId::CONFIDENCE,
@@ -68,6 +80,11 @@ pub static BUILT_IN_LAYERS: [BuiltInLayer; 3] = [
         descriptor: CURIOSITY,
         summary: "How badly the scene model explains a cell: mean surprise of a word, the binary logarithm of the perplexity",
     },
+    BuiltInLayer {
+        id: LayerId::LAST_SEEN,
+        descriptor: LAST_SEEN,
+        summary: "How long before its last camera frame the vehicle last saw a cell",
+    },
 ];
 
 impl LayerId {
@@ -77,6 +94,8 @@ impl LayerId {
     pub const CONFIDENCE: Self = Self::of_built_in(1);
     /// Binary logarithm of the perplexity, bits a word.
     pub const CURIOSITY: Self = Self::of_built_in(2);
+    /// Time from the last sight of the cell to the last camera frame, minutes.
+    pub const LAST_SEEN: Self = Self::of_built_in(3);
 }
 
 #[cfg(test)]
