@@ -141,9 +141,9 @@ mod tests {
     #[test]
     fn the_lawnmower_reports_the_legs_that_it_takes() {
         let mut steering = steering(PlannerKind::Horizon);
-        let (mut at, finish) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
-        assert_eq!((finish.points.len(), finish.continues), (4, false));
-        for place in finish.points {
+        let (mut at, planned) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
+        assert_eq!((planned.points.len(), planned.continues), (4, false));
+        for place in planned.points {
             let Course::Go(to) = steering.next(at, (&LabelGrid::default(), 1), None, f64::INFINITY) else { panic!() };
             assert!(distance(to, place) < 1e-9, "{to:?} instead of {place:?}");
             at = to;
@@ -154,8 +154,8 @@ mod tests {
     fn no_reported_leg_prevents_the_return() {
         let metres = |left_m: f64| {
             let mut steering = steering(PlannerKind::Lawnmower);
-            let (to, finish) = first(&mut steering, &LabelGrid::default(), None, left_m);
-            let path: Vec<Point> = [steering.start(), to].into_iter().chain(finish.points).collect();
+            let (to, planned) = first(&mut steering, &LabelGrid::default(), None, left_m);
+            let path: Vec<Point> = [steering.start(), to].into_iter().chain(planned.points).collect();
             let gone: f64 = path.windows(2).map(|w| distance(w[0], w[1])).sum();
             gone + distance(path[path.len() - 1], steering.return_place())
         };
@@ -173,15 +173,15 @@ mod tests {
         };
         let utility = Utility { weights: [(2, 100), (1, -5)].into(), ..Utility::default() };
         let mut steering = steering(PlannerKind::Horizon);
-        let (to, finish) = first(&mut steering, &map(true), Some(&utility), f64::INFINITY);
-        assert!(!finish.points.is_empty());
+        let (to, planned) = first(&mut steering, &map(true), Some(&utility), f64::INFINITY);
+        assert!(!planned.points.is_empty());
         let Course::Go(next) = steering.next(to, (&map(true), 1), Some(&utility), f64::INFINITY) else { panic!() };
         assert!(
-            finish.points[0] == next || is_straight(to, next, finish.points[0]),
-            "{next:?} is on no leg of {finish:?}"
+            planned.points[0] == next || is_straight(to, next, planned.points[0]),
+            "{next:?} is on no leg of {planned:?}"
         );
         let Course::Go(west) = steering.next(to, (&map(false), 2), Some(&utility), f64::INFINITY) else { panic!() };
-        assert_ne!(steering.path_after(west, f64::INFINITY), finish);
+        assert_ne!(steering.path_after(west, f64::INFINITY), planned);
     }
 
     #[test]
@@ -192,10 +192,10 @@ mod tests {
         let return_point = Some(DecimetrePoint::new(31, 33));
         steering.set_fence(&Fence { keep_outs: vec![wall], return_point, ..Fence::default() });
         let Course::Go(to) = steering.next_return((17.0, 3.0)) else { panic!("no path") };
-        let finish = steering.path_after_return(to);
-        assert_eq!((finish.points.last(), finish.continues), (Some(&(3.1, 3.3)), false));
-        assert!(finish.points.iter().any(|p| p.1 > 8.0), "{finish:?}");
-        let path: Vec<Point> = std::iter::once(to).chain(finish.points).collect();
+        let planned = steering.path_after_return(to);
+        assert_eq!((planned.points.last(), planned.continues), (Some(&(3.1, 3.3)), false));
+        assert!(planned.points.iter().any(|p| p.1 > 8.0), "{planned:?}");
+        let path: Vec<Point> = std::iter::once(to).chain(planned.points).collect();
         assert!(path.windows(2).all(|w| steering.bounds().allows_leg(w[0], w[1])));
     }
 }
