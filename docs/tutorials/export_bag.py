@@ -46,7 +46,7 @@ def main():
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--images", required=True, help="topic of the camera")
     parser.add_argument("--odometry", required=True, help="topic of nav_msgs/msg/Odometry")
-    parser.add_argument("--period", type=float, default=2.0, help="least seconds between two images [default: 2]")
+    parser.add_argument("--period", type=float, default=2.0, help="shortest time between two images, in seconds [default: 2]")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     poses, times = [], []

@@ -1,4 +1,4 @@
-//! A vocabulary file: the [`Measures`] that features become words by, as bytes.
+//! A vocabulary file: the [`Measures`] that turn features into words, as bytes.
 //!
 //! Measures that were learnt from images of a similar site before the mission give words the same meaning in every
 //! mission.

@@ -1,8 +1,9 @@
 //! Underwater acoustic channels and modem emulators: seeded, in virtual time, without IO.
 //!
-//! Test software for acoustic modems on a desk: put nodes into a [`Channel`], or emulated modems into a
-//! [`Basin`](modem::Basin), and let hours of traffic pass in seconds. Delay, half duplex, collisions, fading, outages and
-//! the quirks of two makes of modem are in it. The same seed and the same calls give the same bytes at the same times.
+//! Use it to test software for acoustic modems on a desk: put nodes into a [`Channel`], or emulated modems into a
+//! [`Basin`](modem::Basin), and simulate hours of traffic in seconds. The simulation includes delay, half duplex,
+//! collisions, fading, outages and the quirks of two makes of modem. The same seed and the same calls give the same
+//! bytes at the same times.
 //!
 //! # The five types that matter
 //!

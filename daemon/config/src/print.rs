@@ -23,7 +23,7 @@ const SHIPPED: [Shipped; 3] = [
         head: "# The vehicle. Every key may be left out. The values are the defaults, except modem.connect, survey.area_m\n\
                # and runtime.state_dir.\n\
                # A rehearsal on one machine: scenecast asv --config config/asv.toml, then in another terminal\n\
-               # scenecast auv --config config/auv.toml\n",
+               # scenecast auv --config config/auv.toml --set camera.source=frames:DIR, where DIR is a recording.\n",
         sets: &["modem.connect=127.0.0.1:8461", "survey.area_m=[0, 0, 100, 60]", "runtime.state_dir=state/auv"],
     },
     Shipped {

@@ -1,10 +1,10 @@
 //! The operator's page, its HTTP API, and the client of that API.
 //!
 //! The host owns the [`Surface`](scenecast_surface::Surface). It publishes a [`Snapshot`] after each change and calls
-//! [`handle_request`] for waiting requests between two steps. So no client can delay the link.
+//! [`handle_request`] for waiting requests between two steps. Therefore no client can delay the link.
 //!
-//! The modules form no circle: the types of the API ([`state`], [`orders`], [`fit`]) are at the bottom; `snapshot` and `request`
-//! fill them from the surface; `http` serves them; [`client`] reads them.
+//! The modules do not depend on each other in circles: the types of the API ([`state`], [`orders`], [`fit`]) are at the
+//! bottom; `snapshot` and `request` fill them from the surface; `http` serves them; [`client`] reads them.
 
 pub mod client;
 mod export;

@@ -1,4 +1,4 @@
-//! Places on the Earth, and the plane that touches it where the mission is.
+//! Positions on the Earth, and the tangent plane at the mission's origin.
 
 use std::f64::consts::PI;
 

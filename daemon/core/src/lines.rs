@@ -1,4 +1,4 @@
-//! Lines in a stream of bytes that nobody trusts.
+//! Lines in an untrusted stream of bytes.
 
 /// Collects the lines of a stream; longer lines than allowed are dropped and counted.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! Packets of a Micromodem at its rates.
+//! The packets of a Micromodem at each of its rates.
 
 use std::time::Duration;
 

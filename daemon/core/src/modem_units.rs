@@ -1,4 +1,4 @@
-//! Sizes that the makes of modems fix.
+//! Sizes that depend on the make of a modem.
 
 /// Bytes of an instant message of an EvoLogics S2C, at most.
 pub const S2C_INSTANT_BYTES: usize = 64;

@@ -1,4 +1,4 @@
-//! Where a modem or an instrument is.
+//! The address of the port of a modem or an instrument.
 
 use std::fmt;
 use std::path::PathBuf;

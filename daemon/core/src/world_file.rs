@@ -1,4 +1,4 @@
-//! A map in the world: the file that geographic information systems look for beside a picture.
+//! World files, which georeference an image for geographic information systems.
 
 use crate::geodesy::TangentPlane;
 use scenecast_protocol::coordinates::MapPoint;

@@ -1,6 +1,6 @@
 //! Files of scenecast: images, recorded missions and vocabularies are read; results are written whole or not at all.
 //!
-//! Internal to scenecast. Reads and writes disks; no clock, no network.
+//! Internal to scenecast. The crate reads and writes files; it uses no clock and no network.
 
 mod images;
 mod recording;

@@ -1,4 +1,4 @@
-//! Recorded missions: images and where they were taken.
+//! Recorded missions: images with their poses.
 
 use image::RgbImage;
 use scenecast_core::Area;

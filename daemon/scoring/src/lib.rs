@@ -1,8 +1,8 @@
 //! Scores label maps against expert annotations, and trains vocabularies. Offline work: no vehicle needs it, and it
 //! does no IO.
 //!
-//! On a small scene, plain mutual information misleads: any map made of patches shares some with any annotation made of
-//! patches. [`score`] therefore also computes a spatial null model, and the excess over it.
+//! On a small scene, mutual information alone is misleading: any map made of patches has some mutual information with
+//! any annotation made of patches. [`score`] therefore also computes a spatial null model, and the excess over it.
 //!
 //! ```
 //! use image::GrayImage;

@@ -1,8 +1,8 @@
 //! The score of a map, and its spatial null model.
 //!
-//! On a small scene, plain mutual information misleads: any map made of patches shares some with any annotation made of
-//! patches. The null model is the mean over the same map flipped in 3 ways and shifted on a torus by 12 large
-//! distances. The excess over it is due to the scene.
+//! On a small scene, mutual information alone is misleading: any map made of patches has some mutual information with
+//! any annotation made of patches. The null model is the mean over the same map flipped in 3 ways and shifted on a
+//! torus by 12 large distances. The excess over it is due to the scene.
 
 use crate::annotations::Annotations;
 use crate::label_grid::LabelGrid;

@@ -1,4 +1,4 @@
-//! A trial: the scene model against the baselines on an annotated image.
+//! A trial: a comparison of the scene model with the baselines on an annotated image.
 
 use image::{GrayImage, RgbImage};
 use scene_model::project::{DownCamera, Pose};

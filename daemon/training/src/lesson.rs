@@ -1,4 +1,4 @@
-//! Lessons for the prior: changes as a mission has them, over procedural maps.
+//! Lessons for the prior: changes like those of a mission, over procedural maps.
 
 use crate::{Flips, MapRng, MapScene, Survey, sampler_noise};
 use scenecast_protocol::map::{Cell, Rect};

@@ -71,7 +71,7 @@ fn header_fields() -> Rows {
             stamp(Address::SURFACE, clock(1, None).expect("a stamp"), 5),
         ),
         (
-            "stamp of a vehicle: clock 16 777 215 ms, frame 9 heard 258 ms before",
+            "stamp of a vehicle: clock 16 777 215 ms, frame 9 received 258 ms before",
             stamp(auv(), vehicle_stamp(16_777_215, 9, 258), 6),
         ),
         ("statement: horizon low ABC, no loss", statement(0xABC, vec![])),

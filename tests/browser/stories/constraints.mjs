@@ -103,7 +103,7 @@ export default [
       await s.steer({ refuse: "fence" });
       await s.post("/vehicles/1/fence", { fence: [[50, 50], [60, 50], [60, 60]] });
       await s.shows("[aria-labelledby=fence-title] .note", /Version 1 stays in force \(solid lines\)/, { advance: 2 });
-      await s.button("Edit the one in force").click();
+      await s.button("Edit the fence in force").click();
       await sendFence(s).click();
       await s.until("the message", () => s.posts.some((p) => p.path.endsWith("/fence")));
       assert.deepEqual(s.posts.at(-1).body.fence, force);
@@ -224,7 +224,7 @@ export default [
       assert.ok(await sendLimits(s).isDisabled());
       await field(s, "Depth, m, lowest").fill("0");
       await field(s, "Depth, m, highest").fill("");
-      await s.shows("#depth_m-fault", /both ends, or neither/);
+      await s.shows("#depth_m-fault", /both bounds, or neither/);
       await field(s, "Depth, m, highest").fill("500");
       await field(s, "Silence, s").fill("0");
       await s.shows("#silence_s-fault", /1 to 65535, whole numbers/);

@@ -10,12 +10,12 @@ section! {
     link: Link {
         /// Bits per second that this end may put on air, as a mean over link.budget_window_s.
         budget_bps: u32 = 10_000, range(10.0, 1e7, "bit/s"), [Auv Asv Scenario];
-        /// Window over which the budget is kept.
+        /// Length of the window in which the bits on air are limited to the budget.
         budget_window_s: f64 = 10.0, range(1.0, 3600.0, "s"), [Auv Asv Scenario];
         /// Size of a full frame, the same at both ends. The modems s2c and micromodem have frame sizes of their own.
         frame_bytes: u32 = 256, range(32.0, 1024.0, "bytes"), [Auv Asv Scenario];
-        /// Least share of the budget for each class while several classes have data to send. The shares add up to
-        /// 100 % or less. A class that is left out keeps its default.
+        /// Minimum share of the budget for each class while several classes have data to send. The shares add up to 100
+        /// % or less. A class that is left out keeps its default.
         shares: Shares = Shares::default(), range(0.0, 100.0, "%"), [Auv Asv Scenario];
         /// Background streams: data that is sent with spare capacity only, in this order. finer: the cells between
         /// those of a coarse map; exemplars: images of new labels that nobody requested; the name of a layer: that layer,
@@ -33,7 +33,7 @@ section! {
         discovery_period_s: f64 = 300.0, range(0.0, 86_400.0, "s"), [Asv Scenario];
         /// Addresses of the vehicles that the surface works with from the start. Empty: vehicle.address only.
         vehicles: Vec<u8> = Vec::new(), range(1.0, 14.0, ""), [Asv];
-        /// Range that sets how long a reply is awaited before the first round trip has been measured.
+        /// Assumed range, from which the wait for a reply follows until the first round trip has been measured.
         max_range_m: f64 = 3000.0, range(10.0, 20_000.0, "m"), [Asv Scenario];
         /// Time that a modem needs between receiving and transmitting.
         turn_around_s: f64 = 0.2, range(0.0, 10.0, "s"), [Auv Asv Scenario];

@@ -13,18 +13,18 @@ section! {
         codec: Codec = Codec::Auto, ANY, [Auv Scenario];
         /// delta sends changes. whole-png sends the whole map again whenever it has changed, for comparison only.
         stream: MapStream = MapStream::Delta, ANY, [Auv Scenario];
-        /// Time that a new value of a cell must be stable before it is sent, if the operator already has a value of
-        /// that cell. A cell that changes again and again must be stable for up to eight times as long. 0: no delay.
+        /// Time for which a new value of a cell must be stable before it is sent, if the operator already has a value
+        /// of that cell. A cell that changes repeatedly must be stable for up to eight times as long. 0: no delay.
         debounce_s: f64 = 0.0, range(0.0, 600.0, "s"), [Auv Scenario];
-        /// Longest backlog, in seconds of the budget, that is sent in plain order. A longer one is sent coarse to fine:
-        /// every fourth cell in both directions first. 0: never coarse to fine.
+        /// Longest backlog, in seconds of the budget, that is sent in plain order. A longer backlog is sent coarse to
+        /// fine: every fourth cell in both directions first. 0: never coarse to fine.
         coarse_after_s: f64 = 0.0, range(0.0, 86_400.0, "s"), [Auv Scenario];
-        /// Cells that are sent. fine: every cell; coarse: every fourth cell in both directions. The scene model's
-        /// cells stay the same, and the operator may choose otherwise.
+        /// Cells that are sent. fine: every cell; coarse: every fourth cell in both directions. The cells of the scene
+        /// model do not change. An order of the operator has precedence.
         cells: MapCells = MapCells::Fine, ANY, [Auv Scenario];
         /// Layers that may be sent beside the labels; the glossary defines each. A layer without a share is sent as a background stream, if link.background lists it.
         layers: Vec<LayerName> = LayerName::all().collect(), ANY, [Auv Scenario];
-        /// Least share of each layer within the map's share of link.shares while labels wait too. The shares add up
+        /// Minimum share of each layer within the map's share of link.shares while labels wait too. The shares add up
         /// to 100 % or less. 0: spare capacity only.
         layer_shares: BTreeMap<LayerName, u8> = BTreeMap::new(), range(0.0, 100.0, "%"), [Auv Scenario];
         /// Step of the depth layer, rounded to tenths of a metre. The layer has 254 steps around survey.depth_m.
@@ -35,7 +35,8 @@ section! {
 section! {
     /// The camera.
     camera: Camera {
-        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal.
+        /// Source of the frames. frames:DIR: images with DIR/poses.csv; empty: the image of the rehearsal; a vehicle at
+        /// sea then has no camera frames.
         source: CameraSource = CameraSource::Rehearsal, ANY, [Auv Scenario];
         /// Frames per second.
         rate_hz: f64 = 0.5, range(0.01, 30.0, "1/s"), [Scenario];
@@ -66,7 +67,7 @@ section! {
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
         /// Words that are resampled per second of mission time.
         refine_words_per_s: u32 = 50_000, range(0.0, 1e8, "1/s"), [Auv Scenario];
-        /// Maximum rate of camera frames into the scene model. Of each interval the first frame is used. 0: every
+        /// Maximum rate of camera frames into the scene model. The first frame of each interval is used. 0: every
         /// frame.
         frames_per_s: f64 = 0.0, range(0.0, 30.0, "1/s"), [Auv Scenario];
         /// Maximum number of words that are kept in a cell.
@@ -76,8 +77,8 @@ section! {
         /// Mission time between two checkpoints of the scene model. A restarted vehicle continues from the last one.
         /// 0: no checkpoints.
         checkpoint_s: f64 = 60.0, range(0.0, 86_400.0, "s"), [Auv];
-        /// Table of scenecast tune, from which "fit to budget" takes settings of the scene model. Empty: the built-in
-        /// table, measured on procedural sea floors.
+        /// File of a table of scenecast tune, from which "fit to budget" takes settings of the scene model. Empty: the
+        /// built-in table, measured on procedural sea floors.
         tuning_table: Option<PathBuf> = None, ANY, [Asv];
     }
 }

@@ -22,10 +22,11 @@ section! {
         connect: Option<HostPort> = None, ANY, [Auv Asv];
         /// Bit rate of the modem on air. The rates of S2C instant messages and of Micromodem packets are built in.
         bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Auv Asv];
-        /// Bits on air that each transmission needs besides its bytes. Those of s2c and micromodem are built in.
+        /// Bits on air that each transmission needs in addition to its bytes. The values for s2c and micromodem are
+        /// built in.
         overhead_bits: u32 = 0, range(0.0, 100_000.0, "bit"), [Auv Asv Scenario];
         /// Address of the surface's modem (s2c, micromodem), the same at both ends. A vehicle's modem has
-        /// vehicle.address. A modem with another address is refused.
+        /// vehicle.address. The program refuses a modem with another address.
         surface_address: u8 = 10, range(1.0, 127.0, ""), [Auv Asv Scenario];
         /// Transfer mode of an S2C modem, the same at both ends. burst: bulk data in bursts, commands in instant
         /// messages; im: all data in instant messages, about 500 bit/s.

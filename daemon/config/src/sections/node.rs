@@ -12,8 +12,8 @@ section! {
         name: String = "rehearsal".into(), ANY, [Auv Asv Scenario];
         /// Number of the mission, the same at both ends. Frames of another mission are dropped.
         id: u32 = 1, range(0.0, 4_294_967_295.0, ""), [Auv Asv Scenario];
-        /// Latitude and longitude of the world's origin (x = y = 0), the same at both ends. With [0.0, 0.0] the
-        /// vehicle does not know the origin, and the surface puts it where its GPS receiver has its first fix.
+        /// Latitude and longitude of the origin of the world frame (x = y = 0), the same at both ends. With [0.0, 0.0]
+        /// the vehicle does not know the origin, and the surface uses the first position of its GPS receiver.
         origin_deg: Option<LatLon> = None, range(-180.0, 180.0, "deg"), [Auv Asv Scenario];
     }
 }
@@ -40,7 +40,7 @@ section! {
 section! {
     /// The operator's page.
     console: Console {
-        /// Address and port that the page is served at. Empty: no page.
+        /// Address and port of the page. Empty: no page.
         listen: Option<HostPort> = HostPort::parse("127.0.0.1:8460"), ANY, [Asv];
         /// File of the token that the page and scripts must present (scenecast key token). It is required for every
         /// listen address except loopback addresses.

@@ -8,7 +8,7 @@ use scenecast_protocol::directive::{PlannerKind, Reaction};
 section! {
     /// The survey.
     survey: Survey {
-        /// Time at which the survey ends. 0: never.
+        /// Mission time at which the survey ends. 0: never.
         duration_s: f64 = 1200.0, range(0.0, 1e7, "s"), [Auv Scenario];
         /// Speed over ground.
         speed_m_s: f64 = 0.5, range(0.01, 10.0, "m/s"), [Auv Scenario];
@@ -24,14 +24,15 @@ section! {
         /// Distance that planned paths keep from the fence and from keep-outs, to allow for the vehicle's size, turns
         /// and drift.
         clearance_m: f64 = 1.0, range(0.0, 1000.0, "m"), [Auv Scenario];
-        /// Longest silence of the surface before the vehicle does as survey.on_silence says, unless the operator sets
-        /// another. 0: no limit.
+        /// Longest silence of the surface before the reaction in survey.on_silence, unless the operator sets another
+        /// limit. 0: no limit.
         max_silence_s: f64 = 0.0, range(0.0, 1e6, "s"), [Auv Scenario];
-        /// Reaction to the surface's silence, unless the operator sets another.
+        /// Reaction to silence of the surface, unless the operator sets another reaction.
         on_silence: Reaction = Reaction::Return, ANY, [Auv Scenario];
-        /// Reaction outside the fence, in a keep-out or outside a depth band, unless the operator sets another.
+        /// Reaction outside the fence, in a keep-out or outside a depth band, unless the operator sets another
+        /// reaction.
         on_breach: Reaction = Reaction::Return, ANY, [Auv Scenario];
-        /// Reaction to an abort, unless the operator sets another.
+        /// Reaction to an abort, unless the operator sets another reaction.
         on_abort: Reaction = Reaction::Surface, ANY, [Auv Scenario];
     }
 }
@@ -41,7 +42,8 @@ section! {
     navigation: Navigation {
         /// Drift of dead reckoning, in percent of the distance travelled.
         drift_percent: f64 = 1.0, range(0.0, 50.0, "%"), [Auv Scenario];
-        /// Standard deviation of the start of the survey. It bounds how far the first fixes may move the map.
+        /// Standard deviation of the vehicle's position at the start of the survey. It limits how far the first fixes
+        /// may move the map.
         start_sigma_m: f64 = 1.0, range(0.0, 100_000.0, "m"), [Auv Scenario];
         /// Time between two position fixes. 0: no fixes.
         fix_period_s: f64 = 10.0, range(0.0, 3600.0, "s"), [Scenario];
@@ -62,7 +64,7 @@ section! {
         system: u8 = 1, range(1.0, 255.0, ""), [Auv Asv];
         /// Whether to arm the autopilot and to switch it to guided mode, once (mavlink). Otherwise a pilot does so.
         arm: bool = false, ANY, [Auv Asv];
-        /// Silence after which the autopilot is taken for disconnected.
+        /// Silence after which the autopilot counts as disconnected.
         timeout_s: f64 = 5.0, range(1.0, 600.0, "s"), [Auv Asv];
         /// Turn rate of a simulated vehicle. 0: it turns on the spot.
         turn_rate_deg_s: f64 = 0.0, range(0.0, 360.0, "deg/s"), [Auv];
@@ -96,7 +98,7 @@ section! {
         follow: bool = false, ANY, [Asv];
         /// Horizontal distance at which the surface vehicle follows.
         stand_off_m: f64 = 30.0, range(0.0, 5000.0, "m"), [Asv];
-        /// Deviation from that distance before the surface vehicle moves.
+        /// Deviation from position.stand_off_m at which the surface vehicle begins to move.
         dead_band_m: f64 = 15.0, range(1.0, 5000.0, "m"), [Asv];
     }
 }

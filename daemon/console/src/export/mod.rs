@@ -1,4 +1,4 @@
-//! The map as files that other programs open in the right place.
+//! The map as georeferenced files for other programs.
 
 mod cells;
 mod files;

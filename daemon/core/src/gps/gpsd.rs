@@ -1,7 +1,7 @@
 //! gpsd's JSON protocol.
 //!
-//! gpsd greets with a `VERSION` object; [`WATCH`] asks for reports; each report is an object on a line of its own. Used
-//! are `TPV` (time, position, velocity) and the heading of `ATT`. Source: gpsd_json(5).
+//! gpsd begins with a `VERSION` object; [`WATCH`] requests reports; each report is an object on a line of its own. The
+//! reader uses `TPV` (time, position, velocity) and the heading of `ATT`. Source: gpsd_json(5).
 
 use crate::geodesy::LatLon;
 use crate::nmea::Sentence;

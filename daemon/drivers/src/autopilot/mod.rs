@@ -5,7 +5,7 @@
 //! | kind | is |
 //! |---|---|
 //! | [`Mavlink`] | ArduSub as on a BlueROV2, ArduRover on a surface vehicle: MAVLink over serial or UDP |
-//! | [`Nmea`] | lines of NMEA 0183 for other vehicles; or only written down |
+//! | [`Nmea`] | NMEA 0183 sentences for other vehicles, or for a file |
 //! | [`Rehearsed`] | a simulated vehicle |
 
 pub mod mavlink;

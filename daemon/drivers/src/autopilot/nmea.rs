@@ -1,14 +1,14 @@
-//! Waypoints as lines of NMEA 0183, for vehicles whose autopilot reads those; or only written down.
+//! Waypoints as NMEA 0183 sentences, for an autopilot that reads them or for a file.
 //!
-//! Each second, while there is a waypoint:
+//! Every second, while there is a waypoint, the driver writes
 //!
 //! ```text
 //! $SCWPL,ddmm.mmmmm,N,dddmm.mmmmm,E,SC*hh                              waypoint, where the mission's origin is known
 //! $SCRMB,A,0.00,L,,SC,ddmm.mmmmm,N,dddmm.mmmmm,E,miles,degrees,,V*hh   way to it
 //! $PSCWP,east,north,depth*hh                                           metres still to go, depth or nothing
 //! ```
-//! and `$PSCHD*hh` while the vehicle is to stay. Read are positions (GGA, RMC), headings (HDT, THS) and depths below the
-//! surface (DBS).
+//! and `$PSCHD*hh` while the vehicle holds its position. The driver reads positions (GGA, RMC), headings (HDT, THS) and
+//! depths below the surface (DBS).
 
 use super::{Autopilot, Counters, Goal, Health, Step, Tray};
 use scenecast_core::gps::{Gps, GpsLanguage};

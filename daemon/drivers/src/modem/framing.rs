@@ -1,8 +1,8 @@
-//! Frames in a stream of bytes that may lose, change or invent some.
+//! Frames in a stream that may lose, change or add bytes.
 //!
 //! COBS (Cheshire and Baker, 1999) with every byte combined with `+` by exclusive or, so that the delimiter is `+` and
-//! occurs nowhere else. One delimiter stands on each side of a frame: `+++AT`, which a modem would take for a command,
-//! never occurs.
+//! occurs nowhere else. There is one delimiter on each side of a frame. `+++AT`, which a modem would interpret as a
+//! command, never occurs.
 
 /// Bytes that framing adds at most to a frame of up to 1016 bytes: two delimiters, a code for each 254 bytes.
 pub const OVERHEAD_BYTES: u64 = 7;

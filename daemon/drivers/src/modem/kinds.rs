@@ -1,4 +1,4 @@
-//! From configuration to a driver and a way to it.
+//! The driver and the port of the configured modem.
 
 use super::driver::Driver;
 use super::micromodem::{Micromodem, MicromodemConfig};

@@ -1,6 +1,7 @@
 //! A modem without reports: frames in a byte stream or in datagrams, at the pace of the channel.
 //!
-//! Kinds `transparent`, `tcp` and `udp`. No report marks the end of a transmission, so the driver keeps the time.
+//! Kinds `transparent`, `tcp` and `udp`. These modems do not report the end of a transmission, so the driver computes
+//! it from the bit rate.
 
 use super::driver::{Class, Destination, Driver, Event, Reception, Refusal, Token, check_length};
 use super::framing::{Deframer, encode};

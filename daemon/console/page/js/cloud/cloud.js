@@ -81,7 +81,7 @@ function build(map) {
     orbit.frame(box, floor);
     framed = store.selectedId;
   }
-  text(note, `Grid ${metres(grid.step, 0)}. ${flat ? "The vehicle sends no depths: the cells are shown flat." : "Heights to scale."}`);
+  text(note, `Grid ${metres(grid.step, 0)}. ${flat ? "The vehicle sends no depths: the cells are shown flat." : "Heights are to scale."}`);
   return { floor, flat };
 }
 

@@ -89,7 +89,7 @@ export function drawLegend() {
   show(box, Boolean(map) && (layer.name !== "label" || coarse));
   if (box.hidden) return;
   if (coarse) {
-    const words = `pale: one cell of 16 was sent, the rest is unknown`;
+    const words = `pale: one cell of 16 was sent, the others are unknown`;
     box.replaceChildren(h("span.pale", { "aria-hidden": "true" }), h("span", {}, words));
     return;
   }

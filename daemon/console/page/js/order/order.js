@@ -115,7 +115,7 @@ export class Order {
       if (version !== null && this.sentVersions.hasArrived(vehicle, version)) edit.parts.delete(part);
     }
     const accepted = [...edit.parts.values()].find((p) => p.version !== null);
-    const waiting = edit.busy ? "Sending to scenecast." : accepted ? `Version ${accepted.version} was accepted; no report yet.` : null;
+    const waiting = edit.busy ? "Sending to scenecast." : accepted ? `Version ${accepted.version} was accepted by the surface; no report yet.` : null;
     return { busy: edit.busy, error: edit.error, waiting };
   }
 }

@@ -11,9 +11,9 @@ const streams = () => [...Object.keys(NAMES), ...(store.snapshot?.layers.map((l)
 /** `value()` returns the streams in order, `change(streams)` sets them. */
 export function backgroundBox(value, change) {
   const list = h("ol", {});
-  const none = h("p.note", {}, "None: spare capacity stays unused.");
+  const none = h("p.note", {}, "No stream: spare capacity is not used.");
   const node = h("div.background", { role: "group", "aria-label": "Use of spare capacity" },
-    h("h3", {}, "Spare capacity, first to last"), list, none);
+    h("h3", {}, "Order of use of spare capacity"), list, none);
   return { node, refresh };
 
   function refresh(order) {

@@ -37,7 +37,7 @@ function lost() {
   const next = wait > 0 ? `trying again in ${span(Math.ceil(wait))}` : "trying now";
   return {
     key: "lost", kind: "bad", head: "No connection to scenecast",
-    body: `for ${since}; ${next}. All values shown are out of date.`, retry: true,
+    body: `for ${since}; ${next}. All displayed values may be out of date.`, retry: true,
   };
 }
 

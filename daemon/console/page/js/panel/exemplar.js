@@ -49,7 +49,7 @@ export function refreshExemplar(box, label, name) {
   const done = e.state === "receiving" ? ` ${percent(e.progress)}` : "";
   text(state, error ?? `${NAMES[e.state] ?? ""}${done}`);
   const why = e.state === "refused" ? slotOf(store.vehicle, "requests")?.reason : null;
-  state.title = error ?? why ?? (e.state === "not_available" ? "The vehicle has no such image yet and sends it once it has one" : "");
+  state.title = error ?? why ?? (e.state === "not_available" ? "The vehicle has no such image yet and will send one as soon as it has it" : "");
   state.dataset.state = error ? "refused" : e.state;
   show(bar, e.state === "receiving");
   bar.value = e.progress;

@@ -18,7 +18,7 @@ const tools = {
   returnPoint: h("button", { type: "button", onclick: () => onMap(() => pickTool(pen.tool === "return_point" ? null : "return_point")) }, "Place return point"),
   done: h("button.primary", { type: "button", onclick: finish }, "Done drawing"),
 };
-const editInForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(store.vehicle.fence_in_force.order)) }, "Edit the one in force");
+const editInForce = h("button.undo", { type: "button", onclick: () => fenceOrder.set(store.vehicle, fromServer(store.vehicle.fence_in_force.order)) }, "Edit the fence in force");
 const returnFields = place("Return point", (p) => setReturnPoint(p));
 const clearReturn = h("button.undo", { type: "button", onclick: () => setReturnPoint(null) }, "Remove");
 clearReturn.setAttribute("aria-label", "Remove the return point");
@@ -109,8 +109,8 @@ function refreshCorner(node, { p, k }) {
 }
 
 const HINTS = {
-  corner: "Click the map for each corner; click the first one again, or Done, to close. By keys: Enter sets one at the cross, Escape ends.",
-  return_point: "Click the map where the vehicle shall return to. By keys: Enter sets it at the cross.",
+  corner: "Click the map for each corner; click the first corner again, or Done, to close the outline. Keys: Enter sets a corner at the cross, Escape ends.",
+  return_point: "Click the map at the point to which the vehicle should return. Keys: Enter sets it at the cross.",
 };
 
 export function update() {
@@ -123,7 +123,7 @@ export function update() {
   text(tools.fence, outlines[0]?.kind === "fence" ? "Extend fence" : "Draw fence");
   tools.returnPoint.setAttribute("aria-pressed", String(pen.tool === "return_point"));
   for (const [name, node] of Object.entries(tools)) show(node, (name === "done") === (pen.tool === "corner"));
-  text(hint, HINTS[pen.tool] ?? (outlines.length > 0 ? "Drag corners on the map; the small dots between add one. Keys: N and P choose, Shift with arrows moves, Delete removes." : ""));
+  text(hint, HINTS[pen.tool] ?? (outlines.length > 0 ? "Drag corners on the map; drag a small dot between two corners to add one. Keys: N and P select a corner, Shift with an arrow key moves it, Delete removes it." : ""));
   keyed(list, outlines.map((outline, i) => ({ outline, i, name: nameOutline(plan(), i), fault: wrong.outlines[i] })), (o) => o.i, makeOutline, refreshOutline);
   show(returnBox, returnPoint !== null);
   if (returnPoint) refreshReturnPoint(returnPoint, wrong.returnPoint);
@@ -143,9 +143,9 @@ function refreshReturnPoint(at, fault) {
 /** The fence in force, as far as the surface knows. */
 function describeInForce(vehicle) {
   const slot = slotOf(vehicle, "fence");
-  if (!slot) return "None sent since the surface started; the vehicle keeps the one that it has.";
+  if (!slot) return "No fence sent since the surface started; the vehicle keeps the fence that it has.";
   if (slot.state === "applied") return "In force: the solid lines on the map.";
   const before = vehicle.fence_in_force;
   if (before && slot.state === "refused") return `Version ${before.version} stays in force (solid lines).`;
-  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "The fence in force meanwhile is unknown to this surface.";
+  return before ? `Version ${before.version} stays in force meanwhile (solid lines).` : "This surface does not know which fence is in force meanwhile.";
 }

@@ -4,7 +4,7 @@ import { $, h } from "../dom.js";
 
 const KEYS = [
   ["Arrows", "pan the map"], ["+ and \u2212", "zoom"], ["0", "show everything"], ["F", "follow the vehicle"],
-  ["N, P", "constraints: next, previous corner; Shift with arrows moves it, Delete removes it"],
+  ["N, P", "constraints: next, previous corner; Shift with an arrow key moves it, Delete removes it"],
   ["Enter", "set a corner, a point to measure, the return point at the cross; Escape ends"],
   ["M", "measure"], ["Tab", "move to the next control"],
   ["Wheel, drag, pinch", "zoom and pan with mouse or fingers"],

@@ -16,7 +16,7 @@ const BANDS = [
 const AMOUNTS = [
   ["distance_m", "Distance, m", "Distance over ground, including the return path", MAX_AMOUNT],
   ["time_s", "Time, s", "Duration of the survey, including the return path", MAX_AMOUNT],
-  ["silence_s", "Silence, s", "Longest time without a frame of the surface", 65535],
+  ["silence_s", "Silence, s", "Longest time without a frame from the surface", 65535],
 ];
 const REACTIONS = [["on_silence", "On silence"], ["on_breach", "On a breach"], ["on_abort", "On abort"]];
 
@@ -30,7 +30,7 @@ export const limitsOrder = new Order("limits", read, (v, value) => sendLimits(v.
 export function bandFault(band) {
   if (band === null) return null;
   const [low, high] = band;
-  if (low === null || high === null) return "Give both ends, or neither";
+  if (low === null || high === null) return "Give both bounds, or neither";
   if (![low, high].every((m) => m >= 0 && m <= MAX_DEPTH_M)) return `The range is 0 to ${MAX_DEPTH_M} m`;
   return Math.round(low * 10) < Math.round(high * 10) ? null : "The lowest must be below the highest";
 }
@@ -45,7 +45,7 @@ const foot = orderFoot(limitsOrder, "Limits", "send-limits");
 const lines = [...BANDS.map(bandLine), ...AMOUNTS.map(amountLine)];
 const choices = REACTIONS.map(reactionLine);
 export const limitsPart = h("section.part", { "aria-labelledby": "limits-title" },
-  h("h3", { id: "limits-title" }, "Limits"), state, h("p.hint", {}, "An empty field is no limit."),
+  h("h3", { id: "limits-title" }, "Limits"), state, h("p.hint", {}, "An empty field means no limit."),
   ...lines.map((l) => l.node), ...choices.map((l) => l.node), foot.node);
 
 function set(key, value) {
@@ -107,10 +107,10 @@ function reactionLine([key, name]) {
 /** The limits in force, as far as the surface knows. */
 function describeInForce(vehicle) {
   const slot = slotOf(vehicle, "limits");
-  if (!slot) return "None sent since the surface started; the vehicle keeps those that it has.";
+  if (!slot) return "No limits sent since the surface started; the vehicle keeps the limits that it has.";
   if (slot.state === "applied") return "In force as last sent.";
   const before = vehicle.limits_in_force;
-  if (!before) return "The limits in force meanwhile are unknown to this surface.";
+  if (!before) return "This surface does not know which limits are in force meanwhile.";
   const items = Object.entries(stated(before.order)).map(([key, value]) => `${NAMES[key]} ${value.join?.(" to ") ?? value}`);
   return `In force meanwhile: version ${before.version}: ${items.join("; ") || "no limits"}.`;
 }

@@ -31,7 +31,7 @@ function direction(name, title) {
 
 export function startLink() {
   for (const [key, name, hint] of [["loss", "Frames lost, up / down"], ["recent", "Recent loss, up / down"], ["refused", "Refused, vehicle / surface"], ["own", "Vehicle's budget"], ["goodput", "Goodput, up / down"], ["trip", "Round trip"],
-    ["backlog", "Backlog", "The bits that the vehicle still has to send: its last report, less the bits received since. The survey continues meanwhile."],
+    ["backlog", "Backlog", "The bits that the vehicle still has to send: those of its last report, minus the bits received since. The survey continues meanwhile."],
     ["lag", "Map lag", "How far this map is behind the vehicle's: its approximate age and the missing bits"]]) {
     const [node, set] = row(name, hint);
     values[key] = set;

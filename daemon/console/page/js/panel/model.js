@@ -12,8 +12,8 @@ const NUMBERS = [
   ["alpha", "Alpha", "Preference for labels that are used elsewhere", 1e-9, 1e3],
   ["beta", "Beta", "Prior weight of each word in a label", 1e-9, 1e3],
   ["gamma", "Gamma", "Weight of a new label", 1e-12, 1e3],
-  ["refine_words_per_s", "Refine, words/s", "Words resampled a second of mission time", 1, 1e8],
-  ["frames_per_s", "Frames, 1/s", "Camera frames a second that the scene model sees at most", 0.01, 30],
+  ["refine_words_per_s", "Refine, words/s", "Words resampled per second of mission time", 1, 1e8],
+  ["frames_per_s", "Frames, 1/s", "Maximum rate of camera frames into the scene model", 0.01, 30],
 ];
 const SIDE = 4;
 const CELLS = { fine: (m) => `all, ${m(1)}`, "coarse-to-fine": (m) => `${m(SIDE)} first, then ${m(1)}`, coarse: (m) => `every fourth, ${m(SIDE)}` };
@@ -34,7 +34,7 @@ export function numberFault(value, low, high) {
 }
 
 const foot = orderFoot(order, "Settings", "send-settings");
-const lines = [...NUMBERS.map(numberLine), choiceLine("cells", "Cells sent", "The cells of its map that the vehicle sends; the cells of its model stay"), choiceLine("layers", "Layers sent", "The layers that it sends in addition to the labels")];
+const lines = [...NUMBERS.map(numberLine), choiceLine("cells", "Cells sent", "Cells of the vehicle's map that it sends; the cells of its scene model do not change"), choiceLine("layers", "Layers sent", "Layers that the vehicle sends in addition to the labels")];
 const limit = h("input", { type: "number", id: "fit-bps", min: 1, max: MAX_BPS, step: "any", oninput: () => forget(), onkeydown: (event) => event.key === "Enter" && pick() });
 const fit = h("button", { type: "button", id: "fit", onclick: pick }, "Fit to budget");
 const fitted = h("p.note", { id: "fitted", role: "status" });
@@ -59,7 +59,7 @@ function inForce(key) {
   const known = store.vehicle.settings?.in_force;
   if (!known) return "unknown";
   const value = known[key] ?? null;
-  if (value === null) return "not set from here";
+  if (value === null) return "not set by this surface";
   return value === 0 || value === "" ? CONFIGURED : key === "layers" ? layersText(value) : key === "cells" ? value.replaceAll("-", " ") : String(value);
 }
 

@@ -21,9 +21,9 @@ const noOrders = h("p.note", {}, "No order sent yet.");
 export function startVehicle() {
   for (const [key, name, hint] of [
     ["position", "East, north"], ["depth", "Depth"], ["heading", "Heading"],
-    ["sigma", "Position \u03c3", "Standard deviation of its position; the ring on the map is twice this"],
-    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "Its plan from the reported position over the waypoint to the last reported place; dashed on the map"], ["cells", "Its own map"], ["contact", "Next contact"],
-    ["gps", "Surface GPS", "The position of the surface by GPS, and the fixes that it sent to vehicles"],
+    ["sigma", "Position \u03c3", "Standard deviation of the position; the ring on the map has twice this radius"],
+    ["fix", "Last fix"], ["waypoint", "Waypoint"], ["path", "Path", "The plan from the reported position through the waypoint to the last reported place; dashed on the map"], ["cells", "Vehicle's map"], ["contact", "Next contact"],
+    ["gps", "Surface GPS", "The position of the surface by GPS, and the number of fixes sent to vehicles"],
   ]) {
     const [node, set] = row(name, hint);
     values[key] = set;

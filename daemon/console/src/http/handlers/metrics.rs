@@ -1,6 +1,7 @@
 //! Metrics for Prometheus, text format 0.0.4.
 //!
-//! The crate `prometheus-client` writes only OpenMetrics, which readers of 0.0.4 refuse, and would need the same descriptions.
+//! The crate `prometheus-client` writes only OpenMetrics, which readers of 0.0.4 reject. It would also need the same
+//! descriptions.
 
 use crate::http::shared::Shared;
 use crate::state::{ChannelQuality, LinkDirection, MissionState, OrderStatus, VehicleState};

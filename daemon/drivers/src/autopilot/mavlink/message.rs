@@ -1,8 +1,8 @@
-//! The messages of MAVLink that are of use here, in the units of the wire.
+//! The MAVLink messages that the driver uses, in the units of MAVLink.
 //!
-//! Eleven of some three hundred. A generated dialect would bring them all: 1.6 MB of source, a quarter more of a clean
-//! build, and a refusal of messages whose enumerations are newer than it. Layouts: `common.xml` of MAVLink; the tests hold
-//! bytes that pymavlink wrote.
+//! These are eleven of about three hundred messages. A generated dialect would contain all of them: 1.6 MB of source
+//! and a quarter more time for a clean build. It would also reject messages whose enumerations are newer than the
+//! dialect. The layouts are from `common.xml` of MAVLink; the tests compare them with bytes that pymavlink wrote.
 
 /// A message that is read.
 #[derive(Debug, Clone, PartialEq)]

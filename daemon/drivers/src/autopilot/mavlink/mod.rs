@@ -1,4 +1,4 @@
-//! ArduSub, and its relatives, over MAVLink 2.
+//! ArduSub and ArduRover over MAVLink 2.
 
 pub mod frame;
 pub mod message;

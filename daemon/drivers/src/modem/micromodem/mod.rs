@@ -1,7 +1,8 @@
 //! WHOI Micromodem 1 and 2: frames in packets of a rate, in cycles that the surface's modem begins.
 //!
-//! The modem asks for each frame when it wants it, so nothing waits in it and commands need no way of their own. Flexible
-//! data packets are not used: they ask for another packet header on all modems, which then cannot have cycles.
+//! The modem requests each frame at the moment of transmission. No data waits inside the modem, so orders need no
+//! separate path. Flexible data packets are not used: they need another packet header on all modems, which excludes
+//! cycles.
 
 mod cycle;
 mod sentence;

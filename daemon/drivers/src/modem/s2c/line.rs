@@ -1,6 +1,7 @@
 //! The lines of an S2C modem: replies, notifications, and raw data between them.
 //!
-//! Payload is counted, never searched. Memory is bounded, and after nonsense the next line that makes sense is found.
+//! Payload is counted, never searched. Memory is bounded, and after invalid bytes the parser resumes with the next
+//! valid line.
 
 use super::notice::{Notice, parse_notice, payload_length};
 

@@ -1,8 +1,8 @@
 //! EvoLogics S2C: bulk as bursts, commands as instant messages, acknowledgements as piggybacks.
 //!
-//! The NET interpreter is preferred; a port of the AT interpreter is found out and spoken to by `+++AT`. Records of a burst
-//! are pieces of a framed stream ([`super::framing`]), so both interpreters understand each other and no payload holds a
-//! command.
+//! The NET interpreter is preferred. The driver detects a port of the AT interpreter and sends commands to it with
+//! `+++AT`. Burst records are pieces of a framed stream ([`super::framing`]), so modems with different interpreters can
+//! communicate, and no payload contains a command.
 
 mod bursts;
 mod config;

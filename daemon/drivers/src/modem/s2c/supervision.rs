@@ -1,4 +1,4 @@
-//! Whether the modem still works as it was set up, and refusals reported to a person.
+//! Checks that the modem still has the configuration of its setup, and reports refused commands.
 
 use super::config::S2cConfig;
 use super::setup::{self, Step};
