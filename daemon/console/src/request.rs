@@ -12,7 +12,7 @@ use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{FenceOrder, LimitsOrder, SettingsOrder, Surface, Wish};
+use scenecast_surface::{FenceOrder, LimitsOrder, RequestKind, SettingsOrder, Surface};
 use std::collections::BTreeMap;
 
 /// A reading or an order. The first number is the address of the vehicle.
@@ -68,7 +68,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
         SurfaceRequest::Map(id) => map(surface, known(surface, id)?, cell_m, now)?,
         SurfaceRequest::Exemplar(id, label, number) => {
             let record = surface.record(known(surface, id)?)?;
-            Reply::File("image/webp", record.exemplars.page(label)?.picture(number)?.webp.clone())
+            Reply::File("image/webp", record.exemplars.label(label)?.exemplar(number)?.webp.clone())
         }
         SurfaceRequest::Fit(id, bits_per_s) => match fit::fit(surface, known(surface, id)?, cell_m, bits_per_s) {
             Ok(fit) => Reply::Fit(Box::new(fit)),
@@ -116,8 +116,8 @@ fn accepted(vehicle: Address, slot: SlotId, issued: Result<u16, String>) -> Repl
 fn order_exemplar(surface: &mut Surface, vehicle: Address, order: &ExemplarOrder, now: Instant) -> Result<u16, String> {
     let ExemplarOrder { label, action, image } = *order;
     match action {
-        ExemplarAction::Another => surface.request_exemplar(vehicle, label, Wish::Another, now),
-        ExemplarAction::Larger => surface.request_exemplar(vehicle, label, Wish::Larger(image), now),
+        ExemplarAction::Another => surface.request_exemplar(vehicle, label, RequestKind::Another, now),
+        ExemplarAction::Larger => surface.request_exemplar(vehicle, label, RequestKind::Larger(image), now),
         ExemplarAction::Cancel => surface.cancel_exemplar(vehicle, label, now),
     }
 }

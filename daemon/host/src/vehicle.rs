@@ -2,15 +2,14 @@
 
 use crate::link_host::{FrameEvent, LinkHost};
 use crate::pilot::{Pilot, PilotEvent};
-use scene_model::exemplars::ExemplarPatch;
 use scenecast_core::TangentPlane;
 use scenecast_drivers::autopilot::{Autopilot, Goal};
 use scenecast_drivers::modem::Station;
 use scenecast_protocol::coordinates::MapPoint;
 use scenecast_protocol::directive::{Budget, Fix, Settings};
 use scenecast_protocol::time::Instant;
-use scenecast_vehicle::{AppliedSlot, MapUpdate, Vehicle, VehicleOutput};
-use std::collections::{BTreeMap, VecDeque};
+use scenecast_vehicle::{AppliedSlot, MapUpdate, SharedExemplars, Vehicle, VehicleOutput};
+use std::collections::VecDeque;
 
 /// Maximum age of a fix that is given to the autopilot, seconds.
 const MAX_FIX_AGE_S: f64 = 60.0;
@@ -70,7 +69,7 @@ impl VehiclePilot {
         let autopilot = &mut self.pilot.autopilot;
         while let Some(step) = autopilot.poll_step() {
             vehicle.handle_odometry(step.dx_m, step.dy_m, step.heading_rad, step.depth_m, now);
-            vehicle.handle_unseen(step.unseen);
+            vehicle.handle_unmeasured(step.unseen);
         }
         vehicle.set_autopilot_silent(autopilot.health(now).is_silent());
         let navigator = vehicle.navigator();
@@ -206,7 +205,7 @@ impl VehicleHost {
         &mut self,
         pose: Option<CameraPose>,
         update: &MapUpdate,
-        exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
+        exemplars: SharedExemplars,
         now: Instant,
     ) {
         if let Some(pose) = pose {
@@ -230,7 +229,7 @@ impl VehicleHost {
     }
 
     /// Takes the mapper's exemplars of each label, the best first.
-    pub fn handle_exemplars(&mut self, exemplars: BTreeMap<u8, Vec<ExemplarPatch>>) {
+    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
         self.link.end_mut().handle_exemplars(exemplars);
     }
 

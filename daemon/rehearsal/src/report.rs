@@ -185,13 +185,13 @@ fn directives(m: &Mission) -> Value {
 }
 
 fn exemplars(m: &Mission) -> Value {
-    let pages = || m.surface().record(m.address()).into_iter().flat_map(|d| d.exemplars.pages()).map(|(_, page)| page);
-    let pictures = || pages().flat_map(|page| &page.pictures);
-    let delivered = pictures().filter(|p| p.asked).count();
+    let pages = || m.surface().record(m.address()).into_iter().flat_map(|d| d.exemplars.labels()).map(|(_, page)| page);
+    let pictures = || pages().flat_map(|page| &page.stored);
+    let delivered = pictures().filter(|p| p.requested).count();
     json!({
-        "requested": delivered + pages().filter(|page| page.asked.is_some()).count(),
+        "requested": delivered + pages().filter(|page| page.request.is_some()).count(),
         "delivered": delivered,
-        "unrequested": pictures().filter(|p| !p.asked).count(),
+        "unrequested": pictures().filter(|p| !p.requested).count(),
         "bytes": pictures().map(|p| p.sent_bytes).sum::<usize>(),
     })
 }
@@ -211,8 +211,8 @@ impl Mission {
     /// The newest image of each label that has one at the surface, as WebP files.
     pub fn exemplars(&self) -> impl Iterator<Item = (u8, &[u8])> {
         let record = self.surface().record(self.address());
-        let pages = record.into_iter().flat_map(|d| d.exemplars.pages());
-        pages.filter_map(|(label, page)| Some((label, page.picture(None)?.webp.as_slice())))
+        let pages = record.into_iter().flat_map(|d| d.exemplars.labels());
+        pages.filter_map(|(label, page)| Some((label, page.exemplar(None)?.webp.as_slice())))
     }
 
     /// Number of legs chosen after the fence took effect that leave it, cross a keep-out, or do not lead back inside

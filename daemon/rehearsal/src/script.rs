@@ -3,7 +3,7 @@
 use scenecast_core::Area;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{FenceOrder, LimitsOrder, Surface, Wish};
+use scenecast_surface::{FenceOrder, LimitsOrder, RequestKind, Surface};
 use std::collections::BTreeMap;
 use std::collections::VecDeque;
 
@@ -95,7 +95,7 @@ fn perform(act: &Act, surface: &mut Surface, vehicle: Address, now: Instant) -> 
         }
         Act::Show(rank) => {
             let Some(label) = ranked(*rank) else { return false };
-            surface.request_exemplar(vehicle, label, Wish::Another, now).is_ok()
+            surface.request_exemplar(vehicle, label, RequestKind::Another, now).is_ok()
         }
     }
 }

@@ -77,7 +77,7 @@ fn relay_config(config: &Config, language: GpsLanguage) -> RelayConfig {
             turn_rad: p.usbl_rotation_deg.to_radians(),
             sound_ratio,
         },
-        most_sigma_m: p.max_sigma_m,
+        max_sigma_m: p.max_sigma_m,
         period: Duration::from_secs_f64(p.fix_period_s),
     }
 }

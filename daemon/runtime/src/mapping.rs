@@ -3,13 +3,11 @@
 use super::checkpoint::CheckpointFile;
 use super::clock::Clock;
 use super::journal::Folder;
-use scene_model::exemplars::ExemplarPatch;
 use scene_model::project::Pose;
 use scenecast_core::UserError;
 use scenecast_files::{RecordedFrame, Recording};
 use scenecast_protocol::directive::Settings;
-use scenecast_vehicle::{MapUpdate, Mapper};
-use std::collections::BTreeMap;
+use scenecast_vehicle::{MapUpdate, Mapper, SharedExemplars};
 use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
@@ -34,7 +32,7 @@ pub(super) struct Mapped {
     pub(super) frame: Option<RecordedFrame>,
     pub(super) update: MapUpdate,
     /// The best images of each label so far.
-    pub(super) exemplars: BTreeMap<u8, Vec<ExemplarPatch>>,
+    pub(super) exemplars: SharedExemplars,
 }
 
 pub(super) struct MapperThread {
@@ -108,7 +106,7 @@ impl Work {
     fn run(mut self, mut incoming: mpsc::UnboundedReceiver<ToMapper>) {
         let mut is_host_alive = true;
         if self.mapper.last_s().is_some() {
-            is_host_alive = self.report(FromMapper::Mapped(self.mapped(None)));
+            is_host_alive = self.report_current(None);
         }
         while is_host_alive && let Some(order) = incoming.blocking_recv() {
             match order {
@@ -116,7 +114,7 @@ impl Work {
                 ToMapper::Keep => self.keep.keep_now(&self.mapper),
                 // A frame beyond the frame rate only changes the vehicle's pose.
                 ToMapper::Frame(frame) if !self.mapper.takes(frame.t_s) => {
-                    is_host_alive = self.report(FromMapper::Mapped(self.mapped(Some(*frame))));
+                    is_host_alive = self.report_current(Some(*frame));
                 }
                 ToMapper::Frame(frame) => {
                     let report = self.see(*frame);
@@ -133,19 +131,26 @@ impl Work {
         self.outgoing.blocking_send(report).is_ok()
     }
 
+    /// Sends the map as it is, without a new frame in it.
+    fn report_current(&mut self, frame: Option<RecordedFrame>) -> bool {
+        let update = self.mapper.current();
+        let mapped = self.mapped(frame, update);
+        self.report(FromMapper::Mapped(mapped))
+    }
+
     fn see(&mut self, frame: RecordedFrame) -> FromMapper {
         match frame.image() {
             Ok(image) => {
                 let pose = Pose { x: frame.x_m, y: frame.y_m, z: -frame.depth_m, yaw_rad: -frame.heading_rad };
-                self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
-                FromMapper::Mapped(self.mapped(Some(frame)))
+                let update = self.mapper.handle_frame(&image, &pose, frame.scale, frame.t_s);
+                FromMapper::Mapped(self.mapped(Some(frame), update))
             }
             Err(error) => FromMapper::Missed(error),
         }
     }
 
-    fn mapped(&self, frame: Option<RecordedFrame>) -> Mapped {
-        Mapped { frame, update: self.mapper.current(), exemplars: self.mapper.gallery() }
+    fn mapped(&mut self, frame: Option<RecordedFrame>, update: MapUpdate) -> Mapped {
+        Mapped { frame, update, exemplars: self.mapper.shared_exemplars() }
     }
 }
 

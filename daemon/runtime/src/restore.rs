@@ -7,7 +7,7 @@ use super::mapping::Keep;
 use scenecast_config::Config;
 use scenecast_core::UserError;
 use scenecast_files::configured_vocabulary;
-use scenecast_vehicle::{Mapper, NoCheckpoint, Restored};
+use scenecast_vehicle::{Mapper, RestoreError, Restored};
 use std::path::Path;
 
 /// The state at the start of a run.
@@ -60,7 +60,7 @@ fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Rest
     let Some(bytes) = file.read()? else { return Ok(None) };
     match Mapper::restore(config, configured_vocabulary(config.scene.vocabulary.as_deref())?, &bytes) {
         Ok(restored) => Ok(Some(restored)),
-        Err(NoCheckpoint::Config(error)) => Err(error),
+        Err(RestoreError::Config(error)) => Err(error),
         Err(why) => {
             let place = file.path();
             tracing::error!("{}: {why}; the scene model starts from scratch, with new labels", place.display());

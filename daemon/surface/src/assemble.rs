@@ -1,4 +1,4 @@
-//! From a configuration to a surface.
+//! Builds a surface from a configuration.
 
 use crate::Surface;
 use scenecast_config::{Config, vehicle_names};
@@ -10,7 +10,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::MissionId;
 use std::time::Duration;
 
-/// A surface that speaks with the configured vehicles; `seed` is random for each run.
+/// Builds a surface for the configured vehicles. `seed` is random for each run.
 pub fn assemble(
     config: &Config,
     authenticity: Option<Authenticity>,

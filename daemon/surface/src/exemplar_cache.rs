@@ -1,4 +1,4 @@
-//! Images of a vehicle's labels: those that are here, and those that are asked for.
+//! The exemplars of a vehicle's labels that have arrived, and the requests for more.
 
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::Exemplar;
@@ -6,98 +6,96 @@ use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 
-/// Which image of a label is wanted.
+/// The kind of exemplar that the operator requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wish {
-    /// The best one that is not here.
+pub enum RequestKind {
+    /// The best one that has not arrived yet.
     Another,
-    /// One that is here with twice its edge: the one of this number, or the one that came last.
+    /// An exemplar that has arrived, with twice its edge: the one of this number, or the latest.
     Larger(Option<u8>),
 }
 
-/// How far a request is.
+/// The progress of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AskState {
-    /// Asked for; how far the request is, the directive's slot knows.
-    Asked,
-    /// The vehicle has no such image yet, and sends it when it has.
+pub enum RequestState {
+    /// The request was ordered. Its order status is that of the directive's slot.
+    Ordered,
+    /// The vehicle has no such exemplar yet and sends it later.
     NoneYet,
-    /// Bytes held of bytes in all.
-    Coming(usize, usize),
-    /// The vehicle refused the request.
+    /// Bytes received, of bytes in all.
+    Arriving(usize, usize),
     Refused,
 }
 
-/// A request that is not met.
+/// A request that has no exemplar yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Asked {
-    /// What the vehicle is asked.
+pub struct OpenRequest {
+    /// The request as it is sent.
     pub request: ExemplarRequest,
-    pub state: AskState,
+    pub state: RequestState,
     pub changed: Instant,
 }
 
-/// An image that is here.
+/// An exemplar that has arrived.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture {
-    /// Its number among those of the label.
+pub struct StoredExemplar {
+    /// The number by which the vehicle knows it among those of the label.
     pub number: u8,
-    /// Its size: an edge of 64 << `size` pixels.
+    /// The size class: an edge of 64 << `size` pixels.
     pub size: u8,
     pub webp: Vec<u8>,
-    /// Bytes of it that came over the water.
+    /// Bytes that the link carried for it.
     pub sent_bytes: usize,
-    pub came: Instant,
-    /// Whether somebody had asked for it.
-    pub asked: bool,
+    pub received: Instant,
+    pub requested: bool,
 }
 
-/// What there is of a label.
+/// The exemplars of a label.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Page {
-    /// Images, the last one last.
-    pub pictures: Vec<Picture>,
-    /// The request that is not met, if there is one.
-    pub asked: Option<Asked>,
+pub struct LabelExemplars {
+    /// In the order of arrival.
+    pub stored: Vec<StoredExemplar>,
+    /// The open request, if there is one.
+    pub request: Option<OpenRequest>,
     serial: u8,
 }
 
-/// The images of a vehicle's labels in one epoch.
+/// The exemplars of a vehicle's labels in one epoch.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ExemplarCache {
-    pages: BTreeMap<u8, Page>,
+    labels: BTreeMap<u8, LabelExemplars>,
 }
 
 impl ExemplarCache {
-    /// Requests at a time: as many as a vehicle takes.
-    const MAX_ASKED: usize = 8;
-    /// Images that are kept of a label.
+    /// Maximum number of open requests; a vehicle takes no more.
+    const MAX_REQUESTS: usize = 8;
+    /// Maximum number of exemplars of a label.
     const MAX_OF_LABEL: usize = 8;
-    /// Bytes that are kept; the oldest images go.
+    /// Maximum number of bytes. Beyond it the oldest exemplar is dropped.
     const MAX_BYTES: usize = 1 << 20;
-    /// The largest size that is asked for.
+    /// The largest size class that can be requested.
     pub const MAX_SIZE: u8 = 1;
 
-    /// What there is of a label.
-    pub fn page(&self, label: u8) -> Option<&Page> {
-        self.pages.get(&label)
+    /// The exemplars of a label and its request.
+    pub fn label(&self, label: u8) -> Option<&LabelExemplars> {
+        self.labels.get(&label)
     }
 
-    /// Labels that were asked for or shown.
-    pub fn pages(&self) -> impl Iterator<Item = (u8, &Page)> {
-        self.pages.iter().map(|(&label, page)| (label, page))
+    /// Labels that have an exemplar or a request.
+    pub fn labels(&self) -> impl Iterator<Item = (u8, &LabelExemplars)> {
+        self.labels.iter().map(|(&label, entry)| (label, entry))
     }
 
-    /// Asks for an image of a label in place of what was asked of it before. The error is one line for the operator.
-    pub fn ask(&mut self, label: u8, wish: Wish, now: Instant) -> Result<(), String> {
-        let others = self.pages.iter().filter(|(l, p)| **l != label && p.is_open()).count();
-        if others >= Self::MAX_ASKED {
+    /// Requests an exemplar of a label. It replaces the label's open request. The error is one line for the operator.
+    pub fn request(&mut self, label: u8, kind: RequestKind, now: Instant) -> Result<(), String> {
+        let others = self.labels.iter().filter(|(l, p)| **l != label && p.is_open()).count();
+        if others >= Self::MAX_REQUESTS {
             return Err(format!("{others} images are on their way: wait for one, or cancel one"));
         }
         let mut request = ExemplarRequest { label, ..ExemplarRequest::default() };
-        let page = self.pages.get(&label);
-        if let Wish::Larger(number) = wish {
-            let picture = page.and_then(|p| p.picture(number)).ok_or_else(|| match number {
+        let entry = self.labels.get(&label);
+        if let RequestKind::Larger(number) = kind {
+            let picture = entry.and_then(|p| p.exemplar(number)).ok_or_else(|| match number {
                 Some(number) => format!("picture {number} of label {label} is not here"),
                 None => format!("no image of label {label} is here yet: ask for one first"),
             })?;
@@ -110,86 +108,89 @@ impl ExemplarCache {
             }
             (request.picture, request.size) = (picture.number, picture.size + 1);
         }
-        let page = self.pages.entry(label).or_default();
-        page.serial = page.serial % u8::MAX + 1;
-        request.serial = page.serial;
-        page.asked = Some(Asked { request, state: AskState::Asked, changed: now });
+        let entry = self.labels.entry(label).or_default();
+        entry.serial = entry.serial % u8::MAX + 1;
+        request.serial = entry.serial;
+        entry.request = Some(OpenRequest { request, state: RequestState::Ordered, changed: now });
         Ok(())
     }
 
-    /// Nobody wants what was asked of a label any more. The error is one line for the operator.
+    /// Withdraws the request of a label. The error is one line for the operator.
     pub fn cancel(&mut self, label: u8) -> Result<(), String> {
-        let asked = self.pages.get_mut(&label).and_then(|page| page.asked.take());
+        let asked = self.labels.get_mut(&label).and_then(|entry| entry.request.take());
         asked.map(drop).ok_or_else(|| format!("no image of label {label} is asked for"))
     }
 
-    /// Requests that are not met yet.
+    /// The open requests, as they are sent.
     pub fn wanted(&self, epoch: u8) -> ExemplarRequests {
-        let open = self.pages.values().filter(|page| page.is_open());
-        ExemplarRequests { epoch, wanted: open.filter_map(|page| Some(page.asked?.request)).collect() }
+        let open = self.labels.values().filter(|entry| entry.is_open());
+        ExemplarRequests { epoch, wanted: open.filter_map(|entry| Some(entry.request?.request)).collect() }
     }
 
-    /// The vehicle refused what is asked for.
+    /// The vehicle has refused the requests.
     pub fn handle_refusal(&mut self, now: Instant) {
-        let asked = self.pages.values_mut().filter_map(|page| page.asked.as_mut());
-        asked.filter(|a| a.state == AskState::Asked).for_each(|a| (a.state, a.changed) = (AskState::Refused, now));
+        let asked = self.labels.values_mut().filter_map(|entry| entry.request.as_mut());
+        asked
+            .filter(|a| a.state == RequestState::Ordered)
+            .for_each(|a| (a.state, a.changed) = (RequestState::Refused, now));
     }
 
-    /// Part of an image came in; `head` are its first bytes.
+    /// Part of an exemplar came in. `head` are its first bytes.
     pub fn handle_progress(&mut self, head: [u8; 4], (held, total): (usize, usize), now: Instant) {
         let [_, label, serial, _] = head;
-        let asked = self.pages.get_mut(&label).and_then(|page| page.asked.as_mut());
+        let asked = self.labels.get_mut(&label).and_then(|entry| entry.request.as_mut());
         if let Some(asked) = asked.filter(|a| a.request.serial == serial) {
-            (asked.state, asked.changed) = (AskState::Coming(held, total), now);
+            (asked.state, asked.changed) = (RequestState::Arriving(held, total), now);
         }
     }
 
-    /// An image is complete; says whether there is something new to show.
+    /// Takes a complete object. Returns whether the operator has something new to see.
     pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
-        let is_meant = |asked: &Asked| asked.request.serial == exemplar.serial;
-        let page = self.pages.entry(exemplar.label).or_default();
-        let asked = page.asked.is_some_and(|a| is_meant(&a));
+        let is_meant = |asked: &OpenRequest| asked.request.serial == exemplar.serial;
+        let entry = self.labels.entry(exemplar.label).or_default();
+        let asked = entry.request.is_some_and(|a| is_meant(&a));
         let Some(webp) = exemplar.webp() else {
             let none_yet = asked && exemplar.bytes.is_empty();
-            if let Some(open) = page.asked.as_mut().filter(|_| none_yet) {
-                (open.state, open.changed) = (AskState::NoneYet, now);
+            if let Some(open) = entry.request.as_mut().filter(|_| none_yet) {
+                (open.state, open.changed) = (RequestState::NoneYet, now);
             }
             return none_yet;
         };
-        page.asked = page.asked.filter(|_| !asked);
+        entry.request = entry.request.filter(|_| !asked);
         let Exemplar { picture: number, size, .. } = *exemplar;
         let sent_bytes = exemplar.encode().len();
-        page.pictures.retain(|p| p.number != number);
-        page.pictures.push(Picture { number, size, webp, sent_bytes, came: now, asked });
-        if page.pictures.len() > Self::MAX_OF_LABEL {
-            page.pictures.remove(0);
+        entry.stored.retain(|p| p.number != number);
+        entry.stored.push(StoredExemplar { number, size, webp, sent_bytes, received: now, requested: asked });
+        if entry.stored.len() > Self::MAX_OF_LABEL {
+            entry.stored.remove(0);
         }
         self.make_room();
         true
     }
 
     fn make_room(&mut self) {
-        let bytes =
-            |pages: &BTreeMap<u8, Page>| pages.values().flat_map(|p| &p.pictures).map(|p| p.webp.len()).sum::<usize>();
-        while bytes(&self.pages) > Self::MAX_BYTES {
-            let with_some = self.pages.values_mut().filter(|page| !page.pictures.is_empty());
-            let Some(page) = with_some.min_by_key(|page| page.pictures.first().map(|p| p.came)) else { return };
-            page.pictures.remove(0);
+        let bytes = |labels: &BTreeMap<u8, LabelExemplars>| {
+            labels.values().flat_map(|p| &p.stored).map(|p| p.webp.len()).sum::<usize>()
+        };
+        while bytes(&self.labels) > Self::MAX_BYTES {
+            let with_some = self.labels.values_mut().filter(|entry| !entry.stored.is_empty());
+            let Some(entry) = with_some.min_by_key(|entry| entry.stored.first().map(|p| p.received)) else { return };
+            entry.stored.remove(0);
         }
     }
 }
 
-impl Page {
-    /// The picture of a number, or the one that came last.
-    pub fn picture(&self, number: Option<u8>) -> Option<&Picture> {
+impl LabelExemplars {
+    /// The exemplar of a number, or the latest one.
+    pub fn exemplar(&self, number: Option<u8>) -> Option<&StoredExemplar> {
         match number {
-            Some(number) => self.pictures.iter().find(|p| p.number == number),
-            None => self.pictures.last(),
+            Some(number) => self.stored.iter().find(|p| p.number == number),
+            None => self.stored.last(),
         }
     }
 
     fn is_open(&self) -> bool {
-        self.asked.is_some_and(|a| a.state != AskState::Refused)
+        self.request.is_some_and(|a| a.state != RequestState::Refused)
     }
 }
 
@@ -207,53 +208,56 @@ mod tests {
     fn a_request_takes_its_own_reply_and_a_larger_image_replaces() {
         let mut cache = ExemplarCache::default();
         assert_eq!(
-            cache.ask(5, Wish::Larger(None), NOW).unwrap_err(),
+            cache.request(5, RequestKind::Larger(None), NOW).unwrap_err(),
             "no image of label 5 is here yet: ask for one first"
         );
-        cache.ask(5, Wish::Another, NOW).unwrap();
+        cache.request(5, RequestKind::Another, NOW).unwrap();
         assert_eq!(
             cache.wanted(3),
             ExemplarRequests { epoch: 3, wanted: vec![ExemplarRequest { label: 5, serial: 1, size: 0, picture: 0 }] }
         );
         cache.handle_progress([3, 5, 1, 0x09], (60, 500), NOW);
-        assert_eq!(cache.page(5).unwrap().asked.unwrap().state, AskState::Coming(60, 500));
+        assert_eq!(cache.label(5).unwrap().request.unwrap().state, RequestState::Arriving(60, 500));
         assert!(cache.handle_exemplar(&come(5, 1, 0, 9), NOW));
         assert!(cache.wanted(3).wanted.is_empty());
-        cache.ask(5, Wish::Larger(None), NOW).unwrap();
+        cache.request(5, RequestKind::Larger(None), NOW).unwrap();
         assert_eq!(cache.wanted(3).wanted, [ExemplarRequest { label: 5, serial: 2, size: 1, picture: 9 }]);
         assert!(cache.handle_exemplar(&come(5, 2, 1, 9), NOW));
-        let sizes: Vec<(u8, u8)> = cache.page(5).unwrap().pictures.iter().map(|p| (p.number, p.size)).collect();
+        let sizes: Vec<(u8, u8)> = cache.label(5).unwrap().stored.iter().map(|p| (p.number, p.size)).collect();
         assert_eq!(sizes, [(9, 1)]);
-        let said = cache.ask(5, Wish::Larger(Some(9)), NOW).unwrap_err();
+        let said = cache.request(5, RequestKind::Larger(Some(9)), NOW).unwrap_err();
         assert_eq!(said, "picture 9 of label 5 is as large as they come: 128 pixels");
-        assert_eq!(cache.ask(5, Wish::Larger(Some(4)), NOW).unwrap_err(), "picture 4 of label 5 is not here");
+        assert_eq!(
+            cache.request(5, RequestKind::Larger(Some(4)), NOW).unwrap_err(),
+            "picture 4 of label 5 is not here"
+        );
     }
 
     #[test]
     fn cancelled_and_refused_requests_end_and_images_stay() {
         let mut cache = ExemplarCache::default();
         assert!(cache.handle_exemplar(&come(5, 0, 0, 9), NOW), "nobody had to ask");
-        assert!(!cache.page(5).unwrap().pictures[0].asked);
-        cache.ask(5, Wish::Another, NOW).unwrap();
+        assert!(!cache.label(5).unwrap().stored[0].requested);
+        cache.request(5, RequestKind::Another, NOW).unwrap();
         cache.cancel(5).unwrap();
-        assert!(cache.wanted(0).wanted.is_empty() && cache.page(5).unwrap().pictures.len() == 1);
+        assert!(cache.wanted(0).wanted.is_empty() && cache.label(5).unwrap().stored.len() == 1);
         assert_eq!(cache.cancel(5).unwrap_err(), "no image of label 5 is asked for");
         cache.handle_progress([0, 5, 1, 0], (1, 2), NOW);
-        assert_eq!(cache.page(5).unwrap().asked, None, "a late part of what was cancelled");
-        cache.ask(6, Wish::Another, NOW).unwrap();
+        assert_eq!(cache.label(5).unwrap().request, None, "a late part of what was cancelled");
+        cache.request(6, RequestKind::Another, NOW).unwrap();
         cache.handle_refusal(NOW);
         assert!(cache.wanted(0).wanted.is_empty());
-        cache.ask(6, Wish::Another, NOW).unwrap();
+        cache.request(6, RequestKind::Another, NOW).unwrap();
         assert_eq!(cache.wanted(0).wanted[0].serial, 2);
     }
 
     #[test]
-    fn a_vehicle_that_has_no_image_says_so_and_is_still_asked() {
+    fn a_request_without_an_image_stays_open() {
         let mut cache = ExemplarCache::default();
-        cache.ask(5, Wish::Another, NOW).unwrap();
+        cache.request(5, RequestKind::Another, NOW).unwrap();
         let none = Exemplar { bytes: Vec::new(), ..come(5, 1, 0, 0) };
         assert!(cache.handle_exemplar(&none, NOW));
-        assert_eq!(cache.page(5).unwrap().asked.unwrap().state, AskState::NoneYet);
+        assert_eq!(cache.label(5).unwrap().request.unwrap().state, RequestState::NoneYet);
         assert_eq!(cache.wanted(0).wanted.len(), 1);
         assert!(!cache.handle_exemplar(&Exemplar { serial: 7, ..none }, NOW), "an answer to what was not asked");
     }
@@ -261,9 +265,9 @@ mod tests {
     #[test]
     fn requests_and_images_are_bounded() {
         let mut cache = ExemplarCache::default();
-        (1..=8).for_each(|label| cache.ask(label, Wish::Another, NOW).unwrap());
-        assert!(cache.ask(9, Wish::Another, NOW).unwrap_err().contains("8 images are on their way"));
-        cache.ask(8, Wish::Another, NOW).unwrap();
+        (1..=8).for_each(|label| cache.request(label, RequestKind::Another, NOW).unwrap());
+        assert!(cache.request(9, RequestKind::Another, NOW).unwrap_err().contains("8 images are on their way"));
+        cache.request(8, RequestKind::Another, NOW).unwrap();
         let large = |label, picture| Exemplar {
             bytes: [vec![0x10, 0, 0], vec![9; 16_000]].concat(),
             ..come(label, 0, 0, picture)
@@ -273,9 +277,9 @@ mod tests {
                 cache.handle_exemplar(&large(label, picture), Instant::from_secs_f64(f64::from(picture)));
             }
         }
-        let kept: Vec<&Picture> = cache.pages().flat_map(|(_, page)| &page.pictures).collect();
+        let kept: Vec<&StoredExemplar> = cache.labels().flat_map(|(_, entry)| &entry.stored).collect();
         assert!(kept.iter().map(|p| p.webp.len()).sum::<usize>() <= ExemplarCache::MAX_BYTES);
         assert!(kept.len() > 60 && kept.iter().all(|p| p.number > 15), "the newest are kept");
-        assert!(cache.pages().all(|(_, page)| page.pictures.len() <= ExemplarCache::MAX_OF_LABEL));
+        assert!(cache.labels().all(|(_, entry)| entry.stored.len() <= ExemplarCache::MAX_OF_LABEL));
     }
 }

@@ -1,4 +1,4 @@
-//! The surface: holds the operator's map of each vehicle, sends each its directive.
+//! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
 mod assemble;
 mod exemplar_cache;
@@ -11,7 +11,7 @@ mod surface;
 mod vehicle_record;
 
 pub use assemble::assemble;
-pub use exemplar_cache::{AskState, Asked, ExemplarCache, Page, Picture, Wish};
+pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use orders::{FenceOrder, LimitsOrder};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};

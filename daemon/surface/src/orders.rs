@@ -1,51 +1,51 @@
-//! What the operator types, as slots of the directive. Every refusal is one line that says what is allowed.
+//! Fences and limits as the operator types them. Every error is one line that names the allowed values.
 
 use scenecast_protocol::coordinates::{DecimetrePoint, WorldPoint};
 use scenecast_protocol::directive::{Band, Fence, Limits, Polygon, Reaction};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A fence as it is typed: vertices east and north of the origin, metres.
+/// A fence as it is typed: vertices in metres east and north of the origin.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FenceOrder {
     /// The vehicle stays inside; `None`: no fence.
     #[schemars(length(min = 3, max = 34))]
     pub fence: Option<Vec<[f64; 2]>>,
-    /// The vehicle stays outside of each.
+    /// The vehicle stays outside each of these outlines.
     #[serde(default)]
     #[schemars(length(max = 15), inner(length(min = 3, max = 34)))]
     pub keep_outs: Vec<Vec<[f64; 2]>>,
-    /// Where it returns to; `None`: where its run began.
+    /// The end of the return path; `None`: the start of the vehicle's run.
     pub return_point: Option<[f64; 2]>,
 }
 
-/// Limits as they are typed; what is left out is not limited, or as configured on the vehicle.
+/// Limits as they are typed. A value that is left out is not limited, or as configured on the vehicle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LimitsOrder {
-    /// Least and greatest depth, metres.
+    /// Minimum and maximum depth, metres.
     #[schemars(inner(range(min = 0.0, max = 6553.5)))]
     pub depth_m: Option<[f64; 2]>,
-    /// Least and greatest altitude, metres.
+    /// Minimum and maximum altitude, metres.
     #[schemars(inner(range(min = 0.0, max = 6553.5)))]
     pub altitude_m: Option<[f64; 2]>,
-    /// Metres of way, the way back included.
+    /// Maximum length of the path in metres, the return path included.
     #[schemars(range(min = 1, max = 16_777_215))]
     pub distance_m: Option<f64>,
-    /// Seconds, the way back included.
+    /// Maximum time in seconds, the return path included.
     #[schemars(range(min = 1, max = 16_777_215))]
     pub time_s: Option<f64>,
-    /// Seconds that the surface may be silent.
+    /// Allowed silence of the surface, seconds.
     #[schemars(range(min = 1, max = 65_535))]
     pub silence_s: Option<f64>,
-    /// What to do then.
+    /// The reaction to a longer silence.
     #[schemars(extend("enum" = ["hold", "return", "surface", null]))]
     pub on_silence: Option<String>,
-    /// What to do on a breach.
+    /// The reaction to a breach.
     #[schemars(extend("enum" = ["hold", "return", "surface", null]))]
     pub on_breach: Option<String>,
-    /// What to do on an abort.
+    /// The reaction to an abort.
     #[schemars(extend("enum" = ["hold", "return", "surface", null]))]
     pub on_abort: Option<String>,
 }
@@ -80,7 +80,7 @@ impl From<&Limits> for LimitsOrder {
 }
 
 impl FenceOrder {
-    /// The slot's content.
+    /// Converts the order into the content of the slot. The error is one line for the operator.
     pub fn read(&self) -> Result<Fence, String> {
         let fence = Fence {
             fence: self.fence.as_deref().map(|v| outline("fence", v)).transpose()?,
@@ -93,7 +93,7 @@ impl FenceOrder {
 }
 
 impl LimitsOrder {
-    /// The slot's content.
+    /// Converts the order into the content of the slot. The error is one line for the operator.
     pub fn read(&self) -> Result<Limits, String> {
         let limits = Limits {
             depth: self.depth_m.map(|b| band("depth_m", b)).transpose()?,
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_vehicle_could_obey_is_refused_where_it_is_typed() {
+    fn invalid_orders_are_refused_with_the_allowed_values() {
         let refused = |json: &str| fence(json).unwrap_err();
         assert_eq!(refused(r#"{"fence": [[0,0],[9,0]]}"#), "fence: 2 vertices: it takes 3 to 34");
         assert_eq!(refused(r#"{"fence": []}"#), "fence: 0 vertices: it takes 3 to 34");
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_is_what_is_sent() {
+    fn typed_orders_become_slots() {
         let sent =
             fence(r#"{"fence": [[0,0],[9.04,0],[9,9]], "keep_outs": [[[4,1],[5,1],[5,2]]], "return_point": [8,1]}"#);
         let sent = sent.unwrap();

@@ -1,32 +1,32 @@
-//! How long a vehicle is usually silent.
+//! The usual length of a vehicle's silence.
 
 use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
-/// The longest pause between two frames of a vehicle lately, whatever the frames of one turn do in between.
+/// The longest recent pause between two frames of a vehicle. Short pauses within a turn do not shorten it at once.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Pauses {
-    heard: Option<Instant>,
+    last_frame: Option<Instant>,
     longest: Option<Duration>,
 }
 
 impl Pauses {
-    /// A pause is forgotten in so many times its length.
+    /// A pause is forgotten after pauses that add up to this many times its length.
     const MEMORY: u32 = 8;
-    /// A pause up to this length is as usual as it is long.
+    /// A pause up to this length counts fully, even if it is far beyond the usual one.
     const SHORT: Duration = Duration::from_secs(60);
 
-    pub fn hear(&mut self, now: Instant) {
-        let Some(last) = self.heard.replace(now) else { return };
+    pub fn handle_frame(&mut self, now: Instant) {
+        let Some(last) = self.last_frame.replace(now) else { return };
         let pause = now.since(last);
         self.longest = Some(match self.longest {
-            // What is long and far beyond the usual was an outage, and makes the next one hardly more usual.
+            // A long pause far beyond the usual one was an outage. It at most doubles the expected pause.
             Some(longest) => pause.min(Self::SHORT.max(longest * 2)).max(longest.saturating_sub(pause / Self::MEMORY)),
             None => pause,
         });
     }
 
-    /// The pause to expect between two frames; `None` before the second one.
+    /// The expected pause between two frames; `None` before the second frame.
     pub fn expected(&self) -> Option<Duration> {
         self.longest
     }
@@ -36,13 +36,13 @@ impl Pauses {
 mod tests {
     use super::*;
 
-    /// Longest silence against what was expected then, after a while, over turns of `frames` frames and a pause.
+    /// The longest silence divided by the expected one, after ten turns of `frames` frames and a pause.
     fn worst(frames: u32, frame: Duration, pause: Duration) -> f64 {
         let (mut pauses, mut now, mut worst) = (Pauses::default(), Instant::ZERO, 0.0);
         for turn in 0..50 {
             for _ in 0..frames {
                 now = now + frame;
-                pauses.hear(now);
+                pauses.handle_frame(now);
             }
             let expected = pauses.expected().unwrap().as_secs_f64();
             if turn > 10 {
@@ -64,8 +64,8 @@ mod tests {
     #[test]
     fn an_outage_does_not_make_silence_usual() {
         let mut pauses = Pauses::default();
-        (1..=20).for_each(|i| pauses.hear(Instant::ZERO + Duration::from_secs(10) * i));
-        pauses.hear(Instant::ZERO + Duration::from_secs(4000));
+        (1..=20).for_each(|i| pauses.handle_frame(Instant::ZERO + Duration::from_secs(10) * i));
+        pauses.handle_frame(Instant::ZERO + Duration::from_secs(4000));
         assert_eq!(pauses.expected(), Some(Duration::from_secs(60)));
     }
 }

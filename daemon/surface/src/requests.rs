@@ -1,21 +1,27 @@
-//! Images of labels: what the surface asks its vehicles for.
+//! The surface requests exemplars of its vehicles.
 
-use super::exemplar_cache::{ExemplarCache, Wish};
+use super::exemplar_cache::{ExemplarCache, RequestKind};
 use super::{Surface, VehicleRecord};
 use scenecast_protocol::directive::{OrderStatus, Slot, SlotId, SlotProgress};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
 
 impl Surface {
-    /// Asks for an image of a label. The error is one line for the operator.
-    pub fn request_exemplar(&mut self, vehicle: Address, label: u8, wish: Wish, now: Instant) -> Result<u16, String> {
+    /// Requests an exemplar of a label. The error is one line for the operator.
+    pub fn request_exemplar(
+        &mut self,
+        vehicle: Address,
+        label: u8,
+        kind: RequestKind,
+        now: Instant,
+    ) -> Result<u16, String> {
         if !self.labels(vehicle).ok_or("no such vehicle")?.contains_key(&label) {
             return Err(format!("label {label} is not on the map"));
         }
-        self.change_requests(vehicle, |cache| cache.ask(label, wish, now), now)
+        self.change_requests(vehicle, |cache| cache.request(label, kind, now), now)
     }
 
-    /// Nobody wants the image of a label any more that was asked for.
+    /// Withdraws the request for an exemplar of a label. The error is one line for the operator.
     pub fn cancel_exemplar(&mut self, vehicle: Address, label: u8, now: Instant) -> Result<u16, String> {
         self.change_requests(vehicle, |cache| cache.cancel(label), now)
     }
@@ -34,16 +40,16 @@ impl Surface {
         Ok(version)
     }
 
-    /// A vehicle that has restarted does not know what it was asked.
-    pub(super) fn ask_again(&mut self, vehicle: Address, now: Instant) {
+    /// A restarted vehicle has lost the requests, so they are sent again.
+    pub(super) fn request_again(&mut self, vehicle: Address, now: Instant) {
         let wanted = self.records.get(&vehicle).map(VehicleRecord::wanted).filter(|r| !r.wanted.is_empty());
         if let Some(requests) = wanted {
-            // It was taken before.
+            // The same order was valid before.
             let _ = self.issue(vehicle, Slot::Requests(requests), now);
         }
     }
 
-    pub(super) fn handle_settled(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
+    pub(super) fn handle_decision(&mut self, vehicle: Address, slot: SlotId, now: Instant) {
         let refused = |s: &SlotProgress| s.id == slot && matches!(s.status, OrderStatus::Refused(_));
         let is_refused = self.link.vehicle(vehicle).is_some_and(|v| v.slots().any(refused));
         if let Some(record) = self.records.get_mut(&vehicle).filter(|_| slot == SlotId::Requests && is_refused) {

@@ -1,23 +1,23 @@
-//! The operator's settings of a vehicle: as they are typed, as they were asked for, as they are in force.
+//! The operator's settings of a vehicle: as typed, as ordered, and as in force.
 
 use scenecast_protocol::directive::{CellBand, Change, OrderStatus, PlannerKind, Settings, ShortDecimal};
 use scenecast_protocol::map::{LayerMask, LayerSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Settings as they are typed. What is left out or null stays as it is on the vehicle; 0, or an empty text, is as the
-/// vehicle is configured. Numbers have three significant digits.
+/// Settings as they are typed. A value that is left out or null stays as it is on the vehicle; 0 or an empty text is as
+/// configured there. Numbers have three significant digits.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SettingsOrder {
-    /// How it chooses its way: lawnmower, greedy, horizon.
+    /// The planner: lawnmower, greedy or horizon.
     pub planner: Option<String>,
-    /// Which cells of its map it tells: fine, every one; coarse, every fourth in both directions; coarse-to-fine, those
-    /// first where there is much to say. The cells of its model stay.
+    /// The cells of the map that are sent: fine (all), coarse (every fourth in both directions), or coarse-to-fine (the
+    /// coarse ones first where the backlog is large). The scene model keeps all cells.
     pub cells: Option<String>,
-    /// The layers that it sends in addition to the labels: none, or names of layers in any order, separated by commas.
+    /// The layers that are sent in addition to the labels: none, or names of layers in any order, separated by commas.
     pub layers: Option<String>,
-    /// Preference for labels that are used elsewhere, 1e-9 to 1e3.
+    /// Preference for labels that are common elsewhere in the map, 1e-9 to 1e3.
     pub alpha: Option<f64>,
     /// Prior weight of each word in a label, 1e-9 to 1e3.
     pub beta: Option<f64>,
@@ -25,11 +25,11 @@ pub struct SettingsOrder {
     pub gamma: Option<f64>,
     /// Words resampled a second of mission time, 1 to 1e8.
     pub refine_words_per_s: Option<f64>,
-    /// Camera frames a second that the scene model sees at most, 0.01 to 30.
+    /// Maximum number of camera frames a second that are mapped, 0.01 to 30.
     pub frames_per_s: Option<f64>,
 }
 
-/// The layers of these names, with commas between; `None` if one is unknown or named twice.
+/// The layers of these names, separated by commas; `None` if one is unknown or named twice.
 fn layer_mask(names: &str, layers: &LayerSet) -> Option<LayerMask> {
     let names: Vec<&str> = if names == "none" { Vec::new() } else { names.split(',').map(str::trim).collect() };
     layers.mask(names.iter().copied()).ok().filter(|mask| mask.iter().count() == names.len())
@@ -41,7 +41,7 @@ fn layer_names(mask: LayerMask, layers: &LayerSet) -> String {
 }
 
 impl SettingsOrder {
-    /// The slot's content.
+    /// Converts the order into the content of the slot. The error is one line for the operator.
     pub fn read(&self, layers: &LayerSet) -> Result<Settings, String> {
         let names: Vec<&str> = layers.iter().map(|(_, layer)| &*layer.name).collect();
         let mut settings = Settings {
@@ -91,21 +91,21 @@ fn choice<T>(
 }
 
 impl SettingsOrder {
-    /// Settings as they would be typed, with the names of these layers.
+    /// Settings as a person would type them, with the names of these layers.
     pub fn of(settings: &Settings, layers: &LayerSet) -> Self {
-        fn told<T, U>(change: Change<T>, configured: U, tell: impl FnOnce(T) -> U) -> Option<U> {
+        fn typed<T, U>(change: Change<T>, configured: U, format: impl FnOnce(T) -> U) -> Option<U> {
             match change {
                 Change::Keep => None,
                 Change::Configured => Some(configured),
-                Change::To(value) => Some(tell(value)),
+                Change::To(value) => Some(format(value)),
             }
         }
         let text = |name: &str| name.to_owned();
-        let figure = |change| told(change, 0.0, ShortDecimal::value);
+        let figure = |change| typed(change, 0.0, ShortDecimal::value);
         Self {
-            planner: told(settings.planner, String::new(), |p| text(p.name())),
-            cells: told(settings.cells, String::new(), |c| text(c.name())),
-            layers: told(settings.layers, String::new(), |mask| layer_names(mask, layers)),
+            planner: typed(settings.planner, String::new(), |p| text(p.name())),
+            cells: typed(settings.cells, String::new(), |c| text(c.name())),
+            layers: typed(settings.layers, String::new(), |mask| layer_names(mask, layers)),
             alpha: figure(settings.alpha),
             beta: figure(settings.beta),
             gamma: figure(settings.gamma),
@@ -115,43 +115,43 @@ impl SettingsOrder {
     }
 }
 
-/// The operator's papers about the settings of a vehicle. Each order that goes out holds all that this surface has asked for,
-/// so a newer one may take the place of one that the vehicle never heard.
+/// The ordered settings of a vehicle. Each order contains everything that this surface has ordered, so that a newer one
+/// can replace one that the vehicle never received.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SettingsRecord {
-    asked: Settings,
+    requested: Settings,
     in_force: Settings,
-    /// An order was superseded of which nobody knows whether the vehicle follows it.
+    /// An order was replaced before its fate was known.
     is_unsure: bool,
 }
 
 impl SettingsRecord {
-    /// All that this surface has asked for.
-    pub fn asked(&self) -> &Settings {
-        &self.asked
+    /// Everything that this surface has ordered.
+    pub fn requested(&self) -> &Settings {
+        &self.requested
     }
 
-    /// What the vehicle has said to follow, as far as this surface has ordered it; none while that is not known.
+    /// The settings that the vehicle has applied, as far as this surface ordered them; `None` while that is unknown.
     pub fn in_force(&self) -> Option<&Settings> {
         (!self.is_unsure).then_some(&self.in_force)
     }
 
-    /// What is to go out for an order: what was asked for before it included, but for what the vehicle has refused.
+    /// The complete settings to send for an order: the earlier orders, unless they were refused, and the new one.
     pub(super) fn next_order(&self, order: &Settings, last: Option<OrderStatus>) -> Settings {
-        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.asked };
+        let base = if matches!(last, Some(OrderStatus::Refused(_))) { &self.in_force } else { &self.requested };
         base.then(order)
     }
 
-    /// That has gone out, after an order that had come as far as `last`.
+    /// The settings were sent. `last` is the status of the order that they replace.
     pub(super) fn handle_sent(&mut self, settings: Settings, last: Option<OrderStatus>) {
         self.is_unsure |= matches!(last, Some(OrderStatus::OnAir | OrderStatus::Received));
-        self.asked = settings;
+        self.requested = settings;
     }
 
     /// The vehicle has decided about the last order.
-    pub(super) fn handle_settled(&mut self, life: OrderStatus) {
-        if life == OrderStatus::Applied {
-            (self.in_force, self.is_unsure) = (self.asked, false);
+    pub(super) fn handle_decision(&mut self, status: OrderStatus) {
+        if status == OrderStatus::Applied {
+            (self.in_force, self.is_unsure) = (self.requested, false);
         }
     }
 }
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_vehicle_could_obey_is_refused_where_it_is_typed() {
+    fn invalid_settings_are_refused_with_the_allowed_values() {
         let refused = |json: &str| read(json).unwrap_err();
         assert_eq!(refused(r#"{"alpha": 5000}"#), "alpha 5000: it takes 0.000000001 to 1000, or 0 as configured");
         assert_eq!(refused(r#"{"gamma": -1}"#), "gamma -1: it takes 0.000000000001 to 1000, or 0 as configured");
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_is_told_as_it_was_typed() {
+    fn an_order_is_shown_as_it_was_typed() {
         let typed = r#"{"planner":"","cells":"coarse","layers":"depth","alpha":0.05,"gamma":0.0,"frames_per_s":0.2}"#;
         let order: SettingsOrder = serde_json::from_str(typed).unwrap();
         assert_eq!(SettingsOrder::of(&order.read(&LayerSet::default()).unwrap(), &LayerSet::default()), order);
@@ -205,19 +205,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_allowed_is_what_the_configuration_allows() {
+    fn allowed_ranges_are_those_of_the_configuration() {
         use scenecast_config::Key;
         let keys = ["scene.alpha", "scene.beta", "scene.gamma", "scene.refine_words_per_s", "camera.rate_hz"];
         for (name, (_, _, range)) in keys.into_iter().zip(Settings::default().numbers()) {
             let key = Key::find(name).unwrap();
-            // 0 words a second is a configuration's way to have no refinement.
+            // A configuration can set 0 words a second, for no refinement.
             let low = if name == "scene.refine_words_per_s" { 0.0 } else { *range.start() };
             assert_eq!(key.rule.range, (low, *range.end()), "{name}");
         }
     }
 
     #[test]
-    fn what_is_in_force_is_what_the_vehicle_said_last() {
+    fn settings_in_force_are_those_that_the_vehicle_applied() {
         let order = |json: &str| read(json).unwrap();
         let mut record = SettingsRecord::default();
         let send = |record: &mut SettingsRecord, json: &str, last| {
@@ -227,7 +227,7 @@ mod tests {
         send(&mut record, r#"{"alpha": 0.5}"#, None);
         assert_eq!(record.in_force(), Some(&Settings::default()));
         send(&mut record, r#"{"gamma": 0.1}"#, Some(OrderStatus::Queued));
-        record.handle_settled(OrderStatus::Applied);
+        record.handle_decision(OrderStatus::Applied);
         assert_eq!(
             record.in_force(),
             Some(&order(r#"{"alpha": 0.5, "gamma": 0.1}"#)),
@@ -237,10 +237,14 @@ mod tests {
         send(&mut record, r#"{"beta": 1}"#, Some(OrderStatus::Received));
         assert_eq!(record.in_force(), None, "the vehicle may follow the layers already");
         let refused = OrderStatus::Refused(RefusalReason::OutOfRange);
-        record.handle_settled(refused);
+        record.handle_decision(refused);
         send(&mut record, r#"{"alpha": 0}"#, Some(refused));
-        assert_eq!(record.asked(), &order(r#"{"alpha": 0, "gamma": 0.1}"#), "what was refused is not asked for again");
-        record.handle_settled(OrderStatus::Applied);
-        assert_eq!(record.in_force(), Some(record.asked()));
+        assert_eq!(
+            record.requested(),
+            &order(r#"{"alpha": 0, "gamma": 0.1}"#),
+            "what was refused is not asked for again"
+        );
+        record.handle_decision(OrderStatus::Applied);
+        assert_eq!(record.in_force(), Some(record.requested()));
     }
 }

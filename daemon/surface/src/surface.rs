@@ -1,4 +1,4 @@
-//! The surface's role: link and operator in one sans-IO whole.
+//! The surface's role: the link and the operator's data in one state machine without IO.
 
 use super::orders::{FenceOrder, LimitsOrder};
 use super::position::{Relay, UsblSighting};
@@ -16,18 +16,18 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement};
 use std::collections::{BTreeMap, VecDeque};
 
-/// What the surface tells its host.
+/// News of the surface for its host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SurfaceOutput {
     /// The operator's map of a vehicle has changed.
     MapChanged(Address),
-    /// A vehicle answered that nobody had known of.
+    /// A vehicle has answered a discovery call for the first time.
     VehicleFound(Address),
-    /// An image of a label is here.
+    /// An exemplar of a label has arrived.
     ExemplarHere(Address, u8),
-    /// A slot is in force or was refused.
+    /// A slot was applied or refused.
     SlotDecided(Address, SlotId),
-    /// Anything else that the operator's page shows.
+    /// Any other fact on the operator's page has changed.
     Changed(Address),
 }
 
@@ -36,26 +36,26 @@ pub struct Surface {
     pub(super) records: BTreeMap<Address, VehicleRecord>,
     outputs: VecDeque<SurfaceOutput>,
     background: BackgroundOrder,
-    /// Where the surface is and where it sees the vehicles, if it has a GPS.
+    /// The localisation relay, if the surface has a GPS.
     relay: Option<Relay>,
     tuning: TuningTable,
 }
 
 impl Surface {
-    /// A surface that speaks with these vehicles, by address and name.
+    /// A surface for these vehicles, by address and name.
     pub fn new(link: SurfaceLink, vehicles: impl IntoIterator<Item = (Address, String)>) -> Self {
         let records = vehicles.into_iter().map(|(address, name)| (address, VehicleRecord::new(name))).collect();
         let (tuning, background) = (TuningTable::default(), BackgroundOrder::default());
         Self { link, records, outputs: VecDeque::new(), background, relay: None, tuning }
     }
 
-    /// Knows what settings of the scene model reach.
+    /// Sets the tuning table, which predicts the bit rate of settings of the scene model.
     #[must_use]
     pub fn with_tuning_table(self, tuning: TuningTable) -> Self {
         Self { tuning, ..self }
     }
 
-    /// Name for people of a vehicle that has none.
+    /// The name of a vehicle that the configuration does not name.
     pub fn name_of(vehicle: Address) -> String {
         format!("vehicle {}", vehicle.number())
     }
@@ -64,54 +64,51 @@ impl Surface {
         self.records.iter().map(|(&a, d)| (a, d))
     }
 
-    /// The operator's papers about a vehicle.
     pub fn record(&self, vehicle: Address) -> Option<&VehicleRecord> {
         self.records.get(&vehicle)
     }
 
-    /// The link's view of a vehicle.
     pub fn view(&self, vehicle: Address) -> Option<PeerView<'_>> {
         self.link.vehicle(vehicle)
     }
 
-    /// The operator's map of a vehicle.
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
         let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
     }
 
-    /// Counts up whenever the operator's map of a vehicle or a layer of it changes.
+    /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
     pub fn map_version(&self, vehicle: Address) -> u64 {
         let wholes = self.records.get(&vehicle).map_or(0, |d| d.wholes);
         wholes + self.link.vehicle(vehicle).map_or(0, |v| v.map_version())
     }
 
-    /// Bits a second that the surface may use.
+    /// The budget of the surface, bit/s.
     pub fn budget_bps(&self) -> u32 {
         self.link.budget_bps()
     }
 
-    /// Least shares of the classes in what the surface sends.
+    /// The least shares of the classes in the surface's own frames.
     pub fn shares(&self) -> Shares {
         self.link.shares()
     }
 
-    /// Frames that no known vehicle has sent, or that could not be read.
-    pub fn strangers(&self) -> u64 {
+    /// Frames of unknown vehicles, and frames that could not be read.
+    pub fn unknown_senders(&self) -> u64 {
         self.link.unknown_senders()
     }
 
-    /// An earlier run may have sent until `now`: the budget counts as spent.
+    /// Counts the whole budget window as spent, because an earlier run may have transmitted until `now`.
     pub fn assume_budget_spent(&mut self, now: Instant) {
         self.link.assume_budget_spent(now);
     }
 
-    /// The next thing to tell the host.
     pub fn poll_output(&mut self) -> Option<SurfaceOutput> {
         self.outputs.pop_front()
     }
 
-    /// Sends weights (-1..=1) of labels, of unseen cells and of perplexity. The error is one line for the operator.
+    /// Sends weights of labels, of unexplored cells and of curiosity, each from -1 to 1. The error is
+    /// one line for the operator.
     pub fn set_utility(
         &mut self,
         vehicle: Address,
@@ -144,17 +141,17 @@ impl Surface {
         self.issue(vehicle, Slot::Utility(utility), now)
     }
 
-    /// Tells a vehicle to stay, or to go on.
+    /// Orders a vehicle to hold, or to continue.
     pub fn set_hold(&mut self, vehicle: Address, hold: bool, now: Instant) -> Result<u16, String> {
         self.set_order(vehicle, Constraints { hold, abort: false }, now)
     }
 
-    /// Tells a vehicle to stay, to abort, or to go on.
+    /// Orders a vehicle to hold, to abort, or to continue.
     pub fn set_order(&mut self, vehicle: Address, order: Constraints, now: Instant) -> Result<u16, String> {
         self.issue(vehicle, Slot::Constraints(order), now)
     }
 
-    /// Sends a fence, keep-outs and a return point in place of the last ones.
+    /// Sends a fence with keep-outs and return point. They replace the last ones.
     pub fn set_fence(&mut self, vehicle: Address, order: &FenceOrder, now: Instant) -> Result<u16, String> {
         let fence = order.read()?;
         let version = self.issue(vehicle, Slot::Fence(fence.clone()), now)?;
@@ -162,7 +159,7 @@ impl Surface {
         Ok(version)
     }
 
-    /// Sends limits in place of the last ones.
+    /// Sends limits. They replace the last ones.
     pub fn set_limits(&mut self, vehicle: Address, order: &LimitsOrder, now: Instant) -> Result<u16, String> {
         let limits = order.read()?;
         let version = self.issue(vehicle, Slot::Limits(limits), now)?;
@@ -170,25 +167,27 @@ impl Surface {
         Ok(version)
     }
 
-    /// Changes settings of a vehicle; what the order does not name stays as it is there.
+    /// Changes settings of a vehicle. Those that the order does not name stay as they are there.
     pub fn set_settings(&mut self, vehicle: Address, order: &SettingsOrder, now: Instant) -> Result<u16, String> {
         let view = self.link.vehicle(vehicle).ok_or("no such vehicle")?;
         let order = order.read(view.layers())?;
-        let last = self.life_of(vehicle, SlotId::Settings);
+        let last = self.order_status(vehicle, SlotId::Settings);
         let settings = self.records.get(&vehicle).ok_or("no such vehicle")?.settings.next_order(&order, last);
         let version = self.issue(vehicle, Slot::Settings(settings), now)?;
         self.records.get_mut(&vehicle).ok_or("no such vehicle")?.settings.handle_sent(settings, last);
         Ok(version)
     }
 
-    /// Bits a second that are the map's of a vehicle's budget: its share of what the vehicle has said, or of ours before.
+    /// The share of the map in the budget of a vehicle, bit/s. Without a report of the vehicle, the budget
+    /// is that of the surface.
     pub fn map_bits_per_s(&self, vehicle: Address) -> f64 {
         let [_, _, _, map, _] = self.link.shares().0;
         let said = self.link.vehicle(vehicle).and_then(|v| v.status().map(|(status, _)| status.budget_bps));
         f64::from(said.unwrap_or(self.link.budget_bps())) * f64::from(map) / 100.0
     }
 
-    /// The settings of the scene model that tell most of those whose stream takes at most `bits_per_s`.
+    /// The most detailed settings of the scene model whose map needs at most `bits_per_s`,
+    /// for cells of `cell_m` metres.
     pub fn fit(&self, cell_m: f64, bits_per_s: f64) -> Result<Fit, NoRow> {
         self.tuning.fit(cell_m, bits_per_s)
     }
@@ -205,23 +204,23 @@ impl Surface {
         all
     }
 
-    /// How far the last order of a slot has come.
-    fn life_of(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
+    /// The order status of a slot.
+    fn order_status(&self, vehicle: Address, slot: SlotId) -> Option<OrderStatus> {
         self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot).map(|s| s.status)
     }
 
-    /// The order of the background streams of the vehicles, as it was configured or sent last.
+    /// The order of the background streams of the vehicles, as configured or as last sent.
     pub fn background(&self) -> BackgroundOrder {
         self.background
     }
 
-    /// The order of the background streams in the next budget, unless that gives another.
+    /// Sets the order of the background streams for the next budget that does not have its own.
     pub fn set_background(&mut self, background: BackgroundOrder) {
         self.background = background;
     }
 
-    /// Changes the bit budget of the surface and of every vehicle, and if they are given the least shares of the classes and
-    /// the order of the background streams.
+    /// Changes the budget of the surface and of every vehicle, and with it the least shares of the classes and the
+    /// order of the background streams, if they are given.
     pub fn set_budget(
         &mut self,
         bits_per_s: u32,
@@ -255,12 +254,12 @@ impl Surface {
         self.relay = Some(relay);
     }
 
-    /// Where the surface is and where it sees the vehicles, if it has a GPS.
+    /// The localisation relay, if the surface has a GPS.
     pub fn relay(&self) -> Option<&Relay> {
         self.relay.as_ref()
     }
 
-    /// The connection to the GPS was opened: what to say to it.
+    /// The connection to the GPS was opened. Returns the bytes to send to the receiver.
     pub fn handle_gps_open(&mut self) -> &'static [u8] {
         self.relay.as_mut().map_or(b"", |relay| relay.handle_gps_open())
     }
@@ -269,21 +268,21 @@ impl Surface {
         self.relay.iter_mut().for_each(|relay| relay.handle_gps(bytes, now));
     }
 
-    /// Bytes of a compass of its own.
+    /// Takes bytes of a separate compass.
     pub fn handle_compass(&mut self, bytes: &[u8], now: Instant) {
         self.relay.iter_mut().for_each(|relay| relay.handle_compass(bytes, now));
     }
 
-    /// The USBL head saw a vehicle: if that gives a fix, the vehicle is sent it.
+    /// Takes a USBL measurement of a vehicle, and sends the vehicle a fix if that gives one.
     pub fn handle_usbl(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) {
         let Some(relay) = &mut self.relay else { return };
         if let Ok(Some(fix)) = relay.handle_usbl(vehicle, sighting, now) {
-            // A vehicle that the link does not know has no slot for it.
+            // A vehicle that is unknown to the link has no slot for it.
             let _ = self.send_fix(vehicle, fix, now);
         }
     }
 
-    /// Where a vehicle says that it is, in the world's frame, metres.
+    /// The reported position of a vehicle in the world frame: metres east and north.
     pub fn vehicle_in_world(&self, vehicle: Address) -> Option<(f64, f64)> {
         let view = self.link.vehicle(vehicle)?;
         let (status, _) = view.status()?;
@@ -296,7 +295,7 @@ impl Surface {
         Ok(version)
     }
 
-    /// Cells of each label on the operator's map.
+    /// The number of cells of each label on the operator's map.
     pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
         let mut cells = BTreeMap::new();
         for (_, label) in self.map(vehicle)?.iter() {
@@ -314,7 +313,7 @@ impl Surface {
         }
         let link = &self.link;
         let speaks = |vehicle| link.vehicle(vehicle).and_then(|v| v.last_received()) == Some(now);
-        self.records.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, record)| record.pauses.hear(now));
+        self.records.iter_mut().filter(|(a, _)| speaks(**a)).for_each(|(_, record)| record.pauses.handle_frame(now));
     }
 
     fn handle_event(&mut self, event: SurfaceEvent, now: Instant) -> Option<SurfaceOutput> {
@@ -325,20 +324,20 @@ impl Surface {
             }
             SurfaceEvent::MapChanged(vehicle) => Some(SurfaceOutput::MapChanged(vehicle)),
             SurfaceEvent::VehicleRestarted(vehicle) => {
-                self.ask_again(vehicle, now);
+                self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
             }
             SurfaceEvent::SlotDecided(vehicle, slot) => {
-                let settled = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
-                let (life, version) = (settled.status, settled.version);
+                let decided = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;
+                let (status, version) = (decided.status, decided.version);
                 let record = self.records.get_mut(&vehicle)?;
                 if slot == SlotId::Settings {
-                    record.settings.handle_settled(life);
+                    record.settings.handle_decision(status);
                 }
-                if life == OrderStatus::Applied {
+                if status == OrderStatus::Applied {
                     record.handle_applied(slot, version);
                 }
-                self.handle_settled(vehicle, slot, now);
+                self.handle_decision(vehicle, slot, now);
                 Some(SurfaceOutput::SlotDecided(vehicle, slot))
             }
             SurfaceEvent::Status(vehicle) => {
@@ -365,27 +364,27 @@ impl Surface {
         }
     }
 
-    /// The transmission that was handed out has left the modem.
+    /// The last frame of [`Self::poll_transmit`] has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
         self.link.handle_transmit_outcome(now);
     }
 
-    /// The modem asks for so many frames.
+    /// The modem requests a number of frames.
     pub fn handle_poll(&mut self, frames: u32) {
         self.link.handle_poll(frames);
     }
 
-    /// The cycle that the modem is to begin next.
+    /// The next cycle for a polled modem to begin.
     pub fn poll_cycle(&mut self, now: Instant) -> Option<Cycle> {
         self.link.poll_cycle(now)
     }
 
-    /// The modem itself put so many bits on air.
+    /// The modem itself transmitted a number of bits, which count against the budget.
     pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
         self.link.handle_repeated(bits, now);
     }
 
-    /// The modem's head has found a vehicle.
+    /// The modem has measured the range or the direction of a vehicle.
     pub fn handle_range(&mut self, vehicle: Address, line: &UsblLine, now: Instant) {
         if let Some(record) = self.records.get_mut(&vehicle) {
             record.found = Some((*line, now));
@@ -397,12 +396,11 @@ impl Surface {
         }
     }
 
-    /// The next frame to put on air.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         self.link.poll_transmit(now)
     }
 
-    /// When to ask for the next frame.
+    /// When to call [`Self::poll_transmit`] again, and why.
     pub fn poll_timeout(&self, now: Instant) -> Option<(Instant, Wakeup)> {
         self.link.poll_timeout(now)
     }

@@ -1,4 +1,4 @@
-//! What the operator has and asked for, for one vehicle.
+//! The operator's data about one vehicle.
 
 use super::exemplar_cache::ExemplarCache;
 use super::pauses::Pauses;
@@ -11,38 +11,38 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
 use std::collections::VecDeque;
 
-/// The operator's papers about one vehicle.
+/// The last orders to a vehicle, and its last reports.
 #[derive(Debug)]
 pub struct VehicleRecord {
     pub name: String,
-    /// The utility that was sent last.
+    /// The last utility that was sent.
     pub utility: Utility,
-    /// The fence that was sent last.
+    /// The last fence that was sent.
     pub fence: Option<Fence>,
-    /// The limits that were sent last.
+    /// The last limits that were sent.
     pub limits: Option<Limits>,
-    /// The fence that it said last to obey, with its version.
+    /// The fence that the vehicle has applied, with its version.
     pub fence_in_force: Option<(u16, Fence)>,
-    /// The limits that it said last to obey, with their version.
+    /// The limits that the vehicle has applied, with their version.
     pub limits_in_force: Option<(u16, Limits)>,
-    /// The settings that were asked for, and those in force.
+    /// The settings that were ordered, and those in force.
     pub settings: SettingsRecord,
     pub exemplars: ExemplarCache,
-    /// Where the vehicle said it was: time, east, north.
+    /// Reported positions in the map frame: time, metres east, metres north.
     pub track: VecDeque<(Instant, f64, f64)>,
     pub epoch: u8,
-    /// The last whole map, where the vehicle sends those.
+    /// The last whole map, where the vehicle sends whole maps.
     pub whole: Option<LabelGrid>,
-    /// Whole maps that came in.
+    /// The number of whole maps that have arrived.
     pub wholes: u64,
-    /// How long it is usually silent.
+    /// The usual length of its silence.
     pub pauses: Pauses,
-    /// Where the surface's modem found it last, and when it said so.
+    /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
 }
 
 impl VehicleRecord {
-    /// Places of the track that are kept.
+    /// Maximum number of positions in the track.
     const TRACK: usize = 500;
 
     pub fn new(name: String) -> Self {
@@ -64,7 +64,7 @@ impl VehicleRecord {
         }
     }
 
-    /// Takes note of a status; a new epoch voids everything that names labels.
+    /// Takes a status. A new epoch voids everything that refers to labels.
     pub fn handle_status(&mut self, status: &VehicleStatus, now: Instant) {
         if status.epoch != self.epoch {
             self.epoch = status.epoch;
@@ -77,7 +77,7 @@ impl VehicleRecord {
         }
     }
 
-    /// The vehicle obeys the version of a slot that was sent last.
+    /// The vehicle has applied the version of a slot that was sent last.
     pub fn handle_applied(&mut self, slot: SlotId, version: u16) {
         match slot {
             SlotId::Fence => self.fence_in_force = self.fence.clone().map(|fence| (version, fence)),
@@ -86,18 +86,18 @@ impl VehicleRecord {
         }
     }
 
-    /// Part of an image came in; `head` are its first bytes, once they are held.
+    /// Part of an exemplar came in. `head` are its first bytes, once they have arrived.
     pub fn handle_progress(&mut self, head: Option<&[u8]>, held: usize, total: usize, now: Instant) {
         let head = head.and_then(|h| h.first_chunk::<4>()).filter(|h| h[0] == self.epoch);
         head.into_iter().for_each(|head| self.exemplars.handle_progress(*head, (held, total), now));
     }
 
-    /// An image is complete; says whether there is something new to show.
+    /// Takes a complete exemplar. Returns whether the operator has something new to see.
     pub fn handle_exemplar(&mut self, exemplar: &Exemplar, now: Instant) -> bool {
         exemplar.epoch == self.epoch && self.exemplars.handle_exemplar(exemplar, now)
     }
 
-    /// Images that are asked for and not here.
+    /// The open requests for exemplars.
     pub fn wanted(&self) -> ExemplarRequests {
         self.exemplars.wanted(self.epoch)
     }

@@ -1,6 +1,6 @@
-//! From a configuration to a vehicle.
+//! Builds a vehicle from a configuration.
 
-use crate::{Durable, Footprint, Habits, Navigator, Steering, Vehicle};
+use crate::{Durable, FailsafePolicy, Footprint, Navigator, Steering, Vehicle};
 use scenecast_config::{Config, LayerName, MapCells, MapStream, cell_m, vehicle_address};
 use scenecast_core::{Area, UserError};
 use scenecast_protocol::link::{Authenticity, VehicleConfig, VehicleLink};
@@ -12,7 +12,7 @@ use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::MissionId;
 use std::time::Duration;
 
-/// A vehicle that surveys `area`; `seed` is random for each run.
+/// Builds a vehicle that surveys `area`. `seed` is random for each run.
 pub fn assemble(
     config: &Config,
     authenticity: Option<Authenticity>,
@@ -48,8 +48,8 @@ pub fn assemble(
         None => Navigator::new(x, y, depth, drift).with_start_sigma(config.navigation.start_sigma_m),
     };
     link.set_background(durable.background.and_then(BackgroundOrder::from_code).unwrap_or(config.link.background));
-    let mut vehicle = Vehicle::new(link, navigator, steering, habits(config), durable, now);
-    vehicle.configure_telling(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, selected_layers(config));
+    let mut vehicle = Vehicle::new(link, navigator, steering, policy(config), durable, now);
+    vehicle.configure_map(config.map.cells == MapCells::Coarse, config.map.coarse_after_s, selected_layers(config));
     if config.map.stream == MapStream::WholePng {
         vehicle.send_whole_png();
     }
@@ -61,10 +61,9 @@ fn footprint(config: &Config) -> Footprint {
     Footprint { across: f64::from(config.camera.width_px) * mpp, along: f64::from(config.camera.height_px) * mpp }
 }
 
-/// What the vehicle does of its own accord.
-fn habits(config: &Config) -> Habits {
+fn policy(config: &Config) -> FailsafePolicy {
     let survey = &config.survey;
-    Habits {
+    FailsafePolicy {
         on_silence: survey.on_silence,
         on_breach: survey.on_breach,
         on_abort: survey.on_abort,
@@ -79,7 +78,7 @@ fn selected_layers(config: &Config) -> LayerMask {
     config.map.layers.iter().map(|layer| layer.id()).collect()
 }
 
-/// Every layer that the operator could request, with its part of the map's share.
+/// Every layer that the operator can select, with its part of the map's share.
 fn layers(config: &Config, codec: Codec) -> impl Iterator<Item = LayerSource> {
     let map = &config.map;
     let debounce = Duration::from_secs_f64(map.debounce_s);

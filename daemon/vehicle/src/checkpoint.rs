@@ -1,4 +1,4 @@
-//! A mapper as bytes: the model with all that its labels and words mean.
+//! The checkpoint of a mapper: the scene model, its labels, its vocabulary and its exemplars as bytes.
 
 use super::mapper::Mapper;
 use super::relief::Relief;
@@ -14,28 +14,26 @@ use std::collections::BTreeMap;
 
 const ENVELOPE: Envelope = Envelope { magic: *b"SCNMAPPR", version: 1 };
 
-/// Why a checkpoint is not gone on from.
+/// The reason why a checkpoint cannot be restored.
 #[derive(Debug, thiserror::Error)]
-pub enum NoCheckpoint {
-    /// Not a checkpoint, of another version, or damaged.
+pub enum RestoreError {
+    /// The bytes are no checkpoint, of another version, or damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The model in it is none to go on from.
+    /// The scene model in it is invalid.
     #[error(transparent)]
     Model(#[from] CheckpointError),
-    /// The checksum is right but the content cannot be.
+    /// The checksum is right, but the content contradicts itself.
     #[error("its content is inconsistent")]
     Inconsistent,
-    /// It was made with other parameters.
     #[error("it was made with other parameters of the scene model")]
     OtherParameters,
-    /// The configuration itself is wrong.
     #[error(transparent)]
     Config(#[from] UserError),
 }
 
 #[derive(Serialize, Deserialize)]
-struct Kept<M, B, W, E, R> {
+struct CheckpointContent<M, B, W, E, R> {
     lineage: u64,
     last_s: Option<f64>,
     model: M,
@@ -45,16 +43,16 @@ struct Kept<M, B, W, E, R> {
     relief: R,
 }
 
-/// A mapper that goes on where a checkpoint left it, and the mission that it belongs to.
+/// A mapper that continues from a checkpoint, and the mission that it belongs to.
 pub struct Restored {
     pub mapper: Mapper,
     pub lineage: u64,
 }
 
 impl Mapper {
-    /// Everything as bytes, for [`Mapper::restore`]; `lineage` says which mission it belongs to.
+    /// Encodes the mapper for [`Mapper::restore`]. `lineage` is the number of the mission.
     pub fn save(&self, lineage: u64) -> Vec<u8> {
-        let kept = Kept {
+        let kept = CheckpointContent {
             lineage,
             last_s: self.last_s,
             model: self.model.save(),
@@ -68,12 +66,12 @@ impl Mapper {
         ENVELOPE.seal(&content)
     }
 
-    /// Goes on from a checkpoint, if it was made with the parameters that are configured. Priors may differ: they are those
-    /// of the checkpoint until [`Mapper::tune`] says which are in force.
-    pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, NoCheckpoint> {
+    /// Restores a mapper if its parameters are those of the configuration. Priors may differ: those of the checkpoint
+    /// apply until [`Mapper::tune`] sets others.
+    pub fn restore(config: &Config, vocabulary: Option<Measures>, bytes: &[u8]) -> Result<Restored, RestoreError> {
         let content = ENVELOPE.open(bytes)?;
-        let (kept, rest): (Kept<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
-            postcard::take_from_bytes(content).map_err(|_| NoCheckpoint::Inconsistent)?;
+        let (kept, rest): (CheckpointContent<Vec<u8>, LabelBook, Measures, ExemplarStore, Relief>, _) =
+            postcard::take_from_bytes(content).map_err(|_| RestoreError::Inconsistent)?;
         // A checkpoint of an earlier build ends here.
         let last_seen_s = if rest.is_empty() { Ok(BTreeMap::new()) } else { postcard::from_bytes(rest) };
         let model = SceneModel::load(&kept.model)?;
@@ -82,13 +80,13 @@ impl Mapper {
         let configured = SceneConfig { alpha, beta, gamma, seed, ..fresh.model.config().clone() };
         let (words, configured_words) = (kept.words.config(), fresh.extractor.measures());
         if *model.config() != configured || words != configured_words.config() {
-            return Err(NoCheckpoint::OtherParameters);
+            return Err(RestoreError::OtherParameters);
         }
         if config.scene.vocabulary.is_some() && !is_same(&kept.words, &configured_words) {
-            return Err(NoCheckpoint::OtherParameters);
+            return Err(RestoreError::OtherParameters);
         }
         let mut mapper = fresh;
-        mapper.last_seen_s = last_seen_s.map_err(|_| NoCheckpoint::Inconsistent)?;
+        mapper.last_seen_s = last_seen_s.map_err(|_| RestoreError::Inconsistent)?;
         mapper.extractor = WordExtractor::from_measures(kept.words);
         (mapper.model, mapper.book) = (model, kept.book);
         (mapper.exemplars, mapper.relief, mapper.last_s) = (kept.exemplars, kept.relief, kept.last_s);
@@ -125,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_restored_mapper_goes_on_as_the_one_that_was_saved() {
+    fn a_restored_mapper_continues_like_the_saved_one() {
         let config = config(&[]);
         let mut whole = Mapper::new(&config, None, 3, 1).unwrap();
         (0..12).for_each(|at| drop(frame(&mut whole, at)));
@@ -170,7 +168,7 @@ mod tests {
         expected.layers.insert(LayerId::LAST_SEEN, Vec::new());
         assert_eq!(restored.current(), expected);
         let damaged = ENVELOPE.seal(&[earlier, &[3]].concat());
-        assert!(matches!(Mapper::restore(&config(&[]), None, &damaged), Err(NoCheckpoint::Inconsistent)));
+        assert!(matches!(Mapper::restore(&config(&[]), None, &damaged), Err(RestoreError::Inconsistent)));
     }
 
     #[test]
@@ -187,13 +185,13 @@ mod tests {
             assert_eq!((again.priors(), again.current()), (whole.priors(), whole.current()));
             again.tune(&settings);
             assert_eq!(again.current(), whole.current());
-            let mut went_on = Mapper::restore(&config(&[]), None, &whole.save(7)).unwrap().mapper;
-            went_on.tune(&settings);
-            assert_eq!(frame(&mut again, 9), frame(&mut went_on, 9));
+            let mut continued = Mapper::restore(&config(&[]), None, &whole.save(7)).unwrap().mapper;
+            continued.tune(&settings);
+            assert_eq!(frame(&mut again, 9), frame(&mut continued, 9));
         }
         let mut other = Mapper::restore(&config(&["scene.gamma=0.01"]), None, &whole.save(7)).unwrap().mapper;
         other.tune(&Settings::default());
-        assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured where nobody says otherwise");
+        assert_eq!(other.priors(), [0.01, 0.1, 0.01], "as configured without an order");
         assert_eq!(frame(&mut other, 9).epoch, 3);
     }
 
@@ -217,14 +215,14 @@ mod tests {
         let mut mapper = Mapper::new(&config(&[]), None, 0, 1).unwrap();
         frame(&mut mapper, 0);
         let bytes = mapper.save(1);
-        let said =
+        let error =
             |sets: &[&str], bytes: &[u8]| Mapper::restore(&config(sets), None, bytes).err().map(|e| e.to_string());
-        assert_eq!(said(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
+        assert_eq!(error(&["runtime.seed=9", "scene.refine_words_per_s=5"], &bytes), None);
         let other = Some("it was made with other parameters of the scene model".to_owned());
-        assert_eq!(said(&["scene.max_labels=20"], &bytes), other);
-        assert_eq!(said(&["scene.cell_m=0.5"], &bytes), other);
-        assert_eq!(said(&[], &bytes[..bytes.len() / 2]), Some("cut off or damaged".to_owned()));
-        assert_eq!(said(&[], b"hello"), Some("a file of another kind".to_owned()));
+        assert_eq!(error(&["scene.max_labels=20"], &bytes), other);
+        assert_eq!(error(&["scene.cell_m=0.5"], &bytes), other);
+        assert_eq!(error(&[], &bytes[..bytes.len() / 2]), Some("cut off or damaged".to_owned()));
+        assert_eq!(error(&[], b"hello"), Some("a file of another kind".to_owned()));
         for at in (20..bytes.len() - 4).step_by(bytes.len() / 200) {
             let mut content = bytes[20..bytes.len() - 4].to_vec();
             content[at - 20] ^= 0x41;

@@ -1,25 +1,25 @@
-//! When the vehicle stops following its survey, of its own accord or because it is told to.
+//! The conditions under which the vehicle leaves its survey: by an order, or by itself.
 
 use scenecast_protocol::directive::{Constraints, Limits, Reaction};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::ModeReason;
 
-/// What the vehicle does where the operator's limits say nothing.
+/// The configured policy, which applies where the operator's limits have no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Habits {
+pub struct FailsafePolicy {
     pub on_silence: Reaction,
-    /// Outside the fence or a band.
+    /// Outside the fence or the depth band.
     pub on_breach: Reaction,
     pub on_abort: Reaction,
-    /// Seconds of silence that are allowed; infinite: any.
+    /// Allowed silence of the surface, seconds; infinite: any.
     pub silence_s: f64,
-    /// Speed over ground, metres a second, to reckon the time of a way.
+    /// Speed over ground in metres a second, by which a time becomes a distance.
     pub speed_m_s: f64,
-    /// Height at which it flies, metres above the sea floor.
+    /// Altitude above the sea floor that the vehicle keeps, metres.
     pub altitude_m: f64,
 }
 
-impl Default for Habits {
+impl Default for FailsafePolicy {
     fn default() -> Self {
         Self {
             on_silence: Reaction::Return,
@@ -32,32 +32,32 @@ impl Default for Habits {
     }
 }
 
-/// What is done instead of the survey, and why.
+/// The reaction that takes the place of the survey, and its reason.
 pub type Stop = (Reaction, ModeReason);
 
-/// Watches over limits, silence and breaches.
+/// Watches limits, silence and breaches.
 #[derive(Debug)]
 pub struct Failsafe {
-    habits: Habits,
+    policy: FailsafePolicy,
     pub limits: Limits,
     pub order: Constraints,
-    /// Metres gone since the limits are in force.
+    /// Metres travelled since the limits were put in force.
     pub used_m: f64,
     pub used_s: f64,
-    /// A breach, until the operator's next order or fence; silence that made the vehicle come up.
+    /// A breach until the operator's next order or fence, or a silence after which the vehicle has surfaced.
     pub latched: ModeReason,
-    heard: Instant,
+    last_received: Instant,
     now: Instant,
 }
 
-/// Part of the limits kept back for what the reckoning misses.
+/// The share of the limits that is kept in reserve for errors of the estimate.
 const RESERVE: f64 = 0.03;
 
 impl Failsafe {
-    /// Watches from `now`; the surface counts as heard then.
-    pub fn new(habits: Habits, now: Instant) -> Self {
+    /// Starts at `now`, as if a frame of the surface had been received then.
+    pub fn new(policy: FailsafePolicy, now: Instant) -> Self {
         let (limits, order, latched) = (Limits::default(), Constraints::default(), ModeReason::Survey);
-        Self { habits, limits, order, used_m: 0.0, used_s: 0.0, latched, heard: now, now }
+        Self { policy, limits, order, used_m: 0.0, used_s: 0.0, latched, last_received: now, now }
     }
 
     pub fn handle_time(&mut self, now: Instant) {
@@ -65,34 +65,33 @@ impl Failsafe {
         self.now = now;
     }
 
-    /// The vehicle went so far.
-    pub fn handle_way(&mut self, metres: f64) {
+    pub fn handle_travel(&mut self, metres: f64) {
         self.used_m += metres;
     }
 
-    /// Speed over ground at which it flies, metres a second.
+    /// Speed over ground that the vehicle keeps, metres a second.
     pub fn speed_m_s(&self) -> f64 {
-        self.habits.speed_m_s
+        self.policy.speed_m_s
     }
 
-    /// A frame of the surface was taken.
-    pub fn handle_surface_heard(&mut self, at: Instant) {
-        self.heard = self.heard.max(at);
+    /// The link received a frame of the surface.
+    pub fn handle_received(&mut self, at: Instant) {
+        self.last_received = self.last_received.max(at);
     }
 
-    /// The vehicle is outside of where it may be.
+    /// The vehicle is outside its fence or depth band.
     pub fn handle_breach(&mut self, why: ModeReason) {
         if self.latched == ModeReason::Survey {
             self.latched = why;
         }
     }
 
-    /// The operator has decided anew.
-    pub fn forgive(&mut self) {
+    /// The operator has answered a breach.
+    pub fn clear_breach(&mut self) {
         self.latched = ModeReason::Survey;
     }
 
-    /// New limits: distance and time count afresh.
+    /// Puts limits in force; distance and time count from zero.
     pub fn set_limits(&mut self, limits: Limits) {
         (self.limits, self.used_m, self.used_s) = (limits, 0.0, 0.0);
     }
@@ -102,13 +101,13 @@ impl Failsafe {
         self.limits.depth.is_some_and(|band| !band.contains(depth_m))
     }
 
-    /// Whether the vehicle flies as these limits demand.
+    /// Whether the vehicle keeps these limits at its depth and altitude.
     pub fn is_able(&self, limits: &Limits, depth_m: f64) -> bool {
         limits.depth.is_none_or(|b| b.contains(depth_m))
-            && limits.altitude.is_none_or(|b| b.contains(self.habits.altitude_m))
+            && limits.altitude.is_none_or(|b| b.contains(self.policy.altitude_m))
     }
 
-    /// Metres that may still be gone, the way home included.
+    /// Metres that may still be travelled, the return path included.
     pub fn left_m(&self) -> f64 {
         self.left_of_distance().min(self.left_of_time())
     }
@@ -119,30 +118,31 @@ impl Failsafe {
 
     fn left_of_time(&self) -> f64 {
         let left_s = |s: u32| f64::from(s) * (1.0 - RESERVE) - self.used_s;
-        self.limits.time_s.map_or(f64::INFINITY, |s| left_s(s) * self.habits.speed_m_s)
+        self.limits.time_s.map_or(f64::INFINITY, |s| left_s(s) * self.policy.speed_m_s)
     }
 
-    /// Which of the limits is the tighter one.
+    /// The reason to report when the tighter of the two limits is used up.
     pub fn tighter(&self) -> ModeReason {
         if self.left_of_time() < self.left_of_distance() { ModeReason::Time } else { ModeReason::Distance }
     }
 
-    /// What is to be done instead of the survey, if anything; `home_m` is the way home.
+    /// The reaction that takes the place of the survey, if one is due. `home_m` is the length
+    /// of the return path, metres.
     pub fn stop(&mut self, home_m: f64) -> Option<Stop> {
-        let silence_s = self.limits.silence_s.map_or(self.habits.silence_s, f64::from);
-        let on_silence = self.limits.on_silence.unwrap_or(self.habits.on_silence);
-        let silent = self.now.since(self.heard).as_secs_f64() > silence_s;
+        let silence_s = self.limits.silence_s.map_or(self.policy.silence_s, f64::from);
+        let on_silence = self.limits.on_silence.unwrap_or(self.policy.on_silence);
+        let silent = self.now.since(self.last_received).as_secs_f64() > silence_s;
         if silent && on_silence == Reaction::Surface {
-            // It does not dive again because somebody is heard: up there are ships.
+            // It stays at the surface when frames are received again, because ships may be above.
             self.handle_breach(ModeReason::Silence);
         }
         if self.order.abort {
-            return Some((self.limits.on_abort.unwrap_or(self.habits.on_abort), ModeReason::Order));
+            return Some((self.limits.on_abort.unwrap_or(self.policy.on_abort), ModeReason::Order));
         }
         match self.latched {
             ModeReason::Survey => {}
             ModeReason::Silence => return Some((Reaction::Surface, ModeReason::Silence)),
-            why => return Some((self.limits.on_breach.unwrap_or(self.habits.on_breach), why)),
+            why => return Some((self.limits.on_breach.unwrap_or(self.policy.on_breach), why)),
         }
         if silent {
             return Some((on_silence, ModeReason::Silence));
@@ -164,31 +164,33 @@ mod tests {
 
     #[test]
     fn silence_triggers_the_policy_until_the_surface_is_received() {
-        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.set_limits(Limits { silence_s: Some(60), on_silence: Some(Reaction::Hold), ..Limits::default() });
         failsafe.handle_time(at(60.0));
         assert_eq!(failsafe.stop(0.0), None);
         failsafe.handle_time(at(61.0));
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Hold, ModeReason::Silence)));
-        failsafe.handle_surface_heard(at(61.0));
+        failsafe.handle_received(at(61.0));
         assert_eq!(failsafe.stop(0.0), None);
     }
 
     #[test]
     fn a_vehicle_surfaced_by_silence_waits_for_an_order() {
-        let mut failsafe =
-            Failsafe::new(Habits { silence_s: 60.0, on_silence: Reaction::Surface, ..Habits::default() }, at(0.0));
+        let mut failsafe = Failsafe::new(
+            FailsafePolicy { silence_s: 60.0, on_silence: Reaction::Surface, ..FailsafePolicy::default() },
+            at(0.0),
+        );
         failsafe.handle_time(at(61.0));
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
-        failsafe.handle_surface_heard(at(62.0));
+        failsafe.handle_received(at(62.0));
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Surface, ModeReason::Silence)));
-        failsafe.forgive();
+        failsafe.clear_breach();
         assert_eq!(failsafe.stop(0.0), None);
     }
 
     #[test]
     fn an_abort_goes_before_a_breach_and_a_breach_before_a_hold() {
-        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.order = Constraints { hold: true, abort: false };
         assert_eq!(failsafe.stop(0.0), Some((Reaction::Hold, ModeReason::Order)));
         failsafe.handle_breach(ModeReason::Fence);
@@ -198,11 +200,11 @@ mod tests {
     }
 
     #[test]
-    fn the_way_home_is_kept_of_distance_and_time() {
-        let mut failsafe = Failsafe::new(Habits::default(), at(0.0));
+    fn distance_and_time_are_reserved_for_the_return_path() {
+        let mut failsafe = Failsafe::new(FailsafePolicy::default(), at(0.0));
         failsafe.set_limits(Limits { distance_m: Some(1000), time_s: Some(1000), ..Limits::default() });
         assert_eq!(failsafe.tighter(), ModeReason::Time, "a thousand seconds are five hundred metres");
-        failsafe.handle_way(900.0);
+        failsafe.handle_travel(900.0);
         assert_eq!(failsafe.stop(80.0), Some((Reaction::Return, ModeReason::Distance)));
         assert_eq!(failsafe.stop(10.0), None);
         failsafe.handle_time(at(960.0));

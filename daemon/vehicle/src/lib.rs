@@ -1,7 +1,7 @@
-//! The vehicle: sees, maps, tells, obeys.
+//! The vehicle: it maps the sea floor, sends the map to the surface and carries out orders.
 //!
-//! [`Mapper`] turns camera frames into labels and may live on a thread of its own; [`Vehicle`] speaks with the surface,
-//! keeps the position estimate and chooses waypoints. Neither does IO.
+//! [`Mapper`] turns camera frames into a label map and may run on a thread of its own. [`Vehicle`] holds the link to
+//! the surface, estimates the position and chooses waypoints. Neither does IO.
 
 mod assemble;
 mod checkpoint;
@@ -16,9 +16,9 @@ mod steering;
 mod vehicle;
 
 pub use assemble::assemble;
-pub use checkpoint::{NoCheckpoint, Restored};
-pub use failsafe::{Failsafe, Habits};
-pub use mapper::{MapUpdate, Mapper};
+pub use checkpoint::{RestoreError, Restored};
+pub use failsafe::{Failsafe, FailsafePolicy};
+pub use mapper::{MapUpdate, Mapper, SharedExemplars};
 pub use navigator::{FixVerdict, Navigator};
 pub use steering::{Course, Footprint, Steering};
 pub use vehicle::{AppliedSlot, Durable, LastPlace, Vehicle, VehicleOutput};

@@ -1,4 +1,4 @@
-//! Camera frames to label map.
+//! The mapper: from camera frames to the label map.
 
 use super::picker::{Judge, PATCH_PX};
 use super::relief::Relief;
@@ -13,23 +13,26 @@ use scenecast_core::UserError;
 use scenecast_protocol::directive::{Change, Settings, ShortDecimal};
 use scenecast_protocol::map::{Cell, LayerId};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// Representative images kept a label.
+/// Exemplars that are kept of each label.
 const EXEMPLARS_KEPT: usize = 4;
+
+/// The best exemplars of each label that has any, the best first.
+pub type SharedExemplars = Arc<BTreeMap<u8, Vec<ExemplarPatch>>>;
 
 /// The label map after a camera frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapUpdate {
     /// Mission time of the frame, seconds.
     pub t_s: f64,
-    /// Epoch of the label ids.
     pub epoch: u8,
-    /// Labels of every explored cell.
+    /// The label of every explored cell.
     pub cells: Vec<(Cell, u8)>,
     /// The quantities of each layer, in the unit of its descriptor.
     pub layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
     pub labels: u8,
-    /// How badly the model explains each cell.
+    /// The perplexity of each cell under the model.
     pub perplexity: Vec<(Cell, f32)>,
 }
 
@@ -41,31 +44,33 @@ pub struct Mapper {
     pub(super) model: SceneModel,
     pub(super) book: LabelBook,
     pub(super) exemplars: ExemplarStore,
+    /// The exemplars of the last [`Mapper::shared_exemplars`].
+    shared: SharedExemplars,
     pub(super) relief: Relief,
     /// Mission time of the last frame that had a word in the cell, by the cell's x and y, seconds.
     pub(super) last_seen_s: BTreeMap<(i32, i32), f64>,
     refine_words_per_s: f64,
-    /// Camera frames a second that are taken at most; none: every one.
+    /// Maximum rate of camera frames, 1/s; `None`: every frame.
     frames_per_s: Option<f64>,
     configured: Configured,
     pub(super) last_s: Option<f64>,
     pub(super) flat: Vec<FlatCell>,
 }
 
-/// What the settings of the operator take the place of.
+/// The configured values that the operator's settings override.
 struct Configured {
     priors: [f64; 3],
     refine_words_per_s: f64,
     frames_per_s: Option<f64>,
 }
 
-/// A frame rate as it is configured, where 0 is every frame.
+/// A configured frame rate, where 0 stands for every frame.
 fn every_frame_or(rate: f64) -> Option<f64> {
     (rate > 0.0).then_some(rate)
 }
 
 impl Mapper {
-    /// A mapper that has seen nothing; its label ids begin at `epoch`.
+    /// An empty mapper. Its labels belong to `epoch`.
     pub fn new(config: &Config, vocabulary: Option<Measures>, epoch: u8, seed: u64) -> Result<Self, UserError> {
         let extractor =
             vocabulary.map_or_else(|| WordExtractor::new(&WordConfig::default()), WordExtractor::from_measures);
@@ -98,6 +103,7 @@ impl Mapper {
             book: LabelBook::new(epoch),
             exemplars: ExemplarStore::new(EXEMPLARS_KEPT, PATCH_PX)
                 .with_distance(f64::from(PATCH_PX) * config.camera.metres_per_pixel),
+            shared: SharedExemplars::default(),
             relief: Relief::default(),
             last_seen_s: BTreeMap::new(),
             refine_words_per_s: f64::from(config.scene.refine_words_per_s),
@@ -112,35 +118,36 @@ impl Mapper {
         })
     }
 
-    /// Follows settings that were checked; what they do not name is as configured. Topics and their labels stay.
+    /// Puts settings in force that were checked; those without a value are as configured. Topics and their labels stay.
     pub fn tune(&mut self, settings: &Settings) {
         let or = |change: Change<ShortDecimal>, configured: f64| change.value().map_or(configured, ShortDecimal::value);
         let [alpha, beta, gamma] = self.configured.priors;
         let priors = (or(settings.alpha, alpha), or(settings.beta, beta), or(settings.gamma, gamma));
         if let Err(e) = self.model.set_priors(priors.0, priors.1, priors.2) {
-            // What a vehicle accepts lies within what the model takes.
+            // The range of the settings lies within the range of the model.
             tracing::error!("the scene model keeps its priors: {e}");
         }
         self.refine_words_per_s = or(settings.refine_words_per_s, self.configured.refine_words_per_s);
         self.frames_per_s = settings.frames_per_s.value().map(ShortDecimal::value).or(self.configured.frames_per_s);
     }
 
-    /// Whether a frame taken at mission time `t_s` is to be seen: of each interval of the frame rate the first one is.
+    /// Whether the frame of mission time `t_s` is to be mapped. Each interval of the frame rate takes its first frame.
     pub fn takes(&self, t_s: f64) -> bool {
         let Some(rate) = self.frames_per_s else { return true };
         let interval = |t_s: f64| (t_s * rate + 1e-6).floor();
         self.last_s.is_none_or(|last_s| interval(last_s) != interval(t_s))
     }
 
-    /// Priors in force: alpha, beta, gamma.
+    /// The priors in force: alpha, beta, gamma.
     pub fn priors(&self) -> [f64; 3] {
         let config = self.model.config();
         [config.alpha, config.beta, config.gamma]
     }
 
-    /// Sees a frame taken at `pose` at mission time `t_s`, and refines as much as the time since the last one is worth.
+    /// Maps a frame that was taken at `pose` at mission time `t_s`, and refines the model in proportion to the time
+    /// since the last frame.
     ///
-    /// Its pixels are `scale` times as large on the sea floor as the configured ones.
+    /// `scale` is the size of a pixel on the sea floor, divided by the configured size.
     pub fn handle_frame(&mut self, image: &RgbImage, pose: &Pose, scale: f64, t_s: f64) -> MapUpdate {
         let camera = DownCamera { metres_per_pixel: scale * self.camera.metres_per_pixel, ..self.camera };
         let words = self.extractor.extract(image, (self.cell_m / camera.metres_per_pixel) as f32);
@@ -154,17 +161,20 @@ impl Mapper {
         let passed = t_s - self.last_s.replace(t_s).unwrap_or(t_s - 2.0);
         self.model.refine((self.refine_words_per_s * passed.clamp(0.0, 60.0)) as u64);
         self.flat = self.model.label_map();
-        self.book.publish(&self.flat);
+        let published = self.book.publish(&self.flat);
         let (cell_m, metres_per_pixel) = (self.cell_m, camera.metres_per_pixel);
         let judge = Judge { flat: &self.flat, cell_m, metres_per_pixel };
         judge.review(&mut self.exemplars);
         judge.offer(&mut self.exemplars, image, pose, t_s);
-        self.current()
+        self.update(&published)
     }
 
-    /// The map as it was published last.
+    /// The map after the last frame.
     pub fn current(&self) -> MapUpdate {
-        let published = self.book.published(&self.flat);
+        self.update(&self.book.published(&self.flat))
+    }
+
+    fn update(&self, published: &[PublishedCell]) -> MapUpdate {
         let place = |c: &PublishedCell| Cell::new(c.x, c.y);
         let confidence = published.iter().map(|c| (place(c), f64::from(c.confidence))).collect();
         let depth = published.iter().filter_map(|c| Some((place(c), self.relief.depth_m(place(c))?))).collect();
@@ -188,10 +198,10 @@ impl Mapper {
         }
     }
 
-    /// Goes on after a restart: in `epoch`, of whose ids those up to `told` may be known at the surface.
-    pub fn resume(&mut self, epoch: u8, told: u8) {
+    /// Continues after a restart in `epoch`. Labels up to `published` may be known at the surface.
+    pub fn resume(&mut self, epoch: u8, published: u8) {
         if self.book.epoch() == epoch {
-            self.book.resume(told);
+            self.book.resume(published);
         } else {
             self.book.begin_epoch(epoch);
         }
@@ -206,19 +216,26 @@ impl Mapper {
         (metres / self.cell_m).floor() as i32
     }
 
-    /// The images that represent a label best so far, the best first.
+    /// The best exemplars of a label, the best first.
     pub fn exemplars(&self, label: u8) -> &[ExemplarPatch] {
         self.book.topic_of(label).map_or(&[], |topic| self.exemplars.all(topic))
     }
 
-    /// The images of all labels that have some.
-    pub fn gallery(&self) -> BTreeMap<u8, Vec<ExemplarPatch>> {
-        let labels = self.book.labels();
-        let images = labels.map(|label| (label, self.exemplars(label).to_vec()));
-        images.filter(|(_, images)| !images.is_empty()).collect()
+    /// The best exemplars of all labels. The same map is given out until an exemplar comes, goes or changes its rank;
+    /// scores are as they were then.
+    pub fn shared_exemplars(&mut self) -> SharedExemplars {
+        let now = || self.book.labels().map(|l| (l, self.exemplars(l))).filter(|(_, patches)| !patches.is_empty());
+        let is_same = |a: &[ExemplarPatch], b: &[ExemplarPatch]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| Arc::ptr_eq(&a.patch, &b.patch))
+        };
+        let is_current = now().count() == self.shared.len()
+            && now().zip(self.shared.iter()).all(|((l, patches), (k, last))| l == *k && is_same(patches, last));
+        if !is_current {
+            self.shared = Arc::new(now().map(|(label, patches)| (label, patches.to_vec())).collect());
+        }
+        self.shared.clone()
     }
 
-    /// Epoch of the label ids.
     pub fn epoch(&self) -> u8 {
         self.book.epoch()
     }
@@ -231,7 +248,7 @@ impl Mapper {
         self.model.words()
     }
 
-    /// Perplexity of the words under the model.
+    /// Perplexity of all words under the model.
     pub fn perplexity(&self) -> f64 {
         self.model.perplexity()
     }

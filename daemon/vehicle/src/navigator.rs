@@ -1,4 +1,4 @@
-//! Where the vehicle believes it is.
+//! The estimate of the vehicle's position.
 
 mod filter;
 mod odometer;
@@ -10,12 +10,12 @@ use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Placement;
 
-/// Dead reckoning in a frame of its own, and where that frame lies in the world.
+/// Dead reckoning in the map frame, and the placement of the map frame in the world.
 ///
-/// The map is binned in the **map's frame**, in which the vehicle never jumps. What a fix says of the past goes two
-/// ways: what was wrong so far moves the [`Placement`] of that frame in the world, and with it the whole map, of which no
-/// cell is binned again; what it tells of the sensors (a compass that is off, a log that is, a current) makes the way from
-/// now on straight, so that the placement needs to move ever less.
+/// The map is binned in the **map frame**, in which the position never jumps. A fix has two effects. The error so far
+/// moves the [`Placement`] of the map frame in the world, and with it the whole map, so that no cell is binned again.
+/// The part of the error that comes from the sensors (a wrong compass, a wrong log, a current) corrects the dead
+/// reckoning from then on, so that later fixes move the placement less and less.
 #[derive(Debug)]
 pub struct Navigator {
     at: MapPoint,
@@ -25,46 +25,45 @@ pub struct Navigator {
     odometer: Odometer,
     placement: Option<Placement>,
     last_fix: Option<Instant>,
-    /// Whether it has been elsewhere than it knows: the first fix tells where on its map it is.
-    is_lost: bool,
-    /// Fixes that were refused though each agreed with the one before, and by how much the last one was off.
+    /// Whether the vehicle may have moved while it was off. The first fix then corrects the position on the map.
+    is_displaced: bool,
+    /// The number of refused fixes in a row that agreed with each other, and the deviation of the last one in metres.
     refused: (u32, (f64, f64)),
 }
 
-/// What became of a fix.
+/// The decision about a fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FixVerdict {
     Used,
-    /// It is of a time that the vehicle does not remember.
+    /// It is older than the memory of the odometer.
     TooOld,
-    /// It says what cannot be: no number, a place beyond every mission.
-    Absurd,
-    /// It is too far from where the vehicle can be.
+    /// A number is not finite or out of range.
+    Invalid,
+    /// It is too far from the estimate.
     Outlier,
 }
 
 impl FixVerdict {
-    /// Whether it corrects the estimate.
     pub fn is_used(self) -> bool {
         self == Self::Used
     }
 }
 
 impl Navigator {
-    /// Oldest fix that is of use.
+    /// Maximum age of a fix, seconds.
     const MEMORY_S: f64 = 120.0;
-    /// Mahalanobis distance squared, two degrees of freedom, that one of a thousand good fixes exceeds.
+    /// The squared Mahalanobis distance with two degrees of freedom that one of a thousand good fixes exceeds.
     const GATE: f64 = 13.8;
-    /// So many refused fixes in a row that agree with each other are believed.
-    const AGREEING: u32 = 4;
-    /// The placement is told anew when it has moved by so much, metres.
-    const WORTH_TELLING_M: f64 = 0.2;
-    /// How far it may have drifted while it was off, metres.
+    /// The number of refused fixes in a row that agree with each other after which they are trusted.
+    const MIN_AGREEING: u32 = 4;
+    /// The placement is changed when it has moved by this distance, metres.
+    const MIN_SHIFT_M: f64 = 0.2;
+    /// Standard deviation of the drift while the vehicle was off, metres.
     const RESUMED_SIGMA_M: f64 = 50.0;
-    /// Farther from the origin is no mission, metres.
+    /// The maximum distance of a mission from its origin, metres.
     const MAX_DISTANCE_M: f64 = 800_000.0;
 
-    /// At `(x_m, y_m)` for certain; `drift` is the expected error a metre of way.
+    /// Starts at `(x_m, y_m)` without uncertainty. `drift` is the expected error in metres for each metre of path.
     pub fn new(x_m: f64, y_m: f64, depth_m: f64, drift: f64) -> Self {
         Self {
             at: MapPoint { x_m, y_m },
@@ -74,24 +73,25 @@ impl Navigator {
             odometer: Odometer::default(),
             placement: None,
             last_fix: None,
-            is_lost: false,
+            is_displaced: false,
             refused: (0, (0.0, 0.0)),
         }
     }
 
-    /// On a map of an earlier run, about where that was at its last fix; the first fix moves the vehicle, not the map.
+    /// Continues on the map of an earlier run, near its position at the last fix. The first fix moves
+    /// the vehicle, not the map.
     pub fn resume(last: LastPlace, depth_m: f64, drift: f64) -> Self {
         let at = last.at();
         let mut navigator = Self::new(at.x_m, at.y_m, depth_m, drift).with_start_sigma(Self::RESUMED_SIGMA_M);
         let world = Placement::map_to_world(last.placement(), at);
         navigator.filter.shift(world.east_m - at.x_m, world.north_m - at.y_m);
-        (navigator.placement, navigator.is_lost) = (last.placement(), true);
+        (navigator.placement, navigator.is_displaced) = (last.placement(), true);
         navigator
     }
 
-    /// At its start within a standard deviation, metres.
+    /// Adds the standard deviation of the start position, metres.
     pub fn with_start_sigma(mut self, sigma_m: f64) -> Self {
-        self.filter.doubt(sigma_m);
+        self.filter.add_uncertainty(sigma_m);
         self
     }
 
@@ -106,7 +106,7 @@ impl Navigator {
         WorldPoint { east_m, north_m }
     }
 
-    /// Where the map's frame lies in the world, as it was told last; `None`: no fix has moved it.
+    /// The placement of the map frame in the world, as reported; `None` until a fix has moved it.
     pub fn placement(&self) -> Option<Placement> {
         self.placement
     }
@@ -136,78 +136,78 @@ impl Navigator {
         self.filter.sigma_m()
     }
 
-    /// When the last fix was used.
+    /// The time at which the last fix was used.
     pub fn last_fix(&self) -> Option<Instant> {
         self.last_fix
     }
 
-    /// The vehicle's own sensors say that it moved by so much since the last call.
+    /// The vehicle's own sensors measured a displacement since the last call: metres east and north.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         if ![dx_m, dy_m, heading_rad, depth_m].into_iter().all(f64::is_finite) {
             return;
         }
         (self.heading_rad, self.depth_m) = (heading_rad, depth_m);
-        let (x, y) = self.filter.handle_way(dx_m, dy_m);
+        let (x, y) = self.filter.handle_travel(dx_m, dy_m);
         self.at = MapPoint { x_m: self.at.x_m + x, y_m: self.at.y_m + y };
-        self.odometer.handle_way(dx_m, dy_m, now, Self::MEMORY_S);
+        self.odometer.handle_travel(dx_m, dy_m, now, Self::MEMORY_S);
     }
 
-    /// It may have gone so far in any direction without a word of its sensors.
-    pub fn handle_unseen_way(&mut self, metres: f64) {
-        // A standard deviation in each of two directions, of which the distance is the mean square.
-        self.filter.doubt(metres.max(0.0) / std::f64::consts::SQRT_2);
+    /// The vehicle may have travelled so far in any direction without a measurement.
+    pub fn handle_unmeasured(&mut self, metres: f64) {
+        // The distance is the root mean square over two directions, so each gets its share of the variance.
+        self.filter.add_uncertainty(metres.max(0.0) / std::f64::consts::SQRT_2);
     }
 
-    /// The position in the map's frame is known from elsewhere, as in a recorded mission.
+    /// Sets the pose in the map frame from another source, such as a recorded mission.
     pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        self.is_lost = false;
+        self.is_displaced = false;
         let (dx, dy) = (x_m - self.at.x_m, y_m - self.at.y_m);
         (self.at, self.heading_rad, self.depth_m) = (MapPoint { x_m, y_m }, heading_rad, depth_m);
         self.filter.shift(dx, dy);
-        self.odometer.handle_way(dx, dy, now, Self::MEMORY_S);
+        self.odometer.handle_travel(dx, dy, now, Self::MEMORY_S);
     }
 
-    /// A fix of where in the world the vehicle was at `taken`.
+    /// Takes a fix: the position in the world frame at the time `taken`, with its standard deviation in metres.
     pub fn handle_fix(&mut self, at: WorldPoint, sigma_m: f64, taken: Instant, now: Instant) -> FixVerdict {
         let (x_m, y_m) = at.xy();
         let is_place = x_m.abs() <= Self::MAX_DISTANCE_M && y_m.abs() <= Self::MAX_DISTANCE_M;
         if !is_place || !sigma_m.is_finite() || sigma_m < 0.0 {
-            return FixVerdict::Absurd;
+            return FixVerdict::Invalid;
         }
         let Some(since) = self.odometer.since(taken.min(now), now, Self::MEMORY_S) else { return FixVerdict::TooOld };
         let sigma = sigma_m.clamp(0.1, 1e4);
         let expected = self.filter.expect(&since, sigma);
         let off = (x_m - expected.at.0, y_m - expected.at.1);
-        if expected.distance2(off) > Self::GATE && !self.believes_anyway(off, sigma) {
+        if expected.distance2(off) > Self::GATE && !self.confirms_refused(off, sigma) {
             return FixVerdict::Outlier;
         }
         self.refused = (0, (0.0, 0.0));
         self.filter.correct(&since, (x_m, y_m), sigma);
         self.last_fix = Some(now);
-        if std::mem::take(&mut self.is_lost) {
+        if std::mem::take(&mut self.is_displaced) {
             self.at = self.to_map(self.world());
         }
         self.place();
         FixVerdict::Used
     }
 
-    /// Fixes that are all off by the same are right, and the estimate was wrong: it is put in doubt.
-    fn believes_anyway(&mut self, off: (f64, f64), sigma: f64) -> bool {
+    /// Fixes that all deviate by the same vector are right and the estimate is wrong, so its uncertainty is raised.
+    fn confirms_refused(&mut self, off: (f64, f64), sigma: f64) -> bool {
         let (row, before) = self.refused;
         let agrees = row > 0 && (off.0 - before.0).hypot(off.1 - before.1) < 4.0 * sigma + 1.0;
         let row = if agrees { row + 1 } else { 1 };
         self.refused = (row, off);
-        if row >= Self::AGREEING {
-            self.filter.doubt(off.0.hypot(off.1));
+        if row >= Self::MIN_AGREEING {
+            self.filter.add_uncertainty(off.0.hypot(off.1));
         }
-        row >= Self::AGREEING
+        row >= Self::MIN_AGREEING
     }
 
     fn place(&mut self) {
         let world = self.world();
         let origin = WorldPoint { east_m: world.east_m - self.at.x_m, north_m: world.north_m - self.at.y_m };
         let before = self.placement.map_or(WorldPoint::default(), |p| p.origin);
-        if before.distance_m(origin) >= Self::WORTH_TELLING_M {
+        if before.distance_m(origin) >= Self::MIN_SHIFT_M {
             self.placement = Some(Placement::moved_to(self.placement, origin));
         }
     }
@@ -222,7 +222,7 @@ mod tests {
         Instant::from_secs_f64(s)
     }
 
-    /// A vehicle that went east for a minute at 1 m/s, by its own reckoning.
+    /// A vehicle that travelled east for a minute at 1 m/s by dead reckoning.
     fn under_way() -> Navigator {
         let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.1);
         for s in 1..=60 {
@@ -232,17 +232,18 @@ mod tests {
     }
 
     #[test]
-    fn a_late_fix_corrects_by_what_was_wrong_when_it_was_taken() {
+    fn a_late_fix_corrects_the_error_of_its_own_time() {
         let mut nav = under_way();
         assert!(nav.sigma_m() > 0.5);
-        // At 30 s it believed to be at 30 m, but was at 33 m: now it is near 66 m if the log is to blame, 63 m if not.
+        // At 30 s the estimate was 30 m and the truth 33 m. Now it is near 66 m if the log is wrong, and near 63 m
+        // otherwise.
         assert_eq!(nav.handle_fix(WorldPoint::new(33.0, 0.0), 0.1, at(30.0), at(60.0)), FixVerdict::Used);
         assert!((63.0..67.0).contains(&nav.world().east_m), "{:?}", nav.world());
         assert_eq!(nav.handle_fix(WorldPoint::new(0.0, 0.0), 0.1, at(30.0), at(600.0)), FixVerdict::TooOld);
     }
 
     #[test]
-    fn a_fix_between_two_steps_counts_where_the_vehicle_was_then() {
+    fn a_fix_between_two_steps_is_interpolated() {
         let mut nav = under_way();
         nav.handle_fix(WorldPoint::new(30.5, 0.0), 0.1, at(30.5), at(60.0));
         assert!((nav.world().east_m - 60.0).abs() < 0.05, "{:?}", nav.world());
@@ -264,7 +265,7 @@ mod tests {
 
     #[test]
     fn fixes_calibrate_the_sensors_and_straighten_the_track() {
-        // A compass that is off by two degrees, on a way of 1 km to the east.
+        // A compass error of two degrees on a path of 1 km to the east.
         let mut nav = Navigator::new(0.0, 0.0, 18.0, 0.03);
         let (sin, cos) = 2f64.to_radians().sin_cos();
         let mut error = Vec::new();
@@ -285,10 +286,10 @@ mod tests {
         nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.world();
         for (x, y, sigma, verdict) in [
-            (f64::NAN, 0.0, 1.0, FixVerdict::Absurd),
-            (0.0, f64::INFINITY, 1.0, FixVerdict::Absurd),
-            (60.0, 0.0, f64::NAN, FixVerdict::Absurd),
-            (1e7, 0.0, 1.0, FixVerdict::Absurd),
+            (f64::NAN, 0.0, 1.0, FixVerdict::Invalid),
+            (0.0, f64::INFINITY, 1.0, FixVerdict::Invalid),
+            (60.0, 0.0, f64::NAN, FixVerdict::Invalid),
+            (1e7, 0.0, 1.0, FixVerdict::Invalid),
             (60.0, 90.0, 1.0, FixVerdict::Outlier),
             (-40.0, 0.0, 1.0, FixVerdict::Outlier),
         ] {
@@ -302,7 +303,7 @@ mod tests {
         let mut nav = under_way();
         nav.handle_fix(WorldPoint::new(60.0, 0.0), 1.0, at(60.0), at(60.0));
         let before = nav.sigma_m();
-        nav.handle_unseen_way(30.0);
+        nav.handle_unmeasured(30.0);
         assert!((20.0..25.0).contains(&nav.sigma_m()), "{} m, {before} m before", nav.sigma_m());
         assert_eq!(
             nav.handle_fix(WorldPoint::new(60.0, 25.0), 1.0, at(61.0), at(61.0)),
@@ -313,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn fixes_that_agree_with_each_other_are_believed_in_the_end() {
+    fn agreeing_outliers_are_trusted_in_the_end() {
         let mut nav = under_way();
         let verdicts: Vec<_> = (0..6)
             .map(|i| nav.handle_fix(WorldPoint::new(60.0, 200.0), 1.0, at(60.0), at(61.0 + f64::from(i))))
@@ -331,7 +332,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_fixes_and_steps_leave_a_place(
+        fn any_fixes_and_steps_keep_the_estimate_finite(
             steps in proptest::collection::vec((any::<f64>(), any::<f64>(), any::<f64>(), -2000.0..2000.0f64, 0.0..300.0f64), 1..60),
         ) {
             let mut nav = Navigator::new(0.0, 0.0, 5.0, 0.01);

@@ -1,4 +1,4 @@
-//! Which patches of a camera frame show best what a label means.
+//! The choice of the patches of a camera frame that represent the labels best.
 
 use scene_model::exemplars::ExemplarStore;
 use scene_model::project::{DownCamera, Pose};
@@ -6,14 +6,14 @@ use scene_model::topics::{FlatCell, TopicId};
 use scene_model::words::Word;
 use scenecast_protocol::exemplar::edge_px;
 
-/// Edge of a patch in pixels: the largest that is sent.
+/// Edge of a patch in pixels, the largest that is sent.
 pub(super) const PATCH_PX: u32 = 128;
-/// Pixels from one place in a frame that is looked at to the next.
+/// Distance in pixels between two candidate patches.
 const STEP_PX: u32 = 64;
-/// Least score of a patch that goes on representing its label.
+/// Minimum score of a patch that represents its label.
 const MIN_SCORE: f32 = 0.3;
 
-/// The map by which patches are judged.
+/// The map by which patches are scored.
 pub(super) struct Judge<'a> {
     /// Sorted by row and column.
     pub(super) flat: &'a [FlatCell],
@@ -22,7 +22,7 @@ pub(super) struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// The topic at a place and how sure the model is that all that the smallest image of it would show is of that topic.
+    /// The topic at a place, and the mean confidence that the smallest image of the place shows only this topic.
     fn score(&self, place: (f64, f64)) -> Option<(TopicId, f32)> {
         let topic = self.at(place)?.topic;
         let reach = f64::from(edge_px(0)) * 0.375 * self.metres_per_pixel;
@@ -41,7 +41,7 @@ impl Judge<'_> {
         self.flat.get(at)
     }
 
-    /// Judges the patches that are kept anew: labels of cells change as the model learns.
+    /// Scores the kept patches again, because the labels of cells change as the model learns.
     pub(super) fn review(&self, store: &mut ExemplarStore) {
         store.review(|topic, place| {
             let (now, score) = self.score(place)?;
@@ -49,7 +49,7 @@ impl Judge<'_> {
         });
     }
 
-    /// Offers patches of a frame, those in the middle first, where the camera distorts least.
+    /// Offers the patches of a frame. Those in the middle come first, because the camera distorts least there.
     pub(super) fn offer(&self, store: &mut ExemplarStore, frame: &image::RgbImage, pose: &Pose, t_s: f64) {
         let (width, height) = frame.dimensions();
         let edge = PATCH_PX.min(width).min(height);
@@ -70,7 +70,8 @@ impl Judge<'_> {
     }
 }
 
-/// Corners of patches where there is so much room beside a patch, from the middle outwards.
+/// The corners of the candidate patches from the middle outwards. `across` and `down` are the pixels
+/// that a patch leaves free.
 fn places(across: u32, down: u32) -> Vec<(u32, u32)> {
     let along = |room: u32| {
         let steps = (room / 2) / STEP_PX;
@@ -88,7 +89,7 @@ mod tests {
     use super::*;
     use image::RgbImage;
 
-    /// A map that is of topic 1 west of the middle and of topic 2 east of it.
+    /// A map of topic 1 west of the middle and of topic 2 east of it.
     fn halves(confidence: f32) -> Vec<FlatCell> {
         let cell = |x: i32, y: i32| FlatCell {
             x,
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn every_label_in_sight_is_represented_by_what_shows_it_alone() {
+    fn each_visible_label_gets_a_patch_of_itself_alone() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
         judge(&flat).offer(&mut store, &frame(), &Pose::default(), 1.0);
@@ -137,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_are_too_small_are_passed_over() {
+    fn too_small_frames_give_no_patch() {
         let flat = halves(0.9);
         let mut store = ExemplarStore::new(4, PATCH_PX);
         judge(&flat).offer(&mut store, &RgbImage::new(63, 480), &Pose::default(), 1.0);

@@ -1,10 +1,10 @@
-//! Depth of the sea floor, cell by cell.
+//! The depth of the sea floor in each cell.
 
 use scenecast_protocol::map::Cell;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Mean depth of what was seen in each cell.
+/// The mean depth of the observations in each cell.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Relief(BTreeMap<(i32, i32), Depths>);
 
@@ -15,14 +15,14 @@ struct Depths {
 }
 
 impl Relief {
-    /// Something was seen in a cell, so many metres below the surface.
+    /// Adds an observation, so many metres below the surface.
     pub(super) fn add(&mut self, cell: Cell, depth_m: f64) {
         let depths = self.0.entry((cell.x, cell.y)).or_default();
         depths.sum_m += depth_m;
         depths.seen += 1.0;
     }
 
-    /// Mean depth in metres below the surface; `None` where nothing was seen.
+    /// Mean depth in metres below the surface; `None` without an observation.
     pub(super) fn depth_m(&self, cell: Cell) -> Option<f64> {
         self.0.get(&(cell.x, cell.y)).map(|d| d.sum_m / d.seen)
     }
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cell_is_as_deep_as_what_was_seen_in_it_on_the_mean() {
+    fn a_cell_has_the_mean_depth_of_its_observations() {
         let (slope, unseen) = (Cell::new(-3, 2), Cell::new(0, 0));
         let mut relief = Relief::default();
         [20.0, 21.0, 23.5].into_iter().for_each(|depth| relief.add(slope, depth));

@@ -1,4 +1,4 @@
-//! Where to go next.
+//! The choice of waypoints.
 
 mod ahead;
 mod choice;
@@ -9,13 +9,13 @@ pub use ahead::PathAhead;
 use choice::PlannerChoice;
 use grounds::Grounds;
 
-use super::planning::{Bounds, Knowledge, Node, Point, Question, Window, Worth, distance};
+use super::planning::{BlockValues, Bounds, CellWindow, Knowledge, Node, PlanRequest, Point, distance};
 use scenecast_core::Area;
 use scenecast_protocol::directive::{Fence, PlannerKind, Utility};
 use scenecast_protocol::map::{Cell, LabelGrid};
 use std::collections::VecDeque;
 
-/// What the camera sees, metres.
+/// The extent of a camera frame on the sea floor, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
     pub across: f64,
@@ -23,54 +23,55 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Metres from the middle that are seen at any heading.
+    /// Metres around the centre that are visible at any heading.
     fn reach(&self) -> f64 {
         self.across.min(self.along) / 2.0
     }
 }
 
-/// What the vehicle is to do next.
+/// The next step of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
     Go(Point),
-    /// What is left of distance or time is the way home.
-    UsedUp,
-    /// It is where it was to go.
-    There,
-    /// There is nowhere that it may go.
-    NoWay,
+    /// The rest of the distance or time is needed for the return path.
+    LimitReached,
+    /// The vehicle is at its goal, or its plan is complete.
+    Arrived,
+    /// There is no allowed path to any goal.
+    NoPath,
 }
 
-/// Chooses waypoints: a lawnmower until the operator has said what matters, then by the planner that is set.
+/// Chooses waypoints: by a lawnmower until the operator has sent a utility, then by the planner in force.
 ///
-/// Places are of the world, as fence and area are: when a fix moves the map, neither they nor the lattice move with it. Only
-/// cells are of the map's frame.
+/// Places are points of the world frame, as fence and area are, so that neither they nor the lattice move when a fix
+/// moves the map. Only cells belong to the map frame.
 #[derive(Debug)]
 pub struct Steering {
     grounds: Grounds,
     choice: PlannerChoice,
-    window: Window,
+    window: CellWindow,
     known: Knowledge,
-    /// East and north of the map's frame in the world, metres.
-    placed: Point,
+    /// The origin of the map frame in the world frame: metres east and north.
+    map_origin: Point,
     plan: VecDeque<Node>,
-    /// The version of the map that the plan is for.
+    /// The version of the map for which the plan was made.
     planned_for: u64,
 }
 
-/// Steps to one waypoint while the way may change with the map: with two, `horizon` collects 2 % less, for each step shows
-/// something new.
+/// Steps up to one waypoint where the plan depends on the map. With two, `horizon` collects 2 % less, because
+/// each step shows new cells.
 const STEPS_AHEAD: usize = 1;
 
 impl Steering {
-    /// Steers within `area`; cells have edges of `cell_m` metres. The vehicle stays `clearance_m` clear of every outline.
+    /// Steers within `area`. Cells have edges of `cell_m` metres, and the vehicle keeps
+    /// `clearance_m` metres from every outline.
     pub fn new(area: Area, footprint: Footprint, cell_m: f64, configured: PlannerKind, clearance_m: f64) -> Self {
         let mut steering = Self {
             grounds: Grounds::new(area, footprint.reach(), clearance_m),
             choice: PlannerChoice::new(configured),
-            window: Window::new(area, cell_m),
+            window: CellWindow::new(area, cell_m),
             known: Knowledge::default(),
-            placed: (0.0, 0.0),
+            map_origin: (0.0, 0.0),
             plan: VecDeque::new(),
             planned_for: 0,
         };
@@ -78,56 +79,55 @@ impl Steering {
         steering
     }
 
-    /// Where the survey begins, metres.
+    /// The first place of the survey.
     pub fn start(&self) -> Point {
         self.grounds.lattice().place(0)
     }
 
-    /// Where the vehicle goes on its return.
-    pub fn home(&self) -> Point {
-        self.grounds.home()
+    /// The end of the return path.
+    pub fn return_place(&self) -> Point {
+        self.grounds.return_place()
     }
 
     pub fn bounds(&self) -> &Bounds {
         self.grounds.bounds()
     }
 
-    /// A fix has moved the map to there in the world: ways are planned anew, from where the vehicle now believes to be.
+    /// A fix has moved the origin of the map frame. The path is planned again from the new position.
     pub fn set_placement(&mut self, east_m: f64, north_m: f64) {
-        if self.placed != (east_m, north_m) {
-            self.placed = (east_m, north_m);
-            self.window = Window::new(self.grounds.area().moved(-east_m, -north_m), self.window.cell_m);
+        if self.map_origin != (east_m, north_m) {
+            self.map_origin = (east_m, north_m);
+            self.window = CellWindow::new(self.grounds.area().moved(-east_m, -north_m), self.window.cell_m);
             self.plan.clear();
         }
     }
 
-    /// Where the map's frame lies in the world.
-    pub fn placed(&self) -> Point {
-        self.placed
+    /// The origin of the map frame in the world frame, metres.
+    pub fn map_origin(&self) -> Point {
+        self.map_origin
     }
 
-    /// Puts a fence that was checked in force.
+    /// Puts a fence in force that was checked.
     pub fn set_fence(&mut self, fence: &Fence) {
         self.grounds.set_fence(fence);
         self.choice.planner_mut().handle_change();
         self.plan.clear();
     }
 
-    /// The operator's choice of a planner; `None`: as configured.
+    /// Sets the planner that the operator ordered; `None`: the configured one.
     pub fn set_planner(&mut self, chosen: Option<PlannerKind>) {
         self.choice.choose(chosen);
         self.plan.clear();
     }
 
-    /// Forgets the way that was planned.
     pub fn replan(&mut self) {
         self.plan.clear();
     }
 
-    /// The camera saw the sea floor around `at`, of the map's frame.
+    /// The camera saw the sea floor around `at`, a point of the map frame.
     pub fn handle_view(&mut self, at: Point) {
         let reach = self.grounds.reach_m();
-        // Cells whose middle was in sight.
+        // The cells whose centre was visible.
         let cells = |middle: f64| {
             let edge = |metres: f64| metres / self.window.cell_m - 0.5;
             edge(middle - reach).ceil() as i32..=edge(middle + reach).floor() as i32
@@ -137,18 +137,19 @@ impl Steering {
         }
     }
 
-    /// How badly the scene model explains a cell.
+    /// Takes the scene model's perplexity of a cell.
     pub fn handle_perplexity(&mut self, cell: Cell, perplexity: f32) {
         self.known.set_perplexity(cell, perplexity);
     }
 
-    /// The next waypoint from `from`, of which version `version` of the map is known, with `left_m` metres to go in all.
+    /// The next waypoint from `from`. `map` is the label map with its version, `left_m` the distance that may
+    /// still be travelled in metres.
     pub fn next(&mut self, from: Point, map: (&LabelGrid, u64), utility: Option<&Utility>, left_m: f64) -> Course {
         if self.choice.follow(utility.is_some()) {
             self.plan.clear();
         }
         let left_m = left_m - self.grounds.last_leg_m();
-        let Some(at) = self.grounds.entry(from) else { return Course::NoWay };
+        let Some(at) = self.grounds.entry(from) else { return Course::NoPath };
         let approach = distance(from, self.grounds.lattice().place(at));
         let adapts = self.choice.adapts();
         let changed = adapts && self.planned_for != map.1;
@@ -159,31 +160,36 @@ impl Steering {
         let follows = self.plan.front().is_some_and(is_next);
         if changed || !follows || !self.can_go(at, &self.plan, left_m - approach) {
             self.planned_for = map.1;
-            self.plan = self.ask(at, map.0, utility, left_m - approach).into();
+            self.plan = self.make_plan(at, map.0, utility, left_m - approach).into();
         }
         self.waypoint(from, at, if adapts { STEPS_AHEAD } else { usize::MAX }, left_m)
     }
 
-    fn ask(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
-        let Some(home) = self.grounds.return_paths() else { return Vec::new() };
+    fn make_plan(&mut self, from: Node, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> Vec<Node> {
+        let Some(return_paths) = self.grounds.return_paths() else { return Vec::new() };
         let none = Utility::default();
-        let worth =
-            Worth::new(self.grounds.lattice(), (&self.window, self.placed), map, &self.known, utility.unwrap_or(&none));
-        let question = Question { lattice: self.grounds.lattice(), worth: &worth, from, home, left_m };
-        self.choice.planner_mut().plan(&question)
+        let values = BlockValues::new(
+            self.grounds.lattice(),
+            (&self.window, self.map_origin),
+            map,
+            &self.known,
+            utility.unwrap_or(&none),
+        );
+        let request = PlanRequest { lattice: self.grounds.lattice(), values: &values, from, return_paths, left_m };
+        self.choice.planner_mut().plan(&request)
     }
 
-    /// Whether the first place of a plan still leaves the way home.
+    /// Whether the first place of a plan leaves enough distance for the return path.
     fn can_go(&self, from: Node, plan: &VecDeque<Node>, left_m: f64) -> bool {
-        let Some(home) = self.grounds.return_paths() else { return false };
+        let Some(return_paths) = self.grounds.return_paths() else { return false };
         let first = plan.front().and_then(|&to| self.grounds.lattice().around(from).find(|(n, _)| *n == to));
-        first.is_some_and(|(n, step)| !left_m.is_finite() || step + home.metres[n] <= left_m)
+        first.is_some_and(|(n, step)| !left_m.is_finite() || step + return_paths.metres[n] <= left_m)
     }
 
     /// The last place that lies straight ahead, at most `most` steps away.
     fn waypoint(&mut self, from: Point, at: Node, most: usize, left_m: f64) -> Course {
         let Some(&first) = self.plan.front() else {
-            return if left_m.is_finite() { Course::UsedUp } else { Course::There };
+            return self.without_plan(at, left_m);
         };
         let entry = self.grounds.lattice().place(at);
         if distance(from, entry) > self.grounds.lattice().step_m()
@@ -207,38 +213,48 @@ impl Steering {
             count += 1;
             self.plan.pop_front();
         }
-        // It is popped when it is reached, so that the rest of the plan follows it.
+        // The place stays in the plan until it is reached, so that the rest of the plan follows it.
         self.plan.push_front(ahead);
         Course::Go(self.grounds.lattice().place(ahead))
     }
 
-    /// The next waypoint on the way home.
-    pub fn next_home(&mut self, from: Point) -> Course {
-        self.plan.clear();
-        let home = self.home();
-        if distance(from, home) <= self.arrival_m() {
-            return Course::There;
+    /// The course where the planner has no waypoint.
+    fn without_plan(&self, at: Node, left_m: f64) -> Course {
+        let has_return = self.grounds.return_paths().is_some_and(|paths| paths.metres[at].is_finite());
+        match (left_m.is_finite(), has_return) {
+            (true, _) => Course::LimitReached,
+            (false, true) => Course::Arrived,
+            (false, false) => Course::NoPath,
         }
-        let Some((at, end, way)) = self.grounds.return_path(from) else { return Course::NoWay };
-        if at != end && way.is_empty() {
-            return Course::NoWay;
+    }
+
+    /// The next waypoint of the return path.
+    pub fn next_return(&mut self, from: Point) -> Course {
+        self.plan.clear();
+        let home = self.return_place();
+        if distance(from, home) <= self.arrival_m() {
+            return Course::Arrived;
+        }
+        let Some((at, end, path)) = self.grounds.return_path(from) else { return Course::NoPath };
+        if at != end && path.is_empty() {
+            return Course::NoPath;
         }
         let entry = self.grounds.lattice().place(at);
-        match way.first().map(|&n| self.grounds.lattice().place(n)) {
+        match path.first().map(|&n| self.grounds.lattice().place(n)) {
             None if distance(from, entry) > self.arrival_m() => Course::Go(entry),
             None if self.grounds.bounds().allows_exit(home, entry) => Course::Go(home),
-            None => Course::There,
+            None => Course::Arrived,
             Some(next) if self.grounds.bounds().allows_leg(from, next) => Course::Go(next),
             Some(_) => Course::Go(entry),
         }
     }
 
-    /// Metres of the return path from a place, infinite if there is none.
-    pub fn way_home_m(&self, from: Point) -> f64 {
+    /// Metres of the return path from a place; infinite if there is none.
+    pub fn return_path_m(&self, from: Point) -> f64 {
         self.grounds.return_path_m(from)
     }
 
-    /// Metres from a waypoint at which it counts as reached.
+    /// The distance in metres at which a waypoint counts as reached.
     pub fn arrival_m(&self) -> f64 {
         self.grounds.arrival_m()
     }
@@ -255,7 +271,7 @@ mod tests {
         Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
     }
 
-    /// Drives to waypoint after waypoint; the places that it came to.
+    /// Steers from waypoint to waypoint, and returns them.
     fn drive(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, legs: usize) -> Vec<Point> {
         let mut at = steering.start();
         let mut track = vec![at];

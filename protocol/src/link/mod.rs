@@ -21,7 +21,7 @@ pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
 pub use surface::{Cycle, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
-pub use vehicle::{VehicleConfig, VehicleEvent, VehicleLink};
+pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{LinkWindow, WindowRefusal};
 
 use crate::schedule::Class;

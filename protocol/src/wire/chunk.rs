@@ -65,9 +65,9 @@ fn chunk_header_len(payload: usize, room: usize) -> usize {
 /// The longest payload of a chunk in bytes.
 const MAX_PAYLOAD: usize = 27 + 1023;
 
-/// The longest payload of a single chunk in `room` bytes; every shorter payload fits too.
+/// The longest payload of a single chunk in `room` bytes, at most 1050; every shorter payload fits too.
 pub fn room_for_payload(room: usize) -> usize {
-    room.saturating_sub(1)
+    room.saturating_sub(1).min(MAX_PAYLOAD)
 }
 
 /// Appends a chunk to a frame body that can still take `room` bytes; returns whether it fitted.

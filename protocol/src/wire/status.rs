@@ -36,7 +36,7 @@ impl VehicleMode {
 /// The reason for the vehicle's mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ModeReason {
-    /// The survey's plan; there is no fault.
+    /// The survey's plan; there is no fault. A vehicle that holds for this reason has arrived at the end of its plan.
     #[default]
     Survey,
     /// An order of the operator.
@@ -202,6 +202,11 @@ impl VehicleStatus {
     const REPORT_HEAD: usize = 8 + Backlog::BYTES;
     /// Length of a pose with a waypoint, without a path, in bytes.
     pub(crate) const POSE: usize = 21;
+
+    /// Whether the vehicle holds because it has reached the end of its survey's plan.
+    pub fn has_arrived(&self) -> bool {
+        (self.mode, self.reason) == (VehicleMode::Hold, ModeReason::Survey)
+    }
 
     /// Encodes the pose; values out of range are clamped. If `room` is too small, the waypoint or the end of
     /// the path is left out.

@@ -6,23 +6,23 @@ use scenecast_protocol::directive::{OrderStatus, SlotId};
 use scenecast_protocol::exemplar::edge_px;
 use scenecast_protocol::link::PeerView;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{AskState, ExemplarCache, Picture, VehicleRecord};
+use scenecast_surface::{ExemplarCache, RequestState, StoredExemplar, VehicleRecord};
 
 pub(super) fn progress(label: u8, record: &VehicleRecord, view: &PeerView<'_>, address: Address) -> ExemplarProgress {
-    let page = record.exemplars.page(label);
-    let request = page.and_then(|page| page.asked);
+    let entry = record.exemplars.label(label);
+    let request = entry.and_then(|entry| entry.request);
     let base = format!("/api/v2/vehicles/{}/exemplars/{label}", address.number());
     let images: Vec<ExemplarImage> =
-        page.into_iter().flat_map(|page| &page.pictures).map(|p| image(p, &base)).collect();
+        entry.into_iter().flat_map(|entry| &entry.stored).map(|p| image(p, &base)).collect();
     let latest = images.last();
     let (state, progress, bytes) = match request.map(|r| r.state) {
         None if latest.is_some() => (ExemplarStage::Received, 1.0, None),
         None => (ExemplarStage::None, 0.0, None),
-        Some(AskState::Asked) if is_queued(view) => (ExemplarStage::Queued, 0.0, None),
-        Some(AskState::Asked) => (ExemplarStage::OnAir, 0.0, None),
-        Some(AskState::NoneYet) => (ExemplarStage::NotAvailable, 0.0, None),
-        Some(AskState::Refused) => (ExemplarStage::Refused, 0.0, None),
-        Some(AskState::Coming(held, total)) => {
+        Some(RequestState::Ordered) if is_queued(view) => (ExemplarStage::Queued, 0.0, None),
+        Some(RequestState::Ordered) => (ExemplarStage::OnAir, 0.0, None),
+        Some(RequestState::NoneYet) => (ExemplarStage::NotAvailable, 0.0, None),
+        Some(RequestState::Refused) => (ExemplarStage::Refused, 0.0, None),
+        Some(RequestState::Arriving(held, total)) => {
             (ExemplarStage::Receiving, held as f64 / total.max(1) as f64, Some(total))
         }
     };
@@ -36,15 +36,15 @@ pub(super) fn progress(label: u8, record: &VehicleRecord, view: &PeerView<'_>, a
     }
 }
 
-fn image(p: &Picture, base: &str) -> ExemplarImage {
+fn image(p: &StoredExemplar, base: &str) -> ExemplarImage {
     ExemplarImage {
         number: p.number,
         edge_px: edge_px(p.size),
         can_enlarge: p.size < ExemplarCache::MAX_SIZE,
         bytes: p.sent_bytes,
         url: format!("{base}-{}.webp", p.number),
-        at_s: seconds(p.came),
-        requested: p.asked,
+        at_s: seconds(p.received),
+        requested: p.requested,
     }
 }
 

@@ -45,7 +45,7 @@ pub(super) fn summary(surface: &Surface, meter: &LinkMeter, now: Instant) -> Lin
         budget_window_s: meter.window_s(),
         shares: Class::SHARED.iter().zip(surface.shares().0).map(|(c, s)| (c.name().to_owned(), s)).collect(),
         background: surface.background().names(&surface.layers()),
-        unknown_senders: surface.strangers(),
+        unknown_senders: surface.unknown_senders(),
         up: direction(0, numbered, numbered.saturating_sub(received), |s| &s.received_by_class),
         down: direction(1, lost + delivered, lost, |s| &s.bytes_by_class),
         round_trip_s: views.iter().find_map(PeerView::round_trip).map(|d| d.as_secs_f64()),

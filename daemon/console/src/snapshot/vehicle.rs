@@ -59,9 +59,9 @@ fn orders(record: &VehicleRecord, view: &PeerView<'_>) -> VehicleOrders {
         limits: record.limits.as_ref().map(Into::into),
         fence_in_force: in_force(&record.fence_in_force),
         limits_in_force: in_force(&record.limits_in_force),
-        planner: record.settings.asked().planner.value().map(|p| PlannerKind::name(p).to_owned()),
+        planner: record.settings.requested().planner.value().map(|p| PlannerKind::name(p).to_owned()),
         settings: VehicleSettings {
-            requested: SettingsOrder::of(record.settings.asked(), view.layers()),
+            requested: SettingsOrder::of(record.settings.requested(), view.layers()),
             in_force: record.settings.in_force().map(|settings| SettingsOrder::of(settings, view.layers())),
         },
         directive: DirectiveSlots { slots: view.slots().map(order_progress).collect() },
@@ -153,6 +153,9 @@ fn activity(s: &VehicleStatus) -> String {
         VehicleMode::Abort => "aborted",
         VehicleMode::Done => "done",
     };
+    if s.has_arrived() {
+        return format!("{mode}: arrived");
+    }
     s.reason.name().map_or(mode.to_owned(), |reason| format!("{mode}: {reason}"))
 }
 

@@ -98,7 +98,7 @@ pub struct StatusReport {
     pub autopilot_silent: bool,
     /// The reason for the mode, unless it is the survey: order, fence, distance, time, silence, depth or altitude, no path.
     pub reason: Option<String>,
-    /// Mode and reason as a text, such as "holding: fence".
+    /// Mode and reason as a text, such as "holding: fence"; "holding: arrived" at the end of the survey's plan.
     pub activity: String,
     /// Its plan.
     #[serde(flatten)]

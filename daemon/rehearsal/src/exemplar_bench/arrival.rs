@@ -15,7 +15,7 @@ use scenecast_protocol::map::Cell;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{Page, Wish};
+use scenecast_surface::{LabelExemplars, RequestKind};
 use scenecast_vehicle::{Durable, MapUpdate};
 use serde::Serialize;
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
@@ -79,8 +79,8 @@ pub fn arrivals(
         let next = bench.now + Duration::from_secs_f64(1.0 + 40.0 * bench.rng.uniform());
         bench.run_until(next, |_| false);
         let label = bench.any_label();
-        let first = bench.get(label, Wish::Another)?;
-        took.extend(if setting.larger { bench.get(label, Wish::Larger(None))? } else { first });
+        let first = bench.get(label, RequestKind::Another)?;
+        took.extend(if setting.larger { bench.get(label, RequestKind::Larger(None))? } else { first });
         progress((i + 1) as f64 / setting.requests as f64);
     }
     let within = took.iter().filter(|(s, _)| *s <= 30.0).count();
@@ -147,7 +147,7 @@ impl ExemplarBench {
         )?;
         let window = Duration::from_secs_f64(config.link.budget_window_s);
         let mut vehicle = VehicleHost::new(vehicle, channel_station(modem, window, now), None);
-        vehicle.handle_exemplars(gallery(patches));
+        vehicle.handle_exemplars(Arc::new(gallery(patches)));
         Ok(Self {
             setting,
             now,
@@ -173,23 +173,23 @@ impl ExemplarBench {
     }
 
     /// Requests an image; its seconds and bytes, or `None` if it did not arrive.
-    pub(super) fn get(&mut self, label: u8, wish: Wish) -> Result<Option<(f64, usize)>, UserError> {
+    pub(super) fn get(&mut self, label: u8, kind: RequestKind) -> Result<Option<(f64, usize)>, UserError> {
         let asked = self.now;
-        self.surface.surface_mut().request_exemplar(self.address, label, wish, asked).map_err(UserError::Failed)?;
+        self.surface.surface_mut().request_exemplar(self.address, label, kind, asked).map_err(UserError::Failed)?;
         if !self.run_until(asked + GIVE_UP_TIMEOUT, |w| w.is_met(label)) {
             self.surface.surface_mut().cancel_exemplar(self.address, label, self.now).map_err(UserError::Failed)?;
             return Ok(None);
         }
-        let bytes = self.page(label).and_then(|page| page.picture(None)).map(|p| p.sent_bytes);
+        let bytes = self.page(label).and_then(|page| page.exemplar(None)).map(|p| p.sent_bytes);
         Ok(bytes.map(|bytes| (self.now.since(asked).as_secs_f64(), bytes)))
     }
 
-    pub(super) fn page(&self, label: u8) -> Option<&Page> {
-        self.surface.surface().record(self.address)?.exemplars.page(label)
+    pub(super) fn page(&self, label: u8) -> Option<&LabelExemplars> {
+        self.surface.surface().record(self.address)?.exemplars.label(label)
     }
 
     fn is_met(&self, label: u8) -> bool {
-        self.page(label).is_some_and(|page| page.asked.is_none())
+        self.page(label).is_some_and(|page| page.request.is_none())
     }
 
     /// A map of random labels that change faster than the link can follow; without load the map stays constant.

@@ -13,6 +13,7 @@ use scenecast_vehicle::Mapper;
 use scenecast_vehicle::exemplar::{GOOD_SSIM, compress, compress_to, middle};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Number of camera frames across and along a source.
 const FRAMES: (u32, u32) = (4, 3);
@@ -90,7 +91,7 @@ pub fn patches(source: &PatchSource, seed: u64) -> Result<Vec<RgbImage>, UserErr
         mapper.handle_frame(&view, &pose, 1.0, f64::from(i) / camera.rate_hz);
     }
     let of_label = |images: Vec<ExemplarPatch>| images.into_iter().take(EACH).map(|e| e.patch.as_ref().clone());
-    Ok(mapper.gallery().into_values().flat_map(of_label).collect())
+    Ok(Arc::unwrap_or_clone(mapper.shared_exemplars()).into_values().flat_map(of_label).collect())
 }
 
 /// Measures the patches of all sources; returns the patches as well.

@@ -6,7 +6,7 @@ use image::RgbImage;
 use scenecast_protocol::directive::Budget;
 use scenecast_protocol::schedule::{BackgroundOrder, Class, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_surface::{AskState, Wish};
+use scenecast_surface::{RequestKind, RequestState};
 
 const IDLE: ArrivalSetting = ArrivalSetting { requests: 0, loss: 0.1, loaded: false, larger: false };
 
@@ -45,22 +45,22 @@ fn exemplar_bytes(bench: &ExemplarBench) -> u64 {
     bench.vehicle.vehicle().stats().bytes_by_class.get(&Class::Exemplar).copied().unwrap_or(0)
 }
 
-fn state(bench: &ExemplarBench, label: u8) -> Option<AskState> {
-    Some(bench.page(label)?.asked?.state)
+fn state(bench: &ExemplarBench, label: u8) -> Option<RequestState> {
+    Some(bench.page(label)?.request?.state)
 }
 
 #[test]
 fn a_small_image_grows_and_another_follows_after_the_survey() {
     let mut bench = bench(IDLE, 1);
-    let (_, small) = bench.get(3, Wish::Another).unwrap().unwrap();
-    let first = bench.page(3).unwrap().picture(None).unwrap().clone();
-    assert!(small <= 700 && first.size == 0 && first.asked, "{small} bytes");
-    let (_, large) = bench.get(3, Wish::Larger(None)).unwrap().unwrap();
-    let pictures = &bench.page(3).unwrap().pictures;
+    let (_, small) = bench.get(3, RequestKind::Another).unwrap().unwrap();
+    let first = bench.page(3).unwrap().exemplar(None).unwrap().clone();
+    assert!(small <= 700 && first.size == 0 && first.requested, "{small} bytes");
+    let (_, large) = bench.get(3, RequestKind::Larger(None)).unwrap().unwrap();
+    let pictures = &bench.page(3).unwrap().stored;
     assert!(large <= 2800 && large > small, "{large} bytes");
     assert_eq!(pictures.iter().map(|p| (p.number, p.size)).collect::<Vec<_>>(), [(first.number, 1)]);
-    bench.get(3, Wish::Another).unwrap().unwrap();
-    let numbers: Vec<u8> = bench.page(3).unwrap().pictures.iter().map(|p| p.number).collect();
+    bench.get(3, RequestKind::Another).unwrap().unwrap();
+    let numbers: Vec<u8> = bench.page(3).unwrap().stored.iter().map(|p| p.number).collect();
     assert!(numbers.len() == 2 && numbers[0] != numbers[1], "{numbers:?}");
 }
 
@@ -68,10 +68,10 @@ fn a_small_image_grows_and_another_follows_after_the_survey() {
 fn a_cancelled_image_costs_no_more_bits() {
     let loaded = ArrivalSetting { loaded: true, ..IDLE };
     let mut bench = bench(loaded, 2);
-    bench.get(4, Wish::Another).unwrap().unwrap();
-    bench.surface.surface_mut().request_exemplar(bench.address, 4, Wish::Larger(None), bench.now).unwrap();
+    bench.get(4, RequestKind::Another).unwrap().unwrap();
+    bench.surface.surface_mut().request_exemplar(bench.address, 4, RequestKind::Larger(None), bench.now).unwrap();
     let until = bench.now + std::time::Duration::from_secs(120);
-    assert!(bench.run_until(until, |w| matches!(state(w, 4), Some(AskState::Coming(..)))));
+    assert!(bench.run_until(until, |w| matches!(state(w, 4), Some(RequestState::Arriving(..)))));
     let version = bench.surface.surface_mut().cancel_exemplar(bench.address, 4, bench.now).unwrap();
     let received = |w: &ExemplarBench| w.vehicle.vehicle().durable().inbox.versions[4] == Some(version);
     assert!(bench.run_until(until, received), "the vehicle receives the order");
@@ -79,7 +79,7 @@ fn a_cancelled_image_costs_no_more_bits() {
     wait(&mut bench, 120.0);
     assert_eq!(exemplar_bytes(&bench), then);
     let page = bench.page(4).unwrap();
-    assert_eq!((page.asked, page.pictures.len()), (None, 1), "the small one stays");
+    assert_eq!((page.request, page.stored.len()), (None, 1), "the small one stays");
 }
 
 #[test]
@@ -87,13 +87,13 @@ fn a_vehicle_without_an_image_reports_so_and_sends_it_later() {
     let mut bench = bench(IDLE, 3);
     let gallery = bench.vehicle.vehicle().exemplars().clone();
     bench.vehicle.handle_exemplars(Default::default());
-    bench.surface.surface_mut().request_exemplar(bench.address, 2, Wish::Another, bench.now).unwrap();
+    bench.surface.surface_mut().request_exemplar(bench.address, 2, RequestKind::Another, bench.now).unwrap();
     let until = bench.now + std::time::Duration::from_secs(120);
-    assert!(bench.run_until(until, |w| state(w, 2) == Some(AskState::NoneYet)));
+    assert!(bench.run_until(until, |w| state(w, 2) == Some(RequestState::NoneYet)));
     wait(&mut bench, 60.0);
-    assert_eq!(state(&bench, 2), Some(AskState::NoneYet));
+    assert_eq!(state(&bench, 2), Some(RequestState::NoneYet));
     bench.vehicle.handle_exemplars(gallery);
-    assert!(bench.run_until(until, |w| w.page(2).unwrap().pictures.len() == 1));
+    assert!(bench.run_until(until, |w| w.page(2).unwrap().stored.len() == 1));
     assert_eq!(state(&bench, 2), None);
 }
 
@@ -102,11 +102,11 @@ fn spare_capacity_shows_every_label_once_and_yields_to_requests() {
     let mut bench = bench(IDLE, 4);
     background(&mut bench, &["exemplars"]);
     let until = bench.now + std::time::Duration::from_secs(120);
-    assert!(bench.run_until(until, |w| w.page(1).is_some_and(|p| !p.pictures.is_empty())));
-    let (seconds, _) = bench.get(LABELS, Wish::Another).unwrap().unwrap();
+    assert!(bench.run_until(until, |w| w.page(1).is_some_and(|p| !p.stored.is_empty())));
+    let (seconds, _) = bench.get(LABELS, RequestKind::Another).unwrap().unwrap();
     assert!(seconds < 30.0, "{seconds} s");
     wait(&mut bench, 300.0);
-    let shown = |label: u8| bench.page(label).unwrap().pictures.iter().map(|p| p.asked).collect::<Vec<_>>();
+    let shown = |label: u8| bench.page(label).unwrap().stored.iter().map(|p| p.requested).collect::<Vec<_>>();
     assert!((1..LABELS).all(|label| shown(label) == [false]), "{:?}", (1..LABELS).map(shown).collect::<Vec<_>>());
     assert_eq!(shown(LABELS), [true]);
     let then = exemplar_bytes(&bench);

@@ -31,7 +31,7 @@ impl Ship {
             origin: Some(ORIGIN),
             language: GpsLanguage::Nmea,
             mounting: Mounting::default(),
-            most_sigma_m: 50.0,
+            max_sigma_m: 50.0,
             period: Duration::from_secs(1),
         };
         Self {

@@ -42,7 +42,7 @@ impl Anchored {
             origin: Some(origin),
             language: GpsLanguage::Nmea,
             mounting: Mounting { depth_m: HEAD_M, ..Mounting::default() },
-            most_sigma_m: 63.0,
+            max_sigma_m: 63.0,
             period: Duration::from_secs(1),
         };
         let (instruments, head) = (Instruments::new(receiver, seed), UsblHead::new(usbl, seed));

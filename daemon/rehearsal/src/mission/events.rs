@@ -182,7 +182,7 @@ impl Mission {
         let pose = Pose { x: x_m, y: y_m, z: -depth_m, yaw_rad: -heading_rad };
         let update = self.mapper.handle_frame(image, &pose, scale, t_s);
         self.vehicle.handle_map(&update, now);
-        self.vehicle.handle_exemplars(self.mapper.gallery());
+        self.vehicle.handle_exemplars(self.mapper.shared_exemplars());
         self.logbook.note_update(self.vehicle.vehicle(), update);
         Ok(())
     }

@@ -39,13 +39,13 @@ impl Mission {
         let give_up = now + Duration::from_secs(120);
         let is_in_force = |m: &Self| {
             let record = &m.surface().record(address).unwrap().settings;
-            record.in_force() == Some(record.asked())
+            record.in_force() == Some(record.requested())
         };
         while !is_in_force(self) {
             assert!(self.now() < give_up, "not in force after two minutes");
             self.advance(self.now() + Duration::from_secs(1)).unwrap();
         }
-        assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().settings.asked());
+        assert_eq!(self.vehicle().settings(), self.surface().record(address).unwrap().settings.requested());
     }
 
     /// Ends the survey and drains the link.

@@ -116,7 +116,7 @@ pub(crate) fn run_planner(scene: &Scene, task: &Task, kind: PlannerKind, knowled
         let left_m = task.limit_m - run.metres();
         let known = if knowledge == MapKnowledge::All { &scene.labels } else { &map };
         let course = match is_back {
-            true => steering.next_home(at),
+            true => steering.next_return(at),
             false => steering.next(at, (known, version), Some(&scene.utility), left_m),
         };
         match course {
@@ -125,7 +125,7 @@ pub(crate) fn run_planner(scene: &Scene, task: &Task, kind: PlannerKind, knowled
                 run.track.push(to);
                 (at, version) = (to, version + 1);
             }
-            Course::UsedUp if !is_back => is_back = true,
+            Course::LimitReached if !is_back => is_back = true,
             _ => break,
         }
     }

@@ -1,6 +1,6 @@
-//! A Kalman filter of a place in the plane that moves about steadily.
+//! A Kalman filter of a position in the plane, with nearly constant velocity.
 
-/// A place with its uncertainty: covariance in m2, xx, xy, yy.
+/// A position with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     pub x_m: f64,
@@ -10,67 +10,69 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// A place that is as uncertain in every direction.
+    /// A position with the same uncertainty in every direction.
     pub fn round(x_m: f64, y_m: f64, sigma_m: f64) -> Self {
         Self { x_m, y_m, cov_m2: [sigma_m * sigma_m, 0.0, sigma_m * sigma_m] }
     }
 
-    /// Standard deviation of one coordinate, the mean of all directions, metres.
+    /// Standard deviation of one coordinate in metres, averaged over all directions.
     pub fn sigma_m(&self) -> f64 {
         ((self.cov_m2[0] + self.cov_m2[2]) / 2.0).max(0.0).sqrt()
     }
 
-    /// Whether every number is one.
+    /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
         [self.x_m, self.y_m].into_iter().chain(self.cov_m2).all(f64::is_finite)
     }
 }
 
-/// What became of a measurement.
+/// The decision about a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum MeasurementVerdict {
     Used,
-    /// It is too far from what was expected.
+    /// It is too far from the prediction.
     Outlier,
-    /// It was far from what was expected, but so were the ones before, at the same place: the filter began anew there.
-    BeganAnew,
+    /// It is far from the prediction, but so were those before it, at the same place. The
+    /// filter has started again there.
+    Restarted,
 }
 
-/// Constant velocity with random acceleration; gates what cannot be.
+/// A filter with constant velocity and random acceleration, which refuses outliers.
 #[derive(Debug, Clone)]
 pub struct PlaneFilter {
-    /// Metres a second squared, over a second.
+    /// Standard deviation of the acceleration, metres a second squared over a second.
     acceleration: f64,
-    state: Option<State>,
-    /// Measurements in a row that were refused though each was near the one before, and the last one.
+    state: Option<FilterState>,
+    /// The number of refused measurements in a row that agreed with each other, and the last one with its time.
     refused: (u32, Option<(f64, Estimate)>),
 }
 
 #[derive(Debug, Clone, Copy)]
-struct State {
+struct FilterState {
     at_s: f64,
     place: [f64; 2],
     velocity: [f64; 2],
-    /// Covariance of one axis: place, place-velocity, velocity; both axes have the noise of the rounder measurement.
+    /// Covariance of each axis: position, position and velocity, velocity. An elliptical measurement
+    /// is taken axis by axis.
     p: [[f64; 3]; 2],
 }
 
 impl PlaneFilter {
-    /// Mahalanobis distance squared, two degrees of freedom, that one of a thousand good measurements exceeds.
+    /// The squared Mahalanobis distance with two degrees of freedom that one of a thousand good measurements exceeds.
     pub const GATE: f64 = 13.8;
-    /// So many refused measurements that agree with each other are believed.
-    const AGREEING: u32 = 4;
-    /// Standard deviation of the speed at first, m/s.
+    /// The number of refused measurements in a row that agree with each other after which they are trusted.
+    const MIN_AGREEING: u32 = 4;
+    /// Standard deviation of the initial velocity, m/s.
     const FIRST_SPEED: f64 = 1.0;
-    /// Longer without a measurement, and the filter begins anew, s.
-    const FORGOTTEN_S: f64 = 600.0;
+    /// The filter starts again after this many seconds without a measurement.
+    const TIMEOUT_S: f64 = 600.0;
 
-    /// A filter of something that speeds up or turns by about `acceleration` m/s2 over a second.
+    /// A filter of a body that accelerates by about `acceleration` m/s2 over a second.
     pub fn new(acceleration: f64) -> Self {
         Self { acceleration, state: None, refused: (0, None) }
     }
 
-    /// Where it is at `at_s`.
+    /// The position at `at_s`, seconds.
     pub fn predict(&self, at_s: f64) -> Option<Estimate> {
         let s = self.state?.moved(at_s, self.acceleration);
         Some(Estimate { x_m: s.place[0], y_m: s.place[1], cov_m2: [s.p[0][0], 0.0, s.p[1][0]] })
@@ -81,15 +83,16 @@ impl PlaneFilter {
         self.state.map(|s| (s.velocity[0], s.velocity[1]))
     }
 
-    /// Takes a measurement of `at_s`; one that is older than the last counts as of the last, with what it may have moved.
-    pub fn update(&mut self, seen: &Estimate, at_s: f64) -> Verdict {
-        let state = self.state.filter(|s| at_s - s.at_s < Self::FORGOTTEN_S);
+    /// Takes a measurement of the time `at_s`. One from before the last is moved to the
+    /// last, with a larger uncertainty.
+    pub fn update(&mut self, seen: &Estimate, at_s: f64) -> MeasurementVerdict {
+        let state = self.state.filter(|s| at_s - s.at_s < Self::TIMEOUT_S);
         let Some(state) = state else {
             self.begin(seen, at_s);
-            return Verdict::Used;
+            return MeasurementVerdict::Used;
         };
         let late_s = (state.at_s - at_s).max(0.0);
-        // Back along its own way: what it may have turned in the meantime adds to the uncertainty.
+        // The measurement is moved along the velocity. A turn in the meantime adds to the uncertainty.
         let seen_now = Estimate {
             x_m: seen.x_m + state.velocity[0] * late_s,
             y_m: seen.y_m + state.velocity[1] * late_s,
@@ -105,32 +108,32 @@ impl PlaneFilter {
         self.refused = (0, None);
         moved.correct(&seen_now);
         self.state = Some(moved);
-        Verdict::Used
+        MeasurementVerdict::Used
     }
 
-    fn refuse(&mut self, seen: &Estimate, at_s: f64) -> Verdict {
+    fn refuse(&mut self, seen: &Estimate, at_s: f64) -> MeasurementVerdict {
         let agrees = self.refused.1.is_some_and(|(before_s, before)| {
             let reach = 3.0 * (before.sigma_m().hypot(seen.sigma_m())) + 2.0 * (at_s - before_s).abs();
             (seen.x_m - before.x_m).hypot(seen.y_m - before.y_m) < reach
         });
         let row = if agrees { self.refused.0 + 1 } else { 1 };
-        if row < Self::AGREEING {
+        if row < Self::MIN_AGREEING {
             self.refused = (row, Some((at_s, *seen)));
-            return Verdict::Outlier;
+            return MeasurementVerdict::Outlier;
         }
         self.begin(seen, at_s);
-        Verdict::BeganAnew
+        MeasurementVerdict::Restarted
     }
 
     fn begin(&mut self, seen: &Estimate, at_s: f64) {
         let axis = |variance: f64| [variance, 0.0, Self::FIRST_SPEED.powi(2)];
         let p = [axis(seen.cov_m2[0]), axis(seen.cov_m2[2])];
-        self.state = Some(State { at_s, place: [seen.x_m, seen.y_m], velocity: [0.0; 2], p });
+        self.state = Some(FilterState { at_s, place: [seen.x_m, seen.y_m], velocity: [0.0; 2], p });
         self.refused = (0, None);
     }
 }
 
-impl State {
+impl FilterState {
     fn moved(mut self, at_s: f64, acceleration: f64) -> Self {
         let dt = (at_s - self.at_s).clamp(0.0, 3600.0);
         let q = acceleration * acceleration;
@@ -176,14 +179,14 @@ mod tests {
     use sim_channel::RandomStream;
 
     #[test]
-    fn a_steady_way_becomes_known_better_than_it_is_measured() {
-        let mut dice = RandomStream::new(1, &[]);
+    fn a_steady_motion_is_filtered_below_measurement_noise() {
+        let mut rng = RandomStream::new(1, &[]);
         let mut filter = PlaneFilter::new(0.02);
         let mut worst: f64 = 0.0;
         for s in 0..200 {
             let t = f64::from(s);
-            let seen = Estimate::round(t + 3.0 * dice.normal(), 2.0 * t + 3.0 * dice.normal(), 3.0);
-            assert_ne!(filter.update(&seen, t), Verdict::BeganAnew);
+            let seen = Estimate::round(t + 3.0 * rng.normal(), 2.0 * t + 3.0 * rng.normal(), 3.0);
+            assert_ne!(filter.update(&seen, t), MeasurementVerdict::Restarted);
             if s > 50 {
                 let e = filter.predict(t).unwrap();
                 worst = worst.max((e.x_m - t).hypot(e.y_m - 2.0 * t));
@@ -200,12 +203,12 @@ mod tests {
         for s in 0..20 {
             filter.update(&Estimate::round(0.0, 0.0, 1.0), f64::from(s));
         }
-        assert_eq!(filter.update(&Estimate::round(40.0, 0.0, 1.0), 20.0), Verdict::Outlier);
-        assert_eq!(filter.update(&Estimate::round(-300.0, 0.0, 1.0), 21.0), Verdict::Outlier);
-        assert_eq!(filter.update(&Estimate::round(0.5, 0.0, 1.0), 22.0), Verdict::Used);
+        assert_eq!(filter.update(&Estimate::round(40.0, 0.0, 1.0), 20.0), MeasurementVerdict::Outlier);
+        assert_eq!(filter.update(&Estimate::round(-300.0, 0.0, 1.0), 21.0), MeasurementVerdict::Outlier);
+        assert_eq!(filter.update(&Estimate::round(0.5, 0.0, 1.0), 22.0), MeasurementVerdict::Used);
         let verdicts: Vec<_> =
             (23..28).map(|s| filter.update(&Estimate::round(40.0, 0.0, 1.0), f64::from(s))).collect();
-        assert_eq!(verdicts[3], Verdict::BeganAnew, "{verdicts:?}");
+        assert_eq!(verdicts[3], MeasurementVerdict::Restarted, "{verdicts:?}");
         assert!((filter.predict(28.0).unwrap().x_m - 40.0).abs() < 1.0);
     }
 }

@@ -1,9 +1,10 @@
-//! Staying above the vehicle.
+//! Goals for a surface vehicle that stays above the vehicle.
 
-/// Where the surface vehicle goes so that it stays near above the one below.
+/// Keeps a surface vehicle near the point above the vehicle.
 ///
-/// It keeps a stand-off, for straight above the angles of a USBL head tell the least and noise of the ship is loudest,
-/// and moves only when the distance has left a dead band, so that its engines are silent most of the time.
+/// It keeps a stand-off, because directly above the vehicle a USBL head measures the direction worst and the
+/// noise of the ship is loudest. It moves only when the distance leaves a dead band, so that the engines are
+/// silent most of the time.
 #[derive(Debug, Clone)]
 pub struct Follow {
     stand_off_m: f64,
@@ -12,15 +13,15 @@ pub struct Follow {
 }
 
 impl Follow {
-    /// Seconds that the vehicle's way is thought on.
+    /// Seconds by which the vehicle's motion is extrapolated.
     const AHEAD_S: f64 = 20.0;
 
-    /// Keeps `stand_off_m` from above the vehicle, give or take `dead_band_m`.
+    /// Keeps `stand_off_m` metres from the point above the vehicle, within `dead_band_m` metres.
     pub fn new(stand_off_m: f64, dead_band_m: f64) -> Self {
         Self { stand_off_m, dead_band_m, ordered: None }
     }
 
-    /// Where the surface vehicle is to go, if that is elsewhere than it was last told.
+    /// The next goal of the surface vehicle, if it differs from the last one.
     pub fn next(&mut self, own: (f64, f64), vehicle: (f64, f64), velocity: (f64, f64)) -> Option<(f64, f64)> {
         let below = (vehicle.0 + velocity.0 * Self::AHEAD_S, vehicle.1 + velocity.1 * Self::AHEAD_S);
         let off = |at: (f64, f64)| ((at.0 - below.0).hypot(at.1 - below.1) - self.stand_off_m).abs();
@@ -29,7 +30,7 @@ impl Follow {
         }
         let (dx, dy) = (own.0 - below.0, own.1 - below.1);
         let distance = dx.hypot(dy);
-        // From straight above any direction is as good; north is one.
+        // Directly above the vehicle every direction is equally good.
         let (ux, uy) = if distance > 0.1 { (dx / distance, dy / distance) } else { (0.0, 1.0) };
         let target = (below.0 + ux * self.stand_off_m, below.1 + uy * self.stand_off_m);
         self.ordered = Some(target);
@@ -52,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_where_the_vehicle_is_going() {
+    fn the_goal_lies_ahead_of_a_moving_vehicle() {
         let mut follow = Follow::new(10.0, 5.0);
         assert_eq!(follow.next((0.0, 0.0), (100.0, 0.0), (1.0, 0.0)), Some((110.0, 0.0)));
     }

@@ -1,15 +1,15 @@
-//! The localisation relay: GPS and USBL into fixes of vehicles, and the surface above them.
+//! The localisation relay: it turns GPS and USBL measurements into fixes of the vehicles, and keeps the surface above
+//! them.
 //!
-//! [`Relay`] takes the bytes of a GPS ([`gps`]: NMEA 0183 or gpsd's JSON) and what a USBL head tells ([`usbl`]), and
-//! gives fixes in the world frame, the plane that touches the Earth at the mission's origin ([`geodesy`]). Nothing here
-//! does IO.
+//! [`Relay`] takes the bytes of a GPS receiver (NMEA 0183 or the JSON of gpsd) and the measurements of a USBL head, and
+//! gives fixes in the world frame, the plane that touches the Earth at the mission's origin. It does no IO.
 
 mod filter;
 mod follow;
 mod relay;
 mod usbl;
 
-pub use filter::{Estimate, PlaneFilter, Verdict};
+pub use filter::{Estimate, MeasurementVerdict, PlaneFilter};
 pub use follow::Follow;
 pub use relay::{Relay, RelayConfig, RelayFault};
 pub use usbl::{Mounting, UsblFault, UsblSighting};

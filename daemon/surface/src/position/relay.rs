@@ -1,6 +1,6 @@
-//! The relay: where the surface is, and where it sees the vehicles.
+//! The relay estimates the position of the surface and of the vehicles that its USBL head measures.
 
-use super::filter::{Estimate, PlaneFilter, Verdict};
+use super::filter::{Estimate, MeasurementVerdict, PlaneFilter};
 use super::usbl::{Mounting, UsblFault, UsblSighting, offset};
 use scenecast_core::gps::{Gps, GpsLanguage};
 use scenecast_core::{LatLon, TangentPlane};
@@ -16,24 +16,23 @@ pub struct RelayConfig {
     /// Origin of the world frame; `None`: the first good position.
     pub origin: Option<LatLon>,
     pub language: GpsLanguage,
-    /// How the USBL head is mounted.
     pub mounting: Mounting,
-    /// Fixes of less are not sent, metres: a standard deviation.
-    pub most_sigma_m: f64,
-    /// At most one fix of a vehicle in so long.
+    /// Maximum standard deviation of a fix that is sent, metres.
+    pub max_sigma_m: f64,
+    /// Minimum time between two fixes of a vehicle.
     pub period: Duration,
 }
 
-/// Why a sighting of a vehicle became no fix.
+/// The reason why a measurement gave no fix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RelayFault {
-    /// What the head told gives no place.
+    /// The measurement gives no position.
     Usbl(UsblFault),
-    /// Nobody knows where the surface is, or was at the time.
+    /// The position of the surface is unknown, or was at that time.
     NoGps,
-    /// It is too far from where the vehicle can be.
+    /// It is too far from the estimate.
     Outlier,
-    /// It is too uncertain to be of use.
+    /// Its standard deviation is too large.
     TooVague,
     TooOld,
 }
@@ -50,16 +49,16 @@ impl RelayFault {
     }
 }
 
-/// A vehicle as the head sees it.
+/// The estimate of a vehicle.
 #[derive(Debug)]
-struct Seen {
+struct TrackedVehicle {
     filter: PlaneFilter,
     depth: Option<(f64, Instant)>,
     sighted: Option<Instant>,
     fixed: Option<Instant>,
 }
 
-/// Fuses GPS, heading and USBL into fixes of vehicles. Times are of one clock; no IO.
+/// Turns GPS, heading and USBL measurements into fixes. All times are of one clock.
 #[derive(Debug)]
 pub struct Relay {
     config: RelayConfig,
@@ -69,20 +68,19 @@ pub struct Relay {
     own: PlaneFilter,
     own_at: Option<Instant>,
     gps_outliers: u64,
-    vehicles: BTreeMap<Address, Seen>,
+    vehicles: BTreeMap<Address, TrackedVehicle>,
     faults: BTreeMap<RelayFault, u64>,
     fixes: u64,
 }
 
 impl Relay {
-    /// A surface without GPS for longer gives no fixes.
-    const GPS_LASTS: Duration = Duration::from_secs(10);
-    /// The vehicle refuses what is older than 120 s; what is nearly as old is not worth its bits.
-    const OLDEST: Duration = Duration::from_secs(60);
-    /// A depth that the vehicle told before so long says little of its depth now.
-    const DEPTH_LASTS: Duration = Duration::from_secs(60);
+    /// Without a GPS position for this time there are no fixes.
+    const GPS_TIMEOUT: Duration = Duration::from_secs(10);
+    /// Maximum age of a measurement. The vehicle refuses fixes older than 120 s, and the link needs time too.
+    const MAX_AGE: Duration = Duration::from_secs(60);
+    /// Maximum age of a reported depth.
+    const DEPTH_TIMEOUT: Duration = Duration::from_secs(60);
 
-    /// A relay that knows nothing yet.
     pub fn new(config: RelayConfig) -> Self {
         Self {
             config,
@@ -98,22 +96,22 @@ impl Relay {
         }
     }
 
-    /// The world frame, once it is known.
+    /// The world frame, once its origin is known.
     pub fn plane(&self) -> Option<&TangentPlane> {
         self.plane.as_ref()
     }
 
-    /// The receiver, for what it said.
+    /// The GPS receiver, for its status.
     pub fn gps(&self) -> &Gps {
         &self.gps
     }
 
-    /// Positions of the receiver that the filter did not believe.
+    /// GPS positions that the filter refused.
     pub fn gps_outliers(&self) -> u64 {
         self.gps_outliers
     }
 
-    /// Sightings that became no fix, by reason.
+    /// Measurements that gave no fix, by reason.
     pub fn faults(&self) -> impl Iterator<Item = (RelayFault, u64)> + '_ {
         self.faults.iter().map(|(&f, &n)| (f, n))
     }
@@ -122,27 +120,28 @@ impl Relay {
         self.fixes
     }
 
-    /// Where the surface is in the world frame; nothing without a fresh GPS.
+    /// The position of the surface in the world frame; `None` without a fresh GPS position.
     pub fn own(&self, at: Instant) -> Option<Estimate> {
         let last = self.own_at?;
-        let is_fresh = at.since(last) < Self::GPS_LASTS;
+        let is_fresh = at.since(last) < Self::GPS_TIMEOUT;
         is_fresh.then(|| self.own.predict(at.as_secs_f64())).flatten()
     }
 
-    /// Where the surface's bow points, clockwise from true north, radians.
+    /// The heading of the surface clockwise from true north, radians.
     pub fn heading_rad(&self, now: Instant) -> Option<f64> {
         self.compass.heading_rad(now).or_else(|| self.gps.heading_rad(now))
     }
 
-    /// Where the head sees a vehicle, and its way east and north in m/s; nothing if it has not seen it for a minute.
+    /// The position of a vehicle, and its velocity east and north in m/s; `None` without a
+    /// measurement within the last minute.
     pub fn vehicle(&self, vehicle: Address, now: Instant) -> Option<(Estimate, (f64, f64))> {
         let seen = self.vehicles.get(&vehicle)?;
-        let is_fresh = now.since(seen.sighted?) < Self::OLDEST;
+        let is_fresh = now.since(seen.sighted?) < Self::MAX_AGE;
         let estimate = seen.filter.predict(now.as_secs_f64()).filter(|_| is_fresh)?;
         Some((estimate, seen.filter.velocity()?))
     }
 
-    /// The connection to the GPS was opened: what to say to it.
+    /// The connection to the GPS was opened. Returns the bytes to send to the receiver.
     pub fn handle_gps_open(&mut self) -> &'static [u8] {
         self.gps.handle_open()
     }
@@ -152,33 +151,33 @@ impl Relay {
             let plane = self.plane.get_or_insert_with(|| TangentPlane::new(fix.place));
             let (x, y) = plane.to_plane(fix.place);
             match self.own.update(&Estimate::round(x, y, fix.sigma_m), now.as_secs_f64()) {
-                Verdict::Outlier => self.gps_outliers += 1,
-                Verdict::Used | Verdict::BeganAnew => self.own_at = Some(now),
+                MeasurementVerdict::Outlier => self.gps_outliers += 1,
+                MeasurementVerdict::Used | MeasurementVerdict::Restarted => self.own_at = Some(now),
             }
         }
     }
 
-    /// Bytes of a compass of its own.
+    /// Takes bytes of a separate compass.
     pub fn handle_compass(&mut self, bytes: &[u8], now: Instant) {
         self.compass.handle_bytes(bytes, now);
     }
 
-    /// The vehicle said how deep it is.
+    /// Takes the reported depth of a vehicle, metres below the surface.
     pub fn handle_depth(&mut self, vehicle: Address, depth_m: f64, now: Instant) {
         if depth_m.is_finite() {
-            self.seen(vehicle).depth = Some((depth_m, now));
+            self.tracked(vehicle).depth = Some((depth_m, now));
         }
     }
 
-    fn seen(&mut self, vehicle: Address) -> &mut Seen {
-        let new = || Seen { filter: PlaneFilter::new(0.05), depth: None, sighted: None, fixed: None };
+    fn tracked(&mut self, vehicle: Address) -> &mut TrackedVehicle {
+        let new = || TrackedVehicle { filter: PlaneFilter::new(0.05), depth: None, sighted: None, fixed: None };
         self.vehicles.entry(vehicle).or_insert_with(new)
     }
 
-    /// The head saw a vehicle: the fix to send to it, if there is one now.
+    /// Takes a USBL measurement of a vehicle. Returns the fix to send, if one is due.
     ///
-    /// It is the one measurement, not the filter's estimate: the vehicle filters too, with odometry that is better than
-    /// any guess from here.
+    /// The fix is the single measurement and not the filter's estimate, because the vehicle has its own filter, and its
+    /// odometry is better than any prediction from here.
     pub fn handle_usbl(
         &mut self,
         vehicle: Address,
@@ -195,7 +194,7 @@ impl Relay {
 
     fn fuse(&mut self, vehicle: Address, sighting: &UsblSighting, now: Instant) -> Result<Option<Fix>, RelayFault> {
         let age_s = if sighting.age_s.is_finite() { sighting.age_s.max(0.0) } else { f64::MAX };
-        if age_s > Self::OLDEST.as_secs_f64() {
+        if age_s > Self::MAX_AGE.as_secs_f64() {
             return Err(RelayFault::TooOld);
         }
         let taken = now - Duration::from_secs_f64(age_s);
@@ -203,8 +202,8 @@ impl Relay {
         let (vx, vy) = self.own.velocity().unwrap_or_default();
         let heading = self.heading_rad(now);
         let mounting = self.config.mounting;
-        let seen = self.seen(vehicle);
-        let depth = seen.depth.filter(|(_, at)| now.since(*at) < Self::DEPTH_LASTS).map(|(d, _)| d);
+        let seen = self.tracked(vehicle);
+        let depth = seen.depth.filter(|(_, at)| now.since(*at) < Self::DEPTH_TIMEOUT).map(|(d, _)| d);
         let away = offset(sighting, &mounting, heading, depth).map_err(RelayFault::Usbl)?;
         let [xx, xy, yy] = away.cov_m2;
         let [own_xx, _, own_yy] = own.cov_m2;
@@ -213,18 +212,18 @@ impl Relay {
             y_m: own.y_m - vy * age_s + away.y_m,
             cov_m2: [xx + own_xx, xy, yy + own_yy],
         };
-        if seen.filter.update(&place, taken.as_secs_f64()) == Verdict::Outlier {
+        if seen.filter.update(&place, taken.as_secs_f64()) == MeasurementVerdict::Outlier {
             return Err(RelayFault::Outlier);
         }
         seen.sighted = Some(now);
         let is_due = seen.fixed.is_none_or(|at| now.since(at) + Duration::from_millis(100) >= self.config.period);
-        if place.sigma_m() > self.config.most_sigma_m {
+        if place.sigma_m() > self.config.max_sigma_m {
             return Err(RelayFault::TooVague);
         }
         if !is_due {
             return Ok(None);
         }
-        self.seen(vehicle).fixed = Some(now);
+        self.tracked(vehicle).fixed = Some(now);
         let position = WorldPoint { east_m: place.x_m, north_m: place.y_m };
         Ok(Some(Fix { position, sigma_m: place.sigma_m(), age_s }))
     }
@@ -243,7 +242,7 @@ mod tests {
             origin: Some(ORIGIN),
             language: GpsLanguage::Nmea,
             mounting: Mounting::default(),
-            most_sigma_m: 50.0,
+            max_sigma_m: 50.0,
             period: Duration::from_secs(10),
         })
     }
@@ -256,7 +255,7 @@ mod tests {
         Instant::from_secs_f64(1000.0 + s)
     }
 
-    /// A GPS that stays at `(x, y)` for as long as a receiver needs to be believed.
+    /// A GPS at `(x, y)` that stays for `seconds`, long enough to be trusted.
     fn anchored(relay: &mut Relay, x: f64, y: f64, seconds: u32) {
         let place = TangentPlane::new(ORIGIN).to_place(x, y);
         for s in 0..seconds {
@@ -287,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn echoes_and_a_gps_that_is_gone_give_no_fix_and_are_counted() {
+    fn echoes_and_a_lost_gps_are_counted_and_give_no_fix() {
         let mut relay = relay();
         anchored(&mut relay, 0.0, 0.0, 30);
         relay.handle_depth(vehicle(), 21.0, at(29.0));

@@ -1,33 +1,34 @@
-//! From what a USBL head tells to a place of the vehicle.
+//! The conversion of a USBL measurement into a position of the vehicle.
 
 use super::filter::Estimate;
 
-/// What a head told of the vehicle, relative to the head.
+/// A measurement of the vehicle relative to the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsblSighting {
     pub range_m: f64,
-    /// Bearing clockwise, radians: from true north if the head has a compass of its own, else from the bow.
+    /// Bearing clockwise, radians: from true north if the head has its own compass, otherwise from the bow.
     pub bearing_rad: f64,
-    /// Above the horizontal, radians; negative for a deeper target.
+    /// Angle above the horizontal, radians; negative for a target below the head.
     pub elevation_rad: f64,
-    /// Expected error of the position, metres; about the range or more if only the range is good; negative: nothing is.
+    /// Expected error of the position, metres. About the range or more: only the range is valid.
+    /// Negative: none of it is.
     pub accuracy_m: f64,
-    /// Seconds since it was measured.
+    /// Age of the measurement, seconds.
     pub age_s: f64,
 }
 
-/// How the head is mounted, and what the water is like.
+/// The mounting of the head, and the speed of sound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mounting {
-    /// Of the head from the GPS antenna: forward, to starboard, down; metres.
+    /// Offset of the head from the GPS antenna in metres: forward, starboard, down.
     pub lever_m: [f64; 3],
     /// Depth of the head, metres.
     pub depth_m: f64,
-    /// Whether bearings count from the bow.
+    /// Whether bearings are relative to the bow.
     pub from_bow: bool,
-    /// Turn of the head against the bow, clockwise, radians.
+    /// Rotation of the head against the bow, clockwise, radians.
     pub turn_rad: f64,
-    /// True speed of sound over the one that the head reckons with.
+    /// The true speed of sound, divided by the one that the head assumes.
     pub sound_ratio: f64,
 }
 
@@ -37,16 +38,16 @@ impl Default for Mounting {
     }
 }
 
-/// Why a sighting gives no place.
+/// The reason why a measurement gives no position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum UsblFault {
-    /// No number, or out of every range.
+    /// A number is not finite or out of range.
     Unreadable,
-    /// The head says that only the range is good.
+    /// Only the range is valid.
     RangeOnly,
-    /// The vehicle's depth does not fit: deeper than the range is long, or the elevation tells another depth.
+    /// The reported depth contradicts the measurement: it is below the range, or the elevation gives another depth.
     Depth,
-    /// Bearings count from the bow, and nobody knows where it points.
+    /// The bearing is relative to the bow, and the heading is unknown.
     NoHeading,
 }
 
@@ -61,16 +62,16 @@ impl UsblFault {
     }
 }
 
-/// Longest range that any head has, metres.
+/// The maximum range of any head, metres.
 const MAX_M: f64 = 20_000.0;
-/// Accuracy over range from which only the range is good.
+/// The ratio of accuracy and range beyond which only the range is valid.
 const RANGE_ONLY: f64 = 0.5;
-/// Standard deviation of a depth that the vehicle tells, metres.
+/// Standard deviation of a reported depth, metres.
 const DEPTH_SIGMA_M: f64 = 0.5;
 
-/// Offset of the vehicle from the GPS antenna in the plane, with its covariance.
+/// The offset of the vehicle from the GPS antenna in the plane, with its covariance.
 ///
-/// A known `depth_m` of the vehicle gives the horizontal range better than the elevation does, and unmasks echoes.
+/// A known `depth_m` of the vehicle gives a better horizontal range than the elevation, and exposes echoes.
 pub fn offset(
     sighting: &UsblSighting,
     mounting: &Mounting,
@@ -95,7 +96,7 @@ pub fn offset(
     let by_elevation = range * s.elevation_rad.cos();
     let (flat, flat_sigma) = match depth_m.filter(|d| d.is_finite()) {
         None => (by_elevation, sigma),
-        // Straight below the head the range tells nothing of the place: there the elevation does.
+        // Directly below the head the range has no information on the horizontal position; the elevation has.
         Some(depth) => {
             let known = by_depth(range, depth - mounting.depth_m, s.elevation_rad, sigma)?;
             if known.1 < sigma { known } else { (by_elevation, sigma) }
@@ -107,7 +108,7 @@ pub fn offset(
     let (sin, cos) = (base + s.bearing_rad).sin_cos();
     let (bow_sin, bow_cos) = heading.sin_cos();
     let [forward, starboard, _] = mounting.lever_m;
-    // Across the line of sight the angle's error counts, along it that of the range.
+    // The error across the line of sight is that of the angle, the one along it that of the range.
     let (along, across) = (flat_sigma.powi(2), sigma.powi(2));
     Ok(Estimate {
         x_m: flat * sin + forward * bow_sin + starboard * bow_cos,
@@ -120,7 +121,7 @@ pub fn offset(
     })
 }
 
-/// Horizontal range and its standard deviation from the slant range and how much deeper the vehicle is.
+/// The horizontal range and its standard deviation, from the slant range and the depth below the head.
 fn by_depth(range: f64, below: f64, elevation: f64, sigma: f64) -> Result<(f64, f64), UsblFault> {
     let told_below = -range * elevation.sin();
     let tolerance = 4.0 * sigma.hypot(DEPTH_SIGMA_M) + 1.0;
@@ -176,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_that_knows_only_the_range_gives_no_place() {
+    fn a_measurement_of_the_range_only_gives_no_position() {
         let vague = UsblSighting { accuracy_m: 100.0, ..sighting(100.0, 0.0, 0.0) };
         assert_eq!(offset(&vague, &Mounting::default(), None, None), Err(UsblFault::RangeOnly));
         let invalid = UsblSighting { accuracy_m: -1.0, ..vague };

@@ -1,4 +1,4 @@
-//! Representative images on the wire.
+//! Exemplars: their size and their compression for the link.
 
 mod codec;
 mod ssim;
@@ -9,10 +9,10 @@ pub use ssim::Luma;
 use image::{RgbImage, imageops};
 use scenecast_protocol::exemplar::edge_px;
 
-/// Structural similarity that is worth bytes.
+/// The structural similarity beyond which more bytes bring no visible gain.
 pub const GOOD_SSIM: f64 = 0.9;
 
-/// The middle of a patch in a size, and which size that is: at most `size`, less if the patch is smaller.
+/// Crops the middle of a patch to at most the edge of `size`, and returns the size class that it has.
 pub fn middle(patch: &RgbImage, size: u8) -> Option<(u8, RgbImage)> {
     let least = patch.width().min(patch.height());
     let size = (0..=size.min(3)).rev().find(|&s| edge_px(s) <= least)?;

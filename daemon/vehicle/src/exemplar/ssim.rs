@@ -1,10 +1,10 @@
-//! How alike two images look: the structural similarity index.
+//! The structural similarity index (SSIM) of two images.
 //!
 //! Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image quality assessment: from error visibility to structural
-//! similarity", IEEE Transactions on Image Processing 13, 2004: on luma (ITU-R BT.601), a Gaussian window of 11 x 11 pixels
-//! with a standard deviation of 1.5, K1 = 0.01, K2 = 0.03, L = 255, the mean over every place where the window lies wholly
-//! inside. The same as `structural_similarity(data_range=255, gaussian_weights=True, sigma=1.5,
-//! use_sample_covariance=False)` of scikit-image.
+//! similarity", IEEE Transactions on Image Processing 13, 2004. It is computed on luma (ITU-R BT.601) with a Gaussian
+//! window of 11 x 11 pixels and a standard deviation of 1.5, K1 = 0.01, K2 = 0.03 and L = 255, as the mean over all
+//! places at which the window lies inside the image. `structural_similarity(data_range=255, gaussian_weights=True,
+//! sigma=1.5, use_sample_covariance=False)` of scikit-image gives the same values.
 
 use image::RgbImage;
 
@@ -13,7 +13,7 @@ const SIGMA: f64 = 1.5;
 /// (K1 L)^2 and (K2 L)^2.
 const STEADY: (f64, f64) = (0.01 * 255.0 * 0.01 * 255.0, 0.03 * 255.0 * 0.03 * 255.0);
 
-/// An image in luma, row by row.
+/// The luma of an image, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Luma {
     width: usize,
@@ -21,7 +21,7 @@ pub struct Luma {
 }
 
 impl Luma {
-    /// The luma of an image, ITU-R BT.601, 0 to 255.
+    /// Converts an image to luma (ITU-R BT.601), 0 to 255.
     pub fn of(image: &RgbImage) -> Self {
         let luma =
             |p: &image::Rgb<u8>| 0.299 * f64::from(p.0[0]) + 0.587 * f64::from(p.0[1]) + 0.114 * f64::from(p.0[2]);
@@ -49,7 +49,7 @@ impl Luma {
     }
 }
 
-/// Weighted means under the window at each place where it lies wholly inside.
+/// The weighted mean under the window at each place at which it lies inside the image.
 fn smooth(values: &[f64], width: usize) -> Vec<f64> {
     let weight = |i: usize| (-(i as f64 - 5.0).powi(2) / (2.0 * SIGMA * SIGMA)).exp();
     let sum: f64 = (0..WINDOW).map(weight).sum();
@@ -75,9 +75,9 @@ mod tests {
         Luma { width: 24, values }
     }
 
-    /// Values of scikit-image 0.26, over the places where the window lies wholly inside.
+    /// Values of scikit-image 0.26 over the places at which the window lies inside the image.
     #[test]
-    fn it_is_what_scikit_image_says() {
+    fn values_equal_those_of_scikit_image() {
         let wave = |x: u32, y: u32| f64::from((x * 9 + y * 5 + (x * y) % 17 * 4) % 256);
         let noisy = |x: u32, y: u32| {
             let noise = f64::from((x * 31 + y * 17) % 23);

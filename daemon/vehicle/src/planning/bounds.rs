@@ -1,11 +1,11 @@
-//! Where the vehicle may go.
+//! The outlines that limit where the vehicle may go.
 
 use scenecast_protocol::directive::{Fence, Polygon};
 
 /// East and north of the origin, metres.
 pub type Point = (f64, f64);
 
-/// The fence and the keep-outs in metres, and how far from them the vehicle stays for its size and turns.
+/// Fence and keep-outs in metres, and the clearance that the vehicle keeps from them for its size and its turns.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Bounds {
     fence: Option<Vec<Point>>,
@@ -14,7 +14,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of a fence that was checked.
+    /// Takes a fence that has passed [`Fence::check`].
     pub fn new(fence: &Fence, clearance_m: f64) -> Self {
         let metres = |p: &Polygon| p.0.iter().map(|v| v.to_world().xy()).collect();
         Self {
@@ -24,22 +24,22 @@ impl Bounds {
         }
     }
 
-    /// Whether the vehicle may be at a place, clearance or not.
+    /// Whether the vehicle may be at a place. The clearance does not count.
     pub fn holds(&self, at: Point) -> bool {
         self.fence.as_ref().is_none_or(|f| contains(f, at)) && !self.keep_outs.iter().any(|k| contains(k, at))
     }
 
-    /// Whether the vehicle may plan to be at a place.
+    /// Whether a plan may contain a place. The clearance counts.
     pub fn allows(&self, at: Point) -> bool {
         self.holds(at) && self.is_clear(at, at)
     }
 
-    /// Whether the vehicle may plan to go straight from one place to another.
+    /// Whether a plan may contain the straight line between two places. The clearance counts.
     pub fn allows_leg(&self, from: Point, to: Point) -> bool {
         self.holds(from) && self.holds(to) && self.is_clear(from, to)
     }
 
-    /// Whether a straight way out of the margin meets no outline.
+    /// Whether the straight line from a place within the clearance to an allowed place meets no outline.
     pub fn allows_exit(&self, from: Point, to: Point) -> bool {
         self.holds(from) && self.allows(to) && !self.edges().any(|(a, b)| segments_meet(from, to, a, b))
     }
@@ -83,7 +83,7 @@ fn boxes_meet(a: Point, b: Point, c: Point, d: Point) -> bool {
     meet(a.0, b.0, c.0, d.0) && meet(a.1, b.1, c.1, d.1)
 }
 
-/// Metres from a place to a segment.
+/// The distance in metres between a place and a segment.
 fn to_segment(p: Point, a: Point, b: Point) -> f64 {
     let (dx, dy) = (b.0 - a.0, b.1 - a.1);
     let length = dx * dx + dy * dy;

@@ -1,53 +1,55 @@
-//! What the seen cells let expect of those that nobody has seen.
+//! The labels to expect in unseen cells, given those of the seen cells.
 
-/// Labels of a rectangle of cells, row by row from the south-west; 0 = not seen.
+/// Labels of a rectangle of cells, row by row from the south-west. 0: not seen.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a> {
+pub struct SeenLabels<'a> {
     pub labels: &'a [u8],
     pub width: usize,
 }
 
-/// How a label fades with the distance from where it was seen: the spatial Chinese Restaurant Process, carried beyond the
-/// Von Neumann neighbourhood of a cell.
+/// The spatial Chinese Restaurant Process, continued beyond the Von Neumann neighbourhood of a cell: the influence of a
+/// seen label fades with the distance.
 ///
-/// In an unseen cell label k weighs `n q_k + alpha p_k`: n counts the seen cells, each worth `fade` to the power of the
-/// steps (east-west plus north-south) to it; q_k is the label's share among them by a `fade` that is steeper, so that of many
-/// seen cells the next ones tell which label it is; p_k is its share of the whole map; a new label weighs `gamma`. Next to
-/// seen cells their labels decide, far from all the mix of the map.
+/// In an unseen cell, label k has the weight `n q_k + alpha p_k`. `n` is the sum over the seen cells of `fade` to the
+/// power of the steps to them (east-west plus north-south). `q_k` is the share of the label among them under a
+/// steeper fade, so that the nearest of many seen cells decide between labels. `p_k` is the label's share of the
+/// whole map. A new label has the weight `gamma`. Next to seen cells their labels dominate; far from all of them the
+/// shares of the map do.
 #[derive(Debug, Clone)]
 pub struct Expectation<'a> {
-    seen: Seen<'a>,
-    /// The steeper fade, by which near labels are told apart.
+    seen: SeenLabels<'a>,
+    /// The steeper fade, which decides between near labels.
     steep: f32,
     alpha: f32,
     gamma: f32,
-    /// Sum of the fading counts of all labels in each cell.
+    /// For each cell, the sum of the faded counts of all seen cells.
     near: Vec<f32>,
-    /// The same by the steeper fade.
+    /// The same sum under the steeper fade.
     next: Vec<f32>,
 }
 
-/// Reach of a label's influence, in lengths over which the labels of the map are alike.
+/// Reach of the influence of a label, in lengths over which labels of the map are alike.
 const REACH: f32 = 0.5;
-/// Reach of what tells near labels apart, in the same lengths.
+/// Reach of the steeper fade, in the same lengths.
 const NEXT: f32 = 0.1;
-/// What an unseen cell counts by the steeper fade, with the mix of the map: far from all that was seen, nothing is divided by 0.
+/// The count of an unseen cell under the steeper fade, with the shares of the map. It prevents a division by 0
+/// far from all seen cells.
 const UNSEEN: f32 = 1e-12;
-/// Weight of the map's overall mix, in counts of a straight edge of seen cells at the distance of one reach.
+/// Weight of the map's overall shares, in counts of a straight edge of seen cells at the distance of one reach.
 const MIX: f32 = 0.05;
-/// Weight of a new label, as a share of that of the mix.
+/// Weight of a new label, as a share of [`MIX`].
 const NEW: f32 = 0.05;
 
 impl<'a> Expectation<'a> {
-    pub fn new(seen: Seen<'a>) -> Self {
+    pub fn new(seen: SeenLabels<'a>) -> Self {
         Self::with(seen, REACH, MIX)
     }
 
-    fn with(seen: Seen<'a>, reach: f32, mix: f32) -> Self {
+    fn with(seen: SeenLabels<'a>, reach: f32, mix: f32) -> Self {
         let length = likeness_length(seen);
         let fade = (-1.0 / (reach * length).clamp(0.5, 40.0)).exp();
         let steep = (-1.0 / (NEXT * length).clamp(0.7, 40.0)).exp();
-        // A half plane of seen cells counts this much in the cell next to it.
+        // The count that a half plane of seen cells gives the cell next to it.
         let edge = fade / (1.0 - fade) * (1.0 + fade) / (1.0 - fade);
         let alpha = mix * edge;
         let counts = |unseen: f32| seen.labels.iter().map(|&l| if l == 0 { unseen } else { 1.0 }).collect();
@@ -56,7 +58,7 @@ impl<'a> Expectation<'a> {
         Self { seen, steep, alpha, gamma: NEW * alpha, near, next }
     }
 
-    /// Expectation in each cell of a value that depends on the label, where a new label has the value `of_new`.
+    /// The expectation in each cell of a value that depends on the label. A new label has the value `of_new`.
     pub fn of(&self, value: impl Fn(u8) -> f32, of_new: f32) -> Vec<f32> {
         let known = || self.seen.labels.iter().filter(|&&l| l != 0);
         let cells = known().count();
@@ -69,19 +71,20 @@ impl<'a> Expectation<'a> {
         expected
     }
 
-    /// Probability of a label in each cell.
+    /// The probability of a label in each cell.
     pub fn share_of(&self, label: u8) -> Vec<f32> {
         self.of(|l| f32::from(u8::from(l == label)), 0.0)
     }
 
-    /// Probability of a label that the map does not have yet, in each cell.
+    /// The probability in each cell of a label that the map does not have yet.
     pub fn share_of_new(&self) -> Vec<f32> {
         self.near.iter().map(|near| self.gamma / (near + self.alpha + self.gamma)).collect()
     }
 }
 
-/// Cells over which labels stay alike: the length of the exponential through the agreement of pairs two and eight cells apart.
-fn likeness_length(seen: Seen<'_>) -> f32 {
+/// The number of cells over which labels are alike: the length of the exponential through the agreement of pairs that
+/// are two and eight cells apart.
+fn likeness_length(seen: SeenLabels<'_>) -> f32 {
     let mut counts = [0f32; 256];
     seen.labels.iter().for_each(|&l| counts[usize::from(l)] += 1.0);
     let cells: f32 = counts[1..].iter().sum();
@@ -106,7 +109,7 @@ fn likeness_length(seen: Seen<'_>) -> f32 {
     if length.is_finite() && length > 0.0 { length.clamp(1.0, 80.0) } else { 80.0 }
 }
 
-/// Each cell's sum over all cells of their value times `fade` to the power of the steps to them.
+/// For each cell, the sum over all cells of their value times `fade` to the power of the steps to them.
 fn fading(mut values: Vec<f32>, width: usize, fade: f32) -> Vec<f32> {
     let width = width.max(1);
     let mut sum = vec![0.0; values.len()];
@@ -143,7 +146,7 @@ fn fading(mut values: Vec<f32>, width: usize, fade: f32) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// Mean log-likelihood of the hidden cells by the expectation and by the shares of the seen map.
+    /// Mean log-likelihood of the hidden cells, by the expectation and by the shares of the seen map.
     fn likelihoods(truth: &[u8], width: usize, seed: u64) -> (f64, f64) {
         let mut seen = vec![0u8; truth.len()];
         let mut chance = sim_channel::RandomStream::new(seed, &[7]);
@@ -155,7 +158,7 @@ mod tests {
                 seen[cells.clone()].copy_from_slice(&truth[cells]);
             }
         }
-        let expectation = Expectation::new(Seen { labels: &seen, width });
+        let expectation = Expectation::new(SeenLabels { labels: &seen, width });
         let labels: std::collections::BTreeSet<u8> = seen.iter().copied().filter(|&l| l != 0).collect();
         let shares: Vec<(u8, Vec<f32>)> = labels.iter().map(|&l| (l, expectation.share_of(l))).collect();
         let cells = seen.iter().filter(|&&l| l != 0).count() as f64;
@@ -180,14 +183,14 @@ mod tests {
     }
 
     #[test]
-    fn near_a_label_it_is_expected_and_far_away_the_mix_of_the_map() {
+    fn near_cells_decide_and_far_away_the_shares_of_the_map() {
         let mut labels = vec![0u8; 200 * 100];
         for y in 0..100 {
             for x in 0..20 {
                 labels[y * 200 + x] = if y < 50 { 1 } else { 2 };
             }
         }
-        let expectation = Expectation::new(Seen { labels: &labels, width: 200 });
+        let expectation = Expectation::new(SeenLabels { labels: &labels, width: 200 });
         let (one, new) = (expectation.share_of(1), expectation.share_of_new());
         assert!(one[10 * 200 + 21] > 0.7 && one[90 * 200 + 21] < 0.3, "{} {}", one[10 * 200 + 21], one[90 * 200 + 21]);
         assert!((one[10 * 200 + 199] - 0.5).abs() < 0.25, "{}", one[10 * 200 + 199]);
@@ -197,10 +200,10 @@ mod tests {
     }
 
     #[test]
-    fn nothing_seen_lets_expect_only_what_is_new() {
+    fn without_seen_cells_only_new_labels_are_expected() {
         let labels = [0u8; 12];
-        let expectation = Expectation::new(Seen { labels: &labels, width: 4 });
+        let expectation = Expectation::new(SeenLabels { labels: &labels, width: 4 });
         assert!(expectation.of(|_| 1.0, 0.25).iter().all(|&e| (e - 0.25).abs() < 1e-6));
-        assert!(Expectation::new(Seen { labels: &[], width: 0 }).of(|_| 1.0, 0.0).is_empty());
+        assert!(Expectation::new(SeenLabels { labels: &[], width: 0 }).of(|_| 1.0, 0.0).is_empty());
     }
 }

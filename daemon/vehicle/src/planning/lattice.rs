@@ -1,4 +1,4 @@
-//! Places to plan over, and the ways between them.
+//! The planning lattice: places, and the shortest paths between them.
 
 use super::bounds::{Bounds, Point, distance};
 use scenecast_core::Area;
@@ -9,30 +9,32 @@ const MAX_SIDE: usize = 192;
 /// Steps to the eight places around, in the order of the bits of a move mask.
 const MOVES: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
 
-/// A square lattice of places that the vehicle may be at, each joined with those around it where the straight way is allowed.
+/// A square lattice of places that the vehicle may be at. Neighbours are joined where the straight
+/// line between them is allowed.
 #[derive(Debug, Clone)]
 pub struct Lattice {
     origin: Point,
     step_m: f64,
     columns: usize,
     rows: usize,
-    /// Allowed moves from each place, a bit a direction; 0 where it may not be.
+    /// Allowed moves from each place, one bit for each direction. 0: the vehicle may not be there.
     moves: Vec<u8>,
 }
 
-/// A place of the lattice: row times columns plus column.
+/// The index of a place: row times columns plus column.
 pub type Node = usize;
 
-/// Ways from one place to all others.
+/// The shortest paths from one place to all others.
 #[derive(Debug, Clone)]
-pub struct Ways {
-    /// Metres to each place; infinite where no way leads.
+pub struct Paths {
+    /// Metres to each place; infinite if no path leads there.
     pub metres: Vec<f64>,
     before: Vec<Node>,
 }
 
 impl Lattice {
-    /// Places `step_m` apart, or more where that would be too many, over `area` and what lies `beyond` it.
+    /// Places over `area` and the points `beyond` it, `step_m` apart, or farther where there would be more than 192
+    /// in a row or column.
     pub fn new(area: Area, beyond: &[Point], step_m: f64, bounds: &Bounds) -> Self {
         let fold = |least: f64, most: f64, of: fn(&Point) -> f64| {
             beyond.iter().map(of).fold((least, most), |(l, m), v| (l.min(v), m.max(v)))
@@ -57,12 +59,12 @@ impl Lattice {
         lattice
     }
 
-    /// Metres between neighbouring places of a row.
+    /// Distance in metres between neighbouring places of a row.
     pub fn step_m(&self) -> f64 {
         self.step_m
     }
 
-    /// Places of a row, and rows.
+    /// The number of columns and of rows.
     pub fn size(&self) -> (usize, usize) {
         (self.columns, self.rows)
     }
@@ -76,7 +78,7 @@ impl Lattice {
         (self.origin.0 + column as f64 * self.step_m, self.origin.1 + row as f64 * self.step_m)
     }
 
-    /// Whether the vehicle can leave a place, and so be there.
+    /// Whether the vehicle can leave a place, and may hence be there.
     pub fn is_open(&self, node: Node) -> bool {
         self.moves[node] != 0
     }
@@ -88,7 +90,7 @@ impl Lattice {
         (column < self.columns && row < self.rows).then_some(row * self.columns + column)
     }
 
-    /// Places next to one, with the metres to them.
+    /// The neighbours that can be reached from a place, each with its distance in metres.
     pub fn around(&self, node: Node) -> impl Iterator<Item = (Node, f64)> + '_ {
         let mask = self.moves[node];
         (0..MOVES.len()).filter(move |m| mask & 1 << m != 0).filter_map(move |m| {
@@ -97,7 +99,8 @@ impl Lattice {
         })
     }
 
-    /// The place to begin at from anywhere: the nearest that can be reached straight. From outside of the bounds, the nearest.
+    /// The place at which a path from anywhere begins: the nearest one that a straight line reaches. From outside the
+    /// bounds it is the nearest of all.
     pub fn entry(&self, from: Point, bounds: &Bounds) -> Option<Node> {
         let open = || (0..self.places()).filter(|&n| self.is_open(n));
         let nearest = |nodes: &mut dyn Iterator<Item = Node>| {
@@ -112,55 +115,57 @@ impl Lattice {
         by_distance.into_iter().find(|&n| bounds.allows_exit(from, self.place(n)))
     }
 
-    /// The places after `from` straight ahead to `to`, if that lies in one of the eight directions and every step is allowed.
+    /// The places from the one after `from` up to `to`, if `to` lies in one of the eight directions
+    /// and every step is allowed.
     pub fn straight(&self, from: Node, to: Node) -> Option<Vec<Node>> {
         let steps = |a: usize, b: usize| b as i32 - a as i32;
         let (x, y) = (steps(from % self.columns, to % self.columns), steps(from / self.columns, to / self.columns));
         let m = MOVES.iter().position(|&step| step == (x.signum(), y.signum()))?;
         let count = x.abs().max(y.abs());
-        let mut way = Vec::with_capacity(count as usize);
+        let mut path = Vec::with_capacity(count as usize);
         for _ in 0..count {
-            let at = way.last().copied().unwrap_or(from);
+            let at = path.last().copied().unwrap_or(from);
             let next = self.moved(at, m).filter(|_| self.moves[at] & 1 << m != 0)?;
-            way.push(next);
+            path.push(next);
         }
-        (way.last() == Some(&to)).then_some(way)
+        (path.last() == Some(&to)).then_some(path)
     }
 
-    /// Shortest ways from a place to all others.
-    pub fn ways(&self, from: Node) -> Ways {
-        let mut ways = Ways { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
-        ways.metres[from] = 0.0;
-        // Lengths in micrometres order like numbers and tie by place, so the tree is the same everywhere.
+    /// Shortest paths from a place to all others.
+    pub fn paths(&self, from: Node) -> Paths {
+        let mut paths = Paths { metres: vec![f64::INFINITY; self.places()], before: vec![from; self.places()] };
+        paths.metres[from] = 0.0;
+        // Keys in whole micrometres have a total order, and ties are broken by the place, so that the tree is the same
+        // on every machine.
         let key = |metres: f64| (metres * 1e6) as u64;
         let mut queue = BinaryHeap::from([Reverse((0u64, from))]);
         while let Some(Reverse((length, node))) = queue.pop() {
-            if length > key(ways.metres[node]) {
+            if length > key(paths.metres[node]) {
                 continue;
             }
             for (to, step) in self.around(node) {
-                let metres = ways.metres[node] + step;
-                if metres + 1e-6 < ways.metres[to] {
-                    (ways.metres[to], ways.before[to]) = (metres, node);
+                let metres = paths.metres[node] + step;
+                if metres + 1e-6 < paths.metres[to] {
+                    (paths.metres[to], paths.before[to]) = (metres, node);
                     queue.push(Reverse((key(metres), to)));
                 }
             }
         }
-        ways
+        paths
     }
 }
 
-impl Ways {
-    /// The places from the one after the start to `to`; empty if no way leads there, or if it is the start.
+impl Paths {
+    /// The places from the one after the start to `to`. Empty if no path leads there, or if `to` is the start.
     pub fn to(&self, to: Node) -> Vec<Node> {
-        let mut way = Vec::new();
+        let mut path = Vec::new();
         let mut node = to;
         while self.metres[to].is_finite() && self.before[node] != node {
-            way.push(node);
+            path.push(node);
             node = self.before[node];
         }
-        way.reverse();
-        way
+        path.reverse();
+        path
     }
 }
 
@@ -172,7 +177,7 @@ mod tests {
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 10.0 };
 
-    /// A wall from the southern edge to two metres before the northern one.
+    /// A wall from the southern edge to two metres before the northern edge.
     fn walled() -> (Bounds, Lattice) {
         let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         let wall = Polygon(vec![place(9, -1), place(11, -1), place(11, 8), place(9, 8)]);
@@ -182,31 +187,31 @@ mod tests {
     }
 
     #[test]
-    fn ways_go_round_what_is_kept_out() {
+    fn paths_avoid_keep_outs() {
         let (bounds, lattice) = walled();
         let from = lattice.entry((5.0, 2.2), &bounds).unwrap();
         let to = lattice.entry((15.0, 2.0), &bounds).unwrap();
-        let ways = lattice.ways(from);
-        assert!(ways.metres[to] > 14.0, "{}", ways.metres[to]);
-        let way = ways.to(to);
-        assert_eq!(way.last(), Some(&to));
+        let paths = lattice.paths(from);
+        assert!(paths.metres[to] > 14.0, "{}", paths.metres[to]);
+        let path = paths.to(to);
+        assert_eq!(path.last(), Some(&to));
         let mut at = lattice.place(from);
-        for node in way {
+        for node in path {
             assert!(bounds.allows_leg(at, lattice.place(node)));
             at = lattice.place(node);
         }
     }
 
     #[test]
-    fn a_straight_way_is_the_shortest_one_and_crosses_nothing() {
+    fn straight_paths_are_shortest_and_cross_no_outline() {
         let (_, lattice) = walled();
         let (columns, _) = lattice.size();
         let mut straight = 0;
         for from in [0, 2 * columns + 5, 9 * columns, 5 * columns + 15] {
-            let ways = lattice.ways(from);
+            let paths = lattice.paths(from);
             for to in 0..lattice.places() {
-                let Some(way) = lattice.straight(from, to) else { continue };
-                assert_eq!(way, ways.to(to), "{from} to {to}");
+                let Some(path) = lattice.straight(from, to) else { continue };
+                assert_eq!(path, paths.to(to), "{from} to {to}");
                 straight += 1;
             }
         }

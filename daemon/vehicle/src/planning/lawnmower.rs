@@ -1,24 +1,25 @@
-//! Parallel legs over all that may be seen.
+//! The planner that covers the whole area in parallel legs.
 
 use super::lattice::Node;
-use super::{Planner, Question};
+use super::{PlanRequest, Planner};
 
-/// East-west legs from the south, each a camera's width from the last; at the end from the north again.
+/// East-west legs from the south, each one camera width from the last. After the last leg it
+/// begins again from the north.
 #[derive(Debug, Default)]
 pub struct Lawnmower {
-    /// Places still to come, the next one last.
+    /// Places still to visit, the next one last.
     coming: Vec<Node>,
 }
 
 impl Planner for Lawnmower {
-    fn plan(&mut self, q: &Question<'_>) -> Vec<Node> {
+    fn plan(&mut self, q: &PlanRequest<'_>) -> Vec<Node> {
         if self.coming.is_empty() {
             self.coming = legs(q);
-            // From the end that is nearer.
-            let ways = q.lattice.ways(q.from);
-            let metres = |node: Option<&Node>| node.map_or(f64::INFINITY, |&n| ways.metres[n]);
+            // Begins at the nearer end.
+            let paths = q.lattice.paths(q.from);
+            let metres = |node: Option<&Node>| node.map_or(f64::INFINITY, |&n| paths.metres[n]);
             if metres(self.coming.first()) > metres(self.coming.last()) {
-                // As it is: the last comes first.
+                // The order stays, because the list is taken from its end.
             } else {
                 self.coming.reverse();
             }
@@ -28,14 +29,14 @@ impl Planner for Lawnmower {
                 self.coming.pop();
                 continue;
             }
-            let ways = q.lattice.ways(q.from);
-            let mut way = ways.to(next);
-            if way.is_empty() {
+            let paths = q.lattice.paths(q.from);
+            let mut path = paths.to(next);
+            if path.is_empty() {
                 self.coming.pop();
                 continue;
             }
-            way.truncate(way.iter().take_while(|&&n| q.can_return(n, ways.metres[n])).count());
-            return way;
+            path.truncate(path.iter().take_while(|&&n| q.can_return(n, paths.metres[n])).count());
+            return path;
         }
         Vec::new()
     }
@@ -49,13 +50,13 @@ impl Planner for Lawnmower {
     }
 }
 
-/// Ends of the open stretches of every other row, there and back.
-fn legs(q: &Question<'_>) -> Vec<Node> {
+/// The ends of the open stretches of every other row, in alternating direction.
+fn legs(q: &PlanRequest<'_>) -> Vec<Node> {
     let (columns, rows) = q.lattice.size();
     let mut legs = Vec::new();
     for (leg, row) in (0..rows).step_by(2).enumerate() {
-        let is_worth = |n: &Node| q.lattice.is_open(*n) && q.home.metres[*n].is_finite();
-        let mut stretch: Vec<Node> = (row * columns..(row + 1) * columns).filter(is_worth).collect();
+        let is_open = |n: &Node| q.lattice.is_open(*n) && q.return_paths.metres[*n].is_finite();
+        let mut stretch: Vec<Node> = (row * columns..(row + 1) * columns).filter(is_open).collect();
         if leg % 2 == 1 {
             stretch.reverse();
         }

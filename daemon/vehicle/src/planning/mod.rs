@@ -1,4 +1,4 @@
-//! Which way to go: places, what they are worth, and the planners that choose among them.
+//! The planners: the value of each part of the sea floor, the lattice, and the choice of a path over it.
 
 mod bounds;
 mod expect;
@@ -6,61 +6,59 @@ mod greedy;
 mod horizon;
 mod lattice;
 mod lawnmower;
-mod way_back;
-mod worth;
+mod return_gain;
+mod value;
 
 pub use bounds::{Bounds, Point, distance};
-pub use expect::{Expectation, Seen};
+pub use expect::{Expectation, SeenLabels};
 pub use greedy::Greedy;
 pub use horizon::Horizon;
-pub use lattice::{Lattice, Node, Ways};
+pub use lattice::{Lattice, Node, Paths};
 pub use lawnmower::Lawnmower;
-pub use worth::{Knowledge, Shown, Window, Worth};
+pub use value::{BlockValues, CellWindow, Knowledge, ShownBlocks};
 
 use scenecast_protocol::directive::PlannerKind;
 
-/// Where the vehicle is, what is left to it, and what there is to gain.
+/// The situation that a planner is given.
 #[derive(Debug)]
-pub struct Question<'a> {
-    /// Places and ways that are allowed.
+pub struct PlanRequest<'a> {
     pub lattice: &'a Lattice,
-    /// What is to be gained.
-    pub worth: &'a Worth,
+    /// The value of the next look at each block.
+    pub values: &'a BlockValues,
     pub from: Node,
-    /// Ways from the place where it must be able to end.
-    pub home: &'a Ways,
-    /// Metres that may be gone from `from`, the way home included; infinite if there is no limit.
+    /// The paths from the place where the survey must be able to end.
+    pub return_paths: &'a Paths,
+    /// Metres that may still be travelled from `from`, the return path included; infinite without a limit.
     pub left_m: f64,
 }
 
-impl Question<'_> {
-    /// Whether the way home from `node` can still be gone after `gone_m` metres.
+impl PlanRequest<'_> {
+    /// Whether the return path from `node` is still allowed after `gone_m` metres.
     pub fn can_return(&self, node: Node, gone_m: f64) -> bool {
-        // A way that begins where no way home is known may go on: it is lost either way.
-        !self.left_m.is_finite() || gone_m + self.home.metres[node] <= self.left_m + 1e-6
+        // Without a limit, a place without a return path is allowed too: the vehicle is cut off in either case.
+        !self.left_m.is_finite() || gone_m + self.return_paths.metres[node] <= self.left_m + 1e-6
     }
 }
 
-/// Chooses a way.
+/// Chooses a path.
 ///
-/// The answer's places are neighbours on the lattice, the first next to [`Question::from`], and the way home from each is
-/// within what is left. Empty: there is nothing to gain, or nothing left. The same questions in the same order get the same
-/// answers.
+/// The places of a plan are neighbours on the lattice, the first one next to [`PlanRequest::from`], and the return path
+/// from each fits into the remaining distance. An empty plan means that there is no gain, or no distance left. The same
+/// requests in the same order get the same plans.
 pub trait Planner: std::fmt::Debug + Send {
-    /// The way to go next.
-    fn plan(&mut self, question: &Question<'_>) -> Vec<Node>;
+    /// The next places of the path.
+    fn plan(&mut self, request: &PlanRequest<'_>) -> Vec<Node>;
 
-    /// Places that it will go to after its last answer, the next one first, each by the shortest way; empty where it decides
-    /// when it is there.
+    /// The places to visit after the last plan, the next one first, each by the shortest path. Empty where the
+    /// planner decides only on arrival.
     fn beyond(&self) -> Vec<Node> {
         Vec::new()
     }
 
-    /// The lattice has changed: places have other numbers.
+    /// The lattice has changed, and with it the numbers of the places.
     fn handle_change(&mut self) {}
 }
 
-/// The planner of a kind.
 pub fn planner(kind: PlannerKind) -> Box<dyn Planner> {
     match kind {
         PlannerKind::Lawnmower => Box::new(Lawnmower::default()),
@@ -80,7 +78,7 @@ mod tests {
 
     const AREA: Area = Area { west: 0.0, south: 0.0, east: 20.0, north: 14.0 };
 
-    /// The answer of a planner on a patchy map with a keep-out, and whether each of its places may be gone to.
+    /// The plan on a patchy map with a keep-out, and whether each of its places is allowed.
     fn ask(kind: PlannerKind, corner: (i32, i32), start: usize, left_m: f64, weights: (i8, i8)) -> (Vec<Node>, bool) {
         let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
         let (x, y) = corner;
@@ -91,18 +89,24 @@ mod tests {
         let map: LabelGrid = seen.map(|(x, y)| (Cell::new(x, y), ((x / 9 + y / 7) % 3 + 1) as u8)).collect();
         let weights = [(1, weights.0), (2, weights.1)].into_iter().collect();
         let utility = Utility { exploration: 5, weights, ..Utility::default() };
-        let worth = Worth::new(&lattice, (&Window::new(AREA, 0.25), (0.0, 0.0)), &map, &Knowledge::default(), &utility);
+        let values = BlockValues::new(
+            &lattice,
+            (&CellWindow::new(AREA, 0.25), (0.0, 0.0)),
+            &map,
+            &Knowledge::default(),
+            &utility,
+        );
         let open: Vec<Node> = (0..lattice.places()).filter(|&n| lattice.is_open(n)).collect();
-        let (from, home) = (open[start % open.len()], lattice.ways(open[(start / 7) % open.len()]));
-        let question = Question { lattice: &lattice, worth: &worth, from, home: &home, left_m };
-        let way = planner(kind).plan(&question);
+        let (from, home) = (open[start % open.len()], lattice.paths(open[(start / 7) % open.len()]));
+        let request = PlanRequest { lattice: &lattice, values: &values, from, return_paths: &home, left_m };
+        let path = planner(kind).plan(&request);
         let (mut at, mut gone_m, mut is_allowed) = (from, 0.0, true);
-        for &node in &way {
+        for &node in &path {
             let step = lattice.around(at).find(|(n, _)| *n == node).map_or(f64::INFINITY, |(_, step)| step);
             (at, gone_m) = (node, gone_m + step);
             is_allowed &= bounds.allows(lattice.place(node)) && gone_m + home.metres[node] <= left_m + 1e-6;
         }
-        (way, is_allowed)
+        (path, is_allowed)
     }
 
     proptest! {
@@ -113,9 +117,9 @@ mod tests {
             weights in (-100i8..=100, -100i8..=100),
         ) {
             for kind in PlannerKind::ALL {
-                let (way, is_allowed) = ask(kind, corner, start, left_m, weights);
-                prop_assert!(is_allowed, "{kind:?}: {way:?}");
-                prop_assert_eq!(&way, &ask(kind, corner, start, left_m, weights).0);
+                let (path, is_allowed) = ask(kind, corner, start, left_m, weights);
+                prop_assert!(is_allowed, "{kind:?}: {path:?}");
+                prop_assert_eq!(&path, &ask(kind, corner, start, left_m, weights).0);
             }
         }
     }

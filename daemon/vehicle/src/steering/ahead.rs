@@ -1,10 +1,10 @@
-//! What is planned after the waypoint, as people are told it.
+//! The planned path after the waypoint, in the form that is reported.
 
 use super::Steering;
 use crate::planning::{Point, distance};
 use scenecast_protocol::wire::PlannedPath;
 
-/// A way as its corners.
+/// A path, reduced to its corners.
 struct Corners {
     start: Point,
     places: Vec<Point>,
@@ -20,7 +20,7 @@ impl Corners {
         self.places.last().copied().unwrap_or(self.start)
     }
 
-    /// Straight on to there; a place on a straight stretch is no corner.
+    /// Adds a straight leg. A place in the middle of a straight stretch is no corner.
     fn go(&mut self, to: Point) {
         let (end, leg) = (self.end(), distance(self.end(), to));
         if leg < 1e-6 {
@@ -34,12 +34,12 @@ impl Corners {
         }
     }
 
-    /// Whether more corners would not be told.
+    /// Whether the report has no room for more corners.
     fn is_full(&self) -> bool {
         self.places.len() > PlannedPath::MAX_POINTS
     }
 
-    fn told(mut self) -> PathAhead {
+    fn finish(mut self) -> PathAhead {
         let continues = self.is_full();
         self.places.truncate(PlannedPath::MAX_POINTS);
         PathAhead { points: self.places, continues }
@@ -51,50 +51,50 @@ fn is_straight(a: Point, b: Point, c: Point) -> bool {
     x * u + y * v > 0.0 && (x * v - y * u).abs() < 1e-3 * x.hypot(y) * u.hypot(v)
 }
 
-/// The path that is planned after a waypoint, in the world frame.
+/// The planned path after a waypoint, in the world frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PathAhead {
-    /// East and north of each further waypoint in metres.
+    /// Each further waypoint: metres east and north.
     pub points: Vec<Point>,
     /// Whether the plan has more waypoints than these.
     pub continues: bool,
 }
 
 impl Steering {
-    /// The plan after the waypoint that [`Self::next`] gave last, from which `left_m` metres may be gone.
-    pub fn ahead(&self, waypoint: Point, left_m: f64) -> PathAhead {
+    /// The plan after the last waypoint of [`Self::next`], from which `left_m` metres may be travelled.
+    pub fn path_after(&self, waypoint: Point, left_m: f64) -> PathAhead {
         let left_m = left_m - self.grounds.last_leg_m();
-        let mut way = Corners::new(waypoint);
-        self.plan.iter().for_each(|&node| way.go(self.grounds.lattice().place(node)));
-        let Some(&(mut end)) = self.plan.back() else { return way.told() };
+        let mut path = Corners::new(waypoint);
+        self.plan.iter().for_each(|&node| path.go(self.grounds.lattice().place(node)));
+        let Some(&(mut end)) = self.plan.back() else { return path.finish() };
         for goal in self.choice.planner().beyond() {
-            if way.is_full() {
+            if path.is_full() {
                 break;
             }
             let straight = self.grounds.lattice().straight(end, goal);
-            for node in straight.unwrap_or_else(|| self.grounds.lattice().ways(end).to(goal)) {
+            for node in straight.unwrap_or_else(|| self.grounds.lattice().paths(end).to(goal)) {
                 let place = self.grounds.lattice().place(node);
-                if !self.grounds.leaves_return(node, way.metres + distance(way.end(), place), left_m) {
-                    return way.told();
+                if !self.grounds.leaves_return(node, path.metres + distance(path.end(), place), left_m) {
+                    return path.finish();
                 }
-                way.go(place);
+                path.go(place);
                 end = node;
             }
         }
-        way.told()
+        path.finish()
     }
 
-    /// The way home after a waypoint of it.
-    pub fn ahead_home(&self, waypoint: Point) -> PathAhead {
-        let mut way = Corners::new(waypoint);
-        let home = self.home();
+    /// The return path after one of its waypoints.
+    pub fn path_after_return(&self, waypoint: Point) -> PathAhead {
+        let mut path = Corners::new(waypoint);
+        let home = self.return_place();
         if let Some((_, end, nodes)) = self.grounds.return_path(waypoint) {
-            nodes.into_iter().for_each(|node| way.go(self.grounds.lattice().place(node)));
+            nodes.into_iter().for_each(|node| path.go(self.grounds.lattice().place(node)));
             if self.grounds.bounds().allows_exit(home, self.grounds.lattice().place(end)) {
-                way.go(home);
+                path.go(home);
             }
         }
-        way.told()
+        path.finish()
     }
 }
 
@@ -114,36 +114,36 @@ mod tests {
         Steering::new(AREA, FOOTPRINT, 0.25, kind, 1.0)
     }
 
-    /// The waypoint from the start, and what is told to come after it.
+    /// The first waypoint, and the planned path after it.
     fn first(steering: &mut Steering, map: &LabelGrid, utility: Option<&Utility>, left_m: f64) -> (Point, PathAhead) {
         let from = steering.start();
         let Course::Go(to) = steering.next(from, (map, 1), utility, left_m) else { panic!("nowhere to go") };
-        (to, steering.ahead(to, left_m - distance(from, to)))
+        (to, steering.path_after(to, left_m - distance(from, to)))
     }
 
     #[test]
-    fn a_way_is_told_by_its_corners_and_that_it_goes_on() {
-        let mut way = Corners::new((0.0, 0.0));
+    fn a_path_is_reported_by_its_corners() {
+        let mut path = Corners::new((0.0, 0.0));
         for to in [(0.0, 0.0), (1.8, 0.0), (3.6, 0.0), (5.4, 1.8), (7.2, 3.6), (7.2, 3.6), (5.4, 1.8)] {
-            way.go(to);
+            path.go(to);
         }
         let folded = [(3.6, 0.0), (7.2, 3.6), (5.4, 1.8)];
-        assert_eq!(way.told(), PathAhead { points: folded.to_vec(), continues: false });
+        assert_eq!(path.finish(), PathAhead { points: folded.to_vec(), continues: false });
         let stairs = |steps: i32| {
-            let mut way = Corners::new((0.0, 0.0));
-            (1..=steps).for_each(|i| way.go((f64::from(i / 2), f64::from((i + 1) / 2))));
-            way.told()
+            let mut path = Corners::new((0.0, 0.0));
+            (1..=steps).for_each(|i| path.go((f64::from(i / 2), f64::from((i + 1) / 2))));
+            path.finish()
         };
         assert_eq!((stairs(7).points.len(), stairs(7).continues), (7, false));
         assert_eq!((stairs(8).points, stairs(8).continues), (stairs(7).points, true));
     }
 
     #[test]
-    fn the_lawnmower_tells_the_legs_that_it_then_goes() {
+    fn the_lawnmower_reports_the_legs_that_it_takes() {
         let mut steering = steering(PlannerKind::Horizon);
-        let (mut at, told) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
-        assert_eq!((told.points.len(), told.continues), (4, false));
-        for place in told.points {
+        let (mut at, planned) = first(&mut steering, &LabelGrid::default(), None, f64::INFINITY);
+        assert_eq!((planned.points.len(), planned.continues), (4, false));
+        for place in planned.points {
             let Course::Go(to) = steering.next(at, (&LabelGrid::default(), 1), None, f64::INFINITY) else { panic!() };
             assert!(distance(to, place) < 1e-9, "{to:?} instead of {place:?}");
             at = to;
@@ -151,13 +151,13 @@ mod tests {
     }
 
     #[test]
-    fn no_leg_is_told_that_would_leave_no_way_home() {
+    fn no_reported_leg_prevents_the_return() {
         let metres = |left_m: f64| {
             let mut steering = steering(PlannerKind::Lawnmower);
-            let (to, told) = first(&mut steering, &LabelGrid::default(), None, left_m);
-            let way: Vec<Point> = [steering.start(), to].into_iter().chain(told.points).collect();
-            let gone: f64 = way.windows(2).map(|w| distance(w[0], w[1])).sum();
-            gone + distance(way[way.len() - 1], steering.home())
+            let (to, planned) = first(&mut steering, &LabelGrid::default(), None, left_m);
+            let path: Vec<Point> = [steering.start(), to].into_iter().chain(planned.points).collect();
+            let gone: f64 = path.windows(2).map(|w| distance(w[0], w[1])).sum();
+            gone + distance(path[path.len() - 1], steering.return_place())
         };
         assert!(metres(f64::INFINITY) > 60.0);
         for left_m in [10.0, 25.0, 40.0, 55.0] {
@@ -166,33 +166,36 @@ mod tests {
     }
 
     #[test]
-    fn a_horizon_is_told_as_it_is_planned_and_anew_when_the_plan_is() {
+    fn the_reported_path_follows_each_new_plan() {
         let label = |x: i32, y: i32, east: bool| if (x > 40) == east && y > 10 { 2 } else { 1 };
         let map = |east: bool| -> LabelGrid {
             (0..48 * 80).map(|i| (i % 80, i / 80)).map(|(x, y)| (Cell::new(x, y), label(x, y, east))).collect()
         };
         let utility = Utility { weights: [(2, 100), (1, -5)].into(), ..Utility::default() };
         let mut steering = steering(PlannerKind::Horizon);
-        let (to, told) = first(&mut steering, &map(true), Some(&utility), f64::INFINITY);
-        assert!(!told.points.is_empty());
+        let (to, planned) = first(&mut steering, &map(true), Some(&utility), f64::INFINITY);
+        assert!(!planned.points.is_empty());
         let Course::Go(next) = steering.next(to, (&map(true), 1), Some(&utility), f64::INFINITY) else { panic!() };
-        assert!(told.points[0] == next || is_straight(to, next, told.points[0]), "{next:?} is on no leg of {told:?}");
+        assert!(
+            planned.points[0] == next || is_straight(to, next, planned.points[0]),
+            "{next:?} is on no leg of {planned:?}"
+        );
         let Course::Go(west) = steering.next(to, (&map(false), 2), Some(&utility), f64::INFINITY) else { panic!() };
-        assert_ne!(steering.ahead(west, f64::INFINITY), told);
+        assert_ne!(steering.path_after(west, f64::INFINITY), planned);
     }
 
     #[test]
-    fn the_way_home_is_told_round_what_is_kept_out() {
+    fn the_reported_return_path_avoids_keep_outs() {
         let place = |x, y| DecimetrePoint::new(10 * x, 10 * y);
         let wall = Polygon(vec![place(9, -5), place(11, -5), place(11, 8), place(9, 8)]);
         let mut steering = steering(PlannerKind::Lawnmower);
         let return_point = Some(DecimetrePoint::new(31, 33));
         steering.set_fence(&Fence { keep_outs: vec![wall], return_point, ..Fence::default() });
-        let Course::Go(to) = steering.next_home((17.0, 3.0)) else { panic!("no way") };
-        let told = steering.ahead_home(to);
-        assert_eq!((told.points.last(), told.continues), (Some(&(3.1, 3.3)), false));
-        assert!(told.points.iter().any(|p| p.1 > 8.0), "{told:?}");
-        let way: Vec<Point> = std::iter::once(to).chain(told.points).collect();
-        assert!(way.windows(2).all(|w| steering.bounds().allows_leg(w[0], w[1])));
+        let Course::Go(to) = steering.next_return((17.0, 3.0)) else { panic!("no path") };
+        let planned = steering.path_after_return(to);
+        assert_eq!((planned.points.last(), planned.continues), (Some(&(3.1, 3.3)), false));
+        assert!(planned.points.iter().any(|p| p.1 > 8.0), "{planned:?}");
+        let path: Vec<Point> = std::iter::once(to).chain(planned.points).collect();
+        assert!(path.windows(2).all(|w| steering.bounds().allows_leg(w[0], w[1])));
     }
 }

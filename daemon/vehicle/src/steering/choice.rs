@@ -1,4 +1,4 @@
-//! The planner that is configured, chosen and in use.
+//! The planner: as configured, as ordered, and in use.
 
 use crate::planning::{Planner, planner};
 use scenecast_protocol::directive::PlannerKind;
@@ -21,7 +21,8 @@ impl PlannerChoice {
         self.chosen = chosen;
     }
 
-    /// A lawnmower until there is a utility, then the chosen or the configured planner; returns whether it has changed.
+    /// Selects the lawnmower until there is a utility, then the ordered or the configured planner. Returns
+    /// whether the planner has changed.
     pub(super) fn follow(&mut self, has_utility: bool) -> bool {
         let wanted = if has_utility { self.chosen.unwrap_or(self.configured) } else { PlannerKind::Lawnmower };
         let changes = wanted != self.running;

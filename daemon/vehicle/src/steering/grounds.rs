@@ -1,25 +1,25 @@
-//! Where the vehicle may go: the survey area within the fence, and the return path from each place of it.
+//! The survey area within the fence, and the return path from each place of it.
 
-use crate::planning::{Bounds, Lattice, Node, Point, Ways, distance};
+use crate::planning::{Bounds, Lattice, Node, Paths, Point, distance};
 use scenecast_core::Area;
 use scenecast_protocol::directive::Fence;
 
-/// Steps between two places of the lattice, in reaches of the camera: looks overlap by a tenth.
+/// Distance between two places of the lattice, in reaches of the camera. Views overlap by a tenth.
 const STEP: f64 = 0.9;
-/// The lattice of places within area and fence, in the world frame.
+/// The lattice over area and fence, in the world frame.
 #[derive(Debug)]
 pub(super) struct Grounds {
     area: Area,
-    /// Metres from the middle of a frame that are seen at any heading.
+    /// Metres around the centre of a frame that are visible at any heading.
     reach_m: f64,
     clearance_m: f64,
     bounds: Bounds,
-    /// The first place of the survey, where a vehicle without a return point returns to.
+    /// The first place of the survey. Without a return point the vehicle returns to it.
     start: Point,
     return_point: Option<Point>,
     lattice: Lattice,
-    return_paths: Option<Ways>,
-    /// Metres from the end of those paths to the return point itself.
+    return_paths: Option<Paths>,
+    /// Metres from the end of the return paths to the return point itself.
     last_leg_m: f64,
 }
 
@@ -51,7 +51,7 @@ impl Grounds {
         &self.lattice
     }
 
-    pub(super) fn return_paths(&self) -> Option<&Ways> {
+    pub(super) fn return_paths(&self) -> Option<&Paths> {
         self.return_paths.as_ref()
     }
 
@@ -60,7 +60,7 @@ impl Grounds {
     }
 
     /// The end of every return path.
-    pub(super) fn home(&self) -> Point {
+    pub(super) fn return_place(&self) -> Point {
         self.return_point.unwrap_or(self.start)
     }
 
@@ -72,10 +72,10 @@ impl Grounds {
 
     fn lay_out(&mut self) {
         let inner = self.area.shrunk(self.reach_m);
-        self.lattice = Lattice::new(inner, &[self.home()], STEP * self.reach_m, &self.bounds);
-        let end = self.entry(self.home());
-        self.return_paths = end.map(|n| self.lattice.ways(n));
-        self.last_leg_m = end.map_or(0.0, |n| distance(self.home(), self.lattice.place(n)));
+        self.lattice = Lattice::new(inner, &[self.return_place()], STEP * self.reach_m, &self.bounds);
+        let end = self.entry(self.return_place());
+        self.return_paths = end.map(|n| self.lattice.paths(n));
+        self.last_leg_m = end.map_or(0.0, |n| distance(self.return_place(), self.lattice.place(n)));
     }
 
     /// The place at which a path from `from` enters the lattice.
@@ -83,25 +83,26 @@ impl Grounds {
         self.lattice.entry(from, &self.bounds)
     }
 
-    /// Whether the return path from a place fits into what is left after `gone_m` metres.
+    /// Whether the return path from a place fits into `left_m` after `gone_m` metres.
     pub(super) fn leaves_return(&self, node: Node, gone_m: f64, left_m: f64) -> bool {
         !left_m.is_finite() || self.return_paths.as_ref().is_some_and(|w| gone_m + w.metres[node] <= left_m)
     }
 
-    /// The place where a return path enters the lattice, the place where it leaves it, and the places after the first.
+    /// The place at which a return path enters the lattice, the place at which it leaves it, and
+    /// the places after the first.
     pub(super) fn return_path(&self, from: Point) -> Option<(Node, Node, Vec<Node>)> {
-        let (at, end) = (self.entry(from)?, self.entry(self.home())?);
-        Some((at, end, self.lattice.ways(at).to(end)))
+        let (at, end) = (self.entry(from)?, self.entry(self.return_place())?);
+        Some((at, end, self.lattice.paths(at).to(end)))
     }
 
-    /// Metres of the return path from a place, infinite if there is none.
+    /// Metres of the return path from a place; infinite if there is none.
     pub(super) fn return_path_m(&self, from: Point) -> f64 {
         let Some(at) = self.entry(from) else { return f64::INFINITY };
         let along = self.return_paths.as_ref().map_or(f64::INFINITY, |w| w.metres[at]);
         distance(from, self.lattice.place(at)) + along + self.last_leg_m
     }
 
-    /// Metres from a waypoint at which it counts as reached.
+    /// The distance in metres at which a waypoint counts as reached.
     pub(super) fn arrival_m(&self) -> f64 {
         0.5f64.min(self.clearance_m.max(0.1) / 2.0)
     }

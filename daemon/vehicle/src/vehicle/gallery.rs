@@ -1,8 +1,9 @@
-//! Pictures of labels: what the vehicle has, what the surface was shown of it, and what is asked for.
+//! The exemplars of the vehicle: those that it has, those that it has sent, and those that the surface requests.
 
+use crate::SharedExemplars;
 use crate::exemplar::{GOOD_SSIM, compress_to, middle};
 use image::RgbImage;
-use scene_model::exemplars::ExemplarPatch as Picture;
+use scene_model::exemplars::ExemplarPatch;
 use scenecast_protocol::directive::{ExemplarRequest, ExemplarRequests};
 use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 use scenecast_protocol::link::VehicleLink;
@@ -11,87 +12,87 @@ use scenecast_protocol::schedule::BackgroundStream;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Pictures of a label that were shown and are remembered.
-const REMEMBERED: usize = 8;
+/// Sent exemplars of a label that are remembered.
+const MAX_SHOWN: usize = 8;
 
-/// A picture that the surface was shown.
+/// An exemplar that was sent to the surface.
 #[derive(Debug)]
 struct Shown {
     number: u8,
-    picture: Picture,
+    picture: ExemplarPatch,
 }
 
-/// What was answered to a request.
+/// The reply to a request.
 #[derive(Debug)]
-struct Answer {
+struct Reply {
     request: ExemplarRequest,
-    /// The number of the picture; 0: that there is none.
+    /// The number of the exemplar; 0: there is none.
     number: u8,
-    /// While it is on its way.
+    /// The object that carries it, while it is in flight.
     object: Option<ObjectId>,
 }
 
-/// A picture that nobody asked for, on its way.
+/// An exemplar in flight that was not requested.
 #[derive(Debug, Clone, Copy)]
-struct Unasked {
+struct Unrequested {
     label: u8,
     number: u8,
     object: ObjectId,
 }
 
-/// Pictures of labels of one epoch.
+/// The exemplars of the labels of one epoch.
 #[derive(Debug, Default)]
 pub(super) struct Gallery {
-    /// By label, the best first.
-    pictures: BTreeMap<u8, Vec<Picture>>,
+    /// For each label, the best first.
+    exemplars: SharedExemplars,
     requests: ExemplarRequests,
-    /// The run of the surface that asks.
+    /// The run of the surface that sent the requests.
     series: Option<u16>,
-    answers: Vec<Answer>,
-    /// By label, the last shown last.
+    replies: Vec<Reply>,
+    /// For each label, the latest last.
     shown: BTreeMap<u8, Vec<Shown>>,
-    /// Labels of which the surface was shown a picture in this run of the link.
+    /// Labels of which an exemplar was sent in this run of the link.
     seen: BTreeSet<u8>,
-    unasked: Option<Unasked>,
+    unrequested: Option<Unrequested>,
 }
 
 impl Gallery {
-    /// Most requests at a time.
+    /// Maximum number of requests at a time.
     pub(super) const MAX_REQUESTS: usize = 8;
 
-    /// The pictures of each label from now on, the best first.
-    pub(super) fn set_pictures(&mut self, pictures: BTreeMap<u8, Vec<Picture>>) {
-        self.pictures = pictures;
+    /// Replaces the exemplars of all labels, the best first.
+    pub(super) fn set_exemplars(&mut self, exemplars: SharedExemplars) {
+        self.exemplars = exemplars;
     }
 
-    pub(super) fn pictures(&self) -> &BTreeMap<u8, Vec<Picture>> {
-        &self.pictures
+    pub(super) fn exemplars(&self) -> &SharedExemplars {
+        &self.exemplars
     }
 
-    /// What is wanted from now on, by the surface's run `series`; what is not wanted any more is not sent to its end, and what
-    /// nobody asked for gives way.
+    /// Replaces the requests by those of the surface's run `series`. Replies in flight that are no longer requested are
+    /// cancelled, and an unrequested exemplar gives way.
     pub(super) fn replace_requests(&mut self, requests: ExemplarRequests, series: Option<u16>, link: &mut VehicleLink) {
         if self.series.is_some() && series != self.series {
-            // Another run of the surface was shown nothing.
+            // A new run of the surface has no exemplar yet.
             self.shown.clear();
             self.seen.clear();
         }
         self.series = series;
         let (kept, dropped) =
-            std::mem::take(&mut self.answers).into_iter().partition(|a| requests.wanted.contains(&a.request));
-        self.answers = kept;
-        for Answer { request, number, object } in dropped {
+            std::mem::take(&mut self.replies).into_iter().partition(|a| requests.wanted.contains(&a.request));
+        self.replies = kept;
+        for Reply { request, number, object } in dropped {
             self.withdraw(request.label, number, object, link);
         }
         self.requests = requests;
-        if self.is_asked()
-            && let Some(Unasked { label, number, object }) = self.unasked.take()
+        if self.has_open_request()
+            && let Some(Unrequested { label, number, object }) = self.unrequested.take()
         {
             self.withdraw(label, number, Some(object), link);
         }
     }
 
-    /// What was on its way was never shown.
+    /// Cancels an object in flight, and forgets that its exemplar was sent.
     fn withdraw(&mut self, label: u8, number: u8, object: Option<ObjectId>, link: &mut VehicleLink) {
         let Some(object) = object else { return };
         link.cancel_object(object);
@@ -103,46 +104,47 @@ impl Gallery {
         }
     }
 
-    /// Whether something is asked for that the surface does not have.
-    fn is_asked(&self) -> bool {
-        let is_met = |r: &ExemplarRequest| self.answers.iter().any(|a| a.request == *r && a.object.is_none());
+    /// Whether a request is open, so that its exemplar has not arrived yet.
+    fn has_open_request(&self) -> bool {
+        let is_met = |r: &ExemplarRequest| self.replies.iter().any(|a| a.request == *r && a.object.is_none());
         !self.requests.wanted.iter().all(is_met)
     }
 
-    /// Sends what is asked for and can be had, or else a picture of a label of which the surface has none, those that weigh
-    /// most first.
-    pub(super) fn tend(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
+    /// Sends the requested exemplars that exist. Without a request it sends one of a label of which the surface has
+    /// none, the label with the greatest weight first.
+    pub(super) fn serve(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
         for request in self.requests.wanted.clone() {
-            self.answer(request, epoch, link);
+            self.reply(request, epoch, link);
         }
-        if self.unasked.is_none() && !self.is_asked() && link.background().has(BackgroundStream::Exemplars) {
-            self.show_unasked(epoch, weight, link);
+        if self.unrequested.is_none() && !self.has_open_request() && link.background().has(BackgroundStream::Exemplars)
+        {
+            self.show_unrequested(epoch, weight, link);
         }
     }
 
-    fn answer(&mut self, request: ExemplarRequest, epoch: u8, link: &mut VehicleLink) {
-        let before = self.answers.iter().position(|a| a.request == request);
-        let was_none = before.and_then(|at| self.answers.get(at)).map(|a| a.number == 0);
+    fn reply(&mut self, request: ExemplarRequest, epoch: u8, link: &mut VehicleLink) {
+        let before = self.replies.iter().position(|a| a.request == request);
+        let was_none = before.and_then(|at| self.replies.get(at)).map(|a| a.number == 0);
         let chosen = if was_none == Some(false) { None } else { self.choose(request) };
         if was_none.is_some() && chosen.is_none() {
             return;
         }
         if let Some(at) = before {
-            let Answer { object, .. } = self.answers.remove(at);
+            let Reply { object, .. } = self.replies.remove(at);
             object.into_iter().for_each(|id| link.cancel_object(id));
         }
         let head = Exemplar { epoch, label: request.label, serial: request.serial, size: 0, picture: 0, bytes: vec![] };
         let exemplar =
             chosen.as_ref().and_then(|(n, p)| fill(head.clone(), *n, &p.patch, request.size)).unwrap_or(head);
         let Some(object) = link.push_object(exemplar.encode()) else { return };
-        self.answers.push(Answer { request, number: exemplar.picture, object: Some(object) });
+        self.replies.push(Reply { request, number: exemplar.picture, object: Some(object) });
         if let Some((number, picture)) = chosen {
             self.note_shown(request.label, number, picture);
         }
     }
 
-    fn show_unasked(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
-        let unseen = self.pictures.keys().filter(|label| !self.seen.contains(label));
+    fn show_unrequested(&mut self, epoch: u8, weight: impl Fn(u8) -> f64, link: &mut VehicleLink) {
+        let unseen = self.exemplars.keys().filter(|label| !self.seen.contains(label));
         let Some(label) = unseen.copied().max_by(|&a, &b| weight(a).total_cmp(&weight(b)).then(b.cmp(&a))) else {
             return;
         };
@@ -153,71 +155,71 @@ impl Gallery {
         let Some(exemplar) = fill(head, number, &picture.patch, 0) else { return };
         self.note_shown(label, number, picture);
         let object = link.push_background_object(exemplar.encode());
-        self.unasked = object.map(|object| Unasked { label, number, object });
+        self.unrequested = object.map(|object| Unrequested { label, number, object });
     }
 
-    /// The picture that a request means: the one that it names while it is known, else the best that was not shown.
-    fn choose(&self, request: ExemplarRequest) -> Option<(u8, Picture)> {
+    /// The exemplar that a request asks for: the named one while it is known, otherwise the best one that was not sent.
+    fn choose(&self, request: ExemplarRequest) -> Option<(u8, ExemplarPatch)> {
         let shown = self.shown.get(&request.label).map_or(&[][..], Vec::as_slice);
-        let pictures = self.pictures.get(&request.label).map_or(&[][..], Vec::as_slice);
+        let exemplars = self.exemplars.get(&request.label).map_or(&[][..], Vec::as_slice);
         if request.picture != 0 {
             let known = shown.iter().find(|s| s.number == request.picture).map(|s| &s.picture);
-            let named = known.or_else(|| pictures.iter().find(|p| number_of(p) == request.picture));
+            let named = known.or_else(|| exemplars.iter().find(|p| number_of(p) == request.picture));
             if let Some(picture) = named {
                 return Some((request.picture, picture.clone()));
             }
         }
-        let is_shown = |p: &&Picture| shown.iter().any(|s| is_same(&s.picture, p));
-        let new = pictures.iter().find(|p| !is_shown(p))?;
+        let is_shown = |p: &&ExemplarPatch| shown.iter().any(|s| is_same(&s.picture, p));
+        let new = exemplars.iter().find(|p| !is_shown(p))?;
         let is_taken = |n: &u8| shown.iter().any(|s| s.number == *n);
         let numbers =
             (0..ExemplarRequest::MAX_PICTURE).map(|i| (number_of(new) - 1 + i) % ExemplarRequest::MAX_PICTURE + 1);
         Some((numbers.into_iter().find(|n| !is_taken(n))?, new.clone()))
     }
 
-    fn note_shown(&mut self, label: u8, number: u8, picture: Picture) {
+    fn note_shown(&mut self, label: u8, number: u8, picture: ExemplarPatch) {
         self.seen.insert(label);
         let shown = self.shown.entry(label).or_default();
         shown.retain(|s| s.number != number);
         shown.push(Shown { number, picture });
-        if shown.len() > REMEMBERED {
+        if shown.len() > MAX_SHOWN {
             shown.remove(0);
         }
     }
 
-    /// The surface has all of an object.
+    /// The surface has an object completely.
     pub(super) fn handle_delivered(&mut self, id: ObjectId) {
-        self.answers.iter_mut().filter(|a| a.object == Some(id)).for_each(|a| a.object = None);
-        self.unasked = self.unasked.filter(|u| u.object != id);
+        self.replies.iter_mut().filter(|a| a.object == Some(id)).for_each(|a| a.object = None);
+        self.unrequested = self.unrequested.filter(|u| u.object != id);
     }
 
-    /// A new run of the link: what is on its way is to be sent again, and the surface may have no picture any more.
+    /// A new run of the link has begun: objects in flight are cancelled, and the surface may have lost every exemplar.
     pub(super) fn handle_restart(&mut self, link: &mut VehicleLink) {
-        let (met, open) = std::mem::take(&mut self.answers).into_iter().partition(|a| a.object.is_none());
-        self.answers = met;
-        for Answer { request, number, object } in open {
+        let (met, open) = std::mem::take(&mut self.replies).into_iter().partition(|a| a.object.is_none());
+        self.replies = met;
+        for Reply { request, number, object } in open {
             self.withdraw(request.label, number, object, link);
         }
-        if let Some(Unasked { label, number, object }) = self.unasked.take() {
+        if let Some(Unrequested { label, number, object }) = self.unrequested.take() {
             self.withdraw(label, number, Some(object), link);
         }
         self.seen.clear();
     }
 }
 
-/// A name for a picture that outlives a restart: of the place and time it was taken at.
-fn number_of(picture: &Picture) -> u8 {
+/// The number of an exemplar, from 1. It depends on place and time of the frame only, so that it survives a restart.
+fn number_of(picture: &ExemplarPatch) -> u8 {
     let bits =
         picture.t_s.to_bits() ^ picture.place.0.to_bits().rotate_left(21) ^ picture.place.1.to_bits().rotate_left(42);
     let mixed = (bits ^ bits >> 31).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
     (mixed % u64::from(ExemplarRequest::MAX_PICTURE)) as u8 + 1
 }
 
-fn is_same(a: &Picture, b: &Picture) -> bool {
+fn is_same(a: &ExemplarPatch, b: &ExemplarPatch) -> bool {
     (a.t_s, a.place) == (b.t_s, b.place)
 }
 
-/// The object of a picture, as large as asked for and there is; `None` if it cannot be compressed.
+/// The object of an exemplar in at most the requested size class; `None` if it cannot be compressed.
 fn fill(head: Exemplar, picture: u8, patch: &Arc<RgbImage>, size: u8) -> Option<Exemplar> {
     let (size, image) = middle(patch, size)?;
     let bytes = compress_to(&image, GOOD_SSIM, max_bytes(size))?.bytes;

@@ -1,86 +1,56 @@
-//! The vehicle's role: link, position estimate and steering in one sans-IO whole.
+//! The vehicle's role: link, position estimate, guidance and map in one state machine without IO.
+//!
+//! [`Vehicle`] joins parts that own their state: the navigator estimates the position, the guidance chooses waypoints, the
+//! publisher selects the parts of the map that are sent, and the gallery sends exemplars.
 
-mod course;
+mod durable;
 mod gallery;
+mod guidance;
+mod last_place;
 #[cfg(test)]
-mod obedience_tests;
-mod obey;
-mod place;
-mod tuning;
+mod orders_tests;
+mod publisher;
+mod report;
+mod slots;
 mod whole_png;
 
-use super::failsafe::{Failsafe, Habits};
-use super::mapper::MapUpdate;
+pub use durable::Durable;
+pub use last_place::LastPlace;
+
+use super::failsafe::FailsafePolicy;
+use super::mapper::{MapUpdate, SharedExemplars};
 use super::navigator::Navigator;
 use super::steering::Steering;
-use course::Doing;
 use gallery::Gallery;
-use scene_model::exemplars::ExemplarPatch as Picture;
+use guidance::{Guidance, Situation};
+use publisher::MapPublisher;
 use scenecast_protocol::coordinates::MapPoint;
-use scenecast_protocol::directive::{Fix, RefusalReason, Settings, Slot, SlotId, SlotState, Utility};
-use scenecast_protocol::link::{LinkStats, SlotInboxState, Transmit, VehicleEvent, VehicleLink, Wakeup};
-use scenecast_protocol::map::{LabelGrid, LayerSource};
+use scenecast_protocol::directive::{Fix, RefusalReason, Settings, SlotId, SlotState, Utility};
+use scenecast_protocol::link::{Transmit, VehicleEvent, VehicleLink, Wakeup};
+use scenecast_protocol::map::LayerMask;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::PlannedPath;
-use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, VecDeque};
-use tuning::Telling;
-use whole_png::WholePng;
+use std::collections::VecDeque;
+use std::time::Duration;
 
-pub use place::LastPlace;
+/// Metres and seconds of use of the limits after which they are stored again.
+const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);
 
-/// What must survive a restart of the vehicle, so that nothing is applied twice and no label changes its meaning.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Durable {
-    pub inbox: SlotInboxState,
-    /// Epoch of the label ids in use.
-    pub epoch: u8,
-    /// Label ids of the epoch that may have been told: 1 to this.
-    pub labels: u8,
-    /// Random number of the mission, by which its checkpoints are known.
-    pub lineage: u64,
-    /// Utility in force: epoch, exploration, curiosity, weights.
-    pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
-    /// Whether the vehicle is told to hold.
-    pub hold: bool,
-    /// Whether it is told to abort.
-    pub abort: bool,
-    /// Budget in force, bits a second, if somebody has changed it.
-    pub budget_bps: Option<u32>,
-    /// Least shares in force in percent, if somebody has changed them.
-    pub shares: Option<[u8; 5]>,
-    /// What left-over bits are spent on, as on the wire, if somebody has changed it.
-    pub background: Option<u128>,
-    /// Settings in force, as on the wire; empty: all as configured.
-    pub settings: Vec<u8>,
-    /// Limits in force, as on the wire; empty: none.
-    pub limits: Vec<u8>,
-    /// Metres and seconds of them that are used up, nearly.
-    pub used: (u32, u32),
-    /// A breach that the operator has not answered yet: the reason's number on the wire.
-    pub breach: u8,
-    /// Fence in force, as on the wire; empty: none.
-    pub fence: Vec<u8>,
-    /// Where it was at its last fix.
-    pub place: Option<LastPlace>,
-}
-
-/// What the vehicle asks of its host.
+/// A request of the vehicle to its host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleOutput {
-    /// Make [`Vehicle::durable`] durable, then call [`Vehicle::handle_persisted`]. If that fails, do nothing that is asked
-    /// for later, and send nothing.
+    /// Store [`Vehicle::durable`], then call [`Vehicle::handle_persisted`]. If that fails, ignore all later
+    /// requests and transmit no more.
     Persist,
-    /// Go there, metres east and north in the map's frame.
+    /// Go to this point of the map frame.
     Waypoint(MapPoint),
     Hold,
     Surface,
-    /// Have the scene model follow these settings; what they do not name is as configured. A run begins with
-    /// [`Vehicle::settings`].
+    /// Have the scene model use these settings; those that have no value are as configured.
+    /// A run begins with [`Vehicle::settings`].
     Tune(Settings),
-    /// A slot was decided about.
+    /// The vehicle has decided about a slot.
     Applied(AppliedSlot),
-    /// A fix in the world that was used, and when it was taken: an autopilot may want it too.
+    /// A fix was used, with the time at which it was measured. An autopilot may need it too.
     Fixed(Fix, Instant),
 }
 
@@ -96,35 +66,26 @@ pub struct AppliedSlot {
 pub struct Vehicle {
     link: VehicleLink,
     navigator: Navigator,
-    steering: Steering,
+    guidance: Guidance,
+    publisher: MapPublisher,
+    gallery: Gallery,
     durable: Durable,
     utility: Option<Utility>,
-    gallery: Gallery,
-    labels: u8,
-    explored: u32,
-    failsafe: Failsafe,
-    course: Doing,
-    waypoint: Option<MapPoint>,
-    /// What is planned after the waypoint.
-    path: PlannedPath,
-    /// An order was applied that may change the way; the surface is to hear what comes of it.
+    settings: Settings,
+    /// Whether an order was applied that may change the path, so that the surface needs a new pose.
     has_new_orders: bool,
-    done: bool,
     outputs: VecDeque<VehicleOutput>,
     fixes_applied: u64,
     autopilot_silent: bool,
-    telling: Telling,
-    /// Instead of the link's map, for comparison.
-    whole_png: Option<WholePng>,
 }
 
 impl Vehicle {
-    /// A vehicle at its start; `durable` is what survived the last run, with the epoch this run begins.
+    /// A vehicle at its start. `durable` is the state of the last run, with the epoch of this run.
     pub fn new(
         link: VehicleLink,
         navigator: Navigator,
         steering: Steering,
-        habits: Habits,
+        policy: FailsafePolicy,
         durable: Durable,
         now: Instant,
     ) -> Self {
@@ -134,27 +95,21 @@ impl Vehicle {
             curiosity,
             weights,
         });
+        let settings = Settings::from_bytes(&durable.settings).unwrap_or_default();
         let mut vehicle = Self {
             link,
             navigator,
-            steering,
-            // Weights speak of labels of their epoch; a new epoch has none yet.
-            utility: utility.filter(|u| u.epoch == durable.epoch),
-            telling: Telling::restore(&durable.settings),
-            durable,
+            guidance: Guidance::new(steering, policy, &durable, settings.planner.value(), now),
+            publisher: MapPublisher::default(),
             gallery: Gallery::default(),
-            labels: 0,
-            explored: 0,
-            failsafe: Failsafe::new(habits, now),
-            course: Doing::default(),
-            waypoint: None,
-            path: PlannedPath::default(),
+            // The weights are those of labels of their epoch; a new epoch has no labels yet.
+            utility: utility.filter(|u| u.epoch == durable.epoch),
+            durable,
+            settings,
             has_new_orders: false,
-            done: false,
             outputs: VecDeque::new(),
             fixes_applied: 0,
             autopilot_silent: false,
-            whole_png: None,
         };
         if vehicle.utility.is_none() && vehicle.durable.utility.take().is_some() {
             let other = SlotState::Refused(RefusalReason::OtherEpoch);
@@ -162,74 +117,58 @@ impl Vehicle {
             vehicle.durable.inbox = vehicle.link.persistent_state().clone();
             vehicle.outputs.push_back(VehicleOutput::Persist);
         }
-        vehicle.follow_telling();
+        vehicle.publisher.set_settings(&vehicle.settings);
+        vehicle.publisher.select(&mut vehicle.link);
         vehicle.follow_utility();
-        vehicle.restore_course();
         vehicle
     }
 
-    /// Sends the whole map as a PNG whenever it has changed instead of what changed, for comparison.
+    /// Sets the part of the map that is sent unless the operator orders another: only coarse cells or all of them, a
+    /// backlog of more than `coarse_after_s` seconds of the budget coarse to fine (0: never), and these layers.
+    pub fn configure_map(&mut self, is_coarse: bool, coarse_after_s: f64, layers: LayerMask) {
+        self.publisher.configure(is_coarse, coarse_after_s, layers);
+        self.publisher.select(&mut self.link);
+    }
+
+    /// For comparison: sends the whole map as a PNG file whenever it has changed, in place of the changes.
     pub fn send_whole_png(&mut self) {
-        self.whole_png = Some(WholePng::default());
+        self.publisher.send_whole_png();
     }
 
-    /// What must survive a restart.
-    pub fn durable(&self) -> &Durable {
-        &self.durable
-    }
-
-    /// The map as the vehicle tells it.
-    pub fn map(&self) -> &LabelGrid {
-        self.whole_png.as_ref().map_or_else(|| self.link.map(), WholePng::map)
-    }
-
-    /// The layers of the map that are told.
-    pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
-        self.link.layers()
-    }
-
-    /// Versions of that map so far.
-    pub fn map_version(&self) -> u64 {
-        self.whole_png.as_ref().map_or_else(|| self.link.map_version(), WholePng::version)
-    }
-
-    /// Changes of labels that never had to be sent, for they did not last.
-    pub fn flips_suppressed(&self) -> u64 {
-        self.link.source().flips_suppressed()
-    }
-
-    /// Whether the surface is known to have everything.
-    pub fn is_converged(&self) -> bool {
-        self.link.is_converged() && self.whole_png.as_ref().is_none_or(WholePng::is_converged)
-    }
-
-    pub fn stats(&self) -> &LinkStats {
-        self.link.stats()
-    }
-
-    /// Bits a second that the link may use.
-    pub fn budget_bps(&self) -> u32 {
-        self.link.budget_bps()
-    }
-
-    /// An earlier run may have sent until `now`: the budget counts as spent.
+    /// Counts the whole budget window as spent, because an earlier run may have transmitted until `now`.
     pub fn assume_budget_spent(&mut self, now: Instant) {
         self.link.assume_budget_spent(now);
     }
 
-    pub fn utility(&self) -> Option<&Utility> {
-        self.utility.as_ref()
+    /// Sets whether the autopilot does not answer; the next status reports it.
+    pub fn set_autopilot_silent(&mut self, is_silent: bool) {
+        self.autopilot_silent = is_silent;
     }
 
-    /// The next thing asked of the host.
+    /// The next request to the host.
     pub fn poll_output(&mut self) -> Option<VehicleOutput> {
         self.outputs.pop_front()
     }
 
-    /// The vehicle's own sensors say that it moved.
+    /// The vehicle's own sensors measured a displacement since the last call: metres east and north.
     pub fn handle_odometry(&mut self, dx_m: f64, dy_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
         self.navigator.handle_odometry(dx_m, dy_m, heading_rad, depth_m, now);
-        self.failsafe.handle_way(dx_m.hypot(dy_m));
+        self.guidance.handle_travel(dx_m.hypot(dy_m));
+    }
+
+    /// Sets the pose in the map frame from another source, such as a recorded mission.
+    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
+        let before = self.navigator.position();
+        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
+        self.guidance.handle_travel(before.distance_m(MapPoint { x_m, y_m }));
+    }
+
+    /// No sensor measured the vehicle's motion for `time`. The distance that it could have gone adds to the position's
+    /// uncertainty and counts against the limits.
+    pub fn handle_unmeasured(&mut self, time: Duration) {
+        let metres = time.as_secs_f64() * self.guidance.speed_m_s();
+        self.navigator.handle_unmeasured(metres);
+        self.guidance.handle_travel(metres);
     }
 
     /// The scene model has a new map.
@@ -238,27 +177,18 @@ impl Vehicle {
             self.begin_epoch(update.epoch, now);
         }
         if update.labels > self.durable.labels {
-            // Before the surface can hear of them: after a restart they keep their meaning or have none.
+            // This is stored before any of the new labels is sent, so that a restart cannot give one another meaning.
             self.durable.labels = update.labels;
             self.outputs.push_back(VehicleOutput::Persist);
         }
-        self.labels = update.labels;
-        self.explored = update.cells.len() as u32;
-        self.telling.see(update);
-        match &mut self.whole_png {
-            Some(whole) => whole.set(update.cells.iter().copied()),
-            None => self.tell(now),
-        }
-        let at = self.navigator.position();
-        self.steering.handle_view(at.xy());
-        update.perplexity.iter().for_each(|&(cell, p)| self.steering.handle_perplexity(cell, p));
+        self.publisher.handle_map(update, &mut self.link, now);
+        self.guidance.handle_view(self.navigator.position().xy(), &update.perplexity);
     }
 
-    /// Label ids start afresh: the surface learns it by a new run, before any of the new ids.
+    /// Labels are numbered again from 1. The surface learns it by a new run of the link, before any of the new labels.
     fn begin_epoch(&mut self, epoch: u8, now: Instant) {
         self.link.begin_epoch(now);
-        self.telling.forget();
-        self.whole_png = self.whole_png.take().map(|_| WholePng::default());
+        self.publisher.begin_epoch();
         (self.durable.epoch, self.durable.labels) = (epoch, 0);
         self.utility = None;
         self.gallery = Gallery::default();
@@ -266,99 +196,109 @@ impl Vehicle {
         self.outputs.push_back(VehicleOutput::Persist);
     }
 
-    /// The images of each label that represent it best by now, the best first.
-    pub fn handle_exemplars(&mut self, pictures: BTreeMap<u8, Vec<Picture>>) {
-        self.gallery.set_pictures(pictures);
-        self.tend_gallery();
+    /// Takes the best exemplars of each label, the best first.
+    pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
+        self.gallery.set_exemplars(exemplars);
+        self.serve_exemplars();
     }
 
-    /// The best patches of each label, as [`Self::handle_exemplars`] got them.
-    pub fn exemplars(&self) -> &BTreeMap<u8, Vec<Picture>> {
-        self.gallery.pictures()
-    }
-
-    fn tend_gallery(&mut self) {
+    fn serve_exemplars(&mut self) {
         let Self { utility, gallery, link, durable, .. } = self;
         let weight = |label| utility.as_ref().map_or(0.0, |u| u.weight(label));
-        gallery.tend(durable.epoch, weight, link);
+        gallery.serve(durable.epoch, weight, link);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
         self.link.handle_frame(bytes, now);
         if let Some(at) = self.link.last_received() {
-            self.failsafe.handle_surface_heard(at);
+            self.guidance.handle_received(at);
         }
         while let Some(event) = self.link.poll_event() {
             match event {
                 VehicleEvent::Slot { id, version, content } => self.handle_slot(id, version, content, now),
                 VehicleEvent::ObjectDelivered(id) => {
                     self.gallery.handle_delivered(id);
-                    self.tend_gallery();
-                    if let Some(whole) = &mut self.whole_png {
-                        whole.handle_delivered(id);
-                    }
+                    self.serve_exemplars();
+                    self.publisher.handle_delivered(id);
                 }
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
+                VehicleEvent::Oversized(fault) => tracing::error!("{fault}: it is left out of this frame"),
             }
         }
     }
 
-    /// What was on its way to the surface is lost.
+    /// Everything that was in flight is lost.
     fn handle_surface_restart(&mut self) {
         self.gallery.handle_restart(&mut self.link);
         self.link.cancel_objects();
-        if let Some(whole) = &mut self.whole_png {
-            whole.send_again();
+        self.publisher.handle_surface_restart();
+        self.serve_exemplars();
+    }
+
+    /// Chooses a waypoint if there is none or the last one is reached, or carries out the reaction of the failsafe.
+    pub fn steer(&mut self, now: Instant) {
+        if !self.guidance.handle_time(now) {
+            return;
         }
-        self.tend_gallery();
+        let (navigator, map, utility) = (&self.navigator, self.publisher.seen(), self.utility.as_ref());
+        let request = self.guidance.steer(&Situation { navigator, map, utility });
+        self.outputs.extend(request);
+        if std::mem::take(&mut self.has_new_orders) {
+            self.link.owe_pose(now);
+        }
+        self.record();
     }
 
-    fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
-        // Before everything that the host does because of the slot, or a power cut would have it done twice.
-        self.outputs.push_back(VehicleOutput::Persist);
-        let state = match content.ok_or(RefusalReason::Malformed).and_then(|slot| self.apply(slot, now)) {
-            Ok(()) => SlotState::Applied,
-            Err(reason) => SlotState::Refused(reason),
-        };
-        self.has_new_orders |= id.steers() && state == SlotState::Applied;
-        self.link.decide(id, state, now);
-        self.durable.inbox = self.link.persistent_state().clone();
-        self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));
+    /// Stores the use of the limits and the breach when they have changed enough.
+    fn record(&mut self) {
+        let (noted_m, noted_s) = (f64::from(self.durable.used.0), f64::from(self.durable.used.1));
+        let (used_m, used_s) = self.guidance.used();
+        let is_far = used_m - noted_m > RECORD_INTERVAL.0 || used_s - noted_s > RECORD_INTERVAL.1;
+        let breach = self.guidance.breach();
+        if (is_far && self.guidance.is_limited()) || breach != self.durable.breach {
+            self.durable.used = (used_m as u32, used_s as u32);
+            self.durable.breach = breach;
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
     }
 
-    /// The host has made [`Self::durable`] durable.
+    /// Ends the survey: the vehicle holds, and the link continues.
+    pub fn finish_survey(&mut self) {
+        let request = self.guidance.finish();
+        self.outputs.push_back(request);
+    }
+
+    /// The host has stored [`Self::durable`].
     pub fn handle_persisted(&mut self) {
         self.link.handle_persisted();
     }
 
-    /// The transmission that was handed out has left the modem.
+    /// The last frame of [`Self::poll_transmit`] has left the modem.
     pub fn handle_transmit_outcome(&mut self, now: Instant) {
         self.link.handle_transmit_outcome(now);
     }
 
-    /// The modem asks for so many frames.
+    /// The modem requests a number of frames.
     pub fn handle_poll(&mut self, frames: u32) {
         self.link.handle_poll(frames);
     }
 
-    /// The modem itself put so many bits on air.
+    /// The modem itself transmitted a number of bits, which count against the budget.
     pub fn handle_repeated(&mut self, bits: u64, now: Instant) {
         self.link.handle_repeated(bits, now);
     }
 
-    /// The next frame to put on air.
+    /// The next frame to transmit.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         if self.link.wants_status(now) {
             let status = self.status(now);
             self.link.set_status(status);
         }
-        if let Some(whole) = &mut self.whole_png {
-            whole.push(&mut self.link);
-        }
+        self.publisher.push_whole_png(&mut self.link);
         self.link.poll_transmit(now)
     }
 
-    /// When to ask for the next frame.
+    /// When to call [`Self::poll_transmit`] again, and why.
     pub fn poll_timeout(&self) -> Option<(Instant, Wakeup)> {
         self.link.poll_timeout()
     }

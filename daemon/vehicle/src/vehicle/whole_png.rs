@@ -1,11 +1,11 @@
-//! For comparison: the whole map as a PNG whenever it has changed, instead of what changed.
+//! For comparison: sends the whole map as a PNG file after each change.
 
 use scenecast_core::label_picture;
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::map::{Cell, LabelGrid};
 use scenecast_protocol::object::ObjectId;
 
-/// A map that travels as one object at a time, the newest version as soon as the last one is through.
+/// A map that is sent as one object at a time. The newest version follows as soon as the last object has arrived.
 #[derive(Debug, Default)]
 pub(super) struct WholePng {
     map: LabelGrid,
@@ -24,18 +24,17 @@ impl WholePng {
         self.version
     }
 
-    /// Sets labels of cells; a change makes a new version.
+    /// Sets the labels of cells. A change makes a new version.
     pub(super) fn set(&mut self, cells: impl Iterator<Item = (Cell, u8)>) {
         let changed = cells.filter(|&(cell, label)| self.map.set(cell, label) != label).count();
         self.version += u64::from(changed > 0);
     }
 
-    /// Whether the surface has the newest version.
     pub(super) fn is_converged(&self) -> bool {
         self.outstanding.is_none() && self.sent == self.version
     }
 
-    /// Hands the newest version to the link, unless one is under way or nothing has changed.
+    /// Hands the newest version to the link, unless an object is in flight or the version was sent.
     pub(super) fn push(&mut self, link: &mut VehicleLink) {
         if self.outstanding.is_some() || self.sent == self.version {
             return;
@@ -46,12 +45,12 @@ impl WholePng {
         }
     }
 
-    /// The surface has all of an object.
+    /// The surface has an object completely.
     pub(super) fn handle_delivered(&mut self, id: ObjectId) {
         self.outstanding = self.outstanding.filter(|&o| o != id);
     }
 
-    /// The surface has lost what it had.
+    /// The surface has lost its map.
     pub(super) fn send_again(&mut self) {
         (self.sent, self.outstanding) = (0, None);
     }

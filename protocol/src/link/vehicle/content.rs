@@ -1,5 +1,6 @@
 //! The content of the vehicle's frames: chosen and encoded when a frame is written.
 
+use super::event::OversizedChunk;
 use super::layers::LayerOut;
 use super::status::StatusSender;
 use crate::directive::{SLOTS, SlotReport};
@@ -54,6 +55,8 @@ pub(super) struct VehicleContent<S> {
     pub(super) shares: ClassShares,
     pub(super) background: BackgroundOrder,
     pub(super) status: StatusSender,
+    /// The last chunk that did not fit into the frame it was made for.
+    pub(super) oversized: Option<OversizedChunk>,
 }
 
 impl<S: StateSource> VehicleContent<S> {
@@ -65,6 +68,7 @@ impl<S: StateSource> VehicleContent<S> {
             shares: ClassShares::new(shares),
             background: BackgroundOrder::default(),
             status: StatusSender::new(status_period, now),
+            oversized: None,
         }
     }
 
@@ -234,8 +238,86 @@ impl<S: StateSource> VehicleContent<S> {
     fn fill_map(&mut self, builder: &mut FrameBuilder, carried: &mut Carried<S::Carried>, now: Instant) {
         let room = room_for_payload(builder.room());
         let Some((bytes, content)) = self.source.next_chunk(room, now) else { return };
-        let fits = builder.push(ChunkKind::Map, &bytes);
-        assert!(fits, "a chunk of {} bytes was made for {room}", bytes.len());
-        carried.push((Part::Map(content), bytes.len()));
+        if builder.push(ChunkKind::Map, &bytes) {
+            carried.push((Part::Map(content), bytes.len()));
+        } else {
+            self.source.handle_fate(content, false, now);
+            self.oversized = Some(OversizedChunk { bytes: bytes.len(), room });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{AckStatement, Address, FrameKind, Header, SessionId};
+
+    /// A source whose chunks are one byte longer than the room it is given.
+    #[derive(Debug, Default)]
+    struct TooLong {
+        lost: u32,
+    }
+
+    impl StateSource for TooLong {
+        type Carried = ();
+
+        fn next_chunk(&mut self, room: usize, _now: Instant) -> Option<(Vec<u8>, ())> {
+            Some((vec![0; room + 1], ()))
+        }
+
+        fn handle_fate(&mut self, (): (), delivered: bool, _now: Instant) {
+            self.lost += u32::from(!delivered);
+        }
+
+        fn handle_peer_restart(&mut self, _now: Instant) {}
+
+        fn backlog_bytes(&self) -> usize {
+            100
+        }
+
+        fn is_converged(&self) -> bool {
+            false
+        }
+
+        fn digest(&self) -> u16 {
+            0
+        }
+    }
+
+    fn builder(size: usize) -> FrameBuilder {
+        let header = Header {
+            from: Address::vehicle(1).unwrap(),
+            to: Address::SURFACE,
+            session: SessionId::from_random(1),
+            number: 1,
+            base: 0,
+            remaining: 0,
+            turn: None,
+            stamp: None,
+            nonce: None,
+            ack: Some(AckStatement { horizon_low: 0, lost: vec![] }),
+            kind: FrameKind::Numbered,
+            keyed: false,
+        };
+        FrameBuilder::new(&header, size)
+    }
+
+    #[test]
+    fn an_oversized_chunk_is_left_out_and_its_content_waits() {
+        let (shares, period) = (Shares::default(), Duration::from_secs(60));
+        let mut content = VehicleContent::new(TooLong::default(), shares, period, Instant::ZERO);
+        let (mut builder, mut carried) = (builder(64), Carried::new());
+        let room = room_for_payload(builder.room());
+        content.fill_map(&mut builder, &mut carried, Instant::ZERO);
+        assert_eq!(content.oversized, Some(OversizedChunk { bytes: room + 1, room }));
+        assert_eq!((content.source.lost, carried.len(), room_for_payload(builder.room())), (1, 0, room));
+    }
+
+    #[test]
+    fn room_in_a_large_frame_ends_at_the_longest_chunk() {
+        let mut builder = builder(4000);
+        let room = room_for_payload(builder.room());
+        assert_eq!(room, 1050);
+        assert!(builder.push(ChunkKind::Map, &vec![0; room]));
     }
 }

@@ -20,4 +20,16 @@ pub enum VehicleEvent {
     ObjectDelivered(ObjectId),
     /// The surface began a new run; everything is sent to it again.
     SurfaceRestarted,
+    /// A chunk was left out of a frame, and its content waits again.
+    Oversized(OversizedChunk),
+}
+
+/// A [`crate::map::StateSource`] has made a chunk that is longer than the room it was given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a chunk of {bytes} bytes was made for {room}")]
+pub struct OversizedChunk {
+    /// The length of the chunk's payload, bytes.
+    pub bytes: usize,
+    /// The room that the source was given, bytes.
+    pub room: usize,
 }

@@ -1,6 +1,7 @@
 //! Layers of the map: their chunks in a frame, and the turns that they need.
 
 use super::content::{Carried, Part, VehicleContent};
+use super::event::OversizedChunk;
 use crate::map::{Cell, LayerId, LayerMask, LayerSource, StateSource};
 use crate::schedule::BackgroundStream;
 use crate::time::Instant;
@@ -88,9 +89,12 @@ impl<S: StateSource> VehicleContent<S> {
         let room = room_for_payload(builder.room());
         let Some(source) = self.layer_mut(id).map(|l| &mut l.source) else { return };
         let Some((bytes, content)) = source.next_chunk(room, now) else { return };
-        let fits = builder.push(ChunkKind::Layer, &bytes);
-        assert!(fits, "a chunk of {} bytes was made for {room}", bytes.len());
-        carried.push((Part::Layer(id, content), bytes.len()));
+        if builder.push(ChunkKind::Layer, &bytes) {
+            carried.push((Part::Layer(id, content), bytes.len()));
+        } else {
+            source.handle_fate(content, false, now);
+            self.oversized = Some(OversizedChunk { bytes: bytes.len(), room });
+        }
     }
 
     /// The digests that are owed, as far as there is room for them.

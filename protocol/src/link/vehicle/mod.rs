@@ -17,7 +17,7 @@ mod timing;
 mod turn;
 
 pub use config::VehicleConfig;
-pub use event::VehicleEvent;
+pub use event::{OversizedChunk, VehicleEvent};
 
 use super::{LinkPair, LinkStats, SlotInbox, SlotInboxState, Wakeup};
 use crate::directive::{SlotId, SlotState};

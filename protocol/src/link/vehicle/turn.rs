@@ -1,8 +1,8 @@
 //! When the vehicle transmits, and how a turn ends.
 
-use super::VehicleLink;
 use super::content::{Carried, FillContext, Part};
 use super::repeat::RepeatTerms;
+use super::{VehicleEvent, VehicleLink};
 use crate::link::{Transmit, TransmitKind};
 use crate::mac::{Access, quarter_seconds};
 use crate::map::StateSource;
@@ -166,6 +166,7 @@ impl<S: StateSource> VehicleLink<S> {
             let (slots, refused_frames) = (self.inbox.reports(), self.pair.stats.refused());
             let context = FillContext { budget: &self.budget, slots, refused_frames, now };
             carried = self.content.fill(&mut builder, &context);
+            self.events.extend(self.content.oversized.take().map(VehicleEvent::Oversized));
         }
         let takes_turns = !matches!(modem.access, Access::ModemOwned { .. });
         let is_complete = takes_turns && !sends_hello && self.content.backlog_bytes(&self.budget, now) == 0;

@@ -1,20 +1,16 @@
-//! Where the vehicle is, through a restart.
+//! The position of the vehicle across a restart.
 
-use super::Vehicle;
 use crate::Navigator;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
-use scenecast_protocol::map::Cell;
-use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Placement, PlannedPath};
+use scenecast_protocol::wire::Placement;
 use serde::{Deserialize, Serialize};
-use std::time::Duration;
 
-/// Where the vehicle was at its last fix; decimetres, so that it compares.
+/// The position at the last fix, in decimetres so that it can be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LastPlace {
-    /// East and north in the map's frame.
+    /// East and north in the map frame, decimetres.
     at_dm: (i32, i32),
-    /// Version, east and north of the placement, if there was one.
+    /// Version, east and north of the placement, if there was one; decimetres.
     placement: Option<(u8, i32, i32)>,
 }
 
@@ -27,14 +23,14 @@ fn metres(dm: i32) -> f64 {
 }
 
 impl LastPlace {
-    /// Where a vehicle is now.
+    /// Takes the present position of a navigator.
     pub fn of(navigator: &Navigator) -> Self {
         let at = navigator.position();
         let placement = navigator.placement().map(|p| (p.version, dm(p.origin.east_m), dm(p.origin.north_m)));
         Self { at_dm: (dm(at.x_m), dm(at.y_m)), placement }
     }
 
-    /// The same place for a map that begins anew, whose frame is the world's at first.
+    /// The same place on a new map, whose frame is that of the world at first.
     pub fn for_new_map(self) -> Self {
         let (_, east, north) = self.placement.unwrap_or_default();
         let at_dm = (self.at_dm.0.saturating_add(east), self.at_dm.1.saturating_add(north));
@@ -46,61 +42,17 @@ impl LastPlace {
         MapPoint { x_m: metres(self.at_dm.0), y_m: metres(self.at_dm.1) }
     }
 
-    /// Where the map lies in the world.
+    /// The placement of the map in the world.
     pub fn placement(self) -> Option<Placement> {
         let (version, east, north) = self.placement?;
         Some(Placement { version, origin: WorldPoint { east_m: metres(east), north_m: metres(north) } })
     }
 }
 
-impl Vehicle {
-    /// The position is known from elsewhere, as in a recorded mission.
-    pub fn set_pose(&mut self, x_m: f64, y_m: f64, heading_rad: f64, depth_m: f64, now: Instant) {
-        let before = self.navigator.position();
-        self.navigator.set_pose(x_m, y_m, heading_rad, depth_m, now);
-        self.failsafe.handle_way(before.distance_m(MapPoint { x_m, y_m }));
-    }
-
-    /// For so long nobody measured the way: it may be anywhere that it could have gone to, and counts as gone there.
-    pub fn handle_unseen(&mut self, time: Duration) {
-        let metres = time.as_secs_f64() * self.failsafe.speed_m_s();
-        self.navigator.handle_unseen_way(metres);
-        self.failsafe.handle_way(metres);
-    }
-
-    /// Labels of cells as the vehicle sees them.
-    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
-        self.telling.seen.iter()
-    }
-
-    pub fn navigator(&self) -> &Navigator {
-        &self.navigator
-    }
-
-    /// Fixes that corrected the estimate.
-    pub fn fixes_applied(&self) -> u64 {
-        self.fixes_applied
-    }
-
-    /// The current goal in the map frame.
-    pub fn waypoint(&self) -> Option<MapPoint> {
-        self.waypoint
-    }
-
-    /// Where it plans to go from there.
-    pub fn path(&self) -> &PlannedPath {
-        &self.path
-    }
-
-    /// Whether the autopilot does not answer; the status tells it.
-    pub fn set_autopilot_silent(&mut self, is_silent: bool) {
-        self.autopilot_silent = is_silent;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use scenecast_protocol::time::Instant;
 
     #[test]
     fn golden_bytes_of_a_place() {
@@ -109,13 +61,13 @@ mod tests {
     }
 
     #[test]
-    fn a_vehicle_that_comes_back_finds_itself_on_its_map_by_a_fix() {
+    fn a_restarted_vehicle_is_located_on_its_map_by_a_fix() {
         let at = Instant::from_secs_f64;
         let mut before = Navigator::new(0.0, 0.0, 10.0, 0.01).with_start_sigma(20.0);
         before.handle_odometry(50.0, 0.0, 0.0, 10.0, at(50.0));
         assert!(before.handle_fix(WorldPoint::new(57.0, 3.0), 0.5, at(50.0), at(51.0)).is_used());
         let last = LastPlace::of(&before);
-        // It drifted 12 m to the north while its computer was off.
+        // The vehicle drifted 12 m to the north while its computer was off.
         let mut after = Navigator::resume(last, 10.0, 0.01);
         assert_eq!((after.position(), after.placement()), (MapPoint::new(50.0, 0.0), before.placement()));
         assert!(after.handle_fix(WorldPoint::new(57.0, 15.0), 0.5, at(1.0), at(1.0)).is_used());

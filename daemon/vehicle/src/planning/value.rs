@@ -1,81 +1,81 @@
-//! What it is worth to see each part of the sea floor next.
+//! The value of the next look at each part of the sea floor.
 
 use super::bounds::Point;
-use super::expect::{Expectation, Seen};
+use super::expect::{Expectation, SeenLabels};
 use super::lattice::{Lattice, Node};
 use scenecast_protocol::directive::Utility;
 use scenecast_protocol::map::{Cell, LabelGrid};
 
-/// What the vehicle knows of the sea floor.
+/// The state of knowledge about the sea floor.
 #[derive(Debug, Default, Clone)]
 pub struct Knowledge {
-    /// How often the camera looked at each cell, up to 255.
+    /// The number of looks of the camera at each cell, at most 255.
     looks: LabelGrid,
-    /// How badly the scene model explains each cell, 1..=255: twenty times the logarithm of its perplexity.
+    /// Twenty times the natural logarithm of the perplexity of each cell, 1 to 255.
     surprise: LabelGrid,
 }
 
 impl Knowledge {
-    /// The camera saw a cell.
     pub fn look(&mut self, cell: Cell) {
         let looks = self.looks.get(cell);
         self.looks.set(cell, looks.saturating_add(1));
     }
 
-    /// The scene model's perplexity of a cell.
+    /// Takes the scene model's perplexity of a cell, 1 or more.
     pub fn set_perplexity(&mut self, cell: Cell, perplexity: f32) {
         let level = (20.0 * perplexity.max(1.0).ln()).round().clamp(1.0, 255.0);
         self.surprise.set(cell, level as u8);
     }
 }
 
-/// Worth of the next look at a cell that was looked at before, against the look before that.
+/// The value of a repeated look at a cell, divided by the value of the look before.
 const REPEATED_LOOK: f32 = 0.2;
 
-/// Worth of the next look at each block, the square between four places of a lattice. A place shows the four blocks around it.
+/// The value of the next look at each block, the square between four places of a lattice. A place shows
+/// the four blocks around it.
 #[derive(Debug, Clone)]
-pub struct Worth {
-    /// Blocks of a row: one more than places.
+pub struct BlockValues {
+    /// The number of blocks in a row: one more than there are places.
     columns: usize,
     blocks: Vec<f32>,
 }
 
-/// The blocks of a place, as places in the rows of blocks.
-pub type Shown = [usize; 4];
+/// The indices of the blocks that a place shows.
+pub type ShownBlocks = [usize; 4];
 
-impl Worth {
-    /// Worth by the operator's utility, in whole cells of weight 1. Beyond the cells of the window nothing is worth anything;
-    /// with it goes where its cells lie in the world.
+impl BlockValues {
+    /// Values by the operator's utility; one whole cell of weight 1 has the value 1. Cells outside the window have
+    /// none. `map_origin` is the origin of the map frame in the world frame, metres.
     pub fn new(
         lattice: &Lattice,
-        (window, placed): (&Window, Point),
+        (window, map_origin): (&CellWindow, Point),
         map: &LabelGrid,
         known: &Knowledge,
         utility: &Utility,
     ) -> Self {
         let (places, rows) = lattice.size();
         let columns = places + 1;
-        let mut worth = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
+        let mut values = Self { columns, blocks: vec![0.0; columns * (rows + 1)] };
         let (south_west, step) = (lattice.place(0), lattice.step_m());
         let block = |at: f64, origin: f64| ((at - origin) / step).floor() as i64 + 1;
-        let cells = window.worth_of_cells(map, known, utility);
+        let cells = window.cell_values(map, known, utility);
         for (row, line) in (0..).zip(cells.chunks(window.width.max(1))) {
-            let y = block(window.centre(row, window.y) + placed.1, south_west.1);
+            let y = block(window.centre(row, window.y) + map_origin.1, south_west.1);
             if !(0..=rows as i64).contains(&y) {
                 continue;
             }
             for (column, value) in (0..).zip(line) {
-                let x = block(window.centre(column, window.x) + placed.0, south_west.0);
+                let x = block(window.centre(column, window.x) + map_origin.0, south_west.0);
                 if (0..columns as i64).contains(&x) {
-                    worth.blocks[y as usize * columns + x as usize] += value;
+                    values.blocks[y as usize * columns + x as usize] += value;
                 }
             }
         }
-        worth
+        values
     }
 
     /// The blocks that a place shows.
-    pub fn shown(&self, node: Node) -> Shown {
+    pub fn shown(&self, node: Node) -> ShownBlocks {
         let first = node + node / (self.columns - 1);
         [first, first + 1, first + self.columns, first + self.columns + 1]
     }
@@ -89,9 +89,9 @@ impl Worth {
     }
 }
 
-/// The cells whose worth counts.
+/// The cells that have a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Window {
+pub struct CellWindow {
     pub x: i32,
     pub y: i32,
     pub width: usize,
@@ -100,11 +100,11 @@ pub struct Window {
     pub cell_m: f64,
 }
 
-/// Most cells whose worth is reckoned one by one.
+/// The maximum number of cells that are valued one by one.
 const MAX_CELLS: f64 = 4e6;
 
-impl Window {
-    /// The cells of an area; fewer where that would be too many.
+impl CellWindow {
+    /// The cells of an area, from the south; at most 4 million.
     pub fn new(area: scenecast_core::Area, cell_m: f64) -> Self {
         let cell = |metres: f64| (metres / cell_m + 1e-9).floor().clamp(-1e9, 1e9) as i32;
         let (x, y) = (cell(area.west), cell(area.south));
@@ -115,7 +115,7 @@ impl Window {
         Self { x, y, width: width.min(MAX_CELLS) as usize, height: height as usize, cell_m }
     }
 
-    /// The middle of a cell of the window, metres.
+    /// The centre of a cell of the window, metres.
     fn centre(&self, index: i64, first: i32) -> f64 {
         (f64::from(first) + index as f64 + 0.5) * self.cell_m
     }
@@ -124,27 +124,27 @@ impl Window {
         grid.copy_area(i64::from(self.x), i64::from(self.y), self.width, self.height)
     }
 
-    fn worth_of_cells(&self, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Vec<f32> {
+    fn cell_values(&self, map: &LabelGrid, known: &Knowledge, utility: &Utility) -> Vec<f32> {
         let labels = self.copy(map);
-        let seen = Seen { labels: &labels, width: self.width };
+        let seen = SeenLabels { labels: &labels, width: self.width };
         let weight: Vec<f32> = (0..=255).map(|l| utility.weight(l) as f32).collect();
         let (exploration, curiosity) = (f32::from(utility.exploration) / 100.0, f32::from(utility.curiosity) / 100.0);
         let expectation = Expectation::new(seen);
-        let mut worth = expectation.of(|label| weight[usize::from(label)], 0.0);
-        for (w, &label) in worth.iter_mut().zip(&labels) {
+        let mut values = expectation.of(|label| weight[usize::from(label)], 0.0);
+        for (w, &label) in values.iter_mut().zip(&labels) {
             *w = if label == 0 { *w + exploration } else { weight[usize::from(label)] };
         }
         if curiosity != 0.0 {
             let odd = oddness(&self.copy(&known.surprise));
-            worth.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
+            values.iter_mut().zip(odd).for_each(|(w, odd)| *w += curiosity * odd);
         }
         let looks = self.copy(&known.looks);
-        worth.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
-        worth
+        values.iter_mut().zip(&looks).for_each(|(w, &n)| *w *= REPEATED_LOOK.powi(i32::from(n)));
+        values
     }
 }
 
-/// Surprise of each cell from 0, the least on the map, to 1, the most; unseen cells have the mean.
+/// The surprise of each cell, from 0 (the least on the map) to 1 (the most). Unseen cells get the mean.
 fn oddness(surprise: &[u8]) -> Vec<f32> {
     let known = || surprise.iter().filter(|&&s| s > 0).map(|&s| f32::from(s));
     let (least, most) = known().fold((255.0f32, 0.0f32), |(l, m), s| (l.min(s), m.max(s)));

@@ -1,4 +1,4 @@
-//! Whatever is ordered, seen, drifted or not heard: no waypoint leads out of the fence, into a keep-out or beyond a limit.
+//! Random orders, maps, drift and silence: no waypoint leads out of the fence, into a keep-out or beyond a limit.
 
 use super::{Vehicle, VehicleOutput};
 use crate::{Durable, MapUpdate, Navigator};
@@ -22,13 +22,13 @@ use std::time::Duration;
 const AREA: Area = Area { west: 0.0, south: 0.0, east: 40.0, north: 30.0 };
 const STEP_S: f64 = 0.5;
 
-/// A vehicle in kinematic water, and what it was told.
+/// A vehicle in a kinematic simulation, and its orders.
 struct Sea {
     vehicle: Vehicle,
     motion: Motion,
     now: Instant,
     fence: Fence,
-    /// Limit of distance, and what of it is used.
+    /// The limit of distance, and the metres used of it.
     limit: Option<(f64, f64)>,
 }
 
@@ -48,7 +48,7 @@ impl Sea {
         Self { vehicle, motion: Motion::new(x, y, 0.5, drift, seed), now, fence: Fence::default(), limit: None }
     }
 
-    fn tell(&mut self, slot: Slot) {
+    fn order(&mut self, slot: Slot) {
         if self.vehicle.apply(slot.clone(), self.now).is_err() {
             return;
         }
@@ -71,7 +71,7 @@ impl Sea {
         self.vehicle.handle_map(&update, self.now);
     }
 
-    /// Half a second; checks every leg that the vehicle sets out on.
+    /// Half a second. Checks every new leg of the vehicle.
     fn step(&mut self) {
         self.now = self.now + Duration::from_secs_f64(STEP_S);
         self.vehicle.steer(self.now);
@@ -99,7 +99,7 @@ impl Sea {
     fn check(&self, from: (f64, f64), to: (f64, f64)) {
         let is_back = stretches_outside(&[from, from], &self.fence) > 0;
         assert!(stretches_outside(&[to, to], &self.fence) == 0, "{to:?} is outside of {:?}", self.fence);
-        // From outside the way in is straight.
+        // From outside the fence, the vehicle returns in a straight line.
         assert!(is_back || stretches_outside(&[from, to], &self.fence) == 0, "{from:?} to {to:?}: {:?}", self.fence);
         let returns = self.vehicle.mode().0 == VehicleMode::Return;
         if let Some((limit, used)) = self.limit.filter(|_| !returns) {
@@ -108,7 +108,7 @@ impl Sea {
         }
     }
 
-    /// What is told to come after the waypoint, too.
+    /// Checks the path that is reported after the waypoint.
     fn check_path(&self) {
         let (vehicle, navigator) = (&self.vehicle, self.vehicle.navigator());
         let waypoint = navigator.to_world(vehicle.waypoint().unwrap()).xy();
@@ -172,7 +172,7 @@ proptest! {
         let mut sea = Sea::new(drift, seed);
         sea.see(seed);
         for (steps, slot) in orders {
-            sea.tell(slot);
+            sea.order(slot);
             for step in 0..steps {
                 sea.step();
                 if step % 8 == 0 {
@@ -187,6 +187,19 @@ proptest! {
     }
 }
 
+#[test]
+fn a_survey_of_one_place_ends_as_arrived() {
+    let mut config = Config::default();
+    (config.camera.width_px, config.camera.height_px) = (400, 400);
+    let width = 400.0 * config.camera.metres_per_pixel;
+    let area = Area { west: 0.0, south: 0.0, east: width, north: 1.5 * width };
+    let profile = profile(&config);
+    let mut vehicle = crate::assemble(&config, None, profile, area, Durable::default(), 1, Instant::ZERO).unwrap();
+    vehicle.steer(Instant::ZERO);
+    assert_eq!(vehicle.mode(), (VehicleMode::Hold, ModeReason::Survey));
+    assert!(vehicle.status(Instant::ZERO).has_arrived());
+}
+
 /// A fence from the origin to (20, 20) m with a return point at (5, 5) m.
 fn small_fence() -> Fence {
     let place = |x: i32, y: i32| DecimetrePoint::new(10 * x, 10 * y);
@@ -197,7 +210,7 @@ fn small_fence() -> Fence {
 #[test]
 fn a_breach_is_reported_until_the_operator_answers() {
     let mut sea = Sea::new(0.0, 1);
-    sea.tell(Slot::Fence(small_fence()));
+    sea.order(Slot::Fence(small_fence()));
     sea.step();
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
     sea.vehicle.navigator.set_pose(25.0, 5.0, 0.0, 16.0, sea.now);
@@ -206,7 +219,7 @@ fn a_breach_is_reported_until_the_operator_answers() {
     assert_eq!(sea.vehicle.durable().breach, 2);
     (0..200).for_each(|_| sea.step());
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Hold, ModeReason::Fence), "back at the return point");
-    sea.tell(Slot::Constraints(Constraints::default()));
+    sea.order(Slot::Constraints(Constraints::default()));
     sea.step();
     assert_eq!(sea.vehicle.mode().0, VehicleMode::Survey);
 }
@@ -218,15 +231,15 @@ fn an_order_clears_the_path_until_a_new_one_is_planned() {
     sea.step();
     let survey = sea.vehicle.path().clone();
     assert!(survey.points.len() > 3 && sea.vehicle.waypoint().is_some(), "{survey:?}");
-    sea.tell(Slot::Fence(small_fence()));
+    sea.order(Slot::Fence(small_fence()));
     assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().points.len()), (None, 0), "not of the old plan");
     sea.step();
     assert!(!sea.vehicle.path().points.is_empty() && sea.vehicle.path() != &survey);
-    sea.tell(Slot::Constraints(Constraints { hold: true, abort: false }));
+    sea.order(Slot::Constraints(Constraints { hold: true, abort: false }));
     sea.step();
     assert_eq!((sea.vehicle.waypoint(), sea.vehicle.path().points.len()), (None, 0));
-    sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
-    sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Return), ..Limits::default() }));
+    sea.order(Slot::Constraints(Constraints { hold: false, abort: true }));
+    sea.order(Slot::Limits(Limits { on_abort: Some(Reaction::Return), ..Limits::default() }));
     sea.vehicle.navigator.set_pose(17.0, 17.0, 0.0, 16.0, sea.now);
     sea.step();
     assert_eq!(sea.vehicle.mode().0, VehicleMode::Return);
@@ -237,7 +250,7 @@ fn an_order_clears_the_path_until_a_new_one_is_planned() {
 fn a_fence_stays_in_the_world_when_a_fix_moves_the_map() {
     let mut sea = Sea::new(0.0, 1);
     sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
-    sea.tell(Slot::Fence(small_fence()));
+    sea.order(Slot::Fence(small_fence()));
     sea.step();
     let fix = |sea: &mut Sea, x, y| sea.vehicle.navigator.handle_fix(WorldPoint::new(x, y), 0.1, sea.now, sea.now);
     assert!(fix(&mut sea, 18.0, 10.0).is_used());
@@ -245,7 +258,7 @@ fn a_fence_stays_in_the_world_when_a_fix_moves_the_map() {
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Survey, ModeReason::Survey));
     let east = sea.vehicle.waypoint().unwrap().x_m;
     assert!(east < 12.0, "{east}: 20 m east of the origin is 12 m east on its map now");
-    // Its own reckoning stays within the numbers of the fence all the time.
+    // Its dead reckoning stays inside the fence all the time.
     sea.vehicle.navigator = Navigator::new(10.0, 10.0, 16.0, 0.01).with_start_sigma(20.0);
     assert!(fix(&mut sea, 24.0, 10.0).is_used());
     sea.step();
@@ -260,15 +273,15 @@ fn a_fence_stays_in_the_world_when_a_fix_moves_the_map() {
 }
 
 #[test]
-fn silence_and_abort_bring_the_vehicle_home_or_up() {
+fn silence_and_abort_trigger_their_reactions() {
     let mut sea = Sea::new(0.0, 1);
     let limits = Limits { silence_s: Some(30), on_silence: Some(Reaction::Surface), ..Limits::default() };
-    sea.tell(Slot::Limits(limits));
+    sea.order(Slot::Limits(limits));
     (0..70).for_each(|_| sea.step());
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Surface, ModeReason::Silence));
     let mut sea = Sea::new(0.0, 1);
-    sea.tell(Slot::Limits(Limits { on_abort: Some(Reaction::Hold), ..Limits::default() }));
-    sea.tell(Slot::Constraints(Constraints { hold: false, abort: true }));
+    sea.order(Slot::Limits(Limits { on_abort: Some(Reaction::Hold), ..Limits::default() }));
+    sea.order(Slot::Constraints(Constraints { hold: false, abort: true }));
     sea.step();
     assert_eq!(sea.vehicle.mode(), (VehicleMode::Abort, ModeReason::Order));
 }
@@ -276,21 +289,21 @@ fn silence_and_abort_bring_the_vehicle_home_or_up() {
 #[test]
 fn the_last_good_fence_survives_a_refusal_and_a_restart() {
     let mut sea = Sea::new(0.0, 1);
-    sea.tell(Slot::Fence(small_fence()));
+    sea.order(Slot::Fence(small_fence()));
     let far = Fence {
         fence: small_fence()
             .fence
             .map(|p| Polygon(p.0.iter().map(|v| DecimetrePoint { east_dm: v.east_dm + 900, ..*v }).collect())),
         ..Fence::default()
     };
-    sea.tell(Slot::Fence(far));
+    sea.order(Slot::Fence(far));
     assert_eq!(sea.fence, small_fence(), "a fence that the vehicle is outside of is refused");
     let config = Config::default();
     let durable = sea.vehicle.durable().clone();
     let again = crate::assemble(&config, None, profile(&config), AREA, durable, 1, sea.now).unwrap();
-    assert!(!again.steering.bounds().holds((25.0, 5.0)));
-    assert!(again.steering.bounds().holds((15.0, 5.0)));
-    assert_eq!(again.steering.home(), (5.0, 5.0));
+    assert!(!again.guidance.steering().bounds().holds((25.0, 5.0)));
+    assert!(again.guidance.steering().bounds().holds((15.0, 5.0)));
+    assert_eq!(again.guidance.steering().return_place(), (5.0, 5.0));
 }
 
 #[test]

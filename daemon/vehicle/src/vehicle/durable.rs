@@ -1,0 +1,42 @@
+//! The part of the vehicle's state that its host stores.
+
+use super::LastPlace;
+use scenecast_protocol::link::SlotInboxState;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The state that survives a restart of the vehicle, so that no order is applied twice and no label changes its meaning.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Durable {
+    pub inbox: SlotInboxState,
+    /// Epoch of the labels in use.
+    pub epoch: u8,
+    /// The highest label of the epoch that may have been sent.
+    pub labels: u8,
+    /// Random number of the mission, which its checkpoints carry too.
+    pub lineage: u64,
+    /// Utility in force: epoch, exploration, curiosity, weights; in hundredths.
+    pub utility: Option<(u8, i8, i8, BTreeMap<u8, i8>)>,
+    /// Whether the operator has ordered the vehicle to hold.
+    pub hold: bool,
+    /// Whether the operator has ordered the vehicle to abort.
+    pub abort: bool,
+    /// Budget in force in bit/s, if it differs from the configuration.
+    pub budget_bps: Option<u32>,
+    /// Least shares in force in percent, if they differ from the configuration.
+    pub shares: Option<[u8; 5]>,
+    /// Order of the background streams as on the wire, if it differs from the configuration.
+    pub background: Option<u128>,
+    /// Settings in force as on the wire. Empty: all as configured.
+    pub settings: Vec<u8>,
+    /// Limits in force as on the wire. Empty: none.
+    pub limits: Vec<u8>,
+    /// Metres and seconds of the limits that are used up, at most 50 m and 60 s behind the truth.
+    pub used: (u32, u32),
+    /// The breach that the operator has not answered yet: the reason's number on the wire, or 0.
+    pub breach: u8,
+    /// Fence in force as on the wire. Empty: none.
+    pub fence: Vec<u8>,
+    /// Position at the last fix that was used.
+    pub place: Option<LastPlace>,
+}

@@ -1,0 +1,177 @@
+//! The vehicle's map, and the choice of the cells and layers of it that are sent.
+
+use super::whole_png::WholePng;
+use crate::MapUpdate;
+use scenecast_protocol::directive::{CellBand, Settings};
+use scenecast_protocol::link::VehicleLink;
+use scenecast_protocol::map::{Cell, LabelGrid, LayerId, LayerMask, UNEXPLORED};
+use scenecast_protocol::map_codec::Stride;
+use scenecast_protocol::object::ObjectId;
+use scenecast_protocol::time::Instant;
+use std::collections::BTreeMap;
+
+/// The limit of the backlog, in seconds of the budget, where the operator orders coarse to fine and the
+/// configuration has no such limit.
+const DEFAULT_COARSE_AFTER_S: f64 = 30.0;
+
+/// The cells and layers that are sent unless the operator orders others.
+#[derive(Debug, Clone, Copy, Default)]
+struct Selection {
+    is_coarse: bool,
+    /// A backlog beyond so many seconds of the budget is sent coarse to fine. 0: never.
+    coarse_after_s: f64,
+    layers: LayerMask,
+}
+
+/// Gives the link the part of the scene model's map that is to be sent.
+#[derive(Debug, Default)]
+pub(super) struct MapPublisher {
+    /// Every cell that the scene model has a label for.
+    map: LabelGrid,
+    version: u64,
+    layers: BTreeMap<LayerId, Vec<(Cell, f64)>>,
+    labels: u8,
+    explored: u32,
+    configured: Selection,
+    ordered_cells: Option<CellBand>,
+    ordered_layers: Option<LayerMask>,
+    /// Takes the place of the link's map, for comparison.
+    whole_png: Option<WholePng>,
+}
+
+impl MapPublisher {
+    /// The map of the scene model and its version, which grows with each change.
+    pub(super) fn seen(&self) -> (&LabelGrid, u64) {
+        (&self.map, self.version)
+    }
+
+    /// The number of labels that the scene model has given.
+    pub(super) fn labels(&self) -> u8 {
+        self.labels
+    }
+
+    /// The number of cells that have a label.
+    pub(super) fn explored(&self) -> u32 {
+        self.explored
+    }
+
+    /// The map as it is sent.
+    pub(super) fn sent_map<'a>(&'a self, link: &'a VehicleLink) -> &'a LabelGrid {
+        self.whole_png.as_ref().map_or_else(|| link.map(), WholePng::map)
+    }
+
+    pub(super) fn sent_version(&self, link: &VehicleLink) -> u64 {
+        self.whole_png.as_ref().map_or_else(|| link.map_version(), WholePng::version)
+    }
+
+    pub(super) fn is_converged(&self) -> bool {
+        self.whole_png.as_ref().is_none_or(WholePng::is_converged)
+    }
+
+    pub(super) fn sends_whole_png(&self) -> bool {
+        self.whole_png.is_some()
+    }
+
+    pub(super) fn send_whole_png(&mut self) {
+        self.whole_png = Some(WholePng::default());
+    }
+
+    /// Sets the configured selection, which orders override.
+    pub(super) fn configure(&mut self, is_coarse: bool, coarse_after_s: f64, layers: LayerMask) {
+        self.configured = Selection { is_coarse, coarse_after_s, layers };
+    }
+
+    /// Takes cells and layers from the settings in force.
+    pub(super) fn set_settings(&mut self, settings: &Settings) {
+        (self.ordered_cells, self.ordered_layers) = (settings.cells.value(), settings.layers.value());
+    }
+
+    fn cells(&self) -> CellBand {
+        let configured = match (self.configured.is_coarse, self.configured.coarse_after_s > 0.0) {
+            (true, _) => CellBand::Coarse,
+            (false, true) => CellBand::CoarseToFine,
+            (false, false) => CellBand::Fine,
+        };
+        self.ordered_cells.unwrap_or(configured)
+    }
+
+    /// The backlog in bytes beyond which cells are sent coarse to fine, at a budget of `bits_per_s`.
+    fn coarse_limit(&self, bits_per_s: u32) -> Option<usize> {
+        let configured_s = self.configured.coarse_after_s;
+        let seconds = if configured_s > 0.0 { configured_s } else { DEFAULT_COARSE_AFTER_S };
+        match self.cells() {
+            CellBand::Fine => None,
+            CellBand::CoarseToFine => Some((f64::from(bits_per_s) / 8.0 * seconds) as usize),
+            CellBand::Coarse => Some(0),
+        }
+    }
+
+    /// Passes the selection on to the link. Settings, configuration and budget determine it.
+    pub(super) fn select(&self, link: &mut VehicleLink) {
+        let limit = self.coarse_limit(link.budget_bps());
+        let is_coarse = self.cells() == CellBand::Coarse;
+        link.source_mut().set_coarse_limit(limit);
+        link.set_coarse_layers(is_coarse.then_some(0));
+        link.select_layers(self.ordered_layers.unwrap_or(self.configured.layers));
+    }
+
+    /// Takes the scene model's map and gives the link its part of it.
+    pub(super) fn handle_map(&mut self, update: &MapUpdate, link: &mut VehicleLink, now: Instant) {
+        self.labels = update.labels;
+        self.explored = update.cells.len() as u32;
+        let changed = update.cells.iter().filter(|&&(cell, label)| self.map.set(cell, label) != label).count();
+        self.version += u64::from(changed > 0);
+        self.layers.clone_from(&update.layers);
+        match &mut self.whole_png {
+            Some(whole) => whole.set(update.cells.iter().copied()),
+            None => self.publish(link, now),
+        }
+    }
+
+    /// Forgets the map, because labels change their meaning.
+    pub(super) fn begin_epoch(&mut self) {
+        self.map.clear();
+        self.layers.clear();
+        self.version += 1;
+        self.whole_png = self.whole_png.take().map(|_| WholePng::default());
+    }
+
+    /// Gives the link the selected cells of the map.
+    ///
+    /// Where only coarse cells are selected, finer ones that the link already has stay up to date, so that no cell on the
+    /// operator's map is older than it looks.
+    pub(super) fn publish(&self, link: &mut VehicleLink, now: Instant) {
+        let is_coarse = self.cells() == CellBand::Coarse;
+        let is_sent = |sent: &LabelGrid, cell: Cell| {
+            !is_coarse || Stride::Four.on_lattice(cell).is_some() || sent.get(cell) != UNEXPLORED
+        };
+        let cells: Vec<(Cell, u8)> = self.map.iter().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+        link.set_map(cells, now);
+        for (&id, cells) in &self.layers {
+            let cells: Vec<(Cell, f64)> =
+                cells.iter().copied().filter(|&(cell, _)| is_sent(link.map(), cell)).collect();
+            link.set_layer(id, cells, now);
+        }
+    }
+
+    /// Gives the link the whole map as an image if that is due.
+    pub(super) fn push_whole_png(&mut self, link: &mut VehicleLink) {
+        if let Some(whole) = &mut self.whole_png {
+            whole.push(link);
+        }
+    }
+
+    /// The surface has an object completely.
+    pub(super) fn handle_delivered(&mut self, id: ObjectId) {
+        if let Some(whole) = &mut self.whole_png {
+            whole.handle_delivered(id);
+        }
+    }
+
+    /// The surface has lost its map.
+    pub(super) fn handle_surface_restart(&mut self) {
+        if let Some(whole) = &mut self.whole_png {
+            whole.send_again();
+        }
+    }
+}

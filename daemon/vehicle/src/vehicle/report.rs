@@ -1,0 +1,114 @@
+//! Read access to the vehicle: for its host, for reports, and for the status that it sends.
+
+use super::{Durable, Vehicle};
+use crate::{Navigator, SharedExemplars};
+use scenecast_protocol::coordinates::MapPoint;
+use scenecast_protocol::directive::{Settings, Utility};
+use scenecast_protocol::link::LinkStats;
+use scenecast_protocol::map::{Cell, LabelGrid, LayerSource};
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{ModeReason, PlannedPath, VehicleMode, VehicleStatus};
+
+impl Vehicle {
+    /// The state that the host stores at [`super::VehicleOutput::Persist`].
+    pub fn durable(&self) -> &Durable {
+        &self.durable
+    }
+
+    /// The map as it is sent to the surface.
+    pub fn map(&self) -> &LabelGrid {
+        self.publisher.sent_map(&self.link)
+    }
+
+    /// The number of versions of [`Self::map`] so far.
+    pub fn map_version(&self) -> u64 {
+        self.publisher.sent_version(&self.link)
+    }
+
+    /// The layers that are selected to be sent.
+    pub fn layers(&self) -> impl Iterator<Item = &LayerSource> {
+        self.link.layers()
+    }
+
+    /// The map of the scene model, of which [`Self::map`] may be a part.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, u8)> + '_ {
+        self.publisher.seen().0.iter()
+    }
+
+    /// Label changes that were never sent, because they did not last for the debounce time.
+    pub fn flips_suppressed(&self) -> u64 {
+        self.link.source().flips_suppressed()
+    }
+
+    /// Whether the surface has acknowledged everything that there is to send.
+    pub fn is_converged(&self) -> bool {
+        self.link.is_converged() && self.publisher.is_converged()
+    }
+
+    pub fn stats(&self) -> &LinkStats {
+        self.link.stats()
+    }
+
+    /// The budget in force, bit/s.
+    pub fn budget_bps(&self) -> u32 {
+        self.link.budget_bps()
+    }
+
+    pub fn utility(&self) -> Option<&Utility> {
+        self.utility.as_ref()
+    }
+
+    /// The settings in force; those that have no value are as configured.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The best patches of each label, as [`Self::handle_exemplars`] got them.
+    pub fn exemplars(&self) -> &SharedExemplars {
+        self.gallery.exemplars()
+    }
+
+    pub fn navigator(&self) -> &Navigator {
+        &self.navigator
+    }
+
+    /// The number of fixes that corrected the position estimate.
+    pub fn fixes_applied(&self) -> u64 {
+        self.fixes_applied
+    }
+
+    /// The current goal in the map frame.
+    pub fn waypoint(&self) -> Option<MapPoint> {
+        self.guidance.waypoint()
+    }
+
+    /// The plan after the waypoint, in the map frame.
+    pub fn path(&self) -> &PlannedPath {
+        self.guidance.path()
+    }
+
+    pub fn mode(&self) -> (VehicleMode, ModeReason) {
+        self.guidance.mode()
+    }
+
+    pub(super) fn status(&self, now: Instant) -> VehicleStatus {
+        let (mode, reason) = self.guidance.mode();
+        VehicleStatus {
+            mode,
+            reason,
+            autopilot_silent: self.autopilot_silent,
+            position: self.navigator.position(),
+            depth_m: self.navigator.depth_m(),
+            heading_deg: self.navigator.heading_rad().to_degrees().rem_euclid(360.0),
+            sigma_m: self.navigator.sigma_m(),
+            fix_age_s: self.navigator.last_fix().map(|at| now.since(at).as_secs_f64()),
+            waypoint: self.guidance.waypoint(),
+            path: self.guidance.path().clone(),
+            epoch: self.durable.epoch,
+            labels: self.publisher.labels(),
+            explored_cells: self.publisher.explored(),
+            placement: self.navigator.placement(),
+            ..VehicleStatus::default()
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! The vehicle applies the slots of the directive: each order is put in force or refused with a reason.
+
+use super::gallery::Gallery;
+use super::{AppliedSlot, LastPlace, Vehicle, VehicleOutput};
+use crate::FixVerdict;
+use scenecast_protocol::coordinates::DecimetrePoint;
+use scenecast_protocol::directive::{
+    Budget, Constraints, ExemplarRequests, Fence, Fix, Limits, LimitsFault, RefusalReason, Settings, Slot, SlotId,
+    SlotState, Utility,
+};
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+impl Vehicle {
+    pub(super) fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
+        // The host persists before it acts on the slot; otherwise a power cut could have the slot applied twice.
+        self.outputs.push_back(VehicleOutput::Persist);
+        let state = match content.ok_or(RefusalReason::Malformed).and_then(|slot| self.apply(slot, now)) {
+            Ok(()) => SlotState::Applied,
+            Err(reason) => SlotState::Refused(reason),
+        };
+        self.has_new_orders |= id.steers() && state == SlotState::Applied;
+        self.link.decide(id, state, now);
+        self.durable.inbox = self.link.persistent_state().clone();
+        self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));
+    }
+
+    pub(super) fn apply(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
+        match slot {
+            Slot::Utility(utility) => self.apply_utility(utility),
+            Slot::Constraints(constraints) => {
+                self.apply_constraints(constraints);
+                Ok(())
+            }
+            Slot::Settings(settings) => self.apply_settings(&settings, now),
+            Slot::Budget(budget) if is_in_range(&budget) => {
+                self.apply_budget(budget, now);
+                Ok(())
+            }
+            Slot::Budget(_) => Err(RefusalReason::OutOfRange),
+            Slot::Requests(requests) => self.apply_requests(requests),
+            Slot::Limits(limits) => self.apply_limits(limits),
+            Slot::Fence(fence) => self.apply_fence(&fence),
+            Slot::Fix(fix) => self.apply_fix(fix, now),
+        }
+    }
+
+    fn apply_requests(&mut self, requests: ExemplarRequests) -> Result<(), RefusalReason> {
+        if requests.epoch != self.durable.epoch {
+            return Err(RefusalReason::OtherEpoch);
+        }
+        if requests.wanted.iter().any(|r| r.label == 0 || r.label > self.publisher.labels()) {
+            return Err(RefusalReason::UnknownLabel);
+        }
+        if requests.wanted.len() > Gallery::MAX_REQUESTS {
+            return Err(RefusalReason::OutOfRange);
+        }
+        let series = self.link.persistent_state().series;
+        self.gallery.replace_requests(requests, series, &mut self.link);
+        self.serve_exemplars();
+        Ok(())
+    }
+
+    fn apply_fix(&mut self, fix: Fix, now: Instant) -> Result<(), RefusalReason> {
+        let taken = now - Duration::from_secs_f64(fix.age_s);
+        match self.navigator.handle_fix(fix.position, fix.sigma_m, taken, now) {
+            FixVerdict::Used => {
+                self.fixes_applied += 1;
+                self.durable.place = Some(LastPlace::of(&self.navigator));
+                self.outputs.push_back(VehicleOutput::Fixed(fix, taken));
+                Ok(())
+            }
+            FixVerdict::TooOld => Err(RefusalReason::TooOld),
+            FixVerdict::Invalid | FixVerdict::Outlier => Err(RefusalReason::OutOfRange),
+        }
+    }
+
+    fn apply_constraints(&mut self, order: Constraints) {
+        (self.durable.hold, self.durable.abort) = (order.hold, order.abort);
+        self.durable.breach = 0;
+        self.guidance.set_constraints(order);
+    }
+
+    fn apply_limits(&mut self, limits: Limits) -> Result<(), RefusalReason> {
+        limits.check().map_err(|fault| match fault {
+            LimitsFault::EmptyBand(_) => RefusalReason::Contradiction,
+            LimitsFault::OutOfRange(..) => RefusalReason::OutOfRange,
+        })?;
+        if !self.guidance.is_able(&limits, self.navigator.depth_m()) {
+            return Err(RefusalReason::Unable);
+        }
+        self.durable.limits = limits.to_bytes();
+        self.durable.used = (0, 0);
+        self.guidance.set_limits(limits);
+        Ok(())
+    }
+
+    /// A fence that the vehicle is outside of would be broken at once. It is probably a typing error, so it is refused;
+    /// the last fence stays in force, and the operator can still order hold and abort.
+    fn apply_fence(&mut self, fence: &Fence) -> Result<(), RefusalReason> {
+        fence.check().map_err(|_| RefusalReason::Contradiction)?;
+        let at = self.navigator.to_world(self.navigator.position());
+        let is_inside = DecimetrePoint::nearest(at).is_some_and(|at| fence.allows(at));
+        if fence.outlines().next().is_some() && !is_inside {
+            return Err(RefusalReason::Outside);
+        }
+        self.durable.fence = fence.to_bytes();
+        self.durable.breach = 0;
+        self.guidance.set_fence(fence);
+        Ok(())
+    }
+
+    fn apply_utility(&mut self, utility: Utility) -> Result<(), RefusalReason> {
+        if !utility.is_in_range() {
+            return Err(RefusalReason::OutOfRange);
+        }
+        if utility.epoch != self.durable.epoch {
+            return Err(RefusalReason::OtherEpoch);
+        }
+        if utility.weights.keys().any(|&label| label > self.publisher.labels()) {
+            return Err(RefusalReason::UnknownLabel);
+        }
+        let u = &utility;
+        self.durable.utility = Some((u.epoch, u.exploration, u.curiosity, u.weights.clone()));
+        self.utility = Some(utility);
+        self.guidance.replan();
+        self.follow_utility();
+        Ok(())
+    }
+
+    /// Has the link send the labels with the greatest weights first.
+    pub(super) fn follow_utility(&mut self) {
+        let utility = self.utility.clone().unwrap_or_default();
+        self.link.source_mut().set_interest(|label| utility.weight(label));
+    }
+
+    fn apply_settings(&mut self, settings: &Settings, now: Instant) -> Result<(), RefusalReason> {
+        settings.check().map_err(|_| RefusalReason::OutOfRange)?;
+        let selects_parts = settings.cells.value().is_some() || settings.layers.value().is_some();
+        if self.publisher.sends_whole_png() && selects_parts {
+            return Err(RefusalReason::OutOfRange);
+        }
+        let before = self.settings;
+        self.settings = before.then(settings);
+        self.durable.settings = self.settings.to_bytes();
+        if self.settings.planner.value() != before.planner.value() {
+            self.guidance.set_planner(self.settings.planner.value());
+        }
+        self.publisher.set_settings(&self.settings);
+        self.publisher.select(&mut self.link);
+        self.publisher.publish(&mut self.link, now);
+        self.outputs.push_back(VehicleOutput::Tune(self.settings));
+        Ok(())
+    }
+
+    /// Changes budget and shares on the vehicle itself. The surface learns it from the next report.
+    pub fn set_budget(&mut self, budget: Budget, now: Instant) {
+        self.apply_budget(budget, now);
+        self.outputs.push_back(VehicleOutput::Persist);
+    }
+
+    fn apply_budget(&mut self, budget: Budget, now: Instant) {
+        self.link.set_budget(budget.bits_per_s, now);
+        self.publisher.select(&mut self.link);
+        self.link.set_shares(budget.shares);
+        self.link.set_background(budget.background);
+        self.serve_exemplars();
+        self.durable.budget_bps = Some(budget.bits_per_s);
+        self.durable.shares = Some(budget.shares.0);
+        self.durable.background = Some(budget.background.code());
+    }
+}
+
+fn is_in_range(budget: &Budget) -> bool {
+    (10..=10_000_000).contains(&budget.bits_per_s) && budget.shares.is_sound()
+}
