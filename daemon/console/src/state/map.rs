@@ -76,8 +76,8 @@ pub struct LayerBody {
     pub is_depth: bool,
     /// The colours: cividis or inferno.
     pub palette: String,
-    /// The colours are spread over: scale, all of `edges`; present, likewise; common, those without the fiftieth of the cells
-    /// at either end.
+    /// The colours are spread over: scale, all of `edges`; present, likewise; common, these without the lowest and the
+    /// highest fiftieth of the cells.
     pub spread: String,
     /// The level whose bounds are the first two of `edges`.
     pub lowest: u8,
