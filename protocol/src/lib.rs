@@ -2,7 +2,7 @@
 //! without IO.
 //!
 //! A modem carries a few hundred bytes a minute, and loses many of them. This crate makes the most of such a link: the
-//! surface holds a copy of the vehicle's map, which converges whatever frames are lost, late or doubled, and each order
+//! surface holds a copy of the vehicle's map, which converges even if frames are lost, late or duplicated, and each order
 //! of the surface comes into force once. No call reads a clock or touches a port: bytes and time are arguments.
 //!
 //! # The five types that matter
@@ -125,7 +125,7 @@
 //! * A random seed for each start of an end. Session numbers and nonces come from it.
 //! * A monotonic clock. The clocks of the two ends need not agree.
 //! * A durable store for [`VehicleLink::persistent_state`] before [`VehicleLink::handle_persisted`]; a restarted vehicle
-//!   passes it to [`VehicleLink::new`]. So an order never comes into force a second time.
+//!   passes it to [`VehicleLink::new`]. So an order is never applied twice.
 //! * One call of `handle_transmit_outcome` for each frame, in the order of transmission. A modem that owns the medium,
 //!   or polls, differs as [`Access`](mac::Access) states.
 //!

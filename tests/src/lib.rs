@@ -31,7 +31,6 @@ fn build() -> PathBuf {
     profile.join("scenecast")
 }
 
-/// The project's folder.
 pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ has a parent").to_owned()
 }
@@ -75,7 +74,6 @@ pub fn scratch(name: &str) -> PathBuf {
 pub struct Process(Child);
 
 impl Process {
-    /// Starts `scenecast`.
     pub fn start(arguments: &[&str]) -> Self {
         let child = scenecast().args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
         Self(child.expect("scenecast starts"))

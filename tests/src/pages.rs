@@ -4,11 +4,9 @@ use crate::workspace;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// A page in Markdown.
 pub struct Page {
     /// Path from the project's folder.
     pub path: PathBuf,
-    /// The whole text.
     pub text: String,
 }
 

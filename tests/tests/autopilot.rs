@@ -13,8 +13,8 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// A Python that has pymavlink: `SCENECAST_PYTHON`, or `python3`. Without one the test is skipped, loudly; where `CI` is
-/// true it fails.
+/// A Python that has pymavlink: `SCENECAST_PYTHON`, or `python3`. Without one the test is skipped, loudly; where
+/// `CI` is true it fails.
 fn python() -> Option<PathBuf> {
     let python = std::env::var_os("SCENECAST_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let imports = Command::new(&python).args(["-c", "import pymavlink"]).stderr(Stdio::null()).status();

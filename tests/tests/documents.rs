@@ -226,7 +226,6 @@ fn links_anchors_and_pictures_resolve() {
     assert_none(&faults);
 }
 
-/// A path without `..`.
 fn normal(path: &Path) -> PathBuf {
     path.components().fold(PathBuf::new(), |mut whole, part| {
         match part.as_os_str() == ".." {

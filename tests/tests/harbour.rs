@@ -9,8 +9,7 @@ use std::time::Duration;
 
 /// Seconds of the rehearsal a second.
 const TIME_SCALE: &str = "20";
-/// Longest wait for anything.
-const PATIENCE: Duration = Duration::from_secs(60);
+const MAX_WAIT: Duration = Duration::from_secs(60);
 
 /// A command whose standard error goes to a file.
 struct Logged {
@@ -27,7 +26,7 @@ impl Logged {
 
     /// Interrupts it as a person would; what it had to say.
     fn finish(mut self) -> String {
-        let code = scenecast_tests::end(&mut self.child, "INT", PATIENCE);
+        let code = scenecast_tests::end(&mut self.child, "INT", MAX_WAIT);
         assert_eq!(code, Some(0), "{}", self.said());
         self.said()
     }
@@ -58,7 +57,7 @@ fn moor(dir: &Path, modem: &str) -> Logged {
     let (file, links) = (file.display().to_string(), dir.join("modems").display().to_string());
     let arguments = ["modem-sim", "--scenario", &file, "--link-dir", &links, "--time-scale", TIME_SCALE];
     let sea = Logged::start(&arguments.map(str::to_owned), dir.join("modem-sim.log"));
-    wait_until("the modems are there", PATIENCE, || {
+    wait_until("the modems are there", MAX_WAIT, || {
         ["ship", "auv"].iter().all(|n| dir.join("modems").join(n).exists())
     });
     sea
@@ -107,14 +106,14 @@ fn assert_survey_arrives(name: &str, modem: &str, sets: &[&str]) {
     let camera = format!("[camera]\nsource = \"frames:{}\"\n", recording.display());
     let surface = end(&dir, "asv", "ship", &page, sets);
     let vehicle = end(&dir, "auv", "auv", &camera, sets);
-    wait_until("the vehicle is heard", PATIENCE, || vehicle_of(port).is_some_and(|v| v["last_received_s"].is_number()));
+    wait_until("the vehicle is heard", MAX_WAIT, || vehicle_of(port).is_some_and(|v| v["last_received_s"].is_number()));
     let order = ("/api/v2/vehicles/1/utility", r#"{"weights": {}, "exploration": 0.5, "curiosity": 0.1}"#);
     let (status, _) =
         http(port, "POST", order.0, "X-Scenecast: 1\r\nContent-Type: application/json\r\n", order.1).unwrap();
     assert_eq!(status, 202);
-    wait_until("the order is known to be applied", PATIENCE, || is_applied(port, "utility"));
+    wait_until("the order is known to be applied", MAX_WAIT, || is_applied(port, "utility"));
     let map = dir.join("asv/operator-map-1.png");
-    wait_until("the operator's map equals the one of the rehearsal", PATIENCE, || {
+    wait_until("the operator's map equals the one of the rehearsal", MAX_WAIT, || {
         std::fs::read(&map).is_ok_and(|png| png == *expected)
     });
     let said = vehicle.finish();

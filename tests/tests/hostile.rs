@@ -15,7 +15,6 @@ fn connect(port: u16, said: &str) -> Option<TcpStream> {
     Some(stream)
 }
 
-/// Ends the operator's work.
 struct End<'a>(&'a AtomicBool);
 
 impl Drop for End<'_> {
@@ -24,8 +23,8 @@ impl Drop for End<'_> {
     }
 }
 
-/// Does `attack` while an operator goes on working; his answers come soon, mission and link run at their pace, and the
-/// surface does not grow.
+/// Does `attack` while an operator goes on working; his answers come soon, mission and link run at their pace, and
+/// the surface does not grow.
 fn assert_unmoved(demo: &Process, port: u16, what: &str, attack: impl FnOnce()) {
     let before = state(port).unwrap();
     let (held, _) = demo.cost().unwrap_or_default();

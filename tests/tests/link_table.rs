@@ -13,7 +13,6 @@ fn table() -> &'static LinkTable {
     TABLE.get_or_init(|| link_table(1, &mut |_| ()).expect("directives can be issued"))
 }
 
-/// Rows of independent loss.
 fn rows(range_km: f64) -> impl Iterator<Item = &'static LinkRow> {
     let rows = table().rows.iter().filter(|r| matches!(r.pattern, Pattern::Independent));
     rows.filter(move |r| r.range_km == range_km)

@@ -43,7 +43,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 18, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_operators_map_equals_the_vehicles_once_the_channel_has_drained(
+    fn maps_are_equal_once_the_channel_has_drained(
         seed in 0u64..1000,
         loss in prop_oneof![Just("0"), Just("0.1"), Just("0.3")],
         frame in prop_oneof![Just("64"), Just("256"), Just("1000")],
@@ -128,7 +128,7 @@ fn the_same_seed_gives_the_same_report() {
 }
 
 #[test]
-fn directives_images_and_fixes_reach_the_vehicle_and_what_it_answers_comes_back() {
+fn orders_and_fixes_reach_the_vehicle_and_replies_return() {
     let figures = fly(&["survey.duration_s=400"], 4);
     assert_sound(&figures);
     assert_eq!(figures["directives"]["issued"], figures["directives"]["applied"], "{figures}");

@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn layers_are_named_each_once_and_their_shares_leave_something_to_labels() {
+    fn layers_are_named_once_and_leave_a_share_to_labels() {
         let said = message(&["map.layers=[\"colour\"]"]);
         let names: Vec<&str> = LayerName::all().map(LayerName::as_str).collect();
         assert!(said.ends_with(&format!("a list of different words of {}", names.join(", "))), "{said}");

@@ -83,19 +83,19 @@ pub struct BudgetOrder {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SharesOrder {
-    /// Orders, except position fixes.
+    /// Minimum share of orders other than position fixes, percent.
     #[schemars(range(max = 100))]
     pub directive: u8,
-    /// Reports of the vehicle.
+    /// Minimum share of the vehicle's reports, percent.
     #[schemars(range(max = 100))]
     pub status: u8,
-    /// Position fixes.
+    /// Minimum share of position fixes, percent.
     #[schemars(range(max = 100))]
     pub fix: u8,
-    /// The map.
+    /// Minimum share of the map's labels, percent.
     #[schemars(range(max = 100))]
     pub map: u8,
-    /// Images.
+    /// Minimum share of exemplars, percent.
     #[schemars(range(max = 100))]
     pub exemplar: u8,
 }

@@ -28,13 +28,9 @@ pub enum SurfaceRequest {
     Utility(u8, BTreeMap<u8, f64>, (f64, f64)),
     /// Request an image of a label, or cancel the request.
     ExemplarOrder(u8, ExemplarOrder),
-    /// Hold, abort or resume.
     Constraints(u8, Constraints),
-    /// Send a fence.
     Fence(u8, FenceOrder),
-    /// Send limits.
     Limits(u8, LimitsOrder),
-    /// Change settings.
     Settings(u8, SettingsOrder),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),

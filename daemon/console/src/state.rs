@@ -17,13 +17,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Everything that the page shows, except maps and images. A member that ends in `_s` is a mission time in seconds, unless it
-/// is called a duration.
+/// Everything that the page shows, except maps and images. A member that ends in `_s` is a mission time in seconds,
+/// unless it is called a duration.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MissionState {
     /// The mission time of this state.
     pub now_s: f64,
-    /// The mission.
+    /// Name, origin and end of the mission.
     pub mission: MissionInfo,
     /// The vehicles that the surface exchanges frames with, by address.
     pub vehicles: Vec<VehicleState>,
@@ -39,7 +39,7 @@ pub struct MissionState {
 /// A layer of the map that vehicles can send in addition to the labels.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LayerInfo {
-    /// Its name.
+    /// The name of the layer, from its descriptor.
     pub name: String,
     /// The unit of its values; empty if they have none.
     pub unit: String,
@@ -56,7 +56,7 @@ pub struct SurfacePosition {
     pub x_m: Option<f64>,
     /// Metres north in the world frame.
     pub y_m: Option<f64>,
-    /// Standard deviation, metres.
+    /// Standard deviation of the position, metres.
     pub sigma_m: Option<f64>,
     /// Latitude of the last valid position.
     pub lat_deg: Option<f64>,
@@ -64,7 +64,7 @@ pub struct SurfacePosition {
     pub lon_deg: Option<f64>,
     /// Mission time of the last valid position.
     pub at_s: Option<f64>,
-    /// Degrees clockwise from north.
+    /// Heading in degrees clockwise from north.
     pub heading_deg: Option<f64>,
     /// GPS sentences that were not used, by reason: checksum, malformed, too_long, no_position, frozen, jump.
     pub rejected: BTreeMap<String, u64>,
@@ -72,8 +72,8 @@ pub struct SurfacePosition {
     pub outliers: u64,
     /// Position fixes sent to vehicles.
     pub fixes_sent: u64,
-    /// USBL measurements that were not used, by reason: malformed, range_only, depth, no_heading, no_gps, outlier,
-    /// too_uncertain, too_old.
+    /// USBL measurements that were not used, by reason: malformed, range_only, depth,
+    /// no_heading, no_gps, outlier, too_uncertain, too_old.
     pub usbl_rejected: BTreeMap<String, u64>,
 }
 
@@ -95,9 +95,9 @@ pub struct MissionInfo {
 /// A place on the Earth, WGS 84.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Origin {
-    /// Degrees, north positive.
+    /// Latitude in degrees, WGS 84, north positive.
     pub lat_deg: f64,
-    /// Degrees, east positive.
+    /// Longitude in degrees, WGS 84, east positive.
     pub lon_deg: f64,
 }
 

@@ -12,8 +12,8 @@ pub enum PortAddress {
     Listen(String),
     /// An address to connect to.
     Connect(String),
-    /// Datagrams: an address to receive at, and one to send to; without the first any port, without the second to whoever
-    /// was heard last.
+    /// Datagrams: an address to receive at, and one to send to; without the first any port, without the second
+    /// to whoever was heard last.
     Datagrams(String, String),
     /// A file to append to.
     File(PathBuf),

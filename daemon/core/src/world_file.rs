@@ -7,8 +7,8 @@ use scenecast_protocol::wire::Placement;
 
 /// The six lines of an ESRI world file for a picture of `bounds`, north up, a pixel a cell; degrees of WGS-84 (EPSG:4326).
 ///
-/// Source: ESRI, "World files for raster datasets": pixel width, two rotations, pixel height, middle of the north-west
-/// pixel.
+/// Source: ESRI, "World files for raster datasets": pixel width, two rotations, pixel height,
+/// middle of the north-west pixel.
 pub fn world_file(plane: &TangentPlane, placement: Option<Placement>, bounds: Rect, cell_m: f64) -> String {
     let world = |column: f64, row: f64| {
         let x_m = (f64::from(bounds.x) + column) * cell_m;

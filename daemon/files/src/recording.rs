@@ -66,7 +66,7 @@ impl Recording {
         for row in reader.records() {
             let row = row.map_err(|e| UserError::file(&path, e))?;
             let place = format!("{}:{}", path.display(), row.position().map_or(0, csv::Position::line));
-            let row = Row { columns: &columns, fields: &row };
+            let row = PoseRow { columns: &columns, fields: &row };
             let frame = match in_pixels {
                 true => {
                     let midnight = frames.last().map_or(0.0, |last| (last.t_s / DAY_S).floor() * DAY_S);
@@ -119,12 +119,12 @@ impl Columns {
 }
 
 #[derive(Clone, Copy)]
-struct Row<'a> {
+struct PoseRow<'a> {
     columns: &'a Columns,
     fields: &'a csv::StringRecord,
 }
 
-impl<'a> Row<'a> {
+impl<'a> PoseRow<'a> {
     fn text(self, name: &str) -> Result<&'a str, String> {
         let place = self.columns.0.iter().find(|(column, _)| *column == name).map(|(_, place)| *place);
         let text = place.and_then(|place| self.fields.get(place)).filter(|text| !text.is_empty());
@@ -138,7 +138,7 @@ impl<'a> Row<'a> {
     }
 }
 
-fn of_metres(dir: &Path, row: Row<'_>) -> Result<RecordedFrame, String> {
+fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
     let t_s = row.number("t_s")?;
     if t_s < 0.0 {
         return Err(format!("t_s is {t_s}; expected 0 or more"));
@@ -157,7 +157,7 @@ fn of_metres(dir: &Path, row: Row<'_>) -> Result<RecordedFrame, String> {
 const DAY_S: f64 = 86_400.0;
 
 /// A frame placed in a mosaic, at its time of the day.
-fn of_mosaic(dir: &Path, row: Row<'_>, metres_per_pixel: f64) -> Result<RecordedFrame, String> {
+fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<RecordedFrame, String> {
     let time = row.text("time_utc_hms")?;
     let t_s = time_of_day(time).ok_or_else(|| format!("time_utc_hms is {time:?}; expected hhmmss"))?;
     let scale = row.number("scale")?;

@@ -25,7 +25,6 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 
-/// Arguments of the command.
 #[derive(Debug)]
 pub struct Options {
     pub scenario: PathBuf,

@@ -7,7 +7,7 @@ use scenecast_protocol::link::{DropReason, LinkStats};
 pub(super) fn warn_without_key(config: &Config) {
     if config.link.key_file.is_none() {
         tracing::warn!(
-            "link.key_file is empty: whoever reaches the water can command the vehicle and forge its map; \
+            "link.key_file is empty: whoever can transmit to the vehicle can give it orders and forge its map; \
              scenecast key new makes a key, and both ends need the same file"
         );
     }

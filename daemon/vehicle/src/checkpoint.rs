@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_checkpoint_of_an_earlier_build_lacks_only_the_times_of_sights() {
+    fn an_earlier_checkpoint_lacks_only_the_times_of_sights() {
         let mut mapper = Mapper::new(&config(&[]), None, 3, 1).unwrap();
         (0..5).for_each(|at| drop(frame(&mut mapper, at)));
         let bytes = mapper.save(7);

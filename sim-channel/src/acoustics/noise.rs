@@ -7,8 +7,8 @@ use super::sum_db;
 /// `wind_m_s` is the wind speed at the surface, `shipping` 0 (none)..=1 (heavy). Turbulence, shipping, waves and thermal
 /// noise add as powers.
 ///
-/// Source: G. M. Wenz 1962, in the empirical form of R. Coates, "Underwater Acoustic Systems", as M. Stojanovic used it
-/// in 2007.
+/// Source: G. M. Wenz 1962, in the empirical form of R. Coates, "Underwater Acoustic Systems", as M.
+/// Stojanovic used it in 2007.
 #[must_use]
 pub fn wenz_db(frequency_khz: f64, wind_m_s: f64, shipping: f64) -> f64 {
     let f = frequency_khz.max(1e-3);

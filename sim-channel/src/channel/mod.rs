@@ -282,8 +282,8 @@ impl Channel {
 
     /// Adds a reception to those under way and marks collisions in both directions.
     ///
-    /// Signals of one sender stay in order on their way and do not collide, although motion may make their rounded
-    /// spans touch each other.
+    /// Signals of one sender stay in order on their way and do not collide, although motion may make their
+    /// rounded spans touch each other.
     fn enter(&mut self, mut new: Reception) {
         let own = self.on_air.get(&new.to).map(Vec::as_slice).unwrap_or_default();
         new.self_deaf = self.config.half_duplex && own.iter().any(|span| span.overlaps(&new.span));

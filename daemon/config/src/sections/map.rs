@@ -67,15 +67,15 @@ section! {
         max_labels: u32 = 16, range(2.0, 254.0, ""), [Auv Scenario];
         /// Words that are resampled per second of mission time.
         refine_words_per_s: u32 = 50_000, range(0.0, 1e8, "1/s"), [Auv Scenario];
-        /// Maximum rate of camera frames into the scene model. The first frame of each interval is used. 0: every
-        /// frame.
+        /// Maximum rate of camera frames into the scene model. The first frame of each interval
+        /// is used. 0: every frame.
         frames_per_s: f64 = 0.0, range(0.0, 30.0, "1/s"), [Auv Scenario];
         /// Maximum number of words that are kept in a cell.
         max_words_per_cell: u32 = 200, range(8.0, 60_000.0, ""), [Auv Scenario];
         /// File of a vocabulary (scenecast vocabulary train). Empty: the built-in vocabulary.
         vocabulary: Option<PathBuf> = None, ANY, [Auv Scenario];
-        /// Mission time between two checkpoints of the scene model. A restarted vehicle continues from the last one.
-        /// 0: no checkpoints.
+        /// Mission time between two checkpoints of the scene model. A restarted vehicle continues from the
+        /// last one. 0: no checkpoints.
         checkpoint_s: f64 = 60.0, range(0.0, 86_400.0, "s"), [Auv];
         /// File of a table of scenecast tune, from which "fit to budget" takes settings of the scene model. Empty: the
         /// built-in table, measured on procedural sea floors.

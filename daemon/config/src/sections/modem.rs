@@ -7,9 +7,9 @@ use std::path::PathBuf;
 section! {
     /// The modem of this end.
     modem: Modem {
-        /// Kind of modem. s2c: EvoLogics S2C; micromodem: WHOI Micromodem; transparent: a modem that passes bytes on;
-        /// tcp, udp: frames go to the other end over a network, and in a rehearsal through the simulated channel
-        /// without modems.
+        /// Kind of modem. s2c: EvoLogics S2C; micromodem: WHOI Micromodem; transparent: a modem that
+        /// passes bytes on; tcp, udp: frames go to the other end over a network, and in a rehearsal
+        /// through the simulated channel without modems.
         kind: ModemKind = ModemKind::Tcp, ANY, [Auv Asv Scenario];
         /// Serial device of the modem, preferably from /dev/serial/by-id. Empty: the modem is reached over the
         /// network, by modem.connect or modem.listen.
@@ -22,8 +22,8 @@ section! {
         connect: Option<HostPort> = None, ANY, [Auv Asv];
         /// Bit rate of the modem on air. The rates of S2C instant messages and of Micromodem packets are built in.
         bit_rate: f64 = 10_000.0, range(10.0, 1e7, "bit/s"), [Auv Asv];
-        /// Bits on air that each transmission needs in addition to its bytes. The values for s2c and micromodem are
-        /// built in.
+        /// Bits on air that each transmission needs in addition to its bytes. The values for s2c
+        /// and micromodem are built in.
         overhead_bits: u32 = 0, range(0.0, 100_000.0, "bit"), [Auv Asv Scenario];
         /// Address of the surface's modem (s2c, micromodem), the same at both ends. A vehicle's modem has
         /// vehicle.address. The program refuses a modem with another address.
@@ -35,8 +35,8 @@ section! {
         source_level: u8 = 3, range(0.0, 3.0, ""), [Auv Asv];
         /// Highest address of an S2C network, the same on all modems: 2, 6, 14, 30, 62, 126 or 254.
         highest_address: u8 = 14, range(2.0, 254.0, ""), [Auv Asv];
-        /// Data packets in one packet train of an S2C modem. Fewer packets let commands through sooner, at a lower
-        /// throughput.
+        /// Data packets in one packet train of an S2C modem. Fewer packets let commands through
+        /// sooner, at a lower throughput.
         cluster: u8 = 10, range(1.0, 32.0, ""), [Auv Asv Scenario];
         /// Longest data packet of an S2C modem, the same on all modems.
         packet_ms: u16 = 750, range(50.0, 1000.0, "ms"), [Auv Asv Scenario];

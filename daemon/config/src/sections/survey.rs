@@ -16,21 +16,21 @@ section! {
         altitude_m: f64 = 4.0, range(0.1, 100.0, "m"), [Auv Scenario];
         /// Depth of the sea floor.
         depth_m: f64 = 20.0, range(0.0, 11_000.0, "m"), [Auv Scenario];
-        /// West, south, east and north limits in the world. All 0: the limits of the recording or of the rehearsal's
-        /// image.
+        /// West, south, east and north limits in the world. All 0: the limits of the recording
+        /// or of the rehearsal's image.
         area_m: Option<Area> = None, range(-1e6, 1e6, "m"), [Auv Scenario];
         /// Planner of the vehicle's path once the operator has sent a utility. The operator may choose another.
         planner: PlannerKind = PlannerKind::Horizon, ANY, [Auv Scenario];
-        /// Distance that planned paths keep from the fence and from keep-outs, to allow for the vehicle's size, turns
-        /// and drift.
+        /// Distance that planned paths keep from the fence and from keep-outs, to allow for the
+        /// vehicle's size, turns and drift.
         clearance_m: f64 = 1.0, range(0.0, 1000.0, "m"), [Auv Scenario];
-        /// Longest silence of the surface before the reaction in survey.on_silence, unless the operator sets another
-        /// limit. 0: no limit.
+        /// Longest silence of the surface before the reaction in survey.on_silence, unless the operator sets
+        /// another limit. 0: no limit.
         max_silence_s: f64 = 0.0, range(0.0, 1e6, "s"), [Auv Scenario];
         /// Reaction to silence of the surface, unless the operator sets another reaction.
         on_silence: Reaction = Reaction::Return, ANY, [Auv Scenario];
-        /// Reaction outside the fence, in a keep-out or outside a depth band, unless the operator sets another
-        /// reaction.
+        /// Reaction outside the fence, in a keep-out or outside a depth band, unless
+        /// the operator sets another reaction.
         on_breach: Reaction = Reaction::Return, ANY, [Auv Scenario];
         /// Reaction to an abort, unless the operator sets another reaction.
         on_abort: Reaction = Reaction::Surface, ANY, [Auv Scenario];
@@ -42,8 +42,8 @@ section! {
     navigation: Navigation {
         /// Drift of dead reckoning, in percent of the distance travelled.
         drift_percent: f64 = 1.0, range(0.0, 50.0, "%"), [Auv Scenario];
-        /// Standard deviation of the vehicle's position at the start of the survey. It limits how far the first fixes
-        /// may move the map.
+        /// Standard deviation of the vehicle's position at the start of the survey. It limits how far the first
+        /// fixes may move the map.
         start_sigma_m: f64 = 1.0, range(0.0, 100_000.0, "m"), [Auv Scenario];
         /// Time between two position fixes. 0: no fixes.
         fix_period_s: f64 = 10.0, range(0.0, 3600.0, "s"), [Scenario];

@@ -15,7 +15,6 @@ use zeroize::Zeroizing;
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(20);
 /// For the next event. The surface sends at least one a second.
 const EVENT_TIMEOUT: Duration = Duration::from_secs(15);
-/// Longer than any response.
 const MAX_BYTES: usize = 1 << 28;
 
 /// An HTTP client of one surface.
@@ -51,7 +50,6 @@ impl Client {
         Ok((self.body(response).await?, tag))
     }
 
-    /// Sends an order.
     pub(super) async fn post(&self, path: &str, order: &impl Serialize) -> Result<AcceptedOrder, UserError> {
         let body = serde_json::to_vec(order).map_err(|e| UserError::Failed(e.to_string()))?;
         let response = self.send(Method::POST, path, body.into()).await?;
@@ -118,7 +116,6 @@ impl Client {
     }
 }
 
-/// The stream of events.
 #[derive(Debug)]
 pub(super) struct EventStream<'a> {
     client: &'a Client,
@@ -127,7 +124,6 @@ pub(super) struct EventStream<'a> {
 }
 
 impl EventStream<'_> {
-    /// The next state.
     pub(super) async fn state(&mut self) -> Result<MissionState, UserError> {
         loop {
             if let Some(end) = self.buffer.windows(2).position(|w| w == b"\n\n") {

@@ -26,7 +26,6 @@ impl Session {
         serde_json::from_slice(&bytes).map_err(|e| self.client.unreadable(&e))
     }
 
-    /// The selected vehicle.
     pub(super) fn choose<'a>(&self, state: &'a MissionState) -> Result<&'a VehicleState, UserError> {
         let known: Vec<String> = state.vehicles.iter().map(|v| v.id.to_string()).collect();
         let known = known.join(", ");

@@ -9,10 +9,8 @@ use scenecast_core::UserError;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerDescriptor, LayerSet};
 use scenecast_surface::SettingsOrder;
 
-/// A change of settings.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SettingsChange {
-    /// The given settings.
     pub order: SettingsOrder,
     /// Whether to fit the other settings to a budget: bit/s, or `None` for the share of the map.
     pub fit: Option<Option<f64>>,

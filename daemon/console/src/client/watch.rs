@@ -5,7 +5,6 @@ use super::{changes, text};
 use crate::state::MissionState;
 use scenecast_core::UserError;
 
-/// Prints the whole state.
 pub async fn show_status(session: &Session) -> Result<(), UserError> {
     let state = session.state().await?;
     session.print(&state, || text::status(&state, session.vehicle))
@@ -18,7 +17,6 @@ pub async fn show_labels(session: &Session) -> Result<(), UserError> {
     session.print(&vehicle.labels, || text::labels(vehicle, state.now_s))
 }
 
-/// Prints changes until Ctrl-C.
 pub async fn watch(session: &Session) -> Result<(), UserError> {
     tokio::select! {
         _ = tokio::signal::ctrl_c() => Ok(()),

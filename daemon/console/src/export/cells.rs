@@ -22,7 +22,6 @@ pub struct MapCells {
     pub labels: Vec<u8>,
     /// Seconds since each cell was received, 65535 = never.
     pub age_s: Vec<u16>,
-    /// The other layers.
     pub layers: Vec<CellLayer>,
 }
 
@@ -68,7 +67,6 @@ fn ages(seconds: &[u16]) -> String {
 }
 
 impl MapCells {
-    /// The map for JSON.
     pub(crate) fn body(&self) -> MapBody {
         MapBody {
             version: self.version,
@@ -90,7 +88,6 @@ impl MapCells {
         (metres(self.bounds.x, column, self.moved_m.0), metres(self.bounds.y, row, self.moved_m.1))
     }
 
-    /// The explored cells.
     pub(super) fn explored(&self) -> impl Iterator<Item = ExploredCell> {
         let width = self.bounds.width.max(1) as usize;
         self.labels.iter().zip(&self.age_s).enumerate().filter(|(_, (label, _))| **label != 0).map(

@@ -17,8 +17,8 @@ const OPEN: [&str; 3] = ["/login", "/style.css", "/icon.svg"];
 pub(super) enum HostNames {
     /// Names of the loopback addresses only.
     Loopback,
-    /// Any address, and the configured name if it is not empty. Another name could belong to an attacker, whose DNS points it
-    /// here; an address cannot.
+    /// Any address, and the configured name if it is not empty. Another name could belong to an attacker, whose DNS
+    /// points it here; an address cannot.
     Network(String),
 }
 

@@ -11,7 +11,6 @@ use std::io::Write;
 
 /// Shorter responses are sent as they are.
 const MIN_BYTES: usize = 512;
-/// Longer than any response.
 const MAX_BYTES: usize = 1 << 28;
 
 /// Bytes in gzip (RFC 1952); `None` if there is no memory for them.
@@ -30,7 +29,6 @@ pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     })
 }
 
-/// Compresses responses of text.
 pub(super) async fn compress(request: Request, next: Next) -> Response {
     let wanted = accepts_gzip(request.headers());
     let mut response = next.run(request).await;

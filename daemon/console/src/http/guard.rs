@@ -15,8 +15,8 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 /// From the head of a request to the head of its response.
 const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
 
-/// Refuses requests that the page of another site could have made and those without a token, and adds the headers that isolate
-/// our page.
+/// Refuses requests that the page of another site could have made and those without a token, and adds the
+/// headers that isolate our page.
 pub(super) async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
     let mut response = match check(request.method(), request.uri().path(), request.headers(), &access.names) {
         Err(reason) => error(StatusCode::FORBIDDEN, reason),

@@ -12,7 +12,6 @@ needs a `Host` of this machine and, if it has an `Origin`, that of the page; a P
 surface has a `console.token_file`, a request needs its token, in `Authorization: Bearer TOKEN` or as the cookie of `/login`. \
 Text is compressed for clients that accept gzip; maps and files carry an `ETag`. `/api/v1` answers 410.";
 
-/// The document.
 pub(super) fn document() -> Vec<u8> {
     serde_json::to_vec_pretty(&describe()).unwrap_or_default()
 }

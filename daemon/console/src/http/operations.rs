@@ -78,7 +78,6 @@ macro_rules! map_file {
     }};
 }
 
-/// All operations.
 pub(super) fn operations() -> Vec<Operation> {
     let mut all = readings();
     all.extend(map_files());

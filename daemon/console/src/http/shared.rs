@@ -25,7 +25,6 @@ pub(super) struct Shared {
     pub(super) access: Arc<Access>,
     /// A permit for each open stream of events.
     pub(super) streams: Arc<Semaphore>,
-    /// The OpenAPI document.
     pub(super) document: Bytes,
 }
 
@@ -43,7 +42,6 @@ pub(super) struct CachedMap {
     /// Mission time at which the vehicle confirmed the map last.
     pub(super) updated_s: Option<f64>,
     pub(super) json: Bytes,
-    /// The same in gzip.
     pub(super) packed: Bytes,
 }
 

@@ -19,7 +19,6 @@ use scenecast_surface::Surface;
 /// The state at one moment.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Snapshot {
-    /// The state.
     pub state: MissionState,
     /// The same state as JSON; empty before the first.
     pub json: Bytes,

@@ -91,8 +91,8 @@ fn map(
     }
 }
 
-/// The longest usual pause between two frames. An idle link or the smaller of both budgets can make it longer than the
-/// measured pauses.
+/// The longest usual pause between two frames. An idle link or the smaller of both budgets can make it
+/// longer than the measured pauses.
 fn expected_interval_s(surface: &Surface, view: &PeerView<'_>, record: &VehicleRecord, facts: &MissionFacts) -> f64 {
     let vehicle_bps = view.status().map_or(u32::MAX, |(s, _)| s.budget_bps);
     let budget_bps = surface.budget_bps().min(vehicle_bps).max(1);

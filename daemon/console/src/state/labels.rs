@@ -15,7 +15,7 @@ pub struct MapLabel {
     pub area_m2: f64,
     /// The last weight sent, -1 to 1.
     pub weight: f64,
-    /// Its exemplars.
+    /// The exemplars of the label, and the request for another.
     pub exemplar: ExemplarProgress,
 }
 
@@ -30,7 +30,7 @@ pub struct ExemplarProgress {
     pub bytes: Option<usize>,
     /// The address of the latest image.
     pub url: Option<String>,
-    /// When `state` changed last.
+    /// Mission time of the last change of `state`, seconds.
     pub at_s: Option<f64>,
     /// The received images, the latest one last; at most 8.
     pub images: Vec<ExemplarImage>,
@@ -42,15 +42,15 @@ pub struct ExemplarImage {
     /// The number of the image among those of the label.
     #[schemars(range(min = 1, max = 63))]
     pub number: u8,
-    /// Width and height, pixels.
+    /// Width and height of the image, pixels.
     pub edge_px: u32,
     /// Whether a larger version can be requested.
     pub can_enlarge: bool,
     /// Bytes sent over the link.
     pub bytes: usize,
-    /// Its address.
+    /// Path of the image on this server.
     pub url: String,
-    /// When it was received.
+    /// Mission time of its arrival, seconds.
     pub at_s: f64,
     /// Whether it was requested; otherwise the vehicle sent it with spare capacity.
     pub requested: bool,
@@ -64,7 +64,7 @@ pub enum ExemplarStage {
     None,
     /// The request waits for its turn.
     Queued,
-    /// The request was sent.
+    /// The request was sent and is not yet acknowledged.
     OnAir,
     /// The vehicle has no such image yet and sends it once it has one.
     NotAvailable,

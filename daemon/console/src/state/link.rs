@@ -39,7 +39,7 @@ pub struct LinkDirection {
     pub max_window_bps: f64,
     /// The share of frames that were lost, 0 to 1.
     pub loss: f64,
-    /// The number of frames.
+    /// Number of frames, lost ones included.
     pub frames: u64,
     /// The number of lost frames.
     pub lost: u64,
@@ -52,20 +52,20 @@ pub struct LinkDirection {
 /// The rates on air at one time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LinkRates {
-    /// Mission time.
+    /// Mission time at the end of the interval, seconds.
     pub t_s: u64,
-    /// From the vehicles, bit/s.
+    /// Rate on air from the vehicles, bit/s.
     pub up_bps: f64,
-    /// To the vehicles, bit/s.
+    /// Rate on air to the vehicles, bit/s.
     pub down_bps: f64,
 }
 
 /// Recent measurements of the channel to one vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleChannel {
-    /// From the vehicle.
+    /// The channel from the vehicle to the surface.
     pub up: ChannelQuality,
-    /// To the vehicle.
+    /// The channel from the surface to the vehicle.
     pub down: ChannelQuality,
     /// Two-way travel time, a duration.
     pub round_trip_s: Option<f64>,

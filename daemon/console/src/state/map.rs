@@ -14,9 +14,9 @@ pub struct MapSummary {
     pub x0: i32,
     /// Row of the south-west cell.
     pub y0: i32,
-    /// Number of columns.
+    /// Number of columns, from west to east.
     pub width: u32,
-    /// Number of rows.
+    /// Number of rows, from south to north.
     pub height: u32,
     /// Number of cells with a label.
     pub explored_cells: u32,
@@ -50,9 +50,9 @@ pub struct MapBody {
     pub x0: i32,
     /// Row of the south-west cell.
     pub y0: i32,
-    /// Number of columns.
+    /// Number of columns, from west to east.
     pub width: u32,
-    /// Number of rows.
+    /// Number of rows, from south to north.
     pub height: u32,
     /// Width of a cell, metres.
     pub cell_m: f64,
@@ -93,8 +93,8 @@ pub struct LayerBody {
 /// A label or a layer of a map has changed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct MapEvent {
-    /// Address of the vehicle.
+    /// Acoustic address of the vehicle, 1 to 14.
     pub vehicle: u8,
-    /// Version of its map.
+    /// Version of the vehicle's map at the surface.
     pub version: u64,
 }

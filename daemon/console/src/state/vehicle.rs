@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// A vehicle as the surface knows it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleState {
-    /// Acoustic address.
+    /// Acoustic address of the vehicle, 1 to 14.
     #[schemars(range(min = 1, max = 14))]
     pub id: u8,
     /// The name that people use.
@@ -59,8 +59,8 @@ pub struct VehicleOrders {
     pub directive: DirectiveSlots,
 }
 
-/// Settings of a vehicle. A null member is one that this surface has not set; 0 or an empty text means as configured on the
-/// vehicle.
+/// Settings of a vehicle. A null member is one that this surface has not set; 0 or an empty text means
+/// as configured on the vehicle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct VehicleSettings {
     /// All that this surface has requested.
@@ -89,7 +89,7 @@ pub struct UsblMeasurement {
 pub struct StatusReport {
     /// When the report was received.
     pub at_s: f64,
-    /// Its position and heading.
+    /// Position and heading in the reported pose.
     #[serde(flatten)]
     pub pose: ReportedPose,
     /// The mode of the vehicle.
@@ -100,7 +100,7 @@ pub struct StatusReport {
     pub reason: Option<String>,
     /// Mode and reason as a text, such as "holding: fence"; "holding: arrived" at the end of the survey's plan.
     pub activity: String,
-    /// Its plan.
+    /// The planned path of the vehicle, where reported.
     #[serde(flatten)]
     pub plan: PlannedPath,
     /// Cells that it has explored.
@@ -116,13 +116,13 @@ pub struct StatusReport {
 /// The position and the heading of a vehicle by its own estimate, on its own map.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct ReportedPose {
-    /// Metres east.
+    /// Metres east in the vehicle's map frame.
     pub x_m: f64,
-    /// Metres north.
+    /// Metres north in the vehicle's map frame.
     pub y_m: f64,
     /// Metres up, so the depth is negative.
     pub z_m: f64,
-    /// Degrees clockwise from north.
+    /// Heading in degrees clockwise from north.
     pub heading_deg: f64,
     /// Standard deviation of the position, metres.
     pub sigma_m: f64,
@@ -146,17 +146,17 @@ pub struct PlannedPath {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ReportedMode {
-    /// It surveys.
+    /// The vehicle follows its survey plan.
     Survey,
-    /// It holds its position.
+    /// The vehicle holds its position.
     Hold,
     /// It returns to the return point.
     Return,
-    /// It surfaces.
+    /// The vehicle ascends to the surface.
     Surface,
     /// It has aborted the mission.
     Abort,
-    /// Its survey is complete.
+    /// The survey of the vehicle is complete.
     Done,
 }
 
@@ -179,9 +179,9 @@ pub struct DirectiveSlots {
 /// An order that the vehicle has applied. It stays in force while a newer one is on its way, and after a newer one was refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AppliedOrder<T> {
-    /// Its version.
+    /// Version of the order, which the vehicle acknowledges.
     pub version: u16,
-    /// The order.
+    /// The order as the operator gave it.
     pub order: T,
 }
 
@@ -196,9 +196,9 @@ pub struct OrderProgress {
     pub state: OrderStatus,
     /// Why the vehicle refused it.
     pub reason: Option<String>,
-    /// When it was given.
+    /// Mission time of the order, seconds.
     pub issued_s: f64,
-    /// When `state` changed last.
+    /// Mission time of the last change of `state`, seconds.
     pub changed_s: f64,
 }
 
@@ -208,12 +208,12 @@ pub struct OrderProgress {
 pub enum OrderStatus {
     /// It waits for its turn on the link.
     Queued,
-    /// It was sent.
+    /// The order was sent and is not yet acknowledged.
     OnAir,
     /// The vehicle has received it.
     Received,
     /// The vehicle reports that it is in force.
     Applied,
-    /// The vehicle refused it.
+    /// The vehicle refused the order; `reason` is why.
     Refused,
 }

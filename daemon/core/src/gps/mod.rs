@@ -105,7 +105,6 @@ impl Gps {
         }
     }
 
-    /// Refused reports, by reason.
     pub fn faults(&self) -> impl Iterator<Item = (GpsFault, u64)> + '_ {
         self.faults
             .iter()

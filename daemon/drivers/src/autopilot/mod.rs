@@ -62,7 +62,6 @@ pub enum Health {
     Silent,
     /// It answers but does not follow waypoints: it is disarmed, or in a mode of the pilot's.
     NotInCommand,
-    /// It follows waypoints.
     InCommand,
 }
 

@@ -33,7 +33,6 @@ pub enum Refusal {
     /// It is larger than the modem carries.
     #[error("a frame of {bytes} bytes is larger than the modem's {most}")]
     TooLong { bytes: usize, most: usize },
-    /// The frame is empty.
     #[error("a frame without bytes")]
     Empty,
     /// The modem cannot reach this destination.
@@ -110,7 +109,6 @@ pub trait Driver: Send {
     /// The port was closed, or failed.
     fn handle_closed(&mut self, now: Instant);
 
-    /// Bytes from the port.
     fn handle_bytes(&mut self, bytes: &[u8], now: Instant);
 
     fn handle_timeout(&mut self, now: Instant);
@@ -121,7 +119,6 @@ pub trait Driver: Send {
     /// Bytes for the port; to be asked until there are none, after everything else.
     fn poll_output(&mut self, now: Instant) -> Option<Vec<u8>>;
 
-    /// The next event.
     fn poll_event(&mut self) -> Option<Event>;
 
     /// Whether the port has been silent for so long that it should be opened again.

@@ -10,7 +10,6 @@ use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// How frames are delimited.
 #[derive(Debug)]
 enum Shape {
     Stream(Deframer),

@@ -78,7 +78,7 @@ fn same(a: &LabelGrid, b: &LabelGrid) -> bool {
 }
 
 #[test]
-fn priors_frame_rate_and_layers_change_under_way_and_the_maps_agree() {
+fn maps_agree_after_settings_changed_in_the_mission() {
     let mut mission = mission(&[]);
     mission.fly_to(100.0);
     let (frames, labels) = (mission.logbook.track.len(), mission.mapper.current().labels);

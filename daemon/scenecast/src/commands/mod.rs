@@ -66,7 +66,7 @@ enum Command {
     #[command(subcommand)]
     Key(key::Key),
     #[cfg(feature = "tools")]
-    /// Encode label maps as the stream does, and measure the codecs.
+    /// Encode label maps as on the link, and measure the codecs.
     #[command(subcommand)]
     Map(tools::Map),
     #[cfg(feature = "tools")]

@@ -20,7 +20,7 @@ pub(super) struct ModemSim {
     /// Folder for symbolic links NAME to the devices; they remain when devices are replaced
     #[arg(long, value_name = "DIR")]
     link_dir: Option<PathBuf>,
-    /// Seconds of the emulation per second, as runtime.time_scale of the daemons
+    /// Speed of the emulation relative to real time; set runtime.time_scale of both ends to the same value
     #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true)]
     time_scale: f64,
     /// Seed of all random numbers [default: the scenario's]

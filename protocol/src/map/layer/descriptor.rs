@@ -97,7 +97,7 @@ pub enum Spread {
     Scale,
     /// From the lowest to the highest that the map has.
     Present,
-    /// The same without the fiftieth of the cells at either end, so that a few odd cells do not dim the others.
+    /// The same without the lowest and the highest fiftieth of the cells, so that a few odd cells do not dim the others.
     Common,
 }
 

@@ -49,7 +49,6 @@ pub(in crate::http) async fn fit(
     shared.respond(SurfaceRequest::Fit(id, bits_per_s)).await
 }
 
-/// The OpenAPI document.
 pub(in crate::http) async fn document(State(shared): State<Shared>) -> Response {
     ([(header::CONTENT_TYPE, JSON)], shared.document).into_response()
 }

@@ -25,7 +25,6 @@ pub struct Frame {
     pub payload: Vec<u8>,
 }
 
-/// Refused bytes, by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Refused {
     /// Frames of a known message with a wrong check.

@@ -37,7 +37,6 @@ impl Peer {
     }
 }
 
-/// Its last reported motion.
 #[derive(Debug, Clone, Copy)]
 struct Pose {
     /// North, east, down in its own frame, metres; `None` if it reports only global positions.

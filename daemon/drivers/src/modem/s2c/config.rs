@@ -44,9 +44,9 @@ pub fn instant_airtime(bytes: usize) -> Duration {
 impl S2cConfig {
     /// Settings to write and to read back.
     ///
-    /// No retries of messages: duplicates cost airtime, and the driver repeats by itself. Two retries of a connection:
-    /// more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so that others get
-    /// to speak.
+    /// No retries of messages: duplicates cost airtime, and the driver repeats by itself. Two retries of a
+    /// connection: more would keep on speaking for long to a modem that has restarted. Idle connections end soon, so
+    /// that others get to speak.
     pub(super) fn settings(&self) -> [(&'static str, u32); 10] {
         [
             ("L", self.source_level.into()),

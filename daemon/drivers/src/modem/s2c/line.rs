@@ -22,7 +22,6 @@ const LIMIT: usize = 4096;
 const TEXT_LIMIT: usize = 512;
 const TIES: &[u8] = b"+++AT";
 
-/// Keeps an incomplete line.
 #[derive(Debug, Default)]
 pub struct LineParser {
     buffer: Vec<u8>,
@@ -36,7 +35,6 @@ impl LineParser {
         self.ties = ties;
     }
 
-    /// Drops an incomplete line.
     pub fn clear(&mut self) {
         self.buffer.clear();
     }

@@ -24,7 +24,6 @@ pub enum Notice {
     LocalRate(u32),
     /// A position or a direction of another modem.
     Usbl(Position),
-    /// Any other notice.
     Other,
 }
 

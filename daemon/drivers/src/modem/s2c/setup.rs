@@ -2,7 +2,6 @@
 
 use super::config::S2cConfig;
 
-/// The expected reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Expect {
     Ok,

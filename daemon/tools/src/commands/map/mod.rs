@@ -12,7 +12,7 @@ use clap::{Args, Subcommand};
 use scenecast_core::UserError;
 use scenecast_protocol::map_codec::Codec;
 
-/// Encode label maps as the stream does, and measure the codecs.
+/// Encode label maps as on the link, and measure the codecs.
 #[derive(Debug, Subcommand)]
 pub enum Map {
     /// Write the chunks that turn one map into another, and print their sizes.

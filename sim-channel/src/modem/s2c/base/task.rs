@@ -4,8 +4,8 @@ use super::{AfterSending, PendingFix, ReceivedSignal, S2cFrame};
 use crate::modem::emulator::HostId;
 use std::time::Duration;
 
-/// Numbers (`attempt`, `epoch`, `number`) name the state that a timer belongs to. An old timer finds another number and
-/// has no effect then.
+/// Numbers (`attempt`, `epoch`, `number`) name the state that a timer belongs to. An old timer finds another number
+/// and has no effect then.
 #[derive(Debug)]
 pub(crate) enum S2cTask {
     /// The last bit of a frame has left.
