@@ -14,19 +14,21 @@ mod modem;
 mod old_keys;
 mod print;
 mod reference;
+mod rule;
 mod schema;
 mod sections;
 mod setting;
 mod token_file;
 
 pub use derived::{authenticity, cell_m, modem_profile, survey_depth_m, tuning_table, vehicle_address, vehicle_names};
-pub use key::{Key, Role, Rule};
+pub use key::{Key, Role};
 pub use key_file::{load_key, read_key};
 pub use load::load;
 pub use migrate::{Migration, migrate};
 pub use modem::{full_frame_bytes, modem_port};
 pub use print::{print, shipped_files};
 pub use reference::reference;
+pub use rule::Rule;
 pub use schema::schema;
 pub use sections::{
     Autopilot, Camera, Channel, Config, Console, Link, Map, Mission, Modem, Navigation, Operator, Position, Runtime,

@@ -19,6 +19,6 @@ pub use assemble::assemble;
 pub use checkpoint::{RestoreError, Restored};
 pub use failsafe::{Failsafe, FailsafePolicy};
 pub use mapper::{MapUpdate, Mapper, SharedExemplars};
-pub use navigator::{FixVerdict, Navigator};
+pub use navigator::{FixVerdict, LastPlace, Navigator};
 pub use steering::{Course, Footprint, Steering};
-pub use vehicle::{AppliedSlot, Durable, LastPlace, Vehicle, VehicleOutput};
+pub use vehicle::{AppliedSlot, Durable, Vehicle, VehicleOutput};

@@ -1,9 +1,11 @@
 //! The estimate of the vehicle's position.
 
 mod filter;
+mod last_place;
 mod odometer;
 
-use super::vehicle::LastPlace;
+pub use last_place::LastPlace;
+
 use filter::Filter;
 use odometer::Odometer;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};

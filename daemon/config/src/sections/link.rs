@@ -1,6 +1,7 @@
 //! The acoustic link.
 
-use crate::key::{ANY, range, section};
+use crate::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::Authenticate;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use std::path::PathBuf;

@@ -1,6 +1,7 @@
 //! The map's stream, the camera and the scene model.
 
-use crate::key::{ANY, range, section};
+use crate::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::{BirthRule, CameraSource, LayerName, MapCells, MapStream};
 use scenecast_protocol::map_codec::Codec;
 use std::collections::BTreeMap;

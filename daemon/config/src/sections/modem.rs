@@ -1,6 +1,7 @@
 //! The modem, and the simulated channel between modems.
 
-use crate::key::{ANY, range, section};
+use crate::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::{HostPort, ModemKind, S2cMode};
 use std::path::PathBuf;
 

@@ -1,6 +1,7 @@
 //! The mission, the vehicle and the processes.
 
-use crate::key::{ANY, range, section};
+use crate::key::section;
+use crate::rule::{ANY, range};
 use crate::setting::{HostPort, OperatorScript};
 use scenecast_core::LatLon;
 use std::path::PathBuf;

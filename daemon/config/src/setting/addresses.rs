@@ -1,7 +1,7 @@
 //! Lists of vehicles' addresses.
 
 use super::{Setting, different, read_different, unit};
-use crate::key::Rule;
+use crate::rule::Rule;
 use toml::Value;
 
 impl Setting for Vec<u8> {

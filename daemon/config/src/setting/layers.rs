@@ -1,7 +1,7 @@
 //! Names of layers, and tables by these names.
 
 use super::{Setting, different, one_of, read_different};
-use crate::key::Rule;
+use crate::rule::Rule;
 use crate::setting::tables;
 use scenecast_protocol::map::{BUILT_IN_LAYERS, LayerId};
 use std::collections::BTreeMap;

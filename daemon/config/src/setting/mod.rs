@@ -13,7 +13,7 @@ pub use layers::LayerName;
 pub use ports::{GpsPort, HostPort};
 pub use texts::CameraSource;
 
-use crate::key::Rule;
+use crate::rule::Rule;
 use serde_json::json;
 use toml::Value;
 

@@ -1,7 +1,7 @@
 //! Shares by class, and the order of the background streams.
 
 use super::{Setting, different, read_different, unit};
-use crate::key::Rule;
+use crate::rule::Rule;
 use scenecast_protocol::map::LayerSet;
 use scenecast_protocol::schedule::{BackgroundOrder, BackgroundStream, Class, Shares};
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! Names, files and the source of the camera's frames.
 
 use super::Setting;
-use crate::key::Rule;
+use crate::rule::Rule;
 use serde_json::json;
 use std::path::PathBuf;
 use toml::Value;

@@ -1,6 +1,6 @@
 //! The part of the vehicle's state that its host stores.
 
-use super::LastPlace;
+use crate::LastPlace;
 use scenecast_protocol::link::SlotInboxState;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

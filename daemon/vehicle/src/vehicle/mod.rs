@@ -6,7 +6,6 @@
 mod durable;
 mod gallery;
 mod guidance;
-mod last_place;
 #[cfg(test)]
 mod orders_tests;
 mod publisher;
@@ -15,7 +14,6 @@ mod slots;
 mod whole_png;
 
 pub use durable::Durable;
-pub use last_place::LastPlace;
 
 use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};

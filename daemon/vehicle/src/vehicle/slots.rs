@@ -1,8 +1,9 @@
 //! The vehicle applies the slots of the directive: each order is put in force or refused with a reason.
 
 use super::gallery::Gallery;
-use super::{AppliedSlot, LastPlace, Vehicle, VehicleOutput};
+use super::{AppliedSlot, Vehicle, VehicleOutput};
 use crate::FixVerdict;
+use crate::LastPlace;
 use scenecast_protocol::coordinates::DecimetrePoint;
 use scenecast_protocol::directive::{
     Budget, Constraints, ExemplarRequests, Fence, Fix, Limits, LimitsFault, RefusalReason, Settings, Slot, SlotId,

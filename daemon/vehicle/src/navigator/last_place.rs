@@ -1,6 +1,6 @@
 //! The position of the vehicle across a restart.
 
-use crate::Navigator;
+use super::Navigator;
 use scenecast_protocol::coordinates::{MapPoint, WorldPoint};
 use scenecast_protocol::wire::Placement;
 use serde::{Deserialize, Serialize};
