@@ -141,7 +141,7 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
     let fence = r#"{"type": "Feature", "properties": {},
         "geometry": {"type": "Polygon", "coordinates": [[[-80, -80], [80, -80], [80, 80], [-80, 80], [-80, -80]]]}}"#;
     let plan = format!(r#"{{"type": "FeatureCollection", "features": [{fence}, {keep_out}]}}"#);
-    applied(&["fence", "set", &file("fence.geojson", &plan)]);
+    applied(&["fence", "set", "--metres", &file("fence.geojson", &plan)]);
     applied(&["return-point", "set", "-5", "2.5"]);
     let vehicle = || state(port).unwrap()["vehicles"][0].clone();
     let order = &vehicle()["fence_in_force"]["order"];
@@ -160,15 +160,19 @@ fn a_shell_sets_fence_and_limits_and_holds_and_resumes() {
 
     // A fence that the vehicle refuses, fences that the surface refuses, and files that are not a fence.
     let elsewhere = fence.replace("-80", "300").replace("80", "400");
-    let refused = ctl(port, &["fence", "set", &file("elsewhere.geojson", &elsewhere), "--wait", "80"]);
+    let refused = ctl(port, &["fence", "set", "--metres", &file("elsewhere.geojson", &elsewhere), "--wait", "80"]);
     assert!(refused.status.code() == Some(1) && text(&refused).contains("refused"), "{}", text(&refused));
     assert!(text(&ctl(port, &["fence"])).contains("in force: version 2"));
     let url = format!("http://127.0.0.1:{port}");
     let crossed = fence.replace("[80, 80], [-80, 80]", "[-80, 80], [80, 80]");
     let crossed = file("crossed.geojson", &crossed);
-    assert_refused(&["ctl", "--url", &url, "fence", "set", &crossed], &["crossed.geojson", "edge"]);
+    let set = ["ctl", "--url", &url, "fence", "set"];
+    assert_refused(&[&set[..], &["--metres", &crossed]].concat(), &["crossed.geojson", "edge"]);
     let line = file("line.geojson", &fence.replace("Polygon", "LineString"));
-    assert_refused(&["ctl", "--url", &url, "fence", "set", &line], &["line.geojson", "Polygon"]);
+    assert_refused(&[&set[..], &["--metres", &line]].concat(), &["line.geojson", "Polygon"]);
+    assert_refused(&[&set[..], &[&crossed]].concat(), &["mission.origin_deg", "--metres"]);
+    let alone = file("keep-out.geojson", keep_out);
+    assert_refused(&[&set[..], &["--metres", &alone]].concat(), &["keep-out.geojson", "no fence", "--without-fence"]);
     assert_refused(&["ctl", "--url", &url, "limits", "set", "--depth", "30..5"], &["depth_m", "below"]);
     assert_refused(&["ctl", "--url", &url, "limits", "set", "--on-abort", "dive"], &["on_abort", "hold, return"]);
     assert_refused(&["ctl", "--url", &url, "return-point", "set", "500", "0"], &["return_point", "outside"]);

@@ -43,6 +43,13 @@ impl TangentPlane {
         self.origin
     }
 
+    /// Distance of a place from the origin through the Earth, metres. Unlike [`Self::to_plane`] it does not return to 0
+    /// at the antipode.
+    pub fn distance_m(&self, place: LatLon) -> f64 {
+        let to = to_ecef(place);
+        (0..3).map(|i| (to[i] - self.ecef[i]).powi(2)).sum::<f64>().sqrt()
+    }
+
     /// East and north of the origin, metres.
     pub fn to_plane(&self, place: LatLon) -> (f64, f64) {
         let to = to_ecef(place);

@@ -5,7 +5,7 @@ use scenecast_core::Area;
 use scenecast_core::UserError;
 use std::fmt::Write as _;
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A camera frame of a recorded mission.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,6 +131,19 @@ impl<'a> PoseRow<'a> {
         text.ok_or_else(|| format!("{name} is missing"))
     }
 
+    /// A file of the folder or of a folder below it.
+    fn file(self, dir: &Path) -> Result<PathBuf, String> {
+        let text = self.text("file")?;
+        let is_inside =
+            Path::new(text).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        if is_inside { Ok(dir.join(text)) } else { Err(format!("file is {text:?}; expected a file below the folder")) }
+    }
+
+    fn depth_m(self) -> Result<f64, String> {
+        let depth_m = self.number("depth_m")?;
+        if depth_m >= 0.0 { Ok(depth_m) } else { Err(format!("depth_m is {depth_m}; expected 0 or more, downwards")) }
+    }
+
     fn number(self, name: &str) -> Result<f64, String> {
         let text = self.text(name)?;
         let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
@@ -145,10 +158,10 @@ fn of_metres(dir: &Path, row: PoseRow<'_>) -> Result<RecordedFrame, String> {
     }
     Ok(RecordedFrame {
         t_s,
-        file: dir.join(row.text("file")?),
+        file: row.file(dir)?,
         x_m: row.number("x_m")?,
         y_m: row.number("y_m")?,
-        depth_m: row.number("depth_m")?,
+        depth_m: row.depth_m()?,
         heading_rad: row.number("heading_deg")?.to_radians(),
         scale: 1.0,
     })
@@ -166,7 +179,7 @@ fn of_mosaic(dir: &Path, row: PoseRow<'_>, metres_per_pixel: f64) -> Result<Reco
     }
     Ok(RecordedFrame {
         t_s,
-        file: dir.join(row.text("file")?),
+        file: row.file(dir)?,
         x_m: row.number("x_px")? * metres_per_pixel,
         y_m: -row.number("y_px")? * metres_per_pixel,
         depth_m: 0.0,
@@ -277,6 +290,17 @@ mod tests {
         let text = "t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,4\n1,b.png,nan,2,3,4\n";
         let wrong = open("wrong", "poses.csv", text).unwrap_err().to_string();
         assert!(wrong.contains("poses.csv:3: x_m is \"nan\"; expected a finite number"), "{wrong}");
+    }
+
+    #[test]
+    fn a_file_elsewhere_and_a_negative_depth_are_refused_with_their_line() {
+        let refused = |name: &str, row: &str| {
+            let text = format!("t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,4\n{row}\n");
+            open(name, "poses.csv", &text).unwrap_err().to_string()
+        };
+        assert!(refused("up", "1,../b.png,1,2,3,4").contains("poses.csv:3: file is \"../b.png\""));
+        assert!(refused("root", "1,/etc/passwd,1,2,3,4").contains("poses.csv:3: file is"));
+        assert!(refused("height", "1,b.png,1,2,-3,4").contains("poses.csv:3: depth_m is -3"));
     }
 
     #[test]

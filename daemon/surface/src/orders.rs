@@ -5,6 +5,9 @@ use scenecast_protocol::directive::{Band, Fence, Limits, Polygon, Reaction};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Maximum distance of a place in an order from the mission's origin, metres; a farther one is a typing error.
+const MAX_DISTANCE_M: f64 = 100_000.0;
+
 /// A fence as it is typed: vertices in metres east and north of the origin.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -115,8 +118,9 @@ fn outline(what: &str, vertices: &[[f64; 2]]) -> Result<Polygon, String> {
 }
 
 fn place(what: &str, [x, y]: [f64; 2]) -> Result<DecimetrePoint, String> {
-    let far = format!("{what}: [{x}, {y}] is no place within 838 km of the origin");
-    DecimetrePoint::nearest(WorldPoint::new(x, y)).ok_or(far)
+    let far = || format!("{what}: [{x}, {y}] is no place within 100 km of the mission's origin");
+    let near = Some(WorldPoint::new(x, y)).filter(|_| x.hypot(y) <= MAX_DISTANCE_M);
+    near.and_then(DecimetrePoint::nearest).ok_or_else(far)
 }
 
 fn band(what: &str, [low, high]: [f64; 2]) -> Result<Band, String> {
@@ -163,7 +167,7 @@ mod tests {
             refused(r#"{"fence": [[0,0],[9,0],[9,9]], "return_point": [0, 9]}"#),
             "return_point lies outside the fence"
         );
-        assert!(refused(r#"{"fence": [[0,0],[1e9,0],[9,9]]}"#).contains("838 km"));
+        assert!(refused(r#"{"fence": [[0,0],[1e9,0],[9,9]]}"#).contains("100 km"));
         assert!(refused(r#"{"fenze": []}"#).contains("unknown field"));
         assert_eq!(
             limits(r#"{"depth_m": [30, 10]}"#).unwrap_err(),

@@ -29,12 +29,27 @@ pub async fn show_fence(session: &Session) -> Result<(), UserError> {
     session.print(&view, || view.text(state.now_s, fence_text))
 }
 
+/// How to read a file of outlines.
+#[derive(Debug, Clone, Copy)]
+pub struct FenceFile<'a> {
+    pub path: &'a Path,
+    /// The coordinates are metres east and north of the origin.
+    pub in_metres: bool,
+    /// A file without a fence is accepted: it removes the present one.
+    pub without_fence: bool,
+}
+
 /// Sends the fence, the keep-outs and the return point of a GeoJSON file.
-pub async fn set_fence(session: &Session, file: &Path, metres: bool) -> Result<(), UserError> {
+pub async fn set_fence(session: &Session, file: FenceFile<'_>) -> Result<(), UserError> {
     let state = session.state().await?;
     let v = session.choose(&state)?;
-    let frame = if metres { CoordinateFrame::Metres } else { frame(&state) };
-    send(session, v, "fence", &geojson::read_fence(file, frame)?).await
+    let frame = if file.in_metres { CoordinateFrame::Metres } else { degrees(&state)? };
+    let order = geojson::read_fence(file.path, frame)?;
+    if order.fence.is_none() && !file.without_fence {
+        let line = "it has no fence, and an order replaces the present one; --without-fence removes it on purpose";
+        return Err(UserError::file(file.path, line));
+    }
+    send(session, v, "fence", &order).await
 }
 
 /// Removes the fence, the keep-outs and the return point.
@@ -96,9 +111,14 @@ async fn send(
 }
 
 /// Longitude and latitude if the mission has an origin, as in the files of `ctl map`.
-fn frame(state: &MissionState) -> CoordinateFrame {
+/// Degrees have a place only around the mission's origin.
+fn degrees(state: &MissionState) -> Result<CoordinateFrame, UserError> {
     let origin = state.mission.origin.and_then(|o| LatLon::new(o.lat_deg, o.lon_deg));
-    origin.map_or(CoordinateFrame::Metres, |origin| CoordinateFrame::Wgs84(TangentPlane::new(origin)))
+    let origin = origin.ok_or(UserError::Input(
+        "the mission has no origin (mission.origin_deg), so degrees have no place; --metres reads metres east and north"
+            .to_owned(),
+    ))?;
+    Ok(CoordinateFrame::Wgs84(TangentPlane::new(origin)))
 }
 
 fn slot<'a>(vehicle: &'a VehicleState, name: &str) -> Option<&'a OrderProgress> {

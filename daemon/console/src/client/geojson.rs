@@ -7,6 +7,8 @@ use serde_json::Value;
 use std::path::Path;
 
 const MAX_BYTES: u64 = 1 << 20;
+/// Maximum distance of a place from the mission's origin, metres; a farther one is a mistake in the file.
+const MAX_DISTANCE_M: f64 = 100_000.0;
 
 /// The coordinates of a file.
 #[derive(Debug, Clone, Copy)]
@@ -120,11 +122,26 @@ fn outline(polygon: &Value, frame: CoordinateFrame) -> Result<Vec<[f64; 2]>, Str
 fn place(at: &Value, frame: CoordinateFrame) -> Result<[f64; 2], String> {
     let (x, y) = at[0].as_f64().zip(at[1].as_f64()).ok_or(format!("{at} is not a place"))?;
     match frame {
-        CoordinateFrame::Metres => Ok([x, y]),
+        CoordinateFrame::Metres if x.hypot(y) <= MAX_DISTANCE_M => Ok([x, y]),
+        CoordinateFrame::Metres => {
+            Err(format!("[{x}, {y}] m is more than {} km from the mission's origin", MAX_DISTANCE_M / 1000.0))
+        }
         CoordinateFrame::Wgs84(plane) => {
             let place = LatLon::new(y, x).ok_or(format!(
                 "[{x}, {y}] is not a longitude and latitude; --metres reads metres east and north of the origin"
             ))?;
+            let far_m = plane.distance_m(place);
+            if far_m > MAX_DISTANCE_M {
+                let origin = plane.origin();
+                return Err(format!(
+                    "[{x}, {y}] is {:.0} km from the mission's origin [{}, {}]; expected longitude, latitude at most {} km \
+                     from it, or --metres for metres east and north",
+                    far_m / 1000.0,
+                    origin.lon_deg,
+                    origin.lat_deg,
+                    MAX_DISTANCE_M / 1000.0
+                ));
+            }
             let (x, y) = plane.to_plane(place);
             Ok([x, y])
         }
@@ -171,6 +188,21 @@ mod tests {
         assert!(
             read(SQUARE.replace("60", "600").as_str(), CoordinateFrame::Wgs84(plane)).unwrap_err().contains("--metres")
         );
+    }
+
+    #[test]
+    fn a_fence_far_from_the_origin_is_refused_with_its_distance() {
+        let plane = TangentPlane::new(LatLon::new(29.5, 34.9).unwrap());
+        let refused = |lon: f64, lat: f64| {
+            let json = format!(r#"{{"type": "Point", "coordinates": [{lon}, {lat}]}}"#);
+            read(&json, CoordinateFrame::Wgs84(plane)).unwrap_err()
+        };
+        assert!(refused(34.9, 31.0).contains("166 km from the mission's origin"), "{}", refused(34.9, 31.0));
+        assert!(refused(-145.1, -29.5).contains("127"), "the antipode: {}", refused(-145.1, -29.5));
+        // Latitude and longitude in the wrong order.
+        assert!(refused(29.5, 34.9).contains("expected longitude, latitude"));
+        let metres = read(r#"{"type": "Point", "coordinates": [100001, 0]}"#, CoordinateFrame::Metres);
+        assert!(metres.unwrap_err().contains("more than 100 km"));
     }
 
     #[test]

@@ -13,7 +13,7 @@ mod text;
 mod watch;
 
 pub use constraints::{
-    clear_fence, send_constraints, set_fence, set_limits, set_return_point, show_fence, show_limits,
+    FenceFile, clear_fence, send_constraints, set_fence, set_limits, set_return_point, show_fence, show_limits,
 };
 pub use download::{cancel_exemplar, save_exemplar, save_map};
 pub use http::Client;

@@ -1,9 +1,10 @@
 //! Connections, with bounds on their number, time and memory.
 
 use axum::Router;
-use axum::body::Body;
+use axum::body::{Body, Bytes};
 use axum::http::header::CONTENT_TYPE;
 use http_body_util::BodyExt;
+use hyper::body::{Body as HttpBody, Frame, Incoming, SizeHint};
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::collections::BTreeMap;
@@ -19,8 +20,8 @@ use tokio::task::AbortHandle;
 use tokio::time::Sleep;
 use tower_service::Service;
 
-/// Connections at a time. A further one replaces the oldest idle connection, or else the oldest that is not a stream of events; the
-/// number of streams has a lower bound.
+/// Connections at a time. A further one replaces the oldest connection that waits for its client, or else the oldest
+/// that is not a stream of events; the number of streams has a lower bound.
 const MAX_CONNECTIONS: usize = 256;
 /// For the head of a request, also for the next one on a connection.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(10);
@@ -57,13 +58,14 @@ pub(super) async fn serve(listener: TcpListener, router: Router) {
 
 async fn serve_one(stream: TcpStream, router: Router, activity: Arc<Activity>) -> Result<(), hyper::Error> {
     let _ = stream.set_nodelay(true);
-    let service = hyper::service::service_fn(move |request: hyper::Request<hyper::body::Incoming>| {
-        let active = ActiveRequest::new(&activity);
+    let service = hyper::service::service_fn(move |request: hyper::Request<Incoming>| {
+        let active = Arc::new(ActiveRequest::new(&activity));
+        let request = request.map(|body| Body::new(RequestBody::new(body, active.clone())));
         let mut router = router.clone();
         async move {
-            let response = router.call(request.map(Body::new)).await?;
+            let response = router.call(request).await?;
             if response.headers().get(CONTENT_TYPE).is_some_and(|kind| kind == EVENT_STREAM) {
-                active.0.is_stream.store(true, Ordering::Relaxed);
+                active.activity.is_stream.store(true, Ordering::Relaxed);
             }
             // The request is active until the last byte is sent.
             Ok::<_, Infallible>(response.map(move |body| {
@@ -85,24 +87,71 @@ async fn serve_one(stream: TcpStream, router: Router, activity: Arc<Activity>) -
 /// The use of a connection.
 #[derive(Debug, Default)]
 struct Activity {
-    /// Requests whose response is not complete.
+    /// Requests that were received whole and whose response is not complete.
     requests: AtomicUsize,
     is_stream: AtomicBool,
 }
 
-/// A request whose response is not complete.
-struct ActiveRequest(Arc<Activity>);
+/// A request whose response is not complete. It is active once its body has arrived: until then the connection waits for
+/// its client, and clients that send no body must not displace others.
+struct ActiveRequest {
+    activity: Arc<Activity>,
+    is_whole: AtomicBool,
+}
 
 impl ActiveRequest {
     fn new(activity: &Arc<Activity>) -> Self {
-        activity.requests.fetch_add(1, Ordering::Relaxed);
-        Self(activity.clone())
+        Self { activity: activity.clone(), is_whole: AtomicBool::new(false) }
+    }
+
+    fn handle_whole(&self) {
+        if !self.is_whole.swap(true, Ordering::Relaxed) {
+            self.activity.requests.fetch_add(1, Ordering::Relaxed);
+        }
     }
 }
 
 impl Drop for ActiveRequest {
     fn drop(&mut self) {
-        self.0.requests.fetch_sub(1, Ordering::Relaxed);
+        if *self.is_whole.get_mut() {
+            self.activity.requests.fetch_sub(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The body of a request; its end makes the request active.
+struct RequestBody {
+    body: Incoming,
+    request: Arc<ActiveRequest>,
+}
+
+impl RequestBody {
+    fn new(body: Incoming, request: Arc<ActiveRequest>) -> Self {
+        if body.is_end_stream() {
+            request.handle_whole();
+        }
+        Self { body, request }
+    }
+}
+
+impl HttpBody for RequestBody {
+    type Data = Bytes;
+    type Error = hyper::Error;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Option<hyper::Result<Frame<Bytes>>>> {
+        let frame = ready!(Pin::new(&mut self.body).poll_frame(cx));
+        if frame.is_none() || self.body.is_end_stream() {
+            self.request.handle_whole();
+        }
+        Poll::Ready(frame)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
     }
 }
 
@@ -208,5 +257,31 @@ impl AsyncWrite for TimeoutStream {
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<std::io::Result<()>> {
         Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_new_connection_replaces_the_oldest_that_waits_for_its_client() {
+        let connections = Connections::default();
+        let mut open = |number: u64| {
+            let activity = connections.make_room(number);
+            connections.add(number, tokio::spawn(std::future::pending::<()>()).abort_handle());
+            activity
+        };
+        let activities: Vec<_> = (0..MAX_CONNECTIONS as u64).map(&mut open).collect();
+        let served = ActiveRequest::new(&activities[0]);
+        served.handle_whole();
+        let _without_body = ActiveRequest::new(&activities[1]);
+        open(1000);
+        open(1001);
+        let all: Vec<u64> = connections.lock().keys().copied().collect();
+        assert_eq!((&all[..2], &all[all.len() - 2..]), (&[0, 3][..], &[1000, 1001][..]));
+        drop(served);
+        open(1002);
+        assert!(!connections.lock().contains_key(&0), "its request has ended");
     }
 }

@@ -3,6 +3,7 @@
 use super::access::{Access, HostNames};
 use super::response::error;
 use axum::extract::{Request, State};
+use axum::http::uri::Authority;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
@@ -19,6 +20,7 @@ const RESPONSE_TIMEOUT: Duration = Duration::from_secs(15);
 /// headers that isolate our page.
 pub(super) async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
     let mut response = match check(request.method(), request.uri().path(), request.headers(), &access.names) {
+        _ if !is_known(request.method()) => unknown_method(),
         Err(reason) => error(StatusCode::FORBIDDEN, reason),
         Ok(()) if !access.admits(request.uri().path(), request.headers()) => unauthorized(request.uri().path()),
         Ok(()) => match tokio::time::timeout(RESPONSE_TIMEOUT, next.run(request)).await {
@@ -32,6 +34,17 @@ pub(super) async fn guard(State(access): State<Arc<Access>>, request: Request, n
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("same-origin"));
     headers.insert(HeaderName::from_static("cross-origin-resource-policy"), HeaderValue::from_static("same-origin"));
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    response
+}
+
+/// Whether the interface has operations with this method. TRACE would return the token of a request to its sender.
+fn is_known(method: &Method) -> bool {
+    matches!(*method, Method::GET | Method::HEAD | Method::POST)
+}
+
+fn unknown_method() -> Response {
+    let mut response = error(StatusCode::METHOD_NOT_ALLOWED, "the methods of this interface are GET, HEAD and POST");
+    response.headers_mut().insert(header::ALLOW, HeaderValue::from_static("GET, HEAD, POST"));
     response
 }
 
@@ -69,10 +82,7 @@ fn check(method: &Method, path: &str, headers: &HeaderMap, names: &HostNames) ->
 }
 
 fn is_ours(host: &str, names: &HostNames) -> bool {
-    let name = match host.strip_prefix('[') {
-        Some(rest) => rest.split(']').next().unwrap_or_default(),
-        None => host.rsplit_once(':').map_or(host, |(name, _)| name),
-    };
+    let Some(name) = host_name(host) else { return false };
     let address: Option<IpAddr> = name.parse().ok();
     let is_loopback = name.eq_ignore_ascii_case("localhost") || address.is_some_and(|ip| ip.is_loopback());
     is_loopback
@@ -80,6 +90,17 @@ fn is_ours(host: &str, names: &HostNames) -> bool {
             HostNames::Loopback => false,
             HostNames::Network(own) => address.is_some() || (!own.is_empty() && name.eq_ignore_ascii_case(own)),
         }
+}
+
+/// The name or the address in `HOST[:PORT]` (RFC 9110, section 7.2), without the brackets of IPv6.
+fn host_name(host: &str) -> Option<String> {
+    let authority: Authority = host.parse().ok()?;
+    let name = authority.host();
+    let exact = authority.port_u16().map_or(name.to_owned(), |port| format!("{name}:{port}"));
+    if host != exact {
+        return None;
+    }
+    Some(name.strip_prefix('[').and_then(|name| name.strip_suffix(']')).unwrap_or(name).to_owned())
 }
 
 #[cfg(test)]
@@ -104,11 +125,17 @@ mod tests {
         assert!(checked(Method::GET, &[("host", "127.0.0.1:8460")]).is_ok());
         assert!(checked(Method::GET, &[("host", "[::1]:8460")]).is_ok());
         assert!(checked(Method::GET, &[("host", "evil.example")]).is_err());
+        let wrong =
+            ["127.0.0.1:", "127.0.0.1:99999", "localhost:x", "[::1]evil:1", "[::1", "a@localhost", "localhost/x"];
+        for host in wrong {
+            assert!(checked(Method::GET, &[("host", host)]).is_err(), "{host}");
+        }
         assert!(checked(Method::GET, &[("host", "192.168.1.7:8460")]).is_err());
         assert!(checked(Method::GET, &[("host", "localhost:1"), ("origin", "http://evil.example")]).is_err());
         assert!(checked(Method::POST, &[("host", "localhost:1"), ("x-scenecast", "1"), ("origin", "null")]).is_err());
         assert!(checked(Method::POST, &[("host", "localhost:1")]).is_err());
         assert!(checked(Method::PUT, &[("host", "localhost:1")]).is_err());
+        assert!(!is_known(&Method::TRACE) && !is_known(&Method::CONNECT) && is_known(&Method::HEAD));
         assert!(
             checked(Method::POST, &[("host", "localhost:1"), ("x-scenecast", "1"), ("origin", "http://localhost:1")])
                 .is_ok()

@@ -1,7 +1,7 @@
 //! `scenecast ctl fence`, `return-point`, `limits`, `hold`, `resume`, `abort`
 
 use clap::{Args, Subcommand};
-use scenecast_console::client::{self, Session};
+use scenecast_console::client::{self, FenceFile, Session};
 use scenecast_console::orders::ConstraintsOrder;
 use scenecast_core::UserError;
 use scenecast_surface::LimitsOrder;
@@ -11,8 +11,8 @@ const FILE: &str = "\
 Example: scenecast ctl fence set fence.geojson --wait 120
 
 The property `role` of a feature is one of: fence (a Polygon; the default), keep_out (Polygons), return_point
-(a Point). Coordinates are longitude and latitude, WGS 84, where the mission has an origin, else metres east and north
-of it.";
+(a Point). Coordinates are longitude and latitude, WGS 84, at most 100 km from the mission's origin; a mission without
+an origin needs --metres.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FenceCommand {
@@ -24,6 +24,9 @@ pub(super) enum FenceCommand {
         /// Read the coordinates as metres east and north of the origin
         #[arg(long)]
         metres: bool,
+        /// Accept a file without a fence; it removes the present fence
+        #[arg(long)]
+        without_fence: bool,
     },
     /// Remove fence, keep-outs and return point.
     #[command(after_help = "Example: scenecast ctl fence clear --wait 120")]
@@ -96,7 +99,10 @@ fn band(text: &str) -> Result<[f64; 2], String> {
 pub(super) async fn fence(session: &Session, change: Option<FenceCommand>) -> Result<(), UserError> {
     match change {
         None => client::show_fence(session).await,
-        Some(FenceCommand::Set { file, metres }) => client::set_fence(session, &file, metres).await,
+        Some(FenceCommand::Set { file, metres, without_fence }) => {
+            let file = FenceFile { path: &file, in_metres: metres, without_fence };
+            client::set_fence(session, file).await
+        }
         Some(FenceCommand::Clear) => client::clear_fence(session).await,
     }
 }
