@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The address of `vehicle.address`.
 pub fn vehicle_address(config: &Config) -> Result<Address, UserError> {
     let number = config.vehicle.address;
     Address::vehicle(number)

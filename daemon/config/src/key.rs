@@ -21,7 +21,6 @@ pub enum Role {
 pub struct Key {
     /// Section and name, as in `link.budget_bps`.
     pub name: &'static str,
-    /// Bounds of its value.
     pub rule: Rule,
     /// The processes that read it.
     pub roles: &'static [Role],
@@ -72,7 +71,6 @@ impl Key {
         (self.operations.allowed)(&self.rule)
     }
 
-    /// Its value in `config`.
     pub(crate) fn value(&self, config: &Config) -> Value {
         (self.operations.get)(config)
     }

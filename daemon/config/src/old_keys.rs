@@ -6,7 +6,6 @@ use toml::Value;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct OldKey {
     pub old: &'static str,
-    /// In the same section.
     pub new: &'static str,
 }
 

@@ -19,7 +19,6 @@ pub(crate) const fn range(low: f64, high: f64, unit: &'static str) -> Rule {
     Rule { range: (low, high), unit, ..ANY }
 }
 
-/// Ports of these kinds.
 pub(crate) const fn ports(kinds: &'static [&'static str]) -> Rule {
     Rule { ports: kinds, ..ANY }
 }

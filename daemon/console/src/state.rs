@@ -77,7 +77,7 @@ pub struct SurfacePosition {
     pub usbl_rejected: BTreeMap<String, u64>,
 }
 
-/// Facts of the mission.
+/// Facts of the mission that stay the same while it runs.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct MissionInfo {
     /// The name that people use.
@@ -116,6 +116,6 @@ pub struct AcceptedOrder {
 /// The reason why a request failed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ErrorBody {
-    /// One line for people.
+    /// The reason in one line, for people.
     pub error: String,
 }

@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_elsewhere_and_a_negative_depth_are_refused_with_their_line() {
+    fn a_file_elsewhere_or_a_negative_depth_is_refused() {
         let refused = |name: &str, row: &str| {
             let text = format!("t_s,file,x_m,y_m,depth_m,heading_deg\n0,a.png,1,2,3,4\n{row}\n");
             open(name, "poses.csv", &text).unwrap_err().to_string()

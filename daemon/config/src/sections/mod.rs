@@ -17,7 +17,7 @@ pub use survey::{Autopilot, Navigation, Position, Survey};
 
 use crate::key::Section;
 
-/// Every setting.
+/// The settings of a process, by section; the default is that of the files in `config/`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Config {
     pub mission: Mission,

@@ -7,7 +7,7 @@ use scenecast_protocol::map_codec::Codec;
 use strum::{Display, IntoStaticStr, VariantArray};
 use toml::Value;
 
-/// One of some words.
+/// A setting whose value is one of a few words.
 pub(super) trait Choice: Copy + 'static {
     const CHOICES: &'static [Self];
 

@@ -20,13 +20,11 @@ fn schema<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
 
 /// The content of a successful response.
 pub(super) enum Content {
-    /// JSON with this schema.
     Json(SchemaOf),
     /// A file or a text with this content type.
     File(&'static str),
     /// Server-sent events.
     Events,
-    /// Headers only.
     Headers,
 }
 

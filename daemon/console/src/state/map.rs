@@ -31,7 +31,7 @@ pub struct MapSummary {
 /// The shift from a vehicle's map to the world frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MapPlacement {
-    /// The number of changes.
+    /// Number of changes of the placement so far.
     pub version: u8,
     /// Metres to add to the east.
     pub east_m: f64,
