@@ -3,6 +3,7 @@
 //! Internal to scenecast. No IO: bytes and time come in as arguments.
 
 mod area;
+mod body;
 pub mod drop_counts;
 mod error;
 mod geodesy;
@@ -19,6 +20,7 @@ mod usbl_line;
 mod world_file;
 
 pub use area::Area;
+pub use body::BodyOffset;
 pub use error::UserError;
 pub use geodesy::{LatLon, TangentPlane, wrap_rad};
 pub use lines::Lines;

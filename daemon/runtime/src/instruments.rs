@@ -71,7 +71,7 @@ fn relay_config(config: &Config, language: GpsLanguage) -> RelayConfig {
         origin: config.mission.origin_deg,
         language,
         mounting: Mounting {
-            lever_m: p.usbl_lever_m,
+            lever: p.usbl_lever_m.into(),
             depth_m: p.usbl_depth_m,
             from_bow: p.usbl_from_bow,
             turn_rad: p.usbl_rotation_deg.to_radians(),

@@ -31,9 +31,14 @@ use scenecast_core::UserError;
 #[cfg(feature = "tools")]
 use scenecast_tools::commands as tools;
 
+#[cfg(feature = "rehearsal")]
+const EXAMPLE: &str = "Example: scenecast demo, then open http://127.0.0.1:8460";
+#[cfg(not(feature = "rehearsal"))]
+const EXAMPLE: &str = "Example: scenecast config --role auv > auv.toml";
+
 /// Streams the scene map of an underwater robot over an acoustic link to a scientist at the surface.
 #[derive(Debug, Parser)]
-#[command(name = "scenecast", version, after_help = "Example: scenecast demo, then open http://127.0.0.1:8460")]
+#[command(name = "scenecast", version, after_help = EXAMPLE)]
 pub struct Arguments {
     #[command(subcommand)]
     command: Command,

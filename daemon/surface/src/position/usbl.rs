@@ -1,6 +1,7 @@
 //! The conversion of a USBL measurement into a position of the vehicle.
 
 use super::filter::Estimate;
+use scenecast_core::BodyOffset;
 
 /// A measurement of the vehicle relative to the head.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +21,8 @@ pub struct UsblSighting {
 /// The mounting of the head, and the speed of sound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mounting {
-    /// Offset of the head from the GPS antenna in metres: forward, starboard, down.
-    pub lever_m: [f64; 3],
+    /// Offset of the head from the GPS antenna.
+    pub lever: BodyOffset,
     /// Depth of the head, metres.
     pub depth_m: f64,
     /// Whether bearings are relative to the bow.
@@ -34,7 +35,7 @@ pub struct Mounting {
 
 impl Default for Mounting {
     fn default() -> Self {
-        Self { lever_m: [0.0; 3], depth_m: 1.0, from_bow: false, turn_rad: 0.0, sound_ratio: 1.0 }
+        Self { lever: BodyOffset::default(), depth_m: 1.0, from_bow: false, turn_rad: 0.0, sound_ratio: 1.0 }
     }
 }
 
@@ -102,12 +103,12 @@ pub fn offset(
             if known.1 < sigma { known } else { (by_elevation, sigma) }
         }
     };
-    let needs_heading = mounting.from_bow || mounting.lever_m != [0.0; 3];
+    let needs_heading = mounting.from_bow || mounting.lever != BodyOffset::default();
     let heading = if needs_heading { heading_rad.ok_or(UsblFault::NoHeading)? } else { 0.0 };
     let base = if mounting.from_bow { heading + mounting.turn_rad } else { mounting.turn_rad };
     let (sin, cos) = (base + s.bearing_rad).sin_cos();
     let (bow_sin, bow_cos) = heading.sin_cos();
-    let [forward, starboard, _] = mounting.lever_m;
+    let BodyOffset { forward_m: forward, starboard_m: starboard, .. } = mounting.lever;
     // The error across the line of sight is that of the angle, the one along it that of the range.
     let (along, across) = (flat_sigma.powi(2), sigma.powi(2));
     Ok(Estimate {
@@ -157,7 +158,7 @@ mod tests {
         let plain = Mounting::default();
         let found = offset(&sighting(100.0, 90.0, -30.0), &plain, None, None).unwrap();
         assert!(near(found, 86.6, 0.0), "{found:?}");
-        let mounted = Mounting { from_bow: true, lever_m: [2.0, 1.0, 0.0], ..plain };
+        let mounted = Mounting { from_bow: true, lever: [2.0, 1.0, 0.0].into(), ..plain };
         assert_eq!(offset(&sighting(100.0, 0.0, 0.0), &mounted, None, None), Err(UsblFault::NoHeading));
         // The bow points east: forward is east, starboard is south.
         let heading = Some(90f64.to_radians());

@@ -66,7 +66,7 @@ function gps(p) {
   if (!p) return "none";
   const rejected = total(p.usbl_rejected);
   const state = p.is_valid ? `\u00b1 ${metres(p.sigma_m)}` : "no position";
-  return `${state}, ${count(p.fixes_sent)} fixes${rejected ? `, ${count(rejected)} USBL measurements rejected` : ""}`;
+  return `${state}, ${count(p.fixes_sent)} fixes${rejected ? `, ${count(rejected)} USBL rejected` : ""}`;
 }
 
 const due = (v) => (v.next_contact_s >= store.nowS ? `in ${span(v.next_contact_s - store.nowS)}` : "overdue");
