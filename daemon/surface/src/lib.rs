@@ -12,7 +12,7 @@ mod vehicle_record;
 
 pub use assemble::assemble;
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
-pub use orders::{FenceOrder, LimitsOrder};
+pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
 pub use vehicle_record::VehicleRecord;

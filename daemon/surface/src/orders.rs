@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Maximum distance of a place in an order from the mission's origin, metres; a farther one is a typing error.
-const MAX_DISTANCE_M: f64 = 100_000.0;
+pub const MAX_DISTANCE_M: f64 = 100_000.0;
 
 /// A fence as it is typed: vertices in metres east and north of the origin.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]

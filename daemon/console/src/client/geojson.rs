@@ -2,13 +2,11 @@
 
 use scenecast_core::UserError;
 use scenecast_core::{LatLon, TangentPlane};
-use scenecast_surface::FenceOrder;
+use scenecast_surface::{FenceOrder, MAX_DISTANCE_M};
 use serde_json::Value;
 use std::path::Path;
 
 const MAX_BYTES: u64 = 1 << 20;
-/// Maximum distance of a place from the mission's origin, metres; a farther one is a mistake in the file.
-const MAX_DISTANCE_M: f64 = 100_000.0;
 
 /// The coordinates of a file.
 #[derive(Debug, Clone, Copy)]
