@@ -1,77 +1,91 @@
-//! A track with and without the relay, as a drawing.
+//! A track with and without the relay, as a chart.
 
 use super::Tracks;
-use std::fmt::Write;
+use plotters::coord::Shift;
+use plotters::prelude::*;
 
-const WIDTH: f64 = 900.0;
-const MARGIN: f64 = 30.0;
-const FOOT: f64 = 96.0;
+const WIDTH: u32 = 900;
+/// Space for the title, the labels of the axes and the margins, pixels.
+const FRAME: (u32, u32) = (90, 120);
+/// Height of the key below the tracks, pixels.
+const KEY: f64 = 160.0;
+const FONT: (&str, u32) = ("sans-serif", 18);
 
-/// Draws truth, dead reckoning and relayed estimate as SVG, north up.
-pub fn localisation_plot(tracks: &Tracks, title: &str) -> String {
+const SHIP: RGBColor = RGBColor(183, 163, 217);
+const TRUTH: RGBColor = RGBColor(176, 176, 176);
+const RECKONED: RGBColor = RGBColor(209, 73, 91);
+const RELAYED: RGBColor = RGBColor(0, 121, 140);
+const REFUSED: RGBColor = RGBColor(237, 174, 73);
+
+type SvgError = DrawingAreaErrorKind<std::io::Error>;
+
+/// Draws truth, dead reckoning and relayed estimate as SVG, in metres east and north.
+///
+/// # Errors
+/// The error of `plotters`.
+pub fn localisation_plot(tracks: &Tracks, title: &str) -> Result<String, SvgError> {
     let all = || tracks.truth.iter().chain(&tracks.reckoned).chain(&tracks.relayed).chain(&tracks.ship);
-    let (mut west, mut south, mut east, mut north) = (f64::MAX, f64::MAX, f64::MIN, f64::MIN);
-    for &(x, y) in all() {
-        (west, south, east, north) = (west.min(x), south.min(y), east.max(x), north.max(y));
-    }
-    let scale = (WIDTH - 2.0 * MARGIN) / (east - west).max(1.0);
-    let height = (north - south).max(1.0) * scale + 2.0 * MARGIN;
-    let at = |&(x, y): &(f64, f64)| ((x - west) * scale + MARGIN, (north - y) * scale + MARGIN);
-    let line = |track: &[(f64, f64)], colour: &str, style: &str| {
-        let points = track.iter().step_by(5).map(&at).fold(String::new(), |mut all, (x, y)| {
-            let _ = write!(all, "{x:.1},{y:.1} ");
-            all
-        });
-        format!("<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" {style}/>\n")
+    let ends = |of: fn(&(f64, f64)) -> f64| {
+        let (low, high) = all().map(of).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+        let margin = 0.03 * (high - low).max(1.0);
+        low - margin..high + margin
     };
-    let total = height + FOOT;
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {total:.0}\" font-family=\"sans-serif\" \
-         font-size=\"15\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
-    );
-    svg += &line(&tracks.ship, "#b7a3d9", "stroke-width=\"1.5\"");
-    svg += &line(&tracks.truth, "#b0b0b0", "stroke-width=\"5\"");
-    svg += &line(&tracks.reckoned, "#d1495b", "stroke-width=\"2\" stroke-dasharray=\"7 4\"");
-    svg += &line(&tracks.relayed, "#00798c", "stroke-width=\"2\"");
-    for (place, used) in &tracks.fixes {
-        let (x, y) = at(place);
-        let inside = (0.0..=WIDTH).contains(&x) && (0.0..=height).contains(&y);
-        if inside {
-            let colour = if *used { "#00798c" } else { "#edae49" };
-            let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{colour}\"/>");
-        }
-    }
-    svg += &legend(tracks, title, scale, height);
-    svg + "</svg>\n"
+    let (east, north) = (ends(|p| p.0), ends(|p| p.1));
+    let pixels_per_metre = f64::from(WIDTH - FRAME.0) / (east.end - east.start);
+    let north = north.start - KEY / pixels_per_metre..north.end;
+    let height = ((north.end - north.start) * pixels_per_metre).round() as u32 + FRAME.1;
+    let mut svg = String::new();
+    let area = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
+    draw(&area, tracks, title, east, north)?;
+    drop(area);
+    Ok(svg)
 }
 
-fn legend(tracks: &Tracks, title: &str, scale: f64, top: f64) -> String {
-    let error = |track: &[(f64, f64)]| format!("{:.1} m", tracks.mean_error(track));
-    let bar = 100.0 * scale;
-    let mut text = format!("<text x=\"{MARGIN}\" y=\"{:.0}\" font-weight=\"bold\">{title}</text>\n", top + 8.0);
-    let entries = [
-        ("#b0b0b0", "where it was".to_owned()),
-        ("#d1495b", format!("dead reckoning, mean error {}", error(&tracks.reckoned))),
-        ("#00798c", format!("with the relay and its fixes, mean error {}", error(&tracks.relayed))),
-        ("#b7a3d9", "the surface vehicle".to_owned()),
-        ("#edae49", "fix that the vehicle refused".to_owned()),
-    ];
-    for (i, (colour, name)) in entries.iter().enumerate() {
-        let (x, y) = (MARGIN + (i % 2) as f64 * 400.0, top + 32.0 + (i / 2) as f64 * 22.0);
-        let _ = writeln!(
-            text,
-            "<rect x=\"{x:.0}\" y=\"{:.0}\" width=\"18\" height=\"5\" fill=\"{colour}\"/>\
-             <text x=\"{:.0}\" y=\"{y:.0}\">{name}</text>",
-            y - 8.0,
-            x + 24.0
-        );
+fn draw(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    tracks: &Tracks,
+    title: &str,
+    east: std::ops::Range<f64>,
+    north: std::ops::Range<f64>,
+) -> Result<(), SvgError> {
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(area)
+        .margin(10)
+        .caption(title, FONT)
+        .x_label_area_size(50)
+        .y_label_area_size(70)
+        .build_cartesian_2d(east, north)?;
+    chart
+        .configure_mesh()
+        .x_desc("metres east")
+        .y_desc("metres north")
+        .x_label_formatter(&|x| format!("{x:.0}"))
+        .y_label_formatter(&|y| format!("{y:.0}"))
+        .label_style(FONT)
+        .light_line_style(TRANSPARENT)
+        .draw()?;
+    let with_error = |name: &str, track: &[(f64, f64)]| format!("{name}, mean error {:.1} m", tracks.mean_error(track));
+    for (track, style, name) in [
+        (&tracks.ship, SHIP.stroke_width(2), "surface vehicle".to_owned()),
+        (&tracks.truth, TRUTH.stroke_width(5), "true track".to_owned()),
+        (&tracks.reckoned, RECKONED.stroke_width(2), with_error("dead reckoning", &tracks.reckoned)),
+        (&tracks.relayed, RELAYED.stroke_width(2), with_error("with the fixes of the relay", &tracks.relayed)),
+    ] {
+        let key = move |(x, y)| PathElement::new(vec![(x, y), (x + 20, y)], style);
+        chart.draw_series(LineSeries::new(track.iter().step_by(5).copied(), style))?.label(name).legend(key);
     }
-    let (x, y) = (WIDTH - MARGIN - bar, top + 76.0);
-    let _ = writeln!(
-        text,
-        "<path d=\"M{x:.1} {y:.0}h{bar:.1}\" stroke=\"#222\" stroke-width=\"3\"/>\
-         <text x=\"{x:.1}\" y=\"{:.0}\">100 m, north up</text>",
-        y - 8.0
-    );
-    text
+    for (used, colour, name) in [(true, RELAYED, "fix that was used"), (false, REFUSED, "fix that was refused")] {
+        let fixes = tracks.fixes.iter().filter(|fix| fix.1 == used);
+        chart
+            .draw_series(fixes.map(|fix| Circle::new(fix.0, 3, colour.filled())))?
+            .label(name)
+            .legend(move |(x, y)| Circle::new((x + 10, y), 3, colour.filled()));
+    }
+    chart
+        .configure_series_labels()
+        .position(SeriesLabelPosition::LowerLeft)
+        .background_style(WHITE)
+        .label_font(FONT)
+        .draw()?;
+    area.present()
 }

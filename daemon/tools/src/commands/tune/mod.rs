@@ -143,7 +143,7 @@ impl Tune {
     fn conclude(&self, config: &Config, rows: &[Row], budget_bps: f64) -> Result<(), UserError> {
         let best = most(rows.iter().filter(|row| row.measurement.stream_bps <= budget_bps));
         let plot = plot::Plot::new(rows, best);
-        write_whole(&self.out.join("tuning.svg"), plot.svg().as_bytes())?;
+        write_whole(&self.out.join("tuning.svg"), plot.svg()?.as_bytes())?;
         write_whole(&self.out.join("tuning.png"), &plot.png()?)?;
         let path = self.out.join("best.toml");
         let Some(best) = best else {

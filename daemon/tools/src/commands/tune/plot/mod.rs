@@ -1,72 +1,44 @@
 //! The paper's scatter plot: mutual information of the map, with the mosaic's colours and with
 //! the annotations, against its bytes.
 
-mod axis;
 mod raster;
-mod svg;
 
-use axis::Axis;
+use plotters::prelude::*;
 use raster::Raster;
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::{Measurement, Row};
-use svg::Svg;
+use std::ops::Range;
 
-pub(super) const WIDTH: u32 = 1240;
-pub(super) const HEIGHT: u32 = 620;
-/// Width of a character and height of a line of text, pixels.
-pub(super) const CHARACTER: (f64, f64) = (9.0, 18.0);
+const WIDTH: u32 = 1240;
+const HEIGHT: u32 = 620;
+const LEGEND_WIDTH: u32 = 220;
+/// Height of a line of the legend, pixels.
+const LEGEND_LINE: i32 = 26;
+const FONT: (&str, u32) = ("sans-serif", 20);
 
-const INK: Colour = [40, 48, 56];
-const FAINT: Colour = [222, 227, 231];
-const FRONT: Colour = [120, 128, 136];
-const BEST: Colour = [200, 30, 40];
+const INK: RGBColor = RGBColor(40, 48, 56);
+const FAINT: RGBColor = RGBColor(222, 227, 231);
+const FRONT: RGBColor = RGBColor(120, 128, 136);
+const BEST: RGBColor = RGBColor(200, 30, 40);
 /// Colours of the values of alpha, in order (Okabe and Ito, distinguishable for colour-blind readers).
-const SERIES: [Colour; 7] =
-    [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0], [140, 140, 40]];
+const SERIES: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(213, 94, 0),
+    RGBColor(140, 140, 40),
+];
 
-pub(super) type Colour = [u8; 3];
-
-/// The part of a text that is at its position.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Anchor {
-    Start,
-    Middle,
-    End,
-}
-
-/// A drawing surface; positions are in pixels from the top left corner.
-pub(super) trait Canvas {
-    fn line(&mut self, from: (f64, f64), to: (f64, f64), width: f64, colour: Colour);
-    fn disc(&mut self, centre: (f64, f64), radius: f64, colour: Colour);
-    fn ring(&mut self, centre: (f64, f64), radius: f64, colour: Colour);
-    /// Draws a line of text, vertically centred at the position.
-    fn text(&mut self, at: (f64, f64), anchor: Anchor, colour: Colour, text: &str);
-}
+type Drawn<Db> = Result<(), DrawingAreaErrorKind<<Db as DrawingBackend>::ErrorType>>;
+type Area<Db> = DrawingArea<Db, plotters::coord::Shift>;
 
 pub struct Plot<'a> {
     rows: &'a [Row],
     best: Option<&'a Row>,
     alphas: Vec<f64>,
 }
-
-struct Panel {
-    left: f64,
-    title: &'static str,
-    information: fn(&Measurement) -> f64,
-}
-
-const PANELS: [Panel; 2] = [
-    Panel {
-        left: 80.0,
-        title: "MI with the mosaic's colours, nats",
-        information: |m| m.mosaic_mutual_information_nats,
-    },
-    Panel { left: 590.0, title: "MI with the annotations, nats", information: |m| m.mutual_information_nats },
-];
-const PANEL_WIDTH: f64 = 420.0;
-const TOP: f64 = 60.0;
-const BOTTOM: f64 = 540.0;
-const LEGEND: f64 = 1040.0;
 
 impl<'a> Plot<'a> {
     pub fn new(rows: &'a [Row], best: Option<&'a Row>) -> Self {
@@ -76,84 +48,109 @@ impl<'a> Plot<'a> {
         Self { rows, best, alphas }
     }
 
-    pub fn svg(&self) -> String {
-        let mut svg = Svg::new(WIDTH, HEIGHT);
-        self.draw(&mut svg);
-        svg.finish()
+    pub fn svg(&self) -> Result<String, UserError> {
+        let mut svg = String::new();
+        self.draw(SVGBackend::with_string(&mut svg, (WIDTH, HEIGHT))).map_err(failed)?;
+        Ok(svg)
     }
 
     pub fn png(&self) -> Result<Vec<u8>, UserError> {
         let mut raster = Raster::new(WIDTH, HEIGHT);
-        self.draw(&mut raster);
-        raster.finish().map_err(|e| UserError::Failed(e.to_string()))
+        self.draw(&mut raster).map_err(failed)?;
+        raster.finish().map_err(failed)
     }
 
-    fn draw(&self, canvas: &mut dyn Canvas) {
-        for panel in &PANELS {
-            self.panel(canvas, panel);
-        }
-        self.legend(canvas);
+    fn draw<Db: DrawingBackend>(&self, backend: Db) -> Drawn<Db> {
+        let root = backend.into_drawing_area();
+        root.fill(&WHITE)?;
+        let (panels, legend) = root.split_horizontally(WIDTH - LEGEND_WIDTH);
+        let (mosaic, annotations) = panels.split_horizontally((WIDTH - LEGEND_WIDTH) / 2);
+        self.panel(&mosaic, "MI with the mosaic's colours, nats", |m| m.mosaic_mutual_information_nats)?;
+        self.panel(&annotations, "MI with the annotations, nats", |m| m.mutual_information_nats)?;
+        self.legend(&legend)?;
+        root.present()
     }
 
-    fn panel(&self, canvas: &mut dyn Canvas, panel: &Panel) {
+    fn panel<Db: DrawingBackend>(&self, area: &Area<Db>, title: &str, of: fn(&Measurement) -> f64) -> Drawn<Db> {
         let bytes = |row: &Row| row.measurement.map_bytes as f64;
-        let information = |row: &Row| (panel.information)(&row.measurement);
-        let across = Axis::over(self.rows.iter().map(bytes), panel.left, panel.left + PANEL_WIDTH);
-        let up = Axis::over(self.rows.iter().map(information), BOTTOM, TOP);
-        for (x, tick) in across.ticks() {
-            canvas.line((x, TOP), (x, BOTTOM), 1.0, FAINT);
-            canvas.text((x, BOTTOM + 18.0), Anchor::Middle, INK, &tick);
-        }
-        for (y, tick) in up.ticks() {
-            canvas.line((panel.left, y), (panel.left + PANEL_WIDTH, y), 1.0, FAINT);
-            canvas.text((panel.left - 8.0, y), Anchor::End, INK, &tick);
-        }
-        canvas.line((panel.left, TOP), (panel.left, BOTTOM), 1.5, INK);
-        canvas.line((panel.left, BOTTOM), (panel.left + PANEL_WIDTH, BOTTOM), 1.5, INK);
-        canvas.text((panel.left - 60.0, TOP - 32.0), Anchor::Start, INK, panel.title);
-        canvas.text((panel.left + PANEL_WIDTH / 2.0, BOTTOM + 48.0), Anchor::Middle, INK, "bytes of the map");
-        let place = |row: &Row| (across.place(bytes(row)), up.place(information(row)));
+        let information = |row: &Row| of(&row.measurement);
+        let place = |row: &Row| (bytes(row), information(row));
+        let mut chart = ChartBuilder::on(area)
+            .margin(16)
+            .caption(title, FONT.into_font().color(&INK))
+            .x_label_area_size(56)
+            .y_label_area_size(64)
+            .build_cartesian_2d(axis(self.rows.iter().map(bytes)), axis(self.rows.iter().map(information)))?;
+        chart
+            .configure_mesh()
+            .x_desc("bytes of the map")
+            .x_labels(6)
+            .x_label_formatter(&|bytes| format!("{bytes:.0}"))
+            .y_labels(6)
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(FAINT)
+            .axis_style(INK)
+            .label_style(FONT.into_font().color(&INK))
+            .draw()?;
         let front = front(self.rows, information);
+        let mut stairs: Vec<(f64, f64)> = front.iter().take(1).map(|row| place(row)).collect();
         for step in front.windows(2) {
-            let (from, to) = (place(step[0]), place(step[1]));
-            canvas.line(from, (to.0, from.1), 1.5, FRONT);
-            canvas.line((to.0, from.1), to, 1.5, FRONT);
+            stairs.extend([(bytes(step[1]), information(step[0])), place(step[1])]);
         }
-        for row in self.rows {
-            canvas.disc(place(row), 5.0, self.colour(row));
-        }
-        front.iter().for_each(|row| canvas.ring(place(row), 8.0, FRONT));
-        if let Some(best) = self.best {
-            canvas.ring(place(best), 11.0, BEST);
-        }
+        chart.draw_series(LineSeries::new(stairs, FRONT.stroke_width(2)))?;
+        chart.draw_series(self.rows.iter().map(|row| Circle::new(place(row), 5, self.colour(row).filled())))?;
+        chart.draw_series(front.iter().map(|row| Circle::new(place(row), 8, FRONT.stroke_width(2))))?;
+        chart.draw_series(self.best.iter().map(|row| Circle::new(place(row), 11, BEST.stroke_width(2))))?;
+        Ok(())
     }
 
-    fn legend(&self, canvas: &mut dyn Canvas) {
-        let mut y = TOP + 10.0;
-        let mut entry = |mark: &mut dyn FnMut(&mut dyn Canvas, f64), text: &str| {
-            mark(canvas, y);
-            canvas.text((LEGEND + 18.0, y), Anchor::Start, INK, text);
-            y += 26.0;
-        };
-        for (alpha, colour) in self.alphas.iter().zip(SERIES.iter().cycle()) {
-            entry(&mut |canvas, y| canvas.disc((LEGEND, y), 5.0, *colour), &format!("alpha {alpha}"));
+    fn legend<Db: DrawingBackend>(&self, area: &Area<Db>) -> Drawn<Db> {
+        let mut lines: Vec<(Option<(i32, ShapeStyle)>, String)> = self
+            .alphas
+            .iter()
+            .zip(SERIES.iter().cycle())
+            .map(|(alpha, colour)| (Some((5, colour.filled())), format!("alpha {alpha}")))
+            .collect();
+        lines.push((Some((8, FRONT.stroke_width(2))), "Pareto front".to_owned()));
+        if let Some(Row { setting, measurement, .. }) = self.best {
+            lines.push((Some((11, BEST.stroke_width(2))), "best in the budget:".to_owned()));
+            lines.extend(
+                [
+                    format!("alpha {}", setting.alpha),
+                    format!("beta {}", setting.beta),
+                    format!("gamma {}", setting.gamma),
+                    format!("cells {} m", setting.cell_m),
+                    format!("{:.0} bit/s", measurement.stream_bps),
+                ]
+                .map(|text| (None, text)),
+            );
         }
-        entry(&mut |canvas, y| canvas.ring((LEGEND, y), 8.0, FRONT), "Pareto front");
-        if let Some(best) = self.best {
-            entry(&mut |canvas, y| canvas.ring((LEGEND, y), 11.0, BEST), "best in the budget:");
-            let (setting, measurement) = (best.setting, best.measurement);
-            entry(&mut |_, _| {}, &format!("alpha {}", setting.alpha));
-            entry(&mut |_, _| {}, &format!("beta {}", setting.beta));
-            entry(&mut |_, _| {}, &format!("gamma {}", setting.gamma));
-            entry(&mut |_, _| {}, &format!("cells {} m", setting.cell_m));
-            entry(&mut |_, _| {}, &format!("{:.0} bit/s", measurement.stream_bps));
+        for (y, (mark, text)) in (60..).step_by(LEGEND_LINE as usize).zip(lines) {
+            if let Some((radius, style)) = mark {
+                area.draw(&Circle::new((16, y), radius, style))?;
+            }
+            area.draw(&Text::new(text, (36, y - 8), FONT.into_font().color(&INK)))?;
         }
+        Ok(())
     }
 
-    fn colour(&self, row: &Row) -> Colour {
+    fn colour(&self, row: &Row) -> RGBColor {
         let index = self.alphas.iter().position(|&alpha| alpha == row.setting.alpha).unwrap_or(0);
         SERIES[index % SERIES.len()]
     }
+}
+
+fn failed(error: impl std::fmt::Display) -> UserError {
+    UserError::Failed(error.to_string())
+}
+
+/// The range of an axis over all of the values; it starts at 0 unless they are close to each other.
+fn axis(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
+    let margin = if high - low > 1e-9 { 0.08 * (high - low) } else { high.abs().max(1e-3) };
+    let from = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low - margin };
+    from..high + margin
 }
 
 /// The Pareto front, smallest map first: rows with more information than every row of as few bytes.
@@ -207,7 +204,7 @@ mod tests {
     fn both_plots_show_every_setting_and_have_the_same_size() {
         let rows = rows();
         let plot = Plot::new(&rows, rows.first());
-        let svg = plot.svg();
+        let svg = plot.svg().unwrap();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && svg.contains("bytes of the map"));
         assert_eq!(svg.matches("r=\"5\"").count(), 2 * rows.len() + plot.alphas.len());
         let png = image::load_from_memory(&plot.png().unwrap()).unwrap();
@@ -218,6 +215,6 @@ mod tests {
     fn empty_and_equal_rows_can_be_drawn() {
         Plot::new(&[], None).png().unwrap();
         let rows = [rows()[0]; 3];
-        assert!(!Plot::new(&rows, None).svg().contains("NaN"));
+        assert!(!Plot::new(&rows, None).svg().unwrap().contains("NaN"));
     }
 }

@@ -1,14 +1,20 @@
-//! The plot as a PNG.
+//! A picture that `plotters` draws on, with letters that need no font file.
 
-use super::{Anchor, CHARACTER, Canvas, Colour};
 use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_9X18_BOLD};
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::{DrawTarget, OriginDimensions, Pixel, Point, Size};
 use embedded_graphics::text::Baseline;
 use embedded_graphics::text::renderer::TextRenderer;
 use image::{ImageFormat, Rgb, RgbImage};
+use plotters_backend::text_anchor::{HPos, VPos};
+use plotters_backend::{BackendColor, BackendCoord, BackendTextStyle, DrawingBackend, DrawingErrorKind};
 use std::convert::Infallible;
 use std::io::Cursor;
+
+/// Width of a character and height of a line of text, pixels.
+const CHARACTER: (u32, u32) = (9, 18);
+
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
 #[derive(Debug)]
 pub struct Raster {
@@ -17,65 +23,68 @@ pub struct Raster {
 
 impl Raster {
     pub fn new(width: u32, height: u32) -> Self {
-        Self { image: RgbImage::from_pixel(width, height, Rgb([255; 3])) }
+        Self { image: RgbImage::new(width, height) }
     }
 
+    /// The picture as a PNG file.
     pub fn finish(self) -> image::ImageResult<Vec<u8>> {
         let mut png = Cursor::new(Vec::new());
         self.image.write_to(&mut png, ImageFormat::Png)?;
         Ok(png.into_inner())
     }
-
-    /// Paints the pixels of a box in proportion to their cover by a shape; `depth` is the distance of
-    /// a point inside its edge.
-    fn shape(&mut self, from: (f64, f64), to: (f64, f64), colour: Colour, depth: impl Fn(f64, f64) -> f64) {
-        let pixels = |a: f64, b: f64, length: u32| {
-            let low = (a.min(b) - 2.0).clamp(0.0, f64::from(length));
-            low as u32..(a.max(b) + 2.0).clamp(0.0, f64::from(length)) as u32
-        };
-        for y in pixels(from.1, to.1, self.image.height()) {
-            for x in pixels(from.0, to.0, self.image.width()) {
-                let cover = (depth(f64::from(x) + 0.5, f64::from(y) + 0.5) + 0.5).clamp(0.0, 1.0);
-                let pixel = self.image.get_pixel_mut(x, y);
-                for (value, ink) in pixel.0.iter_mut().zip(colour) {
-                    *value = (f64::from(*value) + (f64::from(ink) - f64::from(*value)) * cover).round() as u8;
-                }
-            }
-        }
-    }
 }
 
-impl Canvas for Raster {
-    fn line(&mut self, from: (f64, f64), to: (f64, f64), width: f64, colour: Colour) {
-        let (along, length) = ((to.0 - from.0, to.1 - from.1), (to.0 - from.0).hypot(to.1 - from.1));
-        let away = |x: f64, y: f64| {
-            let share = ((x - from.0) * along.0 + (y - from.1) * along.1) / (length * length).max(1e-9);
-            let share = share.clamp(0.0, 1.0);
-            (x - from.0 - share * along.0).hypot(y - from.1 - share * along.1)
+impl DrawingBackend for &mut Raster {
+    type ErrorType = Infallible;
+
+    fn get_size(&self) -> (u32, u32) {
+        self.image.dimensions()
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn present(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn draw_pixel(&mut self, (x, y): BackendCoord, colour: BackendColor) -> Drawn {
+        let place = u32::try_from(x).ok().zip(u32::try_from(y).ok());
+        if let Some(pixel) = place.and_then(|(x, y)| self.image.get_pixel_mut_checked(x, y)) {
+            let (r, g, b) = colour.rgb;
+            for (value, ink) in pixel.0.iter_mut().zip([r, g, b]) {
+                *value = (f64::from(*value) + (f64::from(ink) - f64::from(*value)) * colour.alpha).round() as u8;
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, at: BackendCoord) -> Drawn {
+        let (width, height) = self.estimate_text_size(text, style)?;
+        let left = match style.anchor().h_pos {
+            HPos::Left => at.0,
+            HPos::Center => at.0 - width as i32 / 2,
+            HPos::Right => at.0 - width as i32,
         };
-        self.shape(from, to, colour, |x, y| width / 2.0 - away(x, y));
-    }
-
-    fn disc(&mut self, (x, y): (f64, f64), radius: f64, colour: Colour) {
-        let (from, to) = ((x - radius, y - radius), (x + radius, y + radius));
-        self.shape(from, to, colour, |u, v| radius - (u - x).hypot(v - y));
-    }
-
-    fn ring(&mut self, (x, y): (f64, f64), radius: f64, colour: Colour) {
-        let (from, to) = ((x - radius, y - radius), (x + radius, y + radius));
-        self.shape(from, to, colour, |u, v| 1.0 - ((u - x).hypot(v - y) - radius).abs());
-    }
-
-    fn text(&mut self, (x, y): (f64, f64), anchor: Anchor, colour: Colour, text: &str) {
-        let width = text.chars().count() as f64 * CHARACTER.0;
-        let left = match anchor {
-            Anchor::Start => x,
-            Anchor::Middle => x - width / 2.0,
-            Anchor::End => x - width,
+        let top = match style.anchor().v_pos {
+            VPos::Top => at.1,
+            VPos::Center => at.1 - height as i32 / 2,
+            VPos::Bottom => at.1 - height as i32,
         };
-        let mut page = TextPage { image: &mut self.image, ink: Rgb(colour) };
-        let style = MonoTextStyle::new(&FONT_9X18_BOLD, BinaryColor::On);
-        let Ok(_) = style.draw_string(text, Point::new(left as i32, y as i32), Baseline::Middle, &mut page);
+        let (r, g, b) = style.color().rgb;
+        let mut page = TextPage { image: &mut self.image, ink: Rgb([r, g, b]) };
+        let font = MonoTextStyle::new(&FONT_9X18_BOLD, BinaryColor::On);
+        let Ok(_) = font.draw_string(text, Point::new(left, top), Baseline::Top, &mut page);
+        Ok(())
+    }
+
+    fn estimate_text_size<S: BackendTextStyle>(
+        &self,
+        text: &str,
+        _: &S,
+    ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
+        Ok((text.chars().count() as u32 * CHARACTER.0, CHARACTER.1))
     }
 }
 
