@@ -9,7 +9,7 @@ use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::map::{StateReplica, StateSource};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -79,7 +79,9 @@ impl StateReplica for Endless {
         0
     }
 
-    fn clear(&mut self) {}
+    fn take(&mut self) -> Self {
+        Self
+    }
 }
 
 /// Two ends separated only by airtime.
@@ -109,6 +111,7 @@ impl Wire {
         let vehicle = VehicleConfig {
             address,
             mission,
+            cell_edge: CellEdge::default(),
             modem,
             budget_bps,
             budget_window,
@@ -118,6 +121,7 @@ impl Wire {
         };
         let surface = SurfaceConfig {
             mission,
+            cell_edge: CellEdge::default(),
             modem,
             budget_bps,
             budget_window,

@@ -16,7 +16,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -78,6 +78,7 @@ impl Sea {
         let config = VehicleConfig {
             address,
             mission: MissionId(77),
+            cell_edge: CellEdge::default(),
             modem: MODEM,
             budget_bps: 500,
             budget_window: Duration::from_secs(10),
@@ -154,6 +155,7 @@ fn decision(slot: Option<&Slot>) -> SlotState {
 fn surface_config(vehicle: Address, authenticity: Option<Authenticity>) -> SurfaceConfig {
     SurfaceConfig {
         mission: MissionId(77),
+        cell_edge: CellEdge::default(),
         modem: MODEM,
         budget_bps: 500,
         budget_window: Duration::from_secs(10),

@@ -9,7 +9,7 @@ use scenecast_protocol::map::Cell;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId};
+use scenecast_protocol::wire::{Address, CellEdge, MissionId};
 use std::time::Duration;
 
 const LOSS_PERCENT: u64 = 30;
@@ -108,6 +108,7 @@ fn vehicle_config(address: Address) -> VehicleConfig {
     VehicleConfig {
         address,
         mission: MissionId(0x5CE7),
+        cell_edge: CellEdge::default(),
         modem: MODEM,
         budget_bps: 400,
         budget_window: Duration::from_secs(10),
@@ -120,6 +121,7 @@ fn vehicle_config(address: Address) -> VehicleConfig {
 fn surface_config(address: Address) -> SurfaceConfig {
     SurfaceConfig {
         mission: MissionId(0x5CE7),
+        cell_edge: CellEdge::default(),
         modem: MODEM,
         budget_bps: 400,
         budget_window: Duration::from_secs(10),

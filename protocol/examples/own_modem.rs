@@ -12,7 +12,7 @@ use scenecast_protocol::map::Cell;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId};
+use scenecast_protocol::wire::{Address, CellEdge, MissionId};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::Duration;
@@ -80,6 +80,7 @@ fn run_vehicle(address: Address, modem: &QueueModem) -> u64 {
     let config = VehicleConfig {
         address,
         mission: MISSION,
+        cell_edge: CellEdge::default(),
         modem: MODEM,
         budget_bps: BUDGET_BPS,
         budget_window: WINDOW,
@@ -113,6 +114,7 @@ fn run_surface(vehicle: Address, modem: &QueueModem) -> usize {
     let clock = Clock(std::time::Instant::now());
     let config = SurfaceConfig {
         mission: MISSION,
+        cell_edge: CellEdge::default(),
         modem: MODEM,
         budget_bps: BUDGET_BPS,
         budget_window: WINDOW,

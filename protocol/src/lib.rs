@@ -49,7 +49,7 @@
 //! use scenecast_protocol::map::Cell;
 //! use scenecast_protocol::map_codec::Codec;
 //! use scenecast_protocol::schedule::Shares;
-//! use scenecast_protocol::wire::VehicleStatus;
+//! use scenecast_protocol::wire::{CellEdge, VehicleStatus};
 //! use scenecast_protocol::{Address, Instant, MissionId};
 //! use scenecast_protocol::{SurfaceConfig, SurfaceLink, VehicleConfig, VehicleEvent, VehicleLink};
 //! use std::time::Duration;
@@ -65,6 +65,7 @@
 //! let config = VehicleConfig {
 //!     address,
 //!     mission,
+//!     cell_edge: CellEdge::default(),
 //!     modem,
 //!     budget_bps: 400,
 //!     budget_window: window,
@@ -76,6 +77,7 @@
 //! let mut vehicle = VehicleLink::new(config, Codec::Auto, 1, SlotInboxState::default(), now);
 //! let config = SurfaceConfig {
 //!     mission,
+//!     cell_edge: CellEdge::default(),
 //!     modem,
 //!     budget_bps: 400,
 //!     budget_window: window,

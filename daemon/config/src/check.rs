@@ -13,11 +13,11 @@ pub(crate) fn check_together(config: &Config) -> Result<(), UserError> {
     check_shares("link.shares", config.link.shares.0.iter().copied(), config)?;
     check_shares("map.layer_shares", config.map.layer_shares.values().copied(), config)?;
     let link = &config.link;
-    let is_all = link.authenticate == Authenticate::All;
-    if link.key_file.is_none() && (link.encrypt || is_all) {
-        let given = if link.encrypt { "link.encrypt = true" } else { "link.authenticate = \"all\"" };
+    if link.key_file.is_none() && link.encrypt {
         let advice = "it needs a key; set link.key_file to a file that scenecast key new has written";
-        return Err(UserError::Input(format!("{given} is not allowed with an empty link.key_file: {advice}")));
+        return Err(UserError::Input(format!(
+            "link.encrypt = true is not allowed with an empty link.key_file: {advice}"
+        )));
     }
     crate::modem::check(config)?;
     check_ports(config)?;
@@ -61,10 +61,12 @@ fn check_follow(config: &Config) -> Result<(), UserError> {
 /// Under a key a frame ends in a tag, beside which the longest indivisible chunk must fit.
 fn check_frame(config: &Config) -> Result<(), UserError> {
     let link = &config.link;
-    let (least, with, chunk) = match (&link.key_file, link.authenticate) {
+    let (least, with, chunk, or) = match (&link.key_file, link.authenticate) {
         (None, _) => return Ok(()),
-        (Some(_), Authenticate::All) => (48, "link.authenticate = \"all\"", "the vehicle's report"),
-        (Some(_), Authenticate::Down) => (36, "a link.key_file", "a position fix"),
+        (Some(_), Authenticate::All) => {
+            (48, "a link.key_file", "the vehicle's report", ", or link.authenticate = \"down\"")
+        }
+        (Some(_), Authenticate::Down) => (36, "a link.key_file", "a position fix", ""),
     };
     let frame_bytes = crate::full_frame_bytes(config);
     if frame_bytes >= least {
@@ -75,7 +77,9 @@ fn check_frame(config: &Config) -> Result<(), UserError> {
         _ => format!("link.frame_bytes = {frame_bytes}"),
     };
     let why = format!("{chunk} does not fit a smaller frame beside the tag");
-    Err(UserError::Input(format!("{given} is not allowed with {with}; allowed: {least} to 1024 bytes, because {why}")))
+    Err(UserError::Input(format!(
+        "{given} is not allowed with {with}; allowed: {least} to 1024 bytes{or}, because {why}"
+    )))
 }
 
 fn check_airtime(config: &Config) -> Result<(), UserError> {

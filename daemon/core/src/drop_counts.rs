@@ -15,6 +15,7 @@ fn name(reason: DropReason) -> &'static str {
         DropReason::NotForUs => "not_for_us",
         DropReason::Checksum => "checksum",
         DropReason::Malformed => "malformed",
+        DropReason::Undecodable => "undecodable",
         DropReason::OldSession => "old_session",
         DropReason::Duplicate => "duplicate",
         DropReason::Late => "late",

@@ -102,6 +102,7 @@ mod tests {
     use super::*;
     use scenecast_protocol::link::SlotInboxState;
     use scenecast_protocol::schedule::BackgroundOrder;
+    use scenecast_protocol::wire::Series;
 
     fn begin(disk: &Disk) -> Result<(Keeper<Disk>, Durable), UserError> {
         Keeper::begin_run(disk.clone(), 9, None).map(|run| (run.keeper, run.durable))
@@ -140,8 +141,12 @@ mod tests {
     #[test]
     fn the_bytes_of_a_state_are_those_of_this_version_of_the_file() {
         let versions = [None, Some(300), None, None, None, Some(1), None, None];
-        let inbox =
-            SlotInboxState { series: Some(7), retired: [5, 6].into(), versions, decisions: [0, 1, 0, 0, 0, 2, 0, 0] };
+        let inbox = SlotInboxState {
+            series: Some(Series::from_random(7)),
+            retired: [5, 6].map(Series::from_random).into(),
+            versions,
+            decisions: [0, 1, 0, 0, 0, 2, 0, 0],
+        };
         let utility = Some((3, 50, -1, [(2, -3)].into()));
         let durable = Durable {
             inbox,

@@ -193,7 +193,10 @@ impl SurfaceShell {
             SurfaceOutput::ExemplarHere(vehicle, label) => {
                 tracing::info!("an image of label {label} of vehicle {} is here", vehicle.number());
             }
-            SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
+            SurfaceOutput::Mismatch(vehicle, mismatch) => {
+                tracing::warn!("frames of vehicle {} are refused: {mismatch}", vehicle.number());
+            }
+            SurfaceOutput::RunEnded(_) | SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
         Ok(())
     }

@@ -1,13 +1,13 @@
 //! Builds a surface from a configuration.
 
 use crate::Surface;
-use scenecast_config::{Config, vehicle_names};
+use scenecast_config::{Config, cell_m, vehicle_names};
 use scenecast_core::UserError;
 use scenecast_core::tuning_table::TuningTable;
 use scenecast_protocol::link::{Authenticity, SurfaceConfig, SurfaceLink};
 use scenecast_protocol::mac::{MasterConfig, ModemProfile};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::MissionId;
+use scenecast_protocol::wire::{CellEdge, MissionId};
 use std::time::Duration;
 
 /// Builds a surface for the configured vehicles. `seed` is random for each run.
@@ -22,6 +22,7 @@ pub fn assemble(
     let vehicles = vehicle_names(config)?;
     let link = SurfaceConfig {
         mission: MissionId(config.mission.id),
+        cell_edge: CellEdge::from_metres(cell_m(config)),
         modem,
         budget_bps: config.link.budget_bps,
         budget_window: Duration::from_secs_f64(config.link.budget_window_s),

@@ -9,7 +9,7 @@ use scenecast_core::label_picture;
 use scenecast_core::tuning_table::{Fit, NoRow, TuningTable};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
-use scenecast_protocol::link::{Cycle, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
+use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
 use scenecast_protocol::map::{LabelGrid, LayerSet};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
@@ -27,6 +27,10 @@ pub enum SurfaceOutput {
     ExemplarHere(Address, u8),
     /// A slot was applied or refused.
     SlotDecided(Address, SlotId),
+    /// The copy of a vehicle's last run is kept apart ([`PeerView::ended_run`]), because a new run begins.
+    RunEnded(Address),
+    /// Frames of a vehicle are refused because a setting differs.
+    Mismatch(Address, Mismatch),
     /// Any other fact on the operator's page has changed.
     Changed(Address),
 }
@@ -326,6 +330,11 @@ impl Surface {
             SurfaceEvent::VehicleRestarted(vehicle) => {
                 self.request_again(vehicle, now);
                 Some(SurfaceOutput::MapChanged(vehicle))
+            }
+            SurfaceEvent::RunEnded(vehicle) => Some(SurfaceOutput::RunEnded(vehicle)),
+            SurfaceEvent::Mismatch(vehicle, mismatch) => {
+                self.records.get_mut(&vehicle)?.mismatch = Some((mismatch, now));
+                Some(SurfaceOutput::Mismatch(vehicle, mismatch))
             }
             SurfaceEvent::SlotDecided(vehicle, slot) => {
                 let decided = self.link.vehicle(vehicle)?.slots().find(|s| s.id == slot)?;

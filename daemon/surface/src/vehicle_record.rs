@@ -6,6 +6,7 @@ use super::settings::SettingsRecord;
 use scenecast_core::UsblLine;
 use scenecast_protocol::directive::{ExemplarRequests, Fence, Limits, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
+use scenecast_protocol::link::Mismatch;
 use scenecast_protocol::map::LabelGrid;
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::VehicleStatus;
@@ -39,6 +40,8 @@ pub struct VehicleRecord {
     pub pauses: Pauses,
     /// The last measurement of the surface's modem, and its time.
     pub found: Option<(UsblLine, Instant)>,
+    /// The last setting in which the vehicle was found to differ, and when.
+    pub mismatch: Option<(Mismatch, Instant)>,
 }
 
 impl VehicleRecord {
@@ -61,6 +64,7 @@ impl VehicleRecord {
             wholes: 0,
             pauses: Pauses::default(),
             found: None,
+            mismatch: None,
         }
     }
 

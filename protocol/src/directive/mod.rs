@@ -222,25 +222,24 @@ impl Slot {
 ///  0                   1                   2                   3
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
 /// +-----+---------+-------------------------------+---------------
-/// |slot |0 0 0 0 0| series                        | version
+/// |slot |0 0 0 0 0| version                       | payload ...
 /// +-----+---------+-------------------------------+---------------
-///   version       | payload ...
 /// ```
+/// The version counts in the series of the surface ([`crate::wire::Series`]), which its hello names. A slot of which one of
+/// the five bits after its number is 1 belongs to a later version of the wire, and is skipped.
 ///
 /// ```
 /// use scenecast_protocol::directive::{Constraints, Slot, VersionedSlot};
 ///
 /// let hold = Slot::Constraints(Constraints { hold: true, abort: false });
-/// let bytes = VersionedSlot::encode(0xABCD, 1, &hold);
-/// assert_eq!(bytes, [0x20, 0xAB, 0xCD, 0, 1, 0x80]);
+/// let bytes = VersionedSlot::encode(1, &hold);
+/// assert_eq!(bytes, [0x20, 0, 1, 0x80]);
 /// assert_eq!(VersionedSlot::decode(&bytes).unwrap().content, Some(hold));
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct VersionedSlot {
     /// The slot, also where the payload is unreadable.
     pub id: SlotId,
-    /// The random number of the surface's run that counts the versions.
-    pub series: u16,
     /// The version within the series; wraps.
     pub version: u16,
     /// The payload; `None` if it is unreadable.
@@ -248,11 +247,10 @@ pub struct VersionedSlot {
 }
 
 impl VersionedSlot {
-    /// Encodes `slot` at `version` of `series`.
+    /// Encodes `slot` at `version`.
     #[must_use]
-    pub fn encode(series: u16, version: u16, slot: &Slot) -> Vec<u8> {
+    pub fn encode(version: u16, slot: &Slot) -> Vec<u8> {
         let mut out = vec![(slot.id() as u8) << 5];
-        out.extend_from_slice(&series.to_be_bytes());
         out.extend_from_slice(&version.to_be_bytes());
         slot.encode_payload(&mut out);
         out
@@ -262,10 +260,10 @@ impl VersionedSlot {
     pub fn decode(bytes: &[u8]) -> Result<Self, Truncated> {
         let mut r = Reader::new(bytes);
         let head = r.u8()?;
-        let id = SlotId::ALL.get(usize::from(head >> 5)).copied().ok_or(Truncated)?;
-        let (series, version) = (r.u16()?, r.u16()?);
+        let id = SlotId::ALL.get(usize::from(head >> 5)).copied().filter(|_| head & 31 == 0).ok_or(Truncated)?;
+        let version = r.u16()?;
         let content = Slot::decode_payload(id, &mut r).ok().filter(|_| r.rest().is_empty());
-        Ok(Self { id, series, version, content })
+        Ok(Self { id, version, content })
     }
 }
 
@@ -284,11 +282,11 @@ mod tests {
         #[test]
         fn utilities_round_trip(
             weights in proptest::collection::btree_map(1u8..=254, -100i8..=100, 0..60),
-            exploration in -100i8..=100, epoch: u8, series: u16, version: u16,
+            exploration in -100i8..=100, epoch: u8, version: u16,
         ) {
             let slot = Slot::Utility(Utility { epoch, exploration, curiosity: 5, weights });
-            let bytes = VersionedSlot::encode(series, version, &slot);
-            let back = VersionedSlot { id: SlotId::Utility, series, version, content: Some(slot) };
+            let bytes = VersionedSlot::encode(version, &slot);
+            let back = VersionedSlot { id: SlotId::Utility, version, content: Some(slot) };
             prop_assert_eq!(VersionedSlot::decode(&bytes), Ok(back));
         }
     }
@@ -296,7 +294,7 @@ mod tests {
     #[test]
     fn twelve_weights_fit_a_frame_of_64_bytes() {
         let weights = (1..=12).map(|l| (l, 50)).collect();
-        let bytes = VersionedSlot::encode(1, 1, &Slot::Utility(Utility { weights, ..Utility::default() }));
+        let bytes = VersionedSlot::encode(1, &Slot::Utility(Utility { weights, ..Utility::default() }));
         assert!(bytes.len() <= 49, "{} bytes", bytes.len());
     }
 
@@ -313,8 +311,8 @@ mod tests {
             refine_words_per_s: figure,
             frames_per_s: figure,
         };
-        let bytes = VersionedSlot::encode(1, 1, &Slot::Settings(settings));
-        assert_eq!(bytes.len(), 19);
+        let bytes = VersionedSlot::encode(1, &Slot::Settings(settings));
+        assert_eq!(bytes.len(), 17);
         let back = VersionedSlot::decode(&bytes).map(|slot| slot.content);
         assert_eq!(back, Ok(Some(Slot::Settings(settings))));
     }
@@ -323,9 +321,6 @@ mod tests {
     fn golden_bytes_of_a_utility() {
         let weights = [(3, 80), (5, -20)].into_iter().collect();
         let utility = Utility { epoch: 1, exploration: 20, curiosity: 0, weights };
-        assert_eq!(
-            VersionedSlot::encode(0xABCD, 4, &Slot::Utility(utility)),
-            [0x00, 0xAB, 0xCD, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]
-        );
+        assert_eq!(VersionedSlot::encode(4, &Slot::Utility(utility)), [0x00, 0, 4, 1, 20, 0, 3, 80, 5, 0xEC]);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{RefusalReason, SLOTS, Slot, SlotId, SlotReport, SlotState, VersionedSlot};
 use crate::time::Instant;
+use crate::wire::Series;
 
 /// How far an order has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +43,7 @@ pub struct SlotProgress {
 pub struct PendingSlot {
     /// The slot that the chunk belongs to.
     pub id: SlotId,
-    /// The version within the series of this run.
+    /// The version within the series.
     pub version: u16,
     /// The encoded payload of the chunk.
     pub bytes: Vec<u8>,
@@ -51,14 +52,19 @@ pub struct PendingSlot {
 /// The directive of one vehicle at the surface.
 #[derive(Debug)]
 pub struct SlotOutbox {
-    series: u16,
+    series: Series,
     slots: [Option<SlotProgress>; SLOTS],
 }
 
 impl SlotOutbox {
-    /// An empty directive; `series` must be drawn at random at each start of the surface.
-    pub fn new(series: u16) -> Self {
+    /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
+    pub fn new(series: Series) -> Self {
         Self { series, slots: Default::default() }
+    }
+
+    /// The series that the versions belong to.
+    pub fn series(&self) -> Series {
+        self.series
     }
 
     /// Issues a new version of a slot, which supersedes the older one; returns the version.
@@ -97,7 +103,7 @@ impl SlotOutbox {
             .map(|s| PendingSlot {
                 id: s.id,
                 version: s.version,
-                bytes: VersionedSlot::encode(self.series, s.version, &dated(s, now)),
+                bytes: VersionedSlot::encode(s.version, &dated(s, now)),
             })
             .collect()
     }
@@ -105,7 +111,7 @@ impl SlotOutbox {
     /// The chunk of a version as of `now`, unless the version is superseded.
     pub fn encode(&self, id: SlotId, version: u16, now: Instant) -> Option<Vec<u8>> {
         let slot = self.progress().find(|s| s.id == id && s.version == version)?;
-        Some(VersionedSlot::encode(self.series, version, &dated(slot, now)))
+        Some(VersionedSlot::encode(version, &dated(slot, now)))
     }
 
     /// Notes that a frame with this version was written.

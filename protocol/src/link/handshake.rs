@@ -3,7 +3,7 @@
 
 use super::run::{Identity, LinkRun};
 use crate::seal::SessionKey;
-use crate::wire::SessionId;
+use crate::wire::{Introduction, SessionId};
 use std::collections::VecDeque;
 
 /// The result of a hello.
@@ -71,6 +71,7 @@ impl<T> Handshake<T> {
     pub(super) fn handle_call(
         &mut self,
         peer: Identity,
+        introduction: Introduction,
         key: impl Fn(Identity, Identity) -> Option<SessionKey>,
     ) -> HandshakeOutcome {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) && !self.leaving {
@@ -81,7 +82,7 @@ impl<T> Handshake<T> {
         }
         if self.offered.as_ref().is_none_or(|r| r.peer != peer) {
             let own = fresh(&mut self.random);
-            self.offered = Some(LinkRun::new(own, peer, key(own, peer)));
+            self.offered = Some(LinkRun::new(own, peer, introduction, key(own, peer)));
         }
         HandshakeOutcome::New
     }
@@ -99,6 +100,7 @@ impl<T> Handshake<T> {
     pub(super) fn handle_answer(
         &mut self,
         peer: Identity,
+        introduction: Introduction,
         key: impl Fn(Identity, Identity) -> Option<SessionKey>,
     ) -> HandshakeOutcome {
         if self.run.as_ref().is_some_and(|r| r.peer == peer) {
@@ -107,15 +109,15 @@ impl<T> Handshake<T> {
         if self.retired.contains(&peer) {
             return HandshakeOutcome::Retired;
         }
-        self.replace(LinkRun::new(self.own, peer, key(self.own, peer)));
+        self.replace(LinkRun::new(self.own, peer, introduction, key(self.own, peer)));
         HandshakeOutcome::New
     }
 
     /// At the vehicle: begins a new run toward the surface's current one.
     pub(super) fn renew_vehicle(&mut self, key: impl Fn(Identity, Identity) -> Option<SessionKey>) {
-        let Some(peer) = self.run.as_ref().map(|r| r.peer) else { return };
+        let Some((peer, introduction)) = self.run.as_ref().map(|r| (r.peer, r.introduction)) else { return };
         let own = fresh(&mut self.random);
-        self.offered = Some(LinkRun::new(own, peer, key(own, peer)));
+        self.offered = Some(LinkRun::new(own, peer, introduction, key(own, peer)));
         self.leaving = true;
     }
 

@@ -6,6 +6,7 @@
 mod estimate;
 mod flight;
 mod handshake;
+mod mismatch;
 mod pair;
 mod run;
 mod slots;
@@ -16,11 +17,12 @@ mod window;
 
 pub use estimate::{Goodput, Loss};
 pub use flight::Flight;
+pub use mismatch::Mismatch;
 use pair::{Inbound, LinkPair};
 pub use run::{Authenticity, Identity};
 pub use slots::{SlotInbox, SlotInboxState};
 pub use stats::{DropReason, LinkStats};
-pub use surface::{Cycle, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
+pub use surface::{Cycle, EndedRun, IssueError, PeerView, SurfaceConfig, SurfaceEvent, SurfaceLink};
 pub use vehicle::{OversizedChunk, VehicleConfig, VehicleEvent, VehicleLink};
 pub use window::{LinkWindow, WindowRefusal};
 

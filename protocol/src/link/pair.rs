@@ -1,10 +1,14 @@
 //! The state of one end toward one peer.
 
 use super::handshake::{Handshake, HandshakeOutcome};
+use super::mismatch::{Mismatch, MismatchReport};
 use super::run::{Authenticity, Identity};
 use super::{DropReason, FrameNumber, LinkStats, LinkWindow, WindowRefusal};
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
-use crate::wire::{Address, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, MissionId, Seal, Stamp};
+use crate::wire::{
+    Address, ChunkKind, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp,
+    WIRE_VERSION,
+};
 
 /// The content of a verified frame.
 #[derive(Debug)]
@@ -48,7 +52,10 @@ pub struct LinkPair<T> {
     us: Address,
     peer: Address,
     authenticity: Option<Authenticity>,
+    /// The introduction in the hellos of this end.
+    introduction: Introduction,
     handshake: Handshake<T>,
+    mismatch: MismatchReport,
     /// At the vehicle: the surface's last frame with a turn is to be answered with a hello.
     owes_hello: bool,
     /// Consecutive frames that seem to come from another run of the peer.
@@ -62,9 +69,26 @@ impl<T> LinkPair<T> {
     const STRAYS: u32 = 3;
 
     /// A pair without contact; `seed` must be random for each start of the program.
-    pub fn new(mission: MissionId, us: Address, peer: Address, authenticity: Option<Authenticity>, seed: u64) -> Self {
-        let (handshake, stats) = (Handshake::new(seed), LinkStats::default());
-        Self { mission, us, peer, authenticity, handshake, owes_hello: false, strays: 0, stats }
+    pub fn new(
+        mission: MissionId,
+        us: Address,
+        peer: Address,
+        authenticity: Option<Authenticity>,
+        introduction: Introduction,
+        seed: u64,
+    ) -> Self {
+        let (handshake, mismatch, stats) = (Handshake::new(seed), MismatchReport::default(), LinkStats::default());
+        Self { mission, us, peer, authenticity, introduction, handshake, mismatch, owes_hello: false, strays: 0, stats }
+    }
+
+    /// The introduction of the peer's current run.
+    pub fn peer_introduction(&self) -> Option<&Introduction> {
+        self.handshake.run().map(|r| &r.introduction)
+    }
+
+    /// A setting in which the peer differs, once after it was found.
+    pub fn poll_mismatch(&mut self) -> Option<Mismatch> {
+        self.mismatch.poll()
     }
 
     /// The address of the other end.
@@ -136,6 +160,14 @@ impl<T> LinkPair<T> {
         }
     }
 
+    /// The most bytes of a hello of ours.
+    pub fn hello_bytes(&self) -> usize {
+        const HEADER_AND_TURN: usize = 9;
+        const CHUNK_HEAD: usize = 2;
+        let seal = if self.authenticity.is_some() { 8 + TAG_BYTES } else { Seal::bytes(false, 0) };
+        HEADER_AND_TURN + CHUNK_HEAD + self.introduction.encode().len() + seal
+    }
+
     /// Bytes of the seal of a full frame of ours.
     pub fn full_seal_bytes(&self, frame_bytes: usize) -> usize {
         Seal::bytes(self.is_keyed(self.direction_out()), frame_bytes)
@@ -153,11 +185,16 @@ impl<T> LinkPair<T> {
         self.authenticity.as_ref().is_some_and(|a| a.all || matches!(direction, Direction::Down))
     }
 
-    /// Opens a frame of this peer. The error is the reason for which it was dropped and counted.
-    pub fn handle_frame<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
+    /// Opens a frame of this peer. `decodes` tells whether the chunks of a frame with this base decode; a frame of which
+    /// one does not changes nothing. The error is the reason for which the frame was dropped and counted.
+    pub fn handle_frame<'a>(
+        &mut self,
+        envelope: &Envelope<'a>,
+        decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool,
+    ) -> Result<Inbound<'a, T>, DropReason> {
         let result = match envelope.header.kind {
             FrameKind::Hello => self.read_hello(envelope),
-            FrameKind::Numbered => self.read_numbered(envelope),
+            FrameKind::Numbered => self.read_numbered(envelope, decodes),
         };
         if let Err(reason) = &result {
             self.stats.drop(*reason);
@@ -174,11 +211,25 @@ impl<T> LinkPair<T> {
             None => envelope.open(&Seal::Crc(self.mission, session)),
         };
         let Some(frame) = frame else { return Err(self.refuse(envelope, session)) };
+        let is_other = envelope.version != WIRE_VERSION;
+        let introduction = introduction_of(&frame).filter(|i| own.is_some() || i.series.is_some());
+        let introduction = match (is_other, introduction) {
+            (false, Some(introduction)) => introduction,
+            (false, None) => return Err(DropReason::Malformed),
+            // The answer to it names our version. No numbered frame of such a run is ever read.
+            (true, _) => Introduction::default(),
+        };
+        if is_other {
+            self.mismatch.note(Mismatch::Version(envelope.version));
+            if own.is_some() {
+                return Err(DropReason::Version);
+            }
+        }
         let peer = Identity { session: header.session, nonce: header.nonce.unwrap_or_default() };
         let key = session_key(self.authenticity.clone(), self.mission, self.us, self.peer);
         let outcome = match own {
-            Some(_) => self.handshake.handle_answer(peer, key),
-            None => self.handshake.handle_call(peer, key),
+            Some(_) => self.handshake.handle_answer(peer, introduction, key),
+            None => self.handshake.handle_call(peer, introduction, key),
         };
         if outcome == HandshakeOutcome::Retired {
             // A late hello can make the current run look ended; the vehicle's next frames decide.
@@ -193,7 +244,11 @@ impl<T> LinkPair<T> {
         Ok(Inbound::empty(restarted, frame))
     }
 
-    fn read_numbered<'a>(&mut self, envelope: &Envelope<'a>) -> Result<Inbound<'a, T>, DropReason> {
+    fn read_numbered<'a>(
+        &mut self,
+        envelope: &Envelope<'a>,
+        decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool,
+    ) -> Result<Inbound<'a, T>, DropReason> {
         let (mission, direction) = (self.mission, self.direction_in());
         let keyed = self.is_keyed(direction);
         let offered = self.handshake.offered().and_then(|r| r.open(envelope, mission, direction, keyed));
@@ -201,14 +256,19 @@ impl<T> LinkPair<T> {
         let known = || self.handshake.run().and_then(|r| r.open(envelope, mission, direction, keyed));
         let Some(frame) = offered.or_else(known) else {
             let reason = self.refuse(envelope, self.handshake.own().session.get());
-            let stray = self.handshake.run().is_some_and(|r| r.peer.session != envelope.header.session);
-            self.strays += u32::from(stray && (reason == DropReason::OldSession || keyed));
+            let stray = self.handshake.run().is_none_or(|r| r.peer.session != envelope.header.session);
+            // Without a valid CRC the session may be noise; without a valid tag it may be a forgery.
+            self.strays += u32::from(stray && reason == DropReason::OldSession);
             return Err(reason);
         };
         if !frame.chunks().are_sound() {
             return Err(DropReason::Malformed);
         }
+        if !restarted && !self.decodes(&frame, decodes) {
+            return Err(DropReason::Undecodable);
+        }
         self.strays = 0;
+        self.mismatch.clear();
         if restarted {
             self.handshake.accept_offered();
             self.stats.peer_restarts += 1;
@@ -218,6 +278,15 @@ impl<T> LinkPair<T> {
             return Ok(Inbound::empty(restarted, frame));
         }
         self.take(frame, restarted)
+    }
+
+    /// Whether the chunks of a frame decode, if the window would accept it.
+    fn decodes(&self, frame: &Frame<'_>, decodes: impl Fn(FrameNumber, Chunks<'_>) -> bool) -> bool {
+        let Some(run) = self.handshake.run() else { return true };
+        match run.window.preview(frame.header.number, frame.header.base) {
+            Ok((_, base)) => decodes(base, frame.chunks()),
+            Err(_) => true,
+        }
     }
 
     fn take<'a>(&mut self, frame: Frame<'a>, restarted: bool) -> Result<Inbound<'a, T>, DropReason> {
@@ -252,8 +321,14 @@ impl<T> LinkPair<T> {
         let expected = if kind.is_hello() { self.authenticity.is_some() } else { self.is_keyed(self.direction_in()) };
         let plain = || envelope.open(&Seal::Crc(self.mission, session)).is_some();
         match (expected, envelope.header.keyed) {
-            (false, true) => DropReason::Keyed,
-            (true, false) if plain() => DropReason::Unauthenticated,
+            (false, true) => {
+                self.mismatch.note(Mismatch::Tag);
+                DropReason::Keyed
+            }
+            (true, false) if plain() => {
+                self.mismatch.note(Mismatch::NoTag);
+                DropReason::Unauthenticated
+            }
             (false, false) if !kind.is_hello() && plain() => DropReason::OldSession,
             _ => DropReason::Checksum,
         }
@@ -295,7 +370,11 @@ impl<T> LinkPair<T> {
             kind,
             keyed,
         };
-        FrameBuilder::new(&header, size)
+        let mut builder = FrameBuilder::new(&header, size);
+        if hello {
+            builder.push(ChunkKind::Introduction, &self.introduction.encode());
+        }
+        builder
     }
 
     /// Closes a frame and keeps its content until its fate is known.
@@ -334,6 +413,12 @@ impl<T> LinkPair<T> {
     }
 }
 
+/// The introduction in a hello.
+fn introduction_of(frame: &Frame<'_>) -> Option<Introduction> {
+    let chunk = frame.chunks().find(|chunk| chunk.kind == ChunkKind::Introduction)?;
+    Introduction::decode(chunk.payload).ok()
+}
+
 /// Derives the key of a run of ours with a run of the peer.
 fn session_key(
     authenticity: Option<Authenticity>,
@@ -370,7 +455,7 @@ mod tests {
         let bytes = from.finish_frame(builder, content, kind, true);
         let us = to.us;
         let envelope = Envelope::decode(&bytes, |a| a == us).unwrap();
-        let inbound = to.handle_frame(&envelope).unwrap();
+        let inbound = to.handle_frame(&envelope, |_, _| true).unwrap();
         inbound.fates
     }
 
@@ -379,8 +464,10 @@ mod tests {
         let key = Arc::new(MissionKey::from_bytes([9; 16]));
         let authenticity = Some(Authenticity { key, all: true, encrypt: true });
         let auv = Address::vehicle(3).unwrap();
-        let mut surface = LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), 1);
-        let mut vehicle = LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, 2);
+        let introduction =
+            Introduction { series: Some(crate::wire::Series::from_random(1)), ..Introduction::default() };
+        let mut surface = LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), introduction, 1);
+        let mut vehicle = LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, introduction, 2);
         carry(&mut surface, &mut vehicle, 0, FrameKind::Hello);
         carry(&mut vehicle, &mut surface, 0, FrameKind::Hello);
         carry(&mut surface, &mut vehicle, 0, FrameKind::Numbered);

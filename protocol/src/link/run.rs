@@ -2,7 +2,7 @@
 
 use super::{Flight, LinkWindow};
 use crate::seal::{Direction, MissionKey, SessionKey};
-use crate::wire::{Envelope, Frame, MissionId, Seal, SessionId, unwrap_number};
+use crate::wire::{Envelope, Frame, Introduction, MissionId, Seal, SessionId, unwrap_number};
 use std::sync::Arc;
 
 /// The key and the scope of authentication.
@@ -30,14 +30,16 @@ pub struct Identity {
 pub(super) struct LinkRun<T> {
     pub(super) own: Identity,
     pub(super) peer: Identity,
+    /// The introduction in the peer's hello.
+    pub(super) introduction: Introduction,
     pub(super) key: Option<SessionKey>,
     pub(super) flight: Flight<T>,
     pub(super) window: LinkWindow,
 }
 
 impl<T> LinkRun<T> {
-    pub(super) fn new(own: Identity, peer: Identity, key: Option<SessionKey>) -> Self {
-        Self { own, peer, key, flight: Flight::default(), window: LinkWindow::default() }
+    pub(super) fn new(own: Identity, peer: Identity, introduction: Introduction, key: Option<SessionKey>) -> Self {
+        Self { own, peer, introduction, key, flight: Flight::default(), window: LinkWindow::default() }
     }
 
     /// The frame, if the peer's run sealed it to ours. If `keyed`, it must have a tag.

@@ -1,16 +1,17 @@
 //! The vehicle's side of the directive: it decides about each version of each slot once.
 
 use crate::directive::{SLOTS, SlotId, SlotReport, SlotState, VersionedSlot};
+use crate::wire::Series;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// The state that must survive a restart of the vehicle, so that no order is applied twice.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct SlotInboxState {
-    /// The series of the surface's current run.
-    pub series: Option<u16>,
-    /// Series of ended runs, oldest first.
-    pub retired: VecDeque<u16>,
+    /// The series of the surface's orders.
+    pub series: Option<Series>,
+    /// Ended series, oldest first.
+    pub retired: VecDeque<Series>,
     /// The latest version received, by slot.
     pub versions: [Option<u16>; SLOTS],
     /// The decision about that version in the code of the report, by slot.
@@ -49,13 +50,13 @@ impl SlotInbox {
         self.reports
     }
 
-    /// Whether a version is new; if so, it counts as received from now on.
-    pub fn admit(&mut self, slot: &VersionedSlot) -> bool {
-        if self.state.retired.contains(&slot.series) {
+    /// Whether a version of a series is new; if so, it counts as received from now on.
+    pub fn admit(&mut self, series: Series, slot: &VersionedSlot) -> bool {
+        if self.state.retired.contains(&series) {
             return false;
         }
-        if self.state.series != Some(slot.series) {
-            self.begin_series(slot.series);
+        if self.state.series != Some(series) {
+            self.begin_series(series);
         }
         let Some(seen) = self.state.versions.get_mut(slot.id.index()) else { return false };
         let newer = seen.is_none_or(|v| (slot.version.wrapping_sub(v) as i16) > 0);
@@ -76,7 +77,7 @@ impl SlotInbox {
         }
     }
 
-    fn begin_series(&mut self, series: u16) {
+    fn begin_series(&mut self, series: Series) {
         if let Some(old) = self.state.series.replace(series) {
             self.state.retired.push_back(old);
             if self.state.retired.len() > Self::MEMORY {
@@ -95,19 +96,19 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::BTreeSet;
 
-    fn slot(series: u16, version: u16) -> VersionedSlot {
-        VersionedSlot { id: SlotId::Utility, series, version, content: None }
+    fn slot(version: u16) -> VersionedSlot {
+        VersionedSlot { id: SlotId::Utility, version, content: None }
     }
 
     proptest! {
         #[test]
         fn no_version_is_admitted_twice_even_across_restarts(
-            arrivals in proptest::collection::vec((0u16..4, 1u16..30, any::<bool>()), 1..200),
+            arrivals in proptest::collection::vec((0u64..4, 1u16..30, any::<bool>()), 1..200),
         ) {
             let mut inbox = SlotInbox::default();
             let mut admitted = BTreeSet::new();
             for (series, version, restart) in arrivals {
-                if inbox.admit(&slot(series, version)) {
+                if inbox.admit(Series::from_random(series), &slot(version)) {
                     prop_assert!(admitted.insert((series, version)));
                 }
                 if restart {
@@ -119,9 +120,9 @@ mod tests {
 
     #[test]
     fn versions_wrap_without_going_back() {
-        let mut inbox = SlotInbox::default();
-        assert!(inbox.admit(&slot(1, 65_535)));
-        assert!(inbox.admit(&slot(1, 0)));
-        assert!(!inbox.admit(&slot(1, 65_535)));
+        let (mut inbox, series) = (SlotInbox::default(), Series::from_random(1));
+        assert!(inbox.admit(series, &slot(65_535)));
+        assert!(inbox.admit(series, &slot(0)));
+        assert!(!inbox.admit(series, &slot(65_535)));
     }
 }

@@ -19,6 +19,8 @@ pub enum DropReason {
     Checksum,
     /// A field or a chunk makes no sense.
     Malformed,
+    /// A chunk does not decode with the state of this end.
+    Undecodable,
     /// From a run of the peer that has ended.
     OldSession,
     /// The frame was accepted before.

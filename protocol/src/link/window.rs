@@ -43,8 +43,8 @@ impl LinkWindow {
         self.highest - self.closed
     }
 
-    /// Accepts a frame and returns its number, or the reason for which it is rejected.
-    pub fn accept(&mut self, number_low: u16, base_distance: u16) -> Result<FrameNumber, WindowRefusal> {
+    /// Number and base of a frame that [`Self::accept`] would accept, or the reason for which it would reject it.
+    pub fn preview(&self, number_low: u16, base_distance: u16) -> Result<(FrameNumber, FrameNumber), WindowRefusal> {
         let number = unwrap_number(number_low, self.highest);
         let base = number.checked_sub(u64::from(base_distance)).ok_or(WindowRefusal::Late)?;
         if self.held.contains(&number) {
@@ -56,6 +56,12 @@ impl LinkWindow {
         if base > self.closed || number - self.base > 2 * MAX_WINDOW {
             return Err(WindowRefusal::NoBase);
         }
+        Ok((number, base))
+    }
+
+    /// Accepts a frame and returns its number, or the reason for which it is rejected.
+    pub fn accept(&mut self, number_low: u16, base_distance: u16) -> Result<FrameNumber, WindowRefusal> {
+        let (number, base) = self.preview(number_low, base_distance)?;
         self.base = base;
         self.held = self.held.split_off(&(base + 1));
         self.held.insert(number);

@@ -64,6 +64,25 @@ impl Replica {
 }
 
 impl Replica {
+    /// Whether a chunk with labels up to `max_label` decodes with the base that `horizon` gives.
+    pub(super) fn decodes_up_to(&self, max_label: u8, horizon: u64, chunk: &[u8]) -> bool {
+        let mut later = self.log.range(..=horizon).flat_map(|(_, changes)| changes).peekable();
+        let decoded = match later.peek() {
+            None => map_codec::decode(&self.base, chunk),
+            Some(_) => {
+                let mut base = self.base.clone();
+                for &(cell, label) in later {
+                    base.set(cell, label);
+                }
+                map_codec::decode(&base, chunk)
+            }
+        };
+        decoded.is_ok_and(|changes| {
+            let is_large = self.received.len() + changes.len() > MAX_CELLS;
+            !is_large && changes.iter().all(|&(_, label)| label <= max_label)
+        })
+    }
+
     /// Applies a chunk of frame `number`, unless it does not decode here or has a label above `max_label`.
     pub(super) fn apply_up_to(&mut self, max_label: u8, number: u64, chunk: &[u8], now: Instant) -> bool {
         let Ok(changes) = map_codec::decode(&self.base, chunk) else { return false };
@@ -87,6 +106,10 @@ impl Replica {
 }
 
 impl StateReplica for Replica {
+    fn decodes(&self, horizon: u64, chunk: &[u8]) -> bool {
+        self.decodes_up_to(MAX_LABEL, horizon, chunk)
+    }
+
     fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
         self.apply_up_to(MAX_LABEL, number, chunk, now)
     }
@@ -108,8 +131,13 @@ impl StateReplica for Replica {
         self.version
     }
 
-    fn clear(&mut self) {
-        *self = Self { version: self.version + 1, ..Self::default() };
+    fn size(&self) -> usize {
+        self.received.len()
+    }
+
+    fn take(&mut self) -> Self {
+        let empty = Self { version: self.version + 1, ..Self::default() };
+        std::mem::replace(self, empty)
     }
 }
 

@@ -54,7 +54,14 @@ pub trait StateSource: Debug {
 }
 
 /// The receiving side of a replicated state.
-pub trait StateReplica: Debug + Default {
+pub trait StateReplica: Debug + Default + Sized {
+    /// Whether a chunk that is based on every frame up to `horizon` would decode here. A frame with a chunk that does not is
+    /// refused as a whole.
+    fn decodes(&self, horizon: u64, chunk: &[u8]) -> bool {
+        let _ = (horizon, chunk);
+        true
+    }
+
     /// Applies a chunk of frame `number`; frames may come in any order. Returns `false` if it makes no sense here.
     fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool;
 
@@ -67,6 +74,12 @@ pub trait StateReplica: Debug + Default {
     /// Counts changes of the visible state.
     fn version(&self) -> u64;
 
-    /// Empties the state, because the sender has begun a new run.
-    fn clear(&mut self);
+    /// The size of the state, for example in cells. The surface keeps the copy of a run that has ended until the copy of
+    /// the next run is as large; a state of size 0 is not kept.
+    fn size(&self) -> usize {
+        0
+    }
+
+    /// Takes the state and leaves an empty one with a higher version, because the sender has begun a new run.
+    fn take(&mut self) -> Self;
 }

@@ -15,23 +15,28 @@ pub enum ChunkKind {
     Report,
     /// A patch of a layer of the map, or a digest of the surface's copy of one.
     Layer,
+    /// The introduction of a hello's sender.
+    Introduction,
 }
 
-impl ChunkKind {
-    fn code(self) -> u8 {
-        match self {
-            Self::Map => 1,
-            Self::Pose => 2,
-            Self::Slot => 3,
-            Self::Object => 4,
-            Self::Report => 5,
-            Self::Layer => 6,
-        }
-    }
+/// The code after which the first byte of the payload names the kind.
+const EXTENDED: u8 = 7;
 
-    fn from_code(code: u8) -> Option<Self> {
-        let all = [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report, Self::Layer];
-        all.into_iter().find(|k| k.code() == code)
+impl ChunkKind {
+    const ALL: [Self; 7] =
+        [Self::Map, Self::Pose, Self::Slot, Self::Object, Self::Report, Self::Layer, Self::Introduction];
+
+    /// The code in the header of the chunk, and the byte that begins the payload of an extended kind.
+    fn code(self) -> (u8, Option<u8>) {
+        match self {
+            Self::Map => (1, None),
+            Self::Pose => (2, None),
+            Self::Slot => (3, None),
+            Self::Object => (4, None),
+            Self::Report => (5, None),
+            Self::Layer => (6, None),
+            Self::Introduction => (EXTENDED, Some(0)),
+        }
     }
 }
 
@@ -42,14 +47,15 @@ impl ChunkKind {
 /// +-----+---------+----------------+-----------+
 /// |kind | length  | [more length]  | payload   |
 /// +-----+---------+----------------+-----------+
-/// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer; 7 reserved: the frame is refused
+/// kind     0 end of the frame's content, 1 map, 2 pose, 3 slot, 4 object, 5 report, 6 layer;
+///          7 extended: the first byte of the payload is 0 introduction; any other value, or no payload: skipped
 /// length   0..26 bytes of payload; 27..30: 27 + 256 x (length - 27) + next byte; 31: to the end of the frame
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Chunk<'a> {
     /// The kind, which names the format of the payload.
     pub kind: ChunkKind,
-    /// The payload, without the header.
+    /// The payload, without the header and without the byte of an extended kind.
     pub payload: &'a [u8],
 }
 
@@ -72,21 +78,23 @@ pub fn room_for_payload(room: usize) -> usize {
 
 /// Appends a chunk to a frame body that can still take `room` bytes; returns whether it fitted.
 pub(super) fn push_chunk(kind: ChunkKind, payload: &[u8], room: usize, out: &mut Vec<u8>) -> bool {
-    let n = payload.len();
+    let (code, extended) = kind.code();
+    let n = payload.len() + usize::from(extended.is_some());
     if n + chunk_header_len(n, room) > room || n > MAX_PAYLOAD {
         return false;
     }
-    let head = kind.code() << 5;
+    let head = code << 5;
     match n {
         0..=26 => out.push(head | n as u8),
         n if n + 1 == room => out.push(head | 31),
         _ => out.extend_from_slice(&[head | (27 + ((n - 27) >> 8)) as u8, (n - 27) as u8]),
     }
+    out.extend(extended);
     out.extend_from_slice(payload);
     true
 }
 
-/// The chunks of a received frame, in order; ends at the first malformed one.
+/// The chunks of a received frame, in order; ends at the first malformed one. Chunks of unknown kinds are skipped.
 #[derive(Debug, Clone, Default)]
 pub struct Chunks<'a> {
     body: &'a [u8],
@@ -104,12 +112,12 @@ impl<'a> Chunks<'a> {
         all.body.is_empty()
     }
 
-    fn split(&self) -> Option<(Option<Chunk<'a>>, &'a [u8])> {
+    /// The code and the payload of the next chunk, and the bytes after it.
+    fn split(&self) -> Option<(u8, &'a [u8], &'a [u8])> {
         let (&head, rest) = self.body.split_first()?;
         if head >> 5 == 0 {
-            return Some((None, &[]));
+            return Some((0, &[], &[]));
         }
-        let kind = ChunkKind::from_code(head >> 5)?;
         let (len, rest) = match head & 31 {
             31 => (rest.len(), rest),
             n @ 27..=30 => {
@@ -119,17 +127,34 @@ impl<'a> Chunks<'a> {
             n => (usize::from(n), rest),
         };
         let (payload, rest) = rest.split_at_checked(len)?;
-        Some((Some(Chunk { kind, payload }), rest))
+        Some((head >> 5, payload, rest))
     }
+}
+
+/// The chunk with this code and payload; `None` if its kind is unknown.
+fn known(code: u8, payload: &[u8]) -> Option<Chunk<'_>> {
+    let (extended, payload) = match code {
+        EXTENDED => payload.split_first().map(|(&kind, payload)| (Some(kind), payload))?,
+        _ => (None, payload),
+    };
+    let kind = ChunkKind::ALL.into_iter().find(|kind| kind.code() == (code, extended))?;
+    Some(Chunk { kind, payload })
 }
 
 impl<'a> Iterator for Chunks<'a> {
     type Item = Chunk<'a>;
 
     fn next(&mut self) -> Option<Chunk<'a>> {
-        let (chunk, rest) = self.split()?;
-        self.body = rest;
-        chunk
+        loop {
+            let (code, payload, rest) = self.split()?;
+            self.body = rest;
+            if code == 0 {
+                return None;
+            }
+            if let Some(chunk) = known(code, payload) {
+                return Some(chunk);
+            }
+        }
     }
 }
 
@@ -155,6 +180,19 @@ mod tests {
                 assert_eq!(Chunks::new(&out).next().map(|c| c.payload.len()), Some(n));
             }
         }
+    }
+
+    #[test]
+    fn unknown_kinds_are_skipped_by_their_length() {
+        let mut body = Vec::new();
+        assert!(push_chunk(ChunkKind::Introduction, &[1, 2, 3], 40, &mut body));
+        assert_eq!(body, [0b111_00100, 0, 1, 2, 3]);
+        body.extend([0b111_00011, 200, 9, 9, 0b111_00000]);
+        assert!(push_chunk(ChunkKind::Pose, &[4], 20, &mut body));
+        let chunks = Chunks::new(&body);
+        assert!(chunks.are_sound());
+        let kinds: Vec<_> = chunks.map(|chunk| (chunk.kind, chunk.payload)).collect();
+        assert_eq!(kinds, [(ChunkKind::Introduction, &[1, 2, 3][..]), (ChunkKind::Pose, &[4][..])]);
     }
 
     proptest! {

@@ -107,6 +107,8 @@ fn checksum(parts: &[&[u8]], len: usize, mission: MissionId, to_session: u16) ->
 pub struct Envelope<'a> {
     /// The header, which may be forged.
     pub header: Header,
+    /// The wire version of the sender; only a hello can have another one than [`WIRE_VERSION`].
+    pub version: u8,
     head: &'a [u8],
     body: &'a [u8],
     end: &'a [u8],
@@ -130,7 +132,8 @@ impl<'a> Envelope<'a> {
         let header = Header::decode(&mut reader, to_us)?;
         let body = reader.rest();
         let head = covered.get(..covered.len() - body.len()).ok_or(FrameError::Truncated)?;
-        Ok(Self { header, head, body, end })
+        let version = head.first().map_or(0, |flags| flags >> 5);
+        Ok(Self { header, version, head, body, end })
     }
 
     /// The frame, if this seal verifies it.
@@ -302,10 +305,20 @@ mod tests {
         let mut b = FrameBuilder::new(&header(), 64);
         assert!(b.push(ChunkKind::Map, &[0xAA, 0xBB]));
         let bytes = b.finish(&Seal::Crc(MISSION, 0x4321), true);
-        assert_eq!(bytes[..13], [0x50, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
-        assert_eq!(bytes[13..], [0x00, 0xF6, 0x3D]);
+        assert_eq!(bytes[..13], [0x70, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB]);
+        assert_eq!(bytes[13..], [0xAE, 0x0B, 0x05]);
         let frame = envelope(&bytes).unwrap().open(&Seal::Crc(MISSION, 0x4321)).unwrap();
         assert_eq!(frame.header, header());
+    }
+
+    #[test]
+    fn of_version_2_only_hellos_are_read() {
+        let map = [0x50, 0x10, 0x12, 0x34, 0x00, 0xFF, 3, 2, 0x00, 0x50, 0x22, 0xAA, 0xBB, 0x00, 0xF6, 0x3D];
+        assert_eq!(envelope(&map).unwrap_err(), FrameError::Version(2));
+        let hello = [0x44, 0x10, 0x12, 0x34, 0, 0, 1, 0, 0x4A, 0xC0, 0x2B];
+        let read = envelope(&hello).unwrap();
+        assert_eq!((read.version, read.header.session.get()), (2, 0x1234));
+        assert!(read.open(&Seal::Crc(MISSION, 0xBEEF)).is_some_and(|frame| frame.chunks().next().is_none()));
     }
 
     #[test]
@@ -326,7 +339,7 @@ mod tests {
             ..header()
         };
         let bytes = FrameBuilder::new(&hello, 64).finish(&Seal::Hello(&key(), MISSION, 0, 0), true);
-        let expected = [0x4F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];
+        let expected = [0x6F, 0x02, 0x12, 0x34, 0, 0, 1, 0, 9, 0, 0, 5, 0, 7, 1, 2, 3, 4, 5, 6, 7, 8];
         assert_eq!(bytes[..22], expected);
         assert_eq!(bytes.len(), 30);
         let read = Envelope::decode(&bytes, |to| to.number() == 2).unwrap();

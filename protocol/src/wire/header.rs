@@ -79,7 +79,7 @@ impl FrameKind {
 ///  0                   1                   2                   3
 ///  0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5 6 7 8 9 0 1
 /// +-----+-+-+-+-+-+-------+-------+-------------------------------+
-/// |ver=2|A|T|H|S|K| from  |  to   | session of the sender         |
+/// |ver=3|A|T|H|S|K| from  |  to   | session of the sender         |
 /// +-----+-+-+-+-+-+-------+-------+-------+-------+---------------+
 /// | number                        | base (1-2)    | remaining     |
 /// +-------------------------------+---------------+---------------+
@@ -129,6 +129,9 @@ pub struct Header {
     pub keyed: bool,
 }
 
+/// Header and seal of a hello have the same layout in every version from this one on.
+const FIRST_COMMON_HELLO: u8 = 2;
+
 const ACK: u8 = 0b1_0000;
 const TURN: u8 = 0b1000;
 const HELLO: u8 = 0b100;
@@ -139,8 +142,9 @@ impl Header {
     /// Reads the header of a frame if `to_us` selects its receiver; the frame is not verified yet.
     pub(super) fn decode(r: &mut Reader<'_>, to_us: impl Fn(Address) -> bool) -> Result<Self, FrameError> {
         let flags = r.u8()?;
-        if flags >> 5 != WIRE_VERSION {
-            return Err(FrameError::Version(flags >> 5));
+        let (version, is_hello) = (flags >> 5, flags & HELLO != 0);
+        if version != WIRE_VERSION && !(is_hello && version >= FIRST_COMMON_HELLO) {
+            return Err(FrameError::Version(version));
         }
         let addresses = r.u8()?;
         let (from, to) = (Address(addresses >> 4), Address(addresses & 15));

@@ -7,6 +7,7 @@ mod backlog;
 mod chunk;
 mod frame;
 mod header;
+mod introduction;
 mod number;
 mod path;
 mod placement;
@@ -20,11 +21,12 @@ pub(crate) use chunk::room_for_payload;
 pub use chunk::{Chunk, ChunkKind, Chunks};
 pub use frame::{Envelope, Frame, FrameBuilder, FrameError, Seal};
 pub use header::{Address, FrameKind, Header, MissionId, SessionId};
+pub use introduction::{CellEdge, Introduction, Series};
 pub use number::unwrap_number;
 pub use path::PlannedPath;
 pub use placement::Placement;
 pub use stamp::Stamp;
 pub use status::{ModeReason, StatusError, VehicleMode, VehicleStatus};
 
-/// The version of the wire format; a frame of another version is counted and dropped.
-pub const WIRE_VERSION: u8 = 2;
+/// The version of the wire format. Of another version only hellos are read, so that both ends can name the difference.
+pub const WIRE_VERSION: u8 = 3;

@@ -88,7 +88,7 @@ fn contents() -> Vec<Seed> {
                 ChunkKind::Report => seeds.push(("status", format!("report-{i}"), payload)),
                 ChunkKind::Slot => seeds.push(("slot", format!("slot-{i}"), framed)),
                 ChunkKind::Layer => seeds.push(("layer_chunk", format!("talk-{i}"), payload)),
-                ChunkKind::Map | ChunkKind::Object => {}
+                ChunkKind::Map | ChunkKind::Object | ChunkKind::Introduction => {}
             }
         }
         seeds.push(("chunks", format!("{way}-{i}"), body));

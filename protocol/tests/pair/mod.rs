@@ -13,7 +13,7 @@ use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::seal::MissionKey;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
@@ -344,6 +344,7 @@ fn vehicle(setup: &Setup, seed: u64, durable: SlotInboxState, now: Instant) -> V
     let config = VehicleConfig {
         address: auv(),
         mission: setup.mission,
+        cell_edge: CellEdge::default(),
         modem: setup.modem(),
         budget_bps: setup.budget_bps,
         budget_window: Duration::from_secs(10),
@@ -371,6 +372,7 @@ pub(crate) fn layer(id: LayerId, share: u8, codec: Codec, debounce: Duration) ->
 fn surface(setup: &Setup, seed: u64, now: Instant) -> SurfaceLink {
     let config = SurfaceConfig {
         mission: setup.mission,
+        cell_edge: CellEdge::default(),
         modem: setup.modem(),
         budget_bps: setup.budget_bps,
         budget_window: Duration::from_secs(10),

@@ -7,8 +7,8 @@ mod samples;
 use document::{DOCUMENT, assert_same, frames, hex, rows, section};
 use samples::{
     CALL_NONCE, CALL_SESSION, MISSION, SURFACE_NONCE, SURFACE_SESSION, VEHICLE_SESSION, all_up_to, answer_of_vehicle,
-    answered, auv, call, clock, first_of_surface, frame, header, here, hold, key, map_payload, session, surface_hello,
-    vehicle_hello,
+    answered, auv, call, clock, first_of_surface, frame, header, here, hold, introduction, key, map_payload, session,
+    surface_hello, vehicle_hello,
 };
 use scenecast_protocol::seal::Direction;
 use scenecast_protocol::wire::{Address, ChunkKind, Header, Seal, WIRE_VERSION};
@@ -27,8 +27,8 @@ fn frames_with_a_crc_are_those_of_the_document() {
     let map = Header { base: 2, remaining: 1, ..header(auv(), 2) };
     let empty = Header { turn: Some(40), ..header(auv(), 2) };
     let expected = vec![
-        ("hello of the surface", frame(surface_hello(false), 64, true, crc(0), &[])),
-        ("hello of the vehicle", frame(vehicle_hello(false), 64, true, crc(SURFACE_SESSION), &[])),
+        ("hello of the surface", frame(surface_hello(false), 64, true, crc(0), &introduction(true))),
+        ("hello of the vehicle", frame(vehicle_hello(false), 64, true, crc(SURFACE_SESSION), &introduction(false))),
         ("first numbered frame of the surface", frame(first_of_surface(false), 64, true, crc(VEHICLE_SESSION), &slot)),
         ("grant with an ack statement", frame(grant, 64, true, crc(VEHICLE_SESSION), &[])),
         ("answer of the vehicle", frame(answer_of_vehicle(false), 64, true, crc(SURFACE_SESSION), &answered())),
@@ -52,10 +52,10 @@ fn frames_with_a_tag_are_those_of_the_document() {
     let down = |key| frame(first_of_surface(true), 64, true, Seal::Session(key, Direction::Down, 1), &slot);
     let up = |key| frame(answer_of_vehicle(true), 64, true, Seal::Session(key, Direction::Up, 1), &answered());
     let expected = vec![
-        ("keyed hello of the surface", frame(surface_hello(true), 64, true, hello(0, 0), &[])),
+        ("keyed hello of the surface", frame(surface_hello(true), 64, true, hello(0, 0), &introduction(true))),
         (
             "keyed hello of the vehicle",
-            frame(vehicle_hello(true), 64, true, hello(SURFACE_SESSION, SURFACE_NONCE), &[]),
+            frame(vehicle_hello(true), 64, true, hello(SURFACE_SESSION, SURFACE_NONCE), &introduction(false)),
         ),
         ("keyed numbered frame of the surface", down(&plain)),
         ("keyed numbered frame of the vehicle", up(&plain)),

@@ -164,10 +164,10 @@ fn status_chunks() -> Rows {
     ]
 }
 
-/// A version of a slot in series ABCD; it must read back.
+/// A version of a slot ; it must read back.
 fn slot(version: u16, content: Slot) -> Vec<u8> {
-    let bytes = VersionedSlot::encode(0xABCD, version, &content);
-    let read = VersionedSlot { id: content.id(), series: 0xABCD, version, content: Some(content) };
+    let bytes = VersionedSlot::encode(version, &content);
+    let read = VersionedSlot { id: content.id(), version, content: Some(content) };
     assert_eq!(VersionedSlot::decode(&bytes), Ok(read));
     bytes
 }
@@ -198,29 +198,26 @@ fn orders() -> Rows {
     };
     vec![
         (
-            "slot: series ABCD, version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",
+            "slot: version 4, utility: epoch 1, unseen 20, perplexity 0, label 3: 80, label 5: -20",
             slot(4, Slot::Utility(utility)),
         ),
-        ("slot: series ABCD, version 1, constraints: hold", hold()),
+        ("slot: version 1, constraints: hold", hold()),
+        ("slot: version 2, constraints: abort", slot(2, Slot::Constraints(Constraints { hold: false, abort: true }))),
         (
-            "slot: series ABCD, version 2, constraints: abort",
-            slot(2, Slot::Constraints(Constraints { hold: false, abort: true })),
-        ),
-        (
-            "slot: series ABCD, version 6, limits: depth 5 to 40 m, 3000 m, silence 600 s, on silence return",
+            "slot: version 6, limits: depth 5 to 40 m, 3000 m, silence 600 s, on silence return",
             slot(6, Slot::Limits(limits)),
         ),
         (
-            "slot: series ABCD, version 7, fence: (0, 0), (40, 0), (40, 30), (0, 30) m, keep-out (10, 10), (15, 10), \
+            "slot: version 7, fence: (0, 0), (40, 0), (40, 30), (0, 30) m, keep-out (10, 10), (15, 10), \
              (10, 18) m, return point (2, 3) m",
             slot(7, Slot::Fence(fence)),
         ),
         (
-            "slot: series ABCD, version 1, requests: epoch 1, label 3, request 2; label 5, request 1, image 9 with an edge of \
+            "slot: version 1, requests: epoch 1, label 3, request 2; label 5, request 1, image 9 with an edge of \
              128 pixels",
             slot(1, Slot::Requests(requests)),
         ),
-        ("slot: series ABCD, version 9, fix: x -12.3 m, y 400 m, sigma 1.5 m, age 0.82 s", slot(9, Slot::Fix(fix))),
+        ("slot: version 9, fix: x -12.3 m, y 400 m, sigma 1.5 m, age 0.82 s", slot(9, Slot::Fix(fix))),
     ]
 }
 
@@ -247,26 +244,23 @@ fn settings_and_budgets() -> Rows {
     };
     vec![
         (
-            "slot: series ABCD, version 2, settings: planner horizon, coarse cells, depth alone, alpha 0.01, gamma as \
+            "slot: version 2, settings: planner horizon, coarse cells, depth alone, alpha 0.01, gamma as \
              configured, 0.25 frames a second",
             slot(2, Slot::Settings(settings)),
         ),
         (
-            "slot: series ABCD, version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, spare capacity to finer cells, depth, \
+            "slot: version 3, budget: 400 bit/s, shares 10, 5, 5, 50, 20, spare capacity to finer cells, depth, \
              exemplars, confidence",
             slot(3, Slot::Budget(budget)),
         ),
         (
-            "slot: series ABCD, version 3, the same budget, spare capacity to curiosity, finer cells, depth, exemplars, \
+            "slot: version 3, the same budget, spare capacity to curiosity, finer cells, depth, exemplars, \
              confidence",
             slot(3, Slot::Budget(curious)),
         ),
+        ("slot: version 3, the same budget, spare capacity to finer cells and layer 15", slot(3, Slot::Budget(long))),
         (
-            "slot: series ABCD, version 3, the same budget, spare capacity to finer cells and layer 15",
-            slot(3, Slot::Budget(long)),
-        ),
-        (
-            "slot: series ABCD, version 2, settings: layers 2 and 15 alone",
+            "slot: version 2, settings: layers 2 and 15 alone",
             slot(2, Slot::Settings(Settings { layers: Change::To(LayerMask(0x8004)), ..Settings::default() })),
         ),
     ]

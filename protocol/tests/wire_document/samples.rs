@@ -7,8 +7,8 @@ use scenecast_protocol::directive::{
 };
 use scenecast_protocol::seal::{MissionKey, SessionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Backlog, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, MissionId, ModeReason,
-    PlannedPath, Seal, SessionId, Stamp, VehicleMode, VehicleStatus,
+    AckStatement, Address, Backlog, CellEdge, Chunk, ChunkKind, Envelope, FrameBuilder, FrameKind, Header,
+    Introduction, MissionId, ModeReason, PlannedPath, Seal, Series, SessionId, Stamp, VehicleMode, VehicleStatus,
 };
 use std::time::Duration;
 
@@ -57,8 +57,15 @@ pub(crate) fn all_up_to(horizon_low: u16, lost: Vec<u16>) -> Option<AckStatement
     Some(AckStatement { horizon_low, lost })
 }
 
+/// The introduction in the hello of the surface, or of the vehicle.
+pub(crate) fn introduction(of_surface: bool) -> [(ChunkKind, Vec<u8>); 1] {
+    let series = of_surface.then(|| Series::from_random(0x0A0B_0C0D_0E0F));
+    let introduction = Introduction { cell_edge: CellEdge::from_metres(0.25), series };
+    [(ChunkKind::Introduction, introduction.encode())]
+}
+
 pub(crate) fn hold() -> Vec<u8> {
-    VersionedSlot::encode(0xABCD, 1, &Slot::Constraints(Constraints { hold: true, abort: false }))
+    VersionedSlot::encode(1, &Slot::Constraints(Constraints { hold: true, abort: false }))
 }
 
 pub(crate) fn status() -> VehicleStatus {

@@ -40,9 +40,9 @@ section! {
         turn_around_s: f64 = 0.2, range(0.0, 10.0, "s"), [Auv Asv Scenario];
         /// File of the mission key (scenecast key new), the same at both ends. Empty: frames are not authenticated.
         key_file: Option<PathBuf> = None, ANY, [Auv Asv Scenario];
-        /// Frames that the mission key authenticates, the same at both ends. down: from the surface to
-        /// the vehicle; all: both directions.
-        authenticate: Authenticate = Authenticate::Down, ANY, [Auv Asv Scenario];
+        /// Frames that the mission key authenticates, the same at both ends. all: both directions;
+        /// down: from the surface to the vehicle only, so that anybody can forge the map.
+        authenticate: Authenticate = Authenticate::All, ANY, [Auv Asv Scenario];
         /// Whether authenticated frames are encrypted too, the same at both ends.
         encrypt: bool = false, ANY, [Auv Asv Scenario];
     }

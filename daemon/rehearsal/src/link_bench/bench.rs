@@ -12,7 +12,7 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::{Access, MasterConfig, ModemProfile};
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, Envelope, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, Envelope, MissionId, VehicleStatus};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodeId, NodePosition, RandomStream, ReceptionOutcome};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -244,6 +244,7 @@ impl BenchVehicle {
         let config = VehicleConfig {
             address,
             mission: MissionId(7),
+            cell_edge: CellEdge::default(),
             modem: setting.modem(),
             budget_bps: setting.budget_bps,
             budget_window: WINDOW,
@@ -283,6 +284,7 @@ fn surface_config(setting: &LinkSetting) -> SurfaceConfig {
     let known = if setting.discovery_period.is_none() { setting.vehicles } else { 0 };
     SurfaceConfig {
         mission: MissionId(7),
+        cell_edge: CellEdge::default(),
         modem: setting.modem(),
         budget_bps: setting.budget_bps,
         budget_window: WINDOW,

@@ -312,8 +312,9 @@ impl StateReplica for OpaqueReplica {
         self.version
     }
 
-    fn clear(&mut self) {
-        *self = Self { version: self.version + 1, useful_bytes: self.useful_bytes, ..Self::default() };
+    fn take(&mut self) -> Self {
+        let empty = Self { version: self.version + 1, useful_bytes: self.useful_bytes, ..Self::default() };
+        std::mem::replace(self, empty)
     }
 }
 

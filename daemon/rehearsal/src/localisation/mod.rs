@@ -262,7 +262,7 @@ impl LocalisationTrial {
         }
         let wait = draw.wait_s;
         let leaves = reported_at + Duration::from_secs_f64(wait);
-        let slot = VersionedSlot::encode(1, 1, &Slot::Fix(Fix { age_s: fix.age_s + wait, ..fix }));
+        let slot = VersionedSlot::encode(1, &Slot::Fix(Fix { age_s: fix.age_s + wait, ..fix }));
         let travel = Duration::from_secs_f64(seen.range_m / SOUND_M_S);
         self.under_way.push(UnderWay { slot, arrives: leaves + travel, travel });
     }

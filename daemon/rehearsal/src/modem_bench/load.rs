@@ -15,7 +15,7 @@ use scenecast_protocol::link::{
 use scenecast_protocol::mac::MasterConfig;
 use scenecast_protocol::schedule::Shares;
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::{Address, MissionId, VehicleStatus};
+use scenecast_protocol::wire::{Address, CellEdge, MissionId, VehicleStatus};
 use sim_channel::modem::{Emulator, Fault};
 use sim_channel::{Channel, ChannelConfig, LossModel, NodePosition, RandomStream};
 use std::collections::BTreeMap;
@@ -94,6 +94,7 @@ impl ModemBench {
         let vehicle = VehicleConfig {
             address,
             mission,
+            cell_edge: CellEdge::default(),
             modem: *at_vehicle.profile(),
             budget_bps: config.link.budget_bps,
             budget_window: window,
@@ -103,6 +104,7 @@ impl ModemBench {
         };
         let surface = SurfaceConfig {
             mission,
+            cell_edge: CellEdge::default(),
             modem: *at_surface.profile(),
             budget_bps: config.link.budget_bps,
             budget_window: window,

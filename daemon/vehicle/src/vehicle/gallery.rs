@@ -9,6 +9,7 @@ use scenecast_protocol::exemplar::{Exemplar, max_bytes};
 use scenecast_protocol::link::VehicleLink;
 use scenecast_protocol::object::ObjectId;
 use scenecast_protocol::schedule::BackgroundStream;
+use scenecast_protocol::wire::Series;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -46,8 +47,8 @@ pub(super) struct Gallery {
     /// For each label, the best first.
     exemplars: SharedExemplars,
     requests: ExemplarRequests,
-    /// The run of the surface that sent the requests.
-    series: Option<u16>,
+    /// The series of the requests.
+    series: Option<Series>,
     replies: Vec<Reply>,
     /// For each label, the latest last.
     shown: BTreeMap<u8, Vec<Shown>>,
@@ -71,7 +72,12 @@ impl Gallery {
 
     /// Replaces the requests by those of the surface's run `series`. Replies in flight that are no longer requested are
     /// cancelled, and an unrequested exemplar gives way.
-    pub(super) fn replace_requests(&mut self, requests: ExemplarRequests, series: Option<u16>, link: &mut VehicleLink) {
+    pub(super) fn replace_requests(
+        &mut self,
+        requests: ExemplarRequests,
+        series: Option<Series>,
+        link: &mut VehicleLink,
+    ) {
         if self.series.is_some() && series != self.series {
             // A new run of the surface has no exemplar yet.
             self.shown.clear();

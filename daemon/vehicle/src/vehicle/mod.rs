@@ -220,6 +220,9 @@ impl Vehicle {
                     self.publisher.handle_delivered(id);
                 }
                 VehicleEvent::SurfaceRestarted => self.handle_surface_restart(),
+                VehicleEvent::Mismatch(mismatch) => {
+                    tracing::warn!("frames of the surface are refused: {mismatch}");
+                }
                 VehicleEvent::Oversized(fault) => tracing::error!("{fault}: it is left out of this frame"),
             }
         }

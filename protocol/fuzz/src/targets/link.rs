@@ -10,7 +10,7 @@ use scenecast_protocol::map::{
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::schedule::{Audit, Shares};
 use scenecast_protocol::time::Instant;
-use scenecast_protocol::wire::Address;
+use scenecast_protocol::wire::{Address, CellEdge};
 use std::fmt;
 use std::time::Duration;
 
@@ -30,6 +30,9 @@ impl<T> fmt::Debug for Opaque<T> {
 }
 
 impl StateReplica for Opaque<Replica> {
+    fn decodes(&self, horizon: u64, chunk: &[u8]) -> bool {
+        self.0.decodes(horizon, chunk)
+    }
     fn apply(&mut self, number: u64, chunk: &[u8], now: Instant) -> bool {
         self.0.apply(number, chunk, now)
     }
@@ -42,8 +45,11 @@ impl StateReplica for Opaque<Replica> {
     fn version(&self) -> u64 {
         self.0.version()
     }
-    fn clear(&mut self) {
-        self.0.clear();
+    fn size(&self) -> usize {
+        self.0.size()
+    }
+    fn take(&mut self) -> Self {
+        Self(self.0.take())
     }
 }
 
@@ -91,7 +97,9 @@ impl StateReplica for Pile {
     fn version(&self) -> u64 {
         0
     }
-    fn clear(&mut self) {}
+    fn take(&mut self) -> Self {
+        std::mem::take(self)
+    }
 }
 
 /// A state whose host can add to it.
@@ -173,6 +181,7 @@ impl Setup {
         let config = VehicleConfig {
             address: vehicle(),
             mission: MISSION,
+            cell_edge: CellEdge::default(),
             modem: self.modem(),
             budget_bps: BUDGET_BPS,
             budget_window: WINDOW,
@@ -186,6 +195,7 @@ impl Setup {
     pub fn surface<R: StateReplica>(self, now: Instant) -> Surface<R> {
         let config = SurfaceConfig {
             mission: MISSION,
+            cell_edge: CellEdge::default(),
             modem: self.modem(),
             budget_bps: BUDGET_BPS,
             budget_window: WINDOW,

@@ -3,7 +3,7 @@
 use crate::link::Authenticity;
 use crate::mac::{MasterConfig, ModemProfile};
 use crate::schedule::Shares;
-use crate::wire::{Address, MissionId};
+use crate::wire::{Address, CellEdge, MissionId};
 use std::time::Duration;
 
 /// Settings of the surface's end.
@@ -21,6 +21,8 @@ pub struct SurfaceConfig {
     pub shares: Shares,
     /// Limits of turns and pauses in medium access.
     pub master: MasterConfig,
+    /// The edge of a cell on the operator's map, until a vehicle has stated its own.
+    pub cell_edge: CellEdge,
     /// The vehicles that are contacted from the beginning.
     pub vehicles: Vec<Address>,
     /// Longest time between two discovery calls; `None` disables them.

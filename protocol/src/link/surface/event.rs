@@ -1,6 +1,7 @@
 //! Events and errors for the surface's host.
 
 use crate::directive::SlotId;
+use crate::link::Mismatch;
 use crate::wire::Address;
 
 /// An event of [`super::SurfaceLink`] for its host.
@@ -29,6 +30,10 @@ pub enum SurfaceEvent {
     },
     /// A vehicle began a new run; its map starts empty.
     VehicleRestarted(Address),
+    /// The copy of a run with this vehicle is kept as [`super::PeerView::ended_run`], because a new run begins.
+    RunEnded(Address),
+    /// Frames of a vehicle are refused because a setting differs; reported once until one is accepted.
+    Mismatch(Address, Mismatch),
 }
 
 impl SurfaceEvent {

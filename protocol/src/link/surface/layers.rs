@@ -45,6 +45,14 @@ impl Layers {
         self.replicas.values_mut().for_each(|r| r.advance_base(horizon));
     }
 
+    /// Whether a chunk that is based on every frame up to `horizon` is readable, and decodes if its layer is known.
+    pub(super) fn decodes(&self, horizon: u64, payload: &[u8]) -> bool {
+        match LayerChunk::decode(payload) {
+            Some(LayerChunk::Patch(id, patch)) => self.get(id).is_none_or(|replica| replica.decodes(horizon, patch)),
+            other => other.is_some(),
+        }
+    }
+
     pub(super) fn handle_chunk(&mut self, number: u64, payload: &[u8], now: Instant) -> LayerOutcome {
         let Some(chunk) = LayerChunk::decode(payload) else { return LayerOutcome::Skipped };
         if let LayerChunk::Descriptor(id, part) = chunk {
@@ -80,9 +88,10 @@ impl Layers {
         LayerOutcome::Accepted
     }
 
-    /// Forgets everything: the vehicle has begun a new run.
-    pub(super) fn clear(&mut self) {
-        *self = Self { version: self.version + 1, ..Self::default() };
+    /// Takes all layers and leaves none: the vehicle has begun a new run.
+    pub(super) fn take(&mut self) -> Self {
+        let empty = Self { version: self.version + 1, ..Self::default() };
+        std::mem::replace(self, empty)
     }
 }
 
@@ -123,7 +132,7 @@ mod tests {
         assert_eq!(layers.handle_chunk(5, &descriptor, Instant::ZERO), LayerOutcome::Accepted, "repeated");
         let (descriptor, _) = other.next_chunk(200, Instant::ZERO).unwrap();
         assert_eq!(layers.handle_chunk(6, &descriptor, Instant::ZERO), LayerOutcome::OutOfStep, "another scale");
-        layers.clear();
+        layers.take();
         assert_eq!((layers.get(LayerId::DEPTH).is_none(), layers.version()), (true, 2));
         assert_eq!(layers.set(), &LayerSet::default());
     }

@@ -14,7 +14,7 @@ mod transmit;
 
 pub use config::SurfaceConfig;
 pub use event::{IssueError, SurfaceEvent};
-pub use peer::PeerView;
+pub use peer::{EndedRun, PeerView};
 pub use polled::Cycle;
 
 use crate::directive::{Slot, VersionedSlot};
@@ -23,7 +23,7 @@ use crate::mac::Access;
 use crate::map::{Replica, StateReplica};
 use crate::schedule::{BitBudget, ClassShares, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, Envelope, Seal};
+use crate::wire::{Address, Envelope, Introduction, Seal, Series};
 use discovery::Discovery;
 use fleet::Fleet;
 use peer::{Ready, VehiclePeer, room_for_slot};
@@ -50,7 +50,7 @@ pub struct SurfaceLink<R: StateReplica = Replica> {
     in_modem: VecDeque<OnAir>,
     discovery: Discovery,
     cycle: polled::Cycles,
-    series: u16,
+    series: Series,
     random: u64,
     events: VecDeque<SurfaceEvent>,
     unknown_senders: u64,
@@ -60,7 +60,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     /// An end without contact; `seed` must be random for each run.
     pub fn new(config: SurfaceConfig, seed: u64, now: Instant) -> Self {
         let mut random = seed;
-        let series = crate::random::next(&mut random) as u16;
+        let series = Series::from_random(crate::random::next(&mut random));
         let is_any_known = !config.vehicles.is_empty();
         let mut link = Self {
             fleet: Fleet::new(),
@@ -85,7 +85,8 @@ impl<R: StateReplica> SurfaceLink<R> {
     fn add(&mut self, vehicle: Address, now: Instant) {
         let seed = crate::random::next(&mut self.random);
         let c = &self.config;
-        let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), seed, self.series, c.master, now);
+        let introduction = Introduction { cell_edge: c.cell_edge, series: Some(self.series) };
+        let peer = VehiclePeer::new(c.mission, vehicle, c.authenticity.clone(), introduction, seed, c.master, now);
         self.fleet.insert(vehicle, peer);
     }
 
@@ -108,7 +109,7 @@ impl<R: StateReplica> SurfaceLink<R> {
     pub fn issue(&mut self, vehicle: Address, slot: Slot, now: Instant) -> Result<u16, IssueError> {
         let seal = Seal::bytes(self.config.authenticity.is_some(), self.config.modem.frame_bytes);
         let room = room_for_slot(self.config.modem.frame_bytes, seal);
-        let bytes = VersionedSlot::encode(0, 0, &slot).len();
+        let bytes = VersionedSlot::encode(0, &slot).len();
         if bytes > room {
             return Err(IssueError::TooLarge { bytes, room });
         }
@@ -169,7 +170,7 @@ impl<R: StateReplica> SurfaceLink<R> {
         let is_current = self.fleet.is_current(from);
         let Some(peer) = self.fleet.get_mut(from) else { return self.drop_unknown(DropReason::UnknownSender) };
         peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);
-        if peer.resync_if_out_of_step(now) {
+        if peer.resync_if_out_of_step(now, &mut self.events) {
             if is_current && !self.turn.is_empty() {
                 // The rest of the turn was written for the run that has ended.
                 self.turn.clear();
@@ -181,6 +182,13 @@ impl<R: StateReplica> SurfaceLink<R> {
             self.events.push_back(SurfaceEvent::MapChanged(from));
         }
         peer.owe_answer(now);
+    }
+
+    /// Drops the copy of an ended run of a vehicle, because the operator needs it no more.
+    pub fn drop_ended_run(&mut self, vehicle: Address) {
+        if self.fleet.get_mut(vehicle).is_some_and(VehiclePeer::drop_ended) {
+            self.events.push_back(SurfaceEvent::MapChanged(vehicle));
+        }
     }
 
     fn handle_call_answer(&mut self, from: Address, now: Instant) {

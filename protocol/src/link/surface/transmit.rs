@@ -62,9 +62,9 @@ impl<R: StateReplica> SurfaceLink<R> {
         let kind = FrameKind::hello_if(is_hello_due(peer.master.unanswered()) || peer.is_full());
         let copies = if is_plentiful { peer.stats().loss_out.copies(TURN_LOSS_RISK, 6) } else { 1 };
         let mut plan = peer.plan_turn(&modem, kind, copies, &self.shares, now);
-        let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem), now)));
+        let affordable = self.budget.affordable(plan.iter().map(|slots| (peer.bits(slots, &modem, kind), now)));
         if affordable == 0 {
-            let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem));
+            let bits = plan.first().map_or(0, |slots| peer.bits(slots, &modem, kind));
             peer.master.postpone(self.budget.earliest(bits, now));
             return false;
         }

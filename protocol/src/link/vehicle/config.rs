@@ -3,7 +3,7 @@
 use crate::link::Authenticity;
 use crate::mac::ModemProfile;
 use crate::schedule::Shares;
-use crate::wire::{Address, MissionId};
+use crate::wire::{Address, CellEdge, MissionId};
 use std::time::Duration;
 
 /// Settings of the vehicle's end.
@@ -13,6 +13,8 @@ pub struct VehicleConfig {
     pub address: Address,
     /// The mission; frames of another one fail their integrity check.
     pub mission: MissionId,
+    /// The edge of a map cell, which the hello states.
+    pub cell_edge: CellEdge,
     /// Frame size, bit rate and access scheme of the modem.
     pub modem: ModemProfile,
     /// Bit budget on air in bit/s.

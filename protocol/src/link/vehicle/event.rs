@@ -1,6 +1,7 @@
 //! Events for the vehicle's host.
 
 use crate::directive::{Slot, SlotId};
+use crate::link::Mismatch;
 use crate::object::ObjectId;
 
 /// An event of [`super::VehicleLink`] for its host.
@@ -20,6 +21,8 @@ pub enum VehicleEvent {
     ObjectDelivered(ObjectId),
     /// The surface began a new run; everything is sent to it again.
     SurfaceRestarted,
+    /// Frames of the surface are refused because a setting differs; reported once until one is accepted.
+    Mismatch(Mismatch),
     /// A chunk was left out of a frame, and its content waits again.
     Oversized(OversizedChunk),
 }

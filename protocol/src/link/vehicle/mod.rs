@@ -26,7 +26,7 @@ use crate::map::{Cell, LabelGrid, LayerId, LayerMask, LayerSource, MapSource, St
 use crate::object::ObjectId;
 use crate::schedule::{BackgroundOrder, BitBudget, Shares};
 use crate::time::Instant;
-use crate::wire::{Address, VehicleStatus};
+use crate::wire::{Address, Introduction, VehicleStatus};
 use content::{Carried, VehicleContent};
 use discovery::CallReply;
 use repeat::Repeater;
@@ -57,8 +57,10 @@ impl<S: StateSource> VehicleLink<S> {
     /// An end without contact that replicates `source`. `seed` must be random for each run; `restored` is the state
     /// that survived the last one.
     pub fn with_source(config: VehicleConfig, source: S, seed: u64, restored: SlotInboxState, now: Instant) -> Self {
+        let introduction = Introduction { cell_edge: config.cell_edge, series: None };
+        let (mission, authenticity) = (config.mission, config.authenticity.clone());
         Self {
-            pair: LinkPair::new(config.mission, config.address, Address::SURFACE, config.authenticity.clone(), seed),
+            pair: LinkPair::new(mission, config.address, Address::SURFACE, authenticity, introduction, seed),
             budget: BitBudget::new(config.budget_bps, config.budget_window, now),
             content: VehicleContent::new(source, config.shares, config.status_period, now),
             inbox: SlotInbox::restore(restored),

@@ -23,7 +23,9 @@ impl<S: StateSource> VehicleLink<S> {
         if envelope.header.to == Address::EVERYBODY {
             return self.handle_call(&envelope, now);
         }
-        let inbound = match self.pair.handle_frame(&envelope) {
+        let inbound = self.pair.handle_frame(&envelope, |_, _| true);
+        self.events.extend(self.pair.poll_mismatch().map(VehicleEvent::Mismatch));
+        let inbound = match inbound {
             Ok(inbound) => inbound,
             Err(DropReason::NoBase) => {
                 // The surface builds on frames that we never acknowledged: in between it took us for another run.
@@ -104,10 +106,11 @@ impl<S: StateSource> VehicleLink<S> {
     }
 
     fn handle_slot(&mut self, payload: &[u8], number: u64, frame_bytes: usize, now: Instant) {
-        let Ok(mut slot) = VersionedSlot::decode(payload) else {
+        let series = self.pair.peer_introduction().and_then(|introduction| introduction.series);
+        let (Some(series), Ok(mut slot)) = (series, VersionedSlot::decode(payload)) else {
             return self.pair.stats.drop(DropReason::Malformed);
         };
-        if !self.inbox.admit(&slot) {
+        if !self.inbox.admit(series, &slot) {
             return;
         }
         if let Some(window) = self.pair.window_mut() {

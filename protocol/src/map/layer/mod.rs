@@ -181,6 +181,11 @@ impl LayerReplica {
         &self.levels
     }
 
+    /// Whether a patch that is based on every frame up to `horizon` would decode.
+    pub fn decodes(&self, horizon: u64, patch: &[u8]) -> bool {
+        self.levels.decodes_up_to(self.descriptor.levels, horizon, patch)
+    }
+
     /// Applies a patch of frame `number`; `false` if it makes no sense on the base, or has levels that the layer lacks.
     pub fn apply(&mut self, number: u64, patch: &[u8], now: Instant) -> bool {
         self.levels.apply_up_to(self.descriptor.levels, number, patch, now)

@@ -1,6 +1,7 @@
 //! The surface's copy of a vehicle's state: map, layers, status and objects.
 
 use super::backlog::ReportedBacklog;
+use super::ended::EndedRun;
 use super::status::StatusParts;
 use crate::link::surface::layers::{LayerOutcome, Layers};
 use crate::link::{FrameNumber, LinkStats, SurfaceEvent};
@@ -8,7 +9,7 @@ use crate::map::{LayerChunk, StateReplica};
 use crate::object::{ObjectReceiver, Part, Received};
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind};
+use crate::wire::{Address, Chunk, ChunkKind, Chunks, VehicleStatus};
 use std::collections::VecDeque;
 
 /// The result of handling a chunk.
@@ -40,6 +41,7 @@ pub(super) struct PeerContent<R> {
     pub(super) layers: Layers,
     pub(super) status: StatusParts,
     pub(super) backlog: Option<ReportedBacklog>,
+    pub(super) ended: Option<EndedRun<R>>,
     objects: ObjectReceiver,
 }
 
@@ -50,17 +52,47 @@ impl<R: StateReplica> PeerContent<R> {
             layers: Layers::default(),
             status: StatusParts::default(),
             backlog: None,
+            ended: None,
             objects: ObjectReceiver::default(),
         }
     }
 
-    /// The vehicle has begun a new run.
-    pub(super) fn clear(&mut self) {
-        self.replica.clear();
-        self.layers.clear();
+    /// The vehicle has begun a new run. The larger of the copies of this run and of an earlier one is kept; returns
+    /// whether it is that of this run.
+    pub(super) fn end_run(&mut self, now: Instant) -> bool {
+        let (replica, layers) = (self.replica.take(), self.layers.take());
+        let (epoch, status) = (self.status.epoch(), self.status.whole().cloned());
+        let size = replica.size();
+        let is_kept = size > 0 && self.ended.as_ref().is_none_or(|ended| ended.replica.size() <= size);
+        if is_kept {
+            self.ended = Some(EndedRun { replica, layers, epoch, status, ended: now });
+        }
         self.objects.clear();
         self.status = StatusParts::default();
         self.backlog = None;
+        is_kept
+    }
+
+    /// Drops the copy of an ended run if the present one is as large; returns whether it did.
+    pub(super) fn overtake(&mut self) -> bool {
+        let size = self.replica.size();
+        let is_overtaken = self.ended.as_ref().is_some_and(|ended| ended.replica.size() <= size);
+        if is_overtaken {
+            self.ended = None;
+        }
+        is_overtaken
+    }
+
+    /// Whether every chunk of a frame with this base decodes. Chunks that only a vehicle receives are skipped.
+    pub(super) fn decodes(&self, base: FrameNumber, mut chunks: Chunks<'_>) -> bool {
+        chunks.all(|chunk| match chunk.kind {
+            ChunkKind::Map => self.replica.decodes(base, chunk.payload),
+            ChunkKind::Pose => VehicleStatus::default().read_pose(chunk.payload).is_ok(),
+            ChunkKind::Report => VehicleStatus::default().read_report(chunk.payload).is_ok(),
+            ChunkKind::Object => Part::decode(chunk.payload).is_ok(),
+            ChunkKind::Layer => self.layers.decodes(base, chunk.payload),
+            ChunkKind::Slot | ChunkKind::Introduction => true,
+        })
     }
 
     /// Counts changes of the map and its layers.
@@ -96,7 +128,7 @@ impl<R: StateReplica> PeerContent<R> {
                 LayerOutcome::Skipped => ChunkOutcome::Malformed,
                 LayerOutcome::OutOfStep => ChunkOutcome::Contradictory,
             },
-            ChunkKind::Slot => ChunkOutcome::Malformed,
+            ChunkKind::Slot | ChunkKind::Introduction => ChunkOutcome::Malformed,
         }
     }
 
@@ -132,6 +164,7 @@ pub(super) fn class_of(chunk: &Chunk<'_>) -> Class {
         ChunkKind::Map => Class::Map,
         ChunkKind::Pose | ChunkKind::Report => Class::Status,
         ChunkKind::Slot => Class::Directive,
+        ChunkKind::Introduction => Class::Overhead,
         ChunkKind::Object => Class::Exemplar,
         ChunkKind::Layer => LayerChunk::decode(chunk.payload).map_or(Class::Overhead, |c| Class::Layer(c.id())),
     }

@@ -5,12 +5,15 @@
 
 mod backlog;
 mod content;
+mod divergence;
+mod ended;
 mod pool;
 mod status;
 mod timing;
 mod turn;
 mod view;
 
+pub use ended::EndedRun;
 pub(super) use turn::{Ready, room_for_slot};
 pub use view::PeerView;
 
@@ -20,8 +23,9 @@ use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Envelope, FrameKind, Header, MissionId, Stamp};
-use content::{PeerContent, class_of};
+use crate::wire::{Address, Chunk, ChunkKind, Envelope, FrameKind, Header, Introduction, MissionId, Series, Stamp};
+use content::{ChunkOutcome, PeerContent, class_of};
+use divergence::Divergence;
 use std::collections::VecDeque;
 use std::time::Duration;
 use timing::VehicleTiming;
@@ -66,6 +70,7 @@ pub(super) struct VehiclePeer<R> {
     timing: VehicleTiming,
     contact: Contact,
     last_turn: LastTurn,
+    divergence: Divergence,
     /// The two ends were found to differ: a new run must begin.
     is_out_of_step: bool,
 }
@@ -75,19 +80,20 @@ impl<R: StateReplica> VehiclePeer<R> {
         mission: MissionId,
         vehicle: Address,
         authenticity: Option<Authenticity>,
+        introduction: Introduction,
         seed: u64,
-        series: u16,
         config: MasterConfig,
         now: Instant,
     ) -> Self {
         Self {
             master: Master::new(config, now),
-            pair: LinkPair::new(mission, Address::SURFACE, vehicle, authenticity, seed),
-            outbox: SlotOutbox::new(series),
+            pair: LinkPair::new(mission, Address::SURFACE, vehicle, authenticity, introduction, seed),
+            outbox: SlotOutbox::new(introduction.series.unwrap_or(Series::from_random(seed))),
             content: PeerContent::new(),
             timing: VehicleTiming::default(),
             contact: Contact { last_received: None, answer_due: None, hello_due: now, hellos: 0 },
             last_turn: LastTurn { began: 0, kind: FrameKind::Numbered },
+            divergence: Divergence::default(),
             is_out_of_step: false,
         }
     }
@@ -128,9 +134,14 @@ impl<R: StateReplica> VehiclePeer<R> {
         now: Instant,
         events: &mut VecDeque<SurfaceEvent>,
     ) {
-        let inbound = match self.pair.handle_frame(envelope) {
+        let content = &self.content;
+        let inbound = match self.pair.handle_frame(envelope, |base, chunks| content.decodes(base, chunks)) {
             Ok(inbound) => inbound,
             Err(reason) => {
+                events.extend(self.pair.poll_mismatch().map(|m| SurfaceEvent::Mismatch(self.pair.peer(), m)));
+                if reason == DropReason::Undecodable {
+                    self.is_out_of_step |= self.divergence.note_undecodable(now);
+                }
                 // The vehicle builds on frames that we never acknowledged, or means another run of ours.
                 let silent = matches!(modem.access, Access::ModemOwned { .. }) || self.master.unanswered() >= 2;
                 let strays = self.pair.seems_out_of_step() && silent;
@@ -139,7 +150,7 @@ impl<R: StateReplica> VehiclePeer<R> {
             }
         };
         if inbound.restarted {
-            self.forget_peer(now);
+            self.forget_peer(now, events);
             events.push_back(SurfaceEvent::VehicleRestarted(self.address()));
         }
         self.handle_fates(&inbound.fates, now);
@@ -184,7 +195,8 @@ impl<R: StateReplica> VehiclePeer<R> {
             self.handle_chunk(&chunk, number, now, events);
         }
         self.pair.stats.receive(Class::Overhead, overhead, now);
-        if self.content.map_version() != version {
+        let is_overtaken = self.content.overtake();
+        if self.content.map_version() != version || is_overtaken {
             events.push_back(SurfaceEvent::MapChanged(self.address()));
         }
     }
@@ -200,6 +212,9 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.pair.stats.receive(class_of(chunk), chunk.payload.len(), now);
         let outcome = self.content.handle_chunk(vehicle, number, chunk, &self.pair.stats, now, events);
         self.is_out_of_step |= outcome.is_out_of_step();
+        if outcome == ChunkOutcome::Accepted && matches!(chunk.kind, ChunkKind::Map | ChunkKind::Layer) {
+            self.divergence.clear();
+        }
         if !outcome.is_accepted() {
             return self.pair.stats.drop(DropReason::Malformed);
         }
@@ -245,18 +260,26 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     /// Begins a new run toward the vehicle if the two ends were found to differ; returns whether they were.
-    pub(super) fn resync_if_out_of_step(&mut self, now: Instant) -> bool {
+    pub(super) fn resync_if_out_of_step(&mut self, now: Instant, events: &mut VecDeque<SurfaceEvent>) -> bool {
         if !std::mem::take(&mut self.is_out_of_step) {
             return false;
         }
         self.pair.renew();
-        self.forget_peer(now);
+        self.forget_peer(now, events);
         true
     }
 
+    /// Drops the copy of an ended run; returns whether there was one.
+    pub(super) fn drop_ended(&mut self) -> bool {
+        self.content.ended.take().is_some()
+    }
+
     /// The state of the vehicle is unknown: one of the two ends has begun a new run.
-    fn forget_peer(&mut self, now: Instant) {
-        self.content.clear();
+    fn forget_peer(&mut self, now: Instant, events: &mut VecDeque<SurfaceEvent>) {
+        if self.content.end_run(now) {
+            events.push_back(SurfaceEvent::RunEnded(self.address()));
+        }
+        self.divergence.clear();
         self.timing = VehicleTiming::default();
         self.last_turn.began = 0;
         self.outbox.handle_peer_restart(now);

@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Received frames after which an acknowledgement does not wait any longer.
 const MAX_UNACKNOWLEDGED: u64 = 16;
 /// Silence after which a vehicle is sent a hello, because it may have restarted.
-const SILENCE_TIMEOUT: Duration = Duration::from_secs(60);
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(40);
 
 impl Contact {
     fn is_silent(&self, now: Instant) -> bool {
@@ -23,9 +23,10 @@ impl Contact {
         self.answer_due.is_some_and(|at| now >= at)
     }
 
-    /// When a hello becomes due if the vehicle stays silent.
-    fn next_hello(&self) -> Instant {
-        self.last_received.map_or(self.hello_due, |at| (at + SILENCE_TIMEOUT).max(self.hello_due))
+    /// When a hello becomes due if no frame comes in. A vehicle that has not proven the run may not know it.
+    fn next_hello(&self, is_proven: bool) -> Instant {
+        let silent = self.last_received.filter(|_| is_proven);
+        silent.map_or(self.hello_due, |at| (at + SILENCE_TIMEOUT).max(self.hello_due))
     }
 
     /// A hello went out; the next ones follow at growing intervals.
@@ -37,7 +38,7 @@ impl Contact {
 
 impl<R: StateReplica> VehiclePeer<R> {
     fn must_send_hello(&self, now: Instant) -> bool {
-        let is_doubtful = !self.pair.has_run() || self.contact.is_silent(now) || self.pair.is_full();
+        let is_doubtful = !self.pair.is_proven() || self.contact.is_silent(now) || self.pair.is_full();
         is_doubtful && now >= self.contact.hello_due
     }
 
@@ -56,7 +57,10 @@ impl<R: StateReplica> VehiclePeer<R> {
     pub(in crate::link::surface) fn next_reason(&self) -> Option<Instant> {
         let again = self.outbox.progress().filter_map(|s| s.sent).min().map(|at| at + self.slot_timeout());
         let again = again.filter(|_| self.outbox.has_backlog());
-        [Some(self.contact.next_hello()), self.contact.answer_due, again].into_iter().flatten().min()
+        [Some(self.contact.next_hello(self.pair.is_proven())), self.contact.answer_due, again]
+            .into_iter()
+            .flatten()
+            .min()
     }
 
     /// Writes a frame, or postpones it if the budget does not allow it yet.
@@ -70,7 +74,7 @@ impl<R: StateReplica> VehiclePeer<R> {
         let kind = FrameKind::hello_if(self.must_send_hello(now));
         let plan = self.plan_turn(modem, kind, 1, shares, now - self.slot_timeout());
         let slots = plan.into_iter().next()?;
-        let allowed = budget.earliest(self.bits(&slots, modem), now);
+        let allowed = budget.earliest(self.bits(&slots, modem, kind), now);
         if allowed > now {
             self.contact.answer_due = Some(allowed);
             return None;

@@ -26,6 +26,11 @@ impl StatusParts {
         self.whole.as_ref()
     }
 
+    /// The epoch of the label ids, once a report has come in.
+    pub(super) fn epoch(&self) -> Option<u8> {
+        self.has_report.then_some(self.latest.epoch)
+    }
+
     /// Reads a pose, which is ignored if a newer one came in before; returns whether it makes sense.
     pub(super) fn read_pose(&mut self, payload: &[u8], number: FrameNumber, now: Instant) -> bool {
         let mut read = self.latest.clone();

@@ -72,11 +72,11 @@ impl<R: StateReplica> VehiclePeer<R> {
     ) -> Vec<Ready> {
         let turn_kind = FrameKind::hello_if(kind.is_hello() || !self.pair.has_run());
         self.last_turn = LastTurn { began: self.pair.next_number(), kind: turn_kind };
-        let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem)).sum();
+        let mut bits_left: u64 = plan.iter().map(|slots| self.bits(slots, modem, turn_kind)).sum();
         let mut at = now;
         let mut turn = Vec::with_capacity(plan.len());
         for slots in plan {
-            bits_left -= self.bits(slots, modem);
+            bits_left -= self.bits(slots, modem, turn_kind);
             let ready = self.write_frame(slots, modem, grant, Grant::code_remaining(bits_left), kind, at);
             at = at + modem.airtime(ready.transmit.bytes.len());
             turn.push(ready);
@@ -85,10 +85,13 @@ impl<R: StateReplica> VehiclePeer<R> {
     }
 
     /// The most bits on air that a frame with these slots takes.
-    pub(in crate::link::surface) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile) -> u64 {
+    pub(in crate::link::surface) fn bits(&self, slots: &[PendingSlot], modem: &ModemProfile, kind: FrameKind) -> u64 {
         const HEAD: usize = 9 + 1 + Stamp::SURFACE_BYTES;
         let chunks: usize = slots.iter().map(|s| s.bytes.len() + 2).sum();
-        let bytes = HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes();
+        let bytes = match kind.is_hello() || !self.pair.has_run() {
+            true => self.pair.hello_bytes(),
+            false => HEAD + chunks + self.pair.statement_bytes() + self.pair.seal_bytes(),
+        };
         modem.bits_on_air(bytes.min(modem.frame_bytes))
     }
 

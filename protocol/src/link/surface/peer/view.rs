@@ -1,12 +1,12 @@
 //! The surface's view of a vehicle, for its host.
 
-use super::VehiclePeer;
+use super::{EndedRun, VehiclePeer};
 use crate::directive::SlotProgress;
 use crate::link::LinkStats;
 use crate::mac::ClockMap;
 use crate::map::{LayerId, LayerReplica, LayerSet, Replica, StateReplica};
 use crate::time::Instant;
-use crate::wire::{Backlog, VehicleStatus};
+use crate::wire::{Backlog, Series, VehicleStatus};
 use std::time::Duration;
 
 /// A read-only view of a vehicle for the host.
@@ -25,6 +25,21 @@ impl<'a, R: StateReplica> PeerView<'a, R> {
     /// The operator's copy of the replicated state.
     pub fn replica(&self) -> &'a R {
         &self.0.content.replica
+    }
+
+    /// The copy of a run that has ended, until the present copy is as large.
+    pub fn ended_run(&self) -> Option<&'a EndedRun<R>> {
+        self.0.content.ended.as_ref()
+    }
+
+    /// The edge of a cell on the vehicle's map in metres, as its hello states it.
+    pub fn cell_m(&self) -> Option<f64> {
+        self.0.pair.peer_introduction()?.cell_edge.metres()
+    }
+
+    /// The series that the versions of its orders belong to.
+    pub fn series(&self) -> Series {
+        self.0.outbox.series()
     }
 
     /// The layers of its map: the built-in ones, and above them those that it has announced in this run.

@@ -1,0 +1,186 @@
+//! Without a key anybody can write frames that are accepted. The link recovers within a minute after the last one.
+
+mod pair;
+
+use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
+use proptest::prelude::*;
+use scenecast_protocol::mac::Access;
+use scenecast_protocol::map_codec::Codec;
+use scenecast_protocol::time::Instant;
+use scenecast_protocol::wire::{
+    AckStatement, Address, ChunkKind, Envelope, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Series,
+    SessionId,
+};
+use std::time::Duration;
+
+const MISSION: MissionId = MissionId(7);
+/// The longest time from the last forged frame to the recovery.
+const RECOVERY: Duration = Duration::from_secs(60);
+
+const CALM: LossyChannel = LossyChannel {
+    loss: 0.05,
+    duplication: 0.0,
+    reordering: 0.0,
+    corruption: 0.0,
+    talker: 0.0,
+    propagation: Duration::from_millis(300),
+};
+
+/// A stranger who hears every frame and can write a CRC.
+struct Stranger<'a> {
+    pair: &'a mut LinkedEnds,
+    random: u64,
+}
+
+impl Stranger<'_> {
+    fn draw(&mut self, below: u64) -> u64 {
+        self.random = self.random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.random >> 33) % below
+    }
+
+    /// The session of the last frame of an end.
+    fn session(&self, of: Address) -> Option<SessionId> {
+        let to_any = |bytes: &Vec<u8>| Envelope::decode(bytes, |_| true).ok().map(|e| e.header);
+        self.pair.overheard.iter().filter_map(to_any).find(|h| h.from == of).map(|h| h.session)
+    }
+
+    /// Writes one frame to one of the ends.
+    fn speak(&mut self) {
+        let to_vehicle = self.draw(2) == 0;
+        let (from, to) = if to_vehicle { (Address::SURFACE, auv()) } else { (auv(), Address::SURFACE) };
+        let (Some(sender), Some(receiver)) = (self.session(from), self.session(to)) else { return };
+        let bytes = match self.draw(6) {
+            0 => self.replay(),
+            1 => self.hello(from, to, sender, receiver),
+            2 => self.invented(from, to, sender, receiver),
+            _ => self.changed(from, to, receiver),
+        };
+        let now = self.pair.now;
+        let Some(bytes) = bytes else { return };
+        match to_vehicle {
+            true => self.pair.vehicle.handle_frame(&bytes, now),
+            false => self.pair.surface.handle_frame(&bytes, now),
+        }
+    }
+
+    fn replay(&mut self) -> Option<Vec<u8>> {
+        let pick = self.draw(self.pair.overheard.len().max(1) as u64) as usize;
+        self.pair.overheard.get(pick).cloned()
+    }
+
+    /// A hello of a run that exists or not.
+    fn hello(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
+        let session = if self.draw(2) == 0 { sender } else { SessionId::from_random(self.draw(1 << 16) as u16) };
+        let series = (from == Address::SURFACE).then(|| Series::from_random(self.draw(1 << 31)));
+        let header = Header { session, number: 0, kind: FrameKind::Hello, ..self.header(from, to, session) };
+        let mut builder = FrameBuilder::new(&header, 64);
+        builder.push(ChunkKind::Introduction, &Introduction { series, ..Introduction::default() }.encode());
+        let sealed_to = if from == Address::SURFACE { 0 } else { receiver.get() };
+        Some(builder.finish(&Seal::Crc(MISSION, sealed_to), true))
+    }
+
+    /// A frame with arbitrary chunks.
+    fn invented(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
+        let header = self.header(from, to, sender);
+        let mut builder = FrameBuilder::new(&header, 64);
+        for _ in 0..self.draw(3) {
+            let kinds = [ChunkKind::Map, ChunkKind::Pose, ChunkKind::Slot, ChunkKind::Object, ChunkKind::Report];
+            let kind = kinds[self.draw(5) as usize];
+            let bytes: Vec<u8> = (0..self.draw(24)).map(|_| self.draw(256) as u8).collect();
+            builder.push(kind, &bytes);
+        }
+        Some(builder.finish(&Seal::Crc(MISSION, receiver.get()), true))
+    }
+
+    /// An overheard frame with another number, base, statement or content.
+    fn changed(&mut self, from: Address, to: Address, receiver: SessionId) -> Option<Vec<u8>> {
+        let heard: Vec<Vec<u8>> = self.pair.overheard.iter().take(60).cloned().collect();
+        let pick = self.draw(heard.len().max(1) as u64) as usize;
+        let envelope = Envelope::decode(heard.get(pick)?, |_| true).ok().filter(|e| e.header.from == from)?;
+        let frame = envelope.open(&Seal::Crc(MISSION, receiver.get()))?;
+        let mut header = Header { to, ..frame.header.clone() };
+        match self.draw(5) {
+            0 => header.number = header.number.wrapping_add(self.draw(64) as u16),
+            1 => header.base = 1 + self.draw(100) as u16,
+            2 => {
+                let horizon_low = (self.draw(4096)) as u16;
+                header.ack = Some(AckStatement { horizon_low, lost: vec![self.draw(8) as u16] });
+            }
+            3 => header.turn = Some(self.draw(256) as u8),
+            _ => {}
+        }
+        let mut builder = FrameBuilder::new(&header, 64);
+        for chunk in frame.chunks() {
+            let mut payload = chunk.payload.to_vec();
+            if self.draw(3) == 0 && !payload.is_empty() {
+                let at = self.draw(payload.len() as u64) as usize;
+                payload[at] ^= 1 << self.draw(8);
+            }
+            builder.push(chunk.kind, &payload);
+        }
+        builder.set_remaining(header.remaining);
+        Some(builder.finish(&Seal::Crc(MISSION, receiver.get()), true))
+    }
+
+    fn header(&mut self, from: Address, to: Address, session: SessionId) -> Header {
+        let last = self.pair.overheard.iter().filter_map(|b| Envelope::decode(b, |_| true).ok()).map(|e| e.header);
+        let number = last.filter(|h| h.from == from).map(|h| h.number).next().unwrap_or(0);
+        Header {
+            from,
+            to,
+            session,
+            number: number.wrapping_add(self.draw(4) as u16),
+            base: 1 + self.draw(4) as u16,
+            remaining: 0,
+            turn: (self.draw(2) == 0).then(|| self.draw(256) as u8),
+            stamp: None,
+            nonce: None,
+            ack: None,
+            kind: FrameKind::Numbered,
+            keyed: false,
+        }
+    }
+}
+
+/// The time from `from` until the maps agree and the last order is applied, if that is before `until`.
+fn recovery(pair: &mut LinkedEnds, order: i8, until: Instant) -> Option<Duration> {
+    let from = pair.now;
+    while pair.now < until {
+        pair.run(pair.now + Duration::from_millis(500), false);
+        if pair.is_converged() && pair.applied.last() == Some(&utility(order)) {
+            return Some(pair.now.since(from));
+        }
+    }
+    None
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(150))]
+
+    #[test]
+    fn the_link_recovers_within_a_minute_of_accepted_forgeries(
+        seed: u64,
+        forgeries in 1u32..120,
+        pause_ms in 20u64..2000,
+        access in prop_oneof![3 => Just(Access::Shared), 1 => Just(Access::ModemOwned { pool_frames: 8 }), 1 => Just(Access::Polled)],
+    ) {
+        let setup = Setup { access, ..Setup::new(64, 10_000, Codec::Context) };
+        let mut pair = LinkedEnds::new(seed, setup, CALM);
+        pair.vehicle.set_map(patchy(12, 1).iter(), pair.now);
+        pair.run(pair.now + Duration::from_secs(40), true);
+        let mut stranger = Stranger { pair: &mut pair, random: seed ^ 0x5EED };
+        for step in 0..forgeries {
+            stranger.speak();
+            let pause = stranger.draw(pause_ms) + 1;
+            let pair = &mut *stranger.pair;
+            pair.run(pair.now + Duration::from_millis(pause), false);
+            if step % 20 == 0 {
+                pair.vehicle.set_map(patchy(12, 1 + u64::from(step)).iter(), pair.now);
+            }
+        }
+        pair.surface.issue(auv(), utility(77), pair.now).unwrap();
+        let until = pair.now + RECOVERY;
+        let took = recovery(&mut pair, 77, until);
+        prop_assert!(took.is_some(), "surface {:?}\nvehicle {:?}", pair.surface.vehicle(auv()).unwrap().stats(), pair.vehicle.stats());
+    }
+}
