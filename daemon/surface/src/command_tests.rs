@@ -99,11 +99,13 @@ proptest! {
             let (by, now) = (&crew[who], at(seconds));
             let before = command.holder().map(|h| h.principal.name().to_owned());
             let is_own = before.as_deref() == Some(by.name());
+            let mut is_sign = is_own;
             let change = match &step {
                 Step::Order(kind) => {
                     let allowed = command.check(by, *kind, now).is_ok();
                     let has_command = *kind == OrderKind::Stop || is_own || before.is_none();
                     prop_assert_eq!(allowed, by.role() >= kind.role() && has_command);
+                    is_sign &= allowed;
                     command.handle_order(by, *kind, now)
                 }
                 Step::Act(action) => command.handle_action(by, action, now).ok().flatten(),
@@ -126,8 +128,8 @@ proptest! {
             prop_assert_eq!(&recorded, &after, "each change of the holder is recorded");
             prop_assert!(command.holder().is_none_or(|h| h.principal.role() >= Role::Operator));
             prop_assert!(command.changes().count() <= 32 && command.requests(now).count() <= 4);
-            // A sign of the holder: its own step, or that by which it became the holder.
-            if before != after || is_own {
+            // A sign of the holder: its own step unless refused, or that by which it became the holder.
+            if before != after || is_sign {
                 last_sign = seconds;
             }
         }
