@@ -22,6 +22,8 @@ const MAX_CHANGES: usize = 32;
 pub enum OrderKind {
     /// Hold or abort: any operator may stop a vehicle, with and without command.
     Stop,
+    /// A record that stays at the surface, such as a note: any operator, with and without command.
+    Record,
     /// Any other order: an operator who has command.
     Order,
     /// A change of settings: an administrator who has command.
@@ -32,9 +34,14 @@ impl OrderKind {
     /// The least role that may do it.
     pub fn role(self) -> Role {
         match self {
-            Self::Stop | Self::Order => Role::Operator,
+            Self::Stop | Self::Record | Self::Order => Role::Operator,
             Self::Settings => Role::Administrator,
         }
+    }
+
+    /// Whether its giver must have command.
+    pub fn needs_command(self) -> bool {
+        matches!(self, Self::Order | Self::Settings)
     }
 }
 
@@ -162,19 +169,19 @@ impl Command {
     pub fn check(&self, by: &Principal, kind: OrderKind, now: Instant) -> Result<(), CommandRefusal> {
         require_role(by, kind.role())?;
         match &self.holder {
-            Some(holder) if kind != OrderKind::Stop && holder.principal.name() != by.name() => Err(held(holder, now)),
+            Some(holder) if kind.needs_command() && holder.principal.name() != by.name() => Err(held(holder, now)),
             _ => Ok(()),
         }
     }
 
-    /// An order that passed [`Command::check`] was accepted. If nobody has command, its giver takes it, unless the order
-    /// is a stop. Returns the change.
+    /// An order that passed [`Command::check`] was accepted. If nobody has command and the order needs it, its giver takes
+    /// it. Returns the change.
     pub fn handle_order(&mut self, by: &Principal, kind: OrderKind, now: Instant) -> Option<CommandChange> {
         if self.check(by, kind, now).is_err() {
             return None;
         }
         match self.holder {
-            None if kind != OrderKind::Stop => Some(self.give(CommandChangeKind::Taken, by, Some(by.clone()), now)),
+            None if kind.needs_command() => Some(self.give(CommandChangeKind::Taken, by, Some(by.clone()), now)),
             _ => {
                 self.keep(by, now);
                 None

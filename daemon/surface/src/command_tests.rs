@@ -83,7 +83,7 @@ fn step() -> impl Strategy<Value = Step> {
         CommandAction::Release,
         CommandAction::Keep,
     ];
-    let orders = prop::sample::select(vec![OrderKind::Stop, OrderKind::Order, OrderKind::Settings]);
+    let orders = prop::sample::select(vec![OrderKind::Stop, OrderKind::Record, OrderKind::Order, OrderKind::Settings]);
     prop_oneof![orders.prop_map(Step::Order), to.prop_map(Step::Act), prop::sample::select(others).prop_map(Step::Act)]
 }
 
@@ -103,7 +103,7 @@ proptest! {
             let change = match &step {
                 Step::Order(kind) => {
                     let allowed = command.check(by, *kind, now).is_ok();
-                    let has_command = *kind == OrderKind::Stop || is_own || before.is_none();
+                    let has_command = !kind.needs_command() || is_own || before.is_none();
                     prop_assert_eq!(allowed, by.role() >= kind.role() && has_command);
                     is_sign &= allowed;
                     command.handle_order(by, *kind, now)
@@ -113,7 +113,7 @@ proptest! {
             let after = command.holder().map(|h| h.principal.name().to_owned());
             if before != after {
                 let by_rule = match &step {
-                    Step::Order(kind) => before.is_none() && *kind != OrderKind::Stop,
+                    Step::Order(kind) => before.is_none() && kind.needs_command(),
                     Step::Act(CommandAction::HandOver(_) | CommandAction::Release) => is_own,
                     Step::Act(CommandAction::Request) => before.is_none(),
                     Step::Act(CommandAction::Take) => before.is_none() || seconds - last_sign >= 120,
