@@ -220,7 +220,10 @@ fn other_machines_need_a_token() {
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
     assert!(!cookie.contains(&token), "the cookie is not the token");
     let session = cookie.split(';').next().unwrap();
-    assert_eq!(status("/", &format!("Cookie: {session}\r\n")), 200);
+    let cookie = format!("Cookie: {session}\r\n");
+    assert_eq!(status("/", &cookie), 200);
+    let logout = http(port, "POST", "/logout", &format!("{cookie}X-Scenecast: 1\r\n"), "").unwrap();
+    assert_eq!((logout.0, status("/", &cookie)), (303, 303), "the session has ended");
     let url = format!("http://127.0.0.1:{port}");
     assert_eq!(run(&["ctl", "status", "--url", &url, "--token-file", file]).status.code(), Some(0));
     let without = run(&["ctl", "status", "--url", &url]);
