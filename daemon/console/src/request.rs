@@ -4,16 +4,26 @@ use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
 use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder};
-use crate::snapshot::seconds;
-use crate::state::AcceptedOrder;
+use crate::snapshot::{command_state, seconds};
+use crate::state::{AcceptedOrder, CommandState};
 use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
 use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
-use scenecast_surface::{FenceOrder, LimitsOrder, RequestKind, SettingsOrder, Surface};
+use scenecast_surface::{
+    CommandAction, CommandRefusal, FenceOrder, LimitsOrder, OrderKind, Principal, RequestKind, SettingsOrder, Surface,
+};
 use std::collections::BTreeMap;
+
+/// A request and the principal who makes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClientRequest {
+    /// `None` is enough for a reading only.
+    pub principal: Option<Principal>,
+    pub request: SurfaceRequest,
+}
 
 /// A reading or an order. The first number is the address of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +44,25 @@ pub enum SurfaceRequest {
     Settings(u8, SettingsOrder),
     /// Change the bit budget, the shares and the background streams.
     Budget(BudgetOrder),
+    /// Request command, hand it over, take it or give it up.
+    Command(CommandAction),
+}
+
+impl SurfaceRequest {
+    /// The kind of an order; `None` for readings, and for changes of command, which have rules of their own.
+    fn order_kind(&self) -> Option<OrderKind> {
+        match self {
+            Self::Map(_) | Self::Exemplar(..) | Self::Fit(..) | Self::Command(_) => None,
+            Self::Constraints(_, order) if order.hold || order.abort => Some(OrderKind::Stop),
+            Self::Utility(..)
+            | Self::ExemplarOrder(..)
+            | Self::Constraints(..)
+            | Self::Fence(..)
+            | Self::Limits(..)
+            | Self::Budget(_) => Some(OrderKind::Order),
+            Self::Settings(..) => Some(OrderKind::Settings),
+        }
+    }
 }
 
 /// The reply of the surface.
@@ -47,6 +76,12 @@ pub enum Reply {
     Fit(Box<Fit>),
     /// The order was accepted and waits for its turn.
     Accepted(AcceptedOrder),
+    /// Who has command after a change.
+    Command(CommandState),
+    /// The role of the principal does not allow it: the reason in one line.
+    Forbidden(String),
+    /// Another principal has command: the reason and the remedy in one line.
+    NotInCommand(String),
     /// There is no such vehicle, label or image.
     NotFound,
     /// The order is not allowed: the reason in one line.
@@ -54,7 +89,40 @@ pub enum Reply {
 }
 
 /// Handles a request between two steps of the surface.
-pub fn handle_request(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Reply {
+pub fn handle_request(surface: &mut Surface, request: ClientRequest, cell_m: f64, now: Instant) -> Reply {
+    let ClientRequest { principal, request } = request;
+    let Some(by) = principal else {
+        let is_reading = request.order_kind().is_none() && !matches!(request, SurfaceRequest::Command(_));
+        let anonymous = || Reply::Forbidden("an order needs a principal".to_owned());
+        return if is_reading { reply(surface, request, cell_m, now) } else { anonymous() };
+    };
+    if let SurfaceRequest::Command(action) = &request {
+        return match surface.change_command(&by, action, now) {
+            Ok(()) => Reply::Command(command_state(surface.command(), now)),
+            Err(refusal) => refused(&refusal),
+        };
+    }
+    let Some(kind) = request.order_kind() else { return reply(surface, request, cell_m, now) };
+    if let Err(refusal) = surface.command().check(&by, kind, now) {
+        return refused(&refusal);
+    }
+    let reply = reply(surface, request, cell_m, now);
+    if matches!(reply, Reply::Accepted(_)) {
+        surface.handle_accepted(&by, kind, now);
+    }
+    reply
+}
+
+fn refused(refusal: &CommandRefusal) -> Reply {
+    let line = refusal.to_string();
+    match refusal {
+        CommandRefusal::Role { .. } => Reply::Forbidden(line),
+        CommandRefusal::Held { .. } => Reply::NotInCommand(line),
+        _ => Reply::Refused(line),
+    }
+}
+
+fn reply(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Instant) -> Reply {
     handle(surface, request, cell_m, now).unwrap_or(Reply::NotFound)
 }
 
@@ -95,6 +163,8 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             accepted(vehicle, SlotId::Settings, surface.set_settings(vehicle, &order, now))
         }
         SurfaceRequest::Budget(order) => budget(surface, order, now),
+        // Handled with its principal, before.
+        SurfaceRequest::Command(_) => return None,
     })
 }
 

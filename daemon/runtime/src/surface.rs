@@ -10,15 +10,15 @@ use super::stop::Stop;
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
-    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request, snapshot, start,
+    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, bind, handle_request, snapshot, start,
 };
 use scenecast_core::UserError;
 use scenecast_core::label_picture;
 use scenecast_core::world_file;
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::wire::Address;
-use scenecast_surface::SurfaceOutput;
 use scenecast_surface::position::Follow;
+use scenecast_surface::{CommandChange, SurfaceOutput};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,11 +31,13 @@ const PUBLISH_INTERVAL: Duration = Duration::from_secs(1);
 pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Result<(), UserError> {
     super::block_on(async move {
         let stop = Stop::new()?;
+        let mut principals = Vec::new();
         let listener = match &config.console.listen {
             None => None,
             Some(address) => {
-                let token = scenecast_config::load_token(&config)?;
-                Some(bind(address.as_str(), "console.listen", token, &config.console.host).await?)
+                let tokens = scenecast_config::load_tokens(&config)?;
+                principals.extend(tokens.iter().map(|t| t.principal.clone()));
+                Some(bind(address.as_str(), "console.listen", tokens, &config.console.host).await?)
             }
         };
         let dir = config.runtime.state_dir.clone();
@@ -52,6 +54,7 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
             super::random_bits(),
             clock.now(),
         )?;
+        surface.set_principals(principals);
         if let Some(relay) = relay(&config) {
             surface.set_relay(relay);
         }
@@ -135,7 +138,7 @@ impl SurfaceShell {
         }
     }
 
-    fn handle_request(&mut self, request: SurfaceRequest, reply: oneshot::Sender<Reply>) {
+    fn handle_request(&mut self, request: ClientRequest, reply: oneshot::Sender<Reply>) {
         // A browser that closed its connection needs no reply.
         let _ = reply.send(handle_request(self.host.surface_mut(), request, self.facts.cell_m, self.clock.now()));
     }
@@ -196,6 +199,7 @@ impl SurfaceShell {
             SurfaceOutput::Mismatch(vehicle, mismatch) => {
                 tracing::warn!("frames of vehicle {} are refused: {mismatch}", vehicle.number());
             }
+            SurfaceOutput::CommandChanged(change) => log_command(&change),
             SurfaceOutput::RunEnded(_) | SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
         Ok(())
@@ -234,6 +238,12 @@ impl SurfaceShell {
         }
         scenecast_files::write_whole(&file("png"), &png)
     }
+}
+
+fn log_command(change: &CommandChange) {
+    let CommandChange { by, from, to, kind, .. } = change;
+    let [from, to] = [from, to].map(|name| name.as_deref().unwrap_or("nobody"));
+    tracing::info!("command {kind:?} by {by}: before {from}, now {to}");
 }
 
 async fn next_request(console: &mut Option<Console>) -> PendingRequest {

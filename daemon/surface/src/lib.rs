@@ -1,6 +1,9 @@
 //! The surface: it holds the operator's map of each vehicle and sends each vehicle its directive. It does no IO.
 
 mod assemble;
+mod command;
+#[cfg(test)]
+mod command_tests;
 mod exemplar_cache;
 mod orders;
 mod pauses;
@@ -11,8 +14,13 @@ mod surface;
 mod vehicle_record;
 
 pub use assemble::assemble;
+pub use command::{
+    COMMAND_SILENCE, Command, CommandAction, CommandChange, CommandChangeKind, CommandHolder, CommandRefusal,
+    CommandRequest, OrderKind,
+};
 pub use exemplar_cache::{ExemplarCache, LabelExemplars, OpenRequest, RequestKind, RequestState, StoredExemplar};
 pub use orders::{FenceOrder, LimitsOrder, MAX_DISTANCE_M};
+pub use scenecast_core::{Principal, Role};
 pub use settings::{SettingsOrder, SettingsRecord};
 pub use surface::{Surface, SurfaceOutput};
 pub use vehicle_record::VehicleRecord;

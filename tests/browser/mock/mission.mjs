@@ -1,5 +1,6 @@
 // The whole synthetic mission: vehicles, the surface's turns, budget and the state document.
 
+import { Command } from "./command.mjs";
 import { LAYERS, Vehicle } from "./vehicle.mjs";
 import { Direction } from "./link.mjs";
 
@@ -25,6 +26,7 @@ export class Mission {
     this.background = ["finer", "depth", "exemplars", "confidence"];
     this.layers = false;
     this.ended = false;
+    this.command = new Command();
     this.down = new Direction(7);
     this.history = [];
     this.nextDownS = 2;
@@ -100,6 +102,7 @@ export class Mission {
       mission: { name: this.name, id: `mock-${this.name}`, speed: this.speed, ended: this.ended },
       vehicles: this.vehicles.map((v) => v.json(this.nowS)),
       position: this.position ?? null,
+      command: this.command.json(),
       layers: LAYERS.map(({ name, unit }) => ({ name, unit, summary: `what ${name} means` })),
       link: {
         budget_bps: this.budgetBps, shares: this.shares, background: this.background, budget_window_s: 10,

@@ -13,6 +13,9 @@ pub(super) fn respond(reply: Reply) -> Response {
         Reply::File(content_type, bytes) => ([(header::CONTENT_TYPE, content_type)], bytes).into_response(),
         Reply::Fit(fit) => Json(*fit).into_response(),
         Reply::Accepted(accepted) => (StatusCode::ACCEPTED, Json(accepted)).into_response(),
+        Reply::Command(command) => Json(command).into_response(),
+        Reply::Forbidden(reason) => error(StatusCode::FORBIDDEN, &reason),
+        Reply::NotInCommand(reason) => error(StatusCode::CONFLICT, &reason),
         Reply::NotFound => not_found(),
         Reply::Refused(reason) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
     }

@@ -1,5 +1,7 @@
-// Alarms: no connection, a silent vehicle, a map that is not up to date, the end of the mission.
+// Alarms and requests: no connection, a request for command, a silent vehicle, a map that is not up to date, the end of the mission.
 
+import { sendCommand } from "../api.js";
+import { hasCommand } from "../command.js";
 import { $, announce, h, keyed, show, text } from "../dom.js";
 import { missionTime, span } from "../format.js";
 import { ageOf, isSilent, store } from "../store.js";
@@ -27,6 +29,7 @@ function current() {
     if (isSilent(v)) found.push(silent(v));
     if (store.connected && store.mapFaults.has(v.id)) found.push(outdated(v));
   }
+  if (hasCommand()) found.push(...store.snapshot.command.requests.map(requested));
   if (store.snapshot?.mission.ended) found.push(ended());
   return found;
 }
@@ -37,7 +40,7 @@ function lost() {
   const next = wait > 0 ? `trying again in ${span(Math.ceil(wait))}` : "trying now";
   return {
     key: "lost", kind: "bad", head: "No connection to scenecast",
-    body: `for ${since}; ${next}. All displayed values may be out of date.`, retry: true,
+    body: `for ${since}; ${next}. All displayed values may be out of date.`, action: ["Try now", retryNow],
   };
 }
 
@@ -64,9 +67,16 @@ function ended() {
   return { key: "ended", kind: "info", head: "The mission has ended", body: `at ${missionTime(store.nowS)}. The map is final.` };
 }
 
+function requested({ name, at_s: at }) {
+  const body = `${span(ageOf(at))} ago. You have command.`;
+  const handOver = () => sendCommand("hand_over", name).catch(() => {});
+  return { key: `command-${name}`, kind: "info", head: `${name} requests command`, body, action: ["Hand over", handOver] };
+}
+
 function make(banner) {
-  const retry = h("button", { type: "button", onclick: retryNow }, "Try now");
-  return h("p.banner", { data: { kind: banner.kind } }, h("b"), " ", h("span"), " ", banner.retry ? retry : null);
+  const [name, onclick] = banner.action ?? [];
+  const button = name ? h("button", { type: "button", onclick }, name) : null;
+  return h("p.banner", { data: { kind: banner.kind } }, h("b"), " ", h("span"), " ", button);
 }
 
 function refresh(node, banner) {
