@@ -16,9 +16,11 @@ pub mod orders;
 mod request;
 mod snapshot;
 pub mod state;
+mod tiles;
 
-pub use export::{CellLayer, MapCells};
+pub use export::MapCells;
 pub use http::{Console, ConsoleListener, PendingRequest, bind, start};
 pub use link_meter::LinkMeter;
 pub use request::{Reply, SurfaceRequest, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, snapshot};
+pub use tiles::TiledMap;

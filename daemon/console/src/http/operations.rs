@@ -25,6 +25,8 @@ pub(super) enum Content {
     File(&'static str),
     /// Server-sent events.
     Events,
+    /// Tiles of a map.
+    Tiles,
     Headers,
 }
 
@@ -98,9 +100,17 @@ fn readings() -> Vec<Operation> {
         read(
             "/api/v2/vehicles/{id}/map",
             "map",
-            "The map with the age of its cells",
+            "The map or a region of it in JSON, with the age of its cells: at most 1048576 cells",
             Content::Json(schema::<MapBody>),
             || get(maps::map),
+        ),
+        read(
+            "/api/v2/vehicles/{id}/map/tiles",
+            "map_tiles",
+            "The map in binary tiles, of any extent, or those that have changed since a tag; docs/reference/map-tiles.md has the \
+             format",
+            Content::Tiles,
+            || get(maps::tiles),
         ),
         read(
             "/api/v2/vehicles/{id}/exemplars/{file}",
@@ -157,6 +167,19 @@ fn map_files() -> Vec<Operation> {
             maps::PLY
         ),
         map_file!("/api/v2/vehicles/{id}/map.csv", "map_csv", "One line for each explored cell", maps::CSV),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.tif",
+            "map_tiff",
+            "The map as a tiled GeoTIFF, a pixel a cell, in transverse Mercator about the mission's origin, or in metres without one",
+            maps::TIFF
+        ),
+        map_file!(
+            "/api/v2/vehicles/{id}/map.utm.tif",
+            "map_utm",
+            "The map as a GeoTIFF in the UTM zone of the origin",
+            maps::UTM
+        ),
+        map_file!("/api/v2/vehicles/{id}/map.wgs84.tif", "map_wgs84", "The map as a GeoTIFF in EPSG:4326", maps::WGS84),
     ]
 }
 

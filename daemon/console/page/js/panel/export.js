@@ -10,16 +10,21 @@ const FILES = [
   ["PNG", "one pixel a cell, pixel value = label", "png"],
   ["World file", "the place of the PNG, beside it", "pgw"],
   ["Projection", "the projection of the PNG, beside it", "png.aux.xml"],
+  ["GeoTIFF", "one pixel a cell, of any extent, pixel value = label", "tif"],
+  ["GeoTIFF, UTM", "the same in the UTM zone of the origin", "utm.tif"],
+  ["GeoTIFF, WGS 84", "the same in longitude and latitude", "wgs84.tif"],
   ["CSV", "one line a cell with label, age and layers", "csv"],
   ["GeoJSON", "regions of equal label", "geojson"],
   ["PLY", "coloured points for 3-D tools", "ply"],
 ];
 
+const NEEDS_ORIGIN = ["utm.tif", "wgs84.tif"];
+
 export function openExport() {
   const { map, vehicle } = store;
   const dialog = $("dialog");
   const close = h("button.primary", { type: "button", onclick: () => dialog.close() }, "Close");
-  dialog.replaceChildren(h("h2", { id: "dialog-title" }, "Export the map"), ...(map && map.width > 0 ? offer(vehicle) : [h("p", {}, "No cell has arrived yet.")]), h("div.buttons", {}, close));
+  dialog.replaceChildren(h("h2", { id: "dialog-title" }, "Export the map"), ...(map && !map.isEmpty ? offer(vehicle) : [h("p", {}, "No cell has arrived yet.")]), h("div.buttons", {}, close));
   dialog.showModal();
 }
 
@@ -31,7 +36,7 @@ function offer(vehicle) {
   const local = mission.origin ? "" : " The mission has no origin in latitude and longitude: coordinates are metres east and north.";
   return [
     h("p", {}, `Version ${vehicle.map.version} of ${vehicle.name}, changed ${ago(ageOf(vehicle.map.updated_s))}.${local}`),
-    h("ul.files", {}, ...FILES.map(item)),
+    h("ul.files", {}, ...FILES.filter(([, , extension]) => mission.origin || !NEEDS_ORIGIN.includes(extension)).map(item)),
     h("p.hint", {}, "Files have label numbers. Names, colours and merges of labels stay in this browser."),
   ];
 }
