@@ -18,8 +18,8 @@ mod snapshot;
 pub mod state;
 mod tiles;
 
-pub use export::MapCells;
-pub use http::{Console, ConsoleListener, PendingRequest, bind, start};
+pub use export::{MapCells, MapFormat};
+pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
 pub use request::{Reply, SurfaceRequest, handle_request};
 pub use snapshot::{MissionFacts, Snapshot, snapshot};

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// An indexed PNG, north up, pixel value = label. A PNG has no empty tiles, so its extent is limited.
-pub(crate) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
+pub(super) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
     let Rect { width, height, .. } = cells.rectangle();
     if cells.rectangle().area() > label_picture::MAX_CELLS {
         let most = label_picture::MAX_CELLS;
@@ -24,7 +24,7 @@ pub(crate) fn indexed_png(cells: &MapCells) -> Result<Vec<u8>, String> {
 }
 
 /// The six lines of a world file: the size of a pixel and the centre of the north-west pixel.
-pub(crate) fn world_file(cells: &MapCells) -> String {
+pub(super) fn world_file(cells: &MapCells) -> String {
     let Rect { x, y, height, .. } = cells.rectangle();
     let (west, north) = cells.corner_m(i64::from(x), i64::from(y) + i64::from(height.max(1)));
     let (cell, half) = (cells.cell_m, cells.cell_m / 2.0);
@@ -32,13 +32,13 @@ pub(crate) fn world_file(cells: &MapCells) -> String {
 }
 
 /// The `.aux.xml` file in which GDAL and QGIS look for the projection of a PNG.
-pub(crate) fn projection(origin: Option<Origin>) -> String {
+pub(super) fn projection(origin: Option<Origin>) -> String {
     let text = well_known_text(origin).replace('"', "&quot;");
     format!("<PAMDataset>\n  <SRS dataAxisToSRSAxisMapping=\"1,2\">{text}</SRS>\n</PAMDataset>\n")
 }
 
 /// Regions of equal label: WGS 84 if the mission has an origin, else metres east and north of it.
-pub(crate) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
+pub(super) fn geojson(cells: &MapCells, origin: Option<Origin>) -> String {
     let projection = origin.map(TransverseMercator::about);
     let corner = |&(column, row): &(i64, i64)| {
         let (x, y) = cells.corner_m(column, row);
@@ -73,7 +73,7 @@ fn tidy(degrees: f64) -> f64 {
 }
 
 /// ASCII PLY: the centre of each explored cell in metres east, north and up (0 where the depth is unknown), colour, label.
-pub(crate) fn ply(cells: &MapCells) -> String {
+pub(super) fn ply(cells: &MapCells) -> String {
     let count = cells.explored().count();
     let mut out = format!(
         "ply\nformat ascii 1.0\ncomment scenecast map, metres east, north, up\nelement vertex {count}\n\
@@ -90,7 +90,7 @@ pub(crate) fn ply(cells: &MapCells) -> String {
 }
 
 /// One line for each explored cell: the centre in metres, the label, its age in seconds, the value of each layer if known.
-pub(crate) fn csv(cells: &MapCells) -> String {
+pub(super) fn csv(cells: &MapCells) -> String {
     let mut out = String::from("east_m,north_m,label,age_s");
     cells.layers.iter().for_each(|layer| out.extend([",", &layer.descriptor.name]));
     for ExploredCell { cell, x, y, label, age_s } in cells.explored() {

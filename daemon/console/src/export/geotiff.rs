@@ -23,7 +23,7 @@ const DEGREE_M: f64 = 111_320.0;
 
 /// The coordinate reference system of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Reference {
+pub(super) enum Reference {
     /// Transverse Mercator about the origin of the mission: each pixel is a cell. Without an origin: metres alone.
     Mission,
     /// The UTM zone of the origin.
@@ -75,7 +75,7 @@ impl Places {
 
 /// The map as a GeoTIFF, pixel value = label, 0 = no data. In UTM and WGS 84, each pixel has the label of the cell at its centre.
 /// The error is one line for people.
-pub(crate) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Reference) -> Result<Vec<u8>, String> {
+pub(super) fn geotiff(cells: &MapCells, origin: Option<Origin>, reference: Reference) -> Result<Vec<u8>, String> {
     let no_origin =
         "the mission has no origin in latitude and longitude: set mission.origin_deg, or take map.tif in metres";
     let (places, keys) = match (reference, origin) {

@@ -2,11 +2,11 @@
 
 mod cells;
 mod files;
+mod format;
 mod geotiff;
 mod projection;
 mod regions;
 
 pub use cells::MapCells;
 pub(crate) use cells::{CellLayer, Tiles};
-pub(crate) use files::{csv, geojson, indexed_png, ply, projection, world_file};
-pub(crate) use geotiff::{Reference, geotiff};
+pub use format::MapFormat;

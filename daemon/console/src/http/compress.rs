@@ -14,7 +14,7 @@ const MIN_BYTES: usize = 512;
 const MAX_BYTES: usize = 1 << 28;
 
 /// Bytes in gzip (RFC 1952); `None` if there is no memory for them.
-pub(super) fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
+pub fn gzip(bytes: &[u8]) -> Option<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
     encoder.write_all(bytes).ok()?;
     encoder.finish().ok()

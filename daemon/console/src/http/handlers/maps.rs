@@ -1,12 +1,11 @@
 //! Maps. Each version is requested from the surface once, however many clients read it, and everything is made of it beside the
 //! link.
 
-use crate::export::{self, MapCells, Reference};
+use crate::export::{MapCells, MapFormat};
 use crate::http::compress::{accepts_gzip, gzip, tagged};
 use crate::http::response::{error, respond};
 use crate::http::shared::{CachedMap, Shared, VehicleId};
 use crate::request::{Reply, SurfaceRequest};
-use crate::state::Origin;
 use crate::tiles::TiledMap;
 use axum::Json;
 use axum::body::Bytes;
@@ -140,39 +139,8 @@ async fn packed_tiles(cached: Arc<CachedMap>, since: Option<String>, is_packed: 
     Some(bytes)
 }
 
-/// Makes a file of a map. The error is one line for people.
-type Make = fn(&MapCells, Option<Origin>) -> Result<Vec<u8>, String>;
-
-/// A file format of the map.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::http) struct FileFormat {
-    pub(in crate::http) content_type: &'static str,
-    make: Make,
-}
-
-pub(in crate::http) const PNG: FileFormat =
-    FileFormat { content_type: "image/png", make: |cells, _| export::indexed_png(cells) };
-pub(in crate::http) const WORLD: FileFormat =
-    FileFormat { content_type: "text/plain", make: |cells, _| Ok(export::world_file(cells).into()) };
-pub(in crate::http) const PROJECTION: FileFormat =
-    FileFormat { content_type: "application/xml", make: |_, origin| Ok(export::projection(origin).into()) };
-pub(in crate::http) const GEOJSON: FileFormat = FileFormat {
-    content_type: "application/geo+json",
-    make: |cells, origin| Ok(export::geojson(cells, origin).into()),
-};
-pub(in crate::http) const PLY: FileFormat =
-    FileFormat { content_type: "application/ply", make: |cells, _| Ok(export::ply(cells).into()) };
-pub(in crate::http) const CSV: FileFormat =
-    FileFormat { content_type: "text/csv", make: |cells, _| Ok(export::csv(cells).into()) };
-pub(in crate::http) const TIFF: FileFormat =
-    FileFormat { content_type: "image/tiff", make: |cells, origin| export::geotiff(cells, origin, Reference::Mission) };
-pub(in crate::http) const UTM: FileFormat =
-    FileFormat { content_type: "image/tiff", make: |cells, origin| export::geotiff(cells, origin, Reference::Utm) };
-pub(in crate::http) const WGS84: FileFormat =
-    FileFormat { content_type: "image/tiff", make: |cells, origin| export::geotiff(cells, origin, Reference::Wgs84) };
-
 /// The map as a file.
-pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, format: FileFormat) -> Response {
+pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, format: MapFormat) -> Response {
     let cached = match latest(&shared, id).await {
         Ok(cached) => cached,
         Err(response) => return response,
@@ -191,11 +159,11 @@ pub(in crate::http) async fn file(shared: Shared, id: u8, headers: HeaderMap, fo
     };
     let made = tokio::task::spawn_blocking(move || {
         let moved_m = placement.map_or((0.0, 0.0), |p| (p.east_m, p.north_m));
-        (format.make)(&MapCells { moved_m, ..cached.map.cells().clone() }, origin)
+        MapCells { moved_m, ..cached.map.cells().clone() }.export(format, origin)
     });
     match made.await {
         Ok(Ok(bytes)) => {
-            tagged(&headers, &tag, || ([(header::CONTENT_TYPE, format.content_type)], bytes).into_response())
+            tagged(&headers, &tag, || ([(header::CONTENT_TYPE, format.content_type())], bytes).into_response())
         }
         Ok(Err(reason)) => error(StatusCode::UNPROCESSABLE_ENTITY, &reason),
         Err(_) => error(StatusCode::INTERNAL_SERVER_ERROR, "the file could not be made"),
