@@ -201,14 +201,12 @@ export class Vehicle {
     return this.replica.bytes(nowS, LAYERS.filter((p) => streams.includes(p.name)), since);
   }
 
-  /** A survey of a million cells: lanes of 12 cells in a box of 20 x 20 km, received long ago. */
+  /** A survey of a million cells: lanes along two sides of a box of 20 x 20 km, received long ago. */
   surveyWidely() {
-    for (let lane = 0; lane < 2; lane += 1)
+    for (const side of [-40000, 39993])
       for (let along = -40000; along < 40000; along += 1)
         for (let across = 0; across < 7; across += 1) {
-          const label = 1 + ((along >> 5) + (across >> 2) + lane & 3);
-          this.replica.set(along, -40000 + 79000 * lane + across, label, 10 + ((along + 40000) >> 9));
-          if (along !== 0) this.replica.set(-40000 + 79000 * lane + across, along, label, 10 + ((along + 40000) >> 9));
+          this.replica.set(along, side + across, 1 + (((along >> 5) + (across >> 2)) & 3), 10 + ((along + 40000) >> 9));
         }
     this.replica.version += 1;
   }

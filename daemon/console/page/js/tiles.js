@@ -4,9 +4,9 @@
 export const EDGE = 64;
 const MAGIC = 0x544d4353;
 const FORMAT = 1;
-const HALF = 2 ** 26;
+const HALF = 2 ** 25;
 
-/** A tile's place as one number. */
+/** A tile's place as one number; columns and rows have 26 bits. */
 export const keyOf = (column, row) => (row + HALF) * 2 * HALF + column + HALF;
 
 /** The known levels of one layer in a tile: a rectangle, with the time at which each was received. */
