@@ -68,18 +68,29 @@ export default [
     async run(s) {
       const seen = await network(s);
       await update(s);
-      const known = await s.inPage(({ store }) => [...store.map.tiles.values()].find((t) => t.column === -625));
-      const [before, count] = [await s.cpuMs(), (await s.vehicle()).map.explored_cells];
-      const times = 6;
+      await s.inPage(({ store }) => (globalThis.held = store.map));
+      const count = (await s.vehicle()).map.explored_cells;
+      while ((await s.vehicle()).map.explored_cells < count + 500) await update(s);
+      const cells = (await s.vehicle()).map.explored_cells - count;
       Object.assign(seen, { mapBytes: 0, tiles: [] });
-      for (let i = 0; i < times; i += 1) await update(s);
+      // The same update several times, since CPU time is measured in steps of 10 ms. The polling of a story would cost more.
+      const times = 20;
+      const before = await s.cpuMs();
+      await s.inPage(async ({ store }, n) => {
+        const { id, map } = store.vehicle;
+        for (let i = 0; i < n; i += 1) {
+          store.maps.set(id, globalThis.held);
+          await store.fetchMap(id, map);
+          for (let k = 0; k < 2; k += 1) await new Promise((resolve) => requestAnimationFrame(resolve));
+        }
+      }, times);
       const ms = ((await s.cpuMs()) - before) / times;
-      const cells = ((await s.vehicle()).map.explored_cells - count) / times;
-      s.figures.push(`${Math.round(cells)} new cells: ${Math.round(seen.mapBytes / times)} bytes, ${Math.round(ms)} ms of CPU time`);
-      assert.ok(seen.tiles.length >= times && seen.tiles.every((since) => since), `${seen.tiles}`);
-      assert.ok(seen.mapBytes > 0 && seen.mapBytes / times < UPDATE_BYTES, `${seen.mapBytes / times} bytes`);
+      await s.until("the last byte", () => seen.mapBytes > 0);
+      s.figures.push(`${cells} new cells: ${Math.round(seen.mapBytes / times)} bytes, ${Math.round(ms)} ms of CPU time`);
+      assert.ok(seen.tiles.length === times && seen.tiles.every((since) => since), `${seen.tiles}`);
+      assert.ok(seen.mapBytes / times < UPDATE_BYTES, `${seen.mapBytes / times} bytes`);
       assert.ok(ms < UPDATE_MS, `${ms} ms`);
-      assert.ok(known && (await isWhole(s)));
+      assert.ok(await isWhole(s));
     },
   },
   {
