@@ -283,7 +283,8 @@ fn assert_exports_open(name: &str, origin: &[&str]) {
     // A late fix may move the map between two files.
     wait_until("all files with the map in one place", LIMIT, || {
         let before = placement();
-        for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv"] {
+        let projected: &[&str] = if origin.is_empty() { &[] } else { &["map.utm.tif", "map.wgs84.tif"] };
+        for file in ["map.json", "map.png", "map.geojson", "map.ply", "map.csv", "map.tif"].iter().chain(projected) {
             let made = ctl(port, &["map", "--out", &path(file)]);
             assert_eq!(made.status.code(), Some(0), "{file}: {}", text(&made));
         }

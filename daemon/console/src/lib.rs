@@ -22,5 +22,5 @@ pub use export::{MapCells, MapFormat};
 pub use http::{Console, ConsoleListener, PendingRequest, bind, gzip, page_files, start};
 pub use link_meter::LinkMeter;
 pub use request::{Reply, SurfaceRequest, handle_request};
-pub use snapshot::{MissionFacts, Snapshot, snapshot};
+pub use snapshot::{MissionFacts, Snapshot, measured_origin, snapshot};
 pub use tiles::TiledMap;
