@@ -11,8 +11,8 @@ use super::stop::Stop;
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
-    Console, LinkMeter, MapCells, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request,
-    measured_origin, snapshot, start,
+    Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request, measured_origin,
+    snapshot, start,
 };
 use scenecast_core::UserError;
 use scenecast_core::world_file;
@@ -217,14 +217,13 @@ impl SurfaceShell {
     fn write_map(&mut self, vehicle: Address) {
         let (now, cell_m) = (self.clock.now(), self.facts.cell_m);
         let request = SurfaceRequest::Map(vehicle.number());
-        let Reply::Map(cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
+        let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
         let surface = self.host.surface();
         let placement = surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
         let place = surface.relay().and_then(|r| r.plane()).zip(cells.bounds);
         let origin = measured_origin(surface).or(self.facts.origin);
         let world_file = place.map(|(plane, bounds)| world_file(plane, placement, bounds, cell_m));
-        let moved_m = placement.map_or((0.0, 0.0), |p| (p.origin.east_m, p.origin.north_m));
-        let cells = MapCells { moved_m, ..cells };
+        cells.moved_m = placement.map_or((0.0, 0.0), |p| (p.origin.east_m, p.origin.north_m));
         self.maps.write(vehicle.number(), MapFile { cells, world_file, origin });
     }
 }
