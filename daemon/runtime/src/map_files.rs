@@ -106,3 +106,40 @@ fn write(dir: &Path, vehicle: u8, map: &MapFile) -> Result<(), String> {
     put("png", &map.cells.export(MapFormat::Png, map.origin)?)?;
     remove("tif")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use scenecast_protocol::map::{Cell, LabelGrid};
+
+    fn file(cells: &[(i32, i32)]) -> MapFile {
+        let grid: LabelGrid = cells.iter().map(|&(x, y)| (Cell::new(x, y), 3)).collect();
+        MapFile { cells: MapCells::of_labels(&grid, 0.25), world_file: Some("1".to_owned()), origin: None }
+    }
+
+    #[test]
+    fn the_last_map_is_on_disk_when_the_writer_has_finished() {
+        let dir = std::env::temp_dir().join(format!("scenecast-map-files-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let names = || {
+            let mut names: Vec<_> = std::fs::read_dir(&dir).unwrap().map(|e| e.unwrap().file_name()).collect();
+            names.sort();
+            names
+        };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let run = |maps: &[(u8, MapFile)]| {
+            runtime.block_on(async {
+                let files = MapFiles::start(dir.clone());
+                maps.iter().for_each(|(vehicle, map)| files.write(*vehicle, map.clone()));
+                files.finish().await;
+            });
+        };
+        run(&[(2, file(&[(0, 0), (80_000, 80_000)])), (1, file(&[(0, 0)])), (2, file(&[(0, 0), (1, 1)]))]);
+        assert_eq!(names(), ["operator-map-1.pgw", "operator-map-1.png", "operator-map-2.pgw", "operator-map-2.png"]);
+        run(&[(1, file(&[(0, 0), (80_000, 80_000)]))]);
+        assert_eq!(names(), ["operator-map-1.tif", "operator-map-2.pgw", "operator-map-2.png"]);
+        run(&[(1, file(&[(5, 5)]))]);
+        assert_eq!(names()[..2], ["operator-map-1.pgw", "operator-map-1.png"]);
+        std::fs::remove_dir_all(&dir).unwrap();
+    }
+}

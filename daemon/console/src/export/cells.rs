@@ -3,7 +3,9 @@
 use crate::state::{LayerBody, MapBody};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use scenecast_protocol::map::{Cell, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey};
+use scenecast_protocol::map::{
+    Cell, LabelGrid, LayerDescriptor, Quantity, REPLICA_TILE, Rect, ReplicaTile, ReplicaTileKey,
+};
 use scenecast_protocol::time::Instant;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -100,6 +102,19 @@ impl CellLayer {
 }
 
 impl MapCells {
+    /// A map of labels without layers and times of reception, at the start of the mission.
+    pub fn of_labels(grid: &LabelGrid, cell_m: f64) -> Self {
+        Self {
+            version: 1,
+            at: Instant::ZERO,
+            bounds: grid.bounds(),
+            cell_m,
+            moved_m: (0.0, 0.0),
+            tiles: ReplicaTile::tiles_of(grid),
+            layers: Vec::new(),
+        }
+    }
+
     /// The cells of a region, by default of the bounds. The error is one line for people.
     pub(crate) fn body(&self, region: Option<Rect>) -> Result<MapBody, String> {
         let region = region.unwrap_or(self.rectangle());

@@ -84,15 +84,7 @@ pub(super) mod tests {
     #[test]
     fn a_tile_has_the_bytes_of_its_document() {
         let grid: LabelGrid = [(Cell::new(-3, 2), 5), (Cell::new(-2, 3), 7)].into_iter().collect();
-        let cells = MapCells {
-            version: 4,
-            at: Instant::from_secs_f64(9.0),
-            bounds: grid.bounds(),
-            cell_m: 0.25,
-            moved_m: (0.0, 0.0),
-            tiles: ReplicaTile::tiles_of(&grid),
-            layers: Vec::new(),
-        };
+        let cells = MapCells { version: 4, ..MapCells::of_labels(&grid, 0.25) };
         let bytes = crate::tiles::TiledMap::first(cells, 0xab).tiles_since(None);
         assert_eq!(bytes[..8], *b"SCMT\x01\0\0\0");
         let found = index(&bytes);

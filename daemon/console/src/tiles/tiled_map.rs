@@ -116,20 +116,10 @@ fn keys(cells: &MapCells) -> BTreeSet<ReplicaTileKey> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use scenecast_protocol::map::{Cell, LabelGrid, ReplicaTile};
-    use scenecast_protocol::time::Instant;
+    use scenecast_protocol::map::Cell;
 
     fn map(cells: &[(i32, i32)]) -> MapCells {
-        let grid: LabelGrid = cells.iter().map(|&(x, y)| (Cell::new(x, y), 3)).collect();
-        MapCells {
-            version: 1,
-            at: Instant::ZERO,
-            bounds: grid.bounds(),
-            cell_m: 0.25,
-            moved_m: (0.0, 0.0),
-            tiles: ReplicaTile::tiles_of(&grid),
-            layers: Vec::new(),
-        }
+        MapCells::of_labels(&cells.iter().map(|&(x, y)| (Cell::new(x, y), 3)).collect(), 0.25)
     }
 
     fn index(map: &TiledMap, since: Option<&str>) -> MapIndex {

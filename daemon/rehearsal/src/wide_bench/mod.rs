@@ -75,7 +75,8 @@ pub struct WideFigures {
     pub surface_bytes: Option<u64>,
 }
 
-/// Measures a survey. `progress` receives the share of the cells that have arrived.
+/// Measures a survey. `progress` receives the share of the cells that have arrived, `keep` the extension and the bytes of each
+/// export.
 ///
 /// # Errors
 ///
@@ -85,6 +86,7 @@ pub fn wide(
     setting: WideSetting,
     seed: u64,
     progress: &mut dyn FnMut(f64),
+    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), UserError>,
 ) -> Result<WideFigures, UserError> {
     let mut survey = Survey::new(config, setting, seed)?;
     let before = resident_bytes();
@@ -100,6 +102,7 @@ pub fn wide(
         costs.push(view.update(&mut survey)?);
     }
     let cells = view.map.cells();
+    let exports = MapFormat::ALL.into_iter().map(|format| export(cells, format, keep)).collect::<Result<_, _>>()?;
     Ok(WideFigures {
         explored_cells: survey.explored(),
         box_m: setting.box_m,
@@ -108,7 +111,7 @@ pub fn wide(
         map_bytes,
         map_ms,
         update: median(&costs),
-        exports: MapFormat::ALL.into_iter().map(|format| export(cells, format)).collect(),
+        exports,
         surface_bytes,
     })
 }
@@ -161,11 +164,19 @@ fn cells(survey: &mut Survey, cell_m: f64) -> Result<MapCells, UserError> {
     }
 }
 
-fn export(cells: &MapCells, format: MapFormat) -> ExportCost {
+fn export(
+    cells: &MapCells,
+    format: MapFormat,
+    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), UserError>,
+) -> Result<ExportCost, UserError> {
     let meter = CpuMeter::start();
     let made = cells.export(format, Some(ORIGIN));
+    let cpu_ms = meter.ms();
     let bytes = made.as_ref().map_or(0, Vec::len);
-    ExportCost { format: format.extension(), cpu_ms: meter.ms(), bytes, refused: made.err() }
+    if let Ok(bytes) = &made {
+        keep(format.extension(), bytes)?;
+    }
+    Ok(ExportCost { format: format.extension(), cpu_ms, bytes, refused: made.err() })
 }
 
 fn median(costs: &[UpdateCost]) -> UpdateCost {
@@ -191,7 +202,7 @@ mod tests {
     fn a_wide_survey_of_few_cells_loads_and_updates_in_few_bytes() {
         let setting = WideSetting { cells: 20_000, box_m: 20_000.0, update: 500, updates: 3, depth: true };
         let config = scenecast_config::load(None, &[]).unwrap();
-        let run = || wide(&config, setting, 1, &mut |_| ()).unwrap();
+        let run = || wide(&config, setting, 1, &mut |_| (), &mut |_, _| Ok(())).unwrap();
         let found = run();
         assert!(found.explored_cells >= 21_500, "{found:?}");
         // A million cells in less than 3 MB, the page among them, are less than 2.8 bytes a cell.

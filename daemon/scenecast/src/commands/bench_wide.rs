@@ -2,8 +2,10 @@
 
 use clap::Args;
 use scenecast_core::UserError;
+use scenecast_files::write_whole;
 use scenecast_rehearsal::wide_bench::{WideFigures, WideSetting, wide};
 use scenecast_tools::Progress;
+use std::path::PathBuf;
 
 /// A wide survey at the surface: CPU time and bytes of an update of the page, of loading page and map, and of each
 /// export, and the memory of the map.
@@ -30,6 +32,9 @@ pub(super) struct WideBench {
     /// Leave out the layer of depths
     #[arg(long)]
     labels_only: bool,
+    /// Folder for the exports of the map
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
 fn side(text: &str) -> Result<f64, String> {
@@ -48,7 +53,14 @@ impl WideBench {
             depth: !self.labels_only,
         };
         let mut progress = Progress::new("cells");
-        let figures = wide(&config, setting, self.seed, &mut |share| progress.show(share))?;
+        if let Some(dir) = &self.out {
+            std::fs::create_dir_all(dir).map_err(|e| UserError::file(dir, e))?;
+        }
+        let mut keep = |extension: &str, bytes: &[u8]| match &self.out {
+            Some(dir) => write_whole(&dir.join(format!("map.{extension}")), bytes),
+            None => Ok(()),
+        };
+        let figures = wide(&config, setting, self.seed, &mut |share| progress.show(share), &mut keep)?;
         drop(progress);
         if self.json {
             let text = serde_json::to_string_pretty(&figures).map_err(|e| UserError::Failed(e.to_string()))?;
