@@ -23,6 +23,15 @@ export default [
     },
   },
   {
+    name: "a wide map is offered in formats that can hold it",
+    scenario: "wide",
+    async run(s) {
+      await s.button("Export").click();
+      const links = await s.page.locator("#dialog .files a").evaluateAll((all) => all.map((a) => a.getAttribute("href").split("/map.")[1]));
+      assert.deepEqual(links, ["tif", "csv", "geojson", "ply"]);
+    },
+  },
+  {
     name: "CSV, GeoJSON and PLY have the cells of the map",
     unmocked: true,
     async run(s) {

@@ -19,6 +19,15 @@ const FILES = [
 ];
 
 const NEEDS_ORIGIN = ["utm.tif", "wgs84.tif"];
+/** A PNG has no empty tiles: the server makes none of more cells than this. */
+const PNG_FILES = ["png", "pgw", "png.aux.xml"];
+const MAX_PNG_CELLS = 2 ** 23;
+
+/** Whether the server can make a file of this map. */
+function isOffered(extension, { mission }, map) {
+  if (NEEDS_ORIGIN.includes(extension)) return Boolean(mission.origin);
+  return !PNG_FILES.includes(extension) || map.width * map.height <= MAX_PNG_CELLS;
+}
 
 export function openExport() {
   const { map, vehicle } = store;
@@ -36,7 +45,7 @@ function offer(vehicle) {
   const local = mission.origin ? "" : " The mission has no origin in latitude and longitude: coordinates are metres east and north.";
   return [
     h("p", {}, `Version ${vehicle.map.version} of ${vehicle.name}, changed ${ago(ageOf(vehicle.map.updated_s))}.${local}`),
-    h("ul.files", {}, ...FILES.filter(([, , extension]) => mission.origin || !NEEDS_ORIGIN.includes(extension)).map(item)),
+    h("ul.files", {}, ...FILES.filter(([, , extension]) => isOffered(extension, store.snapshot, vehicle.map)).map(item)),
     h("p.hint", {}, "Files have label numbers. Names, colours and merges of labels stay in this browser."),
   ];
 }
