@@ -33,6 +33,9 @@ pub struct WideSetting {
 /// Where a survey was made: any place, far from the middle of its UTM zone.
 const ORIGIN: Origin = Origin { lat_deg: 60.17, lon_deg: -10.25 };
 
+/// Keeps an export, by its extension.
+type Keep<'a> = dyn FnMut(&str, &[u8]) -> Result<(), UserError> + 'a;
+
 /// The medians of the updates.
 #[derive(Debug, Clone, Serialize)]
 pub struct UpdateCost {
@@ -86,7 +89,7 @@ pub fn wide(
     setting: WideSetting,
     seed: u64,
     progress: &mut dyn FnMut(f64),
-    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), UserError>,
+    keep: &mut Keep<'_>,
 ) -> Result<WideFigures, UserError> {
     let mut survey = Survey::new(config, setting, seed)?;
     let before = resident_bytes();
@@ -164,11 +167,7 @@ fn cells(survey: &mut Survey, cell_m: f64) -> Result<MapCells, UserError> {
     }
 }
 
-fn export(
-    cells: &MapCells,
-    format: MapFormat,
-    keep: &mut dyn FnMut(&str, &[u8]) -> Result<(), UserError>,
-) -> Result<ExportCost, UserError> {
+fn export(cells: &MapCells, format: MapFormat, keep: &mut Keep<'_>) -> Result<ExportCost, UserError> {
     let meter = CpuMeter::start();
     let made = cells.export(format, Some(ORIGIN));
     let cpu_ms = meter.ms();

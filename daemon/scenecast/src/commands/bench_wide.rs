@@ -83,7 +83,7 @@ fn print(f: &WideFigures) {
     }
     println!();
     println!(
-        "update of {:.0} cells: {:.1} ms CPU ({:.1} ms in the link's loop), {:.0} bytes of tiles",
+        "update of {:.0} cells: {:.2} ms CPU ({:.2} ms in the link's loop), {:.0} bytes of tiles",
         u.cells,
         u.link_loop_ms + u.tiles_ms,
         u.link_loop_ms,
