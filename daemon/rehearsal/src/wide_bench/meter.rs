@@ -2,6 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+/// The system counts CPU time in steps of some milliseconds. A shorter time is that of the clock, which is never less.
+const MIN_CPU_TIME: Duration = Duration::from_millis(20);
+
 /// Measures the CPU time of the calling thread; where the system does not report it, the time of the clock.
 pub(super) struct CpuMeter {
     cpu: Option<Duration>,
@@ -15,8 +18,9 @@ impl CpuMeter {
 
     /// Milliseconds since the start.
     pub(super) fn ms(&self) -> f64 {
+        let elapsed = self.clock.elapsed();
         let cpu = thread_cpu().zip(self.cpu).map(|(now, start)| now.saturating_sub(start));
-        1000.0 * cpu.unwrap_or(self.clock.elapsed()).as_secs_f64()
+        1000.0 * cpu.filter(|_| elapsed > MIN_CPU_TIME).unwrap_or(elapsed).as_secs_f64()
     }
 }
 
