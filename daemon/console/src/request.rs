@@ -4,11 +4,9 @@ use crate::export::MapCells;
 use crate::fit::{self, Fit};
 use crate::layers;
 use crate::orders::{BudgetOrder, ExemplarAction, ExemplarOrder};
-use crate::snapshot::{command_state, seconds};
+use crate::snapshot::command_state;
 use crate::state::{AcceptedOrder, CommandState};
-use scenecast_core::label_picture::MAX_CELLS;
 use scenecast_protocol::directive::{Constraints, SlotId};
-use scenecast_protocol::map::Rect;
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::Address;
@@ -28,7 +26,7 @@ pub struct ClientRequest {
 /// A reading or an order. The first number is the address of the vehicle.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SurfaceRequest {
-    /// Read the map with the age of its cells.
+    /// Read the map: its tiles with the time of each cell.
     Map(u8),
     /// Read an image of a label: the one with this number, or the latest.
     Exemplar(u8, u8, Option<u8>),
@@ -66,7 +64,7 @@ impl SurfaceRequest {
 }
 
 /// The reply of the surface.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub enum Reply {
     /// The cells of a map.
     Map(MapCells),
@@ -201,22 +199,16 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     Reply::Accepted(AcceptedOrder { slot: SlotId::Budget.name().to_owned(), version: None, versions })
 }
 
+/// The map, whose tiles the surface shares: the link waits for a list of tiles and not for a copy of their cells.
 fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option<Reply> {
-    let grid = surface.map(vehicle)?;
     let view = surface.view(vehicle)?;
-    let bounds = grid.bounds().unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
-    if bounds.area() > MAX_CELLS {
-        let Rect { width, height, .. } = bounds;
-        return Some(Reply::Refused(format!("the map spans {width} x {height} cells: at most {MAX_CELLS} are sent")));
-    }
     Some(Reply::Map(MapCells {
         version: surface.map_version(vehicle),
-        at_s: seconds(now),
-        bounds,
+        at: now,
+        bounds: surface.map_bounds(vehicle),
         cell_m,
         moved_m: (0.0, 0.0),
-        labels: bounds.cells().map(|cell| grid.get(cell)).collect(),
-        age_s: layers::ages(view.replica(), bounds, now),
-        layers: layers::layers(&view, bounds, now),
+        tiles: surface.map_tiles(vehicle)?,
+        layers: layers::layers(&view),
     }))
 }

@@ -12,7 +12,7 @@ pub use command::{
 };
 pub use labels::{ExemplarImage, ExemplarProgress, ExemplarStage, MapLabel};
 pub use link::{ChannelQuality, LinkDirection, LinkRates, LinkSummary, ReportedBacklog, VehicleChannel};
-pub use map::{LayerBody, MapBody, MapEvent, MapPlacement, MapSummary};
+pub use map::{LayerBody, MapBody, MapEvent, MapIndex, MapPlacement, MapSummary, TileLayer};
 pub use vehicle::{
     AppliedOrder, DirectiveSlots, OrderProgress, OrderStatus, PlannedPath, ReportedMode, ReportedPose, StatusReport,
     UsblMeasurement, UtilityTerms, VehicleOrders, VehicleSettings, VehicleState,

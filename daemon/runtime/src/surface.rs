@@ -3,6 +3,7 @@
 use super::clock::Clock;
 use super::instruments::{Instruments, relay};
 use super::journal::create_folder;
+use super::map_files::{MapFile, MapFiles};
 use super::modem::{self, ModemPort};
 use super::pilot::{self, PilotPort, SimulatedAutopilot};
 use super::refusals::{Refusals, warn_without_key};
@@ -10,16 +11,15 @@ use super::stop::Stop;
 use crate::port::FromPort;
 use scenecast_config::Config;
 use scenecast_console::{
-    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, bind, handle_request, snapshot, start,
+    ClientRequest, Console, LinkMeter, MissionFacts, PendingRequest, Reply, SurfaceRequest, bind, handle_request,
+    measured_origin, snapshot, start,
 };
 use scenecast_core::UserError;
-use scenecast_core::label_picture;
 use scenecast_core::world_file;
 use scenecast_host::{Follower, FrameEvent, SurfaceHost, SurfaceHostEvent, modem_station};
 use scenecast_protocol::wire::Address;
 use scenecast_surface::position::Follow;
 use scenecast_surface::{CommandChange, SurfaceOutput};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::oneshot;
@@ -77,7 +77,8 @@ pub fn run_surface(config: Config, simulated: Option<SimulatedAutopilot>) -> Res
         let follower = autopilot.map(|a| Follower::new(a, follow, vehicle, clock.now()));
         let host = SurfaceHost::new(surface, modem_station(&config, Address::SURFACE, profile)?, follower);
         let refusals = Refusals::default();
-        SurfaceShell { host, ports, console, clock, dir, facts, meter, refusals }.run(stop).await
+        let maps = MapFiles::start(dir);
+        SurfaceShell { host, ports, console, clock, maps, facts, meter, refusals }.run(stop).await
     })
 }
 
@@ -93,7 +94,7 @@ struct SurfaceShell {
     ports: Ports,
     console: Option<Console>,
     clock: Clock,
-    dir: PathBuf,
+    maps: MapFiles,
     facts: MissionFacts,
     meter: LinkMeter,
     refusals: Refusals,
@@ -112,6 +113,7 @@ impl SurfaceShell {
             tokio::select! {
                 () = stop.asked() => {
                     modem::log_audit(self.host.link());
+                    self.maps.finish().await;
                     return Ok(());
                 }
                 _ = tokio::time::sleep_until(self.clock.wall(wake)) => {}
@@ -172,7 +174,7 @@ impl SurfaceShell {
             match event {
                 SurfaceHostEvent::Role(output) => {
                     is_changed = true;
-                    self.handle_output(output)?;
+                    self.handle_output(output);
                 }
                 SurfaceHostEvent::Following(x, y) => {
                     tracing::info!("following: to {x:.0} m east, {y:.0} m north");
@@ -187,9 +189,9 @@ impl SurfaceShell {
         Ok(is_changed)
     }
 
-    fn handle_output(&self, output: SurfaceOutput) -> Result<(), UserError> {
+    fn handle_output(&mut self, output: SurfaceOutput) {
         match output {
-            SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle)?,
+            SurfaceOutput::MapChanged(vehicle) => self.write_map(vehicle),
             SurfaceOutput::VehicleFound(vehicle) => {
                 tracing::info!("vehicle {} answered a call: it is spoken with from now on", vehicle.number());
             }
@@ -202,7 +204,6 @@ impl SurfaceShell {
             SurfaceOutput::CommandChanged(change) => log_command(&change),
             SurfaceOutput::RunEnded(_) | SurfaceOutput::SlotDecided(..) | SurfaceOutput::Changed(_) => {}
         }
-        Ok(())
     }
 
     fn measure(&mut self, event: &FrameEvent) {
@@ -220,23 +221,17 @@ impl SurfaceShell {
         }
     }
 
-    fn write_map(&self, vehicle: Address) -> Result<(), UserError> {
-        let Some(map) = self.host.surface().map(vehicle) else { return Ok(()) };
-        let png = match label_picture::encode(map) {
-            Ok(png) => png,
-            // Received data must not end the run.
-            Err(e) => {
-                tracing::warn!("operator-map-{}.png is not written: {e}", vehicle.number());
-                return Ok(());
-            }
-        };
-        let file = |extension| self.dir.join(format!("operator-map-{}.{extension}", vehicle.number()));
-        if let (Some(plane), Some(bounds)) = (self.host.surface().relay().and_then(|r| r.plane()), map.bounds()) {
-            let placement = self.host.surface().view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
-            let text = world_file(plane, placement, bounds, self.facts.cell_m);
-            scenecast_files::write_whole(&file("pgw"), text.as_bytes())?;
-        }
-        scenecast_files::write_whole(&file("png"), &png)
+    fn write_map(&mut self, vehicle: Address) {
+        let (now, cell_m) = (self.clock.now(), self.facts.cell_m);
+        let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.number()) };
+        let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
+        let surface = self.host.surface();
+        let placement = surface.view(vehicle).and_then(|v| v.status().and_then(|(s, _)| s.placement));
+        let place = surface.relay().and_then(|r| r.plane()).zip(cells.bounds);
+        let origin = measured_origin(surface).or(self.facts.origin);
+        let world_file = place.map(|(plane, bounds)| world_file(plane, placement, bounds, cell_m));
+        cells.moved_m = placement.map_or((0.0, 0.0), |p| (p.origin.east_m, p.origin.north_m));
+        self.maps.write(vehicle.number(), MapFile { cells, world_file, origin });
     }
 }
 

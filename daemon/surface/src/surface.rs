@@ -11,11 +11,12 @@ use scenecast_core::{Principal, UsblLine};
 use scenecast_protocol::directive::{Budget, Constraints, Fix, OrderStatus, Slot, SlotId, Utility};
 use scenecast_protocol::exemplar::Exemplar;
 use scenecast_protocol::link::{Cycle, Mismatch, PeerView, SurfaceEvent, SurfaceLink, Transmit, Wakeup};
-use scenecast_protocol::map::{LabelGrid, LayerSet};
+use scenecast_protocol::map::{LabelGrid, LayerSet, Rect, ReplicaTile, ReplicaTileKey};
 use scenecast_protocol::schedule::{BackgroundOrder, Shares};
 use scenecast_protocol::time::Instant;
 use scenecast_protocol::wire::{Address, Placement};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 
 /// News of the surface for its host.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -111,6 +112,20 @@ impl Surface {
     pub fn map(&self, vehicle: Address) -> Option<&LabelGrid> {
         let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
         whole.or_else(|| self.link.vehicle(vehicle).map(|v| v.replica().shown()))
+    }
+
+    /// The labels of a vehicle's map in tiles. They are shared, so a clone stays as it is and costs little.
+    pub fn map_tiles(&self, vehicle: Address) -> Option<BTreeMap<ReplicaTileKey, Arc<ReplicaTile>>> {
+        if let Some(whole) = self.records.get(&vehicle).and_then(|d| d.whole.as_ref()) {
+            return Some(ReplicaTile::tiles_of(whole));
+        }
+        Some(self.link.vehicle(vehicle)?.replica().tiles().clone())
+    }
+
+    /// The smallest rectangle around the explored cells of a vehicle's map.
+    pub fn map_bounds(&self, vehicle: Address) -> Option<Rect> {
+        let whole = self.records.get(&vehicle).and_then(|d| d.whole.as_ref());
+        whole.map_or_else(|| self.link.vehicle(vehicle)?.replica().bounds(), LabelGrid::bounds)
     }
 
     /// A number that grows whenever the operator's map of a vehicle or one of its layers changes.
@@ -333,8 +348,11 @@ impl Surface {
 
     /// The number of cells of each label on the operator's map.
     pub fn labels(&self, vehicle: Address) -> Option<BTreeMap<u8, u32>> {
+        let Some(whole) = self.records.get(&vehicle).and_then(|d| d.whole.as_ref()) else {
+            return Some(self.link.vehicle(vehicle)?.replica().counts().collect());
+        };
         let mut cells = BTreeMap::new();
-        for (_, label) in self.map(vehicle)?.iter() {
+        for (_, label) in whole.iter() {
             *cells.entry(label).or_default() += 1;
         }
         Some(cells)

@@ -10,6 +10,7 @@ mod vehicle;
 pub(crate) use command::{command_state, principal_info};
 pub use facts::MissionFacts;
 pub(crate) use facts::seconds;
+pub use position::measured_origin;
 
 use crate::link_meter::LinkMeter;
 use crate::state::{LayerInfo, MissionInfo, MissionState, VehicleState};

@@ -64,7 +64,7 @@ enum Command {
     #[command(after_help = "Example: scenecast ctl status")]
     Status,
     /// Write the operator's map in the format of the file's extension: .png (with world file and
-    /// projection), .geojson, .ply, .csv, .json.
+    /// projection), .tif, .utm.tif and .wgs84.tif (GeoTIFF), .geojson, .ply, .csv, .json.
     #[command(after_help = "Example: scenecast ctl map --out reef.png")]
     Map {
         /// File to write, replaced if it exists
