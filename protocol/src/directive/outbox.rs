@@ -53,16 +53,23 @@ pub struct PendingSlot {
 pub struct SlotOutbox {
     series: u16,
     slots: [Option<SlotProgress>; SLOTS],
+    /// Whether the vehicle refused an order because it has lost its record of this series.
+    is_forgotten: bool,
 }
 
 impl SlotOutbox {
     /// An empty directive; `series` must be drawn at random at each start of the surface.
     pub fn new(series: u16) -> Self {
-        Self { series, slots: Default::default() }
+        Self { series, slots: Default::default(), is_forgotten: false }
     }
 
     /// Issues a new version of a slot, which supersedes the older one; returns the version.
+    ///
+    /// If the vehicle has lost its record of the series, a new one begins, in which every order is sent again.
     pub fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
+        if std::mem::take(&mut self.is_forgotten) {
+            self.begin_series(now);
+        }
         let id = slot.id();
         let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
         let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
@@ -139,6 +146,7 @@ impl SlotOutbox {
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
             if self.advance(id, slot.version, status, now, |s| s == OrderStatus::Received) {
+                self.is_forgotten |= status == OrderStatus::Refused(RefusalReason::Forgotten);
                 decided.push(id);
             }
         }
@@ -150,6 +158,21 @@ impl SlotOutbox {
         for slot in self.slots.iter_mut().flatten() {
             if matches!(slot.status, OrderStatus::OnAir | OrderStatus::Received) {
                 (slot.status, slot.changed, slot.sent) = (OrderStatus::Queued, now, None);
+            }
+        }
+    }
+
+    /// Sends every order again in a new series, except one that only lifts a hold or an abort: the vehicle holds since it
+    /// has lost its record, and the operator lifts that by a new order.
+    fn begin_series(&mut self, now: Instant) {
+        self.series = self.series.wrapping_add(1);
+        for progress in self.slots.iter_mut().flatten() {
+            let lifts = matches!(progress.slot, Slot::Constraints(order) if !order.hold && !order.abort);
+            let is_refused = matches!(progress.status, OrderStatus::Refused(r) if r != RefusalReason::Forgotten);
+            if lifts {
+                progress.status = OrderStatus::Refused(RefusalReason::Forgotten);
+            } else if !is_refused {
+                (progress.status, progress.changed, progress.sent) = (OrderStatus::Queued, now, None);
             }
         }
     }

@@ -39,4 +39,37 @@ pub struct Durable {
     pub fence: Vec<u8>,
     /// Position at the last fix that was used.
     pub place: Option<LastPlace>,
+    /// The orders that this state knows nothing of, because an earlier state was lost.
+    pub lost: LostOrders,
+}
+
+/// The series of orders of which the vehicle no longer knows which versions it has applied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum LostOrders {
+    /// No series: every decision is known.
+    #[default]
+    None,
+    /// The series in which the surface speaks, which is not known yet.
+    Present,
+    /// This series.
+    Of(u16),
+}
+
+impl LostOrders {
+    /// Whether an order of `series` may have been applied before. The first series that is received counts as the one
+    /// in which orders were lost; another one ends the loss.
+    pub(super) fn may_contain(&mut self, series: Option<u16>) -> bool {
+        match (*self, series) {
+            (Self::None, _) => false,
+            (Self::Present, Some(series)) => {
+                *self = Self::Of(series);
+                true
+            }
+            (Self::Of(lost), Some(series)) if lost != series => {
+                *self = Self::None;
+                false
+            }
+            _ => true,
+        }
+    }
 }
