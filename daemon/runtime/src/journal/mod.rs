@@ -72,9 +72,10 @@ pub(super) struct Journal<S: Storage> {
     names: JournalNames,
     /// The state with the highest number on the disk.
     last: Option<Record>,
-    /// Whether the journal has this state. If not, only the copy has it, so the journal gets it before the copy is
-    /// overwritten.
-    is_equal: bool,
+    /// Whether the copy's last state may be in the page cache only, while the journal has the state before on the disk.
+    is_copy_uncertain: bool,
+    /// Whether the journal may lack the last state on the disk, while the copy has it.
+    is_journal_uncertain: bool,
     files: [Option<S::File>; 2],
     /// Whether a file is put aside before a new one takes its name.
     is_damaged: [bool; 2],
@@ -89,13 +90,21 @@ impl<S: Storage> Journal<S> {
             Err(e) => Content::Damaged(Damage::Unreadable(e.to_string())),
         });
         let last = contents.iter().filter_map(Content::record).max_by_key(|record| record.sequence).cloned();
-        let is_equal = contents[0].record() == last.as_ref();
+        // An earlier process may have been killed between a write and its sync: of two equal files the journal was
+        // written last, and of two unequal ones the copy.
+        let [journal, copy] = [0, 1].map(|at| contents[at].record());
+        let is_copy_last = copy.is_some() && copy == last.as_ref();
+        let is_next =
+            journal.zip(copy).is_some_and(|(journal, copy)| copy.sequence == journal.sequence.wrapping_add(1));
+        let is_copy_uncertain = is_copy_last && is_next;
         let is_unreadable = |content: &Content| matches!(content, Content::Torn | Content::Damaged(_));
         let unreadable = [0, 1].map(|at| is_unreadable(&contents[at]));
         let found = find(names, contents);
         // A torn file beside a whole one is overwritten.
         let is_damaged = if matches!(found, Found::State { damage: None, .. }) { [false; 2] } else { unreadable };
-        (Self { storage, names, last, is_equal, files: [None, None], is_damaged }, found)
+        let is_journal_uncertain = is_copy_last;
+        let files = [None, None];
+        (Self { storage, names, last, is_copy_uncertain, is_journal_uncertain, files, is_damaged }, found)
     }
 
     pub(super) fn storage(&self) -> &S {
@@ -107,16 +116,20 @@ impl<S: Storage> Journal<S> {
     /// # Errors
     /// The disk refuses. The next call writes the whole record again.
     pub(super) fn persist(&mut self, state: &[u8]) -> Result<(), JournalError> {
-        if let Some(last) = self.last.clone().filter(|_| !self.is_equal) {
+        if let Some(last) = self.last.clone().filter(|_| self.is_journal_uncertain) {
+            if self.is_copy_uncertain {
+                self.write(1, &last)?;
+                self.is_copy_uncertain = false;
+            }
             self.write(0, &last)?;
-            self.is_equal = true;
+            self.is_journal_uncertain = false;
         }
         let sequence = self.last.as_ref().map_or(1, |last| last.sequence.wrapping_add(1));
         let next = Record { sequence, body: state.to_vec() };
         self.write(1, &next)?;
-        (self.is_equal, self.last) = (false, Some(next.clone()));
+        (self.is_journal_uncertain, self.last) = (true, Some(next.clone()));
         self.write(0, &next)?;
-        self.is_equal = true;
+        self.is_journal_uncertain = false;
         Ok(())
     }
 
