@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use scenecast_host::CameraPose;
 use scenecast_protocol::directive::{Constraints, OrderStatus, RefusalReason, SlotId};
 use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_surface::FenceOrder;
 use scenecast_vehicle::{Durable, LostOrders};
 
 const FILES: [&str; 2] = ["vehicle.journal", "vehicle.journal.copy"];
