@@ -4,6 +4,7 @@ mod pair;
 
 use pair::{LinkedEnds, LossyChannel, Setup, auv, patchy, utility};
 use proptest::prelude::*;
+use scenecast_protocol::directive::VersionedSlot;
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map_codec::Codec;
 use scenecast_protocol::time::Instant;
@@ -49,7 +50,8 @@ impl Stranger<'_> {
         let to_vehicle = self.draw(2) == 0;
         let (from, to) = if to_vehicle { (Address::SURFACE, auv()) } else { (auv(), Address::SURFACE) };
         let (Some(sender), Some(receiver)) = (self.session(from), self.session(to)) else { return };
-        let bytes = match self.draw(6) {
+        let bytes = match self.draw(7) {
+            3 if to_vehicle => self.order(from, to, sender, receiver),
             0 => self.replay(),
             1 => self.hello(from, to, sender, receiver),
             2 => self.invented(from, to, sender, receiver),
@@ -77,6 +79,15 @@ impl Stranger<'_> {
         builder.push(ChunkKind::Introduction, &Introduction { series, ..Introduction::default() }.encode());
         let sealed_to = if from == Address::SURFACE { 0 } else { receiver.get() };
         Some(builder.finish(&Seal::Crc(MISSION, sealed_to), true))
+    }
+
+    /// An order under any version.
+    fn order(&mut self, from: Address, to: Address, sender: SessionId, receiver: SessionId) -> Option<Vec<u8>> {
+        let header = self.header(from, to, sender);
+        let slot = VersionedSlot::encode(self.draw(1 << 16) as u16, &utility(self.draw(50) as i8));
+        let mut builder = FrameBuilder::new(&header, 64);
+        builder.push(ChunkKind::Slot, &slot);
+        Some(builder.finish(&Seal::Crc(MISSION, receiver.get()), true))
     }
 
     /// A frame with arbitrary chunks.

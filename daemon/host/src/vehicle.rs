@@ -18,7 +18,7 @@ const MAX_FIX_AGE_S: f64 = 60.0;
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleHostEvent {
     /// Make [`Vehicle::durable`] durable, then call [`VehicleHost::handle_persisted`]. Until then the host returns
-    /// no further event and no frame. If it fails, end the run.
+    /// no further event and no frame. If it fails, call [`VehicleHost::handle_persist_failed`].
     Persist,
     /// The vehicle's next waypoint, metres east and north in the map frame.
     Waypoint(MapPoint),
@@ -249,6 +249,13 @@ impl VehicleHost {
     pub fn handle_persisted(&mut self) {
         self.is_persisting = false;
         self.link.end_mut().handle_persisted();
+    }
+
+    /// The owner could not make [`Vehicle::durable`] durable. The vehicle holds and aborts from memory, refuses other
+    /// orders, and asks for it again later.
+    pub fn handle_persist_failed(&mut self, now: Instant) {
+        self.is_persisting = false;
+        self.link.end_mut().handle_persist_failed(now);
     }
 
     /// The next request or event; `None` while the state is being made durable.

@@ -8,6 +8,11 @@ const NAME: &str = "scene.checkpoint";
 /// Name of the file while it is being written.
 const PART: &str = "scene.checkpoint.part";
 
+/// Whether the folder has a checkpoint, readable or not.
+pub(super) fn is_there(storage: &impl Storage) -> bool {
+    !matches!(storage.read(NAME), Ok(None))
+}
+
 pub(super) struct CheckpointFile<S: Storage> {
     storage: S,
 }

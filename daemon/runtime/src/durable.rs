@@ -1,77 +1,124 @@
 //! The vehicle's durable state: read at the start of a run, and kept during it.
 
-use super::journal::{Damage, Journal, JournalError, Storage};
+use super::checkpoint;
+use super::journal::{Damage, Found, Journal, JournalNames, Storage};
 use scenecast_core::UserError;
-use scenecast_vehicle::{Durable, LastPlace};
-use std::path::Path;
+use scenecast_vehicle::{Durable, LastPlace, LostOrders};
 
-/// The journal's file. Its records hold a [`Durable`] in postcard; another layout needs another version of the file.
-const JOURNAL: &str = "vehicle.journal";
+/// The journal's files. Their records hold a [`Durable`] in postcard; another layout needs another version of the files.
+const JOURNAL: JournalNames = JournalNames { journal: "vehicle.journal", copy: "vehicle.journal.copy" };
 /// The state file of builds without a journal.
 const EARLIER_FILE: &str = "vehicle.state";
-/// Length at which the journal is rewritten: 64 records of a block.
-const MAX_BYTES: usize = 64 * 4096;
 
 /// Writes the durable state of a run to the journal.
 pub(super) struct Keeper<S: Storage> {
     journal: Journal<S>,
+    /// Whether the last state was refused.
+    is_refused: bool,
 }
 
-/// A run whose state is on disk, so that it may transmit.
+/// A run at its start.
 pub(super) struct StartedRun<S: Storage> {
     pub(super) keeper: Keeper<S>,
     pub(super) durable: Durable,
     /// Whether an earlier run left a state.
     pub(super) is_again: bool,
+    /// Whether the state is on the disk. If not, the vehicle holds, and its epoch may have been used before.
+    pub(super) is_stored: bool,
 }
 
 impl<S: Storage> Keeper<S> {
     /// Begins a run with the state that survived the last one. `checkpoint` has the lineage and the epoch of a restored
     /// scene model: if the last run had the same, its epoch continues; otherwise a new epoch begins.
     ///
-    /// The first run of a mission has the given `lineage`, which is random.
+    /// The first run of a mission has the given `lineage`, which is random. The run begins in hold if the journal is
+    /// damaged, if it is missing beside a checkpoint, or if the disk does not take the state.
+    ///
+    /// # Errors
+    /// A state file of a build without a journal.
     pub(super) fn begin_run(
         storage: S,
         lineage: u64,
         checkpoint: Option<(u64, u8)>,
     ) -> Result<StartedRun<S>, UserError> {
-        let place = storage.path(JOURNAL);
-        let opened = Journal::open(storage, JOURNAL, MAX_BYTES);
-        let (journal, state) = opened.map_err(|e| for_people(&place, e))?;
-        let is_again = state.is_some();
-        let durable = match state {
-            Some(state) => {
-                let last = decode(&state).ok_or(JournalError::Damage(Damage::Version));
-                let last = last.map_err(|e| for_people(&place, e))?;
-                match checkpoint == Some((last.lineage, last.epoch)) {
-                    true => last,
-                    false => {
-                        let place = last.place.map(LastPlace::for_new_map);
-                        Durable { epoch: last.epoch.wrapping_add(1), labels: 0, place, ..last }
+        let (journal, found) = Journal::open(storage, JOURNAL);
+        let storage = journal.storage();
+        let (mut durable, is_again) = match found {
+            Found::Absent if !checkpoint::is_there(storage) => {
+                refuse_earlier_build(storage)?;
+                (Durable { lineage, ..Durable::default() }, false)
+            }
+            Found::Absent => (forgetful(storage, JOURNAL.journal, &Damage::Missing, lineage), true),
+            Found::Lost(name, damage) => (forgetful(storage, name, &damage, lineage), true),
+            Found::State { body, is_earlier, damage } => match decode(body, is_earlier) {
+                Some(last) => {
+                    let mut durable = continued(last, checkpoint);
+                    if let Some((name, damage)) = damage {
+                        let place = storage.path(name);
+                        tracing::error!("{}: {damage}; the other copy is used, and the vehicle holds", place.display());
+                        durable.hold = true;
                     }
+                    (durable, true)
                 }
-            }
-            None => {
-                refuse_earlier_build(journal.storage())?;
-                Durable { lineage, ..Durable::default() }
-            }
+                None => (forgetful(storage, JOURNAL.journal, &Damage::Version, lineage), true),
+            },
         };
-        let mut keeper = Self { journal };
+        let mut keeper = Self { journal, is_refused: false };
         // Label ids of another model have other meanings, so a new epoch is on disk before it is published.
-        keeper.save(&durable)?;
-        Ok(StartedRun { keeper, durable, is_again })
+        let is_stored = keeper.save(&durable);
+        if !is_stored {
+            tracing::error!("the vehicle holds, because its journal cannot be written");
+            durable.hold = true;
+        }
+        Ok(StartedRun { keeper, durable, is_again, is_stored })
     }
 
-    /// Makes the state durable. A power cut before the return leaves either the previous state or this one.
-    pub(super) fn save(&mut self, durable: &Durable) -> Result<(), UserError> {
-        let place = self.journal.storage().path(JOURNAL);
-        let state = postcard::to_allocvec(durable).map_err(|e| UserError::Failed(e.to_string()))?;
-        self.journal.persist(&state).map_err(|e| for_people(&place, e))
+    /// Makes the state durable and returns whether the disk took it. A power cut before the return leaves either the
+    /// previous state or this one. The first of several refusals is logged as an error.
+    pub(super) fn save(&mut self, durable: &Durable) -> bool {
+        let stored = match postcard::to_allocvec(durable) {
+            Ok(state) => self.journal.persist(&state).map_err(|e| e.to_string()),
+            Err(e) => Err(e.to_string()),
+        };
+        let place = self.journal.storage().path(JOURNAL.journal);
+        let was_refused = std::mem::replace(&mut self.is_refused, stored.is_err());
+        match stored {
+            Ok(()) if was_refused => tracing::info!("{}: the disk takes the state again", place.display()),
+            Err(e) if !was_refused => tracing::error!(
+                "{}: {e}; until the disk takes it, the vehicle obeys only hold and abort",
+                place.display()
+            ),
+            Err(e) => tracing::debug!("{}: {e}", place.display()),
+            Ok(()) => {}
+        }
+        !self.is_refused
     }
 }
 
-fn decode(state: &[u8]) -> Option<Durable> {
-    match postcard::take_from_bytes(state) {
+/// The state of a run that continues the last one's.
+fn continued(last: Durable, checkpoint: Option<(u64, u8)>) -> Durable {
+    if checkpoint == Some((last.lineage, last.epoch)) {
+        return last;
+    }
+    let place = last.place.map(LastPlace::for_new_map);
+    Durable { epoch: last.epoch.wrapping_add(1), labels: 0, place, ..last }
+}
+
+/// The state of a run after the loss of the last one's: it holds, and applies no order that may have been applied before.
+/// The epoch is random, because the last one is not known.
+fn forgetful(storage: &impl Storage, name: &str, damage: &Damage, lineage: u64) -> Durable {
+    let place = storage.path(name);
+    tracing::error!("{}: {damage}; the vehicle's orders are lost, and it holds", place.display());
+    let epoch = lineage.to_be_bytes()[0];
+    Durable { lineage, epoch, hold: true, lost: LostOrders::Present, ..Durable::default() }
+}
+
+/// Reads a state; earlier builds wrote it without its last member, [`Durable::lost`].
+fn decode(mut state: Vec<u8>, is_earlier: bool) -> Option<Durable> {
+    if is_earlier {
+        state.push(0);
+    }
+    match postcard::take_from_bytes(&state) {
         Ok((durable, [])) => Some(durable),
         _ => None,
     }
@@ -89,16 +136,9 @@ fn refuse_earlier_build(storage: &impl Storage) -> Result<(), UserError> {
     }
 }
 
-fn for_people(place: &Path, error: JournalError) -> UserError {
-    match error {
-        JournalError::Damage(damage) => UserError::file(place, damage),
-        other => UserError::Failed(format!("{}: {other}", place.display())),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::journal::disk::Disk;
+    use super::super::journal::disk::{Disk, DiskRefusal};
     use super::*;
     use scenecast_protocol::link::SlotInboxState;
     use scenecast_protocol::schedule::BackgroundOrder;
@@ -114,7 +154,7 @@ mod tests {
         let (mut keeper, durable) = begin(&disk).unwrap();
         assert_eq!(durable, Durable { lineage: 9, ..Durable::default() });
         let held = Durable { epoch: 4, labels: 7, hold: true, budget_bps: Some(500), ..durable };
-        keeper.save(&held).unwrap();
+        assert!(keeper.save(&held));
         let later = |epoch| Durable { epoch, labels: 0, ..held.clone() };
         assert_eq!(begin(&disk).unwrap().1, later(5));
         assert_eq!(begin(&disk).unwrap().1, later(6));
@@ -125,7 +165,7 @@ mod tests {
         let disk = Disk::default();
         let (mut keeper, durable) = begin(&disk).unwrap();
         let last = Durable { epoch: 4, labels: 7, ..durable };
-        keeper.save(&last).unwrap();
+        assert!(keeper.save(&last));
         let run = |checkpoint| {
             let run = Keeper::begin_run(disk.clone(), 1, Some(checkpoint)).unwrap();
             assert!(run.is_again);
@@ -165,6 +205,7 @@ mod tests {
             breach: 2,
             fence: vec![0],
             place: None,
+            lost: LostOrders::Of(Series::from_random(300)),
         };
         let golden = [
             &[1, 7, 2, 5, 6][..],
@@ -172,24 +213,26 @@ mod tests {
             &[0, 1, 0, 0, 0, 2, 0, 0],
             &[3, 12, 172, 2],
             &[1, 3, 50, 255, 1, 2, 253, 1, 0, 1, 244, 3, 1, 10, 5, 5, 50, 20, 1, 128, 100],
-            &[2, 0x40, 0, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0],
+            &[2, 0x40, 0, 2, 0, 4, 130, 1, 2, 2, 1, 0, 0, 2, 172, 2],
         ];
         assert_eq!(postcard::to_allocvec(&durable).unwrap(), golden.concat());
-        assert_eq!(decode(&golden.concat()), Some(durable));
+        assert_eq!(decode(golden.concat(), false), Some(durable.clone()));
+        let earlier = golden.concat()[..golden.concat().len() - 3].to_vec();
+        assert_eq!(decode(earlier, true), Some(Durable { lost: LostOrders::None, ..durable }), "an earlier build's");
     }
 
     #[test]
     fn a_state_with_two_bytes_of_background_order_reads_as_before() {
-        let stored = |background: &[u8]| [&[0; 26][..], background, &[0; 7]].concat();
+        let stored = |background: &[u8]| [&[0; 26][..], background, &[0; 8]].concat();
         let zeros = Durable::default();
-        assert_eq!(decode(&stored(&[0])), Some(zeros.clone()));
+        assert_eq!(decode(stored(&[0]), false), Some(zeros.clone()));
         let codes = (0..0x8000u16).filter(|&code| BackgroundOrder::from_code(u128::from(code)).is_some());
         for code in codes {
             // Earlier builds held the order as a `u16`, because it had no long form.
             let bytes = stored(&postcard::to_allocvec(&Some(code)).unwrap());
             let durable = Durable { background: Some(u128::from(code)), ..zeros.clone() };
             assert_eq!(
-                (decode(&bytes), postcard::to_allocvec(&durable).unwrap()),
+                (decode(bytes.clone(), false), postcard::to_allocvec(&durable).unwrap()),
                 (Some(durable), bytes),
                 "{code:04x}"
             );
@@ -197,20 +240,60 @@ mod tests {
     }
 
     #[test]
-    fn an_unusable_state_is_refused_in_one_line() {
-        let refused = |name: &str, content: &[u8]| {
-            let disk = Disk::default();
-            disk.put(name, content);
-            begin(&disk).err().unwrap()
-        };
-        let input = |text: &str| UserError::Input(text.to_owned());
-        let other = "vehicle.journal: the file is of another version of scenecast; use that one, or move the file away to \
-                     begin a new mission";
-        assert_eq!(refused("vehicle.journal", b"scVJRN99"), input(other));
-        let damaged = "vehicle.journal: damaged at byte 0; restore the file, or move it away to begin a new mission";
-        assert_eq!(refused("vehicle.journal", b""), input(damaged));
+    fn the_state_of_a_build_without_a_journal_is_refused_in_one_line() {
+        let disk = Disk::default();
+        disk.put("vehicle.state", b"scVSTA01");
         let earlier = "vehicle.state: the state of an earlier build, which this one does not read; move it away to begin a \
                        new mission";
-        assert_eq!(refused("vehicle.state", b"scVSTA01"), input(earlier));
+        assert_eq!(begin(&disk).err().unwrap(), UserError::Input(earlier.to_owned()));
+    }
+
+    #[test]
+    fn a_vehicle_without_its_journal_holds_and_has_lost_its_orders() {
+        let lost = |disk: &Disk| {
+            let run = Keeper::begin_run(disk.clone(), 9 << 56, None).unwrap();
+            assert!(run.is_again && run.is_stored);
+            let expected = Durable { lineage: 9 << 56, epoch: 9, hold: true, ..Durable::default() };
+            assert_eq!(run.durable, Durable { lost: LostOrders::Present, ..expected });
+            let again = Keeper::begin_run(disk.clone(), 1, None).unwrap().durable;
+            assert!(again.hold && again.lost == LostOrders::Present, "a restart changes neither");
+        };
+        for content in [&b""[..], b"scVJRN99", &[7; 5000]] {
+            let disk = Disk::default();
+            disk.put("vehicle.journal", content);
+            lost(&disk);
+        }
+        let disk = Disk::default();
+        disk.put("scene.checkpoint", b"any");
+        lost(&disk);
+    }
+
+    #[test]
+    fn one_damaged_copy_leaves_the_state_and_the_vehicle_holds() {
+        for name in ["vehicle.journal", "vehicle.journal.copy"] {
+            let disk = Disk::default();
+            let (mut keeper, durable) = begin(&disk).unwrap();
+            let last = Durable { budget_bps: Some(500), breach: 2, ..durable };
+            assert!(keeper.save(&last));
+            disk.remove(name);
+            assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 1, hold: true, ..last.clone() });
+            assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 2, hold: true, ..last });
+        }
+    }
+
+    #[test]
+    fn a_run_on_a_disk_that_refuses_its_state_holds() {
+        for refusal in [DiskRefusal::Full, DiskRefusal::ReadOnly] {
+            let disk = Disk::default();
+            disk.refuse(refusal);
+            let run = Keeper::begin_run(disk.clone(), 9, None).unwrap();
+            assert!(run.durable.hold && !run.is_stored && !run.is_again);
+        }
+        let disk = Disk::default();
+        let last = begin(&disk).unwrap().1;
+        disk.refuse(DiskRefusal::Full);
+        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 1, ..last.clone() }, "the files have their full length");
+        disk.refuse(DiskRefusal::ReadOnly);
+        assert_eq!(begin(&disk).unwrap().1, Durable { epoch: 2, hold: true, ..last });
     }
 }

@@ -103,7 +103,8 @@ impl LabelTrial {
         let kept: Option<TopicScene> = file.read().ok()?.and_then(|bytes| postcard::from_bytes(&bytes).ok());
         let claim = kept.as_ref().map(|scene| (scene.lineage, scene.book.epoch()));
         let lineage = self.rng.below(1 << 30) as u64;
-        let StartedRun { mut keeper, durable, .. } = Keeper::begin_run(self.disk.clone(), lineage, claim).ok()?;
+        let run = Keeper::begin_run(self.disk.clone(), lineage, claim).ok().filter(|run| run.is_stored);
+        let StartedRun { mut keeper, durable, .. } = run?;
         let mut scene = match kept.filter(|scene| scene.lineage == durable.lineage) {
             Some(mut scene) if scene.book.epoch() == durable.epoch => {
                 scene.book.resume(durable.labels);
@@ -153,7 +154,7 @@ impl LabelTrial {
         host.handle_map(update, Instant::ZERO);
         while let Some(event) = host.poll_event() {
             if event == VehicleHostEvent::Persist {
-                keeper.save(host.vehicle().durable()).ok()?;
+                keeper.save(host.vehicle().durable()).then_some(())?;
                 host.handle_persisted();
             }
         }

@@ -17,6 +17,8 @@ mod port;
 #[cfg(all(test, feature = "surface"))]
 mod power_cut_tests;
 mod refusals;
+#[cfg(all(test, feature = "surface"))]
+mod refusing_disk_tests;
 mod reload;
 mod restore;
 mod stop;
@@ -47,7 +49,9 @@ pub fn random_bits() -> u64 {
 pub fn block_on<T>(future: impl Future<Output = Result<T, UserError>>) -> Result<T, UserError> {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
     // A second command in the same process (as in tests) keeps the first one's log.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    // A log on a full disk must not end the process: a failed write would be reported on the same stream, and panic.
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let _ = log.log_internal_errors(false).try_init();
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build();
     let runtime = runtime.map_err(|e| UserError::Failed(e.to_string()))?;
     let result = runtime.block_on(future);

@@ -23,8 +23,8 @@ pub(super) struct Start {
 /// logged as an error, and the mission starts.
 pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
     let refused = |e: std::io::Error| UserError::file(dir, e);
-    let folder = Folder::hold(dir).map_err(refused)?;
-    let file = CheckpointFile::new(folder.share().map_err(refused)?);
+    let folder = Folder::hold_when_there(dir).map_err(refused)?;
+    let file = CheckpointFile::new(folder.clone());
     let restored = if config.scene.checkpoint_s > 0.0 { restore(config, &file)? } else { None };
     let claim = restored.as_ref().map(|restored| (restored.lineage, restored.mapper.epoch()));
     let run = Keeper::begin_run(folder, super::random_bits(), claim)?;
@@ -57,7 +57,11 @@ pub(super) fn start(config: &Config, dir: &Path) -> Result<Start, UserError> {
 }
 
 fn restore(config: &Config, file: &CheckpointFile<Folder>) -> Result<Option<Restored>, UserError> {
-    let Some(bytes) = file.read()? else { return Ok(None) };
+    let bytes = file.read().unwrap_or_else(|error| {
+        tracing::error!("{error}; the scene model starts from scratch, with new labels");
+        None
+    });
+    let Some(bytes) = bytes else { return Ok(None) };
     match Mapper::restore(config, configured_vocabulary(config.scene.vocabulary.as_deref())?, &bytes) {
         Ok(restored) => Ok(Some(restored)),
         Err(RestoreError::Config(error)) => Err(error),

@@ -30,7 +30,7 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         warn_without_key(&config);
         let dir = config.runtime.state_dir.as_path();
         let Start { run, mut mapper, keep } = start(&config, dir)?;
-        let StartedRun { keeper, durable, is_again } = run;
+        let StartedRun { keeper, durable, is_again, is_stored } = run;
         let clock = Clock::new(config.runtime.time_scale);
         let address = scenecast_config::vehicle_address(&config)?;
         let profile = scenecast_drivers::modem::modem_of_process(&config, address)?;
@@ -50,6 +50,9 @@ pub fn run_vehicle(load: Load, simulated: Option<SimulatedAutopilot>) -> Result<
         )?;
         if is_again {
             vehicle.assume_budget_spent(clock.now());
+        }
+        if !is_stored {
+            vehicle.assume_start_refused(clock.now());
         }
         let is_recorded = recording.is_some();
         let mut camera = Camera::new(recording, clock, mapper.last_s());
@@ -184,8 +187,11 @@ impl VehicleShell {
         while let Some(event) = self.host.poll_event() {
             match event {
                 VehicleHostEvent::Persist => {
-                    self.keeper.save(self.host.vehicle().durable())?;
-                    self.host.handle_persisted();
+                    // A refusing disk must not end the link: the vehicle then obeys hold and abort from memory.
+                    match self.keeper.save(self.host.vehicle().durable()) {
+                        true => self.host.handle_persisted(),
+                        false => self.host.handle_persist_failed(self.clock.now()),
+                    }
                 }
                 VehicleHostEvent::Tune(settings) => {
                     let _ = self.mapper.orders.send(ToMapper::Tune(settings));

@@ -15,7 +15,7 @@ pub enum SlotState {
 }
 
 impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=9 a reason of refusal.
+    /// The number on the wire: 0 unknown, 1 applied, 2..=11 a reason of refusal.
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Unknown => 0,

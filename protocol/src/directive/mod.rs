@@ -116,10 +116,14 @@ pub enum RefusalReason {
     Outside,
     /// The vehicle is not able to obey it.
     Unable,
+    /// The vehicle's disk does not keep it.
+    Disk,
+    /// The vehicle has lost its record of the orders that it applied, and this series may contain one of them.
+    Forgotten,
 }
 
 impl RefusalReason {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 10] = [
         Self::Malformed,
         Self::OtherEpoch,
         Self::UnknownLabel,
@@ -128,6 +132,8 @@ impl RefusalReason {
         Self::TooOld,
         Self::Outside,
         Self::Unable,
+        Self::Disk,
+        Self::Forgotten,
     ];
 
     pub(crate) fn code(self) -> u8 {
@@ -149,6 +155,8 @@ impl RefusalReason {
             Self::TooOld => "it came too late to be of use",
             Self::Outside => "the vehicle is outside of it: it keeps the last one",
             Self::Unable => "the vehicle flies at an altitude or depth that it does not allow",
+            Self::Disk => "the vehicle's disk does not keep it: until it does, the vehicle obeys only hold and abort",
+            Self::Forgotten => "the vehicle has lost its journal and may have applied it before: give the order again",
         }
     }
 }

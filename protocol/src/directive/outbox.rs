@@ -54,12 +54,16 @@ pub struct PendingSlot {
 pub struct SlotOutbox {
     series: Series,
     slots: [Option<SlotProgress>; SLOTS],
+    /// Whether the vehicle refused an order because it has lost its record of this series.
+    is_forgotten: bool,
+    /// Whether the vehicle reports a version that this surface has not issued.
+    is_overtaken: bool,
 }
 
 impl SlotOutbox {
     /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
     pub fn new(series: Series) -> Self {
-        Self { series, slots: Default::default() }
+        Self { series, slots: Default::default(), is_forgotten: false, is_overtaken: false }
     }
 
     /// The series that the versions belong to.
@@ -68,7 +72,12 @@ impl SlotOutbox {
     }
 
     /// Issues a new version of a slot, which supersedes the older one; returns the version.
+    ///
+    /// If the vehicle has lost its record of the series, a new one begins, in which every order is sent again.
     pub fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
+        if self.is_forgotten {
+            self.begin_series(now);
+        }
         let id = slot.id();
         let Some(entry) = self.slots.get_mut(id.index()) else { return 0 };
         let version = entry.as_ref().map_or(1, |s| s.version.wrapping_add(1));
@@ -136,19 +145,33 @@ impl SlotOutbox {
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let status = match report.state {
                 SlotState::Unknown => {
-                    let forgotten = |s| matches!(s, OrderStatus::Received | OrderStatus::Applied);
-                    self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
+                    // An order that is received without a decision waits for the vehicle's disk.
+                    let version = slot.version;
+                    self.advance(id, version, OrderStatus::Queued, now, |s| s == OrderStatus::Applied);
                     continue;
                 }
-                _ if slot.version as u8 != report.version_low => continue,
+                _ if slot.version as u8 != report.version_low => {
+                    let is_ahead = (report.version_low.wrapping_sub(slot.version as u8) as i8) > 0;
+                    self.is_overtaken |= is_ahead && slot.status == OrderStatus::Received;
+                    continue;
+                }
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
             if self.advance(id, slot.version, status, now, |s| s == OrderStatus::Received) {
+                self.is_forgotten |= status == OrderStatus::Refused(RefusalReason::Forgotten);
                 decided.push(id);
             }
         }
         decided
+    }
+
+    /// Begins a new series if the vehicle reports a version that was not issued here, under which it would ignore later
+    /// ones. That needs a forged order, or a second surface with the same series.
+    pub fn leave_overtaken_series(&mut self, now: Instant) {
+        if self.is_overtaken {
+            self.begin_series(now);
+        }
     }
 
     /// Queues again each order that a restarted vehicle is not known to have in force.
@@ -156,6 +179,22 @@ impl SlotOutbox {
         for slot in self.slots.iter_mut().flatten() {
             if matches!(slot.status, OrderStatus::OnAir | OrderStatus::Received) {
                 (slot.status, slot.changed, slot.sent) = (OrderStatus::Queued, now, None);
+            }
+        }
+    }
+
+    /// Sends every order again in a new series, except one that only lifts a hold or an abort: the vehicle holds since it
+    /// has lost its record, and the operator lifts that by a new order.
+    fn begin_series(&mut self, now: Instant) {
+        self.series = Series::from_random(self.series.get().wrapping_add(1));
+        (self.is_forgotten, self.is_overtaken) = (false, false);
+        for progress in self.slots.iter_mut().flatten() {
+            let lifts = matches!(progress.slot, Slot::Constraints(order) if !order.hold && !order.abort);
+            let is_refused = matches!(progress.status, OrderStatus::Refused(r) if r != RefusalReason::Forgotten);
+            if lifts {
+                progress.status = OrderStatus::Refused(RefusalReason::Forgotten);
+            } else if !is_refused {
+                (progress.status, progress.changed, progress.sent) = (OrderStatus::Queued, now, None);
             }
         }
     }

@@ -6,8 +6,8 @@ use super::run::{Authenticity, Identity};
 use super::{DropReason, FrameNumber, LinkStats, LinkWindow, WindowRefusal};
 use crate::seal::{Direction, SessionKey, TAG_BYTES};
 use crate::wire::{
-    Address, ChunkKind, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal, Stamp,
-    WIRE_VERSION,
+    Address, ChunkKind, Chunks, Envelope, Frame, FrameBuilder, FrameKind, Header, Introduction, MissionId, Seal,
+    Series, Stamp, WIRE_VERSION,
 };
 
 /// The content of a verified frame.
@@ -84,6 +84,11 @@ impl<T> LinkPair<T> {
     /// The introduction of the peer's current run.
     pub fn peer_introduction(&self) -> Option<&Introduction> {
         self.handshake.run().map(|r| &r.introduction)
+    }
+
+    /// Names another series in the hellos of this end; returns whether it is another one.
+    pub fn set_series(&mut self, series: Series) -> bool {
+        self.introduction.series.replace(series) != Some(series)
     }
 
     /// A setting in which the peer differs, once after it was found.
@@ -464,8 +469,7 @@ mod tests {
         let key = Arc::new(MissionKey::from_bytes([9; 16]));
         let authenticity = Some(Authenticity { key, all: true, encrypt: true });
         let auv = Address::vehicle(3).unwrap();
-        let introduction =
-            Introduction { series: Some(crate::wire::Series::from_random(1)), ..Introduction::default() };
+        let introduction = Introduction { series: Some(Series::from_random(1)), ..Introduction::default() };
         let mut surface = LinkPair::new(MissionId(1), Address::SURFACE, auv, authenticity.clone(), introduction, 1);
         let mut vehicle = LinkPair::new(MissionId(1), auv, Address::SURFACE, authenticity, introduction, 2);
         carry(&mut surface, &mut vehicle, 0, FrameKind::Hello);

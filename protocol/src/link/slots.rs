@@ -18,6 +18,15 @@ pub struct SlotInboxState {
     pub decisions: [u8; SLOTS],
 }
 
+impl SlotInboxState {
+    /// Notes the decision about the latest version of a slot.
+    pub fn decide(&mut self, id: SlotId, state: SlotState) {
+        if let Some(decision) = self.decisions.get_mut(id.index()) {
+            *decision = state.code();
+        }
+    }
+}
+
 /// Filters the slots that come in, and keeps the decisions for the report.
 #[derive(Debug, Default)]
 pub struct SlotInbox {
@@ -69,11 +78,9 @@ impl SlotInbox {
     /// Keeps the host's decision about the latest version of a slot.
     pub fn decide(&mut self, id: SlotId, state: SlotState) {
         let i = id.index();
-        if let Some(&Some(version)) = self.state.versions.get(i)
-            && let (Some(report), Some(decision)) = (self.reports.get_mut(i), self.state.decisions.get_mut(i))
-        {
+        if let (Some(&Some(version)), Some(report)) = (self.state.versions.get(i), self.reports.get_mut(i)) {
             *report = SlotReport { version_low: version as u8, state };
-            *decision = state.code();
+            self.state.decide(id, state);
         }
     }
 

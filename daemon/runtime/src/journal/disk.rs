@@ -30,6 +30,7 @@ impl DiskRng {
 pub(crate) enum DiskStep {
     Create,
     Append,
+    Overwrite,
     Sync,
     Rename,
     SyncFolder,
@@ -37,9 +38,20 @@ pub(crate) enum DiskStep {
     Host,
 }
 
+/// The lasting refusal of a disk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum DiskRefusal {
+    #[default]
+    None,
+    /// It takes no more bytes; those of a file can be overwritten.
+    Full,
+    ReadOnly,
+}
+
 #[derive(Debug, Clone, Default)]
 struct Content {
-    safe: usize,
+    /// The bytes at the last sync.
+    synced: Vec<u8>,
     bytes: Vec<u8>,
 }
 
@@ -51,6 +63,7 @@ struct Platter {
     steps: Vec<DiskStep>,
     cut_at: Option<usize>,
     failing: Option<DiskStep>,
+    refusal: DiskRefusal,
 }
 
 /// A simulated disk; clones share it.
@@ -79,6 +92,19 @@ impl Disk {
         self.0.borrow_mut().failing = step;
     }
 
+    /// The disk refuses writes from now on, or takes them again.
+    pub(crate) fn refuse(&self, refusal: DiskRefusal) {
+        self.0.borrow_mut().refusal = refusal;
+    }
+
+    /// Removes a file, without a step of the disk.
+    pub(crate) fn remove(&self, name: &str) {
+        let mut platter = self.0.borrow_mut();
+        let mut names = platter.names.last().cloned().unwrap_or_default();
+        names.remove(name);
+        platter.names = vec![names];
+    }
+
     /// Counts a step; an error if the power is cut.
     pub(crate) fn step(&self, step: DiskStep) -> Result<()> {
         if self.is_off() {
@@ -86,6 +112,13 @@ impl Disk {
         }
         let mut platter = self.0.borrow_mut();
         platter.steps.push(step);
+        let is_full = platter.refusal == DiskRefusal::Full && matches!(step, DiskStep::Create | DiskStep::Append);
+        if is_full {
+            return Err(Error::other("no space left on device"));
+        }
+        if platter.refusal == DiskRefusal::ReadOnly && step != DiskStep::Host {
+            return Err(Error::other("read-only file system"));
+        }
         if platter.failing == Some(step) { Err(Error::other("input/output error")) } else { Ok(()) }
     }
 
@@ -108,7 +141,7 @@ impl Disk {
     /// Writes a file directly, without the journal.
     pub(crate) fn put(&self, name: &str, bytes: &[u8]) {
         let mut platter = self.0.borrow_mut();
-        platter.contents.push(Content { safe: bytes.len(), bytes: bytes.to_vec() });
+        platter.contents.push(Content { synced: bytes.to_vec(), bytes: bytes.to_vec() });
         let at = platter.contents.len() - 1;
         let mut names = platter.names.last().cloned().unwrap_or_default();
         names.insert(name.to_owned(), at);
@@ -117,23 +150,32 @@ impl Disk {
 }
 
 impl Content {
-    /// Each unsynced sector is written, half written, zero, or holds bytes of an older file.
+    /// Each unsynced sector is written, half written, zero, or holds bytes of an older file; one that was overwritten
+    /// may hold its old bytes.
     fn survive(&mut self, older: &[u8], rng: &mut DiskRng) {
-        let unsynced = self.bytes.len() - self.safe;
-        self.bytes.truncate(self.safe + [0, rng.below(unsynced + 1), unsynced][rng.below(3)]);
-        let mut from = self.safe;
+        let appended = self.bytes.len().saturating_sub(self.synced.len());
+        self.bytes.truncate(self.synced.len() + [0, rng.below(appended + 1), appended][rng.below(3)]);
+        let mut from = 0;
         while from < self.bytes.len() {
             let to = (from + 1).next_multiple_of(SECTOR).min(self.bytes.len());
             let sector = &mut self.bytes[from..to];
+            if self.synced.get(from..to) == Some(&*sector) {
+                from = to;
+                continue;
+            }
+            let old = |at: usize| self.synced.get(at).or(older.get(at)).copied().unwrap_or(0);
             match rng.below(6) {
                 0 => sector.fill(0),
-                1 => sector.iter_mut().enumerate().for_each(|(i, b)| *b = older.get(from + i).copied().unwrap_or(0)),
-                2 => sector[rng.below(to - from)..].fill(0),
+                1 | 2 => sector.iter_mut().enumerate().for_each(|(i, b)| *b = old(from + i)),
+                3 => {
+                    let half = rng.below(to - from);
+                    (half..to - from).for_each(|i| sector[i] = old(from + i));
+                }
                 _ => {}
             }
             from = to;
         }
-        self.safe = self.bytes.len();
+        self.synced.clone_from(&self.bytes);
     }
 }
 
@@ -148,6 +190,26 @@ impl Storage for Disk {
         let platter = self.0.borrow();
         let at = platter.names.last().and_then(|names| names.get(name));
         Ok(at.map(|&at| platter.contents[at].bytes.clone()))
+    }
+
+    fn open(&mut self, name: &str, bytes: usize) -> Result<Option<usize>> {
+        let platter = self.0.borrow();
+        let at = platter.names.last().and_then(|names| names.get(name)).copied();
+        Ok(at.filter(|&at| platter.contents[at].bytes.len() == bytes))
+    }
+
+    fn overwrite(&mut self, name: &str, file: &mut usize, bytes: &[u8]) -> Result<()> {
+        {
+            let mut platter = self.0.borrow_mut();
+            if platter.names.last().and_then(|names| names.get(name)) != Some(&*file) {
+                return Err(Error::other("the file was removed"));
+            }
+            // A write that is cut off may have written some bytes; a refused one has not.
+            if platter.refusal != DiskRefusal::ReadOnly {
+                platter.contents[*file].bytes[..bytes.len()].copy_from_slice(bytes);
+            }
+        }
+        self.step(DiskStep::Overwrite)
     }
 
     fn create(&mut self, name: &str) -> Result<usize> {
@@ -170,7 +232,7 @@ impl Storage for Disk {
     fn sync(&mut self, file: &mut usize) -> Result<()> {
         self.step(DiskStep::Sync)?;
         let content = &mut self.0.borrow_mut().contents[*file];
-        content.safe = content.bytes.len();
+        content.synced = content.bytes.clone();
         Ok(())
     }
 

@@ -1,10 +1,12 @@
-//! A journal: the last state that was confirmed survives a power cut at any instant.
+//! A journal: the last state that was confirmed survives a power cut at any instant, and a damaged file is recognised.
 
 mod record;
 mod storage;
 
 #[cfg(test)]
 mod cuts;
+#[cfg(test)]
+mod damage;
 #[cfg(test)]
 pub(super) mod disk;
 
@@ -13,19 +15,16 @@ pub(super) use record::Damage;
 pub(crate) use storage::create_folder;
 pub(crate) use storage::{Folder, Storage};
 
+use record::{Content, FILE_BYTES, Record};
 use std::io;
 
-/// The reason that a state could not be read or made durable.
+/// The reason that a state could not be made durable. A later attempt may succeed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum JournalError {
-    /// The file is no valid journal.
-    #[error(transparent)]
-    Damage(#[from] Damage),
-    #[error("{doing}: {cause}; check the disk, then start again")]
+    #[error("{doing}: {cause}")]
     Io { doing: &'static str, cause: io::Error },
-    /// An earlier write failed, so the content of the file is unknown.
-    #[error("a write has failed before; check the disk, then start again")]
-    Broken,
+    #[error("the state of {bytes} bytes does not fit")]
+    TooLong { bytes: usize },
 }
 
 /// Adds the operation to an error of the file system.
@@ -33,82 +32,174 @@ fn doing(doing: &'static str) -> impl FnOnce(io::Error) -> JournalError {
     move |cause| JournalError::Io { doing, cause }
 }
 
-/// The destination of the next record.
-enum JournalEnd<F> {
-    /// The beginning of a new file.
-    New,
-    /// The end of this file, whose length is `bytes`.
-    Open { file: F, bytes: usize },
-    /// None: after a failed write or sync the content of the disk is unknown, even if a later one succeeds.
-    Broken,
+/// The names of a journal's two files.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct JournalNames {
+    pub(super) journal: &'static str,
+    pub(super) copy: &'static str,
 }
 
-/// A file of records, each a complete state; the last one is valid.
+impl JournalNames {
+    fn name(&self, number: u8) -> &'static str {
+        if number == 0 { self.journal } else { self.copy }
+    }
+}
+
+/// The content of a journal at the start of a run.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// There is no file.
+    Absent,
+    State {
+        /// The last confirmed state, or one that was being written since.
+        body: Vec<u8>,
+        /// Whether an earlier build wrote it, in the layout before.
+        is_earlier: bool,
+        /// A file that is not as a run or a power cut leaves it; the state is that of the other file.
+        damage: Option<(&'static str, Damage)>,
+    },
+    /// No file has a readable state.
+    Lost(&'static str, Damage),
+}
+
+/// Two files of a fixed length, each with the whole state and a sequence number.
 ///
-/// The first record of a run, and one for which the file has no room left, begins a new file: written beside the old
-/// one, synced, renamed, and the folder synced. So no run ever writes behind the remains of an earlier one.
+/// A record overwrites first the copy and then the journal, each followed by a sync. So at most one file is unreadable
+/// after a power cut, and the other one has the last confirmed state. Both files have their full length from the start,
+/// so that a full disk still takes records.
 pub(super) struct Journal<S: Storage> {
     storage: S,
-    name: &'static str,
-    most_bytes: usize,
-    sequence: u64,
-    end: JournalEnd<S::File>,
-    confirmed: Vec<u8>,
+    names: JournalNames,
+    /// The state with the highest number on the disk.
+    last: Option<Record>,
+    /// Whether the copy's last state may be in the page cache only, while the journal has the state before on the disk.
+    is_copy_uncertain: bool,
+    /// Whether the journal may lack the last state on the disk, while the copy has it.
+    is_journal_uncertain: bool,
+    files: [Option<S::File>; 2],
+    /// Whether a file is put aside before a new one takes its name.
+    is_damaged: [bool; 2],
 }
 
 impl<S: Storage> Journal<S> {
-    /// Opens the journal of this name; its state is `None` before the first record.
-    pub(super) fn open(
-        storage: S,
-        name: &'static str,
-        most_bytes: usize,
-    ) -> Result<(Self, Option<Vec<u8>>), JournalError> {
-        let bytes = storage.read(name).map_err(doing("reading"))?;
-        let mut journal = Self { storage, name, most_bytes, sequence: 0, end: JournalEnd::New, confirmed: Vec::new() };
-        let Some(bytes) = bytes else { return Ok((journal, None)) };
-        let scan = record::scan(&bytes)?;
-        if let Some(offset) = scan.torn {
-            let file = journal.storage.path(name);
-            tracing::warn!("{}: dropped an unfinished record at byte {offset}, cut short by a stop", file.display());
-        }
-        journal.sequence = scan.last.sequence;
-        Ok((journal, Some(scan.last.body.to_vec())))
+    /// Reads the journal of these names.
+    pub(super) fn open(storage: S, names: JournalNames) -> (Self, Found) {
+        let contents = [0, 1].map(|number| match storage.read(names.name(number)) {
+            Ok(Some(bytes)) => record::read(number, &bytes),
+            Ok(None) => Content::Absent,
+            Err(e) => Content::Damaged(Damage::Unreadable(e.to_string())),
+        });
+        let last = contents.iter().filter_map(Content::record).max_by_key(|record| record.sequence).cloned();
+        // An earlier process may have been killed between a write and its sync: of two equal files the journal was
+        // written last, and of two unequal ones the copy.
+        let [journal, copy] = [0, 1].map(|at| contents[at].record());
+        let is_copy_last = copy.is_some() && copy == last.as_ref();
+        let is_next =
+            journal.zip(copy).is_some_and(|(journal, copy)| copy.sequence == journal.sequence.wrapping_add(1));
+        let is_copy_uncertain = is_copy_last && is_next;
+        let is_unreadable = |content: &Content| matches!(content, Content::Torn | Content::Damaged(_));
+        let unreadable = [0, 1].map(|at| is_unreadable(&contents[at]));
+        let found = find(names, contents);
+        // A torn file beside a whole one is overwritten.
+        let is_damaged = if matches!(found, Found::State { damage: None, .. }) { [false; 2] } else { unreadable };
+        let is_journal_uncertain = is_copy_last;
+        let files = [None, None];
+        (Self { storage, names, last, is_copy_uncertain, is_journal_uncertain, files, is_damaged }, found)
     }
 
     pub(super) fn storage(&self) -> &S {
         &self.storage
     }
 
-    /// Makes a state durable. A power cut before the return of `Ok` leaves this state or the last confirmed one.
+    /// Makes a state durable. A power cut before the return of `Ok` leaves this state or the last one.
+    ///
+    /// # Errors
+    /// The disk refuses. The next call writes the whole record again.
     pub(super) fn persist(&mut self, state: &[u8]) -> Result<(), JournalError> {
-        let record = record::encode(self.sequence + 1, state);
-        self.end = match std::mem::replace(&mut self.end, JournalEnd::Broken) {
-            JournalEnd::Broken => return Err(JournalError::Broken),
-            JournalEnd::Open { file, bytes } if self.confirmed == state => {
-                self.end = JournalEnd::Open { file, bytes };
-                return Ok(());
+        if let Some(last) = self.last.clone().filter(|_| self.is_journal_uncertain) {
+            if self.is_copy_uncertain {
+                self.write(1, &last)?;
+                self.is_copy_uncertain = false;
             }
-            JournalEnd::Open { mut file, bytes } if bytes + record.len() <= self.most_bytes => {
-                self.storage.append(&mut file, &record).map_err(doing("writing"))?;
-                self.storage.sync(&mut file).map_err(doing("syncing"))?;
-                JournalEnd::Open { file, bytes: bytes + record.len() }
-            }
-            JournalEnd::New | JournalEnd::Open { .. } => {
-                JournalEnd::Open { file: self.begin_file(&record)?, bytes: record.len() }
-            }
-        };
-        self.sequence += 1;
-        self.confirmed = state.to_vec();
+            self.write(0, &last)?;
+            self.is_journal_uncertain = false;
+        }
+        let sequence = self.last.as_ref().map_or(1, |last| last.sequence.wrapping_add(1));
+        let next = Record { sequence, body: state.to_vec() };
+        self.write(1, &next)?;
+        (self.is_journal_uncertain, self.last) = (true, Some(next.clone()));
+        self.write(0, &next)?;
+        self.is_journal_uncertain = false;
         Ok(())
     }
 
-    fn begin_file(&mut self, record: &[u8]) -> Result<S::File, JournalError> {
-        let part = format!("{}.part", self.name);
+    fn write(&mut self, number: u8, record: &Record) -> Result<(), JournalError> {
+        let too_long = JournalError::TooLong { bytes: record.body.len() };
+        let bytes = record::encode(number, record).ok_or(too_long)?;
+        let (name, at) = (self.names.name(number), usize::from(number));
+        let mut open = self.files[at].take();
+        if open.is_none() && !self.is_damaged[at] {
+            open = self.storage.open(name, FILE_BYTES).map_err(doing("opening"))?;
+        }
+        self.files[at] = Some(match open {
+            Some(mut file) => {
+                self.storage.overwrite(name, &mut file, &bytes).map_err(doing("writing"))?;
+                self.storage.sync(&mut file).map_err(doing("syncing"))?;
+                file
+            }
+            None => self.begin_file(number, &bytes)?,
+        });
+        Ok(())
+    }
+
+    fn begin_file(&mut self, number: u8, bytes: &[u8]) -> Result<S::File, JournalError> {
+        let (name, at) = (self.names.name(number), usize::from(number));
+        let part = format!("{name}.part");
         let mut file = self.storage.create(&part).map_err(doing("creating"))?;
-        self.storage.append(&mut file, record).map_err(doing("writing"))?;
+        self.storage.append(&mut file, bytes).map_err(doing("writing"))?;
         self.storage.sync(&mut file).map_err(doing("syncing"))?;
-        self.storage.rename(&part, self.name).map_err(doing("renaming"))?;
+        if self.is_damaged[at] && self.storage.rename(name, &format!("{name}.damaged")).is_ok() {
+            self.is_damaged[at] = false;
+        }
+        self.storage.rename(&part, name).map_err(doing("renaming"))?;
         self.storage.sync_folder().map_err(doing("syncing the folder"))?;
         Ok(file)
+    }
+}
+
+/// Judges the two files together. Of two states the one with the higher sequence number is the last one.
+fn find(names: JournalNames, [journal, copy]: [Content; 2]) -> Found {
+    let state = |record: Record, damage| Found::State { body: record.body, is_earlier: false, damage };
+    match (journal, copy) {
+        (Content::Absent, Content::Absent) => Found::Absent,
+        (Content::Sound(journal), Content::Sound(copy)) if journal.sequence > copy.sequence => {
+            state(journal, Some((names.copy, Damage::Older)))
+        }
+        (Content::Sound(journal), Content::Sound(copy)) => {
+            let is_older = copy.sequence - journal.sequence > 1;
+            state(copy, is_older.then_some((names.journal, Damage::Older)))
+        }
+        (Content::Sound(record), Content::Torn) | (Content::Torn, Content::Sound(record)) => {
+            tracing::warn!("{}: one of two copies was cut short by a stop", names.journal);
+            state(record, None)
+        }
+        // A stop between the first record's two files, or between those of the first record after an update.
+        (Content::Absent, Content::Sound(record)) if record.sequence == 1 => state(record, None),
+        (Content::Earlier(_), Content::Sound(record)) => state(record, None),
+        (Content::Earlier(record), Content::Absent | Content::Torn) => {
+            Found::State { body: record.body, is_earlier: true, damage: None }
+        }
+        (Content::Sound(record), Content::Absent) => state(record, Some((names.copy, Damage::Missing))),
+        (Content::Absent, Content::Sound(record)) => state(record, Some((names.journal, Damage::Missing))),
+        (Content::Sound(record), Content::Damaged(damage)) => state(record, Some((names.copy, damage))),
+        (Content::Damaged(damage), Content::Sound(record)) => state(record, Some((names.journal, damage))),
+        (Content::Earlier(record), Content::Damaged(damage)) => {
+            Found::State { body: record.body, is_earlier: true, damage: Some((names.copy, damage)) }
+        }
+        // The copy is never of an earlier build.
+        (Content::Sound(record), Content::Earlier(_)) => state(record, Some((names.copy, Damage::Content))),
+        (Content::Damaged(damage), _) => Found::Lost(names.journal, damage),
+        (Content::Absent, _) => Found::Lost(names.journal, Damage::Missing),
+        (Content::Torn | Content::Earlier(_), _) => Found::Lost(names.journal, Damage::Content),
     }
 }

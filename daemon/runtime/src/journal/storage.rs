@@ -1,8 +1,9 @@
 //! The operations that the journal needs of a file system.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A folder under power cuts: content is durable after [`Storage::sync`], names are after [`Storage::sync_folder`].
 pub(crate) trait Storage {
@@ -18,6 +19,15 @@ pub(crate) trait Storage {
     /// Creates an empty file, which replaces one of the same name.
     fn create(&mut self, name: &str) -> io::Result<Self::File>;
 
+    /// Opens a file of exactly this length for [`Storage::overwrite`]; `None` if there is none.
+    fn open(&mut self, name: &str, bytes: usize) -> io::Result<Option<Self::File>>;
+
+    /// Writes over the beginning of a file; the bytes are durable after [`Storage::sync`].
+    ///
+    /// # Errors
+    /// One of them is a file that no longer has its name, because it would be gone after a restart.
+    fn overwrite(&mut self, name: &str, file: &mut Self::File, bytes: &[u8]) -> io::Result<()>;
+
     /// Appends bytes to a file; they are durable after [`Storage::sync`].
     fn append(&mut self, file: &mut Self::File, bytes: &[u8]) -> io::Result<()>;
 
@@ -31,31 +41,64 @@ pub(crate) trait Storage {
     fn sync_folder(&mut self) -> io::Result<()>;
 }
 
-/// A folder of the machine's file system, held by one process.
+/// A folder of the machine's file system, held by one process. Clones share the lock.
+#[derive(Clone)]
 pub(crate) struct Folder {
     path: PathBuf,
-    handle: File,
+    /// `None` while the folder does not exist.
+    handle: Arc<Mutex<Option<File>>>,
 }
 
 impl Folder {
     /// Opens the folder and creates it if necessary; an error if another process holds it.
     pub(crate) fn hold(path: &Path) -> io::Result<Self> {
-        create_folder(path)?;
-        let handle = File::open(path)?;
-        match handle.try_lock() {
-            Err(TryLockError::WouldBlock) => Err(io::Error::new(ErrorKind::ResourceBusy, HELD)),
-            // On a file system without locks the folder is not protected.
-            Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => Err(e),
-            _ => Ok(Self { path: path.to_owned(), handle }),
+        let handle = Arc::new(Mutex::new(Some(lock(path)?)));
+        Ok(Self { path: path.to_owned(), handle })
+    }
+
+    /// Like [`Self::hold`], but a folder that cannot be opened or created is no error: every write tries it again.
+    pub(crate) fn hold_when_there(path: &Path) -> io::Result<Self> {
+        match Self::hold(path) {
+            Err(e) if e.kind() != ErrorKind::ResourceBusy => {
+                tracing::error!("{}: {e}", path.display());
+                Ok(Self { path: path.to_owned(), handle: Arc::default() })
+            }
+            held => held,
         }
+    }
+
+    /// Creates and holds the folder if it was removed or was never there.
+    fn restore(&self) -> io::Result<()> {
+        let mut handle = self.handle.lock().unwrap_or_else(PoisonError::into_inner);
+        if handle.is_none() || !self.path.is_dir() {
+            *handle = Some(lock(&self.path)?);
+        }
+        Ok(())
     }
 }
 
-impl Folder {
-    /// The same folder for another owner; it stays locked until both are dropped.
-    pub(crate) fn share(&self) -> io::Result<Self> {
-        Ok(Self { path: self.path.clone(), handle: self.handle.try_clone()? })
+fn lock(path: &Path) -> io::Result<File> {
+    create_folder(path)?;
+    let handle = File::open(if path.as_os_str().is_empty() { Path::new(".") } else { path })?;
+    match handle.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(io::Error::new(ErrorKind::ResourceBusy, HELD)),
+        // On a file system without locks the folder is not protected.
+        Err(TryLockError::Error(e)) if e.kind() != ErrorKind::Unsupported => Err(e),
+        _ => Ok(handle),
     }
+}
+
+/// Whether `file` is the one of this path: a removed file still takes bytes, which are gone after a restart.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let (open, named) = (file.metadata()?, fs::metadata(path)?);
+    Ok((open.dev(), open.ino()) == (named.dev(), named.ino()))
+}
+
+#[cfg(not(unix))]
+fn is_at(_file: &File, path: &Path) -> io::Result<bool> {
+    path.try_exists()
 }
 
 const HELD: &str = "another process keeps its state there; stop it, or set another runtime.state_dir";
@@ -88,7 +131,25 @@ impl Storage for Folder {
         }
     }
 
+    fn open(&mut self, name: &str, bytes: usize) -> io::Result<Option<File>> {
+        let file = match OpenOptions::new().write(true).open(self.path(name)) {
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            opened => opened?,
+        };
+        let has_length = file.metadata()?.len() == bytes as u64;
+        Ok(has_length.then_some(file))
+    }
+
+    fn overwrite(&mut self, name: &str, file: &mut File, bytes: &[u8]) -> io::Result<()> {
+        if !is_at(file, &self.path(name))? {
+            return Err(io::Error::new(ErrorKind::NotFound, "the file was removed or replaced"));
+        }
+        file.seek(SeekFrom::Start(0))?;
+        file.write_all(bytes)
+    }
+
     fn create(&mut self, name: &str) -> io::Result<File> {
+        self.restore()?;
         OpenOptions::new().write(true).create(true).truncate(true).open(self.path(name))
     }
 
@@ -105,16 +166,17 @@ impl Storage for Folder {
     }
 
     fn sync_folder(&mut self) -> io::Result<()> {
-        self.handle.sync_all()
+        scenecast_files::sync_folder(&self.path)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Journal, record};
+    use super::super::record::FILE_BYTES;
+    use super::super::{Found, Journal, JournalNames};
     use super::*;
 
-    const NAME: &str = "test.journal";
+    const NAMES: JournalNames = JournalNames { journal: "test.journal", copy: "test.journal.copy" };
 
     fn scratch(name: &str) -> PathBuf {
         let path = std::env::temp_dir().join(format!("scenecast-{}-{name}", std::process::id()));
@@ -122,26 +184,47 @@ mod tests {
         path
     }
 
-    fn open(path: &Path) -> (Journal<Folder>, Option<Vec<u8>>) {
-        Journal::open(Folder::hold(path).unwrap(), NAME, 4 * record::BLOCK).unwrap()
+    fn open(path: &Path) -> (Journal<Folder>, Found) {
+        Journal::open(Folder::hold(path).unwrap(), NAMES)
+    }
+
+    fn state(body: &[u8]) -> Found {
+        Found::State { body: body.to_vec(), is_earlier: false, damage: None }
     }
 
     #[test]
     fn a_journal_in_a_new_folder_is_read_without_its_torn_end() {
         let path = scratch("journal").join("a/b");
         let (mut journal, found) = open(&path);
-        assert_eq!(found, None);
+        assert_eq!(found, Found::Absent);
         (0..10u8).for_each(|n| journal.persist(&[n]).unwrap());
         drop(journal);
-        let file = path.join(NAME);
-        let whole = fs::read(&file).unwrap();
-        fs::write(&file, [&whole[..], &record::encode(11, b"torn")[..20]].concat()).unwrap();
+        let file = path.join(NAMES.copy);
+        let mut torn = fs::read(&file).unwrap();
+        torn[..512].fill(0);
+        fs::write(&file, torn).unwrap();
         fs::write(path.join("test.journal.part"), "left by a power cut").unwrap();
         let (mut journal, found) = open(&path);
-        assert_eq!(found, Some(vec![9]));
+        assert_eq!(found, state(&[9]));
         journal.persist(&[10]).unwrap();
-        assert_eq!(fs::read(&file).unwrap(), record::encode(11, &[10]), "a run begins a new file");
-        assert_eq!(fs::read_dir(&path).unwrap().count(), 1);
+        drop(journal);
+        assert_eq!(open(&path).1, state(&[10]));
+        for name in [NAMES.journal, NAMES.copy] {
+            assert_eq!(fs::metadata(path.join(name)).unwrap().len(), FILE_BYTES as u64);
+        }
+    }
+
+    #[test]
+    fn a_removed_folder_refuses_one_record_and_takes_the_next() {
+        let path = scratch("removed");
+        let (mut journal, _) = open(&path);
+        journal.persist(b"first").unwrap();
+        fs::remove_dir_all(&path).unwrap();
+        let refused = journal.persist(b"second").unwrap_err().to_string();
+        assert!(refused.starts_with("writing: "), "{refused}");
+        journal.persist(b"third").unwrap();
+        drop(journal);
+        assert_eq!(open(&path).1, state(b"third"));
     }
 
     #[test]
@@ -149,6 +232,7 @@ mod tests {
         let path = scratch("held");
         let first = Folder::hold(&path).unwrap();
         assert_eq!(Folder::hold(&path).err().unwrap().to_string(), HELD);
+        assert_eq!(Folder::hold_when_there(&path).err().unwrap().to_string(), HELD);
         drop(first);
         assert!(Folder::hold(&path).is_ok());
     }

@@ -2,6 +2,7 @@
 
 use super::{PortEnds, ToPort, read};
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::Instant;
@@ -9,10 +10,44 @@ use tokio::time::Instant;
 /// A stream that accepts no byte for this time counts as dead.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
+/// When a peer last sent a byte.
+#[derive(Debug)]
+pub(super) struct Activity {
+    began: Instant,
+    /// Microseconds from the beginning to the last received byte, at least 1; 0 before the first.
+    last_us: AtomicU64,
+}
+
+impl Activity {
+    pub(super) fn new() -> Self {
+        Self { began: Instant::now(), last_us: AtomicU64::new(0) }
+    }
+
+    pub(super) fn began(&self) -> Instant {
+        self.began
+    }
+
+    pub(super) fn has_spoken(&self) -> bool {
+        self.last_us.load(Ordering::Relaxed) > 0
+    }
+
+    /// Time since the last received byte, or since the beginning.
+    pub(super) fn silence(&self) -> Duration {
+        let last = Duration::from_micros(self.last_us.load(Ordering::Relaxed));
+        self.began.elapsed().saturating_sub(last)
+    }
+
+    fn note(&self) {
+        let us = u64::try_from(self.began.elapsed().as_micros()).unwrap_or(u64::MAX);
+        self.last_us.store(us.max(1), Ordering::Relaxed);
+    }
+}
+
 /// Carries bytes both ways until the stream ends or fails, or is silent for `quiet`, or until the host is gone (`Ok`).
 pub(super) async fn carry(
     stream: impl AsyncRead + AsyncWrite + Unpin,
     quiet: Option<Duration>,
+    activity: &Activity,
     ends: &mut PortEnds,
 ) -> io::Result<()> {
     if !ends.report_open().await {
@@ -48,6 +83,7 @@ pub(super) async fn carry(
                     return Err(io::ErrorKind::UnexpectedEof.into());
                 }
                 last_read = Instant::now();
+                activity.note();
                 if !ends.report(read(&buffer, n)).await {
                     return Ok(());
                 }
@@ -96,7 +132,7 @@ mod tests {
     fn carried(quiet: Option<Duration>) -> (tokio::io::DuplexStream, Port, tokio::task::JoinHandle<io::Result<()>>) {
         let (near, far) = tokio::io::duplex(16);
         let (port, mut ends) = Port::pair();
-        let task = tokio::spawn(async move { carry(near, quiet, &mut ends).await });
+        let task = tokio::spawn(async move { carry(near, quiet, &Activity::new(), &mut ends).await });
         (far, port, task)
     }
 

@@ -2,6 +2,7 @@
 
 use crate::LastPlace;
 use scenecast_protocol::link::SlotInboxState;
+use scenecast_protocol::wire::Series;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -39,4 +40,37 @@ pub struct Durable {
     pub fence: Vec<u8>,
     /// Position at the last fix that was used.
     pub place: Option<LastPlace>,
+    /// The orders that this state knows nothing of, because an earlier state was lost.
+    pub lost: LostOrders,
+}
+
+/// The series of orders of which the vehicle no longer knows which versions it has applied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum LostOrders {
+    /// No series: every decision is known.
+    #[default]
+    None,
+    /// The series in which the surface speaks, which is not known yet.
+    Present,
+    /// This series.
+    Of(Series),
+}
+
+impl LostOrders {
+    /// Whether an order of `series` may have been applied before. The first series that is received counts as the one
+    /// in which orders were lost; another one ends the loss.
+    pub(super) fn may_contain(&mut self, series: Option<Series>) -> bool {
+        match (*self, series) {
+            (Self::None, _) => false,
+            (Self::Present, Some(series)) => {
+                *self = Self::Of(series);
+                true
+            }
+            (Self::Of(lost), Some(series)) if lost != series => {
+                *self = Self::None;
+                false
+            }
+            _ => true,
+        }
+    }
 }

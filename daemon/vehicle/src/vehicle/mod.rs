@@ -11,9 +11,10 @@ mod orders_tests;
 mod publisher;
 mod report;
 mod slots;
+mod storing;
 mod whole_png;
 
-pub use durable::Durable;
+pub use durable::{Durable, LostOrders};
 
 use super::failsafe::FailsafePolicy;
 use super::mapper::{MapUpdate, SharedExemplars};
@@ -29,6 +30,7 @@ use scenecast_protocol::map::LayerMask;
 use scenecast_protocol::time::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
+use storing::{Storing, WaitingMap};
 
 /// Metres and seconds of use of the limits after which they are stored again.
 const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);
@@ -36,8 +38,8 @@ const RECORD_INTERVAL: (f64, f64) = (50.0, 60.0);
 /// A request of the vehicle to its host.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleOutput {
-    /// Store [`Vehicle::durable`], then call [`Vehicle::handle_persisted`]. If that fails, ignore all later
-    /// requests and transmit no more.
+    /// Store [`Vehicle::durable`], then call [`Vehicle::handle_persisted`]; if that fails, call
+    /// [`Vehicle::handle_persist_failed`]. Until then act on no later request and transmit no frame.
     Persist,
     /// Go to this point of the map frame.
     Waypoint(MapPoint),
@@ -68,6 +70,7 @@ pub struct Vehicle {
     publisher: MapPublisher,
     gallery: Gallery,
     durable: Durable,
+    storing: Storing,
     utility: Option<Utility>,
     settings: Settings,
     /// Whether an order was applied that may change the path, so that the surface needs a new pose.
@@ -102,6 +105,7 @@ impl Vehicle {
             gallery: Gallery::default(),
             // The weights are those of labels of their epoch; a new epoch has no labels yet.
             utility: utility.filter(|u| u.epoch == durable.epoch),
+            storing: Storing::new(durable.epoch, durable.labels),
             durable,
             settings,
             has_new_orders: false,
@@ -138,6 +142,12 @@ impl Vehicle {
         self.link.assume_budget_spent(now);
     }
 
+    /// The disk has refused the state with which the run begins. Until it takes one, no map is sent, because the next
+    /// run could give its labels other meanings.
+    pub fn assume_start_refused(&mut self, now: Instant) {
+        self.storing.handle_refused_start(now);
+    }
+
     /// Sets whether the autopilot does not answer; the next status reports it.
     pub fn set_autopilot_silent(&mut self, is_silent: bool) {
         self.autopilot_silent = is_silent;
@@ -169,41 +179,52 @@ impl Vehicle {
         self.guidance.handle_travel(metres);
     }
 
-    /// The scene model has a new map.
+    /// The scene model has a new map. New labels are stored before any of them is sent, so that a restart cannot give one
+    /// another meaning.
     pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
-        if update.epoch != self.durable.epoch {
-            self.begin_epoch(update.epoch, now);
+        if self.storing.covers(update) {
+            return self.publish(update, now);
         }
-        if update.labels > self.durable.labels {
-            // This is stored before any of the new labels is sent, so that a restart cannot give one another meaning.
-            self.durable.labels = update.labels;
+        let is_other = update.epoch != self.durable.epoch;
+        let is_more = is_other || update.labels > self.durable.labels;
+        if is_more {
+            (self.durable.epoch, self.durable.labels) = (update.epoch, update.labels);
+        }
+        if let Some(part) = self.storing.hold_map(update, now) {
+            self.publish(&part, now);
+        }
+        // A refused state is given to the disk again at its time, not with each frame of the camera.
+        if is_more || !self.storing.is_refused() {
             self.outputs.push_back(VehicleOutput::Persist);
         }
+    }
+
+    fn publish(&mut self, update: &MapUpdate, now: Instant) {
         self.publisher.handle_map(update, &mut self.link, now);
         self.guidance.handle_view(self.navigator.position().xy(), &update.perplexity);
     }
 
     /// Labels are numbered again from 1. The surface learns it by a new run of the link, before any of the new labels.
-    fn begin_epoch(&mut self, epoch: u8, now: Instant) {
+    fn begin_epoch(&mut self, now: Instant) {
         self.link.begin_epoch(now);
         self.publisher.begin_epoch();
-        (self.durable.epoch, self.durable.labels) = (epoch, 0);
         self.utility = None;
         self.gallery = Gallery::default();
         self.follow_utility();
-        self.outputs.push_back(VehicleOutput::Persist);
     }
 
     /// Takes the best exemplars of each label, the best first.
     pub fn handle_exemplars(&mut self, exemplars: SharedExemplars) {
-        self.gallery.set_exemplars(exemplars);
-        self.serve_exemplars();
+        if let Some(exemplars) = self.storing.hold_exemplars(exemplars) {
+            self.gallery.set_exemplars(exemplars);
+            self.serve_exemplars();
+        }
     }
 
     fn serve_exemplars(&mut self) {
-        let Self { utility, gallery, link, durable, .. } = self;
+        let Self { utility, gallery, link, storing, .. } = self;
         let weight = |label| utility.as_ref().map_or(0.0, |u| u.weight(label));
-        gallery.serve(durable.epoch, weight, link);
+        gallery.serve(storing.epoch(), weight, link);
     }
 
     pub fn handle_frame(&mut self, bytes: &[u8], now: Instant) {
@@ -238,6 +259,9 @@ impl Vehicle {
 
     /// Chooses a waypoint if there is none or the last one is reached, or carries out the reaction of the failsafe.
     pub fn steer(&mut self, now: Instant) {
+        if self.storing.takes_retry(now) {
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
         if !self.guidance.handle_time(now) {
             return;
         }
@@ -269,8 +293,30 @@ impl Vehicle {
         self.outputs.push_back(request);
     }
 
-    /// The host has stored [`Self::durable`].
+    /// The host has stored [`Self::durable`]. Orders that waited for it are applied, and stored in their turn.
     pub fn handle_persisted(&mut self) {
+        let is_new_epoch = self.durable.epoch != self.storing.epoch();
+        let (decisions, map) = self.storing.handle_stored(self.durable.epoch, self.durable.labels);
+        if let Some(WaitingMap { update, exemplars, at }) = map {
+            if is_new_epoch {
+                self.begin_epoch(at);
+            }
+            self.publish(&update, at);
+            if let Some(exemplars) = exemplars {
+                self.handle_exemplars(exemplars);
+            }
+        }
+        self.report_decisions(decisions);
+        if !self.decide_waiting() {
+            self.link.handle_persisted();
+        }
+    }
+
+    /// The host could not store [`Self::durable`]. Holds and aborts are obeyed from memory, other orders that waited are
+    /// refused, and the state is stored again later.
+    pub fn handle_persist_failed(&mut self, now: Instant) {
+        self.storing.handle_refusal(now);
+        self.refuse_waiting();
         self.link.handle_persisted();
     }
 

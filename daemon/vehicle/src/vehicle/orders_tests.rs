@@ -69,6 +69,7 @@ impl Sea {
         let (layers, perplexity) = (BTreeMap::new(), Vec::new());
         let update = MapUpdate { t_s: 0.0, epoch: 0, cells: known, layers, perplexity, labels: 4 };
         self.vehicle.handle_map(&update, self.now);
+        self.vehicle.handle_persisted();
     }
 
     /// Half a second. Checks every new leg of the vehicle.

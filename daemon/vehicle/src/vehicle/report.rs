@@ -15,6 +15,11 @@ impl Vehicle {
         &self.durable
     }
 
+    /// Whether the disk has refused the present state, and how often it has refused one in this run.
+    pub fn disk_refusals(&self) -> (bool, u64) {
+        (self.storing.is_refused(), self.storing.refusals())
+    }
+
     /// The map as it is sent to the surface.
     pub fn map(&self) -> &LabelGrid {
         self.publisher.sent_map(&self.link)
@@ -104,7 +109,7 @@ impl Vehicle {
             fix_age_s: self.navigator.last_fix().map(|at| now.since(at).as_secs_f64()),
             waypoint: self.guidance.waypoint(),
             path: self.guidance.path().clone(),
-            epoch: self.durable.epoch,
+            epoch: self.storing.epoch(),
             labels: self.publisher.labels(),
             explored_cells: self.publisher.explored(),
             placement: self.navigator.placement(),

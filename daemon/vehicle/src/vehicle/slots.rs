@@ -1,6 +1,7 @@
 //! The vehicle applies the slots of the directive: each order is put in force or refused with a reason.
 
 use super::gallery::Gallery;
+use super::storing::{UnreportedDecision, WaitingOrder};
 use super::{AppliedSlot, Vehicle, VehicleOutput};
 use crate::FixVerdict;
 use crate::LastPlace;
@@ -13,17 +14,76 @@ use scenecast_protocol::time::Instant;
 use std::time::Duration;
 
 impl Vehicle {
+    /// Has an order wait until the disk has taken a record. A disk that refuses it would keep neither the order nor the
+    /// fact that it was applied, so that only holds and aborts are obeyed then.
     pub(super) fn handle_slot(&mut self, id: SlotId, version: u16, content: Option<Slot>, now: Instant) {
-        // The host persists before it acts on the slot; otherwise a power cut could have the slot applied twice.
-        self.outputs.push_back(VehicleOutput::Persist);
-        let state = match content.ok_or(RefusalReason::Malformed).and_then(|slot| self.apply(slot, now)) {
-            Ok(()) => SlotState::Applied,
-            Err(reason) => SlotState::Refused(reason),
-        };
+        if self.storing.await_disk(WaitingOrder { id, version, content, at: now }) {
+            self.outputs.push_back(VehicleOutput::Persist);
+        }
+    }
+
+    /// Decides about the orders that waited for the disk; returns whether there were any.
+    pub(super) fn decide_waiting(&mut self) -> bool {
+        let waiting = self.storing.take_orders();
+        for WaitingOrder { id, version, content, at } in &waiting {
+            // The host stores the decision before it acts; otherwise a power cut could have the order applied twice.
+            self.outputs.push_back(VehicleOutput::Persist);
+            let state = match content.clone().ok_or(RefusalReason::Malformed) {
+                Ok(slot) => self.decide_known(slot, *at),
+                Err(reason) => SlotState::Refused(reason),
+            };
+            self.put_in_force((*id, *version), state, *at);
+        }
+        !waiting.is_empty()
+    }
+
+    /// The disk has refused a record: holds and aborts are obeyed from memory, and the other waiting orders are refused.
+    pub(super) fn refuse_waiting(&mut self) {
+        for WaitingOrder { id, version, content, at } in self.storing.take_orders() {
+            match content.filter(|slot| self.is_obeyed_from_memory(slot)) {
+                Some(slot) => {
+                    let state = self.decide(slot, at);
+                    self.put_in_force((id, version), state, at);
+                }
+                None => {
+                    let state = SlotState::Refused(RefusalReason::Disk);
+                    self.link.decide(id, state, at);
+                    self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at }));
+                }
+            }
+        }
+        self.durable.inbox = self.storing.with_decisions(self.link.persistent_state().clone());
+    }
+
+    /// Reports decisions that are on the disk. Until then the surface shows their orders as received, and sends them
+    /// again to a vehicle that has restarted.
+    pub(super) fn report_decisions(&mut self, decisions: Vec<UnreportedDecision>) {
+        decisions.into_iter().for_each(|(id, state, at)| self.link.decide(id, state, at));
+    }
+
+    fn put_in_force(&mut self, (id, version): (SlotId, u16), state: SlotState, at: Instant) {
         self.has_new_orders |= id.steers() && state == SlotState::Applied;
-        self.link.decide(id, state, now);
-        self.durable.inbox = self.link.persistent_state().clone();
-        self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at: now }));
+        self.storing.handle_decision(id, state, at);
+        self.durable.inbox = self.storing.with_decisions(self.link.persistent_state().clone());
+        self.outputs.push_back(VehicleOutput::Applied(AppliedSlot { id, version, state, at }));
+    }
+
+    /// Refuses an order that may have been applied before its record was lost. A hold or an abort is obeyed again.
+    fn decide_known(&mut self, slot: Slot, at: Instant) -> SlotState {
+        let series = self.link.persistent_state().series;
+        match self.durable.lost.may_contain(series) && !self.is_obeyed_from_memory(&slot) {
+            true => SlotState::Refused(RefusalReason::Forgotten),
+            false => self.decide(slot, at),
+        }
+    }
+
+    fn decide(&mut self, slot: Slot, at: Instant) -> SlotState {
+        self.apply(slot, at).map_or_else(SlotState::Refused, |()| SlotState::Applied)
+    }
+
+    /// Whether an order stops the vehicle, and lifts no abort.
+    fn is_obeyed_from_memory(&self, slot: &Slot) -> bool {
+        matches!(slot, Slot::Constraints(order) if order.abort || order.hold && !self.durable.abort)
     }
 
     pub(super) fn apply(&mut self, slot: Slot, now: Instant) -> Result<(), RefusalReason> {
@@ -47,7 +107,7 @@ impl Vehicle {
     }
 
     fn apply_requests(&mut self, requests: ExemplarRequests) -> Result<(), RefusalReason> {
-        if requests.epoch != self.durable.epoch {
+        if requests.epoch != self.storing.epoch() {
             return Err(RefusalReason::OtherEpoch);
         }
         if requests.wanted.iter().any(|r| r.label == 0 || r.label > self.publisher.labels()) {
@@ -115,7 +175,7 @@ impl Vehicle {
         if !utility.is_in_range() {
             return Err(RefusalReason::OutOfRange);
         }
-        if utility.epoch != self.durable.epoch {
+        if utility.epoch != self.storing.epoch() {
             return Err(RefusalReason::OtherEpoch);
         }
         if utility.weights.keys().any(|&label| label > self.publisher.labels()) {

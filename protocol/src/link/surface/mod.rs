@@ -113,7 +113,27 @@ impl<R: StateReplica> SurfaceLink<R> {
         if bytes > room {
             return Err(IssueError::TooLarge { bytes, room });
         }
-        self.fleet.get_mut(vehicle).map(|p| p.issue(slot, now)).ok_or(IssueError::NoVehicle)
+        let version = self.fleet.get_mut(vehicle).map(|p| p.issue(slot, now)).ok_or(IssueError::NoVehicle)?;
+        self.resync_if_out_of_step(vehicle, now);
+        Ok(version)
+    }
+
+    /// Begins a new run toward a vehicle if the two ends were found to differ.
+    fn resync_if_out_of_step(&mut self, vehicle: Address, now: Instant) {
+        let is_current = self.fleet.is_current(vehicle);
+        let Some(peer) = self.fleet.get_mut(vehicle) else { return };
+        if !peer.resync_if_out_of_step(now, &mut self.events) {
+            return;
+        }
+        if is_current && !self.turn.is_empty() {
+            // The rest of the turn was written for the run that has ended.
+            self.turn.clear();
+            match self.in_modem.back_mut() {
+                Some(sent) => sent.last = true,
+                None => peer.master.postpone(now),
+            }
+        }
+        self.events.push_back(SurfaceEvent::MapChanged(vehicle));
     }
 
     /// Issues a new version of a slot to several vehicles; each acknowledges and decides by itself.
@@ -167,21 +187,12 @@ impl<R: StateReplica> SurfaceLink<R> {
         if self.discovery.is_answered_by(&envelope, self.config.mission, authenticity, now) {
             return self.handle_call_answer(from, now);
         }
-        let is_current = self.fleet.is_current(from);
         let Some(peer) = self.fleet.get_mut(from) else { return self.drop_unknown(DropReason::UnknownSender) };
         peer.handle_frame(&envelope, bytes.len(), &self.config.modem, now, &mut self.events);
-        if peer.resync_if_out_of_step(now, &mut self.events) {
-            if is_current && !self.turn.is_empty() {
-                // The rest of the turn was written for the run that has ended.
-                self.turn.clear();
-                match self.in_modem.back_mut() {
-                    Some(sent) => sent.last = true,
-                    None => peer.master.postpone(now),
-                }
-            }
-            self.events.push_back(SurfaceEvent::MapChanged(from));
+        self.resync_if_out_of_step(from, now);
+        if let Some(peer) = self.fleet.get_mut(from) {
+            peer.owe_answer(now);
         }
-        peer.owe_answer(now);
     }
 
     /// Drops the copy of an ended run of a vehicle, because the operator needs it no more.

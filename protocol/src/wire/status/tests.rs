@@ -81,7 +81,7 @@ proptest! {
 
     #[test]
     fn reports_of_any_size_cover_every_decided_slot(
-        decided in proptest::collection::vec((any::<u8>(), 0u8..10), SLOTS),
+        decided in proptest::collection::vec((any::<u8>(), 0u8..12), SLOTS),
         room in 0usize..30,
         moved in any::<bool>(),
     ) {

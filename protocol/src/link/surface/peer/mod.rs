@@ -122,7 +122,14 @@ impl<R: StateReplica> VehiclePeer<R> {
 
     /// Issues a new version of a slot; returns the version.
     pub(super) fn issue(&mut self, slot: Slot, now: Instant) -> u16 {
-        self.outbox.issue(slot, now)
+        let version = self.outbox.issue(slot, now);
+        self.follow_series();
+        version
+    }
+
+    /// The hello names the series, so a new one begins with a new run.
+    fn follow_series(&mut self) {
+        self.is_out_of_step |= self.pair.set_series(self.outbox.series());
     }
 
     /// Handles a frame of this vehicle; `bytes` is its length.
@@ -221,6 +228,8 @@ impl<R: StateReplica> VehiclePeer<R> {
         if chunk.kind == ChunkKind::Report {
             let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
             events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotDecided(vehicle, id)));
+            self.outbox.leave_overtaken_series(now);
+            self.follow_series();
         }
         if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {
             events.push_back(SurfaceEvent::Status(vehicle));

@@ -1,0 +1,202 @@
+//! A vehicle whose disk refuses, is damaged or is removed, with restarts at random instants.
+
+use super::journal::Storage;
+use super::journal::disk::{DiskRefusal, DiskStep};
+use super::power_cut_tests::PowerCutTrial;
+use proptest::prelude::*;
+use scenecast_host::CameraPose;
+use scenecast_protocol::directive::{Constraints, OrderStatus, RefusalReason, SlotId};
+use scenecast_protocol::wire::{ModeReason, VehicleMode};
+use scenecast_surface::FenceOrder;
+use scenecast_vehicle::{Durable, LostOrders};
+
+const FILES: [&str; 2] = ["vehicle.journal", "vehicle.journal.copy"];
+
+fn trial(seed: u64) -> PowerCutTrial {
+    let mut trial = PowerCutTrial::new(seed, 0, Vec::new());
+    trial.is_damaged = true;
+    trial
+}
+
+fn run(trial: &mut PowerCutTrial, ticks: u32) {
+    (0..ticks).for_each(|_| trial.tick());
+}
+
+fn order(trial: &mut PowerCutTrial, hold: bool, abort: bool) {
+    let (auv, now) = (trial.auv(), trial.now());
+    trial.surface.surface_mut().set_order(auv, Constraints { hold, abort }, now).unwrap();
+}
+
+fn status(trial: &PowerCutTrial, id: SlotId) -> OrderStatus {
+    let view = trial.surface.surface().view(trial.auv()).unwrap();
+    let slot = view.slots().find(|slot| slot.id == id).unwrap();
+    slot.status
+}
+
+fn durable(trial: &PowerCutTrial) -> &Durable {
+    trial.onboard.host.vehicle().durable()
+}
+
+#[test]
+fn a_refusing_disk_leaves_hold_and_abort_and_the_link() {
+    for refusal in [Some(DiskStep::Sync), Some(DiskStep::Overwrite), None] {
+        let mut trial = trial(1);
+        run(&mut trial, 100);
+        match refusal {
+            Some(step) => trial.disk.fail(Some(step)),
+            None => trial.disk.refuse(DiskRefusal::ReadOnly),
+        }
+        let (auv, now) = (trial.auv(), trial.now());
+        trial.surface.surface_mut().set_budget(5000, None, None, now).unwrap();
+        order(&mut trial, true, false);
+        run(&mut trial, 200);
+        let refused = OrderStatus::Refused(RefusalReason::Disk);
+        assert_eq!(status(&trial, SlotId::Budget), refused);
+        assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Received, "in force, and not on the disk");
+        assert_eq!(trial.onboard.host.vehicle().mode(), (VehicleMode::Hold, ModeReason::Order));
+        assert!(trial.onboard.host.vehicle().disk_refusals().0);
+        order(&mut trial, false, true);
+        run(&mut trial, 200);
+        assert_eq!(trial.onboard.host.vehicle().mode(), (VehicleMode::Surface, ModeReason::Order));
+        order(&mut trial, false, false);
+        run(&mut trial, 200);
+        assert_eq!(status(&trial, SlotId::Constraints), refused, "a disk that keeps no order lifts none");
+        assert!(durable(&trial).abort);
+        trial.disk.fail(None);
+        trial.disk.refuse(DiskRefusal::None);
+        run(&mut trial, 200);
+        assert!(trial.onboard.is_stored && trial.onboard.saved.abort, "it is stored when the disk takes it");
+        let now = trial.now();
+        trial.surface.surface_mut().set_budget(6000, None, None, now).unwrap();
+        trial.surface.surface_mut().set_order(auv, Constraints::default(), now).unwrap();
+        run(&mut trial, 200);
+        assert_eq!(status(&trial, SlotId::Budget), OrderStatus::Applied);
+        assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Applied);
+        assert!(!durable(&trial).abort && !durable(&trial).hold);
+    }
+}
+
+#[test]
+fn a_vehicle_that_lost_its_journal_holds_until_a_new_series() {
+    let mut trial = trial(2);
+    order(&mut trial, false, false);
+    let now = trial.now();
+    trial.surface.surface_mut().set_budget(5000, None, None, now).unwrap();
+    run(&mut trial, 200);
+    assert_eq!(status(&trial, SlotId::Budget), OrderStatus::Applied);
+    FILES.iter().for_each(|name| trial.disk.put(name, b"damaged"));
+    trial.restart();
+    assert!(durable(&trial).hold && durable(&trial).lost == LostOrders::Present);
+    run(&mut trial, 300);
+    assert_eq!(trial.onboard.host.vehicle().mode(), (VehicleMode::Hold, ModeReason::Order));
+    assert!(durable(&trial).hold, "the old order does not lift the hold");
+    trial.restart();
+    assert!(durable(&trial).hold && durable(&trial).lost != LostOrders::None, "a restart changes neither");
+    // The first order is refused, unless the surface has learned of the loss before.
+    for _ in 0..2 {
+        order(&mut trial, false, false);
+        run(&mut trial, 400);
+    }
+    assert_eq!(status(&trial, SlotId::Constraints), OrderStatus::Applied, "a new order begins a new series");
+    assert_eq!(status(&trial, SlotId::Budget), OrderStatus::Applied);
+    assert!(!durable(&trial).hold);
+}
+
+#[derive(Debug, Clone)]
+enum Action {
+    Order(bool, bool),
+    Budget,
+    Refuse(DiskRefusal),
+    Fail(Option<DiskStep>),
+    /// One file, or both, are cut off at this byte.
+    Truncate(bool, bool, usize),
+    Remove(bool),
+    Restart,
+    /// The vehicle leaves its fence.
+    Breach,
+}
+
+fn actions() -> impl Strategy<Value = Vec<(Action, u32)>> {
+    let action = prop_oneof![
+        3 => (any::<bool>(), any::<bool>()).prop_map(|(hold, abort)| Action::Order(hold, abort)),
+        1 => Just(Action::Budget),
+        2 => prop_oneof![Just(DiskRefusal::None), Just(DiskRefusal::Full), Just(DiskRefusal::ReadOnly)]
+            .prop_map(Action::Refuse),
+        1 => prop_oneof![Just(None), Just(Some(DiskStep::Sync)), Just(Some(DiskStep::Overwrite))]
+            .prop_map(Action::Fail),
+        1 => (any::<bool>(), any::<bool>(), 0usize..16_384).prop_map(|(one, both, at)| Action::Truncate(one, both, at)),
+        1 => any::<bool>().prop_map(Action::Remove),
+        3 => Just(Action::Restart),
+        1 => Just(Action::Breach),
+    ];
+    proptest::collection::vec((action, 1u32..60), 1..25)
+}
+
+/// Whether the vehicle is stopped by an order or a breach.
+fn is_stopped(durable: &Durable) -> bool {
+    durable.hold || durable.abort || durable.breach != 0
+}
+
+fn restart(trial: &mut PowerCutTrial) -> Result<(), TestCaseError> {
+    let onboard = &trial.onboard;
+    let (before, was_stored) = (onboard.host.vehicle().durable().clone(), onboard.is_stored);
+    trial.restart();
+    let after = durable(trial).clone();
+    // A state that the disk had not taken and a disk that takes writes again: the surface sends the order again, because
+    // it was never reported as applied.
+    let is_sent_again = !was_stored && trial.onboard.is_stored && !after.hold;
+    prop_assert!(is_stopped(&after) || !is_stopped(&before) || is_sent_again, "{before:?} became {after:?}");
+    if was_stored && after.lost == before.lost {
+        prop_assert!(after.abort || !before.abort);
+        prop_assert!(after.hold || !before.hold);
+        prop_assert!(after.breach == before.breach);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    #[test]
+    fn no_restart_lifts_a_hold_an_abort_or_a_breach(actions in actions(), seed: u64) {
+        let mut trial = trial(seed);
+        let around = [[-90.0, -90.0], [90.0, -90.0], [90.0, 90.0], [-90.0, 90.0]].to_vec();
+        let fence = FenceOrder { fence: Some(around), ..FenceOrder::default() };
+        let (auv, now) = (trial.auv(), trial.now());
+        trial.surface.surface_mut().set_fence(auv, &fence, now).unwrap();
+        run(&mut trial, 100);
+        for (action, ticks) in actions {
+            match action {
+                Action::Order(hold, abort) => order(&mut trial, hold, abort),
+                Action::Budget => {
+                    let now = trial.now();
+                    trial.surface.surface_mut().set_budget(5000, None, None, now).unwrap();
+                }
+                Action::Refuse(refusal) => trial.disk.refuse(refusal),
+                Action::Fail(step) => trial.disk.fail(step),
+                Action::Truncate(one, both, at) => {
+                    for name in FILES.into_iter().skip(usize::from(one && !both)).take(1 + usize::from(both)) {
+                        let whole = trial.disk.read(name).unwrap().unwrap_or_default();
+                        trial.disk.put(name, &whole[..at.min(whole.len())]);
+                    }
+                    restart(&mut trial)?;
+                }
+                Action::Remove(one) => {
+                    trial.disk.remove(FILES[usize::from(one)]);
+                    restart(&mut trial)?;
+                }
+                Action::Restart => restart(&mut trial)?,
+                Action::Breach => {
+                    let now = trial.now();
+                    let outside = CameraPose { x_m: 500.0, y_m: 0.0, heading_rad: 0.0, depth_m: 10.0 };
+                    trial.onboard.host.handle_pose(outside, now);
+                }
+            }
+            run(&mut trial, ticks);
+        }
+        trial.disk.refuse(DiskRefusal::None);
+        trial.disk.fail(None);
+        order(&mut trial, true, false);
+        run(&mut trial, 600);
+        prop_assert!(is_stopped(durable(&trial)), "the last order is obeyed");
+    }
+}

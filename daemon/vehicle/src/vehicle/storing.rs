@@ -1,0 +1,147 @@
+//! The part of the vehicle's state that waits for the disk, and the part that the disk refuses.
+
+use crate::{MapUpdate, SharedExemplars};
+use scenecast_protocol::directive::{Slot, SlotId, SlotState};
+use scenecast_protocol::link::SlotInboxState;
+use scenecast_protocol::time::Instant;
+use std::time::Duration;
+
+/// Time after which a state that the disk has refused is given to it again.
+const RETRY_INTERVAL: Duration = Duration::from_secs(10);
+
+/// An order that waits until the disk has taken a record, so that it can be refused if the disk does not.
+#[derive(Debug)]
+pub(super) struct WaitingOrder {
+    pub(super) id: SlotId,
+    pub(super) version: u16,
+    pub(super) content: Option<Slot>,
+    /// When it was received.
+    pub(super) at: Instant,
+}
+
+/// A map whose labels must be on the disk before they are sent, with the exemplars that belong to it.
+#[derive(Debug)]
+pub(super) struct WaitingMap {
+    pub(super) update: MapUpdate,
+    pub(super) exemplars: Option<SharedExemplars>,
+    pub(super) at: Instant,
+}
+
+/// A decision in force, and when it was made.
+pub(super) type UnreportedDecision = (SlotId, SlotState, Instant);
+
+/// Knows which labels are on the disk, and keeps whatever waits for it.
+#[derive(Debug, Default)]
+pub(super) struct Storing {
+    orders: Vec<WaitingOrder>,
+    /// Decisions in force that are reported once they are on the disk.
+    decisions: Vec<UnreportedDecision>,
+    map: Option<WaitingMap>,
+    /// The epoch on the disk, and its highest label.
+    epoch: u8,
+    labels: u8,
+    /// When the refused state is given to the disk again; `None` while the disk takes everything.
+    retry_at: Option<Instant>,
+    refusals: u64,
+}
+
+impl Storing {
+    pub(super) fn new(epoch: u8, labels: u8) -> Self {
+        Self { epoch, labels, ..Self::default() }
+    }
+
+    /// The epoch of the labels that are sent.
+    pub(super) fn epoch(&self) -> u8 {
+        self.epoch
+    }
+
+    /// The number of times that the disk has refused the state.
+    pub(super) fn refusals(&self) -> u64 {
+        self.refusals
+    }
+
+    pub(super) fn is_refused(&self) -> bool {
+        self.retry_at.is_some()
+    }
+
+    /// Has an order wait in the place of an older version; returns whether it is the first one that waits.
+    pub(super) fn await_disk(&mut self, order: WaitingOrder) -> bool {
+        let is_first = self.orders.is_empty();
+        self.orders.retain(|waiting| waiting.id != order.id);
+        self.decisions.retain(|&(id, ..)| id != order.id);
+        self.orders.push(order);
+        is_first
+    }
+
+    pub(super) fn take_orders(&mut self) -> Vec<WaitingOrder> {
+        std::mem::take(&mut self.orders)
+    }
+
+    /// Keeps a decision until it is on the disk.
+    pub(super) fn handle_decision(&mut self, id: SlotId, state: SlotState, at: Instant) {
+        self.decisions.push((id, state, at));
+    }
+
+    /// The link's state with the decisions that are not reported yet.
+    pub(super) fn with_decisions(&self, mut inbox: SlotInboxState) -> SlotInboxState {
+        self.decisions.iter().for_each(|&(id, state, _)| inbox.decide(id, state));
+        inbox
+    }
+
+    /// Whether every label of a map is on the disk.
+    pub(super) fn covers(&self, update: &MapUpdate) -> bool {
+        update.epoch == self.epoch && update.labels <= self.labels
+    }
+
+    /// Has a map wait in the place of an older one. Returns the part of it that may be sent at once: while the disk
+    /// refuses the new labels, their cells keep their last label or none.
+    pub(super) fn hold_map(&mut self, update: &MapUpdate, at: Instant) -> Option<MapUpdate> {
+        let exemplars = self.map.take().and_then(|map| map.exemplars);
+        self.map = Some(WaitingMap { update: update.clone(), exemplars, at });
+        let is_part_known = self.is_refused() && update.epoch == self.epoch && self.labels > 0;
+        is_part_known.then(|| {
+            let mut part = update.clone();
+            part.cells.retain(|&(_, label)| label <= self.labels);
+            part.labels = self.labels;
+            part
+        })
+    }
+
+    /// Has exemplars wait for the labels of the waiting map; gives them back if there is none.
+    pub(super) fn hold_exemplars(&mut self, exemplars: SharedExemplars) -> Option<SharedExemplars> {
+        match &mut self.map {
+            Some(map) => {
+                map.exemplars = Some(exemplars);
+                None
+            }
+            None => Some(exemplars),
+        }
+    }
+
+    /// The state with these labels is on the disk. Returns the decisions to report and the map to send.
+    pub(super) fn handle_stored(&mut self, epoch: u8, labels: u8) -> (Vec<UnreportedDecision>, Option<WaitingMap>) {
+        (self.epoch, self.labels, self.retry_at) = (epoch, labels, None);
+        (std::mem::take(&mut self.decisions), self.map.take())
+    }
+
+    /// The disk has refused the state.
+    pub(super) fn handle_refusal(&mut self, now: Instant) {
+        self.refusals += 1;
+        self.retry_at = Some(now + RETRY_INTERVAL);
+    }
+
+    /// The disk has refused the state at the start of the run, which begins an epoch.
+    pub(super) fn handle_refused_start(&mut self, now: Instant) {
+        self.handle_refusal(now);
+        self.labels = 0;
+    }
+
+    /// Whether the state is due to be given to the disk again; if so, the next time is later.
+    pub(super) fn takes_retry(&mut self, now: Instant) -> bool {
+        let is_due = self.retry_at.is_some_and(|at| at <= now);
+        if is_due {
+            self.retry_at = Some(now + RETRY_INTERVAL);
+        }
+        is_due
+    }
+}
