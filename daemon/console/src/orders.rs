@@ -104,20 +104,20 @@ pub struct SharesOrder {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CommandOrder {
-    /// The change.
+    /// The change of command that is ordered.
     pub action: CommandOrderAction,
     /// For `hand_over`: the name of the principal; by default the one whose request is the oldest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to: Option<String>,
 }
 
-/// A change of command.
+/// A change of command, with its time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CommandOrderAction {
     /// Asks the holder for command, for 120 s; takes it if nobody has it.
     Request,
-    /// Withdraws the request.
+    /// Withdraws the own request for command.
     Withdraw,
     /// Takes command if nobody has it, or its holder was silent for 120 s.
     Take,

@@ -8,11 +8,11 @@ const MAX_NAME: usize = 32;
 /// A role. Each one may do everything that the roles before it may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Role {
-    /// Reads.
+    /// Reads everything and changes no state.
     Viewer,
-    /// Gives orders.
+    /// Gives orders, and reads everything.
     Operator,
-    /// Changes settings and keys.
+    /// Changes settings and keys, and gives orders.
     Administrator,
 }
 

@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn the_state_of_a_build_without_a_journal_is_refused_in_one_line() {
+    fn a_state_from_before_the_journal_is_refused_in_one_line() {
         let disk = Disk::default();
         disk.put("vehicle.state", b"scVSTA01");
         let earlier = "vehicle.state: the state of an earlier build, which this one does not read; move it away to begin a \

@@ -103,7 +103,7 @@ fn a_vehicle_that_lost_its_journal_holds_until_a_new_series() {
 }
 
 #[derive(Debug, Clone)]
-enum Action {
+enum OrderAction {
     Order(bool, bool),
     Budget,
     Refuse(DiskRefusal),
@@ -116,18 +116,18 @@ enum Action {
     Breach,
 }
 
-fn actions() -> impl Strategy<Value = Vec<(Action, u32)>> {
+fn actions() -> impl Strategy<Value = Vec<(OrderAction, u32)>> {
     let action = prop_oneof![
-        3 => (any::<bool>(), any::<bool>()).prop_map(|(hold, abort)| Action::Order(hold, abort)),
-        1 => Just(Action::Budget),
+        3 => (any::<bool>(), any::<bool>()).prop_map(|(hold, abort)| OrderAction::Order(hold, abort)),
+        1 => Just(OrderAction::Budget),
         2 => prop_oneof![Just(DiskRefusal::None), Just(DiskRefusal::Full), Just(DiskRefusal::ReadOnly)]
-            .prop_map(Action::Refuse),
+            .prop_map(OrderAction::Refuse),
         1 => prop_oneof![Just(None), Just(Some(DiskStep::Sync)), Just(Some(DiskStep::Overwrite))]
-            .prop_map(Action::Fail),
-        1 => (any::<bool>(), any::<bool>(), 0usize..16_384).prop_map(|(one, both, at)| Action::Truncate(one, both, at)),
-        1 => any::<bool>().prop_map(Action::Remove),
-        3 => Just(Action::Restart),
-        1 => Just(Action::Breach),
+            .prop_map(OrderAction::Fail),
+        1 => (any::<bool>(), any::<bool>(), 0usize..16_384).prop_map(|(one, both, at)| OrderAction::Truncate(one, both, at)),
+        1 => any::<bool>().prop_map(OrderAction::Remove),
+        3 => Just(OrderAction::Restart),
+        1 => Just(OrderAction::Breach),
     ];
     proptest::collection::vec((action, 1u32..60), 1..25)
 }
@@ -166,26 +166,26 @@ proptest! {
         run(&mut trial, 100);
         for (action, ticks) in actions {
             match action {
-                Action::Order(hold, abort) => order(&mut trial, hold, abort),
-                Action::Budget => {
+                OrderAction::Order(hold, abort) => order(&mut trial, hold, abort),
+                OrderAction::Budget => {
                     let now = trial.now();
                     trial.surface.surface_mut().set_budget(5000, None, None, now).unwrap();
                 }
-                Action::Refuse(refusal) => trial.disk.refuse(refusal),
-                Action::Fail(step) => trial.disk.fail(step),
-                Action::Truncate(one, both, at) => {
+                OrderAction::Refuse(refusal) => trial.disk.refuse(refusal),
+                OrderAction::Fail(step) => trial.disk.fail(step),
+                OrderAction::Truncate(one, both, at) => {
                     for name in FILES.into_iter().skip(usize::from(one && !both)).take(1 + usize::from(both)) {
                         let whole = trial.disk.read(name).unwrap().unwrap_or_default();
                         trial.disk.put(name, &whole[..at.min(whole.len())]);
                     }
                     restart(&mut trial)?;
                 }
-                Action::Remove(one) => {
+                OrderAction::Remove(one) => {
                     trial.disk.remove(FILES[usize::from(one)]);
                     restart(&mut trial)?;
                 }
-                Action::Restart => restart(&mut trial)?,
-                Action::Breach => {
+                OrderAction::Restart => restart(&mut trial)?,
+                OrderAction::Breach => {
                     let now = trial.now();
                     let outside = CameraPose { x_m: 500.0, y_m: 0.0, heading_rad: 0.0, depth_m: 10.0 };
                     trial.onboard.host.handle_pose(outside, now);

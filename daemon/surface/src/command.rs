@@ -50,13 +50,11 @@ impl OrderKind {
 pub enum CommandAction {
     /// Asks the holder for command; takes it if nobody has it.
     Request,
-    /// Withdraws a request.
     Withdraw,
     /// Takes command after the holder's silence, or if nobody has it.
     Take,
     /// Gives command to this principal, or to the one whose request is the oldest.
     HandOver(Option<String>),
-    /// Gives command up.
     Release,
     /// A sign that the holder is present; ignored from others.
     Keep,
@@ -126,9 +124,9 @@ pub struct CommandChange {
     pub kind: CommandChangeKind,
     /// The principal who made the change.
     pub by: String,
-    /// The holder before.
+    /// The holder before it, by name.
     pub from: Option<String>,
-    /// The holder after.
+    /// The holder after it, by name.
     pub to: Option<String>,
 }
 
@@ -174,8 +172,8 @@ impl Command {
         }
     }
 
-    /// An order that passed [`Command::check`] was accepted. If nobody has command and the order needs it, its giver takes
-    /// it. Returns the change.
+    /// An order that passed [`Command::check`] was accepted. If nobody has command and the order needs
+    /// it, its giver takes it. Returns the change.
     pub fn handle_order(&mut self, by: &Principal, kind: OrderKind, now: Instant) -> Option<CommandChange> {
         if self.check(by, kind, now).is_err() {
             return None;

@@ -68,12 +68,12 @@ fn command_is_handed_over_to_an_operator_on_request() {
 }
 
 #[derive(Debug, Clone)]
-enum Step {
+enum CommandStep {
     Order(OrderKind),
     Act(CommandAction),
 }
 
-fn step() -> impl Strategy<Value = Step> {
+fn step() -> impl Strategy<Value = CommandStep> {
     let name = prop::sample::select(vec!["victor", "anna", "bob", "carla", "dora"]);
     let to = prop::option::of(name).prop_map(|to| CommandAction::HandOver(to.map(str::to_owned)));
     let others = vec![
@@ -84,7 +84,11 @@ fn step() -> impl Strategy<Value = Step> {
         CommandAction::Keep,
     ];
     let orders = prop::sample::select(vec![OrderKind::Stop, OrderKind::Record, OrderKind::Order, OrderKind::Settings]);
-    prop_oneof![orders.prop_map(Step::Order), to.prop_map(Step::Act), prop::sample::select(others).prop_map(Step::Act)]
+    prop_oneof![
+        orders.prop_map(CommandStep::Order),
+        to.prop_map(CommandStep::Act),
+        prop::sample::select(others).prop_map(CommandStep::Act)
+    ]
 }
 
 proptest! {
@@ -101,23 +105,23 @@ proptest! {
             let is_own = before.as_deref() == Some(by.name());
             let mut is_sign = is_own;
             let change = match &step {
-                Step::Order(kind) => {
+                CommandStep::Order(kind) => {
                     let allowed = command.check(by, *kind, now).is_ok();
                     let has_command = !kind.needs_command() || is_own || before.is_none();
                     prop_assert_eq!(allowed, by.role() >= kind.role() && has_command);
                     is_sign &= allowed;
                     command.handle_order(by, *kind, now)
                 }
-                Step::Act(action) => command.handle_action(by, action, now).ok().flatten(),
+                CommandStep::Act(action) => command.handle_action(by, action, now).ok().flatten(),
             };
             let after = command.holder().map(|h| h.principal.name().to_owned());
             if before != after {
                 let by_rule = match &step {
-                    Step::Order(kind) => before.is_none() && kind.needs_command(),
-                    Step::Act(CommandAction::HandOver(_) | CommandAction::Release) => is_own,
-                    Step::Act(CommandAction::Request) => before.is_none(),
-                    Step::Act(CommandAction::Take) => before.is_none() || seconds - last_sign >= 120,
-                    Step::Act(_) => false,
+                    CommandStep::Order(kind) => before.is_none() && kind.needs_command(),
+                    CommandStep::Act(CommandAction::HandOver(_) | CommandAction::Release) => is_own,
+                    CommandStep::Act(CommandAction::Request) => before.is_none(),
+                    CommandStep::Act(CommandAction::Take) => before.is_none() || seconds - last_sign >= 120,
+                    CommandStep::Act(_) => false,
                 };
                 prop_assert!(by_rule, "{} took it by {:?}", by.name(), step);
             }

@@ -69,7 +69,6 @@ impl Surface {
         self.command = Command::new(principals);
     }
 
-    /// Who has command.
     pub fn command(&self) -> &Command {
         &self.command
     }

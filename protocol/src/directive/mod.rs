@@ -255,7 +255,7 @@ pub struct VersionedSlot {
 }
 
 impl VersionedSlot {
-    /// Encodes `slot` at `version`.
+    /// The bytes of `slot` at `version`.
     #[must_use]
     pub fn encode(version: u16, slot: &Slot) -> Vec<u8> {
         let mut out = vec![(slot.id() as u8) << 5];

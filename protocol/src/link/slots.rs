@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 pub struct SlotInboxState {
     /// The series of the surface's orders.
     pub series: Option<Series>,
-    /// Ended series, oldest first.
+    /// Series that have ended, oldest first.
     pub retired: VecDeque<Series>,
     /// The latest version received, by slot.
     pub versions: [Option<u16>; SLOTS],

@@ -55,8 +55,8 @@ pub trait StateSource: Debug {
 
 /// The receiving side of a replicated state.
 pub trait StateReplica: Debug + Default + Sized {
-    /// Whether a chunk that is based on every frame up to `horizon` would decode here. A frame with a chunk that does not is
-    /// refused as a whole.
+    /// Whether a chunk that is based on every frame up to `horizon` would decode here. A frame with a chunk
+    /// that does not is refused as a whole.
     fn decodes(&self, horizon: u64, chunk: &[u8]) -> bool {
         let _ = (horizon, chunk);
         true

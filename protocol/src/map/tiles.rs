@@ -18,7 +18,7 @@ pub type ReplicaTileKey = (i32, i32);
 
 /// A frame that covered cells of a tile.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Reception {
+struct CellReception {
     number: u64,
     at: Instant,
 }
@@ -29,7 +29,7 @@ pub struct ReplicaTile {
     labels: [u8; CELLS],
     /// One more than the index of each cell's reception; 0 = never received.
     received: [u16; CELLS],
-    receptions: Vec<Reception>,
+    receptions: Vec<CellReception>,
 }
 
 impl ReplicaTile {
@@ -57,12 +57,12 @@ impl ReplicaTile {
         tiles
     }
 
-    fn reception(&self, index: u16) -> Option<Reception> {
+    fn reception(&self, index: u16) -> Option<CellReception> {
         self.receptions.get(usize::from(index).checked_sub(1)?).copied()
     }
 
     /// Enters a reception unless the last one is the same; the result is the number by which cells refer to it.
-    fn enter(&mut self, reception: Reception) -> u16 {
+    fn enter(&mut self, reception: CellReception) -> u16 {
         if self.receptions.last() != Some(&reception) {
             if self.receptions.len() >= MAX_RECEPTIONS {
                 self.forget_unused();
@@ -163,7 +163,7 @@ impl ReplicaTiles {
             return None;
         }
         let tile = Arc::make_mut(shared);
-        let index = tile.enter(Reception { number, at });
+        let index = tile.enter(CellReception { number, at });
         *tile.received.get_mut(place)? = index;
         let old = std::mem::replace(tile.labels.get_mut(place)?, label);
         self.received += usize::from(held.is_none());

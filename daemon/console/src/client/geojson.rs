@@ -19,7 +19,7 @@ pub(super) enum CoordinateFrame {
 
 /// The property `role` of a feature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Role {
+enum FeatureRole {
     Fence,
     KeepOut,
     ReturnPoint,
@@ -65,7 +65,7 @@ fn add(order: &mut FenceOrder, feature: &Value, frame: CoordinateFrame) -> Resul
     let (geometry, role) = (&feature["geometry"], role(feature)?);
     let coordinates = &geometry["coordinates"];
     let rings: Vec<&Value> = match geometry["type"].as_str() {
-        Some("Point") if matches!(role, None | Some(Role::ReturnPoint)) => {
+        Some("Point") if matches!(role, None | Some(FeatureRole::ReturnPoint)) => {
             let at = place(coordinates, frame)?;
             return match order.return_point.replace(at) {
                 None => Ok(()),
@@ -82,10 +82,10 @@ fn add(order: &mut FenceOrder, feature: &Value, frame: CoordinateFrame) -> Resul
     for polygon in rings {
         let outline = outline(polygon, frame)?;
         match role {
-            Some(Role::KeepOut) => order.keep_outs.push(outline),
-            Some(Role::ReturnPoint) => return Err("the return point is a Point".to_owned()),
-            Some(Role::Fence) | None if order.fence.is_none() => order.fence = Some(outline),
-            Some(Role::Fence) | None => {
+            Some(FeatureRole::KeepOut) => order.keep_outs.push(outline),
+            Some(FeatureRole::ReturnPoint) => return Err("the return point is a Point".to_owned()),
+            Some(FeatureRole::Fence) | None if order.fence.is_none() => order.fence = Some(outline),
+            Some(FeatureRole::Fence) | None => {
                 return Err("a second fence: an area to stay out of has the property role = keep_out".to_owned());
             }
         }
@@ -93,12 +93,12 @@ fn add(order: &mut FenceOrder, feature: &Value, frame: CoordinateFrame) -> Resul
     Ok(())
 }
 
-fn role(feature: &Value) -> Result<Option<Role>, String> {
+fn role(feature: &Value) -> Result<Option<FeatureRole>, String> {
     match &feature["properties"]["role"] {
         Value::Null => Ok(None),
-        Value::String(s) if s == "fence" => Ok(Some(Role::Fence)),
-        Value::String(s) if s == "keep_out" => Ok(Some(Role::KeepOut)),
-        Value::String(s) if s == "return_point" => Ok(Some(Role::ReturnPoint)),
+        Value::String(s) if s == "fence" => Ok(Some(FeatureRole::Fence)),
+        Value::String(s) if s == "keep_out" => Ok(Some(FeatureRole::KeepOut)),
+        Value::String(s) if s == "return_point" => Ok(Some(FeatureRole::ReturnPoint)),
         other => Err(format!("role {other}: expected fence, keep_out or return_point")),
     }
 }

@@ -14,22 +14,21 @@ pub enum MapFormat {
     WorldFile,
     /// The projection of that PNG.
     Projection,
-    /// Regions of equal label.
+    /// Regions of equal label as polygons.
     GeoJson,
-    /// A point cloud.
+    /// A point cloud for CloudCompare and the like.
     Ply,
     /// A line for each explored cell.
     Csv,
     /// A GeoTIFF in the projection of the mission, a pixel a cell.
     Tiff,
-    /// A GeoTIFF in UTM.
+    /// A GeoTIFF in the zone of UTM.
     UtmTiff,
     /// A GeoTIFF in longitude and latitude.
     Wgs84Tiff,
 }
 
 impl MapFormat {
-    /// Every format.
     pub const ALL: [Self; 9] = [
         Self::Png,
         Self::WorldFile,

@@ -28,7 +28,6 @@ pub(super) enum Reference {
     Mission,
     /// The UTM zone of the origin.
     Utm,
-    /// Longitude and latitude, EPSG:4326.
     Wgs84,
 }
 

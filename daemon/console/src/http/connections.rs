@@ -31,8 +31,8 @@ const MAX_HEADERS: usize = 64;
 pub(super) const EVENT_STREAM: &str = "text/event-stream";
 /// For a client to read sent data.
 const READ_TIMEOUT: Duration = Duration::from_secs(20);
-/// For the client of a stream of events. With the time in which events fill the buffers, a stream that is not read ends
-/// within 10 s.
+/// For the client of a stream of events. With the time in which events fill the buffers, a stream that
+/// is not read ends within 10 s.
 const STREAM_READ_TIMEOUT: Duration = Duration::from_secs(5);
 /// The bytes that a client must read within the timeout, unless it reads everything.
 const MIN_PROGRESS_BYTES: usize = 8 * 1024;
@@ -256,7 +256,6 @@ impl TimeoutStream {
         Poll::Ready(result)
     }
 
-    /// The client reads.
     fn handle_progress(&mut self) {
         (self.timeout, self.progress) = (None, 0);
     }
@@ -305,7 +304,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_new_connection_replaces_the_oldest_that_waits_for_its_client() {
+    async fn a_new_connection_replaces_the_oldest_that_only_waits() {
         let connections = Connections::default();
         let mut open = |number: u64| {
             let activity = connections.make_room(number);

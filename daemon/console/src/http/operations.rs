@@ -26,7 +26,7 @@ pub(super) enum Content {
     File(&'static str),
     /// Server-sent events.
     Events,
-    /// Tiles of a map.
+    /// Changed tiles of a map, binary.
     Tiles,
     Headers,
 }

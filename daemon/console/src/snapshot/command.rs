@@ -8,7 +8,6 @@ use crate::state::{
 use scenecast_protocol::time::Instant;
 use scenecast_surface::{COMMAND_SILENCE, Command, CommandChange, CommandChangeKind, Principal, Role};
 
-/// The state of command.
 pub(crate) fn command_state(command: &Command, now: Instant) -> CommandState {
     CommandState {
         holder: command.holder().map(|h| CommandHolderState {

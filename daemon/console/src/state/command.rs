@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PrincipalRole {
-    /// Reads.
+    /// Reads everything and changes no state.
     Viewer,
-    /// Gives orders.
+    /// Gives orders, and reads everything.
     Operator,
-    /// Changes settings.
+    /// Changes settings, gives orders, and reads everything.
     Administrator,
 }
 
@@ -42,7 +42,7 @@ pub struct CommandState {
 pub struct CommandHolderState {
     /// The name of the principal.
     pub name: String,
-    /// Its role.
+    /// The role that its token gives.
     pub role: PrincipalRole,
     /// Mission time since which it has command.
     pub since_s: f64,
@@ -52,7 +52,7 @@ pub struct CommandHolderState {
     pub takeable_s: f64,
 }
 
-/// A request for command.
+/// A request for command that is open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CommandRequestState {
     /// The principal who requests it.
@@ -61,12 +61,12 @@ pub struct CommandRequestState {
     pub at_s: f64,
 }
 
-/// A change of command.
+/// A change of command, with its time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CommandChangeState {
     /// Mission time of the change.
     pub at_s: f64,
-    /// The kind of change.
+    /// How command changed, or was requested.
     pub kind: CommandChangeName,
     /// The principal who made it.
     pub by: String,
@@ -86,8 +86,8 @@ pub enum CommandChangeName {
     HandedOver,
     /// Given up by its holder.
     Released,
-    /// Requested from its holder.
+    /// Command was requested from its holder.
     Requested,
-    /// The request was withdrawn.
+    /// The request for command was withdrawn.
     Withdrawn,
 }

@@ -77,7 +77,7 @@ pub struct TileLayer {
     pub is_depth: bool,
     /// The colours: cividis or inferno.
     pub palette: String,
-    /// As in a [`LayerBody`].
+    /// The spread, as in a [`LayerBody`].
     pub spread: String,
     /// The level whose bounds are the first two of `edges`.
     pub lowest: u8,

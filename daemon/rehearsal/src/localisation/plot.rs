@@ -22,7 +22,7 @@ type SvgError = DrawingAreaErrorKind<std::io::Error>;
 /// Draws truth, dead reckoning and relayed estimate as SVG, in metres east and north.
 ///
 /// # Errors
-/// The error of `plotters`.
+/// The error of `plotters`, if it cannot draw.
 pub fn localisation_plot(tracks: &Tracks, title: &str) -> Result<String, SvgError> {
     let all = || tracks.truth.iter().chain(&tracks.reckoned).chain(&tracks.relayed).chain(&tracks.ship);
     let ends = |of: fn(&(f64, f64)) -> f64| {

@@ -16,7 +16,6 @@ impl CpuMeter {
         Self { cpu: thread_cpu(), clock: Instant::now() }
     }
 
-    /// Milliseconds since the start.
     pub(super) fn ms(&self) -> f64 {
         let elapsed = self.clock.elapsed();
         let cpu = thread_cpu().zip(self.cpu).map(|(now, start)| now.saturating_sub(start));

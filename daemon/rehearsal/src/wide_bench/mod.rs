@@ -13,16 +13,14 @@ use scenecast_console::{
 use scenecast_core::UserError;
 use serde::Serialize;
 use std::time::Duration;
-use survey::Survey;
+use survey::WideSurvey;
 
 /// The size of the survey and of its updates.
 #[derive(Debug, Clone, Copy)]
 pub struct WideSetting {
-    /// Explored cells.
     pub cells: usize,
     /// Side of the square that the survey spans, metres.
     pub box_m: f64,
-    /// Cells of an update.
     pub update: usize,
     /// Number of updates that are measured.
     pub updates: usize,
@@ -60,7 +58,6 @@ pub struct ExportCost {
     pub refused: Option<String>,
 }
 
-/// The measured values.
 #[derive(Debug, Clone, Serialize)]
 pub struct WideFigures {
     pub explored_cells: usize,
@@ -91,7 +88,7 @@ pub fn wide(
     progress: &mut dyn FnMut(f64),
     keep: &mut Keep<'_>,
 ) -> Result<WideFigures, UserError> {
-    let mut survey = Survey::new(config, setting, seed)?;
+    let mut survey = WideSurvey::new(config, setting, seed)?;
     let before = resident_bytes();
     survey.receive(setting.cells, progress)?;
     let surface_bytes = resident_bytes().zip(before).map(|(after, before)| after.saturating_sub(before));
@@ -128,7 +125,7 @@ struct View {
 }
 
 impl View {
-    fn new(config: &Config, survey: &mut Survey) -> Result<Self, UserError> {
+    fn new(config: &Config, survey: &mut WideSurvey) -> Result<Self, UserError> {
         let facts = MissionFacts::new(config, &survey.modem, 1, 1.0);
         let map = TiledMap::first(cells(survey, facts.cell_m)?, 1);
         let meter = LinkMeter::new(Duration::from_secs_f64(config.link.budget_window_s));
@@ -136,7 +133,7 @@ impl View {
     }
 
     /// What one page costs after a change of the map.
-    fn update(&mut self, survey: &mut Survey) -> Result<UpdateCost, UserError> {
+    fn update(&mut self, survey: &mut WideSurvey) -> Result<UpdateCost, UserError> {
         let cpu = CpuMeter::start();
         let state = snapshot(&survey.surface, &self.facts, &self.meter, survey.now);
         let cells = cells(survey, self.facts.cell_m)?;
@@ -160,7 +157,7 @@ fn packed(map: &TiledMap, since: Option<&str>) -> usize {
     gzip(&map.tiles_since(since)).map_or(0, |packed| packed.len())
 }
 
-fn cells(survey: &mut Survey, cell_m: f64) -> Result<MapCells, UserError> {
+fn cells(survey: &mut WideSurvey, cell_m: f64) -> Result<MapCells, UserError> {
     let request = ClientRequest { principal: None, request: SurfaceRequest::Map(survey.vehicle.number()) };
     match handle_request(&mut survey.surface, request, cell_m, survey.now) {
         Reply::Map(cells) => Ok(cells),

@@ -30,7 +30,7 @@ const MAX_IDLE_FRAMES: usize = 20_000;
 const LABELS: u8 = 6;
 
 /// The ends of the link, and the rest of the track.
-pub(super) struct Survey {
+pub(super) struct WideSurvey {
     pub(super) surface: Surface,
     pub(super) vehicle: Address,
     pub(super) modem: ModemProfile,
@@ -40,7 +40,7 @@ pub(super) struct Survey {
     has_depth: bool,
 }
 
-impl Survey {
+impl WideSurvey {
     pub(super) fn new(config: &Config, setting: WideSetting, seed: u64) -> Result<Self, UserError> {
         let now = Instant::ZERO;
         let vehicle = vehicle_address(config)?;
@@ -138,14 +138,12 @@ impl Survey {
 struct Track {
     /// Half the side of the square, cells.
     half: i32,
-    /// Cells between two lanes.
     spacing: i32,
     /// Cells that are left out after each segment.
     gap: i32,
     along: i32,
     lane: i32,
     waiting: VecDeque<(Cell, u8, f64)>,
-    /// Phases of the depth.
     phases: (f64, f64),
     rng: RandomStream,
     label: u8,

@@ -15,7 +15,7 @@ pub(super) use record::Damage;
 pub(crate) use storage::create_folder;
 pub(crate) use storage::{Folder, Storage};
 
-use record::{Content, FILE_BYTES, Record};
+use record::{FILE_BYTES, Record, RecordContent};
 use std::io;
 
 /// The reason that a state could not be made durable. A later attempt may succeed.
@@ -48,7 +48,6 @@ impl JournalNames {
 /// The content of a journal at the start of a run.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// There is no file.
     Absent,
     State {
         /// The last confirmed state, or one that was being written since.
@@ -86,10 +85,10 @@ impl<S: Storage> Journal<S> {
     pub(super) fn open(storage: S, names: JournalNames) -> (Self, Found) {
         let contents = [0, 1].map(|number| match storage.read(names.name(number)) {
             Ok(Some(bytes)) => record::read(number, &bytes),
-            Ok(None) => Content::Absent,
-            Err(e) => Content::Damaged(Damage::Unreadable(e.to_string())),
+            Ok(None) => RecordContent::Absent,
+            Err(e) => RecordContent::Damaged(Damage::Unreadable(e.to_string())),
         });
-        let last = contents.iter().filter_map(Content::record).max_by_key(|record| record.sequence).cloned();
+        let last = contents.iter().filter_map(RecordContent::record).max_by_key(|record| record.sequence).cloned();
         // An earlier process may have been killed between a write and its sync: of two equal files the journal was
         // written last, and of two unequal ones the copy.
         let [journal, copy] = [0, 1].map(|at| contents[at].record());
@@ -97,7 +96,8 @@ impl<S: Storage> Journal<S> {
         let is_next =
             journal.zip(copy).is_some_and(|(journal, copy)| copy.sequence == journal.sequence.wrapping_add(1));
         let is_copy_uncertain = is_copy_last && is_next;
-        let is_unreadable = |content: &Content| matches!(content, Content::Torn | Content::Damaged(_));
+        let is_unreadable =
+            |content: &RecordContent| matches!(content, RecordContent::Torn | RecordContent::Damaged(_));
         let unreadable = [0, 1].map(|at| is_unreadable(&contents[at]));
         let found = find(names, contents);
         // A torn file beside a whole one is overwritten.
@@ -168,38 +168,38 @@ impl<S: Storage> Journal<S> {
 }
 
 /// Judges the two files together. Of two states the one with the higher sequence number is the last one.
-fn find(names: JournalNames, [journal, copy]: [Content; 2]) -> Found {
+fn find(names: JournalNames, [journal, copy]: [RecordContent; 2]) -> Found {
     let state = |record: Record, damage| Found::State { body: record.body, is_earlier: false, damage };
     match (journal, copy) {
-        (Content::Absent, Content::Absent) => Found::Absent,
-        (Content::Sound(journal), Content::Sound(copy)) if journal.sequence > copy.sequence => {
+        (RecordContent::Absent, RecordContent::Absent) => Found::Absent,
+        (RecordContent::Sound(journal), RecordContent::Sound(copy)) if journal.sequence > copy.sequence => {
             state(journal, Some((names.copy, Damage::Older)))
         }
-        (Content::Sound(journal), Content::Sound(copy)) => {
+        (RecordContent::Sound(journal), RecordContent::Sound(copy)) => {
             let is_older = copy.sequence - journal.sequence > 1;
             state(copy, is_older.then_some((names.journal, Damage::Older)))
         }
-        (Content::Sound(record), Content::Torn) | (Content::Torn, Content::Sound(record)) => {
+        (RecordContent::Sound(record), RecordContent::Torn) | (RecordContent::Torn, RecordContent::Sound(record)) => {
             tracing::warn!("{}: one of two copies was cut short by a stop", names.journal);
             state(record, None)
         }
         // A stop between the first record's two files, or between those of the first record after an update.
-        (Content::Absent, Content::Sound(record)) if record.sequence == 1 => state(record, None),
-        (Content::Earlier(_), Content::Sound(record)) => state(record, None),
-        (Content::Earlier(record), Content::Absent | Content::Torn) => {
+        (RecordContent::Absent, RecordContent::Sound(record)) if record.sequence == 1 => state(record, None),
+        (RecordContent::Earlier(_), RecordContent::Sound(record)) => state(record, None),
+        (RecordContent::Earlier(record), RecordContent::Absent | RecordContent::Torn) => {
             Found::State { body: record.body, is_earlier: true, damage: None }
         }
-        (Content::Sound(record), Content::Absent) => state(record, Some((names.copy, Damage::Missing))),
-        (Content::Absent, Content::Sound(record)) => state(record, Some((names.journal, Damage::Missing))),
-        (Content::Sound(record), Content::Damaged(damage)) => state(record, Some((names.copy, damage))),
-        (Content::Damaged(damage), Content::Sound(record)) => state(record, Some((names.journal, damage))),
-        (Content::Earlier(record), Content::Damaged(damage)) => {
+        (RecordContent::Sound(record), RecordContent::Absent) => state(record, Some((names.copy, Damage::Missing))),
+        (RecordContent::Absent, RecordContent::Sound(record)) => state(record, Some((names.journal, Damage::Missing))),
+        (RecordContent::Sound(record), RecordContent::Damaged(damage)) => state(record, Some((names.copy, damage))),
+        (RecordContent::Damaged(damage), RecordContent::Sound(record)) => state(record, Some((names.journal, damage))),
+        (RecordContent::Earlier(record), RecordContent::Damaged(damage)) => {
             Found::State { body: record.body, is_earlier: true, damage: Some((names.copy, damage)) }
         }
         // The copy is never of an earlier build.
-        (Content::Sound(record), Content::Earlier(_)) => state(record, Some((names.copy, Damage::Content))),
-        (Content::Damaged(damage), _) => Found::Lost(names.journal, damage),
-        (Content::Absent, _) => Found::Lost(names.journal, Damage::Missing),
-        (Content::Torn | Content::Earlier(_), _) => Found::Lost(names.journal, Damage::Content),
+        (RecordContent::Sound(record), RecordContent::Earlier(_)) => state(record, Some((names.copy, Damage::Content))),
+        (RecordContent::Damaged(damage), _) => Found::Lost(names.journal, damage),
+        (RecordContent::Absent, _) => Found::Lost(names.journal, Damage::Missing),
+        (RecordContent::Torn | RecordContent::Earlier(_), _) => Found::Lost(names.journal, Damage::Content),
     }
 }

@@ -7,8 +7,8 @@ const MAGIC: &[u8; 8] = b"scVJRN03";
 const HEAD: usize = 21;
 const TAIL: usize = 4;
 
-/// Length of each file of the journal, bytes. All of it is written when the file is created, so that later records need
-/// no free space.
+/// Length of each file of the journal, bytes. All of it is written when the file is created, so
+/// that later records need no free space.
 pub(super) const FILE_BYTES: usize = 16 * 1024;
 /// Maximum length of a state, bytes.
 pub(super) const MAX_BODY_BYTES: usize = FILE_BYTES - HEAD - TAIL;
@@ -34,7 +34,7 @@ pub(crate) enum Damage {
 
 /// The content of one file of the journal.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Content {
+pub(super) enum RecordContent {
     Absent,
     /// A record of this build.
     Sound(Record),
@@ -46,7 +46,7 @@ pub(super) enum Content {
     Damaged(Damage),
 }
 
-impl Content {
+impl RecordContent {
     pub(super) fn record(&self) -> Option<&Record> {
         match self {
             Self::Sound(record) | Self::Earlier(record) => Some(record),
@@ -88,18 +88,18 @@ pub(super) fn encode(number: u8, record: &Record) -> Option<Vec<u8>> {
 ///
 /// A record counts only at its place, in a file of the exact length and of its own number. So a truncated, extended or
 /// shifted file, and one in the place of another, is never read as an older state.
-pub(super) fn read(number: u8, bytes: &[u8]) -> Content {
+pub(super) fn read(number: u8, bytes: &[u8]) -> RecordContent {
     if bytes.starts_with(earlier::MAGIC) {
-        return earlier::read(bytes).map_or(Content::Damaged(Damage::Content), Content::Earlier);
+        return earlier::read(bytes).map_or(RecordContent::Damaged(Damage::Content), RecordContent::Earlier);
     }
     if bytes.len() != FILE_BYTES {
-        return Content::Damaged(Damage::Length { bytes: bytes.len() });
+        return RecordContent::Damaged(Damage::Length { bytes: bytes.len() });
     }
     match decode(number, bytes) {
-        Some(record) => Content::Sound(record),
+        Some(record) => RecordContent::Sound(record),
         // Every version up to now has two digits.
-        None if is_other_version(bytes) => Content::Damaged(Damage::Version),
-        None => Content::Torn,
+        None if is_other_version(bytes) => RecordContent::Damaged(Damage::Version),
+        None => RecordContent::Torn,
     }
 }
 
@@ -182,8 +182,8 @@ mod tests {
         assert_eq!(bytes[..24], *b"scVJRN03\x01\0\0\0\0\0\0\x01\x02\0\0\0\x03abc");
         assert_eq!(bytes[24..28], CRC.checksum(&bytes[..24]).to_be_bytes());
         assert!(bytes[28..].iter().all(|&b| b == 0));
-        assert_eq!(read(1, &bytes), Content::Sound(Record { sequence: 0x0102, body: b"abc".to_vec() }));
-        assert_eq!(read(0, &bytes), Content::Torn, "the copy in the place of the journal");
+        assert_eq!(read(1, &bytes), RecordContent::Sound(Record { sequence: 0x0102, body: b"abc".to_vec() }));
+        assert_eq!(read(0, &bytes), RecordContent::Torn, "the copy in the place of the journal");
     }
 
     #[test]
@@ -198,28 +198,31 @@ mod tests {
         for (at, bit) in (0..HEAD + 500 + TAIL).flat_map(|at| (0..8).map(move |bit| (at, bit))) {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << bit;
-            assert!(!matches!(read(0, &damaged), Content::Sound(_) | Content::Earlier(_)), "byte {at}, bit {bit}");
+            assert!(
+                !matches!(read(0, &damaged), RecordContent::Sound(_) | RecordContent::Earlier(_)),
+                "byte {at}, bit {bit}"
+            );
         }
     }
 
     #[test]
     fn the_last_record_of_an_earlier_build_is_read() {
         let file = |numbers: &[u64]| numbers.iter().flat_map(|&n| earlier::encode(n, &[n as u8; 5000])).collect();
-        let last = |sequence: u64| Content::Earlier(Record { sequence, body: vec![sequence as u8; 5000] });
+        let last = |sequence: u64| RecordContent::Earlier(Record { sequence, body: vec![sequence as u8; 5000] });
         let whole: Vec<u8> = file(&[5, 6, 7]);
         assert_eq!(read(0, &whole), last(7));
         assert_eq!(read(0, &whole[..whole.len() - 8192]), last(6), "this layout does not show a lost end");
         assert_eq!(read(0, &whole[..20_000]), last(6), "a power cut leaves a record without its end");
         let missing: Vec<u8> = file(&[5, 6, 8]);
-        assert_eq!(read(0, &missing), Content::Damaged(Damage::Content));
+        assert_eq!(read(0, &missing), RecordContent::Damaged(Damage::Content));
     }
 
     #[test]
     fn other_files_are_no_journal() {
-        assert_eq!(read(0, b""), Content::Damaged(Damage::Length { bytes: 0 }));
-        assert_eq!(read(0, &[0; FILE_BYTES]), Content::Torn);
+        assert_eq!(read(0, b""), RecordContent::Damaged(Damage::Length { bytes: 0 }));
+        assert_eq!(read(0, &[0; FILE_BYTES]), RecordContent::Torn);
         let mut later = encode(0, &record(1, b"state")).unwrap();
         later[7] = b'9';
-        assert_eq!(read(0, &later), Content::Damaged(Damage::Version));
+        assert_eq!(read(0, &later), RecordContent::Damaged(Damage::Version));
     }
 }

@@ -12,13 +12,13 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// When a peer last sent a byte.
 #[derive(Debug)]
-pub(super) struct Activity {
+pub(super) struct PortActivity {
     began: Instant,
     /// Microseconds from the beginning to the last received byte, at least 1; 0 before the first.
     last_us: AtomicU64,
 }
 
-impl Activity {
+impl PortActivity {
     pub(super) fn new() -> Self {
         Self { began: Instant::now(), last_us: AtomicU64::new(0) }
     }
@@ -47,7 +47,7 @@ impl Activity {
 pub(super) async fn carry(
     stream: impl AsyncRead + AsyncWrite + Unpin,
     quiet: Option<Duration>,
-    activity: &Activity,
+    activity: &PortActivity,
     ends: &mut PortEnds,
 ) -> io::Result<()> {
     if !ends.report_open().await {
@@ -132,7 +132,7 @@ mod tests {
     fn carried(quiet: Option<Duration>) -> (tokio::io::DuplexStream, Port, tokio::task::JoinHandle<io::Result<()>>) {
         let (near, far) = tokio::io::duplex(16);
         let (port, mut ends) = Port::pair();
-        let task = tokio::spawn(async move { carry(near, quiet, &Activity::new(), &mut ends).await });
+        let task = tokio::spawn(async move { carry(near, quiet, &PortActivity::new(), &mut ends).await });
         (far, port, task)
     }
 

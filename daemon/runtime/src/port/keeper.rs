@@ -1,6 +1,6 @@
 //! Opens a port, and opens it again whenever it fails.
 
-use super::carry::{Activity, append, carry};
+use super::carry::{PortActivity, append, carry};
 use super::{FromPort, PortEnds, tcp, udp};
 use scenecast_core::PortAddress;
 use std::fs::File;
@@ -95,10 +95,10 @@ impl PortKeeper {
             tracing::info!("{}: open", self.name);
         }
         let result = match opened {
-            Opened::Serial(stream) => carry(stream, self.quiet, &Activity::new(), &mut self.ends).await,
+            Opened::Serial(stream) => carry(stream, self.quiet, &PortActivity::new(), &mut self.ends).await,
             Opened::Connection(stream) => {
                 let _ = stream.set_nodelay(true);
-                carry(stream, self.quiet, &Activity::new(), &mut self.ends).await
+                carry(stream, self.quiet, &PortActivity::new(), &mut self.ends).await
             }
             Opened::Listener(listener) => return tcp::accept(self.name, listener, self.quiet, &mut self.ends).await,
             Opened::Socket(socket, remote) => udp::carry(socket, remote, self.quiet, &mut self.ends).await,

@@ -1,6 +1,6 @@
 //! TCP ports that wait for the other side to connect.
 
-use super::carry::{Activity, carry};
+use super::carry::{PortActivity, carry};
 use super::{FromPort, PortEnds};
 use std::io;
 use std::net::SocketAddr;
@@ -63,7 +63,7 @@ async fn serve(
     door: &mut Door,
 ) -> Left {
     let _ = stream.set_nodelay(true);
-    let activity = Activity::new();
+    let activity = PortActivity::new();
     let carried = carry(stream, quiet, &activity, ends);
     tokio::pin!(carried);
     loop {
@@ -102,7 +102,6 @@ struct Door {
 }
 
 impl Door {
-    /// The next connection. Cancel-safe.
     async fn next(&mut self) -> (TcpStream, SocketAddr) {
         loop {
             tokio::time::sleep_until(self.closed_until).await;

@@ -33,14 +33,14 @@ pub(super) async fn open(own: &str, remote: &str) -> io::Result<(UdpSocket, Opti
 
 /// The other side of a socket: datagrams go to it, and those of others are dropped.
 #[derive(Debug)]
-struct Peer {
+struct UdpPeer {
     /// Whether the address is configured. Then datagrams come from any port of it.
     is_fixed: bool,
     address: Option<SocketAddr>,
     last_read: Instant,
 }
 
-impl Peer {
+impl UdpPeer {
     fn new(fixed: Option<SocketAddr>, now: Instant) -> Self {
         Self { is_fixed: fixed.is_some(), address: fixed, last_read: now }
     }
@@ -62,8 +62,8 @@ impl Peer {
     }
 }
 
-/// Carries datagrams to `fixed`, or else to the sender that is listened to. A socket has no connection, so it is
-/// always open.
+/// Carries datagrams to `fixed`, or else to the sender that is listened to. A socket has no
+/// connection, so it is always open.
 pub(super) async fn carry(
     socket: UdpSocket,
     fixed: Option<SocketAddr>,
@@ -73,7 +73,7 @@ pub(super) async fn carry(
     if !ends.report_open().await {
         return Ok(());
     }
-    let mut peer = Peer::new(fixed, Instant::now());
+    let mut peer = UdpPeer::new(fixed, Instant::now());
     let mut buffer = [0; MAX_DATAGRAM_BYTES];
     loop {
         tokio::select! {
@@ -146,7 +146,7 @@ mod tests {
     fn a_configured_address_is_listened_to_at_any_of_its_ports() {
         let now = Instant::now();
         let address = |text: &str| text.parse::<SocketAddr>().unwrap();
-        let mut peer = Peer::new(Some(address("192.0.2.1:4001")), now);
+        let mut peer = UdpPeer::new(Some(address("192.0.2.1:4001")), now);
         assert!(peer.takes(address("192.0.2.1:9"), now));
         assert!(!peer.takes(address("192.0.2.2:4001"), now + 9 * SILENCE_TIMEOUT));
         assert_eq!(peer.address, Some(address("192.0.2.1:4001")), "datagrams go to the configured port");

@@ -20,7 +20,7 @@ pub(super) struct WideBench {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Number of explored cells
+    /// Number of explored cells on the map
     #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1000..=4_000_000))]
     cells: u32,
     /// Side of the square that the survey spans, metres

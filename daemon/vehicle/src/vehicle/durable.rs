@@ -52,7 +52,6 @@ pub enum LostOrders {
     None,
     /// The series in which the surface speaks, which is not known yet.
     Present,
-    /// This series.
     Of(Series),
 }
 

@@ -179,8 +179,8 @@ impl Vehicle {
         self.guidance.handle_travel(metres);
     }
 
-    /// The scene model has a new map. New labels are stored before any of them is sent, so that a restart cannot give one
-    /// another meaning.
+    /// The scene model has a new map. New labels are stored before any of them is sent, so that a
+    /// restart cannot give one another meaning.
     pub fn handle_map(&mut self, update: &MapUpdate, now: Instant) {
         if self.storing.covers(update) {
             return self.publish(update, now);

@@ -15,7 +15,6 @@ pub(super) struct WaitingOrder {
     pub(super) id: SlotId,
     pub(super) version: u16,
     pub(super) content: Option<Slot>,
-    /// When it was received.
     pub(super) at: Instant,
 }
 

@@ -10,13 +10,13 @@ pub(super) enum CommandChange {
     /// Ask the holder for command, for 120 s; take it if nobody has it.
     #[command(after_help = "Example: scenecast ctl command request --token-file anna.token")]
     Request,
-    /// Withdraw the request.
+    /// Withdraw your request for command.
     #[command(after_help = "Example: scenecast ctl command withdraw")]
     Withdraw,
     /// Take command if nobody has it, or its holder was silent for 120 s.
     #[command(after_help = "Example: scenecast ctl command take")]
     Take,
-    /// Hand command over.
+    /// Hand command over to another operator.
     #[command(after_help = "Example: scenecast ctl command hand-over bob")]
     HandOver {
         /// Name of a principal [default: the one whose request is the oldest]

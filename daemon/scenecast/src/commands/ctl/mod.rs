@@ -55,11 +55,11 @@ pub(super) struct Ctl {
     #[arg(long, global = true, value_name = "SECONDS", allow_negative_numbers = true)]
     wait: Option<f64>,
     #[command(subcommand)]
-    command: Command,
+    command: CtlCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum CtlCommand {
     /// Print the state of mission, link and vehicles, with the age of each value.
     #[command(after_help = "Example: scenecast ctl status")]
     Status,
@@ -143,8 +143,8 @@ enum Command {
         #[arg(long)]
         yes: bool,
     },
-    /// Print who has command, the right to give orders other than hold and abort; or request it, hand it over, take it,
-    /// give it up.
+    /// Print who has command, the right to give orders other than hold and abort; or request it, hand
+    /// it over, take it, give it up.
     #[command(
         name = "command",
         after_help = "Example: scenecast ctl command\n         scenecast ctl command hand-over bob"
@@ -283,7 +283,7 @@ impl Ctl {
     }
 }
 
-impl Command {
+impl CtlCommand {
     async fn run(self, session: &Session) -> Result<(), UserError> {
         match self {
             Self::Status => client::show_status(session).await,

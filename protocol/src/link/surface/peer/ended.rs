@@ -16,7 +16,7 @@ pub struct EndedRun<R = Replica> {
 }
 
 impl<R> EndedRun<R> {
-    /// The replicated state.
+    /// The replicated state at its end.
     pub fn replica(&self) -> &R {
         &self.replica
     }
@@ -41,7 +41,7 @@ impl<R> EndedRun<R> {
         self.epoch
     }
 
-    /// When the run ended.
+    /// When the surface noticed its end.
     pub fn ended(&self) -> Instant {
         self.ended
     }
