@@ -291,7 +291,7 @@ fn held_changes_are_requested_when_due() {
         let start = patchy(20, 0);
         pair.vehicle.set_map(start.iter(), pair.now);
         pair.run(pair.now + Duration::from_secs(60), false);
-        assert!(pair.is_converged());
+        assert!(pair.is_converged(), "{access:?}: {:?}", pair.vehicle.stats());
         let cell = Cell::new(0, 0);
         pair.vehicle.set_map([(cell, 99)], pair.now);
         pair.run(pair.now + Duration::from_millis(3900), false);

@@ -4,7 +4,7 @@ mod pair;
 
 use pair::{LinkedEnds, LossyChannel, Setup, auv, hold, patchy, utility};
 use proptest::prelude::*;
-use scenecast_protocol::link::{DropReason, VehicleEvent};
+use scenecast_protocol::link::{DropReason, Mismatch, VehicleEvent};
 use scenecast_protocol::mac::Access;
 use scenecast_protocol::map::{Cell, LabelGrid, StateSource};
 use scenecast_protocol::map_codec::Codec;
@@ -185,7 +185,8 @@ fn a_keyed_vehicle_refuses_and_counts_unkeyed_frames() {
     for bytes in &keyless.overheard {
         keyed.vehicle.handle_frame(bytes, keyed.now);
     }
-    assert!(keyed.vehicle.poll_event().is_none());
+    assert_eq!(keyed.vehicle.poll_event(), Some(VehicleEvent::Mismatch(Mismatch::NoTag)));
+    assert_eq!(keyed.vehicle.poll_event(), None, "reported once");
     // Only hellos of another mission can be recognised; other frames are sealed to a run that is not ours.
     let to_vehicle = |bytes: &&Vec<u8>| {
         let envelope = Envelope::decode(bytes, |to| to == auv()).ok();

@@ -132,7 +132,7 @@ fn handle(surface: &mut Surface, request: SurfaceRequest, cell_m: f64, now: Inst
             let record = surface.record(known(surface, id)?)?;
             Reply::File("image/webp", record.exemplars.label(label)?.exemplar(number)?.webp.clone())
         }
-        SurfaceRequest::Fit(id, bits_per_s) => match fit::fit(surface, known(surface, id)?, cell_m, bits_per_s) {
+        SurfaceRequest::Fit(id, bits_per_s) => match fit(surface, known(surface, id)?, cell_m, bits_per_s) {
             Ok(fit) => Reply::Fit(Box::new(fit)),
             Err(reason) => Reply::Refused(reason),
         },
@@ -199,9 +199,17 @@ fn budget(surface: &mut Surface, order: BudgetOrder, now: Instant) -> Reply {
     Reply::Accepted(AcceptedOrder { slot: SlotId::Budget.name().to_owned(), version: None, versions })
 }
 
+/// The settings that fit a budget, for the cells of the vehicle.
+fn fit(surface: &Surface, vehicle: Address, cell_m: f64, bits_per_s: Option<f64>) -> Result<Fit, String> {
+    let cell_m = surface.view(vehicle).and_then(|view| view.cell_m()).unwrap_or(cell_m);
+    fit::fit(surface, vehicle, cell_m, bits_per_s)
+}
+
 /// The map, whose tiles the surface shares: the link waits for a list of tiles and not for a copy of their cells.
 fn map(surface: &Surface, vehicle: Address, cell_m: f64, now: Instant) -> Option<Reply> {
     let view = surface.view(vehicle)?;
+    // The vehicle states the edge of its cells; the configured one holds until then.
+    let cell_m = view.cell_m().unwrap_or(cell_m);
     Some(Reply::Map(MapCells {
         version: surface.map_version(vehicle),
         at: now,

@@ -222,7 +222,9 @@ impl SurfaceShell {
     }
 
     fn write_map(&mut self, vehicle: Address) {
-        let (now, cell_m) = (self.clock.now(), self.facts.cell_m);
+        let now = self.clock.now();
+        let stated = self.host.surface().view(vehicle).and_then(|view| view.cell_m());
+        let cell_m = stated.unwrap_or(self.facts.cell_m);
         let request = ClientRequest { principal: None, request: SurfaceRequest::Map(vehicle.number()) };
         let Reply::Map(mut cells) = handle_request(self.host.surface_mut(), request, cell_m, now) else { return };
         let surface = self.host.surface();

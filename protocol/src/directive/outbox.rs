@@ -56,14 +56,14 @@ pub struct SlotOutbox {
     slots: [Option<SlotProgress>; SLOTS],
     /// Whether the vehicle refused an order because it has lost its record of this series.
     is_forgotten: bool,
-    /// Whether the vehicle reports a version that this surface has not issued.
-    is_overtaken: bool,
+    /// The frame that acknowledged each slot that is received.
+    received_in: [u64; SLOTS],
 }
 
 impl SlotOutbox {
     /// An empty directive; `series` must be drawn at random by a surface that does not know its last orders.
     pub fn new(series: Series) -> Self {
-        Self { series, slots: Default::default(), is_forgotten: false, is_overtaken: false }
+        Self { series, slots: Default::default(), is_forgotten: false, received_in: [0; SLOTS] }
     }
 
     /// The series that the versions belong to.
@@ -131,11 +131,14 @@ impl SlotOutbox {
         }
     }
 
-    /// Notes that the vehicle acknowledged a frame with this version.
-    pub fn mark_received(&mut self, id: SlotId, version: u16, now: Instant) {
-        self.advance(id, version, OrderStatus::Received, now, |status| {
+    /// Notes that frame `number` of the vehicle acknowledged a frame with this version.
+    pub fn mark_received(&mut self, id: SlotId, version: u16, number: u64, now: Instant) {
+        let is_new = self.advance(id, version, OrderStatus::Received, now, |status| {
             matches!(status, OrderStatus::Queued | OrderStatus::OnAir)
         });
+        if let Some(received_in) = self.received_in.get_mut(id.index()).filter(|_| is_new) {
+            *received_in = number;
+        }
     }
 
     /// Takes the decisions in the vehicle's report; returns the slots that are newly applied or refused.
@@ -150,11 +153,7 @@ impl SlotOutbox {
                     self.advance(id, version, OrderStatus::Queued, now, |s| s == OrderStatus::Applied);
                     continue;
                 }
-                _ if slot.version as u8 != report.version_low => {
-                    let is_ahead = (report.version_low.wrapping_sub(slot.version as u8) as i8) > 0;
-                    self.is_overtaken |= is_ahead && slot.status == OrderStatus::Received;
-                    continue;
-                }
+                _ if slot.version as u8 != report.version_low => continue,
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),
             };
@@ -166,10 +165,18 @@ impl SlotOutbox {
         decided
     }
 
-    /// Begins a new series if the vehicle reports a version that was not issued here, under which it would ignore later
-    /// ones. That needs a forged order, or a second surface with the same series.
-    pub fn leave_overtaken_series(&mut self, now: Instant) {
-        if self.is_overtaken {
+    /// Begins a new series if the report in frame `number` alone, without earlier ones, shows that the vehicle ignores a
+    /// received version: it knows a newer one that was not issued here, from a forged order. A vehicle decides before it
+    /// acknowledges, so the reports after the acknowledgement have the decision.
+    pub fn leave_overtaken_series(&mut self, report: &[SlotReport; SLOTS], number: u64, now: Instant) {
+        let is_overtaken = self.progress().any(|slot| {
+            let (report, received_in) = (report.get(slot.id.index()), self.received_in.get(slot.id.index()));
+            let is_other = |r: &SlotReport| r.state != SlotState::Unknown && r.version_low != slot.version as u8;
+            slot.status == OrderStatus::Received
+                && report.is_some_and(is_other)
+                && received_in.is_some_and(|&n| n < number)
+        });
+        if is_overtaken {
             self.begin_series(now);
         }
     }
@@ -187,7 +194,7 @@ impl SlotOutbox {
     /// has lost its record, and the operator lifts that by a new order.
     fn begin_series(&mut self, now: Instant) {
         self.series = Series::from_random(self.series.get().wrapping_add(1));
-        (self.is_forgotten, self.is_overtaken) = (false, false);
+        self.is_forgotten = false;
         for progress in self.slots.iter_mut().flatten() {
             let lifts = matches!(progress.slot, Slot::Constraints(order) if !order.hold && !order.abort);
             let is_refused = matches!(progress.status, OrderStatus::Refused(r) if r != RefusalReason::Forgotten);

@@ -79,7 +79,7 @@ fn map(
     let bounds = surface.map_bounds(address);
     MapSummary {
         version: surface.map_version(address),
-        cell_m: facts.cell_m,
+        cell_m: view.cell_m().unwrap_or(facts.cell_m),
         x0: bounds.map_or(0, |b| b.x),
         y0: bounds.map_or(0, |b| b.y),
         width: bounds.map_or(0, |b| b.width),
@@ -167,10 +167,11 @@ fn label(
     address: Address,
     facts: &MissionFacts,
 ) -> MapLabel {
+    let cell_m = view.cell_m().unwrap_or(facts.cell_m);
     MapLabel {
         id,
         cells,
-        area_m2: f64::from(cells) * facts.cell_m * facts.cell_m,
+        area_m2: f64::from(cells) * cell_m * cell_m,
         weight: record.utility.weight(id),
         exemplar: exemplar::progress(id, record, view, address),
     }

@@ -23,7 +23,9 @@ use crate::mac::{Access, Master, MasterConfig, ModemProfile};
 use crate::map::StateReplica;
 use crate::schedule::Class;
 use crate::time::Instant;
-use crate::wire::{Address, Chunk, ChunkKind, Envelope, FrameKind, Header, Introduction, MissionId, Series, Stamp};
+use crate::wire::{
+    Address, Chunk, ChunkKind, Envelope, FrameKind, Header, Introduction, MissionId, Series, Stamp, VehicleStatus,
+};
 use content::{ChunkOutcome, PeerContent, class_of};
 use divergence::Divergence;
 use std::collections::VecDeque;
@@ -54,6 +56,9 @@ struct Contact {
 }
 
 impl Contact {
+    /// Time in which a vehicle that was met proves the run by a numbered frame; after it, it is sent a hello again.
+    const PROOF_TIMEOUT: Duration = Duration::from_secs(5);
+
     fn last_received(&self) -> Option<Instant> {
         self.last_received
     }
@@ -158,9 +163,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         };
         if inbound.restarted {
             self.forget_peer(now, events);
+            self.contact.hello_due = now + self.slot_timeout().max(Contact::PROOF_TIMEOUT);
             events.push_back(SurfaceEvent::VehicleRestarted(self.address()));
         }
-        self.handle_fates(&inbound.fates, now);
+        self.handle_fates(&inbound.fates, inbound.number.unwrap_or(FrameNumber::MAX), now);
         self.is_out_of_step |= inbound.lacks_base;
         let header = inbound.header().clone();
         if header.kind.is_hello() {
@@ -177,11 +183,11 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.handle_content(&inbound, number, bytes, now, events);
     }
 
-    fn handle_fates(&mut self, fates: &[(Carried, bool)], now: Instant) {
+    fn handle_fates(&mut self, fates: &[(Carried, bool)], number: FrameNumber, now: Instant) {
         for (carried, _) in fates.iter().filter(|(_, delivered)| *delivered) {
             for &(id, version, bytes) in carried {
                 self.pair.stats.deliver(id.class(), bytes, now);
-                self.outbox.mark_received(id, version, now);
+                self.outbox.mark_received(id, version, number, now);
             }
         }
     }
@@ -228,7 +234,10 @@ impl<R: StateReplica> VehiclePeer<R> {
         if chunk.kind == ChunkKind::Report {
             let settled = self.outbox.handle_report(&self.content.status.latest().slots, now);
             events.extend(settled.into_iter().map(|id| SurfaceEvent::SlotDecided(vehicle, id)));
-            self.outbox.leave_overtaken_series(now);
+            let mut report = VehicleStatus::default();
+            if report.read_report(chunk.payload).is_ok() {
+                self.outbox.leave_overtaken_series(&report.slots, number, now);
+            }
             self.follow_series();
         }
         if matches!(chunk.kind, ChunkKind::Pose | ChunkKind::Report) && self.content.status.whole().is_some() {

@@ -30,8 +30,8 @@ impl Contact {
     }
 
     /// A hello went out; the next ones follow at growing intervals.
-    fn note_hello(&mut self, now: Instant) {
-        self.hello_due = now + Duration::from_secs(5 << self.hellos.min(4));
+    fn note_hello(&mut self, timeout: Duration, now: Instant) {
+        self.hello_due = now + timeout.max(Self::PROOF_TIMEOUT) * (1 << self.hellos.min(4));
         self.hellos += 1;
     }
 }
@@ -83,15 +83,17 @@ impl<R: StateReplica> VehiclePeer<R> {
         self.master.note_begun(now);
         // A run that was met must be proven by a numbered frame, or the vehicle will not transmit.
         let must_prove = self.pair.has_run() && !self.pair.is_proven();
-        self.contact.answer_due = must_prove.then(|| now + self.slot_timeout());
+        // After a hello of a run with this vehicle, a numbered frame follows at once.
+        let timeout = self.slot_timeout();
+        self.contact.answer_due = must_prove.then(|| if kind.is_hello() { now } else { now + timeout });
         if kind.is_hello() {
-            self.contact.note_hello(now);
+            self.contact.note_hello(timeout, now);
         }
         Some(ready)
     }
 
     /// Time after which a slot that was not acknowledged goes out again.
-    fn slot_timeout(&self) -> Duration {
+    pub(super) fn slot_timeout(&self) -> Duration {
         self.master.round_trip().unwrap_or(Duration::from_secs(4)) * 2 + Duration::from_secs(4)
     }
 }
