@@ -31,7 +31,12 @@ export class Stage {
     this.page.setDefaultTimeout(TIMEOUT_MS);
     this.page.on("pageerror", (error) => this.errors.push(`page: ${error.stack}`));
     this.page.on("console", (m) => m.type() === "error" && this.errors.push(`console: ${m.text()} ${m.location().url}`));
-    this.page.on("request", (r) => r.method() === "POST" && this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() }));
+    this.orders = [];
+    this.page.on("request", (r) => {
+      if (r.method() !== "POST") return;
+      this.orders.push(r);
+      this.posts.push({ path: new URL(r.url()).pathname, body: r.postDataJSON() });
+    });
     const theme = story.theme ?? "light";
     await this.page.addInitScript((t) => localStorage.getItem("scenecast.theme") ?? localStorage.setItem("scenecast.theme", JSON.stringify(t)), theme);
     if (story.stopped) await this.stopClock();
@@ -138,7 +143,9 @@ export class Stage {
     assert.deepEqual(bad, [], "no errors in the console");
   }
 
-  close() {
-    return this.context?.close();
+  /** Closes the page once the mock has answered every order: one under way would reach the mission of the next story. */
+  async close() {
+    await Promise.allSettled((this.orders ?? []).map((request) => request.response()));
+    await this.context?.close();
   }
 }

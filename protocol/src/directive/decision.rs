@@ -12,15 +12,18 @@ pub enum SlotState {
     Applied,
     /// Refused; the previous version stays in force.
     Refused(RefusalReason),
+    /// Received, and waits for the decision: an order that the vehicle obeys while its disk does not keep it.
+    Pending,
 }
 
 impl SlotState {
-    /// The number on the wire: 0 unknown, 1 applied, 2..=11 a reason of refusal.
+    /// The number on the wire: 0 unknown, 1 applied, 2..=11 a reason of refusal, 15 pending.
     pub(crate) fn code(self) -> u8 {
         match self {
             Self::Unknown => 0,
             Self::Applied => 1,
             Self::Refused(reason) => reason.code(),
+            Self::Pending => 15,
         }
     }
 
@@ -28,6 +31,7 @@ impl SlotState {
         match code {
             0 => Some(Self::Unknown),
             1 => Some(Self::Applied),
+            15 => Some(Self::Pending),
             code => RefusalReason::from_code(code).map(Self::Refused),
         }
     }

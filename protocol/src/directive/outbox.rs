@@ -148,11 +148,11 @@ impl SlotOutbox {
             let Some(Some(slot)) = self.slots.get(id.index()) else { continue };
             let status = match report.state {
                 SlotState::Unknown => {
-                    // An order that is received without a decision waits for the vehicle's disk.
-                    let version = slot.version;
-                    self.advance(id, version, OrderStatus::Queued, now, |s| s == OrderStatus::Applied);
+                    let forgotten = |s| matches!(s, OrderStatus::Received | OrderStatus::Applied);
+                    self.advance(id, slot.version, OrderStatus::Queued, now, forgotten);
                     continue;
                 }
+                SlotState::Pending => continue,
                 _ if slot.version as u8 != report.version_low => continue,
                 SlotState::Applied => OrderStatus::Applied,
                 SlotState::Refused(reason) => OrderStatus::Refused(reason),

@@ -67,10 +67,14 @@ impl SlotInbox {
         if self.state.series != Some(series) {
             self.begin_series(series);
         }
-        let Some(seen) = self.state.versions.get_mut(slot.id.index()) else { return false };
+        let i = slot.id.index();
+        let (Some(seen), Some(report)) = (self.state.versions.get_mut(i), self.reports.get_mut(i)) else {
+            return false;
+        };
         let newer = seen.is_none_or(|v| (slot.version.wrapping_sub(v) as i16) > 0);
         if newer {
             *seen = Some(slot.version);
+            *report = SlotReport { version_low: slot.version as u8, state: SlotState::Pending };
         }
         newer
     }

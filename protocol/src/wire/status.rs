@@ -108,7 +108,7 @@ impl ModeReason {
 ///  7-8  16    backlog, see `Backlog`
 ///  9    8     slots in this report, a bit each, the first slot in the highest bit
 /// 10..  8     version of each of them, low 8 bits
-/// then  4     decision about each of them: 1 applied, 2..9 refusal reason; any other value is refused; after an odd number,
+/// then  4     decision about each of them: 1 applied, 2..11 refusal reason, 15 pending; any other value is refused; after an odd number,
 ///             4 bits 0
 /// 7 more      [placement of the map, see `Placement`]; left out while it has not moved
 /// ```

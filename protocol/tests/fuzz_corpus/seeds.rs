@@ -129,7 +129,7 @@ fn few(mut seeds: Vec<Seed>) -> Vec<Seed> {
 }
 
 fn chunks(body: &[u8]) -> Vec<(ChunkKind, Vec<u8>)> {
-    let mut bytes = vec![0x40, 0x10, 0, 5, 0, 1, 1, 0];
+    let mut bytes = vec![0x60, 0x10, 0, 5, 0, 1, 1, 0];
     bytes.extend_from_slice(body);
     raw::close_with_crc(&mut bytes, MissionId(7), 0);
     let envelope = Envelope::decode(&bytes, |_| true).expect("a sound header");

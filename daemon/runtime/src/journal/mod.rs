@@ -75,6 +75,9 @@ pub(super) struct Journal<S: Storage> {
     is_copy_uncertain: bool,
     /// Whether the journal may lack the last state on the disk, while the copy has it.
     is_journal_uncertain: bool,
+    /// Whether the names of both files may be missing after a power cut, because the folder's sync failed or was made by an
+    /// earlier process.
+    is_folder_uncertain: bool,
     files: [Option<S::File>; 2],
     /// Whether a file is put aside before a new one takes its name.
     is_damaged: [bool; 2],
@@ -104,7 +107,17 @@ impl<S: Storage> Journal<S> {
         let is_damaged = if matches!(found, Found::State { damage: None, .. }) { [false; 2] } else { unreadable };
         let is_journal_uncertain = is_copy_last;
         let files = [None, None];
-        (Self { storage, names, last, is_copy_uncertain, is_journal_uncertain, files, is_damaged }, found)
+        let journal = Self {
+            storage,
+            names,
+            last,
+            is_copy_uncertain,
+            is_journal_uncertain,
+            is_folder_uncertain: true,
+            files,
+            is_damaged,
+        };
+        (journal, found)
     }
 
     pub(super) fn storage(&self) -> &S {
@@ -116,6 +129,15 @@ impl<S: Storage> Journal<S> {
     /// # Errors
     /// The disk refuses. The next call writes the whole record again.
     pub(super) fn persist(&mut self, state: &[u8]) -> Result<(), JournalError> {
+        let persisted = self.write_both(state);
+        if persisted.is_err() {
+            // The folder may have been removed with both files.
+            self.files = [None, None];
+        }
+        persisted
+    }
+
+    fn write_both(&mut self, state: &[u8]) -> Result<(), JournalError> {
         if let Some(last) = self.last.clone().filter(|_| self.is_journal_uncertain) {
             if self.is_copy_uncertain {
                 self.write(1, &last)?;
@@ -149,6 +171,10 @@ impl<S: Storage> Journal<S> {
             }
             None => self.begin_file(number, &bytes)?,
         });
+        if self.is_folder_uncertain {
+            self.storage.sync_folder().map_err(doing("syncing the folder"))?;
+            self.is_folder_uncertain = false;
+        }
         Ok(())
     }
 
@@ -161,8 +187,8 @@ impl<S: Storage> Journal<S> {
         if self.is_damaged[at] && self.storage.rename(name, &format!("{name}.damaged")).is_ok() {
             self.is_damaged[at] = false;
         }
+        self.is_folder_uncertain = true;
         self.storage.rename(&part, name).map_err(doing("renaming"))?;
-        self.storage.sync_folder().map_err(doing("syncing the folder"))?;
         Ok(file)
     }
 }

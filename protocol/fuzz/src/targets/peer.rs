@@ -4,7 +4,8 @@ use super::raw::{self, Script};
 use scenecast_protocol::link::{Authenticity, Flight};
 use scenecast_protocol::seal::{Direction, MissionKey};
 use scenecast_protocol::wire::{
-    AckStatement, Address, Envelope, FrameKind, Header, MissionId, Reader, SessionId, Stamp, unwrap_number,
+    AckStatement, Address, CellEdge, Envelope, FrameKind, Header, Introduction, MissionId, Reader, Series, SessionId,
+    Stamp, unwrap_number,
 };
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -115,9 +116,17 @@ impl FuzzPeer {
         };
         let theirs = self.theirs;
         self.theirs = self.call.filter(|_| flags & 2 != 0).unwrap_or(theirs);
-        let bytes = self.seal(&header, &[], 0);
+        let bytes = self.seal(&header, &self.introduction(), 0);
         self.theirs = theirs;
         bytes
+    }
+
+    /// The chunk with the introduction of a hello.
+    fn introduction(&self) -> Vec<u8> {
+        const EXTENDED: u8 = 7 << 5;
+        let series = (self.us == Address::SURFACE).then(|| Series::from_random(self.own.1 + 1));
+        let payload = Introduction { cell_edge: CellEdge::from_metres(0.25), series }.encode();
+        [&[EXTENDED | (payload.len() as u8 + 1), 0], &payload[..]].concat()
     }
 
     /// A numbered frame whose header follows `flags` and the script, with a body from the script.

@@ -51,7 +51,7 @@ impl<S: Grow> FuzzEnd for Vehicle<S> {
     fn drain(&mut self, now: Instant) -> usize {
         let mut count = 0;
         while let Some(event) = self.poll_event() {
-            count += 1;
+            count += usize::from(!matches!(event, VehicleEvent::Mismatch(_)));
             if let VehicleEvent::Slot { id, content, .. } = event {
                 let refused = SlotState::Refused(RefusalReason::Malformed);
                 self.decide(id, content.map_or(refused, |_| SlotState::Applied), now);
