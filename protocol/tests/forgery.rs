@@ -15,8 +15,8 @@ use std::time::Duration;
 
 const MISSION: MissionId = MissionId(7);
 /// The time in which nearly every attacked link recovers, and the one in which each does.
-const USUAL: Duration = Duration::from_secs(60);
-const LONGEST: Duration = Duration::from_secs(600);
+const USUAL_RECOVERY: Duration = Duration::from_secs(60);
+const MAX_RECOVERY: Duration = Duration::from_secs(600);
 
 const CALM: LossyChannel = LossyChannel {
     loss: 0.05,
@@ -184,7 +184,7 @@ fn attack(seed: u64) -> Option<Duration> {
         }
     }
     pair.surface.issue(auv(), utility(77), pair.now).unwrap();
-    let until = pair.now + LONGEST;
+    let until = pair.now + MAX_RECOVERY;
     recovery(&mut pair, 77, until)
 }
 
@@ -193,8 +193,8 @@ fn a_link_recovers_from_forgeries_that_it_accepted() {
     const ATTACKS: u64 = 400;
     let times: Vec<Option<Duration>> = (0..ATTACKS).map(attack).collect();
     let late: Vec<(usize, &Option<Duration>)> =
-        times.iter().enumerate().filter(|(_, time)| time.is_none_or(|t| t > USUAL)).collect();
-    println!("{} of {ATTACKS} links took longer than {USUAL:?}: {late:?}", late.len());
-    assert!(times.iter().all(Option::is_some), "not within {LONGEST:?}: {late:?}");
-    assert!(late.len() as u64 * 50 <= ATTACKS, "longer than {USUAL:?}: {late:?}");
+        times.iter().enumerate().filter(|(_, time)| time.is_none_or(|t| t > USUAL_RECOVERY)).collect();
+    println!("{} of {ATTACKS} links took longer than {USUAL_RECOVERY:?}: {late:?}", late.len());
+    assert!(times.iter().all(Option::is_some), "not within {MAX_RECOVERY:?}: {late:?}");
+    assert!(late.len() as u64 * 50 <= ATTACKS, "longer than {USUAL_RECOVERY:?}: {late:?}");
 }

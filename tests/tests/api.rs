@@ -66,7 +66,7 @@ fn settings_are_fitted_to_a_budget_and_sent() {
 #[test]
 fn orders_are_followed_until_applied_or_refused() {
     let port = free_port();
-    let _demo = demo(port, &["--duration", "3000"]);
+    let _demo = demo(port, &["--duration", "3000", "--set", "mission.origin_deg=[60.17, -10.25]"]);
     let label = labels(port)[0];
     let weight = format!("{label}=-0.75");
     let sent = ctl(port, &["utility", "set", &weight, "--exploration", "0.25", "--wait", "60", "--json"]);
